@@ -126,7 +126,7 @@ def test_a_job_of_values_is_checked(folder):
     tables = tomllib.loads((folder / "job.toml").read_text())
     lines, holds = chipload.check_job(tables, folder=folder)
     assert holds
-    assert lines[0].startswith("contour: right: 0 closed and 1 open contours")
+    assert lines[0].startswith("contour: valid: 0 closed and 1 open contours")
 
 
 # -- refused ----------------------------------------------------------------------------------------------------

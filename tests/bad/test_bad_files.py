@@ -206,8 +206,8 @@ class Dying:
 @pytest.mark.parametrize(
     ("function", "message"),
     [
-        ("dies", r"damaged: it ends the CAD kernel: write it again from CAD, or check it there$"),
-        ("loops", r"the CAD kernel is not done with it in 1 s: write the part alone, or check it in CAD$"),
+        ("dies", r"damaged: the CAD kernel crashes on it: write it again from CAD, or check it there$"),
+        ("loops", r"the CAD kernel did not finish it within 1 s: write the part alone, or check it in CAD$"),
         ("grows", r"the CAD kernel needs more than 4 GiB"),
         ("faults", r"damaged: the CAD kernel fails on it: RuntimeError Standard_Failure"),
     ],

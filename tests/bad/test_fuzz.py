@@ -47,7 +47,7 @@ def test_a_case_is_the_same_each_time(tmp_path: Path) -> None:
     ("import numpy as np; np.ones(1 << 30)", "memory"), ("finite([float('nan')])", "fault"),
     ("from chipload.errors import InputError; raise InputError('x')", "refused"),
 ])  # fmt: skip
-def test_each_end_is_told_from_the_others(tmp_path: Path, body: str, end: str) -> None:
+def test_each_end_is_distinguished(tmp_path: Path, body: str, end: str) -> None:
     """The tool itself, with a reader that ends in a known way."""
     for name in ("fuzz.py", "fuzz_fork.py", "fuzz_jobs.py", "fuzz_small.py", "plate.step"):
         (tmp_path / name).write_bytes(TOOL.with_name(name).read_bytes())

@@ -92,7 +92,7 @@ def test_a_fit_is_checked_as_it_is_run(tmp_path: Path) -> None:
     path = a_fit(tmp_path, 400.0)
     lines, holds = inspect_file(path) or ([], False)
     assert holds
-    assert lines[0] == "fit.toml: right: 1 measurements, method instantaneous"
+    assert lines[0] == "fit.toml: valid: 1 measurements, method instantaneous"
     path = a_fit(tmp_path, 10.0)
     messages = []
     for act in (inspect_file, lambda p: run_job(load_job(p))):

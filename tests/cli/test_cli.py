@@ -132,7 +132,7 @@ def test_check_reads_and_plans_nothing(job_dir: Path) -> None:
     code, out, err = call("check", job_dir / "job.toml")
     assert (code, err) == (0, "")
     assert out.splitlines()[:2] == [
-        "job.toml: right: 0 closed and 1 open contours, machine vmc, material al7075-carbide",
+        "job.toml: valid: 0 closed and 1 open contours, machine vmc, material al7075-carbide",
         "operation 0: contour, cutter 1 of 10 mm, 6 passes",
     ]
     pocket = ("operation.0.kind=pocket", 'operation.0.strategies=["pocket"]', "operation.0.use=pocket")

@@ -133,7 +133,7 @@ def test_a_run_with_modes_that_was_killed_goes_on_to_the_same_bytes(folder: Path
     stop(folder, "other-modes", signal.SIGKILL, file="modes.toml")
     change = ("--set", "dynamics.mode.0.stiffness_n_um=7.0")
     other = ended(start(folder, "other-modes", *change, file="modes.toml"))
-    assert other.stderr == "chipload: begins again: what was kept is of another input\n"
+    assert other.stderr == "chipload: begins again: what was kept belongs to another input\n"
 
 
 def test_a_run_that_was_killed_reads_what_it_had_found_of_the_part(folder: Path) -> None:
@@ -176,7 +176,7 @@ def test_ctrl_c_says_what_is_kept_and_how_to_go_on(folder: Path, how: signal.Sig
 def test_another_input_does_not_go_on(folder: Path) -> None:
     stop(folder, "other", signal.SIGKILL)
     again = ended(start(folder, "other", "--set", "material.name=al6082-t6"))
-    assert again.stderr == "chipload: begins again: what was kept is of another input\n"
+    assert again.stderr == "chipload: begins again: what was kept belongs to another input\n"
     other = (folder / "other" / "history.parquet").read_bytes()
     assert other != (folder / "whole" / "history.parquet").read_bytes()
 

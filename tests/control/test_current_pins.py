@@ -107,7 +107,7 @@ def test_the_loop_closes_on_the_power():
     spindle = replace(
         SPINDLE, torque_constant=1e3, idle=(0.3 * 2.0, 0.3 * 0.004), noise=0.3 * SPINDLE.noise, current_step=0.0
     )
-    job = replace(JOB, spindle=spindle, source="power", told_from="power")
+    job = replace(JOB, spindle=spindle, source="power", identified_from="power")
     by_power, machine = go(job, change=lambda i, w, t: (0.3 * i * math.tau * w, w))
     by_current, other = go()
     assert by_power.ended == "path"

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.material import Material
+from chipload.cutting.material import Material, material_named
 from chipload.engagement.contact import Engagement
 from chipload.jobs import load_job, run_job
+from chipload.jobs.checks import _could_be_greatest
 from chipload.planning.cost import CutConditions, cost
 from chipload.result import Verdict
 
@@ -69,3 +70,32 @@ def test_stress_of_a_straight_tooth_by_hand() -> None:
     assert columns["cutter_stress_mpa"][0] == pytest.approx(expected, rel=1e-3)
     # radial depth 10 mm, feed per tooth 0.1 mm: the deflection may be 0.2 mm
     assert columns["deflection_share"][0] == pytest.approx(columns["deflection_cutter_um"][0] / 200.0)
+
+
+def test_a_film_is_not_judged_by_its_deflection() -> None:
+    """Of two tools: the greatest load each, what could be as great by its deflection, a film, a touch."""
+    columns = {
+        "tool": np.array([1, 1, 1, 1, 2]),
+        "force_n": np.array([100.0, 40.0, 40.0, 9.0, 20.0]),
+        "deflection_share": np.array([0.1, 0.6, 0.7, 1e4, 0.2]),
+    }
+    # 40 N (1 + 2 share) (1 + share / 4) is 101.2 N with a share of 0.6, 112.8 N with 0.7
+    assert _could_be_greatest(columns).tolist() == [True, True, True, False, True]
+    assert _could_be_greatest({**columns, "deflection_share": np.full(5, 0.5)}).tolist() == [
+        True,
+        False,
+        False,
+        False,
+        True,
+    ]
+
+
+def test_a_step_that_slows_down_is_held_against_the_feed_before_it() -> None:
+    """The deflection of the last step, at a tenth of the feed, over that which the feed of its neighbour allows."""
+    mill = Cutter(10.0, 1, 0.0, 20.0, 40.0, 5.8e5)
+    met = Engagement(np.full(2, math.pi), np.full(2, 1), np.tile([0.0, math.pi], (2, 4, 1)))
+    cut = CutConditions(mill, material_named("al7075-t6"), 2.0, 100.0, "down")
+    speed, zone = np.array([1.0, 0.1]) * 0.1 * 100.0 / math.tau, np.array(["finish", "finish"], dtype=object)
+    two, heading = np.arange(2.0), np.tile([1.0, 0.0], (2, 1))
+    columns = cost(cut, zone, two, two, np.zeros((2, 2)), heading, -2.0, met, speed, np.zeros(2, dtype=np.bool_))
+    assert columns["deflection_share"] == pytest.approx(columns["deflection_cutter_um"] / 200.0)

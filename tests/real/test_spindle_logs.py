@@ -101,7 +101,7 @@ def test_wax_is_a_light_load_and_is_called_so(number):
     assert spindle.light > 5.0
 
 
-def test_the_spindle_that_stands_is_told_from_the_one_that_turns():
+def test_the_spindle_that_stands_is_distinguished_from_the_one_that_turns():
     log, on, _ = run("11")
     still = log.speed < 1.0
     assert still.sum() > 100

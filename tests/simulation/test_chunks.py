@@ -158,7 +158,7 @@ def test_another_run_begins_at_its_beginning(tmp_path: Path, again: Callable[[Pa
     said: list[str] = []
     again(tmp_path / "u", said)
     assert said in (
-        ["begins again: what was kept is of another input"], ["begins again: it was asked to"]
+        ["begins again: what was kept belongs to another input"], ["begins again: it was asked to"]
     )  # fmt: skip
 
 

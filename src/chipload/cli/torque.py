@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from chipload.control.hal import HalJob
     from chipload.control.identification import IdentifiedSpindle
 
-#: share of pairs below which a cut is not told from air
+#: share of pairs below which a cut is not distinguished from air
 TOLD_APART = 0.8
 
 
@@ -249,7 +249,7 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
             text += f", of {per * answer.greatest:.4g} at most ({100.0 * answer.rms / answer.greatest:.2g} %)"
         text += f", {100.0 * answer.covered:.3g} % inside their interval"
         if math.isfinite(answer.apart):
-            told = "told from air" if answer.apart >= TOLD_APART else "not told from air"
+            told = "distinguished from air" if answer.apart >= TOLD_APART else "not distinguished from air"
             text += f"; cuts {told}: {100.0 * answer.apart:.3g} % of pairs in order (50 %: chance)"
         out.append(text)
     if flutes is not None:

@@ -67,7 +67,8 @@ class HalJob:
     window : the machine is looked for so far from its last place [mm], on the whole path while it is off it
     away : farther from the path it is not on it [mm]
     deviation : of the simulated spindle from ``spindle``
-    told_from : ``current`` or ``power``, what ``spindle`` was identified from; of power its currents are P / w [N m]
+    identified_from : ``current`` or ``power``, what ``spindle`` was identified from; of power its currents
+        are P / w [N m]
     """
 
     path: ToolPath
@@ -82,7 +83,7 @@ class HalJob:
     window: float
     away: float
     deviation: SpindleDeviation = AS_STATED
-    told_from: Literal["current", "power"] = "current"
+    identified_from: Literal["current", "power"] = "current"
 
     def __post_init__(self) -> None:
         if self.source not in SOURCES:
@@ -92,12 +93,12 @@ class HalJob:
                 raise InputError(f"hal.{name} = {getattr(self, name):g}: must be above 0")
         if not 0.0 <= self.latency <= 10.0:
             raise InputError(f"hal.latency = {self.latency:g} s: must be from 0 to 10")
-        if self.told_from not in MEASURED:
-            raise InputError(f"hal.told_from = {self.told_from!r}: must be one of {', '.join(MEASURED)}")
-        if self.source in MEASURED and self.source != self.told_from:
+        if self.identified_from not in MEASURED:
+            raise InputError(f"hal.identified_from = {self.identified_from!r}: must be one of {', '.join(MEASURED)}")
+        if self.source in MEASURED and self.source != self.identified_from:
             raise InputError(
-                f"hal.source = {self.source!r}: the spindle was identified from its {self.told_from}: name the pin of "
-                f"that, --{self.told_from}-pin, or identify it from logs of its {self.source}"
+                f"hal.source = {self.source!r}: the spindle was identified from its {self.identified_from}: name the "
+                f"pin of that, --{self.identified_from}-pin, or identify it from logs of its {self.source}"
             )
         check_light(self.spindle, self.period, self.override.light)
 

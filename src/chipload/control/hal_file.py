@@ -41,7 +41,7 @@ def load_hal(file: str | Path) -> HalJob:
     """
     label, data = read_table("hal", file)
     own = ("path", "source", "acceleration_mm_s2", "period_s", "latency_s", "feed_forward", "window_mm", "away_mm")
-    known = (*own, "fuzzy", "told_from", "override", "spindle", "deviation")
+    known = (*own, "fuzzy", "identified_from", "override", "spindle", "deviation")
     for key in data:
         if key not in known:
             raise InputError(f"{label}: unknown key {key}: the nearest known one is {nearest(key, list(known))}")
@@ -55,7 +55,7 @@ def load_hal(file: str | Path) -> HalJob:
         if isinstance(data[key], bool) or not isinstance(data[key], int | float):
             raise InputError(f"{label}: {key} = {data[key]!r}: must be a number")
         numbers[key] = float(data[key])
-    for key in ("path", "source", *(key for key in ("fuzzy", "told_from") if key in data)):
+    for key in ("path", "source", *(key for key in ("fuzzy", "identified_from") if key in data)):
         if not isinstance(data[key], str):
             raise InputError(f"{label}: {key} = {data[key]!r}: must be a text")
     folder = Path(file).parent
@@ -65,7 +65,7 @@ def load_hal(file: str | Path) -> HalJob:
         table=read_fuzzy(folder / data["fuzzy"]) if "fuzzy" in data else standard(),
         source=data["source"],
         spindle=_made(Spindle, f"{label}: spindle", data["spindle"]),
-        told_from=data.get("told_from", "current"),
+        identified_from=data.get("identified_from", "current"),
         deviation=_made(SpindleDeviation, f"{label}: deviation", data.get("deviation", {})),
         acceleration=numbers["acceleration_mm_s2"],
         period=numbers["period_s"],
@@ -82,7 +82,7 @@ def write_hal(job: HalJob, path: str, fuzzy: str | None = None) -> str:
         f'path = "{path}"',
         *([f'fuzzy = "{fuzzy}"'] if fuzzy is not None else []),
         f'source = "{job.source}"',
-        f'told_from = "{job.told_from}"',
+        f'identified_from = "{job.identified_from}"',
         f"acceleration_mm_s2 = {float(job.acceleration)!r}",
         f"period_s = {float(job.period)!r}",
         f"latency_s = {float(job.latency)!r}",

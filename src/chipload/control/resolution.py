@@ -7,8 +7,8 @@ spindle at its speed, c the share by which it may differ from its map. The error
     R = K_T (2 n sqrt(g / (2 - g)) + q / 2 + c I_0),
 
 two standard deviations of the noise behind the filter, half a step and the error of the idle map. A reading below R is
-not told from air. With a share k by which the torque constant may be wrong, a torque h T that is held may in truth be
-(1 + k) h T + R, so a limit T of which an excess of x is granted needs R <= (1 + x - (1 + k) h) T.
+not distinguished from air. With a share k by which the torque constant may be wrong, a torque h T that is held may in
+truth be (1 + k) h T + R, so a limit T of which an excess of x is granted needs R <= (1 + x - (1 + k) h) T.
 """
 
 from __future__ import annotations

@@ -287,7 +287,7 @@ def idle_map(
 ) -> SpindleMap:
     """A map from a spindle that runs free: idle current only; K_T is taken as given (1: the torque is in amperes).
 
-    ``light`` is raised to twice the spread of a reading, below which nothing can be told from the air.
+    ``light`` is raised to twice the spread of a reading, below which nothing can be distinguished from the air.
     """
     if len(speed) < 10 * idle_terms or len(speed) != len(current):
         raise InputError(f"spindle.speed: {len(speed)} rows in the air: must be at least {10 * idle_terms}")

@@ -118,10 +118,12 @@ class Isolated:
             return self._slow()
         if code == -getattr(signal, "SIGKILL", 0):
             return _TOO_LARGE
-        return "damaged: it ends the CAD kernel: write it again from CAD, or check it there"
+        return "damaged: the CAD kernel crashes on it: write it again from CAD, or check it there"
 
     def _slow(self) -> str:
-        return f"the CAD kernel is not done with it in {self._seconds:.0f} s: write the part alone, or check it in CAD"
+        return (
+            f"the CAD kernel did not finish it within {self._seconds:.0f} s: write the part alone, or check it in CAD"
+        )
 
 
 _TOO_LARGE = (

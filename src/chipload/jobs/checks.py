@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
-from chipload.cutting.rigid import deflection_share
+from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs.tables import ChecksTable
@@ -27,10 +27,10 @@ from chipload.simulation.removal import BANDED
 CHECK_COLUMNS = ("cutter_stress_mpa", "deflection_share")
 
 
-#: steps with less than this share of the greatest load are not judged by their deflection: the cutter only touches
-#: there, and what the deflection changes stays far below the greatest load
+#: steps with less than this share of the greatest load of their tool are not judged by their deflection: the cutter
+#: only touches there
 LOADED = 0.1
-#: the columns that tell this, the first that a track has
+#: the column by which :func:`_could_be_greatest` judges a step, the first that a track has
 LOADS = ("force_n", "force_xy_n", "force_normal_n", "torque_mean_nm")
 #: loads whose direction is not known where the material has a tangential force alone
 DIRECTED = (
@@ -210,12 +210,26 @@ def default_limits(
     if "flute_length" not in checks.off and "axial_overrun_mm" in columns:
         out.append(check_limit("axial_overrun_mm", 0.0, columns, track=track))
     if "rigid_model" not in checks.off and "deflection_share" in columns:
-        load = np.asarray(columns[next(c for c in LOADS if c in columns)])
-        loaded = load >= LOADED * load.max(initial=0.0)
-        error = load_error(errors, "deflection_share")
-        check = check_limit("deflection_share", 1.0, columns, track=track, rows=loaded, error=error, reason=direction)
+        rows, error = _could_be_greatest(columns), load_error(errors, "deflection_share")
+        check = check_limit("deflection_share", 1.0, columns, track=track, rows=rows, error=error, reason=direction)
         out.append(_rigid(check))
     return tuple(with_peaks(check, checks.material) for check in out)
+
+
+def _could_be_greatest(columns: Columns) -> NDArray[np.bool_]:
+    """Steps whose load, greater by what the deflection may add to the chip, would be the greatest of their tool.
+
+    A tooth takes at most its feed and the deflection of the tooth before it, and the radial depth is greater by the
+    deflection at most: of other steps the loads may be wrong by both and stay below those that limits are held against.
+    """
+    load = np.asarray(columns[next(c for c in LOADS if c in columns)])
+    tool = np.asarray(columns["tool"]) if "tool" in columns else np.zeros(len(load), dtype=np.int64)
+    greatest = np.zeros(len(load))
+    for number in np.unique(tool):
+        greatest[tool == number] = load[tool == number].max(initial=0.0)
+    share = np.asarray(columns["deflection_share"])
+    could = load * (1.0 + OF_FEED * share) * (1.0 + OF_DEPTH * share)
+    return np.asarray((load >= LOADED * greatest) & (could >= greatest) & (load > 0.0))
 
 
 def _rigid(check: LimitCheck) -> LimitCheck:

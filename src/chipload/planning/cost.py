@@ -128,12 +128,16 @@ def _bent(
     greatest with which the rigid model holds.
     """
     plain = engagement_of_arcs(phi_in, phi_out, f_z, cut.cutter, cut.axial_depth, count=count)
+    # where the machine slows down or speeds up in a step, no chip is thicker than at the feed of its neighbours
+    around = np.concatenate([f_z[:1], f_z, f_z[-1:]])
+    fed = np.maximum(f_z, np.maximum(around[:-2], around[2:]))
+    chips = engagement_of_arcs(phi_in, phi_out, fed, cut.cutter, cut.axial_depth, count=count)
     tip = float(chain_compliance(tool_bars(cut.cutter), 0.0, 0.0))
     deflection = 1000.0 * tip * force
     return {
         "cutter_stress_mpa": cutter_stress(with_runout(plain, cut.cutter), cut.cutter, cut.material),
         "deflection_cutter_um": deflection,
-        "deflection_share": deflection_share(plain, deflection, cut.of_feed, cut.of_depth),
+        "deflection_share": deflection_share(chips, deflection, cut.of_feed, cut.of_depth),
     }
 
 

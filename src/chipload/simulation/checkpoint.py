@@ -186,7 +186,9 @@ class Checkpoint:
             if state is not None:
                 return state
             if any(_of_run(file) for file in self.folder.iterdir()):
-                self.notice(f"begins again: {'it was asked to' if self.fresh else 'what was kept is of another input'}")
+                self.notice(
+                    f"begins again: {'it was asked to' if self.fresh else 'what was kept belongs to another input'}"
+                )
             self._clear()
         return None
 

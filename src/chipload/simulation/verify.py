@@ -195,7 +195,7 @@ def _verification(
     """The verdict on ``what`` was compared, from what was found."""
     verdict: Literal["proved", "failed", "unproven"] = "failed" if failed else "unproven" if open_ else "proved"
     against = (
-        f"gouge {cleft.value_mm * 1e3:.3g} um, excess {remains.value_mm * 1e3:.3g} um" if wall else "no wall given"
+        f"gouge {cleft.value_mm * 1e3:.3g} µm, excess {remains.value_mm * 1e3:.3g} µm" if wall else "no wall given"
     )
     within = f"engagement within {difference.value_mm:.3g} deg"
     text = f"{verdict}: {what}, {within}; {against}; {len(hits)} rapids through stock"

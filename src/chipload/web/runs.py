@@ -73,7 +73,7 @@ class JobRun:
         if self.code is None:
             self.code = code
             self.message = (
-                "stopped: nothing was written" if stopped else f"the run ended without a word: {fault or code}"
+                "stopped: nothing was written" if stopped else f"the run ended without a message: {fault or code}"
             )
         finished = self.code in (0, 3)  # it may have been done before the stop came
         self.state = "done" if finished else "stopped" if stopped or self.code == 130 else "failed"

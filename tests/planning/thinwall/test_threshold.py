@@ -115,7 +115,7 @@ def test_calibrated_plane():
 
 
 def test_scatter_without_repeats():
-    """One place in the middle of a square, e times what its corners bear: foretold one too low."""
+    """One place in the middle of a square, e times what its corners bear: predicted one too low."""
     made = Experiments([[0, 0], [2, 0], [0, 2], [2, 2], [1, 1]], [1.0, 1.0, 1.0, 1.0, math.e])
     assert scatter(made)[0] == pytest.approx(1.0)
 

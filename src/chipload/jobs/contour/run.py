@@ -198,7 +198,7 @@ def check(job: ContourJob) -> tuple[list[str], bool]:
     inputs = read_inputs(job)
     closed = sum(c.closed for c in inputs.contours)
     lines = [
-        f"{job.path.name}: right: {closed} closed and {len(inputs.contours) - closed} open contours, "
+        f"{job.path.name}: valid: {closed} closed and {len(inputs.contours) - closed} open contours, "
         f"machine {inputs.machine.name}, material {inputs.material.name}"
     ]
     beyond = list[str]()

@@ -25,6 +25,9 @@ from chipload.units import rpm_from_rad_s
 DIAMETERS = (20.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5)
 #: share of the area that the guessed cutter must reach
 REACH = 0.97
+#: a channel is narrow below ROOM cutters: each pass takes very little there, and long ones are not possible; it is one
+#: if it holds more than CHANNEL diameters squared, which a corner of 15 deg does not, or joins parts of the area
+ROOM, CHANNEL = 1.3, 1.0
 #: radial depth over the diameter, axial depth over the diameter, feed per tooth over the diameter
 RADIAL, AXIAL, FEED = 0.15, 0.5, 0.005
 #: material left on the wall of a pocket over the diameter
@@ -144,7 +147,7 @@ def _of_layer(drawing: Drawing, layer: str) -> list[Contour]:
 
 
 def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float]:
-    """Diameter [mm] of the largest cutter that reaches nearly all of the area, and the area [mm^2]."""
+    """Diameter [mm] of the largest cutter that reaches nearly all, with room in its channels, and the area [mm^2]."""
     area: Any = shapely.Polygon()
     for c in contours:
         points = c.at(np.linspace(0.0, c.length, POINTS, endpoint=False))[0]
@@ -152,11 +155,23 @@ def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float]:
     whole = float(area.area)
     if not whole > 0.0:
         raise InputError("the contours enclose no area")
-    for d in DIAMETERS:
-        opened = area.buffer(-0.5 * d).buffer(0.5 * d)
-        if float(opened.area) >= REACH * whole:
-            return d, whole
-    return DIAMETERS[-1], whole
+    able = [d for d in DIAMETERS if float(_opened(area, d).area) >= REACH * whole] or [DIAMETERS[-1]]
+    return next((d for d in able if not _narrow(area, d)), able[0]), whole
+
+
+def _opened(area: Any, d: float) -> Any:
+    """What a cutter of diameter d [mm] reaches of an area."""
+    return area.buffer(-0.5 * d).buffer(0.5 * d)
+
+
+def _narrow(area: Any, d: float) -> bool:
+    """Whether an area has channels in which a cutter of diameter d [mm] has no room."""
+    wide = ROOM * d
+    lost = shapely.get_parts(_opened(area, d).difference(_opened(area, wide)))
+    if max((float(piece.area) for piece in lost), default=0.0) > CHANNEL * d * d:
+        return True
+    centres, apart = area.buffer(-0.5 * d), area.buffer(-0.5 * wide)
+    return len(shapely.get_parts(apart)) > len(shapely.get_parts(centres))
 
 
 def _machine(name: str | None) -> Machine:
@@ -210,7 +225,11 @@ def _rest(machine: Machine, named: str | None, d: float, axial: float, kind: str
     if machine.torque is not None:
         limits.append(Entry("torque_nm", machine.torque / 1000.0, f"of the spindle of {machine.name}"))
     limits.append(Entry("force_xy_n", note="across the axis", example="500.0"))
-    why = f"the largest that reaches {100.0 * REACH:g} % of the area" if kind == "pocket" else "a common size"
+    why = (
+        f"the largest that reaches {100.0 * REACH:g} % of the area, with room in every channel"
+        if kind == "pocket"
+        else "a common size"
+    )
     cutter = cutter_table(1, [])
     sized = tuple(
         Entry("diameter_mm", d, why, True) if e.key == "diameter_mm"

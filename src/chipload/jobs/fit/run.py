@@ -101,7 +101,7 @@ def check(job: FitJob) -> tuple[list[str], bool]:
     if job.table.method == "instantaneous":
         fitted = [cut for cut, m in zip(cuts, job.table.measurement, strict=True) if m.use == "fit"]
         turns_in_band(fitted, math.tau * (job.table.band_hz or 0.0))
-    lines = [f"{job.path.name}: right: {len(cuts)} measurements, method {job.table.method}"]
+    lines = [f"{job.path.name}: valid: {len(cuts)} measurements, method {job.table.method}"]
     for cut, m in zip(cuts, job.table.measurement, strict=True):
         lines.append(f"{cut.name}: {m.use}, {len(cut.force)} samples at {cut.rate:g} Hz")
     lines += [f"finding: {f}" for f in findings]
@@ -182,7 +182,7 @@ def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple
     if np.isfinite(fit.coefficients.covariance).all():
         covariance = tuple(tuple(float(f"{v:.9g}") for v in row) for row in fit.coefficients.covariance)
     else:
-        text = "how sure the coefficients are is not written: the covariance of all six is not known"
+        text = "the uncertainty of the coefficients is not written: the covariance of all six is not known"
         found = (Finding("fit-covariance", 0, text),)
     excess = peak_excess(comparisons)
     if excess is None:

@@ -160,8 +160,8 @@ def _open(op: Searched) -> list[str]:
         "The faces at the tip and at the leading and trailing edge of a blade: sides, fillets and hub are walls, each "
         "with its edges.",
         "The upper rim of a cutting part over a narrower neck.",
-        f"Contact points cover along {s['along'][0]:g} to {s['along'][1]:g} and up {s['up'][0]:g} to {s['up'][1]:g} "
-        "of the surface have contact points; between contact points nothing is claimed.",
+        f"The rest of the surface: contact points lie at {s['along'][0]:g} to {s['along'][1]:g} along it and at "
+        f"{s['up'][0]:g} to {s['up'][1]:g} up it; between contact points nothing is claimed.",
         "Fillets, fixtures, pallet and the machine's linear axes: they are not in this search.",
     ]
     if any(c.cutting_length is None for c in op.answer.catalogue.cutters):

@@ -54,7 +54,7 @@ def program_files(outcome: TorqueResult) -> dict[str, bytes]:
         path=outcome.allowable.path, override=case.runs["fuzzy_feedforward"].config, table=outcome.control.table,
         source="plant", spindle=outcome.control.spindle, acceleration=case.loop.acceleration, period=case.loop.period,
         latency=case.loop.latency, modelled=True, window=WINDOW_MM, away=AWAY_MM,
-        deviation=outcome.control.deviation, told_from=outcome.control.told_from,
+        deviation=outcome.control.deviation, identified_from=outcome.control.identified_from,
     )  # fmt: skip
     out[PATH] = write_path(outcome.allowable.path).encode("ascii")
     out[TABLE] = write_fuzzy(outcome.control.table).encode("ascii")

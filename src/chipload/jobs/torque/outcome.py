@@ -253,7 +253,7 @@ class ControlComparison:
     ----------
     cases : the loop without latency, and as stated; none where no torque is allowable
     controller : of the verdict; None: likewise
-    told_from : what the spindle was identified from
+    identified_from : what the spindle was identified from
     deviation : of the real spindle from what is believed
     estimate : of the torque, in the case of the verdict; None: likewise
     ideal_time : with the feed at the limit at every instant [s]; inf where no torque is allowable
@@ -263,7 +263,7 @@ class ControlComparison:
     controller: Override | None
     table: FuzzyTable
     spindle: Spindle
-    told_from: Literal["current", "power"]
+    identified_from: Literal["current", "power"]
     deviation: SpindleDeviation
     estimate: SpindleEstimate | None
     ideal_time: float

@@ -36,7 +36,7 @@ from chipload.jobs.torque.outcome import (
     TorqueResult,
 )
 from chipload.jobs.torque.shell_limit import preview_of_shell, real_shell_stock, shell_torque, shell_wall
-from chipload.jobs.torque.spindle import deviation_of, estimate_range, require_resolved, spindle_of, told_from
+from chipload.jobs.torque.spindle import deviation_of, estimate_range, identified_from, require_resolved, spindle_of
 from chipload.jobs.torque.step_checks import step_checks
 from chipload.jobs.torque.workpiece_cut import allowable_on_workpiece, real_stock_body
 from chipload.jobs.torque.workpiece_limit import allowable_torque, clamped_workpiece, preview_on_workpiece
@@ -91,7 +91,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
             controller=controller,
             table=table,
             spindle=spindle,
-            told_from=told_from(job, spindle),
+            identified_from=identified_from(job, spindle),
             deviation=deviation_of(job),
             estimate=_estimate(job, cases, spindle, controller) if controller is not None else None,
             ideal_time=shortest_time,

@@ -43,7 +43,7 @@ def spindle_of(job: TorqueJob, speeds: Floats) -> Spindle:
     )  # fmt: skip
 
 
-def told_from(job: TorqueJob, spindle: Spindle) -> Literal["current", "power"]:
+def identified_from(job: TorqueJob, spindle: Spindle) -> Literal["current", "power"]:
     """What the spindle was identified from."""
     power = job.spindle_file is not None and read_spindle(job.spindle_file, spindle.speed).source == "power"
     return "power" if power else "current"

@@ -153,7 +153,7 @@ class SpindleDeviationTable(Table):
 class SpindleTable(Table):
     """The spindle that the torque is estimated from.
 
-    Keys that ``chipload spindle`` identifies may stand in its file. Of a spindle that is told from its power all
+    Keys that ``chipload spindle`` identifies may stand in its file. Of a spindle that is identified from its power all
     currents are torques, power over speed [N m].
     """
 

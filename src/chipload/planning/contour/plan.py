@@ -428,7 +428,7 @@ def _overshoots(job: _Job, runs: list[ContourPass]) -> list[Event]:
                         "joint-overshoot",
                         x,
                         y,
-                        f"the stock would need a kink of {delta:.3f} deg here; the cutter leaves {1e3 * gap:.2f} um in "
+                        f"the stock would need a kink of {delta:.3f} deg here; the cutter leaves {1e3 * gap:.2f} µm in "
                         "it, and the engagement overshoots: joint = clothoid removes it",
                     )
                 )

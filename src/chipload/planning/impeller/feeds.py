@@ -138,7 +138,7 @@ class PassLoads:
     def columns(self) -> tuple[tuple[str, Floats, float, str], ...]:
         """Name, values (n,), limit and unit of what is limited."""
         return (
-            ("deflection of the cutter", 1000.0 * self.deflection, 1000.0 * self.most, "um"),
+            ("deflection of the cutter", 1000.0 * self.deflection, 1000.0 * self.most, "µm"),
             ("stress of the cutter", self.stress, self.allowed, "MPa"),
         )
 

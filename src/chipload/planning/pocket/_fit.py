@@ -21,6 +21,8 @@ SWEEP, BEND = 2.6, 0.16
 MOST = 256
 #: greatest turn between two places that are looked at [rad]; so near to the limit [rad] the greatest is looked for
 TURN, NEAR = 0.03, 0.02
+#: where E changes by so much [rad] between two places, a narrow strip of stock may stand there: looked at more closely
+JUMP = 0.05
 #: distance / R of the places at which a segment is held against the centre region
 EVERY = 0.01
 #: engagement above the limit that is none [rad]
@@ -148,17 +150,26 @@ def in_region(seg, R, slack, grid, flag, edges, rows, row_edges):
 
 @njit(cache=True, nogil=True)
 def engagement_along(seg, spacing, limit, r, R, grid, head, link, axis, arcs):
-    """Greatest E along a segment: near its start, at its end and every half ``spacing``; ends early above the limit."""
+    """Greatest E along a segment, or one above the limit: near its start, at its end, every half ``spacing``, and at
+    three places between two of them where E jumps.
+    """
     n = max(2, math.ceil(2.0 * segment_length(seg) / spacing), math.ceil(abs(seg[6]) / TURN))
-    most, at = 0.0, 1.0
+    most, at, after = 0.0, 1.0, 0.0
     for k in range(n, -1, -1):
         w = k / n if k > 0 else 0.02 / n
         x, y, t = place(seg, w)
         e = angle_at(x, y, math.cos(t), math.sin(t), r, R, grid, head, link, axis, arcs)
         if e > most:
             most, at = e, w
+        between = 3 if k < n and abs(e - after) > JUMP else 0
+        for q in range(1, between + 1):
+            x, y, t = place(seg, w + 0.25 * q / n)
+            e_q = angle_at(x, y, math.cos(t), math.sin(t), r, R, grid, head, link, axis, arcs)
+            if e_q > most:
+                most, at = e_q, w + 0.25 * q / n
         if most > limit:
             return most
+        after = e
     if most > limit - NEAR:  # between its neighbours the greatest may be greater
         d = 1.0 / n
         for _ in range(3):

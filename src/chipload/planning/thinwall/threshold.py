@@ -10,7 +10,7 @@ Calibrated: y is interpolated linearly between the experiments (Delaunay's trian
 
     F_th = exp(y - k s).
 
-s is the pooled deviation of repeats, or what it is when each experiment is foretold from the others without it, the
+s is the pooled deviation of repeats, or what it is when each experiment is predicted from the others without it, the
 greater of the two where both are known. Beyond the experiments the wall may bear less than any of them did: such places
 are named in ``outside`` and take the least of all, with the reserve.
 
@@ -189,7 +189,7 @@ def scatter(experiments: Experiments) -> tuple[float, str]:
         if math.isfinite(guess):
             misses.append(guess - y[i])
     if misses:
-        found.append((math.sqrt(float(np.mean(np.square(misses)))), f"{len(misses)} places foretold from the others"))
+        found.append((math.sqrt(float(np.mean(np.square(misses)))), f"{len(misses)} places predicted from the others"))
     if not found:
         raise InputError(
             "experiments: neither repeats at a place nor a place between the others: the scatter is unknown; repeat one"
