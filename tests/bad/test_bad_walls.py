@@ -169,6 +169,19 @@ def test_a_run_refuses_a_wall(plate_job: Path, change: str, says: str) -> None:
     assert run(plate_job, change).startswith(says)
 
 
+def test_a_barrel_is_no_cutter_of_a_wall(plate_job: Path) -> None:
+    """A body of revolution, as tool libraries state a barrel: the cutter, and the operation that names it."""
+    body = "body_mm = [[0.0, 0.0], [3.0, 0.5], [4.0, 5.0], [3.6, 8.0]]"
+    plate_job.write_text(plate_job.read_text().replace("corner_radius_mm = 4.0", body))
+    done = CliRunner().invoke(app, ["run", str(plate_job), "--out", str(plate_job.parent / "result")])
+    assert done.exit_code == 2
+    assert done.stderr.strip().splitlines() == [
+        "chipload: job.toml: cutter 1: body_mm: for a program that is simulated: leave it out, and state its numbers",
+        "chipload: job.toml: operation.0.cutter = 1: is a body (barrel, tap), whose chips are not simulated: state a "
+        "ball nose or a bull nose",
+    ]
+
+
 def test_a_run_refuses_a_table_with_one_place(plate_job: Path) -> None:
     (plate_job.parent / "cuts.csv").write_text(
         "u,v,repeat,expected_normal_force_n,normal_force_n,deflection_um,too_much\n0,1,1,20,21,40,\n"

@@ -21,7 +21,7 @@ from chipload.jobs import load_job, resume_note
         ("contour", "a contour job does not resume: "),
         ("pocket", "a contour job does not resume: "),
         ("tube", "a torque job does not resume: "),
-        ("plate", ""),
+        ("plate", "plans that were simulated are kept; the simulation of a plan does not resume: "),
         ("impeller", ""),
     ],
 )

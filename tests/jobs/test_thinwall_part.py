@@ -100,7 +100,7 @@ def test_compliance_of_a_wall_that_is_held_at_its_foot(folder):
         return float((f * factored.solve(f)).sum())
 
     expected = [[spread(u, z) for z in (5.0 + 14.0 / 3.0, 12.0)] for u in np.linspace(0.0, 1.0, 5)]
-    assert blank.compliance(none, 0).reshape(5, 4)[:, 2:] == pytest.approx(np.array(expected), rel=0.07)
+    assert blank.compliance(none, 0).reshape(5, 4)[:, 2:] == pytest.approx(np.array(expected), rel=0.08)
     # held below its floor alone it gives way more, by a part that the mean of all places sees
     soft = read_wall(job(folder, change=change).job).body.part
     assert (soft.compliance(none, 0) > 1.05 * blank.compliance(none, 0)).all()

@@ -68,7 +68,7 @@ def test_a_turned_wall_gives_the_same():
     foot = np.array([3.3, 1.1])
     corners = [foot, foot + 60 * along, foot + 60 * along + 2 * normal, foot + 2 * normal]
     stock = shaped(shapely.Polygon(corners), 0.0, 40.0, 10.0)
-    grid = CellGrid(np.zeros(3), np.full(3, 5.0), (12, 7, 8))
+    grid = CellGrid((5.0 * np.arange(13), 5.0 * np.arange(8), 5.0 * np.arange(9)))
     work = cell_workpiece(stock, grid, ALUMINIUM, [below(stock)])
     points = [(*(foot + s * along), z) for s, z in ((60.0, 40.0), (30.0, 40.0), (30.0, 20.0))]
     found = across(work, points, (*normal, 0.0))

@@ -63,7 +63,7 @@ def bent_workpiece(
     sections = StockSections(stock)
     parts = [polygons(shape) for shape in sections.shapes]
     bodies = [prisms([part], np.array(ends)) for part, *ends in zip(parts, sections.low, sections.high, strict=True)]
-    size = SIDE * float((work.grid.size * work.grid.counts).max())
+    size = SIDE * float((work.grid.high - work.grid.low).max())
     whole = [body.subdivide_to_size(size, max_iter=12) for body in bodies]
     points = np.concatenate([np.asarray(body.vertices) for body in whole])
     first = np.cumsum([0, *(len(body.vertices) for body in whole)])[:-1]

@@ -95,8 +95,8 @@ def load(path: Path, table: ThinWallJobTable, overrides: Sequence[str]) -> ThinW
 
 
 def resume_note(job: ThinWallJob) -> str:
-    """What is not kept while the job runs: nothing that takes long."""
-    return ""
+    """What is not kept while the job runs: the plan that is being simulated."""
+    return "plans that were simulated are kept; the simulation of a plan does not resume: stopped, it begins again"
 
 
 def missing(values: Mapping[str, Any]) -> list[str]:

@@ -4,8 +4,8 @@ Notation: C_nn [mm/N] normal compliance of a place, of a force that is spread ov
 left on a side, (n, m) at the places.
 
 The cells are those of a workpiece under any program (:mod:`chipload.structure.cells`): the whole part in its clamps
-gives way, floor and neighbours too. The error is the difference to cells of :data:`COARSER` times the side in the
-finished state, and :data:`FLOOR`.
+gives way, floor and neighbours too. The error is :data:`CORNER` times the difference to cells of :data:`COARSER`
+times the side in the finished state, and :data:`FLOOR`.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from chipload.jobs.simulation.clamped import clamped_volumes, clamps_of, elastic_of
 from chipload.jobs.simulation.tables import WorkpieceTable
-from chipload.jobs.simulation.workpiece_compliance import COARSER, FLOOR
+from chipload.jobs.simulation.workpiece_compliance import COARSER, CORNER, FLOOR
 from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import Clamp
-from chipload.structure.cells.grid import CellGrid, grid_over
+from chipload.structure.cells.grid import CellGrid
 from chipload.structure.cells.stress import greatest_stress
 from chipload.structure.cells.thickness import cells_over
 from chipload.structure.cells.workpiece import CellWorkpiece, Elastic, cell_workpiece, line_means
@@ -77,7 +77,7 @@ class PartBlank:
         key, which = b"".join(np.ascontiguousarray(D).tobytes() for D in left), "wide" if wide else "fine"
         if key != self._last.get(which, (b"", None))[0]:
             grid = self.wide if wide else self.grid
-            stock = _layered(self.body, self.places, left, float(self.grid.size[2]) / PER_CELL)
+            stock = _layered(self.body, self.places, left, float(np.diff(self.grid.planes[2]).max()) / PER_CELL)
             self._last[which] = key, cell_workpiece(stock, grid, self.elastic, self.clamps, self.clamped)
         return self._last[which][1]
 
@@ -97,12 +97,12 @@ class PartBlank:
         """(n, m) relative error of the compliance of a finished side by its cells."""
         none = [np.zeros(self.shape) for _ in self.body.each]
         fine, coarse = self.compliance(none, side), self.compliance(none, side, wide=True)
-        return np.asarray((np.abs(coarse / fine - 1.0) + FLOOR).reshape(self.shape))
+        return np.asarray((CORNER * np.abs(coarse / fine - 1.0) + FLOOR).reshape(self.shape))
 
     def stress(self, left: Sequence[Floats], side: int, u: float, v: float, force: float) -> float:
         """Greatest equivalent stress [MPa] under a normal force [N] at a place of a side."""
         lines, normals = self._lines(left, side, (np.array([u]), np.array([v])))
-        away = float(self.grid.size.max())
+        away = self.grid.widest
         return greatest_stress(self.state(left), self.elastic, lines[0], -force * normals[0], away).stress
 
     def _lines(
@@ -139,11 +139,8 @@ def part_blank(job: ThinWallJob, body: PartShape, step_over: float) -> PartBlank
     layer = float(np.ptp(body.part.bounds, axis=0).max()) / LAYERS
     first, last = (_layered(body, places, D, layer) for D in (full, [np.zeros((n, m)) for _ in full]))
     grid, wall = cells_over(first, last, made.cell_mm, made.order or 2)
-    low, high = grid.origin, grid.origin + grid.size * grid.counts
-    wide = grid_over(low, high, COARSER * float(grid.size.max()), grid.order)
-    held = clamped_volumes(table, first)
-    body = replace(body, thickness=wall)
-    return PartBlank(body, places, CONTACT * step_over, elastic_of(table), clamps_of(table, first), held, grid, wide)
+    body, held, clamps = replace(body, thickness=wall), clamped_volumes(table, first), clamps_of(table, first)
+    return PartBlank(body, places, CONTACT * step_over, elastic_of(table), clamps, held, grid, grid.wider(COARSER))
 
 
 def _layered(body: PartShape, places: tuple[Floats, Floats], left: Sequence[Floats], layer: float) -> LayeredStock:

@@ -84,7 +84,7 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
     if inputs.body.part is not None:
         grid = inputs.body.part.grid
         settings["part"] = {
-            "cell_mm": float(grid.size.max()),
+            "cell_mm": grid.widest,
             "order": grid.order,
             "unknowns": inputs.body.part.unknowns,
         }
@@ -158,7 +158,7 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
         nodes = len(inputs.body.wall.solid.grid.nodes)
         solved = f"{len(inputs.body.wall.solid.grid.elements)} elements, {nodes} nodes"
     else:
-        solved = f"cells of {part.grid.size.max():.3g} mm, {part.unknowns} unknowns"
+        solved = f"cells of {part.grid.widest:.3g} mm, {part.unknowns} unknowns"
     bearing, law = inputs.finished_threshold(), inputs.depths.law
     lines = [
         *map(str, _findings(inputs)),

@@ -2,36 +2,45 @@
 
 from __future__ import annotations
 
-import math
-
 from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def _strip(left, right, low, high, i, s, at, weight, out):
+def _cell(planes, x):
+    """The cell of a place within the grid."""
+    low, high = 0, len(planes) - 2
+    while low < high:
+        middle = (low + high + 1) // 2
+        if planes[middle] <= x:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+@njit(cache=True, nogil=True)
+def _strip(left, right, low, high, i, s, xs, ys, at, weight, out):
     """A piece of an edge within one column of cells: what lies below it."""
     ny, n = out.shape[1], out.shape[2]
+    width = xs[i + 1] - xs[i]
     a, va = left, low
-    up = high > low
+    # the cell in which the piece goes on from (a, va)
+    j = _cell(ys, va)
+    if high < va and va == ys[j] and j > 0:
+        j -= 1
     while True:
-        # the cell in which the piece goes on from (a, va)
-        j = math.floor(va)
-        if not up and va == j and high < va:
-            j -= 1
-        j = min(max(j, 0), ny - 1)
-        b, vb = right, high
-        if high > low and high > j + 1 and j < ny - 1:
-            vb = float(j + 1)
-            b = left + (right - left) * (vb - low) / (high - low)
-        elif high < low and high < j and j > 0:
-            vb = float(j)
-            b = left + (right - left) * (vb - low) / (high - low)
-        b = min(max(b, a), right)
-        half = b - a
+        b, vb, following = right, high, j
+        if high > ys[j + 1] and j < ny - 1:
+            following, vb = j + 1, ys[j + 1]
+        elif high < ys[j] and j > 0:
+            following, vb = j - 1, ys[j]
+        if following != j:
+            b = min(max(left + (right - left) * (vb - low) / (high - low), a), right)
+        half, height = (b - a) / width, ys[j + 1] - ys[j]
         for g in range(len(at)):
             t = 0.5 * (1.0 + at[g])
-            xi = 2.0 * (a + (b - a) * t - i) - 1.0
-            eta = 2.0 * (va + (vb - va) * t - j) - 1.0
+            xi = 2.0 * (a + (b - a) * t - xs[i]) / width - 1.0
+            eta = 2.0 * (va + (vb - va) * t - ys[j]) / height - 1.0
             w = s * weight[g] * half
             p0, p1 = 1.0, xi
             for k in range(n):
@@ -46,20 +55,21 @@ def _strip(left, right, low, high, i, s, at, weight, out):
                     out[i, below, k, 0] += 2.0 * w * p0
                 p2 = ((2.0 * k + 3.0) * xi * p1 - (k + 1.0) * p0) / (k + 2.0)
                 p0, p1 = p1, p2
-        if vb == high or b >= right:
+        if following == j or b >= right:
             break
-        a, va = b, vb
+        a, va, j = b, vb, following
 
 
 @njit(cache=True, nogil=True)
-def ring_moments(points, start, sign, at, weight, out):
+def ring_moments(points, start, sign, xs, ys, at, weight, out):
     """Add the moments of rings; see :func:`chipload.structure.cells.moments.section_moments`.
 
     Parameters
     ----------
-    points : (m, 2) float, in cells: cell (i, j) spans i..i + 1, j..j + 1
+    points : (m, 2) float, within the planes
     start : (r + 1,) int, ring r has the points start[r] .. start[r + 1] - 1, the first and the last are equal
     sign : (r,) float, by which each ring counts
+    xs, ys : (nx + 1,), (ny + 1,) float, planes of the cells
     at, weight : (g,) float, Gauss points and weights on -1..1
     out : (nx, ny, n, n) float, to which is added
     """
@@ -74,12 +84,13 @@ def ring_moments(points, start, sign, at, weight, out):
             if u1 < u0:
                 u0, u1, v0, v1, s = u1, u0, v1, v0, -s
             slope = (v1 - v0) / (u1 - u0)
-            i = min(max(math.floor(u0), 0), nx - 1)
+            i = _cell(xs, u0)
             left = u0
             while left < u1:
-                right = min(u1, float(i + 1)) if i < nx - 1 else u1
+                right = min(u1, xs[i + 1]) if i < nx - 1 else u1
                 if right > left:
-                    _strip(left, right, v0 + slope * (left - u0), v0 + slope * (right - u0), i, s, at, weight, out)
+                    low, high = v0 + slope * (left - u0), v0 + slope * (right - u0)
+                    _strip(left, right, low, high, i, s, xs, ys, at, weight, out)
                 left = right
                 i += 1
                 if i >= nx:

@@ -1,7 +1,8 @@
 """Stiffness and mass of the material in cells: sums of fixed tensors times moments.
 
-Notation: M (e, n^3) moments of the active cells, alpha the share of stiffness that the empty part of a cut cell keeps;
-a, b modes of a cell, i, j directions; G_ab,ij the integral of dN_a/dx_i dN_b/dx_j; la, mu the constants of Lame. Then
+Notation: M (e, n^3) moments of the active cells, V and h their volumes and sides, alpha the share of stiffness that
+the empty part of a cut cell keeps; a, b modes of a cell, i, j directions; G_ab,ij the integral of dN_a/dx_i dN_b/dx_j,
+V / (2 h_i h_j) of that in local coordinates; la, mu the constants of Lame. Then
 K_ai,bj = la G_ij + mu G_ji + mu delta_ij trace(G).
 
 Cells of thick material keep only the modes of their corners: where a block of :data:`BULK` cells in each direction is
@@ -12,6 +13,7 @@ Reference: [Parvizian2007] for alpha; [Duester2008].
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,7 +86,7 @@ def modes_of(grid: CellGrid, share: Array, bulk: int = BULK, *, limited: bool = 
     kept = np.unique(numbers[used])
     if limited and len(kept) > MOST_MODES:
         raise InputError(
-            f"workpiece: {3 * len(kept)} unknowns in cells of {np.round(grid.size, 3).tolist()} mm: at most "
+            f"workpiece: {3 * len(kept)} unknowns in cells of at most {grid.widest:.4g} mm: at most "
             f"{3 * MOST_MODES}: state a larger workpiece.cell_mm"
         )
     at = np.searchsorted(kept, numbers)
@@ -111,15 +113,22 @@ def stiffness(
     alpha : see :data:`ALPHA`
     """
     la, mu = modulus * poisson / (1.0 + poisson) / (1.0 - 2.0 * poisson), modulus / 2.0 / (1.0 + poisson)
-    gradients, _ = product_tensors(grid)
-    trace = mu * np.einsum("qabii->qab", gradients)
-    law = la * gradients + mu * gradients.swapaxes(3, 4)
-    for i in range(3):
-        law[..., i, i] += trace
+    gradients, _ = product_tensors(grid.order)
     M = _cells_of(moments, modes)
     M *= 1.0 - alpha
     M[:, 0] += 8.0 * alpha
-    return _assembled(modes, M, law)
+    slopes = 2.0 / grid.sides(modes.cells)
+    scale = _volumes(grid, modes)[:, None, None] / 8.0 * slopes[:, :, None] * slopes[:, None, :]
+
+    def law(G: Array, own: Indices) -> Array:
+        G = G * scale[own, None]
+        trace = mu * np.einsum("eaii->ea", G)
+        out = la * G + mu * G.swapaxes(2, 3)
+        for i in range(3):
+            out[..., i, i] += trace
+        return out
+
+    return _assembled(modes, M, gradients, law)
 
 
 def springs(grid: CellGrid, modes: CellModes, moments: Array, per_volume: Array) -> csr_array:
@@ -130,8 +139,9 @@ def springs(grid: CellGrid, modes: CellModes, moments: Array, per_volume: Array)
     moments : of the material that the springs hold
     per_volume : (3, 3) float [N/mm per mm^3]
     """
-    _, values = product_tensors(grid)
-    return _assembled(modes, _cells_of(moments, modes), values[..., None, None] * per_volume)
+    _, values = product_tensors(grid.order)
+    M = _cells_of(moments, modes) * (_volumes(grid, modes) / 8.0)[:, None]
+    return _assembled(modes, M, values, lambda N, own: N[..., None, None] * per_volume)
 
 
 def mass(grid: CellGrid, modes: CellModes, moments: Array, density: float) -> csr_array:
@@ -145,8 +155,18 @@ def _cells_of(moments: Array, modes: CellModes) -> Array:
     return np.array(moments[x, y, z].reshape(len(modes.cells), -1))
 
 
-def _assembled(modes: CellModes, M: Array, law: Array) -> csr_array:
-    """The sum over cells of M (e, n^3) times ``law`` (n^3, m, m, 3, 3)."""
+def _volumes(grid: CellGrid, modes: CellModes) -> Array:
+    """(e,) volumes [mm^3] of the active cells."""
+    return np.asarray(grid.volumes[tuple(modes.cells.T)])
+
+
+def _assembled(modes: CellModes, M: Array, tensors: Array, law: Callable[[Array, Indices], Array]) -> csr_array:
+    """The sum over cells of blocks (e, m, 3, 3) that ``law`` makes of M (e, n^3) times ``tensors`` (n^3, m, m, ...).
+
+    Parameters
+    ----------
+    law : is also given the numbers of the cells
+    """
     some = np.flatnonzero(M.any(axis=1))
     M, number, u = M[some], modes.number[some], len(modes)
     m = number.shape[1]
@@ -156,7 +176,8 @@ def _assembled(modes: CellModes, M: Array, law: Array) -> csr_array:
     keys = keys[keys >= 0]
     data = np.zeros((len(keys), 3, 3))
     for a in range(m):
-        blocks = (M @ law[:, a, a:].reshape(len(law), -1)).reshape(len(M), m - a, 3, 3)
+        part = tensors[:, a, a:]
+        blocks = law((M @ part.reshape(len(part), -1)).reshape(len(M), *part.shape[1:]), some)
         for b in range(a, m):
             key = _keys(number, a, b, u)
             own = np.flatnonzero(key >= 0)

@@ -3,8 +3,8 @@
 Notation: a clamp holds the material of the stock within an upright prism, in some of the directions x, y, z. Springs
 are spread over that material: k_v = k / V [N/mm per mm^3], with the stiffness k of the whole clamp in each direction
 and the volume V that it holds of the stock before the first cut. A stiff clamp has k_v = :data:`STIFF` E / (h d) with
-the cell size h and its own least side d, at most h: far stiffer than the material beneath it. A face is a thin slab of
-the stock along it.
+the longest side h of a cell and its own least side d, at most h: far stiffer than the material beneath it. A face is a
+thin slab of the stock along it.
 
 Rigid motions: S (6, 6) the stiffness of all clamps, each with a total of 1, against translations and rotations about
 the middle of the held material, lengths over the diagonal of the stock. A motion with less than :data:`LOOSE` is free.
@@ -99,7 +99,7 @@ def clamp_stiffness(
     volumes, unit = [], []
     for k, clamp in enumerate(clamps):
         moments = stock_moments(stock, grid, clamp.region)
-        volume = float(moments[..., 0, 0, 0].sum() * np.prod(grid.size) / 8.0)
+        volume = float((moments[..., 0, 0, 0] * grid.volumes).sum() / 8.0)
         if not volume > 0.0:
             x0, y0, x1, y1 = clamp.region.outline.bounds
             cut = first is not None and first[k] > 0.0
@@ -109,7 +109,7 @@ def clamp_stiffness(
                 f"{'what is left of the stock' if cut else 'the stock'}"
             )
         held = np.diag(clamp.directions.astype(np.float64))
-        size = float(grid.size.min())
+        size = grid.widest
         per_volume = STIFF * modulus / (size * min(size, clamp.region.thickness(stock)))
         if np.isfinite(clamp.stiffness):
             per_volume = clamp.stiffness / (volume if first is None else first[k])
@@ -147,8 +147,9 @@ def rigid_motions(grid: CellGrid, modes: CellModes, about: Array) -> Array:
     """(3 u, 6) float coefficients of three translations and three rotations; rotations per diagonal of the grid."""
     at = modes.lattice
     vertex = (at % grid.order == 0).all(axis=1)
-    scale = float(np.linalg.norm(grid.size * grid.counts))
-    x = np.where(vertex[:, None], (grid.origin + at / grid.order * grid.size - about) / scale, 0.0)
+    scale = float(np.linalg.norm(grid.high - grid.low))
+    corner = np.stack([v[at[:, d] // grid.order] for d, v in enumerate(grid.planes)], axis=1)
+    x = np.where(vertex[:, None], (corner - about) / scale, 0.0)
     out = np.zeros((len(modes), 3, 6))
     for d in range(3):
         out[vertex, d, d] = 1.0
@@ -160,4 +161,5 @@ def rigid_motions(grid: CellGrid, modes: CellModes, about: Array) -> Array:
 def _middle(grid: CellGrid, cells: NDArray[np.bool_]) -> Array:
     """Middle [mm] of the held cells."""
     at = np.argwhere(cells)
-    return np.asarray(grid.origin + (0.5 * (at.min(axis=0) + at.max(axis=0) + 1.0)) * grid.size)
+    ends = zip(grid.planes, at.min(axis=0).tolist(), at.max(axis=0).tolist(), strict=True)
+    return np.array([0.5 * (v[a] + v[b + 1]) for v, a, b in ends])

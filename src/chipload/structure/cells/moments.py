@@ -69,24 +69,27 @@ def section_moments(shapes: NDArray[np.object_], grid: CellGrid) -> Array:
         return out
     xy, ring = shapely.get_coordinates(rings, return_index=True)
     start = np.concatenate([[0], np.cumsum(np.bincount(ring, minlength=len(rings)))]).astype(np.int64)
-    points = np.ascontiguousarray(np.clip((xy - grid.origin[:2]) / grid.size[:2], 0.0, grid.counts[:2]))
+    x, y = grid.planes[:2]
+    points = np.ascontiguousarray(np.clip(xy, grid.low[:2], grid.high[:2]))
     cross = np.append(points[:-1, 0] * points[1:, 1] - points[1:, 0] * points[:-1, 1], 0.0)
     area = np.add.reduceat(np.where(np.append(ring[1:] == ring[:-1], False), cross, 0.0), start[:-1])
     hole = np.append(False, part[1:] == part[:-1])
     sign = np.where(hole, -1.0, 1.0) * np.where(area < 0.0, -1.0, 1.0)
     at, weight = legendre.leggauss(n)
-    _kernels.ring_moments(points, start, sign, at, weight, out)
+    _kernels.ring_moments(points, start, sign, x, y, at, weight, out)
     return out
 
 
 def height_moments(grid: CellGrid, low: float, high: float) -> tuple[range, Array]:
     """The cells along z that a slice low..high [mm] meets, and (c, n) float its moments M_m in them."""
     n = 2 * grid.order + 1
-    a, b = ((np.array([low, high]) - grid.origin[2]) / grid.size[2]).tolist()
-    first, last = max(int(np.floor(a + 1e-12)), 0), min(int(np.ceil(b - 1e-12)), grid.counts[2])
+    z = grid.planes[2]
+    near = 1e-12 * (z[-1] - z[0])
+    first = max(int(np.searchsorted(z, low + near, side="right")) - 1, 0)
+    last = min(int(np.searchsorted(z, high - near, side="left")), grid.counts[2])
     cells = range(first, max(last, first))
-    k = np.array(cells, dtype=np.float64)
-    ends = [np.clip(2.0 * (v - k) - 1.0, -1.0, 1.0) for v in (a, b)]
+    k = np.array(cells, dtype=np.int64)
+    ends = [np.clip(2.0 * (v - z[k]) / (z[k + 1] - z[k]) - 1.0, -1.0, 1.0) for v in (low, high)]
     out = np.empty((len(k), n))
     for m in range(n):
         c = legendre.legint(np.eye(n)[m][: m + 1])

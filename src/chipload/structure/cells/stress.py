@@ -50,12 +50,12 @@ def greatest_stress(work: CellWorkpiece, elastic: Elastic, line: Array, force: A
     for at in range(0, len(work.modes.cells), BLOCK):
         cells, number = work.modes.cells[at : at + BLOCK], work.modes.number[at : at + BLOCK]
         own = np.where((number >= 0)[..., None], u[number], 0.0)
-        slope = np.einsum("emc,pmd->epcd", own, gradients)
+        slope = np.einsum("emc,pmd->epcd", own, gradients) * (2.0 / work.grid.sides(cells))[:, None, None]
         strain = 0.5 * (slope + np.swapaxes(slope, 2, 3))
         sigma = la * np.trace(strain, axis1=2, axis2=3)[..., None, None] * np.eye(3) + 2.0 * mu * strain
         s = sigma - np.trace(sigma, axis1=2, axis2=3)[..., None, None] / 3.0 * np.eye(3)
         mises = np.sqrt(1.5 * (s * s).sum(axis=(2, 3))).ravel()
-        points = (work.grid.origin + (cells[:, None] + 0.5 * (local + 1.0)) * work.grid.size).reshape(-1, 3)
+        points = work.grid.points(cells.repeat(len(local), axis=0), np.tile(local, (len(cells), 1)))
         mises[_distance(points, line) < away] = 0.0
         for k in np.argsort(-mises, kind="stable").tolist():
             if mises[k] <= best.stress:

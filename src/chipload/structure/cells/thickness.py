@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.assembly import LEAST_SHARE, MOST_MODES, modes_of, shares
-from chipload.structure.cells.grid import CellGrid, grid_over
+from chipload.structure.cells.faces import flat_faces, grid_on_faces
+from chipload.structure.cells.grid import CellGrid
 from chipload.structure.cells.moments import alike, stock_moments
 
 #: area over t^2 that counts as a wall
@@ -103,20 +104,18 @@ def cells_over(
     InputError
         The cells do not resolve the thinnest wall, or would be too many.
     """
-    low = np.array([first.xs[0], first.ys[0], first.bounds[0]])
-    high = np.array([first.xs[-1], first.ys[-1], first.bounds[-1]])
-    side = float((high - low).max())
-    wall = thinnest(last, side / 1000.0, side / LEAST_CELLS)
+    side = max(float(v[-1] - v[0]) for v in (first.xs, first.ys, first.bounds))
+    wall, faces = thinnest(last, side / 1000.0, side / LEAST_CELLS), flat_faces(last)
     if cell_mm is not None:
         if cell_mm > MOST * wall * (1.0 + 1e-6):
             raise InputError(
                 f"workpiece.cell_mm = {cell_mm:g}: the thinnest wall left is {wall:.3g} mm: at most {MOST:g} times "
                 f"that, {MOST * wall:.3g}"
             )
-        return grid_over(low, high, cell_mm, order), wall
+        return grid_on_faces(first, faces, cell_mm, order), wall
     size = GOOD * wall
     while True:
-        grid = grid_over(low, high, min(size, side / LEAST_CELLS), order)
+        grid = grid_on_faces(first, faces, min(size, side / LEAST_CELLS), order)
         count = max(_count(stock, grid) for stock in (first, last))
         if count <= WANTED_MODES or (size >= MOST * wall and count <= MOST_MODES):
             return grid, wall
@@ -130,7 +129,7 @@ def cells_over(
 
 def _count(stock: LayeredStock, grid: CellGrid) -> int:
     """Modes of a stock."""
-    share = shares(stock_moments(stock, CellGrid(grid.origin, grid.size, grid.counts, 1)))
+    share = shares(stock_moments(stock, CellGrid(grid.planes, 1)))
     if int((share > LEAST_SHARE).sum()) > 2 * MOST_MODES:
         return 2 * MOST_MODES
     return len(modes_of(grid, share, limited=False))

@@ -39,6 +39,8 @@ SPREAD, PER_CELL = 4, 3
 STATIONS = (0.0, 0.5, 1.0)
 #: modes that nested dissection does not cut any more
 LEAF = 60
+#: active cells about an empty one, of which the nearest takes a force
+AROUND = 27
 #: lines that are solved abreast: three right-hand sides each
 ABREAST = 21
 
@@ -125,7 +127,7 @@ def cell_workpiece(
     pieces, count = label(share > LEAST_SHARE)
     if count > 1:
         kept = np.isin(pieces, np.unique(pieces[springs.cells & (pieces > 0)]))
-        loose = float(share[~kept].sum() * np.prod(grid.size))
+        loose = float((share * grid.volumes)[~kept].sum())
         if loose > 0.0:
             share = np.where(kept, share, 0.0)
             modes = modes_of(grid, share)
@@ -136,7 +138,7 @@ def cell_workpiece(
     place[order] = np.arange(len(order))
     options = {"SymmetricMode": True}
     lu = splu(csc_array(K[order][:, order]), permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
-    volume = float(share.sum() * np.prod(grid.size))
+    volume = float((share * grid.volumes).sum())
     return CellWorkpiece(
         grid, modes, share, csr_array(K), Factors(lu), order, place, volume, loose, springs.volumes,
         StockSections(stock), None if elastic.density is None else mass(grid, modes, moments, elastic.density),
@@ -181,13 +183,11 @@ def _separator(at: Indices, p: int) -> tuple[int, int] | None:
 
 def mode_weights(work: CellWorkpiece, points: Array) -> csr_array:
     """(n, u) sparse values of the modes at points (n, 3), or at the nearest material to them."""
-    cell, local = work.grid.cell_of(work.sections.nearest(points))
+    at = work.sections.nearest(points)
+    cell, local = work.grid.cell_of(at)
     empty = work.share[tuple(cell.T)] <= LEAST_SHARE
     if empty.any():
-        active = work.modes.cells
-        found = active[cKDTree(active).query(cell[empty])[1]]
-        local[empty] = np.clip(local[empty] + 2.0 * (cell[empty] - found), -1.0, 1.0)
-        cell[empty] = found
+        cell[empty], local[empty] = _nearest_cells(work, at[empty], cell[empty])
     rows = np.full(work.grid.counts, -1, dtype=np.int64)
     rows[tuple(work.modes.cells.T)] = np.arange(len(work.modes.cells))
     number = work.modes.number[rows[tuple(cell.T)]]
@@ -195,6 +195,20 @@ def mode_weights(work: CellWorkpiece, points: Array) -> csr_array:
     n, some = len(points), number >= 0
     at = np.broadcast_to(np.arange(n)[:, None], number.shape)
     return csr_array((values[some], (at[some], number[some])), shape=(n, len(work.modes)))
+
+
+def _nearest_cells(work: CellWorkpiece, points: Array, cells: Indices) -> tuple[Indices, Array]:
+    """The nearest of the active cells about empty ones (n, 3), and local coordinates of points (n, 3) clipped to it.
+
+    A point on a face of the material may lie on a plane between a full cell and an empty one.
+    """
+    active = work.modes.cells
+    near = active[cKDTree(active).query(cells, k=min(AROUND, len(active)))[1].reshape(len(cells), -1)]
+    low, high = (np.stack([v[near[..., d] + e] for d, v in enumerate(work.grid.planes)], axis=-1) for e in (0, 1))
+    off = np.linalg.norm(np.maximum(np.maximum(low - points[:, None], points[:, None] - high), 0.0), axis=2)
+    best = np.arange(len(cells)), off.argmin(axis=1)
+    local = 2.0 * (points - low[best]) / (high - low)[best] - 1.0
+    return near[best], np.clip(local, -1.0, 1.0)
 
 
 def line_compliances(work: CellWorkpiece, lines: ArrayLike) -> Array:
@@ -244,7 +258,7 @@ def displacements(work: CellWorkpiece, line: ArrayLike, points: ArrayLike) -> Ar
 
 def _spread(work: CellWorkpiece, ends: Array) -> Array:
     """Shares of contact lines (c, 2, 3) at which their force acts."""
-    longest = float(np.linalg.norm((ends[:, 1] - ends[:, 0]) / work.grid.size, axis=1).max())
+    longest = float(np.linalg.norm(np.diff(work.grid.in_cells(ends), axis=1), axis=2).max())
     count = max(SPREAD, int(np.ceil(PER_CELL * longest)))
     return np.asarray((np.arange(count) + 0.5) / count)
 
