@@ -201,7 +201,7 @@ def test_an_unknown_example_names_the_nearest(tmp_path: Path) -> None:
 
 
 def test_version() -> None:
-    assert call("--version")[:2] == (0, "chipload 0.1.0\n")
+    assert call("--version")[:2] == (0, "chipload 0.2.0\n")
 
 
 def test_help_comes_without_the_heavy_imports() -> None:

@@ -96,3 +96,14 @@ def test_torque() -> None:
     assert all(over[name] > 0.0 for name, t in found["time_s"].items() if t < found["time_s"][own])
     assert len(over) == 6
     assert sum(value <= 0.0 for value in over.values()) == 3
+
+
+def test_impeller() -> None:
+    found, out = ran("impeller")
+    largest, times = found["largest_mm"], found["time_min"]
+    assert len(largest) == 24
+    # one cutter for all fits at each point; two mill in less time, and neither beats the proved bound
+    assert 0.0 < found["one_cutter_mm"] <= largest[0] < largest[-1]
+    assert found["least_time_min"] <= times["2 cutters"] <= times["1 cutter"]
+    assert found["verdict"] == "holds"
+    assert any("application/vnd.plotly.v1+json" in o.get("data", {}) for o in out)
