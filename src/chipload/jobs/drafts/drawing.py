@@ -147,7 +147,9 @@ def _of_layer(drawing: Drawing, layer: str) -> list[Contour]:
 
 
 def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float]:
-    """Diameter [mm] of the largest cutter that reaches nearly all, with room in its channels, and the area [mm^2]."""
+    """Diameter [mm] of the largest cutter that reaches nearly all, with room in its channels if half of it has, and the
+    area [mm^2].
+    """
     area: Any = shapely.Polygon()
     for c in contours:
         points = c.at(np.linspace(0.0, c.length, POINTS, endpoint=False))[0]
@@ -156,7 +158,8 @@ def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float]:
     if not whole > 0.0:
         raise InputError("the contours enclose no area")
     able = [d for d in DIAMETERS if float(_opened(area, d).area) >= REACH * whole] or [DIAMETERS[-1]]
-    return next((d for d in able if not _narrow(area, d)), able[0]), whole
+    near = [d for d in able if d >= 0.5 * able[0]]
+    return next((d for d in near if not _narrow(area, d)), near[-1]), whole
 
 
 def _opened(area: Any, d: float) -> Any:
@@ -226,7 +229,7 @@ def _rest(machine: Machine, named: str | None, d: float, axial: float, kind: str
         limits.append(Entry("torque_nm", machine.torque / 1000.0, f"of the spindle of {machine.name}"))
     limits.append(Entry("force_xy_n", note="across the axis", example="500.0"))
     why = (
-        f"the largest that reaches {100.0 * REACH:g} % of the area, with room in every channel"
+        f"the largest that reaches {100.0 * REACH:g} % of the area, less where channels are narrow"
         if kind == "pocket"
         else "a common size"
     )
