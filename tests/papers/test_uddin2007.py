@@ -91,7 +91,7 @@ def test_kink_of_the_leading_curve(sharp):
     centre = 20.0 + math.sqrt(inner**2 - 2.9**2)
     gap = math.hypot(points[0, 0] - centre, 5.0) - 5.0
     (event,) = [e for e in sharp["backward"].events if e.code == "joint-overshoot"]
-    assert float(event.text.split("leaves ")[1].split(" um")[0]) == pytest.approx(1e3 * gap, abs=0.006)
+    assert float(event.text.split("leaves ")[1].split(" µm")[0]) == pytest.approx(1e3 * gap, abs=0.006)
 
 
 def test_plain_rises_in_the_corner(sharp):
@@ -262,7 +262,7 @@ def test_backward_wins_with_edge_force_and_on_a_slow_machine(sharp, no_edge_forc
 def table(agile, slow):
     """Strategies on the vmc, then on the slow machine."""
     out = [
-        "| strategy | machine | engagement [deg] | force in the plane [N] | range of it | form error [um] "
+        "| strategy | machine | engagement [deg] | force in the plane [N] | range of it | form error [µm] "
         "| of it over the straight wall | finish pass [s] | at equal force [s] | force at equal time [N] |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
