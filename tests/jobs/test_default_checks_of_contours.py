@@ -90,6 +90,16 @@ def test_a_film_is_not_judged_by_its_deflection() -> None:
     ]
 
 
+def test_a_light_step_at_a_weak_place_is_judged() -> None:
+    """A third of the load, and most of the deflection: the rigid model must hold there too."""
+    columns = {
+        "force_n": np.array([100.0, 33.0, 33.0]),
+        "deflection_share": np.array([0.1, 0.5, 0.5]),
+        "deflection_workpiece_um": np.array([5.0, 20.0, 2.0]),
+    }
+    assert _could_be_greatest(columns).tolist() == [True, True, False]
+
+
 def test_a_step_that_slows_down_is_held_against_the_feed_before_it() -> None:
     """The deflection of the last step, at a tenth of the feed, over that which the feed of its neighbour allows."""
     mill = Cutter(10.0, 1, 0.0, 20.0, 40.0, 5.8e5)

@@ -32,6 +32,10 @@ CHECK_COLUMNS = ("cutter_stress_mpa", "deflection_share")
 LOADED = 0.1
 #: the column by which :func:`_could_be_greatest` judges a step, the first that a track has
 LOADS = ("force_n", "force_xy_n", "force_normal_n", "torque_mean_nm")
+#: what a load does at its place, which a light load may do most
+PLACED = (
+    "deflection_um", "deflection_workpiece_um", "form_error_um", "stress_mpa", "strength_share", "force_over_allowable",
+)  # fmt: skip
 #: loads whose direction is not known where the material has a tangential force alone
 DIRECTED = (
     "force_n", "deflection_um", "deflection_workpiece_um", "form_error_um", "cutter_stress_mpa", "deflection_share",
@@ -217,19 +221,24 @@ def default_limits(
 
 
 def _could_be_greatest(columns: Columns) -> NDArray[np.bool_]:
-    """Steps whose load, greater by what the deflection may add to the chip, would be the greatest of their tool.
+    """Steps with a load or a deflection that, greater by what the deflection may add to the chip, would be the greatest
+    of their tool.
 
     A tooth takes at most its feed and the deflection of the tooth before it, and the radial depth is greater by the
-    deflection at most: of other steps the loads may be wrong by both and stay below those that limits are held against.
+    deflection at most: of other steps no value that is limited comes above those that limits are held against.
     """
     load = np.asarray(columns[next(c for c in LOADS if c in columns)])
     tool = np.asarray(columns["tool"]) if "tool" in columns else np.zeros(len(load), dtype=np.int64)
-    greatest = np.zeros(len(load))
-    for number in np.unique(tool):
-        greatest[tool == number] = load[tool == number].max(initial=0.0)
     share = np.asarray(columns["deflection_share"])
-    could = load * (1.0 + OF_FEED * share) * (1.0 + OF_DEPTH * share)
-    return np.asarray((load >= LOADED * greatest) & (could >= greatest) & (load > 0.0))
+    more = (1.0 + OF_FEED * share) * (1.0 + OF_DEPTH * share)
+    judged = [np.abs(np.asarray(columns[c])) for c in dict.fromkeys((*LOADS, *PLACED)) if c in columns]
+    out = np.zeros(len(load), dtype=np.bool_)
+    for number in np.unique(tool):
+        own = tool == number
+        touches = load[own] < LOADED * load[own].max(initial=0.0)
+        could = np.any([v[own] * more[own] >= v[own].max(initial=0.0) for v in judged], axis=0)
+        out[own] = could & ~touches & (load[own] > 0.0)
+    return out
 
 
 def _rigid(check: LimitCheck) -> LimitCheck:
