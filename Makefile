@@ -25,12 +25,14 @@ $(VENV)/.ready: $(VENV)/.run requirements.lock
 	$(PIP) install --require-hashes -r requirements.lock
 	touch $@
 
+# kernels whose types are stated are compiled when they are imported: here once, beside the checks, not by every process
+KERNELS := chipload.engagement.bricks.front._kernels, chipload.stability._kernels, chipload.stability.several._kernels
+
 test: setup
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/lint-imports
-	$(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site
+	$(BIN)/python -c 'import $(KERNELS)' & compiled=$$!; \
+	{ $(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports \
+	&& $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site; }; checked=$$?; \
+	wait $$compiled && exit $$checked
 	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal -ra
 
 # the tests marked core, within 3 minutes on two cores
@@ -46,8 +48,10 @@ coverage: setup
 docs: setup
 	$(BIN)/mkdocs build --strict --site-dir site
 
-# every real file of docs/real_programs.md, run whole; CHIPLOAD_DATA is their folder. Hours: for the night
+# the tests that take minutes, and every real file of docs/real_programs.md, run whole; CHIPLOAD_DATA is their folder.
+# Hours: for the night
 real: setup
+	CHIPLOAD_LONG=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -q tests/real
 	$(BIN)/python tools/real_programs.py
 
 # the wheel and the source archive; the wheel runs a job in an environment of its own, away from the checkout

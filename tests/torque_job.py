@@ -98,5 +98,3 @@ strength_share = 0.9
 torque_over_percent = 5.0
 """
 )
-#: what a run says before it begins
-NOTICE = "chipload: a torque job does not resume: if it is stopped, it begins again\n"

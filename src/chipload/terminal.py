@@ -16,7 +16,7 @@ import typer
 from chipload.errors import Cancelled, InputError, InputErrors, OutputError
 from chipload.files import cannot_write, is_full
 
-#: [s] between two lines of progress in a log
+#: [s] between two lines of progress in a log, and after which a run is long
 LOG_S = 60.0
 FAULT, WRONG, EXCEEDED, UNWRITTEN, STOPPED = 1, 2, 3, 4, 130
 
@@ -173,9 +173,41 @@ def log_lines(clock: Callable[[], float], every_s: float = LOG_S) -> Callable[[f
     return report
 
 
+def with_note(
+    report: Callable[[float, str], None], note: str, clock: Callable[[], float]
+) -> Callable[[float, str], None]:
+    """A progress function that writes a note once, where a run turns out to be long.
+
+    Parameters
+    ----------
+    note : empty: nothing is written
+    clock : time now [s]
+    """
+    begun, said = clock(), not note
+
+    def noted(done: float, what: str) -> None:
+        nonlocal said
+        if not said and clock() - begun >= LOG_S and done < 1.0:
+            write_line(note)
+            said = True
+        report(done, what)
+
+    return noted
+
+
 @contextmanager
-def bar() -> Iterator[Callable[[float, str], None]]:
-    """A progress bar on stderr where that is a terminal, else a line a minute, as in the log of a batch job."""
+def bar(note: str = "") -> Iterator[Callable[[float, str], None]]:
+    """A progress bar on stderr where that is a terminal, else a line a minute, as in the log of a batch job.
+
+    ``note`` is written once, where the run is long.
+    """
+    with _bar() as report:
+        yield with_note(report, note, time.monotonic)
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[float, str], None]]:
+    """The bar or the lines of a log."""
     if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
         yield log_lines(time.monotonic)
         return

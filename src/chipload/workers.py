@@ -1,18 +1,24 @@
 """Tasks on this process, on a pool of processes or on a Dask cluster; what a killed worker had is done again.
 
-A task is a picklable function and its arguments; its result is yielded as it comes, with its number.
+A task is a picklable function and its arguments; its result is yielded as it comes, with its number. A team stays for
+many groups of tasks; it shares a value that all of them need, which goes to each worker once.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any, Protocol
 
 from chipload.errors import ChiploadError, InputError
 from chipload.lazy import require_extra
@@ -60,6 +66,41 @@ class Workers:
         """As :func:`completed`."""
         return completed(function, tasks, self.processes, self.dask)
 
+    @contextmanager
+    def team(self) -> Iterator[Team]:
+        """Workers that stay until the end of the block.
+
+        Raises
+        ------
+        InputError
+            The cluster does not answer.
+        """
+        if self.dask is not None:
+            with _client(self.dask) as client:
+                yield _Cluster(client, self.dask)
+        elif self.processes == 1:
+            yield _Alone()
+        else:
+            with tempfile.TemporaryDirectory(prefix="chipload-") as folder:
+                pool = _Pool(self.processes, Path(folder))
+                try:
+                    yield pool
+                finally:
+                    pool.close()
+
+
+class Team(Protocol):
+    """Workers that stay for many groups of tasks."""
+
+    def share(self, value: Any) -> None:
+        """Give the workers what the functions of :meth:`completed_shared` have as their first argument from now on."""
+
+    def completed(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
+        """As :func:`completed`."""
+
+    def completed_shared(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
+        """As :func:`completed`, with the value that is shared before the arguments of each task."""
+
 
 class WorkerDied(ChiploadError):
     """A worker died each time that it had a task."""
@@ -82,13 +123,106 @@ def completed(
     InputError
         The cluster does not answer.
     """
-    if dask is not None:
-        yield from _on_cluster(function, tasks, dask)
-    elif workers == 1 or len(tasks) < 2:
+    with Workers(workers, dask).team() as team:
+        yield from team.completed(function, tasks)
+
+
+class _Alone:
+    """The process itself."""
+
+    def __init__(self) -> None:
+        self._value: Any = None
+
+    def share(self, value: Any) -> None:
+        self._value = value
+
+    def completed(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
         for k, task in enumerate(tasks):
             yield k, function(*task)
-    else:
-        yield from _in_pool(function, tasks, workers)
+
+    def completed_shared(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
+        return self.completed(partial(function, self._value), tasks)
+
+
+class _Pool(_Alone):
+    """Processes of this computer; a single task is done by this one. What they share is a file in ``folder``."""
+
+    def __init__(self, processes: int, folder: Path) -> None:
+        super().__init__()
+        self._processes, self._folder, self._shared = processes, folder, 0
+        self._executor: ProcessPoolExecutor | None = None
+
+    def share(self, value: Any) -> None:
+        super().share(value)
+        self._file.unlink(missing_ok=True)
+        self._shared += 1
+        self._file.write_bytes(pickle.dumps(value, pickle.HIGHEST_PROTOCOL))
+
+    @property
+    def _file(self) -> Path:
+        return self._folder / f"{self._shared}.pickle"
+
+    def completed_shared(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
+        if len(tasks) < 2:
+            return super().completed_shared(function, tasks)
+        return self.completed(partial(_with_file, str(self._file), function), tasks)
+
+    def completed(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
+        if len(tasks) < 2:
+            yield from super().completed(function, tasks)
+            return
+        waiting = dict.fromkeys(range(len(tasks)), 0)
+        while waiting:
+            running: dict[Future[Any], int] = {}
+            try:
+                for k, value in self._through(function, tasks, list(waiting), running):
+                    del waiting[k]
+                    yield k, value
+            except BrokenProcessPool:
+                self.close()
+                # which of those that ran ended the worker is not known
+                for k in {*running.values()} & set(waiting):
+                    waiting[k] += 1
+                    if waiting[k] > RETRIES:
+                        raise WorkerDied(f"task {k + 1}: its worker died {RETRIES + 1} times: free memory") from None
+            finally:
+                for future in running:
+                    future.cancel()
+
+    def _through(
+        self,
+        function: Callable[..., Any],
+        tasks: Sequence[Task],
+        numbers: Sequence[int],
+        running: dict[Future[Any], int],
+    ) -> Iterator[tuple[int, Any]]:
+        """The tasks of these numbers, two of each worker at a time in ``running``."""
+        if self._executor is None:
+            _single_threaded()
+            # spawned: a fork would copy threads of the libraries in an unknown state
+            self._executor = ProcessPoolExecutor(self._processes, multiprocessing.get_context("spawn"))
+        ahead = iter(numbers)
+        for k in ahead:
+            running[self._executor.submit(function, *tasks[k])] = k
+            if len(running) >= 2 * self._processes:
+                break
+        while running:
+            ended, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in ended:
+                value, k = future.result(), running.pop(future)
+                yield k, value
+                if (following := next(ahead, None)) is not None:
+                    running[self._executor.submit(function, *tasks[following])] = following
+
+    def close(self) -> None:
+        """End the processes."""
+        pool, self._executor = self._executor, None
+        if pool is None:
+            return
+        processes = list((getattr(pool, "_processes", None) or {}).values())
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.terminate()
 
 
 def _single_threaded() -> None:
@@ -97,49 +231,48 @@ def _single_threaded() -> None:
         os.environ.setdefault(name, "1")
 
 
-def _in_pool(function: Callable[..., Any], tasks: Sequence[Task], workers: int) -> Iterator[tuple[int, Any]]:
-    waiting = dict.fromkeys(range(len(tasks)), 0)
-    _single_threaded()
-    while waiting:
-        # spawned: a fork would copy threads of the libraries in an unknown state
-        pool = ProcessPoolExecutor(min(workers, len(waiting)), multiprocessing.get_context("spawn"))
-        try:
-            running: dict[Future[Any], int] = {}
-            ahead = iter(list(waiting))
-            for k in ahead:
-                running[pool.submit(function, *tasks[k])] = k
-                if len(running) >= 2 * workers:
-                    break
-            while running:
-                ended, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in ended:
-                    k = running.pop(future)
-                    value = future.result()
-                    del waiting[k]
-                    yield k, value
-                    if (following := next(ahead, None)) is not None:
-                        running[pool.submit(function, *tasks[following])] = following
-        except BrokenProcessPool:
-            # which of those that ran ended the worker is not known
-            for k in {*running.values()} & set(waiting):
-                waiting[k] += 1
-                if waiting[k] > RETRIES:
-                    raise WorkerDied(f"task {k + 1}: its worker died {RETRIES + 1} times: free memory") from None
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in list((getattr(pool, "_processes", None) or {}).values()):
-                process.terminate()
+def _with_file(file: str, function: Callable[..., Any], *task: Any) -> Any:
+    """A task with the value that a file holds; this is what a worker executes."""
+    return function(_read(file), *task)
 
 
-def _on_cluster(function: Callable[..., Any], tasks: Sequence[Task], address: str) -> Iterator[tuple[int, Any]]:
+@lru_cache(maxsize=1)
+def _read(file: str) -> Any:
+    """What a file holds, read once by each worker."""
+    return pickle.loads(Path(file).read_bytes())
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Any]:
+    """A client of a cluster."""
     require_extra("cluster")
-    from distributed import Client, KilledWorker, as_completed
+    from distributed import Client
 
     try:
         client = Client(address, timeout=10)
     except (OSError, ValueError) as err:
         raise InputError(f"--dask {address}: no scheduler answers: {err}") from None
     with client:
+        yield client
+
+
+class _Cluster(_Alone):
+    """Workers of a cluster; what they share is data of the cluster, copied to each."""
+
+    def __init__(self, client: Any, address: str) -> None:
+        super().__init__()
+        self._client, self._address = client, address
+
+    def share(self, value: Any) -> None:
+        self._value = self._client.scatter(value, broadcast=True, hash=False)
+
+    def completed_shared(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
+        return self.completed(function, [(self._value, *task) for task in tasks])
+
+    def completed(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
+        from distributed import KilledWorker, as_completed
+
+        client, address = self._client, self._address
         numbers = {
             client.submit(function, *task, pure=False, retries=RETRIES): k for k, task in enumerate(tasks)
         }  # fmt: skip
@@ -151,7 +284,7 @@ def _on_cluster(function: Callable[..., Any], tasks: Sequence[Task], address: st
                 k = numbers[future]
                 try:
                     value = future.result()
-                except KilledWorker as err:
+                except (KilledWorker, CancelledError) as err:
                     raise WorkerDied(f"task {k + 1}: {err}") from None
                 future.release()
                 yield k, value

@@ -61,8 +61,8 @@ def test_radial_depth_of_a_diameter(depth):
 
 def test_open_chain_among_closed_contours():
     assert refused([rounded(8.0), CHAIN]) == (
-        "part: open chain ends at (30, 10), gap 31.6228 mm, among closed contours: close it (part.join_mm) "
-        "or choose its layer alone (part.layers)"
+        "part: open chain ends at (30, 10), gap 31.6228 mm, among closed contours: close it (part.join_mm), choose its "
+        'layer alone (part.layers), or leave it out (part.open_chains = "dropped")'
     )
 
 

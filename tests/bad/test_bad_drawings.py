@@ -158,7 +158,8 @@ def test_a_tolerance_that_is_none(drawn, bad):
 def test_an_open_chain_where_a_closed_one_is_needed(drawn):
     drawing = read_dxf(drawn(lambda msp: msp.add_lwpolyline([(0, 0), (10, 0), (10, 10)])))
     message = (
-        "contour open at (10, 10), gap 14.1421 mm: a closed contour is needed; close the drawing or raise part.join_mm"
+        "contour open at (10, 10), gap 14.1421 mm: a closed contour is needed; close the drawing, raise part.join_mm, "
+        'or leave it out (part.open_chains = "dropped")'
     )
     with pytest.raises(InputError, match="^" + re.escape(message) + "$"):
         Region(drawing.contours)

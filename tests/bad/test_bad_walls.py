@@ -169,6 +169,23 @@ def test_a_run_refuses_a_wall(plate_job: Path, change: str, says: str) -> None:
     assert run(plate_job, change).startswith(says)
 
 
+@pytest.mark.parametrize(
+    ("shape", "says"),
+    [
+        ("corner_radius_mm = 0.0", "cutter.corner_radius_mm = 0: must be above 0: choose a ball or bull nose"),
+        (
+            "corner_radius_mm = 2.0\ntaper_deg = 3.0",
+            "cutter.taper_deg = 3: must be 0: choose a ball or bull nose",
+        ),
+    ],
+)
+def test_a_flat_end_and_a_taper_cut_no_wall(plate_job: Path, shape: str, says: str) -> None:
+    """They cut with their flanks."""
+    text = plate_job.read_text().replace("scallop_um = 20.0", "step_over_mm = 0.5")
+    plate_job.write_text(text.replace("corner_radius_mm = 4.0", shape))
+    assert run(plate_job) == f"chipload: {says}"
+
+
 def test_a_barrel_is_no_cutter_of_a_wall(plate_job: Path) -> None:
     """A body of revolution, as tool libraries state a barrel: the cutter, and the operation that names it."""
     body = "body_mm = [[0.0, 0.0], [3.0, 0.5], [4.0, 5.0], [3.6, 8.0]]"

@@ -29,7 +29,7 @@ def ran(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_few_cases_of_every_reader() -> None:
-    done = ran("--cases", "12", "--budget", "800")
+    done = ran("--cases", "6", "--budget", "800")
     assert done.returncode == 0, done.stdout + done.stderr
     rows = re.findall(r"^\| (\w+) \| (\d+) \|", done.stdout, re.MULTILINE)
     assert len(rows) == 26

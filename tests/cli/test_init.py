@@ -412,43 +412,6 @@ def test_a_freecad_part_is_a_pocket(tmp_path: Path) -> None:
     assert (tmp_path / "again" / "part.step").read_bytes() == (tmp_path / "job" / "part.step").read_bytes()
 
 
-def drawn(path: Path, points: list[tuple[float, float]]) -> None:
-    """A closed polygon that names no unit."""
-    import ezdxf
-
-    drawing = ezdxf.new("R2000")
-    drawing.header["$INSUNITS"] = 0
-    drawing.modelspace().add_lwpolyline(points, close=True)
-    drawing.saveas(path)
-
-
-def square(path: Path) -> None:
-    """A closed square of 40 mm that names no unit."""
-    drawn(path, [(0.0, 0.0), (40.0, 0.0), (40.0, 40.0), (0.0, 40.0)])
-
-
-def test_a_drawing_is_a_pocket(tmp_path: Path) -> None:
-    """Of a square of 40 mm an opening by diameter D leaves out (4 - pi) D^2 / 4: 3 % of the area is D = 14.95 mm."""
-    square(tmp_path / "square.dxf")
-    code, said, _ = call("init", tmp_path / "square.dxf", tmp_path / "job")
-    assert code == 0
-    assert "1600 mm2" in said
-    job = tomllib.loads((tmp_path / "job" / "job.toml").read_text())
-    assert (job["operation"][0]["kind"], job["cutter"][0]["diameter_mm"]) == ("pocket", 12.0)
-    assert job["part"]["units_if_unstated"] == "mm"
-    lines, _ = check_job(load_job(tmp_path / "job" / "job.toml"))
-    assert "operation 0: pocket, cutter 1 of 12 mm, 1600 mm2" in lines
-
-
-def test_a_channel_is_wider_than_the_cutter(tmp_path: Path) -> None:
-    """Two squares of 40 mm, joined by a channel of 9 mm: 8 mm would fit, 6 mm is the largest with 1.3 of it."""
-    lower = [(0.0, 0.0), (40.0, 0.0), (40.0, 15.5), (60.0, 15.5), (60.0, 0.0), (100.0, 0.0)]
-    drawn(tmp_path / "joined.dxf", [*lower, *((x, 40.0 - y) for x, y in reversed(lower))])
-    assert call("init", tmp_path / "joined.dxf", tmp_path / "job")[0] == 0
-    job = tomllib.loads((tmp_path / "job" / "job.toml").read_text())
-    assert job["cutter"][0]["diameter_mm"] == 6.0
-
-
 def test_sections_are_a_thin_wall(tmp_path: Path) -> None:
     """Three numbered files of an ellipse of 30 by 4 mm, 20 mm apart."""
     from math import cos, pi, sin

@@ -15,6 +15,7 @@ import pytest
 import trimesh
 
 from cli.test_simulate import JOB
+from command import TIME_LEFT
 
 COMMAND = [sys.executable, "-c", "from chipload.cli import main; main()"]
 
@@ -46,9 +47,7 @@ def start(place: Path, out: str, *more: str, file: str = "job.toml") -> subproce
 
 def ended(process: subprocess.Popen[str]) -> subprocess.CompletedProcess[str]:
     out, err = process.communicate(timeout=500)
-    # on a slow computer it tells the time left
-    err = re.sub(r"^chipload: \d+ %, .*\n", "", err, flags=re.MULTILINE)
-    return subprocess.CompletedProcess(process.args, process.returncode, out, err)
+    return subprocess.CompletedProcess(process.args, process.returncode, out, TIME_LEFT.sub("", err))
 
 
 def stop(
@@ -161,16 +160,17 @@ def test_a_run_that_was_killed_reads_what_it_had_found_of_the_part(folder: Path)
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGHUP])
 def test_ctrl_c_says_what_is_kept_and_how_to_go_on(folder: Path, how: signal.Signals) -> None:
-    stopped = stop(folder, "stopped", how)
+    out = f"stopped-{how.name}"
+    stopped = stop(folder, out, how)
     assert stopped.returncode == 130
     assert re.fullmatch(
-        r"chipload: stopped: \d+ steps are kept in stopped.unfinished: the same command continues from there, with "
+        rf"chipload: stopped: \d+ steps are kept in {out}.unfinished: the same command continues from there, with "
         r"--fresh it begins again\n",
         stopped.stderr,
     )
-    fresh = ended(start(folder, "stopped", "--fresh"))
+    fresh = ended(start(folder, out, "--fresh"))
     assert (fresh.returncode, fresh.stderr) == (0, "chipload: begins again: it was asked to\n")
-    same(folder, "stopped")
+    same(folder, out)
 
 
 def test_another_input_does_not_go_on(folder: Path) -> None:

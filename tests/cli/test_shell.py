@@ -28,7 +28,7 @@ from chipload.result import LimitCheck, Verdict
 from chipload.structure import beam
 from chipload.structure.shell import Shell, compliance, ritz
 from command import call
-from torque_job import NOTICE, TUBE_JOB
+from torque_job import TUBE_JOB
 
 NAMES = ["constant", "model", "model_not_derated", "pi", "fuzzy", "fuzzy_feedforward"]
 
@@ -45,7 +45,6 @@ def result(tmp_path_factory) -> Path:
     (folder / "job.toml").write_text(TUBE_JOB)
     code, out, err = call("run", folder / "job.toml", "--out", folder / "r", "--debug")
     assert code in (0, 3), out + err
-    assert err.startswith(NOTICE)  # on a slow computer it tells the time left
     return folder / "r"
 
 

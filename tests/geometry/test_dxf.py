@@ -79,6 +79,23 @@ def test_what_is_seen_from_below_is_mirrored(draw):
     assert np.allclose(poly.at(poly.length / 2)[0], [[-31, -1]])
 
 
+def test_layers_that_are_off_or_frozen_are_read_only_by_name(draw):
+    def fill(msp, doc):
+        for name, at in (("part", 0.0), ("old", 20.0), ("help", 40.0)):
+            doc.layers.add(name)
+            msp.add_circle((at, 0.0), 5.0, dxfattribs={"layer": name})
+        doc.layers.get("old").off()
+        doc.layers.get("help").freeze()
+
+    drawing = draw(fill)
+    assert drawing.layers == ("part",)
+    assert [f.text for f in drawing.findings] == [
+        "layer 'help' is frozen: 1 entity not read; part.layers = ['help'] reads it",
+        "layer 'old' is off: 1 entity not read; part.layers = ['old'] reads it",
+    ]
+    assert sorted(draw(fill, layers=["old", "part"]).layers) == ["old", "part"]
+
+
 def test_blocks_are_exploded_where_they_stand(draw):
     def fill(msp, doc):
         inner = doc.blocks.new("hole")

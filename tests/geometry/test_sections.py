@@ -120,8 +120,7 @@ def test_refused_files(tmp_path):
     bad.write_text("X Y Z\n1 2 3\n1 2\n")
     with pytest.raises(InputError, match="line 3: 2 numbers: must be as many in every line"):
         read_sections([bad], "mm")
-    # as pyturbo-aero writes all sections of both sides into one table
-    bad.write_text("span_index,ss_x,ss_r,ss_th,ps_x,ps_r,ps_th\n0, 1, 2, 3, 4, 5, 6\n")
+    bad.write_text("X Y Z\n0 1 2 3 4 5 6\n")
     with pytest.raises(InputError, match=r"7 numbers: .*: write each section to a file of its own, a line X Y Z for"):
         read_sections([bad], "mm")
     with pytest.raises(InputError, match="unit = 'yard': must be one of"):

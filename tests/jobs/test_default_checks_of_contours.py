@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,13 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named
 from chipload.engagement.contact import Engagement
 from chipload.jobs import load_job, run_job
-from chipload.jobs.checks import _could_be_greatest
+from chipload.jobs.checks import DefaultChecks, _could_be_greatest
 from chipload.planning.cost import CutConditions, cost
 from chipload.result import Verdict
 
 COARSE = ("operation.0.step_mm=0.4", 'operation.0.strategies=["plain"]', "operation.0.use=plain")
+MILL = Cutter(10.0, 1, 0.0, 20.0, 40.0, 5.8e5)
+CHECKS = DefaultChecks({}, material_named("al7075-t6"))
 ROOMY = ("limits.engagement_deg=60", "limits.force_xy_n=5000", "limits.torque_nm=50", "limits.form_error_um=100000")
 
 
@@ -80,14 +83,34 @@ def test_a_film_is_not_judged_by_its_deflection() -> None:
         "deflection_share": np.array([0.1, 0.6, 0.7, 1e4, 0.2]),
     }
     # 40 N (1 + 2 share) (1 + share / 4) is 101.2 N with a share of 0.6, 112.8 N with 0.7
-    assert _could_be_greatest(columns).tolist() == [True, True, True, False, True]
-    assert _could_be_greatest({**columns, "deflection_share": np.full(5, 0.5)}).tolist() == [
+    assert _could_be_greatest(columns, CHECKS).tolist() == [True, True, True, False, True]
+    assert _could_be_greatest({**columns, "deflection_share": np.full(5, 0.5)}, CHECKS).tolist() == [
         True,
         False,
         False,
         False,
         True,
     ]
+
+
+def test_a_film_is_judged_by_its_feed_and_its_depth_apart() -> None:
+    """f_z = 0.1 mm of a mill with 2 teeth at 100 rad/s: 20 um are a fifth of it, and the share is that of the depth."""
+    n = 3
+    columns = {
+        "force_n": np.array([100.0, 30.0, 50.0]),
+        "deflection_share": np.array([0.1, 3.0, 3.0]),
+        "deflection_um": np.array([60.0, 20.0, 20.0]),
+        "feed_mm_min": np.full(n, 0.1 * 2 * 100.0 / math.tau * 60.0),
+        "torque_mean_nm": np.array([3.0, 1.0, 1.0]),
+        "power_w": np.array([300.0, 100.0, 100.0]),
+    }
+    checks = DefaultChecks({0: replace(MILL, flutes=2)}, material_named("al7075-t6"))
+    # (1 + 0.2) (1 + 0.25 x 3) = 2.1: 63 N and 105 N; by one share for both 12.25 times as much
+    assert _could_be_greatest(columns, checks).tolist() == [True, False, True]
+    turned = {"axis_x": np.array([0.0, 0.1, 0.1]), "axis_y": np.zeros(n), "axis_z": np.array([1.0, 0.995, 0.995])}
+    assert _could_be_greatest({**columns, **turned}, checks).tolist() == [True, True, True]
+    strict = replace(checks, of_feed=0.01, of_depth=0.01)
+    assert _could_be_greatest(columns, strict).tolist() == [True, False, False]
 
 
 def test_a_light_step_at_a_weak_place_is_judged() -> None:
@@ -97,7 +120,7 @@ def test_a_light_step_at_a_weak_place_is_judged() -> None:
         "deflection_share": np.array([0.1, 0.5, 0.5]),
         "deflection_workpiece_um": np.array([5.0, 20.0, 2.0]),
     }
-    assert _could_be_greatest(columns).tolist() == [True, True, False]
+    assert _could_be_greatest(columns, CHECKS).tolist() == [True, True, False]
 
 
 def test_a_step_that_slows_down_is_held_against_the_feed_before_it() -> None:

@@ -27,7 +27,7 @@ def opened(shape, radius):
 )
 def test_tabs_hold_the_part(tmp_path, more):
     """Above 1.5 mm the ring is cleared, below the strips stay whole: areas of both heights, by polygons."""
-    (pocket,), outcome = done(written(tmp_path, RING, operation(f"radial_depth_mm = 1.0\n{TABS}{more}", cutter=2)))
+    (pocket,), outcome = done(written(tmp_path, RING, operation(f"radial_depth_mm = 1.5\n{TABS}{more}", cutter=2)))
     ring = shapely.difference(shapely.box(0, 0, 40, 34), shapely.box(10, 10, 30, 24))
     strips = shapely.union(shapely.box(30, 15, 40, 19), shapely.box(0, 16, 10, 20))
     below = swept(pocket.program, 2.5, -4.0)

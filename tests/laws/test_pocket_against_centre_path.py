@@ -116,7 +116,8 @@ def test_an_open_chain_is_refused():
     with pytest.raises(InputError) as err:
         cleared([Contour.polyline([(0, 0), (30, 0), (30, 30)])])
     assert str(err.value) == (
-        "contour open at (30, 30), gap 42.4264 mm: a closed contour is needed; close the drawing or raise part.join_mm"
+        "contour open at (30, 30), gap 42.4264 mm: a closed contour is needed; close the drawing, raise part.join_mm, "
+        'or leave it out (part.open_chains = "dropped")'
     )
 
 

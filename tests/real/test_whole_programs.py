@@ -37,7 +37,7 @@ DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[3] / "shared"
 BEAR, BOAT = DATA / "camotics" / "bear", DATA / "linuxcnc_5axis" / "boat-xyzac.ngc"
 pytestmark = pytest.mark.skipif(not (BEAR.is_dir() and BOAT.is_file()), reason="no real programs: set CHIPLOAD_DATA")
 long = pytest.mark.skipif(
-    os.environ.get("CHIPLOAD_LONG") != "1", reason="finer models take minutes: set CHIPLOAD_LONG=1"
+    os.environ.get("CHIPLOAD_LONG") != "1", reason="takes minutes: make real, or set CHIPLOAD_LONG=1"
 )
 INCH = 25.4
 JOB = """[program]
@@ -163,6 +163,7 @@ def run_boat(folder: Path, layer: float) -> dict:
     )  # fmt: skip
 
 
+@long
 def test_the_bear_whole(tmp_path: Path) -> None:
     """15,152 moves of a 3.175 mm ball nose in three axes; rays 0.4 mm apart know the volume to 1e-4."""
     done, (places, lines) = run_bear(tmp_path, 2.0), words()

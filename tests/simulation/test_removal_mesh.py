@@ -100,3 +100,17 @@ def test_merging_keeps_the_area_and_leaves_out_what_is_never_seen() -> None:
     turned, _ = merged_quads(corners[:, ::-1], np.tile(np.array([[0, 5]], dtype=np.uint16), (9, 1)))
     e, f = turned[0, 1].astype(int) - turned[0, 0], turned[0, 2].astype(int) - turned[0, 1]
     assert np.cross(e, f)[2] < 0
+
+
+def test_hundreds_of_holes_of_few_frames_are_all_drawn() -> None:
+    """Holes 1.6 wide and 4 deep, 2 apart, each a run of its own: two and more in a frame."""
+    drill = Cutter(1.6, 2, 0.5, 20.0, 30.0, 6e5)
+    tips, apart = [], []
+    for n, (x, y) in enumerate((x, y) for x in np.arange(2.0, 59.0, 2.0) for y in np.arange(2.0, 39.0, 2.0)):
+        apart.append(2 * n)
+        tips += [(x, y, 21.0), (x, y, 16.0)]
+    mesh = removal_mesh(BOX, path(tips, apart=apart), {1: drill})
+    taken = len(apart) * 4.0 * math.pi * 0.64
+    assert mesh.volumes[0] - mesh.volumes[-1] == pytest.approx(taken, rel=0.03)
+    # what is drawn
+    assert mesh.volume(0) - mesh.volume(len(mesh.rows)) == pytest.approx(taken, rel=0.1)

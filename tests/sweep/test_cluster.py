@@ -14,6 +14,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -25,8 +26,8 @@ from chipload.result.summary import summary_bytes
 from chipload.sweep.run import run_sweep
 from chipload.workers import WorkerDied, Workers, completed
 from conftest import EXAMPLES
-from killed_tasks import always_killed
 from slot_job import slot_job
+from worker_tasks import always_killed, shared_sum
 
 pytest.importorskip("distributed", reason="no distributed: no sweep on a cluster")
 
@@ -92,6 +93,16 @@ def test_a_cluster_whose_workers_are_all_gone_is_said(cluster, monkeypatch):
     monkeypatch.setattr(workers_module, "PATIENCE_S", 1.0)
     with pytest.raises(WorkerDied, match="no worker is left: start workers; the same command continues"):
         list(completed(always_killed, [(1,)], dask=address))
+
+
+def test_a_cluster_shares_a_value_for_its_tasks(cluster):
+    address, _ = cluster
+    with Workers(dask=address).team() as team:
+        for size, total in ((3, 3.0), (5, 10.0)):
+            team.share(np.arange(float(size)))
+            assert sorted(team.completed_shared(shared_sum, [(k,) for k in range(4)])) == [
+                (k, total + k) for k in range(4)
+            ]
 
 
 @pytest.mark.parametrize("cluster", [{"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}], indirect=True)

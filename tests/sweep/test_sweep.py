@@ -26,8 +26,8 @@ from chipload.sweep.run import Combination, SweepResult, run_sweep
 from chipload.sweep.table import pareto
 from chipload.workers import WorkerDied, completed
 from conftest import EXAMPLES
-from killed_tasks import always_killed, killed_once
 from slot_job import slot_job
+from worker_tasks import always_killed, killed_once
 
 OVER = ("cutter.0.diameter_mm=8,10", "operation.0.feed_mm_min=600,900")
 

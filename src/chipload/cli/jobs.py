@@ -42,7 +42,7 @@ def run(
         ),
     ] = False,
     workers: Annotated[
-        int, typer.Option("--workers", help="processes that search the surfaces of an impeller job; 1: this one")
+        int, typer.Option("--workers", help="processes that search, plan and check an impeller job; 1: this one")
     ] = 1,
     dask: Annotated[
         str | None,
@@ -71,11 +71,9 @@ def run(
         check_target(out)
         if not 0.0 <= keep_s < math.inf:
             raise InputError(f"--keep-s = {keep_s:g}: must be at least 0 s")
-        if note := resume_note(loaded):
-            write_line(note)
         with Checkpoint(checkpoint_folder(out), keep_s, fresh=fresh, notice=write_line) as kept:
             try:
-                with bar() as progress:
+                with bar(resume_note(loaded)) as progress:
                     done = run_job(
                         loaded, lambda part, what: progress(0.8 * part, what), kept,
                         guesses=Severity.NOTE if accept else None, workers=where,

@@ -19,7 +19,8 @@ from scipy.spatial import cKDTree
 
 from chipload.errors import Finding, InputError
 from chipload.geometry.contour import JOIN_MM, Contour, Floats
-from chipload.geometry.offset import swept, true_centres
+from chipload.geometry.offset import true_centres
+from chipload.geometry.split import swept
 
 #: a gap [mm] that is a rounding and not worth a word
 SILENT_MM = 1e-6

@@ -272,7 +272,7 @@ class Region:
                 gap = np.hypot(*(c.end - c.start))
                 raise InputError(
                     f"contour open at ({x:.6g}, {y:.6g}), gap {gap:.6g} mm: a closed contour is needed; "
-                    "close the drawing or raise part.join_mm"
+                    'close the drawing, raise part.join_mm, or leave it out (part.open_chains = "dropped")'
                 )
 
     @staticmethod

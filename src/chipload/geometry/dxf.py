@@ -56,7 +56,7 @@ def read_dxf(
     path : the file, text or binary DXF
     units : unit of the numbers (``mm``, ``inch`` ...), whatever the header states; a disagreement is a finding
     units_if_unstated : unit where the header names none
-    layers : names of the layers to read, case ignored; all by default
+    layers : names of the layers to read, case ignored; by default all that the drawing shows: neither off nor frozen
     join_mm : widest gap [mm] that is closed
     tolerance_mm : how far [mm] arcs may leave a spline or an ellipse
     max_entities : most entities that are read
@@ -84,7 +84,9 @@ def read_dxf(
 
     skipped: Counter[str] = Counter()
     parts: dict[str, list[Floats]] = {}
-    known = {str(layer.dxf.get("name", "0")) for layer in _sound(doc.layers, findings)}
+    table = list(_sound(doc.layers, findings))
+    known = {str(layer.dxf.get("name", "0")) for layer in table}
+    hidden, left_out = _hidden(table), Counter[str]()
     wanted = None if layers is None else {name.casefold() for name in layers}
     drawn = _Reader(file, MM_PER[unit], tolerance_mm)
     for count, (entity, layer) in enumerate(_entities(_modelspace(doc, file), None, findings)):
@@ -94,6 +96,9 @@ def read_dxf(
         if entity is None:
             continue
         if wanted is not None and layer.casefold() not in wanted:
+            continue
+        if wanted is None and layer.casefold() in hidden:
+            left_out[layer] += 1
             continue
         rows = drawn.rows(entity, layer, findings)
         if rows is not None and len(rows):
@@ -107,6 +112,8 @@ def read_dxf(
                 raise InputError(f"part.layers: no layer {name!r} in {file.name}; layers there are: {names}")
     findings += [Finding("dxf-skipped", 0, f"{n} {what} dropped: not a line") for what, n in sorted(skipped.items())]
 
+    findings += _left_out(left_out, hidden)
+
     contours: list[Contour] = []
     owner: list[str] = []
     for layer, rows_of in parts.items():
@@ -119,8 +126,26 @@ def read_dxf(
         layouts = _sound(doc.layouts, findings)
         sheets = [layout.name for layout in layouts if layout.name != "Model" and len(layout) > 1]
         also = f"; the sheets {', '.join(sheets)} are not read, only the model space" if sheets else ""
+        also += f"; {', '.join(sorted(left_out))} off or frozen, read if part.layers names them" if left_out else ""
         raise InputError(f"part.file = {file.name}: no lines or arcs{on}; layers there are: {names}{also}")
     return Drawing(tuple(contours), tuple(owner), unit, tuple(findings))
+
+
+def _hidden(layers: Sequence[Any]) -> dict[str, str]:
+    """Layers that the drawing does not show, and how it hides them."""
+    out = {}
+    for layer in layers:
+        how = "off" if layer.is_off() else "frozen" if layer.is_frozen() else ""
+        if how:
+            out[str(layer.dxf.get("name", "0")).casefold()] = how
+    return out
+
+
+def _left_out(count: Counter[str], hidden: dict[str, str]) -> Iterator[Finding]:
+    """What was not read of layers that are hidden."""
+    for layer, n in sorted(count.items()):
+        what = f"layer {layer!r} is {hidden[layer.casefold()]}: {n} entit{'y' if n == 1 else 'ies'} not read"
+        yield Finding("dxf-hidden", 0, f"{what}; part.layers = [{layer!r}] reads it")
 
 
 def _too_many(file: Path, count: str, most: int, what: str = "entities") -> str:

@@ -5,8 +5,9 @@ hub to shroud. A blade has the side that faces a growing theta (`plus`) and the 
 u in 0..1 runs along a section from its leading to its trailing edge, v from the first section to the last.
 
 Formats: a table of three columns whose first line names them, `X R*THETA R`, `X R THETA_DEG` or `X Y Z`, a section a
-file (NASA's HECC); TurboGrid `.curve` and `.crv`, x y z, sections divided by lines that begin with #. X of the first
-two is along the axis. Files say no unit: it is asked for.
+file (NASA's HECC); TurboGrid `.curve` and `.crv`, x y z, sections divided by lines that begin with #; tables of
+pyturbo-aero with all sections (``section_table.py``). X of the first two is along the axis. Files say no unit: it is
+asked for.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from scipy.optimize import minimize_scalar
 from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.geometry.bspline import BSplinePatch, through
+from chipload.geometry.section_table import meridian_of_table, sections_of_table
 from chipload.units import MM_PER
 
 Floats = NDArray[np.float64]
@@ -54,7 +56,7 @@ class Blade:
 def read_sections(
     paths: Sequence[str | Path], unit: str, over: bool = False, columns: str | None = None
 ) -> tuple[Floats, ...]:
-    """Sections of one blade, from files in the order hub to shroud; one TurboGrid file may hold all.
+    """Sections of one blade, from files in the order hub to shroud; one file of TurboGrid or pyturbo-aero may hold all.
 
     Parameters
     ----------
@@ -77,9 +79,16 @@ def read_sections(
     return tuple(p * np.array([1.0, -1.0, -1.0]) if over else p for p in out)
 
 
-def read_meridian(path: str | Path, unit: str, over: bool = False) -> Floats:
-    """(n, 2) float [mm] r and z of a hub or shroud: two columns `x r`, or TurboGrid's x y z with z along the axis."""
+def read_meridian(path: str | Path, unit: str, over: bool = False, shroud: bool = False) -> Floats:
+    """(n, 2) float [mm] r and z of a hub or shroud: two columns `x r`, or TurboGrid's x y z with z along the axis.
+
+    A table of all sections is the hub on which its first one lies, or the ``shroud`` of its last.
+    """
     scale = _scale(unit)
+    found = meridian_of_table(_text(Path(path)), Path(path), shroud)
+    if found is not None:
+        r, z = _finite(found * scale, Path(path)).T
+        return np.stack([r, -z if over else z], axis=-1)
     rows = [row for block in _blocks(Path(path)) for row in block[1]]
     if len({len(row) for row in rows}) > 1:
         raise InputError(f"{path}: blocks of 2 and of 3 columns: must be as many in every block")
@@ -229,6 +238,11 @@ def _scale(unit: str) -> float:
 
 
 def _sections_of(path: Path, scale: float, columns: str | None) -> list[Floats]:
+    table = sections_of_table(_text(path), path)
+    if table is not None:
+        if columns is not None:
+            raise InputError(f"{path}: columns {columns}: must not be stated: the table names its own")
+        return [_finite(p * scale, path) for p in table]
     out = []
     stated = "X Y Z" if path.suffix.lower() in (".curve", ".crv") else columns
     for names, rows in _blocks(path):
@@ -262,11 +276,14 @@ def _finite(p: Floats, path: Path) -> Floats:
     return p
 
 
+def _text(path: Path) -> str:
+    return read_regular(path, str(path), _LARGEST_FILE, "not a table of points").decode("utf-8", "replace")
+
+
 def _blocks(path: Path) -> list[tuple[list[str], list[list[float]]]]:
     """(names of the columns, rows) of each block of a file."""
-    text = read_regular(path, str(path), _LARGEST_FILE, "not a table of points").decode("utf-8", "replace")
     blocks: list[tuple[list[str], list[list[float]]]] = [([], [])]
-    for k, line in enumerate(text.splitlines(), 1):
+    for k, line in enumerate(_text(path).splitlines(), 1):
         words = line.replace(",", " ").split()
         if not words:
             continue

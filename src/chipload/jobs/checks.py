@@ -20,7 +20,7 @@ from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, Verdict, check_limit
 from chipload.result.limits import Columns
 from chipload.simulation.chip_space import flute_fill
-from chipload.simulation.loads import Cuts, Floats
+from chipload.simulation.loads import Cuts, Floats, Ints
 from chipload.simulation.removal import BANDED
 
 #: columns that these checks add to those of the simulation
@@ -30,6 +30,8 @@ CHECK_COLUMNS = ("cutter_stress_mpa", "deflection_share")
 #: steps with less than this share of the greatest load of their tool are not judged by their deflection: the cutter
 #: only touches there
 LOADED = 0.1
+#: an axis that changes by less from step to step does not turn
+UPRIGHT = 1e-9
 #: the column by which :func:`_could_be_greatest` judges a step, the first that a track has
 LOADS = ("force_n", "force_xy_n", "force_normal_n", "torque_mean_nm")
 #: what a load does at its place, which a light load may do most
@@ -56,12 +58,15 @@ class DefaultChecks:
     material : whose coefficients the loads have
     off : names of checks that the job switches off, keys of ``[checks]``
     sigma : limits of loads are checked at the value plus so many standard deviations
+    of_feed, of_depth : deflection over feed per tooth and radial depth up to which the rigid model holds
     """
 
     cutters: Mapping[int, Cutter]
     material: Material
     off: tuple[str, ...] = ()
     sigma: float = 0.0
+    of_feed: float = OF_FEED
+    of_depth: float = OF_DEPTH
 
     @property
     def unknown_direction(self) -> str:
@@ -95,7 +100,9 @@ def default_checks(
             f"operation.0.confidence = {confidence:g}: material {material.name} states neither spread nor covariance: "
             "state one (spread = 0.25 for a table value), or leave confidence out"
         )
-    return DefaultChecks(cutters, material, table.off, max(sigma, 0.0))
+    return DefaultChecks(
+        cutters, material, table.off, max(sigma, 0.0), table.deflection_of_feed, table.deflection_of_depth
+    )
 
 
 def with_checks(
@@ -214,13 +221,13 @@ def default_limits(
     if "flute_length" not in checks.off and "axial_overrun_mm" in columns:
         out.append(check_limit("axial_overrun_mm", 0.0, columns, track=track))
     if "rigid_model" not in checks.off and "deflection_share" in columns:
-        rows, error = _could_be_greatest(columns), load_error(errors, "deflection_share")
+        rows, error = _could_be_greatest(columns, checks), load_error(errors, "deflection_share")
         check = check_limit("deflection_share", 1.0, columns, track=track, rows=rows, error=error, reason=direction)
         out.append(_rigid(check))
     return tuple(with_peaks(check, checks.material) for check in out)
 
 
-def _could_be_greatest(columns: Columns) -> NDArray[np.bool_]:
+def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> NDArray[np.bool_]:
     """Steps with a load or a deflection that, greater by what the deflection may add to the chip, would be the greatest
     of their tool.
 
@@ -230,7 +237,8 @@ def _could_be_greatest(columns: Columns) -> NDArray[np.bool_]:
     load = np.asarray(columns[next(c for c in LOADS if c in columns)])
     tool = np.asarray(columns["tool"]) if "tool" in columns else np.zeros(len(load), dtype=np.int64)
     share = np.asarray(columns["deflection_share"])
-    more = (1.0 + OF_FEED * share) * (1.0 + OF_DEPTH * share)
+    of_feed = np.minimum(checks.of_feed * share, _over_feed(columns, tool, checks.cutters))
+    more = (1.0 + of_feed) * (1.0 + checks.of_depth * share)
     judged = [np.abs(np.asarray(columns[c])) for c in dict.fromkeys((*LOADS, *PLACED)) if c in columns]
     out = np.zeros(len(load), dtype=np.bool_)
     for number in np.unique(tool):
@@ -238,6 +246,32 @@ def _could_be_greatest(columns: Columns) -> NDArray[np.bool_]:
         touches = load[own] < LOADED * load[own].max(initial=0.0)
         could = np.any([v[own] * more[own] >= v[own].max(initial=0.0) for v in judged], axis=0)
         out[own] = could & ~touches & (load[own] > 0.0)
+    return out
+
+
+def _over_feed(columns: Columns, tool: Ints, cutters: Mapping[int, Cutter]) -> Floats:
+    """The deflection over the feed per tooth; inf where that is not known, or the axis turns.
+
+    The share of the model's range is the greater of this and of the deflection over the radial depth: of a film, whose
+    depth is next to nothing, it says nothing of the feed.
+    """
+    out = np.full(len(tool), math.inf)
+    bent = next((c for c in ("deflection_um", "deflection_cutter_um") if c in columns), "")
+    if not bent or not {"feed_mm_min", "power_w", "torque_mean_nm"} <= set(columns):
+        return out
+    power, torque = np.asarray(columns["power_w"]), np.asarray(columns["torque_mean_nm"])
+    speed = np.divide(power, torque, out=np.zeros(len(tool)), where=torque > 0.0)
+    numbers, of = np.unique(tool, return_inverse=True)
+    teeth = np.array([cutters[n].flutes if n in cutters else 0 for n in numbers.tolist()])[of]
+    delta = np.asarray(columns[bent]) / 1000.0
+    # feed per tooth [mm]: mm/min over 60 s, over the teeth that pass in a second
+    passing = 60.0 / math.tau * speed * teeth
+    feed = np.divide(columns["feed_mm_min"], passing, out=np.zeros(len(tool)), where=passing > 0.0)
+    np.divide(delta, feed, out=out, where=feed > 0.0)
+    for name in ("axis_x", "axis_y", "axis_z"):
+        if name in columns:
+            axis = np.asarray(columns[name])
+            out[np.abs(np.diff(axis, prepend=axis[:1])) > UPRIGHT] = math.inf
     return out
 
 

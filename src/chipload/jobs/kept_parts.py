@@ -11,15 +11,20 @@ import io
 import json
 import struct
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
+from chipload.progress import Progress, silent
 from chipload.simulation.checkpoint import Checkpoint, digest
+from chipload.workers import Team
+
+if TYPE_CHECKING:
+    from chipload.planning.impeller.kept import PlanTask
 
 T = TypeVar("T")
 #: kinds of records
@@ -38,10 +43,11 @@ class KeptRecords:
     checkpoint : where they are kept; None: nowhere
     key : of all that the run depends on
     records : kinds of records that a part may be made of beside arrays and plain values
+    team : makes parts that are told ahead; None: each is made when it is asked for
     """
 
-    def __init__(self, checkpoint: Checkpoint | None, key: str, records: Kinds) -> None:
-        self.checkpoint, self.records = checkpoint, records
+    def __init__(self, checkpoint: Checkpoint | None, key: str, records: Kinds, team: Team | None = None) -> None:
+        self.checkpoint, self.records, self.team = checkpoint, records, team
         self._parts: dict[str, bytes] = {}
         self._new: dict[str, bytes] = {}
         self._since, self._cost = time.monotonic(), 0.0
@@ -69,15 +75,24 @@ class KeptRecords:
         self.write()
         return read_part(data, self.records)  # type: ignore[no-any-return]
 
-    def has(self, key: tuple[object, ...]) -> bool:
-        """Whether the part of this key is kept."""
-        return digest(*key) in self._parts
+    def share(self, value: object) -> None:
+        """Give the team what the functions of parts have as their first argument from now on."""
+        if self.team is not None:
+            self.team.share(value)
 
-    def add(self, key: tuple[object, ...], data: bytes) -> None:
-        """Keep a part that another process made, as the bytes of :func:`part_bytes`."""
-        name = digest(*key)
-        self._parts[name] = self._new[name] = data
-        self.write()
+    def ahead(self, parts: Sequence[PlanTask], progress: Progress = silent) -> None:
+        """Make the parts that are not kept side by side, where there is a team; a single one waits until asked for."""
+        if self.team is None:
+            return
+        open_yet = {name: part for part in parts if (name := digest(*part.key)) not in self._parts}
+        if len(open_yet) < 2:
+            return
+        names = [*open_yet]
+        tasks = [(part.make, self.records, part.arguments) for part in open_yet.values()]
+        for number, (k, data) in enumerate(self.team.completed_shared(_made, tasks), 1):
+            self._parts[names[k]] = self._new[names[k]] = data
+            self.write()
+            progress(number / len(names), f"{number} of {len(names)} parts")
 
     def write(self, at_once: bool = False) -> None:
         """Write what is new, if it is time to, or ``at_once``."""
@@ -94,6 +109,11 @@ class KeptRecords:
         self._new = {}
         self._since = time.monotonic()
         self._cost = self._since - begin
+
+
+def _made(shared: Any, make: Callable[..., Any], records: Kinds, arguments: tuple[Any, ...]) -> bytes:
+    """A part as bytes; this is what a worker executes."""
+    return part_bytes(make(shared, *arguments), records)
 
 
 def part_bytes(value: object, records: Kinds = ()) -> bytes:

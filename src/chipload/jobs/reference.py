@@ -100,6 +100,7 @@ EXAMPLES = {
     "stable_probability": "0.95", "frequency_percent": "2.0", "fit_mm": "0.001", "reserve": "0.1",
     "override_step": "0.01", "spacing_mm": "0.5", "stock_layers": '["STOCK"]', "part.lines": "[120, 180]",
     "part.labels": '["(WALL)", "(WALL END)"]',
+    "operation.rows": '"finish.apt"', "origin_mm": "[20.0, 15.0]",
     "holes_mm": "[[20.0, 15.0, 8.0]]", "tabs.at_mm": "[[30.0, 17.0], [10.0, 17.0]]",
 }  # fmt: skip
 #: of a number by the unit at the end of its key, where none is stated above

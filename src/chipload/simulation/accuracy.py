@@ -87,8 +87,8 @@ FACTOR, LEANING = 2.0, 3.0
 FLOOR, LEANING_FLOOR = 0.01, 0.02
 #: by moves: error of a column that is not found from a few steps, and slices of the finer run over those of the run
 MOVES_FLOOR = {
-    "force_n": 0.03, "torque_nm": 0.03, "torque_mean_nm": 0.01, "power_w": 0.01, "chip_max_mm": 0.03,
-    "force_normal_n": 0.03,
+    "force_n": 0.035, "torque_nm": 0.035, "torque_mean_nm": 0.01, "power_w": 0.01, "chip_max_mm": 0.035,
+    "force_normal_n": 0.035,
 }  # fmt: skip
 #: the same where an axis leans, for any cutter
 LEANING_MOVES_FLOOR = {

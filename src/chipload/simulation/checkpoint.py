@@ -220,10 +220,20 @@ class Checkpoint:
         self.passes[name] = steps
 
     def what_is_kept(self) -> str:
-        """What the run goes on from, as it is told to the user; empty: nothing."""
-        if self.safe:
-            return f"{self.safe} steps are kept"
+        """What the run goes on from, as it is told to the user; empty: nothing.
+
+        The folder says it: an interrupt may come between the file of a state and what this object knows of it.
+        """
+        if steps := self._steps_kept():
+            return f"{steps} steps are kept"
         return f"{max(self.passes.values())} steps of a pass are kept" if self.passes else ""
+
+    def _steps_kept(self) -> int:
+        """Steps of the state of this run that is on disk."""
+        if not self.key or not (self.folder / LAST).exists():
+            return 0
+        last = json.loads((self.folder / LAST).read_bytes())
+        return sum(part["steps"] for part in last["parts"]) if last["key"] == self.key else 0
 
     def set_aside(self, what: str, only: Path | None = None) -> None:
         """Keep what cannot be read in a folder beside this one, and begin again; ``what`` is the file at fault,

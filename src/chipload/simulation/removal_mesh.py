@@ -29,6 +29,8 @@ LONGEST, ACROSS = 200, 32
 CELLS, WORK = 1_500_000, 12_000_000
 #: frames at most; distance of two instants in radii of the cutter, turn of the path or the axis between them [rad]
 FRAMES, APART, TURN = 320, 0.3, 0.03
+#: volume of a box around two over the sum of theirs, at most
+JOINED = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,13 +121,14 @@ def removal_mesh(
     ends = _frames(instants, path)
     sizes = {id(c): float(c.profile(0.1)[:, 0].max()) for c in cutters.values()}
     for run, frame in zip(_runs(instants, ends), range(1, len(ends) + 1), strict=True):
+        changed: list[tuple[Floats, Floats]] = []
         for places in run:
             tip, axis, cutter = _removed(stock, path, places, cutters, pitch)
-            reach = cutter.flute_length * axis
+            ends_of = np.concatenate([tip, tip + cutter.flute_length * axis])
             size = sizes[id(cutter)]
-            net.update(
-                np.minimum(tip, tip + reach).min(axis=0) - size, np.maximum(tip, tip + reach).max(axis=0) + size, frame
-            )
+            changed.append((ends_of.min(axis=0) - size, ends_of.max(axis=0) + size))
+        for box in _joined_boxes(changed):
+            net.update(*box, frame)
         rows.append(int(ends[frame - 1]))
         volumes.append(_volume(net))
     corners, seen = merged_quads(net.corners, net.seen)
@@ -140,6 +143,21 @@ def _removed(
     tip, axis = _between(path, places, APART * cutter.radius)
     stock.remove_poses(tip, axis, cutter.apt, tol=0.02 * pitch)
     return tip, axis, cutter
+
+
+def _joined_boxes(boxes: Sequence[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
+    """Boxes that follow one another as one, where it is hardly larger than they are: thousands of short runs of a
+    frame, as of holes side by side, are looked at once.
+    """
+    out: list[tuple[Floats, Floats]] = []
+    for low, high in boxes:
+        if out:
+            a, b = np.minimum(out[-1][0], low), np.maximum(out[-1][1], high)
+            if np.prod(b - a) <= JOINED * (np.prod(out[-1][1] - out[-1][0]) + np.prod(high - low)):
+                out[-1] = a, b
+                continue
+        out.append((low, high))
+    return out
 
 
 def _volume(net: SurfaceNet) -> float:

@@ -20,10 +20,14 @@ from numba import njit
 FULL, EMPTY = -1, -2
 #: most separate arcs that a rim is given back in
 ARCS = 24
+#: capsules whose part of a rim is remembered while it is looked at
+KNOWN = 64
 #: capsules that enter a cell before it is pruned for the first time, at least
 MORE = 12
 #: parts that a cell is pruned in, each way, and those of a part that no one capsule holds
 PARTS, FINER = 8, 4
+#: capsules of a cell above which its parts are cut more finely
+LONG = 40
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -209,6 +213,20 @@ def covered_by_arc(cx, cy, rho, t0, sweep, r, R, out):
 
 
 @njit(cache=True, nogil=True)
+def covered_by_capsule(q, ox, oy, tx, ty, heading, r, R, axis, out):
+    """Arcs of the circle of radius r about O, from T, in capsule q: their number and, in ``out``, their ends."""
+    if axis[q, 8] > 0.0:
+        cx, cy = axis[q, 4] - ox, axis[q, 5] - oy
+        return covered_by_arc(
+            cx * tx + cy * ty, cy * tx - cx * ty, axis[q, 6], axis[q, 7] - heading, axis[q, 8], r, R, out
+        )
+    ax, ay = axis[q, 0] - ox, axis[q, 1] - oy
+    bx, by = axis[q, 2] - ox, axis[q, 3] - oy
+    out[0, 0], out[0, 1] = covered(ax * tx + ay * ty, ay * tx - ax * ty, bx * tx + by * ty, by * tx - bx * ty, r, R)
+    return 1 if out[0, 0] <= out[0, 1] else 0
+
+
+@njit(cache=True, nogil=True)
 def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
     """Uncut arcs of the circle of radius r about O; ``out[k] = lo, hi`` from T, counter-clockwise; returns the count.
 
@@ -224,8 +242,12 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
     uhi = np.empty(16)
     vlo = np.empty(34)
     vhi = np.empty(34)
-    part = np.empty((2, 2))
+    # what each capsule covers of the circle is found once: the last one of each place, its number of arcs, their ends
+    known = np.full(KNOWN, -1)
+    parts = np.empty(KNOWN, dtype=np.int64)
+    ends = np.empty((KNOWN, 2, 2))
     count = 0
+    held = -1  # the capsule that held the last piece whole: often it holds the next one too
     heading = math.atan2(ty, tx)
     ca, sa = math.cos(piece), math.sin(piece)
     c, s = math.cos(-0.5 * math.pi + 0.5 * piece), math.sin(-0.5 * math.pi + 0.5 * piece)
@@ -238,7 +260,7 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
         at = FULL
         if 0 <= i < nx and 0 <= j < ny:
             at = head[j * nx + i]
-        if at == EMPTY:
+        if at == EMPTY or (at >= 0 and held >= 0 and axis_distance(mx, my, axis, held) <= R - half):
             continue
         n = 1
         ulo[0], uhi[0] = a0, a1
@@ -249,22 +271,14 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
             if d >= R + half:
                 continue
             if d <= R - half:
-                n = 0
+                n, held = 0, q
                 break
-            if axis[q, 8] > 0.0:
-                cx, cy = axis[q, 4] - ox, axis[q, 5] - oy
-                parts = covered_by_arc(
-                    cx * tx + cy * ty, cy * tx - cx * ty, axis[q, 6], axis[q, 7] - heading, axis[q, 8], r, R, part
-                )
-            else:
-                pax, pay = axis[q, 0] - ox, axis[q, 1] - oy
-                pbx, pby = axis[q, 2] - ox, axis[q, 3] - oy
-                part[0, 0], part[0, 1] = covered(
-                    pax * tx + pay * ty, pay * tx - pax * ty, pbx * tx + pby * ty, pby * tx - pbx * ty, r, R
-                )
-                parts = 1 if part[0, 0] <= part[0, 1] else 0
-            for side in range(parts):
-                lo, hi = part[side, 0], part[side, 1]
+            at_q = q % KNOWN
+            if known[at_q] != q:
+                known[at_q] = q
+                parts[at_q] = covered_by_capsule(q, ox, oy, tx, ty, heading, r, R, axis, ends[at_q])
+            for side in range(parts[at_q]):
+                lo, hi = ends[at_q, side, 0], ends[at_q, side, 1]
                 # of the turns of the covered arc those that can reach into [a0, a1]
                 turns = math.ceil((a0 - hi) / (2.0 * math.pi)) * 2.0 * math.pi
                 lo += turns
@@ -326,15 +340,28 @@ def keep_all(px, py, hd, at, link, axis, R, keep):
 
 @njit(cache=True, nogil=True)
 def keep_fine(px, py, hd, at, link, axis, R, keep):
-    """Mark what the square part needs, cut into FINER x FINER; whether it is cleared."""
+    """Mark what the square part needs, cut into FINER x FINER; whether it is cleared.
+
+    Of a chain of over LONG capsules, as where passes take next to nothing again and again, each of these that no one
+    capsule holds is cut once more: fewer capsules reach a smaller part.
+    """
     whole = True
     side = 2.0 * hd * math.sqrt(0.5) / FINER
     for a in range(FINER):
         for b in range(FINER):
             x, y = px + (a - 0.5 * (FINER - 1)) * side, py + (b - 0.5 * (FINER - 1)) * side
-            if not keep_one(x, y, hd / FINER, at, link, axis, R, keep):
+            if keep_one(x, y, hd / FINER, at, link, axis, R, keep):
+                continue
+            if len(keep) <= LONG:
                 keep_all(x, y, hd / FINER, at, link, axis, R, keep)
                 whole = False
+                continue
+            for c in range(FINER):
+                for d in range(FINER):
+                    u, v = x + ((c + 0.5) / FINER - 0.5) * side, y + ((d + 0.5) / FINER - 0.5) * side
+                    if not keep_one(u, v, hd / FINER / FINER, at, link, axis, R, keep):
+                        keep_all(u, v, hd / FINER / FINER, at, link, axis, R, keep)
+                        whole = False
     return whole
 
 

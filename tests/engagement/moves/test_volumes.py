@@ -202,3 +202,13 @@ def test_material_above_the_flutes_is_seen() -> None:
     stock = MoveStock(LOW, HIGH, {1: short})
     assert not take(stock, line((-6.0, 12.0, -2.9), (10.0, 12.0, -2.9), 1.0)).above.any()
     assert take(stock, line((36.0, 5.0, -3.1), (20.0, 5.0, -3.1), 1.0)).above.any()
+
+
+def test_a_groove_of_an_engraver_whose_tip_is_almost_a_point() -> None:
+    """45 deg, a tip of 0.01 mm, 0.5 mm deep: (0.01 + 0.5) 0.5 mm^2 over each mm, looked at a few times a step."""
+    cutter = Cutter(0.01, 1, 0.0, 3.0, 30.0, 6e5, taper=math.radians(45.0))
+    stock = MoveStock(LOW, HIGH, {1: cutter})
+    points = line((4.0, 12.0, -0.5), (26.0, 12.0, -0.5), 0.8)
+    assert stock.instants(points[:-1], points[1:], np.ones(len(points) - 1, dtype=np.int64)).max() < 20
+    step = float(np.linalg.norm(points[1] - points[0]))
+    np.testing.assert_allclose(volumes(stock, points)[2:-2], 0.51 * 0.5 * step, rtol=2e-3)

@@ -226,6 +226,8 @@ def test_what_programs_take_leads_the_next_division():
     costs = Costs.__new__(Costs)
     costs.factor = np.ones((2, 3, 2))
     costs.measured([])
+    # a patch that no cutter reaches predicts nothing
+    costs.measured([MeasuredCost(1, 1, 0, 0.0, 0.0)])
     assert (costs.factor == 1.0).all()
     costs.measured(
         [MeasuredCost(0, 1, 0, 10.0, 30.0), MeasuredCost(0, 1, 0, 30.0, 30.0), MeasuredCost(0, 2, 1, 10.0, 50.0)]

@@ -179,7 +179,8 @@ class MoveStock:
         self.tools = {n: i for i, n in enumerate(sorted(cutters))}
         self.cutters = np.array([cutter_row(cutters[n]) for n in self.tools])
         size = self.high - self.low
-        side = max(CELL * float(self.cutters[:, 8].min()), math.sqrt(size[0] * size[1] / CELLS))
+        self.radii = np.array([0.5 * cutters[n].resolved_diameter for n in self.tools])
+        side = max(CELL * float(self.radii.min()), math.sqrt(size[0] * size[1] / CELLS))
         count = np.maximum(np.ceil(size[:2] / side - 1e-9), 1.0)
         self.shape = count.astype(np.int64)
         # of a stock that is thinner than a cell the one cell reaches beyond it: what cutters cover is counted in cells
@@ -243,7 +244,7 @@ class MoveStock:
 
     def instants(self, p0: Floats, p1: Floats, tool: Ints) -> Ints:
         """(n,) at how many times each step is looked at: an odd number, so that the middle is one of them."""
-        radius = np.array([self.cutters[self.tools[n], 8] for n in tool.tolist()]).reshape(len(p0))
+        radius = np.array([self.radii[self.tools[n]] for n in tool.tolist()]).reshape(len(p0))
         length = np.linalg.norm(p1 - p0, axis=1)
         more = np.maximum(0.5 * (length / (INSTANT * radius) - 1.0), 0.0)
         return np.asarray(2 * np.ceil(more - 1e-9).astype(np.int64) + 1)

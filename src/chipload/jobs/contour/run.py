@@ -15,10 +15,7 @@ import numpy as np
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, need_directions, read_material
 from chipload.errors import Finding, InputError, Severity
-from chipload.geometry.chains import Drawing
 from chipload.geometry.contour import Contour, Region
-from chipload.geometry.dxf import read_dxf
-from chipload.geometry.step import read_step_face
 from chipload.jobs.checks import default_checks
 from chipload.jobs.contour.advice import greatest_engagement
 from chipload.jobs.contour.earlier_stock import read_stock, standing_between
@@ -33,6 +30,7 @@ from chipload.jobs.contour.finish_program import (
 )
 from chipload.jobs.contour.job import ContourJob, left_on_walls
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
+from chipload.jobs.contour.part import read_part, require_within_travel
 from chipload.jobs.contour.tables import OperationTable
 from chipload.jobs.provenance import provenance_of, title_of
 from chipload.machine.machine import Machine, machine_named, read_machine
@@ -111,7 +109,8 @@ def read_inputs(job: ContourJob) -> Inputs:
             )
         contours = levels[0]
     else:
-        contours, stock, findings = _read_part(job)
+        contours, stock, findings = read_part(job)
+        require_within_travel(contours, machine, max(job.cutters[op.cutter].radius for op in job.operations))
     for at, rpm in _speeds(job):
         speed = rad_s_from_rpm(rpm)
         if not machine.spindle_min * (1.0 - 1e-9) <= speed <= machine.spindle_max * (1.0 + 1e-9):
@@ -434,7 +433,7 @@ def verify(
     )
     return PlanVerification(
         VERDICTS[told.verdict],
-        "; ".join((told.text, *told.reasons)),
+        "; ".join((*told.reasons, told.text)),
         {
             "engagement_difference_deg": told.engagement_difference_deg,
             "engagement_at_mm": list(told.engagement_at),
@@ -450,46 +449,6 @@ def verify(
 
 
 # -- reading ----------------------------------------------------------------------------------------------------
-def _read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Contour, ...], tuple[Finding, ...]]:
-    """Contours of the drawing or of the planar face, those of the stock's outline, and what the reader noticed."""
-    part = job.table.part
-    ending = job.part_file.suffix.lower()
-    if part.stock_layers and ending != ".dxf":
-        raise InputError(f"part.stock_layers: {part.file} has no layers: only a drawing (.dxf) has")
-    if ending == ".dxf":
-        drawing = read_dxf(
-            job.part_file,
-            units=part.units,
-            units_if_unstated=part.units_if_unstated,
-            layers=(*part.layers, *part.stock_layers) if part.layers else None,
-            join_mm=part.join_mm,
-            tolerance_mm=part.tolerance_mm,
-        )
-    elif ending in (".step", ".stp"):
-        drawing = read_step_face(
-            job.part_file, z_mm=part.face_z_mm, join_mm=part.join_mm, tolerance_mm=part.tolerance_mm
-        )
-    else:
-        raise InputError(f"part.file = {part.file}: must end in .dxf, .step or .stp, or be a program")
-    outline, contours = _stock_outline(part.stock_layers, drawing) if part.stock_layers else ((), drawing.contours)
-    return contours, outline, tuple(replace(f, text=f"part: {f.text}") for f in drawing.findings)
-
-
-def _stock_outline(layers: Sequence[str], drawing: Drawing) -> tuple[tuple[Contour, ...], tuple[Contour, ...]]:
-    """The contours on the layers of the stock, and the others."""
-    wanted = {name.casefold() for name in layers}
-    known = {name.casefold() for name in drawing.layers}
-    for name in layers:
-        if name.casefold() not in known:
-            raise InputError(f"part.stock_layers: no contour on layer {name!r}; layers there are: {sorted(known)}")
-    pairs = list(zip(drawing.contours, drawing.layers, strict=True))
-    outline = tuple(c for c, layer in pairs if layer.casefold() in wanted)
-    rest = tuple(c for c, layer in pairs if layer.casefold() not in wanted)
-    if not rest:
-        raise InputError("part.stock_layers: every contour is on these layers: name those of the stock only")
-    return outline, rest
-
-
 def _provenance(job: ContourJob, inputs: Inputs) -> Provenance:
     files: dict[str, Path] = {"part": job.part_file}
     files |= {k: v for k, v in (("machine", job.machine), ("material", job.material)) if isinstance(v, Path)}

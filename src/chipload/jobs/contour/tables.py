@@ -38,8 +38,13 @@ class PartTable(Table):
     file: Text
     units: Unit | None = Field(None, description="overrides the units of the drawing")
     units_if_unstated: Unit | None = Field(None, description="units of a drawing that names none")
-    layers: tuple[Text, ...] = Field((), description="layers that are read; none: all")
+    layers: tuple[Text, ...] = Field(
+        (), description="layers that are read; none: all that the drawing shows, neither off nor frozen"
+    )
     join_mm: NotNegative = Field(0.01, le=10.0, description="gaps up to this are closed and reported")
+    open_chains: Literal["kept", "dropped"] = Field(
+        "kept", description="`dropped`: lines that close no contour, as centre lines, are left out and reported"
+    )
     tolerance_mm: Positive = Field(0.001, ge=1e-6, le=1.0, description="how far arcs may leave splines and ellipses")
     stock_layers: tuple[Text, ...] = Field(
         (), description="layers of a drawing that hold the outline of the stock of a pocket; none: material everywhere"
@@ -56,6 +61,9 @@ class PartTable(Table):
         "each height anew, and one before which it ends; none: where the cut ends",
     )
     face_z_mm: Number | None = Field(None, description="height of the planar face of a STEP file")
+    origin_mm: tuple[Number, Number] = Field(
+        (0.0, 0.0), description="place of a drawing or a model that is X0 Y0 of the job and of the program"
+    )
 
 
 class StockTable(Table):

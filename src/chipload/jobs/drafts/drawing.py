@@ -9,17 +9,21 @@ from typing import Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
-from chipload.errors import InputError
+from chipload.errors import ChiploadError, InputError
 from chipload.geometry.chains import Drawing
 from chipload.geometry.contour import Contour
 from chipload.geometry.dxf import read_dxf
+from chipload.geometry.even_odd import even_odd
 from chipload.geometry.step import read_step_face
 from chipload.geometry.step_faces import Face, read_faces
 from chipload.jobs.drafts.cutters import cutter_table
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
 from chipload.machine.machine import Machine, machine_named, read_machine
-from chipload.units import rpm_from_rad_s
+from chipload.planning.contour.offsets import centre_paths, walls_of
+from chipload.planning.contour.passes import run_on_length
+from chipload.units import MM_PER, rpm_from_rad_s
 
 #: diameters that a shop has [mm], largest first
 DIAMETERS = (20.0, 16.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5)
@@ -30,12 +34,19 @@ REACH = 0.97
 ROOM, CHANNEL = 1.3, 1.0
 #: radial depth over the diameter, axial depth over the diameter, feed per tooth over the diameter
 RADIAL, AXIAL, FEED = 0.15, 0.5, 0.005
+#: axial depth over the diameter of cutters up to SMALL [mm], whose edge forces weigh more
+AXIAL_SMALL, SMALL = 0.3, 1.5
 #: material left on the wall of a pocket over the diameter
 ALLOWANCE = 0.025
 #: cutting speed [m/min], for aluminium with carbide
 CUTTING_M_MIN = 200.0
 #: points along a contour that the size of the cutter is found on
 POINTS = 400
+#: gaps [mm] of a drawing that are flaws, if they are no greater than this share of its width and height
+GAPS, GAP_SHARE = (0.02, 0.05, 0.1, 0.2, 0.5), 0.01
+#: of an open contour: largest diameter [mm], what its finish may leave [mm]; radius of the lead-in and depth of the
+#: semi-finish pass over the diameter
+OPEN_DIAMETER, OPEN_TOLERANCE_MM, LEAD, SEMIFINISH = 10.0, 0.02, 0.3, 0.1
 
 
 def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft:
@@ -44,39 +55,106 @@ def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft
     Raises
     ------
     InputError
-        The drawing cannot be read.
+        The drawing cannot be read, or no cutter fits it.
     """
-    drawing, unit = _read(file)
-    layers = sorted(set(drawing.layers))
-    whole = [layer for layer in layers if all(c.closed for c in _of_layer(drawing, layer))]
-    part = [Entry("file", relative(file, folder))]
-    if unit is not None:
-        part.append(Entry("units_if_unstated", unit, "the drawing names no unit", True))
-    contours: Sequence[Contour] = drawing.contours
-    if len(whole) < len(layers) and whole:
-        best = max(whole, key=lambda layer: sum(abs(c.area) for c in _of_layer(drawing, layer)))
-        contours = _of_layer(drawing, best)
-        part.append(Entry("layers", [best], f"the closed contours of those of {', '.join(layers)[:60]}", True))
-    else:
-        part.append(
-            Entry(
-                "layers",
-                note=f"layers that are read; the drawing has {', '.join(layers)[:60]}",
-                example=str(layers[:1]).replace("'", '"'),
-            )
-        )
     on = _machine(machine)
-    head = (DraftTable("part", tuple(part)),)
+    drawing, contours, entries = _drawn(file, on)
+    part = DraftTable("part", (Entry("file", relative(file, folder)), *entries, *_origin(contours, on)))
+    top = Entry("top_mm", 0.0, "a drawing has no height: its plane is the top", True)
+    tables = (part, DraftTable("stock", (top,)))
     notes = tuple(str(f) for f in drawing.findings[:8])
     if all(c.closed for c in contours):
-        size, region = _cutter_for(contours)
-        top = Entry("top_mm", 0.0, "a drawing has no height: its plane is the top", True)
-        tables = (*head, DraftTable("stock", (top,)), *_rest(on, machine, size, AXIAL * size, "pocket"))
-        return Draft(f"Clear the pocket of {file.name}: {region:.4g} mm2 at constant engagement.", tables, notes)
-    size = 10.0
-    top = Entry("top_mm", 0.0, "a drawing has no height: its plane is the top", True)
-    tables = (*head, DraftTable("stock", (top,)), *_rest(on, machine, size, AXIAL * size, "contour"))
-    return Draft(f"Finish the contours of {file.name} at limited engagement.", tables, notes)
+        size, region, narrow = _cutter_for(contours)
+        rest = _rest(on, machine, size, _axial(size), "pocket", narrow=narrow)
+        return Draft(
+            f"Clear the pocket of {file.name}: {region:.4g} mm2 at constant engagement.", (*tables, *rest), notes
+        )
+    size, side = _side_of(contours)
+    rest = _rest(on, machine, size, _axial(size), "contour", side)
+    return Draft(f"Finish the contours of {file.name} at limited engagement.", (*tables, *rest), notes)
+
+
+def _drawn(file: Path, machine: Machine) -> tuple[Drawing, Sequence[Contour], list[Entry]]:
+    """The drawing, the contours that are milled, and the entries of the part that choose them."""
+    drawing, entries = _read(file, machine)
+    layers = sorted(set(drawing.layers))
+    whole = [layer for layer in layers if all(c.closed for c in _of_layer(drawing, layer))]
+    if len(whole) < len(layers) and whole:
+        best = max(whole, key=lambda layer: sum(abs(c.area) for c in _of_layer(drawing, layer)))
+        entries.append(Entry("layers", [best], f"the closed contours of those of {', '.join(layers)[:60]}", True))
+        return drawing, _of_layer(drawing, best), entries
+    example = str(layers[:1]).replace("'", '"')
+    note = f"layers that are read; the drawing has {', '.join(layers)[:60]}"
+    entries.append(Entry("layers", note=note, example=example))
+    if whole:
+        return drawing, drawing.contours, entries
+    joined = _joined(file, drawing, {e.key: e.value for e in entries if e.guess})
+    if joined is not None:
+        gap, drawing = joined
+        why = f"ends of its lines are up to {gap:g} mm apart, they meet half-way"
+        return drawing, drawing.contours, [*entries, Entry("join_mm", gap, why, True)]
+    closed = [c for c in drawing.contours if c.closed]
+    if not closed:
+        return drawing, drawing.contours, entries
+    why = f"{len(drawing.contours) - len(closed)} of {len(drawing.contours)} chains of lines close no contour"
+    return drawing, closed, [*entries, Entry("open_chains", "dropped", why, True)]
+
+
+def _origin(contours: Sequence[Contour], machine: Machine) -> list[Entry]:
+    """The middle of a drawing as the origin where it lies beyond the travel of the machine.
+
+    Raises
+    ------
+    InputError
+        It is wider than the travel.
+    """
+    if machine.chain.rotary:
+        return []
+    boxes = np.array([c.bounds for c in contours])
+    low, high = boxes[:, 0:2].min(axis=0), boxes[:, 2:4].max(axis=0)
+    least, most = np.array(machine.limits[:2]).T
+    if bool(((low >= least) & (high <= most)).all()):
+        return []
+    for k, axis in enumerate("XY"):
+        if high[k] - low[k] > most[k] - least[k]:
+            raise InputError(
+                f"the drawing is {high[k] - low[k]:.6g} mm wide in {axis}, machine {machine.name} travels "
+                f"{most[k] - least[k]:g} mm: name a larger one (--machine), or see whether the unit is right"
+            )
+    middle = [round(float(v), 3) for v in 0.5 * (low + high) - 0.5 * (least + most)]
+    return [Entry("origin_mm", middle, f"the middle: the drawing lies beyond the travel of {machine.name}", True)]
+
+
+def _joined(file: Path, drawing: Drawing, unit: dict[str, str]) -> tuple[float, Drawing] | None:
+    """The narrowest gap [mm] that closes all contours of a drawing, and it read so; None: none does."""
+    size = float(_extent(drawing.contours).sum())
+    for gap in (g for g in GAPS if g <= GAP_SHARE * size):
+        wider = read_dxf(file, units=unit.get("units"), units_if_unstated=unit.get("units_if_unstated"), join_mm=gap)
+        if all(c.closed for c in wider.contours):
+            return gap, wider
+    return None
+
+
+def _side_of(contours: Sequence[Contour]) -> tuple[float, str]:
+    """Diameter [mm] of the largest common cutter that reaches all of open contours, and their side on which it does.
+
+    Raises
+    ------
+    InputError
+        None does.
+    """
+    for d in (d for d in DIAMETERS if d <= OPEN_DIAMETER):
+        for side in ("left", "right"):
+            try:
+                walls = walls_of(contours, side, "down", run_on_length(0.5 * d, LEAD * d, 1))
+                centre_paths(walls, 0.5 * d, OPEN_TOLERANCE_MM)
+            except ChiploadError as err:
+                why = err
+            else:
+                return d, side
+    raise InputError(
+        f"no cutter from {DIAMETERS[-1]:g} to {OPEN_DIAMETER:g} mm reaches all of the open contours: {why}"
+    )
 
 
 def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
@@ -97,8 +175,8 @@ def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
     floors = _floors(file, planes, top)
     if not floors:
         raise InputError(f"{file.name}: no horizontal face whose edges close: turn the part, or draw it as DXF")
-    level, drawing, size, region = floors[0]
-    axial = min(AXIAL * size, top - level) if top - level > 1e-3 else AXIAL * size
+    level, drawing, size, region, narrow = floors[0]
+    axial = min(_axial(size), top - level) if top - level > 1e-3 else _axial(size)
     others = ", ".join(f"{z:g}" for z in sorted({round(float(f.low[2]), 3) for f in planes}, reverse=True)[:12])
     part = DraftTable(
         "part",
@@ -108,13 +186,13 @@ def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
         ),
     )
     stock = DraftTable("stock", (Entry("top_mm", round(level + axial, 6), "one depth of cut above the face", True),))
-    tables = (part, stock, *_rest(_machine(machine), machine, size, axial, "pocket"))
+    tables = (part, stock, *_rest(_machine(machine), machine, size, axial, "pocket", narrow=narrow))
     notes = tuple(str(f) for f in drawing.findings[:8])
     return Draft(f"Clear the face at z = {level:g} mm of {file.name}: {region:.4g} mm2.", tables, notes)
 
 
-def _floors(file: Path, planes: Sequence[Face], top: float) -> list[tuple[float, Drawing, float, float]]:
-    """Heights with closed contours, their drawing, cutter and area; floors below the top first, large ones first."""
+def _floors(file: Path, planes: Sequence[Face], top: float) -> list[tuple[float, Drawing, float, float, bool]]:
+    """Heights, drawing, cutter, area and whether it is narrow; floors below the top first, large ones first."""
     areas: dict[float, float] = {}
     for face in planes:
         z = round(float(face.low[2]), 3)
@@ -132,34 +210,56 @@ def _floors(file: Path, planes: Sequence[Face], top: float) -> list[tuple[float,
     return []
 
 
-def _read(file: Path) -> tuple[Drawing, str | None]:
-    """The drawing, and the unit that was taken where it names none."""
+def _read(file: Path, machine: Machine) -> tuple[Drawing, list[Entry]]:
+    """The drawing, and the unit that was taken where it names none, or one by which it is wider than the travel."""
     try:
-        return read_dxf(file), None
+        drawing = read_dxf(file)
     except InputError as err:
         if "unit" not in str(err):
             raise
-    return read_dxf(file, units_if_unstated="mm"), "mm"
+        why = "the drawing names no unit"
+        return read_dxf(file, units_if_unstated="mm"), [Entry("units_if_unstated", "mm", why, True)]
+    wide = _extent(drawing.contours)
+    travel = np.ptp(np.array(machine.limits[:2]), axis=1)
+    if MM_PER[drawing.units] > 1.0 and bool((wide > travel).any()):
+        plain = read_dxf(file, units="mm")
+        if bool((_extent(plain.contours) <= travel).all()):
+            why = f"by the unit that it states, {drawing.units}, it is {wide[0]:.6g} by {wide[1]:.6g} mm"
+            return plain, [Entry("units", "mm", why, True)]
+    return drawing, []
+
+
+def _extent(contours: Sequence[Contour]) -> NDArray[np.float64]:
+    """(2,) width of contours in X and Y [mm]."""
+    boxes = np.array([c.bounds for c in contours])
+    out: NDArray[np.float64] = boxes[:, 2:4].max(axis=0) - boxes[:, 0:2].min(axis=0)
+    return out
 
 
 def _of_layer(drawing: Drawing, layer: str) -> list[Contour]:
     return [c for c, own in zip(drawing.contours, drawing.layers, strict=True) if own == layer]
 
 
-def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float]:
-    """Diameter [mm] of the largest cutter that reaches nearly all, with room in its channels if half of it has, and the
-    area [mm^2].
+def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float, bool]:
+    """Diameter [mm] of the largest cutter that reaches nearly all, with room in its channels if half of it has, the
+    area [mm^2], and whether channels are narrow for it all the same.
     """
     area: Any = shapely.Polygon()
-    for c in contours:
+    for c in even_odd(contours)[0]:
         points = c.at(np.linspace(0.0, c.length, POINTS, endpoint=False))[0]
         area = area.symmetric_difference(shapely.Polygon(points).buffer(0.0))
     whole = float(area.area)
     if not whole > 0.0:
         raise InputError("the contours enclose no area")
+    if not float(_opened(area, DIAMETERS[-1]).area) > 0.0:
+        raise InputError(
+            f"the contours enclose {whole:.3g} mm2, too narrow for a cutter of {DIAMETERS[-1]:g} mm: if the drawing "
+            "is in another unit than it states, write the job by hand with part.units"
+        )
     able = [d for d in DIAMETERS if float(_opened(area, d).area) >= REACH * whole] or [DIAMETERS[-1]]
     near = [d for d in able if d >= 0.5 * able[0]]
-    return next((d for d in near if not _narrow(area, d)), near[-1]), whole
+    roomy = next((d for d in near if not _narrow(area, d)), None)
+    return (near[-1], whole, True) if roomy is None else (roomy, whole, False)
 
 
 def _opened(area: Any, d: float) -> Any:
@@ -177,13 +277,20 @@ def _narrow(area: Any, d: float) -> bool:
     return len(shapely.get_parts(apart)) > len(shapely.get_parts(centres))
 
 
+def _axial(d: float) -> float:
+    """Axial depth [mm] of a cutter of diameter d [mm]."""
+    return (AXIAL if d > SMALL else AXIAL_SMALL) * d
+
+
 def _machine(name: str | None) -> Machine:
     if name is None:
         return machine_named("vmc")
     return read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
 
 
-def _rest(machine: Machine, named: str | None, d: float, axial: float, kind: str) -> tuple[DraftTable, ...]:
+def _rest(
+    machine: Machine, named: str | None, d: float, axial: float, kind: str, side: str = "left", narrow: bool = False
+) -> tuple[DraftTable, ...]:
     """Machine, material, cutter, operation and limits."""
     flutes = 2 if d < 4.0 else 3
     least, most = rpm_from_rad_s(machine.spindle_min), rpm_from_rad_s(machine.spindle_max)
@@ -209,19 +316,24 @@ def _rest(machine: Machine, named: str | None, d: float, axial: float, kind: str
         Entry("step_mm", max(0.02 * d, 0.05)),
         Entry("clearance_mm", 5.0, "height of rapids above the stock", True),
     ]
+    if kind == "pocket" and narrow:
+        entries += [
+            Entry("strategies", ["trochoidal"], "circles: channels are hardly wider than the cutter", True),
+            Entry("use", "trochoidal"),
+        ]
     if kind == "pocket":
         entries.append(Entry("allowance_mm", round(ALLOWANCE * d, 3), "left on the wall for finishing", True))
         engagement = math.degrees(math.acos(1.0 - 2.0 * RADIAL))
         limit = Entry("engagement_deg", round(1.1 * engagement, 1), "a tenth above that of a straight front", True)
     else:
         entries += [
-            Entry("side", "left", "of the contour in its direction; or inside, outside", True),
+            Entry("side", side, "of the contour in its direction; or inside, outside", True),
             Entry("strategies", ["plain", "backward"]),
             Entry("use", "backward"),
             Entry("joint", "sharp"),
-            Entry("semifinish_depth_mm", 0.5, "radial depth of the pass before", True),
-            Entry("tolerance_mm", 0.02),
-            Entry("lead_mm", round(0.3 * d, 3), "radius of the lead-in", True),
+            Entry("semifinish_depth_mm", round(SEMIFINISH * d, 3), "radial depth of the pass before", True),
+            Entry("tolerance_mm", OPEN_TOLERANCE_MM),
+            Entry("lead_mm", round(LEAD * d, 3), "radius of the lead-in", True),
         ]
         limit = Entry("engagement_deg", 30.0, "a finish pass", True)
     limits = [limit]

@@ -10,6 +10,7 @@ from chipload.jobs.impeller.five_axis_outcome import NoFiveAxisPath
 from chipload.jobs.impeller.point_milling import PlannedPoints
 from chipload.planning.impeller.answer import Answer, Unreachable
 from chipload.planning.impeller.five_axis_program import LinkedPath
+from chipload.planning.impeller.flank import FlankPass
 from chipload.planning.impeller.lines import Tracks, UnreachedSpan
 from chipload.planning.impeller.links import Linked, Moves
 from chipload.planning.impeller.point_milling import PointPath
@@ -19,19 +20,20 @@ from chipload.planning.impeller.search import SearchLimits
 from chipload.planning.impeller.track import ToolTrack
 from chipload.simulation.channel.gouges import Gouge
 from chipload.simulation.checkpoint import Checkpoint
+from chipload.workers import Team
 
 #: what a part may be made of beside arrays and plain values
 RECORDS = (
-    Answer, Catalogue, CatalogueCutter, Gouge, Linked, LinkedPath, Moves, NoFiveAxisPath, PlannedPoints, PointPath,
-    Ranges, RestPasses, SearchLimits, ToolTrack, Tracks, Unreachable, UnreachedSpan,
+    Answer, Catalogue, CatalogueCutter, FlankPass, Gouge, Linked, LinkedPath, Moves, NoFiveAxisPath, PlannedPoints,
+    PointPath, Ranges, RestPasses, SearchLimits, ToolTrack, Tracks, Unreachable, UnreachedSpan,
 )  # fmt: skip
 
 
 class KeptParts(kept_parts.KeptRecords):
     """Parts of a run by their keys; a :class:`chipload.planning.impeller.kept.Keep`."""
 
-    def __init__(self, checkpoint: Checkpoint | None, key: str) -> None:
-        super().__init__(checkpoint, key, RECORDS)
+    def __init__(self, checkpoint: Checkpoint | None, key: str, team: Team | None = None) -> None:
+        super().__init__(checkpoint, key, RECORDS, team)
 
 
 def part_bytes(value: object) -> bytes:

@@ -22,6 +22,7 @@ from chipload.jobs.impeller.tables import FlankTable, PathsTable, SurfaceTable
 from chipload.planning.impeller.clearance.clearance import clearance
 from chipload.planning.impeller.five_axis_program import LinkedPath, five_axis_program, lifted, outline_of
 from chipload.planning.impeller.flank import FlankPass, flank_pass, offset_pass
+from chipload.planning.impeller.kept import Keep, PlanTask, anew
 from chipload.planning.impeller.settings import FinishSettings
 from chipload.planning.impeller.surfaces import BODIES
 from chipload.progress import Progress, silent
@@ -42,7 +43,7 @@ SIDES = ("plus", "minus")
 
 
 def checked_flanks(
-    job: ImpellerJob, how: FinishSettings, catalogue: Catalogue, progress: Progress = silent
+    job: ImpellerJob, how: FinishSettings, catalogue: Catalogue, progress: Progress = silent, keep: Keep = anew
 ) -> tuple[CheckedFlank | NoFiveAxisPath, ...]:
     """A flank pass for each side that the job names."""
     op, impeller = job.operation, how.impeller
@@ -53,8 +54,10 @@ def checked_flanks(
     sides = [s for s in job.table.surface if s.side in SIDES]
     outline = outline_of(how.scene, impeller.blades)
     out: list[CheckedFlank | NoFiveAxisPath] = []
+    parts = [PlanTask(("flank", k), _planned, (side, catalogue, table, paths, outline)) for k, side in enumerate(sides)]
+    keep.ahead(parts, progress)
     for k, side in enumerate(sides):
-        found = _planned(how, side, catalogue, table, paths, outline)
+        found: tuple[CatalogueCutter, list[LinkedPath]] | NoFiveAxisPath = parts[k].of(how, keep)
         if isinstance(found, NoFiveAxisPath):
             out.append(found)
         else:
@@ -64,7 +67,7 @@ def checked_flanks(
             program = five_axis_program(
                 passes, outline, how.link, feed, spindle, k + 1, machine, impeller.pitch
             )  # fmt: skip
-            got = program_check(how, side, machine, cutter, program, paths)
+            got = program_check(how, side, machine, cutter, program, paths, keep=keep)
             own = tuple(one.path for one in passes if isinstance(one.path, FlankPass))
             out.append(CheckedFlank(
                 f"{side.body} {side.side}", machine, cutter, program, got.gouge, got.left, paths.gouge_mm,

@@ -98,7 +98,7 @@ def _of_sections(folder: Path, given: SectionsTable, blades: int, outer_diameter
     main = blade(given.blade, "blade")
     splitter = blade(given.splitter, "splitter") if given.splitter else None
     hub, shroud = (
-        Revolved(read_meridian(folder / name, given.unit, over), side)
+        Revolved(read_meridian(folder / name, given.unit, over, side < 0), side)
         for name, side in ((given.hub, 1), (given.shroud, -1))
     )
     return Impeller(main, splitter, hub, shroud, blades)
@@ -112,7 +112,7 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
         names = getattr(given, key)
         if isinstance(names, str):
             unit = stated(given.unit, "impeller.step.unit")
-            return Revolved(read_meridian(files[key], unit, given.flow.startswith("+")), side)
+            return Revolved(read_meridian(files[key], unit, given.flow.startswith("+"), side < 0), side)
         at = f"impeller.step.{key}"
         faces = [model.face(name, at) for name in names]
         numbers = [f.number for f in faces]

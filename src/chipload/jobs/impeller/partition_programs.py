@@ -23,14 +23,13 @@ from chipload.planning.impeller.compare import CutterChoice, Partition
 from chipload.planning.impeller.costs import Costs, MeasuredCost
 from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.patch import Patch
+from chipload.planning.impeller.planned_settings import PlannedSettings, planned, tell_millings
 from chipload.planning.impeller.settings import (
     CutterSetting,
     FinishSettings,
     Milling,
     MillingKey,
-    PlannedSettings,
     change_time,
-    planned,
     setting_order,
 )
 from chipload.program.read import times_on
@@ -38,8 +37,8 @@ from chipload.progress import Progress
 
 #: how often ways are divided at most
 _ROUNDS = 2
-#: where the check finds more than asked, what is left is counted on points so many times closer together and planned
-#: again; not where it finds more than this share of what is asked: there no cutter goes
+#: where the check finds more than asked on a patch or surface, what is left is counted on points so many times closer
+#: together and planned again; not for those where it finds more than this share of what is asked: there no cutter goes
 _FINER, _NEARLY = (0.5, 0.25), 1.25
 
 
@@ -82,18 +81,21 @@ def checked_partitions(
     rows: dict[int, list[tuple[int, MeasuredCost]]] = {}
     partitions: Sequence[Partition] = first
     for turn in range(_ROUNDS):
-        moved = False
-        for k, (way, partition) in enumerate(zip(ways, partitions, strict=True)):
-            if partition.divided is None or (turn and _same(partition, best[way.name].partition)):
-                continue
-            moved = True
+        new = [
+            k for k, (way, partition) in enumerate(zip(ways, partitions, strict=True))
+            if partition.divided is not None and not (turn and _same(partition, best[way.name].partition))
+        ]  # fmt: skip
+        patches = [(job.with_catalogue(partitions[k].catalogue), partitions[k].division.patches) for k in new]
+        tell_millings(patches, memory.millings, keep, _from(progress, 0.8 * turn / _ROUNDS))
+        for k in new:
+            way, partition = ways[k], partitions[k]
             done = (turn + k / len(ways)) / _ROUNDS
             plan = _planned(way, partition, job, machine, memory, _from(progress, 0.8 * done), keep)
             for number, row in _measured(way.costs, plan, machine):
                 rows.setdefault(id(way.costs), []).append((number, row))
             if way.name not in best or plan.seconds < best[way.name].seconds:
                 best[way.name] = plan
-        if not moved:
+        if not new:
             break
         for way in ways:
             for number, costs in enumerate(way.costs):
@@ -210,23 +212,33 @@ def _checked(
     own = job.with_catalogue(done.partition.catalogue)
     programs, covered = _looked_at(own, done.plan, machine, paths, memory, keep)
     for fine in _FINER:
-        if not 1.0 < _most_left(programs, covered) <= _NEARLY:
+        left = _left_shares(programs, covered)
+        if not any(1.0 < x <= _NEARLY for x in left):
             break
         plan = planned(
             own, done.partition.division.patches, _changes(way), known=memory.millings, keep=keep, fine=fine
         )  # fmt: skip
         again = _looked_at(own, plan, machine, paths, memory, keep)
-        if _most_left(*again) < _most_left(programs, covered):
+        if _too_high(_left_shares(*again)) < _too_high(left):
             programs, covered = again
     repeats = way.costs[0].terms.repeats
     changes = _change_time([p.setting for p in programs], way)
     return CheckedPartition(done.partition, programs, covered, repeats, done.predicted, changes)
 
 
-def _most_left(programs: Sequence[Checked], covered: Sequence[Covered]) -> float:
-    """The most that is left, as a share of what is asked."""
+def _left_shares(programs: Sequence[Checked], covered: Sequence[Covered]) -> list[float]:
+    """The most that is left in each patch and on each surface, as a share of what is asked."""
     scallops = [x.greatest / x.asked for p in programs for x in p.scallops]
-    return max([*scallops, *(c.greatest[0] / c.asked for c in covered)], default=0.0)
+    return [*scallops, *(c.greatest[0] / c.asked for c in covered)]
+
+
+def _too_high(left: Sequence[float]) -> tuple[int, float]:
+    """How many patches and surfaces have more left than asked, and the most: a corner that no cutter reaches stays.
+
+    >>> _too_high([0.9, 1.05, 5.4]) > _too_high([0.9, 1.0, 5.4])
+    True
+    """
+    return sum(x > 1.0 for x in left), max(left, default=0.0)
 
 
 def _looked_at(

@@ -21,12 +21,13 @@ from chipload.planning.impeller.covering.covering import Covering
 from chipload.planning.impeller.feeds import ForceTerms
 from chipload.planning.impeller.floor import patch_of
 from chipload.planning.impeller.impeller import Impeller
-from chipload.planning.impeller.kept import Keep, anew
+from chipload.planning.impeller.kept import Keep, PlanTask, anew
 from chipload.planning.impeller.lines import LineMotion
 from chipload.planning.impeller.links import Link
 from chipload.planning.impeller.paths import PatchFinish
+from chipload.planning.impeller.planned_settings import PlannedSettings
 from chipload.planning.impeller.programs import pallet_rate, too_fast
-from chipload.planning.impeller.settings import FinishSettings, Milling, PlannedSettings, channel_scene
+from chipload.planning.impeller.settings import FinishSettings, Milling, channel_scene
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling
 from chipload.planning.impeller.tables import IndexTable
 from chipload.program.check import check_program
@@ -93,6 +94,8 @@ def checked_programs(
     coarse = walls_of(impeller, job.ahead)
     walls = [*dense, *whole]
     depth = ray_depth(impeller, EDGE, paths.gouge_mm)
+    keep.ahead([_left_task(walls, s.program, s.cutter, depth) for s in settings])
+    keep.ahead([_gouge_task(coarse, s.program, s.cutter, depth, paths.gouge_mm) for s in settings])
     found = [left_by(job, walls, s.program, s.cutter, depth, keep) for s in settings]
     # what is left is what no program takes
     rest = [replace(same[0], rest=np.min([x.rest for x in same], axis=0)) for same in zip(*found, strict=True)]
@@ -126,16 +129,23 @@ def left_by(
     keep: Keep = anew,
 ) -> tuple[Remainder, ...]:  # fmt: skip
     """What a program leaves on each wall."""
-
-    def columns() -> list[list[NDArray[Any]]]:
-        found = left_on(walls, program, cutter, _HEIGHT, depth, workers=job.workers)
-        return [[x.rest, x.gouge, x.row, x.part] for x in found]
-
-    got = keep(("left", *_moves_key(program, cutter), [w.points for w in walls]), columns)
+    got = _left_task(walls, program, cutter, depth).of(job, keep)
     return tuple(
         Remainder(w, rest, gouge, row, part, _HEIGHT, depth)
         for w, (rest, gouge, row, part) in zip(walls, got, strict=True)
     )
+
+
+def _left_task(walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float) -> PlanTask:
+    key = ("left", *_moves_key(program, cutter), [w.points for w in walls])
+    return PlanTask(key, _left_columns, (walls, program, cutter, depth))
+
+
+def _left_columns(
+    job: FinishSettings, walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float
+) -> list[list[NDArray[Any]]]:
+    found = left_on(walls, program, cutter, _HEIGHT, depth, workers=job.workers)
+    return [[x.rest, x.gouge, x.row, x.part] for x in found]
 
 
 def gouge_by(
@@ -143,10 +153,21 @@ def gouge_by(
     allowed: float, keep: Keep = anew,
 ) -> Gouge:  # fmt: skip
     """The deepest gouge of a program."""
-    return keep(
-        ("gouge", *_moves_key(program, cutter)),
-        lambda: deepest_gouge(walls, program, cutter, depth, _RESOLUTION * allowed, allowed, workers=job.workers),
-    )
+    found: Gouge = _gouge_task(walls, program, cutter, depth, allowed).of(job, keep)
+    return found
+
+
+def _gouge_task(
+    walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float, allowed: float
+) -> PlanTask:
+    return PlanTask(("gouge", *_moves_key(program, cutter)), _deepest, (walls, program, cutter, depth, allowed))
+
+
+def _deepest(
+    job: FinishSettings, walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float,
+    allowed: float,
+) -> Gouge:  # fmt: skip
+    return deepest_gouge(walls, program, cutter, depth, _RESOLUTION * allowed, allowed, workers=job.workers)
 
 
 def in_cut(program: Program) -> NDArray[np.bool_]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,7 @@ from chipload.planning.impeller.five_axis_program import (
     outline_of,
     rotary_share,
 )
-from chipload.planning.impeller.kept import Keep, anew
+from chipload.planning.impeller.kept import Keep, PlanTask, anew
 from chipload.planning.impeller.lines import stretched
 from chipload.planning.impeller.point_milling import PointPath, point_path
 from chipload.planning.impeller.settings import FinishSettings
@@ -72,11 +71,11 @@ def checked_points(
     spindle = rad_s_from_rpm(table.speed_rpm if table.speed_rpm is not None else op.speed_rpm)
     limits = AxisLimits(math.radians(table.lean_deg), _SHARE * paths.gouge_mm, op.clearance_mm, op.scallop_mm)
     out: list[CheckedPoints | NoFiveAxisPath] = []
+    given = (catalogue, table, paths, limits, reachable, outline)
+    parts = [PlanTask(("point milling", k), _planned, (side, *given)) for k, side in enumerate(job.table.surface)]
+    keep.ahead(parts, progress)
     for k, side in enumerate(job.table.surface):
-        found = keep(
-            ("point milling", k),
-            partial(_planned, how, side, catalogue, table, paths, limits, reachable, outline),
-        )
+        found: PlannedPoints | NoFiveAxisPath = parts[k].of(how, keep)
         if isinstance(found, NoFiveAxisPath):
             out.append(found)
         else:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
 from chipload.jobs.impeller.channel_depth import reach_line
-from chipload.jobs.impeller.checkpoint import KeptParts, part_bytes
+from chipload.jobs.impeller.checkpoint import KeptParts
 from chipload.jobs.impeller.estimate import estimate
 from chipload.jobs.impeller.five_axis import five_axis_machine
 from chipload.jobs.impeller.flank import checked_flanks
@@ -38,7 +38,7 @@ from chipload.planning.impeller.compare import CutterChoice, cutter_choices
 from chipload.planning.impeller.costs import ChannelSide, Terms
 from chipload.planning.impeller.covering.covering import Covering, covering_of, first_edge
 from chipload.planning.impeller.impeller import Impeller
-from chipload.planning.impeller.kept import Keep
+from chipload.planning.impeller.kept import Keep, PlanTask
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling, ContactSurface, hub_range, surface_of
 from chipload.planning.impeller.tables import IndexTable, index_table
 from chipload.planning.impeller.unreached import with_fits
@@ -46,7 +46,7 @@ from chipload.progress import Progress, silent
 from chipload.progress import part_of as within
 from chipload.result import Provenance
 from chipload.simulation.checkpoint import Checkpoint, digest
-from chipload.workers import Workers
+from chipload.workers import Team, Workers
 
 #: of the time of a run what search, division, roughing and finishing take, with paths and without
 _WITH_PATHS, _SEARCH_ALONE = (5.0, 10.0, 10.0, 75.0), (50.0, 50.0, 0.0, 0.0)
@@ -61,7 +61,8 @@ def run(
 
     Parameters
     ----------
-    workers : processes or a cluster that search the surfaces, each as a task; None: this process searches them
+    workers : processes or a cluster that search the surfaces, plan paths, links and rest passes and check programs,
+        each as a task; None: this process does all
 
     Raises
     ------
@@ -70,6 +71,13 @@ def run(
     Cancelled
         By ``progress``.
     """
+    if workers is None or workers.alone:
+        return _run(job, progress, checkpoint, None)
+    with workers.team() as team:
+        return _run(job, progress, checkpoint, team)
+
+
+def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, team: Team | None) -> ImpellerResult:
     machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
     impeller = part.impeller
     _picked(job, catalogue)
@@ -79,7 +87,7 @@ def run(
     _five_axis_machines(job)
     op = job.operation
     provenance = _provenance(job, machine, catalogue, part)
-    keep = KeptParts(checkpoint, digest(job.table.model_dump_json(), provenance.inputs, versions(), sources()))
+    keep = KeptParts(checkpoint, digest(job.table.model_dump_json(), provenance.inputs, versions(), sources()), team)
     table, begin = _tables(machine, op), time.perf_counter()
     covering = _covering(job, impeller, catalogue)
     took = time.perf_counter() - begin
@@ -87,8 +95,9 @@ def run(
     if checkpoint is not None:
         checkpoint.notice(_estimate(job, surfaces, catalogue))
     first, second, third, last = _stages(op, progress)
-    if workers is not None:
-        _search_apart(job, workers, keep, first)
+    keep.share((job, surfaces, table, catalogue))
+    searches = [PlanTask(("search", k), _found, (k,)) for k in range(len(surfaces))]
+    keep.ahead(searches, lambda done, what: first(done, f"search, {what}"))
     done = []
     for k, surface in enumerate(surfaces):
         found = _searched(job, k, surface, table, catalogue, part_of(first, k, len(surfaces)), keep)
@@ -115,28 +124,22 @@ def run(
     how = finish_settings(
         impeller, machine, table, catalogue, op, op.paths, _ahead(job), len(roughs or ()), WORKERS, covering, forces
     )
+    keep.share(replace(how, workers=1))
     checked = checked_partitions(ways, partitions, how, machine, op.paths, last, keep)
     chosen = {one.name: one.partition for one in checked}
-    flanks = checked_flanks(job, how, catalogue) if op.flank is not None else None
+    flanks = checked_flanks(job, how, catalogue, keep=keep) if op.flank is not None else None
     points = checked_points(job, how, catalogue, keep=keep) if op.point_milling is not None else None
     keep.write(at_once=True)
     milled = replace(milled, flanks=flanks, points=points)
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
 
 
-def _search_apart(job: ImpellerJob, workers: Workers, keep: KeptParts, progress: Progress) -> None:
-    """Search the surfaces that are not kept, each as a task, and keep what is found."""
-    open_yet = [k for k in range(len(job.table.surface)) if not keep.has(("search", k))]
-    for number, (k, part) in enumerate(workers.completed(_found, [(job, k) for k in open_yet]), 1):
-        keep.add(("search", open_yet[k]), part)
-        progress(number / len(open_yet), f"search of {number} of {len(open_yet)} surfaces")
-
-
-def _found(job: ImpellerJob, k: int) -> bytes:
-    """The search of one surface as a kept part; this is what a worker executes."""
-    machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
-    surface = _surfaces(job, part.impeller, _covering(job, part.impeller, catalogue))[k]
-    return part_bytes(_search(job, surface, _tables(machine, job.operation), catalogue, silent))
+def _found(
+    shared: tuple[ImpellerJob, Sequence[ContactSurface], IndexTable, Catalogue], k: int
+) -> tuple[Answer, tuple[int, int, tuple[NDArray[np.float64], ...]] | None, float]:
+    """The search of one surface; another process executes it."""
+    job, surfaces, table, catalogue = shared
+    return _search(job, surfaces[k], table, catalogue, silent, 1)
 
 
 def _five_axis_machines(job: ImpellerJob) -> None:
@@ -238,15 +241,20 @@ def _searched(
 
 
 def _search(
-    job: ImpellerJob, surface: ContactSurface, table: IndexTable, catalogue: Catalogue, progress: Progress
+    job: ImpellerJob,
+    surface: ContactSurface,
+    table: IndexTable,
+    catalogue: Catalogue,
+    progress: Progress,
+    threads: int = WORKERS,
 ) -> tuple[Answer, tuple[int, int, tuple[NDArray[np.float64], ...]] | None, float]:
     """Largest cutters of a surface, the one cutter that reaches most of it, and the time that this took [s]."""
     begin, scene, clearance = time.perf_counter(), surface.scene, job.operation.clearance_mm
     answer = largest_cutters(
-        scene, catalogue, table.angle, clearance, pallets=table.spans, workers=WORKERS, progress=progress
+        scene, catalogue, table.angle, clearance, pallets=table.spans, workers=threads, progress=progress
     )
-    answer = replace(answer, unreachable=with_fits(scene, answer, table.spans, WORKERS))
-    return answer, one_cutter(scene, answer, clearance, table.spans, WORKERS), time.perf_counter() - begin
+    answer = replace(answer, unreachable=with_fits(scene, answer, table.spans, threads))
+    return answer, one_cutter(scene, answer, clearance, table.spans, threads), time.perf_counter() - begin
 
 
 def _choices(

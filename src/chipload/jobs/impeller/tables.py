@@ -40,8 +40,8 @@ class SectionsTable(Table):
 
     blade: tuple[Text, ...] = Field(min_length=1, description="files in the order hub to shroud")
     splitter: tuple[Text, ...] = Field((), description="likewise; none: there are no splitters")
-    hub: Text
-    shroud: Text
+    hub: Text = Field(description="file of points, or a table of all sections, whose first one lies on the hub")
+    shroud: Text = Field(description="likewise; of a table the last one")
     unit: Unit = Field(description="unit of the files, which do not state it")
     columns: Literal["X R*THETA R", "X R THETA_DEG", "X Y Z"] | None = Field(
         None, description="of files that do not name them"

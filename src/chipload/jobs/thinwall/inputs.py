@@ -23,10 +23,12 @@ from chipload.jobs.thinwall.faces import wall_of_faces
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_blank import PartBlank, part_blank
 from chipload.jobs.thinwall.part_shape import PartShape, part_of_faces
+from chipload.jobs.thinwall.program_rows import program_rows
 from chipload.jobs.thinwall.tables import SHAPES
 from chipload.jobs.thinwall.wall_operation import DepthRules, WallCut, WallOperation, wall_operation
 from chipload.machine.machine import machine_named, read_machine
 from chipload.planning.thinwall.blank import SIDES, FinishSurface, WallBlank
+from chipload.planning.thinwall.finish_rows import FinishSide
 from chipload.planning.thinwall.linking import FineSide
 from chipload.planning.thinwall.passes import ThresholdOf
 from chipload.planning.thinwall.table import read_cuts
@@ -40,6 +42,8 @@ Floats = NDArray[np.float64]
 FACETS = (96, 64)
 #: the finished wall may be cut into by the chord of its rows and by so much [mm], for those of chips and facets
 GOUGE = 0.003
+#: share of a step-over that rows may be farther apart: a height of whole step-overs, with rounded digits, stays so
+SLACK = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,9 +162,16 @@ class WallInputs:
         along = np.linalg.norm(np.diff(p, axis=0), axis=2).sum(axis=0).max()
         up = np.linalg.norm(np.diff(p, axis=1), axis=2).sum(axis=1).max()
         n = max(math.ceil(along / own.table.step_mm), self._chords(side, own.table.chord_mm), 2) + 1
-        m = math.ceil(up / abs(own.cut.step_over)) + 1
+        m = math.ceil(up / abs(own.cut.step_over) - SLACK) + 1
         u, v = np.linspace(0.0, 1.0, n), np.linspace(self.body.foot, 1.0, m)
         return FineSide(self._surface(side, u, v), u, v)
+
+    def sides_of(self, operation: int) -> tuple[FineSide | FinishSide, ...]:
+        """Sides with stock, each with the rows of an operation: planned, or those of its program."""
+        rows = self.operations[operation].rows
+        if rows is not None:
+            return rows.sides
+        return tuple(self.fine(side, operation) for side in self.body.side_numbers)
 
     def _chords(self, side: int, chord: float) -> int:
         """Straight chords along a row that sag by at most ``chord`` [mm]: the sag of one falls as its square."""
@@ -239,13 +250,19 @@ def read_wall(job: ThinWallJob) -> WallInputs:
     findings: tuple[Finding, ...] = ()
     if job.threshold_file is not None:
         experiments, findings = read_cuts(job.threshold_file, table.limits.deflection_workpiece_um / 1000.0)
-    operations = tuple(wall_operation(job, k, machine, material, experiments) for k in range(len(table.operation)))
+    shape = part_of_faces(job) if job.walls else _shape(job)
+    sides, foot = _sides_and_foot(job, shape)
+    operations: list[WallOperation] = []
+    for k in range(len(table.operation)):
+        rows = program_rows(job, k, machine, shape, sides, foot)
+        before = operations[-1] if operations else None
+        operations.append(wall_operation(job, k, machine, material, experiments, rows, before))
     step_over = min(abs(o.cut.step_over) for o in operations)
     return WallInputs(
         job=job,
         title=title_of(job.path),
-        body=_part_body(job, step_over) if job.walls else _wall_body(job),
-        operations=operations,
+        body=_part_body(job, shape, step_over) if isinstance(shape, PartShape) else _wall_body(job, shape, sides, foot),
+        operations=tuple(operations),
         findings=findings,
     )
 
@@ -256,21 +273,33 @@ def _pair(values: tuple[float, ...]) -> tuple[float, float]:
     return minus, plus
 
 
-def _part_body(job: ThinWallJob, step_over: float) -> WallBody:
+def _sides_and_foot(job: ThinWallJob, shape: ThinWall | PartShape) -> tuple[tuple[int, ...], float]:
+    """Numbers of the sides that have stock, and the share of v that keeps it."""
+    if isinstance(shape, PartShape):
+        return tuple(range(len(shape.each))), 0.0
+    w, height = job.wall, shape.size()[1]
+    foot = w.foot_mm / height
+    if not foot < 0.8:
+        raise InputError(
+            f"wall.foot_mm = {w.foot_mm:g}: must be below 0.8 of the wall's height of {height:.4g} mm: the rest is cut"
+        )
+    return tuple(k for k, a in enumerate(w.allowance_mm) if a > 0.0), foot
+
+
+def _part_body(job: ThinWallJob, shape: PartShape, step_over: float) -> WallBody:
     """A part with walls, in its clamps."""
-    part = part_blank(job, part_of_faces(job), step_over)
+    part = part_blank(job, shape, step_over)
     allowance = tuple(s.allowance for s in part.body.each)
     return WallBody(part.body, allowance, tuple(range(len(allowance))), 0.0, part, part.places)
 
 
-def _wall_body(job: ThinWallJob) -> WallBody:
+def _wall_body(job: ThinWallJob, shape: ThinWall, sides: tuple[int, ...], foot: float) -> WallBody:
     """One wall."""
-    shape = _shape(job)
-    wall, foot = _wall(job, shape)
+    wall = _wall(job, shape, foot)
     return WallBody(
         shape=shape,
         allowance=job.wall.allowance_mm,
-        side_numbers=tuple(k for k, a in enumerate(job.wall.allowance_mm) if a > 0.0),
+        side_numbers=sides,
         foot=foot,
         elastic=wall,
         places=(np.linspace(0.0, 1.0, wall.shape[0]), np.linspace(foot, 1.0, wall.shape[1])),
@@ -298,15 +327,9 @@ def _shape(job: ThinWallJob) -> ThinWall:
     return through_sections(made, edge_share, w.span or (0.0, 1.0))
 
 
-def _wall(job: ThinWallJob, shape: ThinWall) -> tuple[WallBlank, float]:
-    """The wall in finite elements with all of its stock, and the share of v that is its foot."""
+def _wall(job: ThinWallJob, shape: ThinWall, foot: float) -> WallBlank:
+    """The wall in finite elements with all of its stock, above the share ``foot`` of v."""
     w, made = job.wall, job.table.workpiece
-    _, height, _ = shape.size()
-    foot = w.foot_mm / height
-    if not foot < 0.8:
-        raise InputError(
-            f"wall.foot_mm = {w.foot_mm:g}: must be below 0.8 of the wall's height of {height:.4g} mm: the rest is cut"
-        )
     i, j = w.elements
     rows = max(1, round(foot * j))
     if rows >= j:
@@ -322,4 +345,4 @@ def _wall(job: ThinWallJob, shape: ThinWall) -> tuple[WallBlank, float]:
 
     grid = from_map(np.linspace(0.0, 1.0, i + 1).tolist(), v.tolist(), [0.0, 1.0], place)
     solid = SolidWorkpiece(grid, 1000.0 * made.modulus_gpa, made.poisson, 1e-12 * made.density_kg_m3, grid.side("j-"))
-    return WallBlank(solid, w.allowance_mm, 1, rows), foot
+    return WallBlank(solid, w.allowance_mm, 1, rows)

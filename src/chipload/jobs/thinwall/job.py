@@ -139,7 +139,8 @@ def _of_operation(
             f"{where}.cutter = {op.cutter}: is a body (barrel, tap), whose chips are not simulated: state a "
             "ball nose or a bull nose"
         )
-    if (op.step_over_mm is None) == (op.scallop_um is None):
+    yield from _of_rows(op, where)
+    if op.rows is None and (op.step_over_mm is None) == (op.scallop_um is None):
         said = "none is" if op.step_over_mm is None else "both are"
         yield f"{where}: {said} stated: state either step_over_mm or scallop_um"
     for key, foot in feet:
@@ -153,6 +154,16 @@ def _of_operation(
             f"{where}.clearance_mm = {op.clearance_mm:g}: must be above wall.allowance_mm = {most:g}: the cutter "
             "goes back over stock"
         )
+
+
+def _of_rows(op: WallOperationTable, where: str) -> Iterator[str]:
+    """Keys of planned rows that a finishing program gives, or that are missing without one."""
+    for key in ("milling", "lean_deg", "lead_deg"):
+        if op.rows is None and getattr(op, key) is None:
+            yield f"{where}.{key}: missing: state it, or a finishing program as {where}.rows"
+    for key in ("milling", "lean_deg", "lead_deg", "step_over_mm", "scallop_um"):
+        if op.rows is not None and getattr(op, key) is not None:
+            yield f"{where}.{key}: not used with {where}.rows, whose program gives it: leave it out"
 
 
 def _of_several(table: ThinWallJobTable, least: float) -> Iterator[str]:
@@ -175,6 +186,8 @@ def _of_several(table: ThinWallJobTable, least: float) -> Iterator[str]:
                 if getattr(op, key):
                     yield f"{where}.{key}: belongs to the last operation, which makes the form error: move it there"
             found = op.leave_mm
+    if table.dynamics is not None and any(op.rows is not None for op in table.operation):
+        yield "dynamics: for planned rows only: leave it out, or operation.rows"
     if len(table.operation) > 1:
         for key in ("threshold", "dynamics"):
             if getattr(table, key) is not None:

@@ -246,6 +246,7 @@ class PlannedOperation:
     reserve : share by which the planner kept below the thresholds
     step_over : [mm]
     feed_per_tooth : [mm]
+    rows : file of the finishing program that its rows are from; None: they are planned
     """
 
     cutter: Cutter
@@ -253,6 +254,7 @@ class PlannedOperation:
     reserve: float
     step_over: float
     feed_per_tooth: float
+    rows: str | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -230,6 +230,7 @@ def _cut_by(walled: ThinWallResult, one: Variant, number: int) -> dict[str, Any]
     depth = [m.depth for m in one.plan.maps if m.operation == number]
     return {
         "cutter": own.cutter.number,
+        "rows": own.rows,
         "leave_mm": own.leave,
         "step_over_mm": own.step_over,
         "feed_per_tooth_mm": own.feed_per_tooth,

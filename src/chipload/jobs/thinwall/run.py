@@ -118,7 +118,14 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
 def _planned_operation(one: WallOperation) -> PlannedOperation:
     """An operation in the result."""
     cut = one.cut
-    return PlannedOperation(cut.cutter, one.leave, one.table.reserve, abs(cut.step_over), cut.posture.feed_per_tooth)
+    return PlannedOperation(
+        cut.cutter,
+        one.leave,
+        one.table.reserve,
+        abs(cut.step_over),
+        cut.posture.feed_per_tooth,
+        one.table.rows,
+    )
 
 
 def _thick_enough(inputs: WallInputs) -> None:
@@ -232,5 +239,7 @@ def _provenance(job: ThinWallJob, inputs: WallInputs) -> Provenance:
     files |= {k: v for k, v in named.items() if isinstance(v, Path)}
     files |= {f"section {k}": f for k, f in enumerate(job.section_files)}
     files |= {} if job.part_file is None else {"part": job.part_file}
+    rows = [o.rows for o in job.table.operation]
+    files |= {f"rows {k}": job.path.parent / name for k, name in enumerate(rows) if name is not None}
     files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
     return provenance_of(files, job.overrides, inputs.cut.machine, (inputs.cut.material,))

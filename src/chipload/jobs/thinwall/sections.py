@@ -26,9 +26,10 @@ def _cutting(walled: ThinWallResult, number: int) -> str:
     """An operation in a sentence."""
     own = walled.planning.operations[number]
     c = own.cutter
+    rows = "rows" if own.rows is None else f"rows of {escape(own.rows)}"
     leaves = f"; {own.leave:g} mm stay for the next cutter" if own.leave else ""
     return (
-        f"Cutter {c.number}: D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes; rows "
+        f"Cutter {c.number}: D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes; {rows} "
         f"{own.step_over:.4g} mm apart, {own.feed_per_tooth:.4g} mm a tooth{leaves}."
     )
 

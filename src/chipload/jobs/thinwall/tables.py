@@ -161,11 +161,18 @@ class WallOperationTable(Table):
 
     kind: Literal["thinwall"]
     cutter: Count = Field(description="number of a [[cutter]]")
-    milling: Literal["down", "up"]
+    rows: Text | None = Field(
+        None,
+        description="finishing program (CL data or NC) whose rows the passes follow, in the coordinates of the wall; "
+        "it gives direction, lean and step-over; none: rows are planned",
+    )
+    milling: Literal["down", "up"] | None = Field(None, description="needed without rows")
     feed_mm_min: Positive = Field(le=1e5, description="feed of the centre of the cutter's corner radius")
     speed_rpm: Positive = Field(le=1e6)
-    lean_deg: Positive = Field(lt=89.0, description="of the axis from the surface's normal towards the free edge")
-    lead_deg: Number = Field(description="of the axis forward along the feed")
+    lean_deg: Positive | None = Field(
+        None, lt=89.0, description="of the axis from the surface's normal towards the free edge; needed without rows"
+    )
+    lead_deg: Number | None = Field(None, description="of the axis forward along the feed; needed without rows")
     step_over_mm: Positive | None = Field(None, description="from row to row; or scallop_um")
     scallop_um: Positive | None = Field(None, ge=0.01, description="scallop height between rows; or step_over_mm")
     depth_min_mm: Positive

@@ -14,10 +14,11 @@ from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.job import ThinWallJob
+from chipload.jobs.thinwall.program_rows import ProgramRows
 from chipload.jobs.thinwall.tables import WallOperationTable
 from chipload.machine.machine import Machine
 from chipload.planning.thinwall.depth import DepthRange, Measure
-from chipload.planning.thinwall.force_table import ForceTable, law_on_stock
+from chipload.planning.thinwall.force_table import ForceTable, greatest_law
 from chipload.planning.thinwall.paths import PassMotion
 from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.planning.thinwall.threshold import Experiments
@@ -61,11 +62,12 @@ class DepthRules:
 
 @dataclass(frozen=True, eq=False)
 class WallOperation:
-    """An operation: its keys, how it cuts, and from what its depths follow."""
+    """An operation: its keys, how it cuts, from what its depths follow, the rows of its program if it names one."""
 
     table: WallOperationTable
     cut: WallCut
     depths: DepthRules
+    rows: ProgramRows | None = None
 
     @property
     def leave(self) -> float:
@@ -74,13 +76,21 @@ class WallOperation:
 
 
 def wall_operation(
-    job: ThinWallJob, number: int, machine: Machine, material: Material, experiments: Experiments | None
+    job: ThinWallJob,
+    number: int,
+    machine: Machine,
+    material: Material,
+    experiments: Experiments | None,
+    rows: ProgramRows | None = None,
+    before: WallOperation | None = None,
 ) -> WallOperation:
     """An operation of a job.
 
     Parameters
     ----------
     number : of the operation, in the order of cutting
+    rows : of its program; None: they are planned
+    before : the operation before it
 
     Raises
     ------
@@ -90,22 +100,17 @@ def wall_operation(
     op = job.table.operation[number]
     cutter = job.cutters[op.cutter]
     feed, spindle = mm_s_from_mm_min(op.feed_mm_min), rad_s_from_rpm(op.speed_rpm)
-    step = _step_over(op, number, cutter) * (-1.0 if op.milling == "down" else 1.0)
-    posture = CutterPose(
-        cutter,
-        feed * math.tau / (spindle * cutter.flutes),
-        step,
-        math.radians(op.lead_deg),
-        -math.copysign(math.radians(op.lean_deg), step),
-    )
-    scallop = _scallop(job, number)
-    # the stock has the scallops of the pass before, which may be one of the operation before
-    met = max(scallop, _scallop(job, number - 1)) if number else scallop
+    feed_per_tooth = feed * math.tau / (spindle * cutter.flutes)
+    poses = _planned_poses(op, number, cutter, feed_per_tooth) if rows is None else rows.poses(cutter, feed_per_tooth)
+    step_over = abs(stated(poses[0].step, f"operation.{number}.step_over_mm"))
+    # step-over^2 / 8 r of a plane; the stock has the scallops of the pass before, which may be one of the one before
+    scallop = step_over**2 / (8.0 * cutter.corner_radius)
+    met = scallop if before is None else max(scallop, before.cut.scallop)
     limits = DepthRange(op.depth_min_mm, op.depth_max_mm)
-    law, even = (
-        law_on_stock(posture, material, limits, slope=slope, scallop=met, measure="greatest")
-        for slope in (op.slope, 0.0)
+    (law, worst), (even, _) = (
+        greatest_law(poses, material, limits, slope=slope, scallop=met, measure="greatest") for slope in (op.slope, 0.0)
     )
+    posture = poses[worst]
     return WallOperation(
         table=op,
         cut=WallCut(
@@ -114,7 +119,7 @@ def wall_operation(
             machine=machine,
             posture=posture,
             pass_motion=PassMotion(posture, feed, machine.rapid, spindle, op.clearance_mm),
-            step_over=step,
+            step_over=stated(posture.step, f"operation.{number}.step_over_mm"),
             scallop=scallop,
             measure="greatest",
         ),
@@ -126,14 +131,18 @@ def wall_operation(
             factor=1.0 - op.reserve,
             experiments=experiments,
         ),
+        rows=rows,
     )
 
 
-def _scallop(job: ThinWallJob, number: int) -> float:
-    """Scallop height between the rows of an operation on a plane [mm]."""
-    op = job.table.operation[number]
-    cutter = job.cutters[op.cutter]
-    return _step_over(op, number, cutter) ** 2 / (8.0 * cutter.corner_radius)
+def _planned_poses(
+    op: WallOperationTable, number: int, cutter: Cutter, feed_per_tooth: float
+) -> tuple[CutterPose, ...]:
+    """How the cutter stands along planned rows."""
+    lean, lead = (stated(getattr(op, key), f"operation.{number}.{key}") for key in ("lean_deg", "lead_deg"))
+    step = _step_over(op, number, cutter) * (-1.0 if op.milling == "down" else 1.0)
+    tilt = -math.copysign(math.radians(lean), step)
+    return (CutterPose(cutter, feed_per_tooth, step, math.radians(lead), tilt),)
 
 
 def _step_over(op: WallOperationTable, number: int, cutter: Cutter) -> float:

@@ -65,4 +65,4 @@ def _motion(inputs: WallInputs, number: int) -> OperationMotion:
     margins = Margins(
         BEYOND + reach, inputs.top + SAFE * cut.cutter.radius, SAG * (cut.pass_motion.clearance - allowance)
     )
-    return OperationMotion([inputs.fine(s, number) for s in inputs.body.side_numbers], cut.pass_motion, margins)
+    return OperationMotion(inputs.sides_of(number), cut.pass_motion, margins)

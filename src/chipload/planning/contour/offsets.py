@@ -61,7 +61,7 @@ def walls_of(contours: Sequence[Contour], side: str, milling: str, length: float
         gap = float(np.hypot(*(chains[0].end - chains[0].start)))
         raise InputError(
             f"part: open chain ends at ({x:.6g}, {y:.6g}), gap {gap:.6g} mm, among closed contours: close it "
-            "(part.join_mm) or choose its layer alone (part.layers)"
+            '(part.join_mm), choose its layer alone (part.layers), or leave it out (part.open_chains = "dropped")'
         )
     if side in ("left", "right"):
         if closed:

@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
     from chipload.planning.impeller.patch import Patch
     from chipload.planning.impeller.paths import PatchFinish
+    from chipload.planning.impeller.planned_settings import PlannedSettings
     from chipload.planning.impeller.rough_settings import RoughingSetting
     from chipload.planning.impeller.roughing import RoughingSettings
-    from chipload.planning.impeller.settings import CutterSetting, FinishSettings, Milling, PlannedSettings
+    from chipload.planning.impeller.settings import CutterSetting, FinishSettings, Milling
     from chipload.planning.impeller.surfaces import ContactSampling, ContactSurface, surface_of
     from chipload.planning.impeller.tables import IndexTable, index_table
 
@@ -76,7 +77,8 @@ __getattr__, __dir__ = attach(
         "paths": "PatchFinish",
         "rough_settings": "RoughingSetting",
         "roughing": "RoughingSettings",
-        "settings": "CutterSetting FinishSettings Milling PlannedSettings",
+        "planned_settings": "PlannedSettings",
+        "settings": "CutterSetting FinishSettings Milling",
         "surfaces": "ContactSampling ContactSurface surface_of",
         "tables": "IndexTable index_table",
     },

@@ -180,7 +180,11 @@ class Costs:
         return out
 
     def measured(self, rows: Sequence[MeasuredCost]) -> None:
-        """Takes the factors from programs; what no program has yet is taken for the mean of its order, or of all."""
+        """Takes the factors from programs; what no program has yet is taken for the mean of its order, or of all.
+
+        A patch of which no contact point is reached predicts no time: its program says nothing of the others.
+        """
+        rows = [r for r in rows if r.predicted > 0.0]
         if not rows:
             return
 

@@ -1,11 +1,37 @@
-"""How a long plan remembers its finished parts, so that a run that was stopped does not plan them again."""
+"""How a long plan remembers its finished parts, so that a run that was stopped does not plan them again.
+
+Parts that do not need one another are told ahead: where there are other processes, they are made side by side.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol, TypeVar
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from chipload.progress import Progress, silent
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class PlanTask:
+    """A part of a plan that another process can make.
+
+    Parameters
+    ----------
+    key : as of :class:`Keep`
+    make : a function of a module or class; its first argument is what all processes share
+    arguments : the others
+    """
+
+    key: tuple[object, ...]
+    make: Callable[..., Any]
+    arguments: tuple[Any, ...]
+
+    def of(self, shared: Any, keep: Keep) -> Any:
+        """The part, kept or made with what all processes share."""
+        return keep(self.key, lambda: self.make(shared, *self.arguments))
 
 
 class Keep(Protocol):
@@ -17,11 +43,23 @@ class Keep(Protocol):
     def __call__(self, key: tuple[object, ...], make: Callable[[], T]) -> T:
         """The part."""
 
+    def ahead(self, parts: Sequence[PlanTask], progress: Progress = silent) -> None:
+        """Parts that are asked for next: made side by side where there are other processes, else when asked for."""
 
-def anew(key: tuple[object, ...], make: Callable[[], T]) -> T:
+
+class Anew:
     """Nothing is kept: the default of every ``keep=`` argument.
 
     >>> anew(("sum",), lambda: 1 + 1)
     2
     """
-    return make()
+
+    def __call__(self, key: tuple[object, ...], make: Callable[[], T]) -> T:
+        """What ``make`` makes."""
+        return make()
+
+    def ahead(self, parts: Sequence[PlanTask], progress: Progress = silent) -> None:
+        """Each is made when it is asked for."""
+
+
+anew = Anew()

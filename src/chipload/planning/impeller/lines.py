@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -31,6 +31,8 @@ from chipload.planning.impeller.track import ToolTrack, posed, written
 
 #: points of a line whose pallet angles are looked for together, and how far from those of the line before [rad]
 _GROUP, _WINDOW = 6, math.radians(10.0)
+#: how far about an angle that meets a wall ranges are taken exactly, and the narrowest range [rad]
+_EXACT, _LEAST = math.radians(12.0), 1e-9
 #: stations and halvings by which the first line that is reached is looked for
 _KNOTS, _BISECT = 17, 4
 #: n within this of 1: the axis stands along the normal, there is no step-over
@@ -168,19 +170,28 @@ class Lines:
     ) -> tuple[Turned, ...]:
         """Pieces of a line with their pallet angles, near those ``before``: of ranges at the check points.
 
-        Where the cutter, as it then stands, meets a wall between them, the ranges there are taken exactly.
+        Where the cutter, as it then stands, meets a wall between them, the ranges about that angle are taken exactly;
+        where nothing is left of them, they are looked for at all angles.
         """
         most = self.how.rate * step / self.how.feed
-        ranges = list(self._ranges(replace(scene, covering=None, known=scene.tree), before))
-        exact = np.zeros(len(before), dtype=np.bool_)
+        plain = replace(scene, covering=None, known=scene.tree)
+        ranges = list(self._ranges(plain, before))
+        exact: list[list[float]] = [[] for _ in ranges]
+        whole: set[int] = set()
         while True:
             pieces = pallet_angles(tuple(ranges), step, most, self.how.wanted, before, widths)
-            met = self._met(scene.contact, scene.normal, pieces) & ~exact
-            if not met.any():
+            met = self._met(scene.contact, scene.normal, pieces, exact)
+            if not met:
                 return pieces
-            for k, r in zip(np.flatnonzero(met), self._ranges(scene, before, met), strict=True):
-                ranges[k] = r
-            exact |= met
+            windows = [windowed(ranges[k], B, _EXACT) for k, B in met.items()]
+            got = self._kept(scene, [*met], tuple(inside for inside, _ in windows))
+            for (k, B), (_, outside), inside in zip(met.items(), windows, got, strict=True):
+                ranges[k] = merged(np.vstack([outside, inside]))
+                exact[k].append(B)
+                if not len(ranges[k]) and k not in whole:
+                    whole.add(k)
+                    exact[k].clear()
+                    ranges[k] = self._valid(plain, np.array([k]), self.pallets)[0]
 
     def _widths(self, N: Floats, K: Floats, d: Floats, point: Ints, pallet: Floats) -> Floats:
         """Step-overs (k,) [mm] of points (k,) of a line at pallet angles (k,); 0 where the axis has no lean to it."""
@@ -313,21 +324,36 @@ class Lines:
             np.column_stack([u, v]),
         )
 
-    def _met(self, S: Floats, N: Floats, pieces: tuple[Turned, ...]) -> Flags:
-        """(n,) whether the cutter, as it stands at a station, meets a wall between the check points."""
-        out = np.zeros(len(S), dtype=np.bool_)
+    def _met(
+        self, S: Floats, N: Floats, pieces: tuple[Turned, ...], exact: Sequence[Sequence[float]]
+    ) -> dict[int, float]:
+        """Stations and angles at which the cutter meets a wall between the check points; none that are ``exact``."""
         covering = self.scene.covering
+        out: dict[int, float] = {}
         if covering is None:
             return out
         for piece in pieces:
             own = slice(piece.first, piece.last)
             tips, axes = posed(S[own], N[own], self.table, written(piece.pallet), self.cutter)
-            out[own] = covering.met(self.cutter, tips, axes, self.how.clearance) > 0.0
+            for k in np.flatnonzero(covering.met(self.cutter, tips, axes, self.how.clearance) > 0.0).tolist():
+                at, B = piece.first + k, float(piece.pallet[k])
+                if not any(abs(math.remainder(B - one, math.tau)) <= _EXACT for one in exact[at]):
+                    out[at] = B
         return out
 
-    def _ranges(self, scene: Scene, before: Floats, which: Flags | None = None) -> tuple[Floats, ...]:
-        """Ranges of every point of ``which``, near the angles of the line ``before`` first, else everywhere."""
-        points = np.arange(len(before)) if which is None else np.flatnonzero(which)
+    def _kept(self, scene: Scene, points: Sequence[int], ranges: tuple[Floats, ...]) -> tuple[Floats, ...]:
+        """What of ranges of points is clear of the walls between the check points."""
+        if scene.covering is None:
+            return ranges
+        kept, _ = scene.covering.kept(
+            scene, self.cutter, np.full(len(points), self.table), self.how.clearance, np.array(points), ranges, _LEAST,
+            self.workers,
+        )  # fmt: skip
+        return kept
+
+    def _ranges(self, scene: Scene, before: Floats) -> tuple[Floats, ...]:
+        """Ranges of every point, near the angles of the line ``before`` first, else everywhere."""
+        points = np.arange(len(before))
         out: dict[int, Floats] = {}
         for a in range(0, len(points), _GROUP):
             group = points[a : a + _GROUP]
@@ -386,6 +412,44 @@ def stretched(
             steps = math.ceil(more / (p[1] - p[0]) - 1e-9)
             out.append(end + sign * more * np.arange(1, steps + 1) / steps)
     return np.sort(np.concatenate(out))
+
+
+def windowed(ranges: Floats, angle: float, width: float) -> tuple[Floats, Floats]:
+    """What of ranges (k, 2) lies within a width of an angle, whole turns from it too, and what does not.
+
+    >>> inside, outside = windowed(np.array([[0.0, 2.0], [3.0, 4.0]]), 1.0 + math.tau, 0.5)
+    >>> inside.round(9).tolist(), outside.round(9).tolist()
+    ([[0.5, 1.5]], [[0.0, 0.5], [1.5, 2.0], [3.0, 4.0]])
+    """
+    inside: list[tuple[float, float]] = []
+    outside: list[tuple[float, float]] = []
+    for low, high in ranges.tolist():
+        at = low
+        first = math.ceil((low - width - angle) / math.tau)
+        for turn in range(first, math.floor((high + width - angle) / math.tau) + 1):
+            middle = angle + math.tau * turn
+            a, b = max(at, middle - width), min(high, middle + width)
+            if b > a:
+                outside += [(at, a)] * (a > at)
+                inside.append((a, b))
+                at = b
+        outside += [(at, high)] * (high > at)
+    return np.array(inside).reshape(-1, 2), np.array(outside).reshape(-1, 2)
+
+
+def merged(ranges: Floats) -> Floats:
+    """Ranges (k, 2) ascending, those that end where another begins as one.
+
+    >>> merged(np.array([[1.5, 2.0], [0.0, 0.5], [0.5, 1.0]])).tolist()
+    [[0.0, 1.0], [1.5, 2.0]]
+    """
+    out: list[list[float]] = []
+    for low, high in sorted(ranges.tolist()):
+        if out and low <= out[-1][1] + _LEAST:
+            out[-1][1] = max(out[-1][1], high)
+        else:
+            out.append([low, high])
+    return np.array(out).reshape(-1, 2)
 
 
 def runs(flags: Flags) -> list[tuple[int, int]]:

@@ -180,9 +180,16 @@ class RestSettings:
 
     def chosen(self, face: SurfaceGrid, region: Flags) -> Pair | None:
         """The cutter and table angle for a region; None: none that was not tried reaches any of its points."""
+        return self.keep(self.pair_key(face, region), lambda: self._chosen(face, region))
+
+    def pair_key(self, face: SurfaceGrid, region: Flags) -> tuple[object, ...]:
+        """What the cutter and table angle of a region depend on; other regions do not overlap it."""
         tried = tuple((k, a, x & region) for (k, a), x in face.tried.items() if (x & region).any())
-        key = ("rest pair", *self._place(face, region), self.catalogue, self.used, tried)
-        return self.keep(key, lambda: self._chosen(face, region))
+        return ("rest pair", *self._place(face, region), self.catalogue, self.used, tried)
+
+    def passes_key(self, face: SurfaceGrid, region: Flags, pair: Pair) -> tuple[object, ...]:
+        """What the passes of a region depend on."""
+        return ("rest passes", *self._place(face, region), self.catalogue.cutters[pair[0]], pair[1])
 
     def _place(self, face: SurfaceGrid, region: Flags) -> tuple[object, ...]:
         """What a region is known by."""
@@ -232,8 +239,7 @@ class RestSettings:
         cutter, alpha = self.catalogue.cutters[pair[0]], pair[1]
         tried = face.tried.setdefault(pair, np.zeros(region.shape, dtype=np.bool_))
         tried |= region
-        key = ("rest passes", *self._place(face, region), cutter, alpha)
-        return self.keep(key, lambda: self._passes(face, region, cutter, alpha))
+        return self.keep(self.passes_key(face, region, pair), lambda: self._passes(face, region, cutter, alpha))
 
     def _passes(self, face: SurfaceGrid, region: Flags, cutter: CatalogueCutter, alpha: float) -> RestPasses:
         i, j = np.nonzero(region)

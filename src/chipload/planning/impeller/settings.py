@@ -1,7 +1,4 @@
-"""From patches to moves: one program for each cutter at each table angle, every patch finished in its turn.
-
-What the passes of all patches together leave too high is milled by rest passes (``rest.py``), in the program of the
-cutter at the table angle that reaches it, or in one of its own.
+"""A cutter at a table angle with its patches: their paths, its rest passes, its moves, one program.
 
 Notation: a setting is a cutter at a table angle with the patches that are milled so; alpha table angle [rad]. In the
 scene of a channel the surfaces are numbered as :meth:`Impeller.scene` does for the plus side of the blade.
@@ -19,10 +16,10 @@ import numpy as np
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch as Surface
 from chipload.planning.impeller.assignment import Changes
-from chipload.planning.impeller.feeds import ForceTerms, PassLoads, PassRows, pass_feeds
+from chipload.planning.impeller.feeds import ForceTerms, PassLoads
 from chipload.planning.impeller.floor import patch_of
 from chipload.planning.impeller.impeller import FILLET, Impeller
-from chipload.planning.impeller.kept import Keep, anew
+from chipload.planning.impeller.kept import Keep, PlanTask, anew
 from chipload.planning.impeller.lines import Tracks
 from chipload.planning.impeller.links import Link, Linked, linked
 from chipload.planning.impeller.passes import surface_joint
@@ -34,17 +31,12 @@ from chipload.planning.impeller.rest_machining import (
     Pair,
     RestPasses,
     RestSettings,
-    SurfaceGrid,
-    face_of,
-    left_over,
-    regions,
 )
-from chipload.planning.impeller.scene import Floats, Scene
+from chipload.planning.impeller.scene import Scene
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling, counts, hub_range
 from chipload.planning.impeller.tables import IndexTable
 from chipload.planning.impeller.track import ToolTrack
-from chipload.program.program import LINE, Program
-from chipload.progress import Progress, silent
+from chipload.program.program import Program
 
 #: number of each surface in the scene of the blade's plus side
 NUMBERS = {(0, "plus"): 0, (1, "minus"): 1, (0, "minus"): 3, (1, "plus"): 4}
@@ -55,6 +47,10 @@ _FLOOR = 2
 _AIM = 0.985
 #: so many settings are brought into the best order; more of them on and on to the nearest
 _EXACT = 7
+
+
+#: (low, high) of u, of v
+Box = tuple[tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +67,7 @@ class Milling:
 
     patch: Patch
     along: str
-    box: tuple[tuple[float, float], tuple[float, float]]
+    box: Box
     tracks: Tracks
 
 
@@ -118,19 +114,6 @@ class CutterSetting:
         return replace(self, program=replace(self.program, tool=np.full(len(self.program), tool)))
 
 
-@dataclass(frozen=True, eq=False)
-class PlannedSettings:
-    """All settings, and what by the planner's own count is still left higher than asked.
-
-    ``left`` [mm2] of each surface by body and side, ``unreached`` [mm2] of it where no cutter and table angle that was
-    tried has a valid pallet angle.
-    """
-
-    settings: tuple[CutterSetting, ...]
-    left: dict[tuple[int, str], float]
-    unreached: dict[tuple[int, str], float]
-
-
 def channel_scene(impeller: Impeller, how: ContactSampling) -> Scene:
     """Check points of the channels beside the blade, as fine as ``how`` says."""
     check, hub = counts(impeller, how)
@@ -175,186 +158,94 @@ class FinishSettings:
 
     def milling(self, patch: Patch, keep: Keep = anew) -> Milling:
         """The finishing path of a patch."""
-        strips, part = (patch.low, patch.high), patch.part
-        along, box = ("v", (strips, part)) if patch.order == "u" else ("u", (part, strips))
-        if patch.part == (0.0, 1.0):
-            other = np.unique(patch.at[:, 1 if patch.order == "u" else 0])
-            whole = (float(other[0]), float(other[-1]))
-            box = (strips, whole) if patch.order == "u" else (whole, strips)
-        tracks = keep(
-            ("milling", *_key(self.catalogue, patch)),
-            lambda: finishing(
-                self.surface(patch.body, patch.side), along, box, self.scene, _number(patch.body, patch.side),
-                self.catalogue.cutters[patch.cutter], patch.table, self.how, self.spans, self.workers,
-            ),
-        )  # fmt: skip
+        along, box = lines_of(patch)
+        tracks: Tracks = self.milling_task(patch).of(self, keep)
         return Milling(patch, along, box, tracks)
+
+    def milling_task(self, patch: Patch) -> PlanTask:
+        """The tracks of a patch as a task."""
+        cutter = self.catalogue.cutters[patch.cutter]
+        return PlanTask(("milling", *milling_key(self.catalogue, patch)), FinishSettings._tracks_of, (cutter, patch))
+
+    def _tracks_of(self, cutter: CatalogueCutter, patch: Patch) -> Tracks:
+        along, box = lines_of(patch)
+        surface, number = self.surface(patch.body, patch.side), surface_number(patch.body, patch.side)
+        return finishing(
+            surface, along, box, self.scene, number, cutter, patch.table, self.how, self.spans, self.workers
+        )
 
     def surface(self, body: int, side: str) -> Surface:
         """The surface with its parameters."""
         return patch_of(self.impeller, BODIES[body], side, self.ahead)
-
-    def mender(self, body: int, side: str, pair: Pair) -> Refinement:
-        """Puts points between those of a track, or of a way between two of them."""
-        motion = self.how.motion
-        return Refinement(
-            self.surface(body, side), self.scene, _number(body, side), self.catalogue.cutters[pair[0]], pair[1],
-            motion.chord, motion.clearance,
-        )  # fmt: skip
 
     def setting(
         self, pair: Pair, millings: Sequence[Milling], rests: Sequence[RestPasses], tool: int, keep: Keep = anew
     ) -> CutterSetting:
         """The tracks of a cutter at a table angle, linked; ``tool`` its number."""
         cutter, alpha = self.catalogue.cutters[pair[0]], pair[1]
-        tracks = (*(t for m in millings for t in m.tracks.tracks), *(t for r in rests for t in r.tracks))
-        motion = self.how.motion
-        owners = [(m.patch.body, m.patch.side, m.tracks.tracks) for m in millings]
-        owners += [(r.body, r.side, r.tracks) for r in rests]
-        menders = [x for body, side, rows in owners for x in [self.mender(body, side, pair)] * len(rows)]
-        stages = (sum(len(m.tracks.tracks) for m in millings),) if rests else ()
-        moves = keep(
-            ("links", cutter, alpha, tracks, stages),
-            lambda: linked(
-                tracks, self.scene, cutter, alpha, motion.feed, self.link, motion.clearance, rate=motion.rate,
-                joint=surface_joint(menders), stages=stages,
-            ),
-        )  # fmt: skip
+        moves: Linked = self.links_task(pair, millings, rests).of(self, keep)
         program = program_of(moves.moves, self.spindle, self.tools + tool)
         return CutterSetting(cutter, alpha, tuple(millings), tuple(rests), moves, program)
+
+    def links_task(self, pair: Pair, millings: Sequence[Milling], rests: Sequence[RestPasses]) -> PlanTask:
+        """The linked tracks of a cutter at a table angle as a task."""
+        cutter, alpha = self.catalogue.cutters[pair[0]], pair[1]
+        tracks = (*(t for m in millings for t in m.tracks.tracks), *(t for r in rests for t in r.tracks))
+        owners = [(m.patch.body, m.patch.side, len(m.tracks.tracks)) for m in millings]
+        owners += [(r.body, r.side, len(r.tracks)) for r in rests]
+        stages = (sum(len(m.tracks.tracks) for m in millings),) if rests else ()
+        return PlanTask(
+            ("links", cutter, alpha, tracks, stages), FinishSettings._links, (cutter, alpha, tracks, stages, owners)
+        )
+
+    def _links(
+        self, cutter: CatalogueCutter, alpha: float, tracks: tuple[ToolTrack, ...], stages: tuple[int, ...],
+        owners: Sequence[tuple[int, str, int]],
+    ) -> Linked:  # fmt: skip
+        motion = self.how.motion
+        menders: list[Refinement | None] = []
+        for body, side, count in owners:
+            mender = Refinement(
+                self.surface(body, side),
+                self.scene,
+                surface_number(body, side),
+                cutter,
+                alpha,
+                motion.chord,
+                motion.clearance,
+            )
+            menders += [mender] * count
+        return linked(
+            tracks, self.scene, cutter, alpha, motion.feed, self.link, motion.clearance, rate=motion.rate,
+            joint=surface_joint(menders), stages=stages,
+        )  # fmt: skip
+
+    def rest_settings(self, used: tuple[Pair, ...], keep: Keep = anew) -> RestSettings:
+        """What rest passes are planned with beside the cutters at table angles in use."""
+        how = self.how
+        return RestSettings(
+            self.scene, self.catalogue, how.motion, how.scallop, how.overrun, used, self.table.angle, self.spans,
+            self.workers, keep,
+        )  # fmt: skip
+
+
+def lines_of(patch: Patch) -> tuple[str, Box]:
+    """The parameter along which the lines of a patch run, and the ranges of u and v of the patch."""
+    strips, part = (patch.low, patch.high), patch.part
+    along, box = ("v", (strips, part)) if patch.order == "u" else ("u", (part, strips))
+    if patch.part == (0.0, 1.0):
+        other = np.unique(patch.at[:, 1 if patch.order == "u" else 0])
+        whole = (float(other[0]), float(other[-1]))
+        box = (strips, whole) if patch.order == "u" else (whole, strips)
+    return along, box
 
 
 #: what a milling is known by: surface, order of its strips, box, cutter, table angle
 MillingKey = tuple[object, ...]
 
 
-def planned(
-    job: FinishSettings,
-    patches: Sequence[Patch],
-    changes: Changes,
-    rounds: int = 8,
-    progress: Progress = silent,
-    known: dict[MillingKey, Milling] | None = None,
-    keep: Keep = anew,
-    fine: float = 1.0,
-) -> PlannedSettings:
-    """The settings of patches with their rest passes, in the order in which changes take least.
-
-    Parameters
-    ----------
-    changes : what a change of cutter and a setting of the table take
-    rounds : most times that what is left is looked at and milled with rest passes
-    known : millings that are planned already; those that are planned here are added
-    keep : gives what an earlier run has finished of them
-    fine : distance of the points at which what is left is counted, over the usual one
-    """
-    groups: dict[Pair, list[Milling]] = {}
-    known = {} if known is None else known
-    for done, patch in enumerate(patches):
-        key = _key(job.catalogue, patch)
-        if key not in known:
-            known[key] = job.milling(patch, keep)
-        milling = replace(known[key], patch=patch)
-        groups.setdefault((patch.cutter, patch.table), []).append(milling)
-        progress(0.8 * (done + 1) / len(patches), f"paths of {done + 1} patches")
-    settings = {pair: job.setting(pair, rows, (), k, keep) for k, (pair, rows) in enumerate(groups.items(), 1)}
-    faces = _faces(job, [m for rows in groups.values() for m in rows], fine)
-    h = job.how.scallop
-    hopeless = [np.zeros((len(f.u), len(f.v)), dtype=np.bool_) for f in faces]
-    left: list[Floats] = []
-    memory: LeftMemory = {}
-    for turn in range(rounds + 1):
-        left = [_left(f, settings.values(), memory) for f in faces]
-        plan = RestSettings(
-            job.scene, job.catalogue, job.how.motion, h, job.how.overrun, tuple(settings), job.table.angle, job.spans,
-            job.workers, keep,
-        )  # fmt: skip
-        new: dict[Pair, list[RestPasses]] = {}
-        for face, over, lost in zip(faces, left, hopeless, strict=True):
-            for region in regions(over, _AIM * h, lost) if turn < rounds else ():
-                pair = plan.chosen(face, region)
-                if pair is None:
-                    lost |= region
-                else:
-                    new.setdefault(pair, []).append(plan.passes(face, region, pair))
-                progress(0.8 + 0.2 * turn / rounds, f"rest passes, {turn + 1} times")
-        if not new:
-            break
-        for pair, rests in new.items():
-            old = settings.get(pair)
-            settings[pair] = job.setting(
-                pair, old.millings if old else (), (*(old.rests if old else ()), *rests),
-                [*settings].index(pair) + 1 if old else len(settings) + 1, keep,
-            )  # fmt: skip
-        progress(0.8 + 0.2 * (turn + 1) / rounds, f"rest passes, {turn + 1} times")
-    area, lost_area = {}, {}
-    for face, over, lost in zip(faces, left, hopeless, strict=True):
-        cell = _cells(face)
-        area[face.body, face.side] = float(cell[over > h].sum())
-        lost_area[face.body, face.side] = float(cell[(over > h) & lost].sum())
-    order = setting_order(list(settings), changes)
-    numbered = tuple(settings[pair].numbered(job.tools + k) for k, pair in enumerate(order, 1))
-    return PlannedSettings(settings_with_feeds(job, numbered), area, lost_area)
-
-
-def settings_with_feeds(job: FinishSettings, settings: tuple[CutterSetting, ...]) -> tuple[CutterSetting, ...]:
-    """The settings, in the order in which they are milled, with the feeds that forces allow."""
-    if job.forces is None:
-        return settings
-    most = job.how.motion.feed
-    passes = [_pass_rows(job, s) for s in settings]
-    cutters = [s.cutter for s in settings]
-    found = pass_feeds([(c, [p for _, p in rows]) for c, rows in zip(cutters, passes, strict=True)], job.forces, most)
-    out = []
-    for s, rows, (feeds, loads) in zip(settings, passes, found, strict=True):
-        allowed = np.full(len(s.tracks) + 1, most)
-        allowed[[number for number, _ in rows]] = feeds
-        program, to = s.program, s.linked.track
-        # the cutter stays down from the end of one pass to the beginning of the next
-        own = np.minimum(allowed[to], allowed[np.concatenate([to[:1], to[:-1]])])
-        in_cut = (program.motion == LINE) & (program.feed <= most * (1.0 + 1e-12)) & (to >= 0)
-        feed = np.where(in_cut, np.minimum(program.feed, own), program.feed)
-        out.append(replace(s, program=replace(program, feed=feed), loads=loads))
-    return tuple(out)
-
-
-def _pass_rows(job: FinishSettings, s: CutterSetting) -> list[tuple[int, PassRows]]:
-    """Number and rows of each track of a setting, in the order in which they are milled."""
-    owners = [(m.patch.body, m.patch.side, t) for m in s.millings for t in m.tracks.tracks]
-    owners += [(r.body, r.side, t) for r in s.rests for t in r.tracks]
-    cut = np.array([name == "finish" for name in s.program.labels])[s.program.label] & (s.linked.track >= 0)
-    numbers = s.linked.track[cut]
-    out = []
-    for number in dict.fromkeys(numbers.tolist()):
-        rows = np.flatnonzero(cut & (s.linked.track == number))
-        body, side, track = owners[number]
-        tip = s.program.p_work[rows]
-        at = np.array([int(((track.tip - p) ** 2).sum(axis=1).argmin()) for p in tip])
-        K = job.surface(body, side).curvature(*track.at[at].T)
-        out.append((number, PassRows(rows, tip, s.program.axis[rows], track.contact[at], track.normal[at], K)))
-    return out
-
-
-#: what the tracks of a patch, or of rest passes, leave on a surface: by the surface and the tracks, which it keeps
-LeftMemory = dict[tuple[int, tuple[int, ...]], tuple[Floats, tuple[ToolTrack, ...]]]
-
-
-def _left(face: SurfaceGrid, settings: Iterable[CutterSetting], memory: LeftMemory) -> Floats:
-    """(a, b) float [mm] what all tracks that are in the moves leave on the grid of a surface."""
-    out = np.full((len(face.u), len(face.v)), np.inf)
-    for s in settings:
-        gone, first = {k for k, _ in s.linked.refused}, 0
-        for tracks in (*(m.tracks.tracks for m in s.millings), *(r.tracks for r in s.rests)):
-            milled = tuple(t for k, t in enumerate(tracks, first) if k not in gone)
-            first += len(tracks)
-            key = (id(face), tuple(id(t) for t in milled))
-            if key not in memory:
-                memory[key] = left_over(face, [(s.cutter, milled)]), milled
-            out = np.minimum(out, memory[key][0])
-    return out
-
-
-def _key(catalogue: Catalogue, patch: Patch) -> MillingKey:
+def milling_key(catalogue: Catalogue, patch: Patch) -> MillingKey:
+    """What the tracks of a patch are known by."""
     c = catalogue.cutters[patch.cutter]
     at = patch.at[:, 1 if patch.order == "u" else 0]
     ends = (float(at.min()), float(at.max()))
@@ -387,29 +278,6 @@ def change_time(pairs: Iterable[Pair], changes: Changes) -> float:
     return changes.cutter * sum(a[0] != b[0] for a, b in two) + changes.table * sum(a[1] != b[1] for a, b in two)
 
 
-def _number(body: int, side: str) -> int:
+def surface_number(body: int, side: str) -> int:
+    """Number of a surface in the scene of a channel."""
     return NUMBERS.get((body, side), _FLOOR)
-
-
-def _faces(job: FinishSettings, millings: Sequence[Milling], fine: float) -> list[SurfaceGrid]:
-    """Every surface that is milled, as far as its patches go."""
-    boxes: dict[tuple[int, str], list[tuple[tuple[float, float], tuple[float, float]]]] = {}
-    for m in millings:
-        boxes.setdefault((m.patch.body, m.patch.side), []).append(m.box)
-    corner = min(job.catalogue.cutters[m.patch.cutter].corner_radius for m in millings)
-    out = []
-    for (body, side), rows in boxes.items():
-        grid = np.array(rows)
-        low, high = grid[:, :, 0].min(axis=0), grid[:, :, 1].max(axis=0)
-        box = ((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
-        surface, number = job.surface(body, side), _number(body, side)
-        out.append(face_of(body, side, surface, number, box, job.how.scallop, corner, fine))
-    return out
-
-
-def _cells(face: SurfaceGrid) -> Floats:
-    """(a, b) area [mm2] that each grid point stands for."""
-    U, V = (x.ravel() for x in np.meshgrid(face.u, face.v, indexing="ij"))
-    size = np.linalg.norm(np.cross(face.surface.at(U, V, 1, 0), face.surface.at(U, V, 0, 1)), axis=1)
-    out: Floats = size.reshape(len(face.u), len(face.v)) * (face.u[1] - face.u[0]) * (face.v[1] - face.v[0])
-    return out

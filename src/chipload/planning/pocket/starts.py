@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,37 +33,60 @@ TRIES = 12
 
 
 class Starts:
-    """All places of the path so far; ``alive`` may still be open, ``open`` were when last looked at."""
+    """All places of the path so far; ``alive`` may still be open, ``open`` were when last looked at.
+
+    The arrays are views of buffers that double when they are full: a pass costs the time of its own places, and of
+    those that are alive.
+    """
 
     def __init__(self, radius: float, step: float) -> None:
         self.radius, self.step = radius, step
-        self.p: Floats = np.zeros((0, 2))
-        self.normal: Floats = np.zeros((0, 2))
-        self.rank: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-        self.first: NDArray[np.bool_] = np.zeros(0, dtype=bool)
-        self.alive: NDArray[np.bool_] = np.zeros(0, dtype=bool)
-        self.open: NDArray[np.bool_] = np.zeros(0, dtype=bool)
-        self.fresh: NDArray[np.bool_] = np.zeros(0, dtype=bool)  # not looked at since the stock near it changed
+        self.count = 0
+        self._buffers: dict[str, NDArray[Any]] = {
+            "p": np.zeros((0, 2)),
+            "normal": np.zeros((0, 2)),
+            "rank": np.zeros(0, dtype=np.int64),
+            "first": np.zeros(0, dtype=bool),
+            "alive": np.zeros(0, dtype=bool),
+            "open": np.zeros(0, dtype=bool),
+            "fresh": np.zeros(0, dtype=bool),  # not looked at since the stock near it changed
+        }
+        self._show()
+
+    def _show(self) -> None:
+        """The views of the places that there are."""
+        used = {name: values[: self.count] for name, values in self._buffers.items()}
+        self.p, self.normal, self.rank = used["p"], used["normal"], used["rank"]
+        self.first, self.alive, self.open, self.fresh = used["first"], used["alive"], used["open"], used["fresh"]
 
     def add(self, points: Floats, headings: Floats) -> None:
         """Places of a pass: right side in its order, left side in the other, and ahead of where it ended."""
         right = np.column_stack([np.sin(headings), -np.cos(headings)])
         fan = headings[-1] + np.radians([-45.0, 0.0, 45.0])
-        p = np.vstack([points, points[::-1], np.repeat(points[-1:], 3, axis=0)])
-        normal = np.vstack([right, -right[::-1], np.column_stack([np.cos(fan), np.sin(fan)])])
         n = len(points)
-        first = np.zeros(len(p), dtype=bool)
+        first = np.zeros(2 * n + 3, dtype=bool)
         first[[0, n, 2 * n, 2 * n + 1, 2 * n + 2]] = True
-        self.p = np.vstack([self.p, p])
-        self.normal = np.vstack([self.normal, normal])
-        self.rank = np.concatenate([self.rank, np.repeat([0, 2, 3], [n, n, 3])])
-        self.first = np.concatenate([self.first, first])
-        self.alive = np.concatenate([self.alive, np.ones(len(p), dtype=bool)])
-        self.open = np.concatenate([self.open, np.zeros(len(p), dtype=bool)])
-        self.fresh = np.concatenate([self.fresh, np.ones(len(p), dtype=bool)])
+        new = {
+            "p": np.vstack([points, points[::-1], np.repeat(points[-1:], 3, axis=0)]),
+            "normal": np.vstack([right, -right[::-1], np.column_stack([np.cos(fan), np.sin(fan)])]),
+            "rank": np.repeat([0, 2, 3], [n, n, 3]),
+            "first": first,
+            "alive": True,
+            "open": False,
+            "fresh": True,
+        }
+        before, self.count = self.count, self.count + len(first)
+        for name, values in self._buffers.items():
+            if self.count > len(values):
+                room = np.zeros((2 * self.count, *values.shape[1:]), dtype=values.dtype)
+                room[:before] = values[:before]
+                self._buffers[name] = room
+            self._buffers[name][before : self.count] = new[name]
+        self._show()
         reach = 2.2 * self.radius  # a rim that far away meets nothing that this pass took
-        near = (self.p >= points.min(axis=0) - reach) & (self.p <= points.max(axis=0) + reach)
-        self.fresh |= near.all(axis=1)
+        k = np.flatnonzero(self.alive)
+        near = (self.p[k] >= points.min(axis=0) - reach) & (self.p[k] <= points.max(axis=0) + reach)
+        self.fresh[k] |= near.all(axis=1)
 
     def revive(self) -> None:
         """Let every place be looked at again."""

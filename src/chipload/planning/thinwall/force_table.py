@@ -6,6 +6,7 @@ Notation: d [mm] depth, F_n [N] force normal to the surface, as in :mod:`chiploa
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,3 +95,29 @@ def law_on_stock(
     plane = law_of(posture, material, DepthRange(limits.smallest, deepest, limits.tolerance), measure=measure)
     d = np.geomspace(limits.smallest, limits.greatest, len(plane.depths))
     return ForceTable(limits, d, plane.force(met(d)))
+
+
+def greatest_law(
+    poses: Sequence[CutterPose],
+    material: Material,
+    limits: DepthRange,
+    *,
+    slope: float,
+    scallop: float,
+    measure: Measure,
+) -> tuple[ForceTable, int]:
+    """Table of the greatest F_n of several poses, and the number of the pose that has most at the greatest depth.
+
+    Parameters
+    ----------
+    poses : at least one
+    slope, scallop, measure : as of :func:`law_on_stock`
+
+    Raises
+    ------
+    InputError
+        As of :func:`law_on_stock`.
+    """
+    each = [law_on_stock(pose, material, limits, slope=slope, scallop=scallop, measure=measure) for pose in poses]
+    worst = int(np.argmax([one.forces[-1] for one in each]))
+    return ForceTable(limits, each[0].depths, np.max([one.forces for one in each], axis=0)), worst

@@ -24,8 +24,10 @@ from scipy.interpolate import PchipInterpolator
 
 from chipload.errors import InputError
 from chipload.planning.thinwall.blank import FinishSurface
+from chipload.planning.thinwall.finish_rows import FinishSide
 from chipload.planning.thinwall.passes import WallPass
 from chipload.planning.thinwall.paths import PassMotion, Rows, placed, rows_of
+from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.program.program import LINE, RAPID, Program
 
 Floats = NDArray[np.float64]
@@ -48,6 +50,12 @@ class FineSide:
     surface: FinishSurface
     u: Floats
     v: Floats
+
+    def laid(self, p: WallPass, places: tuple[Floats, Floats], posture: CutterPose) -> tuple[Rows, Floats, Floats]:
+        """Rows of a pass, and the parameters (r, s, 2) and the planned depth (r, s) [mm] of their contact points."""
+        low, high = (refined(d, places, (self.u, self.v)) for d in (p.low, p.high))
+        rows = rows_of(self.surface, low, high, posture)
+        return (rows, *_known(rows, self, high - low))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +89,12 @@ class OperationMotion:
 
     Attributes
     ----------
-    sides : each finely, rows of its cutter apart
+    sides : each finely, rows of its cutter apart, or with rows of its own
     pass_motion : cutter, feed and clearance
     margins : of its links
     """
 
-    sides: Sequence[FineSide]
+    sides: Sequence[FineSide | FinishSide]
     pass_motion: PassMotion
     margins: Margins
 
@@ -118,15 +126,25 @@ def refined(values: Floats, at: tuple[Floats, Floats], to: tuple[Floats, Floats]
 
 def beyond_edges(rows: Rows, distance: float) -> Rows:
     """Rows with a point more at both ends, ``distance`` [mm] on along the feed, where nothing is cut."""
+    length = rows.contact.shape[1]
+    count = np.full(len(rows.contact), length) if rows.count is None else rows.count
+    at = np.clip(np.arange(length + 2) - 1, 0, count[:, None] - 1)
 
     def ends(values: Floats) -> Floats:
-        return np.concatenate([values[:, :1], values, values[:, -1:]], axis=1)
+        return np.take_along_axis(values, at[..., None], axis=1)
 
-    contact = ends(rows.contact)
-    contact[:, 0] -= distance * rows.feed[:, 0]
-    contact[:, -1] += distance * rows.feed[:, -1]
-    cut = np.pad(rows.cut, ((0, 0), (1, 1)))
-    return Rows(contact, ends(rows.normal), ends(rows.feed), cut)
+    contact, feed = ends(rows.contact), ends(rows.feed)
+    contact[:, 0] -= distance * feed[:, 0]
+    after = np.arange(length + 2) > count[:, None]
+    contact[after] += distance * feed[after]
+    return Rows(
+        contact,
+        ends(rows.normal),
+        feed,
+        np.pad(rows.cut, ((0, 0), (1, 1))),
+        None if rows.axis is None else ends(rows.axis),
+        None if rows.count is None else rows.count + 2,
+    )
 
 
 def link_passes(
@@ -158,13 +176,16 @@ def link_passes(
 
 
 def _pass_program(
-    p: WallPass, side: FineSide, places: tuple[Floats, Floats], pass_motion: PassMotion, margins: Margins, label: str
+    p: WallPass,
+    side: FineSide | FinishSide,
+    places: tuple[Floats, Floats],
+    pass_motion: PassMotion,
+    margins: Margins,
+    label: str,
 ) -> PassProgram:
-    low, high = (refined(d, places, (side.u, side.v)) for d in (p.low, p.high))
-    bare = rows_of(side.surface, low, high, pass_motion.posture)
+    bare, place, depth = side.laid(p, places, pass_motion.posture)
     if not bare.cut.any():
         raise InputError(f"{label}: the pass finds no stock")
-    place, depth = _known(bare, side, high - low)
     rows = beyond_edges(bare, margins.beyond)
     place = np.concatenate([place[:, :1], place, place[:, -1:]], axis=1)
     depth = np.pad(depth, ((0, 0), (1, 1)))
@@ -191,8 +212,7 @@ def _pass_program(
                 path.rapid(outside[r, first], axis[r, first])
                 path.rapid(lifted[r, first], axis[r, first])
             else:
-                step = 1 if first >= before[1] else -1
-                back = np.arange(before[1], first + step, step)
+                back = _return_points(rows, lifted[before], lifted[r], before[1], first)
                 for k in back[_corners(lifted[r, back], margins.sag)]:
                     path.rapid(lifted[r, k], axis[r, k])
             path.line(tip[r, first], axis[r, first], centre[r, first], lifted[r, first] - tip[r, first])
@@ -205,6 +225,17 @@ def _pass_program(
     if before is not None:
         path.rapid(outside[before], axis[before])
     return path.pass_program(p.side, pass_motion, label)
+
+
+def _return_points(rows: Rows, end: Floats, lifted: Floats, number: int, first: int) -> NDArray[np.int64]:
+    """Numbers of the points of a row that a link passes: from where the row before ended to the first one.
+
+    Rows of one's own program may run to and fro, with points of their own: the way begins at the nearest one.
+    """
+    if rows.axis is not None:
+        number = int(np.linalg.norm(lifted - end, axis=1).argmin())
+    step = 1 if first >= number else -1
+    return np.arange(number, first + step, step)
 
 
 def _corners(points: Floats, sag: float) -> NDArray[np.int64]:

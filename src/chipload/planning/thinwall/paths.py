@@ -24,6 +24,7 @@ from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
 from chipload.planning.thinwall.blank import FinishSurface
+from chipload.planning.thinwall.contact import across
 from chipload.planning.thinwall.passes import NOTHING, WallPass
 from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.program.program import LINE, RAPID, Program
@@ -66,12 +67,16 @@ class Rows:
     ----------
     contact, normal, feed : (r, s, 3) float: q [mm], n, t; rows from the free edge on, points in the order of travel
     cut : (r, s) bool, where stock is found
+    axis : (r, s, 3) float, of the cutter; None: as the posture says
+    count : (r,) int, points of each row, the last of which is repeated; None: s
     """
 
     contact: Floats
     normal: Floats
     feed: Floats
     cut: NDArray[np.bool_]
+    axis: Floats | None = None
+    count: NDArray[np.int64] | None = None
 
 
 def _unit(v: Floats) -> Floats:
@@ -123,6 +128,10 @@ def rows_of(surface: FinishSurface, low: Floats, high: Floats, posture: CutterPo
 
 def placed(rows: Rows, posture: CutterPose) -> tuple[Floats, Floats, Floats]:
     """Tip [mm], axis and middle C of the corner circle's centres [mm] at the contact points, (r, s, 3) float each."""
+    if rows.axis is not None:
+        r, e, height = posture.cutter.apt[1:4]
+        C = rows.contact + r * rows.normal + e * across(rows.normal, rows.axis)
+        return C - height * rows.axis, rows.axis, C
     frame = np.stack([rows.feed, np.cross(rows.normal, rows.feed), rows.normal], axis=2)
     axis = np.einsum("k,rskc->rsc", posture.axis, frame)
     C = rows.contact + np.einsum("k,rskc->rsc", posture.centre, frame)

@@ -1,9 +1,14 @@
-"""Tasks that kill the process that executes them; workers import them from here."""
+"""Tasks of tests of workers, which import them from here; some kill the process that executes them."""
 
 from __future__ import annotations
 
 import os
 import signal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
 
 
 def killed_once(flag: str, value: int) -> int:
@@ -20,3 +25,13 @@ def always_killed(value: int) -> int:
     """Kills its process every time."""
     os.kill(os.getpid(), signal.SIGKILL)
     return value
+
+
+def shared_sum(shared: Floats, value: float) -> float:
+    """The sum of what is shared and a value."""
+    return float(shared.sum()) + value
+
+
+def process_of(_: int) -> int:
+    """Number of the process."""
+    return os.getpid()

@@ -1,0 +1,128 @@
+"""Closed contours that cross, touch or overlap become contours of the same area that do neither.
+
+Notation: a **piece** runs along a contour from one meeting of contours to the next; it bounds the area if it has an
+odd number of windings about the one of its sides and an even number about the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+from chipload.geometry.contour import Contour, Floats, Region, winding
+from chipload.geometry.split import (
+    LADDER,
+    RawSegments,
+    SplitSegments,
+    chained_segments,
+    left_of,
+    meetings,
+    rows_of,
+    split_segments,
+)
+
+#: how far beside a piece [mm] its sides are looked at, as a share of its length and at most
+BESIDE, BESIDE_MM = 1e-3, 1e-6
+
+
+def even_odd(contours: Sequence[Contour]) -> tuple[tuple[Contour, ...], Floats]:
+    """Contours of the area that an odd number of windings encloses, and where the given ones met.
+
+    Parameters
+    ----------
+    contours : closed; each may cross, touch or retrace itself and others
+
+    Returns
+    -------
+    The contours, and places (k, 2) [mm]. Contours that meet nowhere are returned as they are, with no place. Otherwise
+    the inside is on the left of each; none crosses another, but they may share single points.
+
+    Raises
+    ------
+    InputError
+        A contour is open, or what is left does not close.
+
+    Examples
+    --------
+    >>> square = [[0, 0], [4, 0], [4, 4], [0, 4]]
+    >>> two = [Contour.polyline(np.add(square, at), closed=True) for at in ((0, 0), (2, 2))]
+    >>> made, where = even_odd(two)
+    >>> sum(c.area for c in made), where.tolist()
+    (24.0, [[2.0, 4.0], [4.0, 2.0]])
+    """
+    given = Region(tuple(contours)).contours
+    if not given:
+        return given, np.zeros((0, 2))
+    raw = _raw(given)
+    places = np.zeros((0, 2))
+    for tol, snap in LADDER:
+        found = np.unique(np.round(meetings(raw, tol)[1], 6), axis=0)
+        if not len(found):
+            return given, found
+        places = found
+        pieces, _ = split_segments(raw, tol, snap)
+        kept, rows = _bounding(given, raw, pieces)
+        made = chained_segments(RawSegments.plain(rows), kept, 1.0, tol)
+        if made and all(c.closed for c in made):
+            return made, places
+    x, y = places[0]
+    raise InputError(f"part: contours cross at ({x:.6g}, {y:.6g}) and enclose no area that is clear: draw one of them")
+
+
+def _raw(contours: Sequence[Contour]) -> RawSegments:
+    """The segments of closed contours, each of which names the next of its contour."""
+    rows = np.vstack([c.segments for c in contours])
+    follow, first = [], 0
+    for c in contours:
+        n = len(c.segments)
+        follow.append(first + np.roll(np.arange(n), -1))
+        first += n
+    return RawSegments.plain(rows, np.concatenate(follow))
+
+
+def _bounding(contours: Sequence[Contour], raw: RawSegments, pieces: SplitSegments) -> tuple[SplitSegments, Floats]:
+    """The pieces that bound the area, each once and turned so that it lies on their left, and their segments."""
+    rows = rows_of(raw, pieces)
+    middle, normal = _middles(rows)
+    length = np.hypot(*(rows[:, 2:4] - rows[:, 0:2]).T)
+    step = np.minimum(np.where(length > 0.0, BESIDE * length, BESIDE_MM), BESIDE_MM)[:, None] * normal
+    left, right = _odd(contours, middle + step), _odd(contours, middle - step)
+    pick = np.flatnonzero((left != right) & _first_of_its_like(pieces, middle))
+    rows, node, back = rows[pick], pieces.node[pick], right[pick]
+    rows[back] = np.column_stack([rows[:, 2:4], rows[:, 0:2], rows[:, 4:6], -rows[:, 6]])[back]
+    node = np.where(back[:, None], node[:, ::-1], node)
+    span = np.tile([0.0, 1.0], (len(pick), 1))
+    return SplitSegments(np.arange(len(pick)), span, node, pieces.place), rows
+
+
+def _first_of_its_like(pieces: SplitSegments, middle: Floats) -> NDArray[np.bool_]:
+    """(m,) pieces that run between two nodes through one middle are one; which ones come first."""
+    ends = np.sort(pieces.node, axis=1)
+    key = np.column_stack([ends, np.round(middle, 6)])
+    out = np.zeros(len(key), dtype=np.bool_)
+    out[np.unique(key, axis=0, return_index=True)[1]] = True
+    return out
+
+
+def _middles(rows: Floats) -> tuple[Floats, Floats]:
+    """(m, 2) middles of segments, and unit vectors to their left."""
+    arc = rows[:, 6:7] != 0.0
+    v = rows[:, 0:2] - rows[:, 4:6]
+    c, s = np.cos(0.5 * rows[:, 6:7]), np.sin(0.5 * rows[:, 6:7])
+    out = c * v + s * left_of(v)
+    middle = np.where(arc, rows[:, 4:6] + out, 0.5 * (rows[:, 0:2] + rows[:, 2:4]))
+    along = rows[:, 2:4] - rows[:, 0:2]
+    normal = np.where(arc, -np.sign(rows[:, 6:7]) * out, left_of(along))
+    return middle, normal / np.hypot(*normal.T)[:, None]
+
+
+def _odd(contours: Sequence[Contour], points: Floats) -> NDArray[np.bool_]:
+    """(m,) whether an odd number of windings goes about each point."""
+    total = np.zeros(len(points), dtype=np.int64)
+    for c in contours:
+        total += winding(c, points)
+    out: NDArray[np.bool_] = total % 2 == 1
+    return out

@@ -1,0 +1,93 @@
+"""All sections of a blade in one table, both sides beside each other, as pyturbo-aero writes them.
+
+Format: a line of names, ``span_index,ss_x,ss_y,ss_z,ps_x,ps_y,ps_z`` or ``span_index,ss_x,ss_r,ss_th,ps_x,ps_r,ps_th``,
+then for each section, from hub to shroud, a line for each place from leading to trailing edge: the point of the suction
+side (ss), that of the pressure side (ps). x is along the axis, th [rad] goes from z towards y. No unit is stated.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.errors import InputError
+
+Floats = NDArray[np.float64]
+
+#: names of the columns after the first, in lower case
+_XYZ, _XRTH = ["ss_x", "ss_y", "ss_z", "ps_x", "ps_y", "ps_z"], ["ss_x", "ss_r", "ss_th", "ps_x", "ps_r", "ps_th"]
+#: points of a meridian are at least so far apart, of its length: nearer ones differ by the rounding of the file
+_APART = 0.01
+
+
+def sections_of_table(text: str, path: Path) -> tuple[Floats, ...] | None:
+    """Closed sections (n, 3) in the file's unit, z along the axis; None: the text is not such a table.
+
+    Raises
+    ------
+    InputError
+        A line is not seven finite numbers, or sections are out of order.
+    """
+    parts = _parts(text, path)
+    if parts is None:
+        return None
+    # from the leading edge along one side and back along the other, both ends once
+    return tuple(np.concatenate([ss, ps[-2:0:-1]]) for ss, ps in parts)
+
+
+def meridian_of_table(text: str, path: Path, last: bool) -> Floats | None:
+    """(n, 2) r and z of the surface on which the first section lies, or the ``last``; None: not such a table."""
+    parts = _parts(text, path)
+    if parts is None:
+        return None
+    side = parts[-1 if last else 0][0]
+    p = np.stack([np.hypot(side[:, 0], side[:, 1]), side[:, 2]], axis=-1)
+    chord = (p[-1] - p[0]) / np.linalg.norm(p[-1] - p[0])
+    p = p[np.argsort((p - p[0]) @ chord, kind="stable")]
+    least = _APART * float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum())
+    kept = [p[0]]
+    for point in p[1:-1]:
+        if min(np.linalg.norm(point - kept[-1]), np.linalg.norm(point - p[-1])) >= least:
+            kept.append(point)
+    return np.array([*kept, p[-1]])
+
+
+def _parts(text: str, path: Path) -> list[tuple[Floats, Floats]] | None:
+    """Suction and pressure side (n, 3) of each section."""
+    lines = [(k, line.replace(",", " ").split()) for k, line in enumerate(text.splitlines(), 1)]
+    lines = [(k, words) for k, words in lines if words]
+    names = [w.lower() for w in lines[0][1]] if lines else []
+    if names[:1] != ["span_index"]:
+        return None
+    if names[1:] not in (_XYZ, _XRTH):
+        raise InputError(
+            f"{path}: columns {' '.join(names[1:])} after span_index: must be {' '.join(_XYZ)} or {' '.join(_XRTH)}"
+        )
+    rows = np.array([_row(words, path, k) for k, words in lines[1:]]).reshape(-1, 7)
+    change = np.flatnonzero(np.diff(rows[:, 0])) + 1
+    spans = [rows[a:b] for a, b in itertools.pairwise([0, *change.tolist(), len(rows)])]
+    numbers = [float(s[0, 0]) for s in spans if len(s)]
+    if not numbers or numbers != sorted(set(numbers)):
+        raise InputError(f"{path}: span_index: must ascend from hub to shroud, each section in one piece")
+    return [(_points(s[:, 1:4], names), _points(s[:, 4:], names)) for s in spans]
+
+
+def _row(words: list[str], path: Path, line: int) -> list[float]:
+    try:
+        row = [float(w) for w in words]
+    except ValueError:
+        raise InputError(f"{path} line {line}: not numbers: {' '.join(words)[:40]!r}") from None
+    if len(row) != 7 or not all(map(math.isfinite, row)):
+        raise InputError(f"{path} line {line}: must be seven finite numbers: {' '.join(words)[:40]!r}")
+    return row
+
+
+def _points(p: Floats, names: list[str]) -> Floats:
+    """The part's frame: z along the file's x."""
+    if names[1:] == _XYZ:
+        return np.stack([p[:, 1], p[:, 2], p[:, 0]], axis=-1)
+    return np.stack([p[:, 1] * np.sin(p[:, 2]), p[:, 1] * np.cos(p[:, 2]), p[:, 0]], axis=-1)

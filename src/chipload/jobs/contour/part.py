@@ -1,0 +1,143 @@
+"""The part of a job: its contours from a drawing or from a planar face of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from chipload.errors import Finding, InputError
+from chipload.geometry.chains import Drawing
+from chipload.geometry.contour import Contour
+from chipload.geometry.dxf import read_dxf
+from chipload.geometry.even_odd import even_odd
+from chipload.geometry.step import read_step_face
+from chipload.jobs.contour.job import ContourJob
+from chipload.machine.machine import Machine
+
+
+def read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Contour, ...], tuple[Finding, ...]]:
+    """Contours of the drawing or of the planar face, those of the stock's outline, and what was noticed.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, has no such layer, or holds contours that cannot be used together.
+    """
+    part = job.table.part
+    ending = job.part_file.suffix.lower()
+    if part.stock_layers and ending != ".dxf":
+        raise InputError(f"part.stock_layers: {part.file} has no layers: only a drawing (.dxf) has")
+    if ending == ".dxf":
+        drawing = read_dxf(
+            job.part_file,
+            units=part.units,
+            units_if_unstated=part.units_if_unstated,
+            layers=(*part.layers, *part.stock_layers) if part.layers else None,
+            join_mm=part.join_mm,
+            tolerance_mm=part.tolerance_mm,
+        )
+    elif ending in (".step", ".stp"):
+        drawing = read_step_face(
+            job.part_file, z_mm=part.face_z_mm, join_mm=part.join_mm, tolerance_mm=part.tolerance_mm
+        )
+    else:
+        raise InputError(f"part.file = {part.file}: must end in .dxf, .step or .stp, or be a program")
+    outline, contours = _stock_outline(part.stock_layers, drawing) if part.stock_layers else ((), drawing.contours)
+    contours, outline = moved(contours, part.origin_mm), moved(outline, part.origin_mm)
+    kept, left_out = closed_alone(contours) if part.open_chains == "dropped" else (contours, ())
+    used, met = clear_of_each_other(kept)
+    return used, outline, tuple(replace(f, text=f"part: {f.text}") for f in (*drawing.findings, *left_out, *met))
+
+
+def moved(contours: Sequence[Contour], origin: tuple[float, float]) -> tuple[Contour, ...]:
+    """The contours in a frame whose origin is a place of the drawing [mm]."""
+    if origin == (0.0, 0.0):
+        return tuple(contours)
+    shift = np.array([*origin, *origin, *origin, 0.0])
+    out = []
+    for c in contours:
+        rows = c.segments - shift
+        rows[:, 4:6] = np.where(rows[:, 6:7] != 0.0, rows[:, 4:6], 0.0)
+        out.append(Contour(rows))
+    return tuple(out)
+
+
+def require_within_travel(contours: Sequence[Contour], machine: Machine, radius: float) -> None:
+    """Refuse contours that the centre of a cutter cannot follow, on whichever side of them it runs.
+
+    Raises
+    ------
+    InputError
+        They reach further beyond the limits of X or Y than the radius [mm].
+    """
+    if machine.chain.rotary or not contours:
+        return
+    boxes = np.array([c.bounds for c in contours])
+    for k, axis in enumerate("XY"):
+        low, high = float(boxes[:, k].min()), float(boxes[:, 2 + k].max())
+        least, most = machine.limits[k]
+        if low + radius < least or high - radius > most:
+            middle = 0.5 * (low + high) - 0.5 * (least + most)
+            remedy = (
+                f"move it by part.origin_mm, {axis} by {middle:.6g}"
+                if high - low - 2.0 * radius <= most - least
+                else "name a machine with more travel, or see whether part.units is right"
+            )
+            raise InputError(
+                f"part: {axis} from {low:.6g} to {high:.6g} mm: machine {machine.name} travels from {least:g} to "
+                f"{most:g} mm: {remedy}"
+            )
+
+
+def closed_alone(contours: Sequence[Contour]) -> tuple[tuple[Contour, ...], tuple[Finding, ...]]:
+    """The closed contours, and where the others begin.
+
+    Raises
+    ------
+    InputError
+        None is closed.
+    """
+    closed, chains = tuple(c for c in contours if c.closed), [c for c in contours if not c.closed]
+    if not closed:
+        raise InputError('part.open_chains = "dropped": no contour is closed: close them (part.join_mm), or drop none')
+    if not chains:
+        return closed, ()
+    x, y = chains[0].start
+    count = f"{len(chains)} open chain{'s' if len(chains) > 1 else ''}"
+    return closed, (Finding("part-open", 0, f"{count} dropped, the first from ({x:.6g}, {y:.6g})"),)
+
+
+def clear_of_each_other(contours: tuple[Contour, ...]) -> tuple[tuple[Contour, ...], tuple[Finding, ...]]:
+    """Closed contours that cross or touch as contours of their even-odd area, and where they meet; others unchanged.
+
+    Raises
+    ------
+    InputError
+        Their area has no clear outline.
+    """
+    if not all(c.closed for c in contours):
+        return contours, ()
+    made, places = even_odd(contours)
+    if not len(places):
+        return contours, ()
+    x, y = places[0]
+    count = f"{len(places)} places" if len(places) > 1 else "one place"
+    text = f"contours meet in {count}, the first ({x:.6g}, {y:.6g}): what an even number of them encloses is not cut"
+    return made, (Finding("part-crossing", 0, text),)
+
+
+def _stock_outline(layers: Sequence[str], drawing: Drawing) -> tuple[tuple[Contour, ...], tuple[Contour, ...]]:
+    """The contours on the layers of the stock, and the others."""
+    wanted = {name.casefold() for name in layers}
+    known = {name.casefold() for name in drawing.layers}
+    for name in layers:
+        if name.casefold() not in known:
+            raise InputError(f"part.stock_layers: no contour on layer {name!r}; layers there are: {sorted(known)}")
+    pairs = list(zip(drawing.contours, drawing.layers, strict=True))
+    outline = tuple(c for c, layer in pairs if layer.casefold() in wanted)
+    rest = tuple(c for c, layer in pairs if layer.casefold() not in wanted)
+    if not rest:
+        raise InputError("part.stock_layers: every contour is on these layers: name those of the stock only")
+    return outline, rest
