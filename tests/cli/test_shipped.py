@@ -100,6 +100,15 @@ def test_what_init_refuses(tmp_path: Path) -> None:
     assert "a template needs no file: chipload init --material DIR" in call("init", "a", "b", "--material")[2]
 
 
+def test_a_coarse_run_of_a_thin_wall_plans_what_is_cut(tmp_path: Path) -> None:
+    """The example asks for two plans that are compared only: least error, and compensated."""
+    assert call("example", "plate", tmp_path / "plate")[0] == 0
+    asked = coarser(load_job(tmp_path / "plate" / "job.toml"))
+    assert {"operation.0.least_error=false", "operation.0.compensate_um=0.0"} <= set(asked)
+    operation = load_job(tmp_path / "plate" / "job.toml", asked).job.operation
+    assert (operation.least_error, operation.compensate_um) == (False, 0.0)
+
+
 def test_a_coarse_run_says_so(tmp_path: Path) -> None:
     """The same slot with coarser steps: unproven, the torque within a tenth, the overrides in the provenance."""
     slot_job(tmp_path, step=0.5, end=28.0)

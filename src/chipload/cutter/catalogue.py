@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from chipload.cutter.table import BARREL_KEYS
 from chipload.errors import InputError
 from chipload.tables import Labelled, nearest, read_table, shipped_table
 
@@ -196,7 +197,7 @@ def _from_table(labelled: Labelled) -> Catalogue:
 def _cutter(k: int, row: Any) -> CatalogueCutter:
     if not isinstance(row, dict):
         raise InputError(f"cutter {k}: must be a table")
-    barrel = next((key for key in row if key in _BARREL or row[key] == "barrel"), None)
+    barrel = next((key for key in row if key in BARREL_KEYS or row[key] == "barrel"), None)
     if barrel is not None:
         raise InputError(
             f"cutter {k}: {barrel} = {row[barrel]!r}: barrel cutters are not planned with: state flat, bull-nose or "
@@ -225,7 +226,5 @@ def _cutter(k: int, row: Any) -> CatalogueCutter:
 
 
 _WANTED = {"name": "text"}
-#: keys by which shops and tool libraries state the large radius of a barrel cutter
-_BARREL = ("barrel_radius_mm", "profile_radius_mm", "side_radius_mm")
-#: likewise the angle of a tapered one
+#: keys by which shops and tool libraries state the angle of a tapered cutter
 _TAPER = ("taper_deg", "taper_angle_deg", "half_angle_deg", "taper")

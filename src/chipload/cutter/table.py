@@ -29,6 +29,14 @@ ENDINGS = (".fctb", ".json", ".tools", ".p21", ".camotics", ".tbl")
 NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "overhang_mm", "modulus_gpa")
 
 
+#: keys by which shops and tool libraries state the large radius of a barrel cutter, and what is said of them
+BARREL_KEYS = ("barrel_radius_mm", "profile_radius_mm", "side_radius_mm")
+BARREL = (
+    "chips of barrel cutters are not simulated: state a flat, bull-nose or ball cutter, or the outline of the barrel as "
+    "body_mm: it is then held against part and fixture alone"
+)
+
+
 def _rows(value: Any) -> Any:
     """A list of lists as tuples."""
     return tuple(tuple(row) if isinstance(row, list) else row for row in value) if isinstance(value, list) else value
@@ -206,7 +214,7 @@ def _first(err: ValidationError, table: Mapping[str, Any]) -> str:
     key = ".".join(str(x) for x in row["loc"])
     if row["type"] == "extra_forbidden":
         near = nearest(key, list(CutterTable.model_fields))
-        return f"cutter.{key}: unknown key: the nearest known one is {near}"
+        return f"cutter.{key}: {BARREL if key in BARREL_KEYS else f'unknown key: the nearest known one is {near}'}"
     wanted = {
         "float_type": "must be a number",
         "finite_number": "must be a finite number",

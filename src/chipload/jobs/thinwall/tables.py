@@ -192,8 +192,8 @@ class WallOperationTable(Table):
         0.005, le=0.1, description="greatest deviation of rows from the surface between contact points"
     )
     least_error: bool = Field(False, description="also plan the least form error within the time of the constant depth")
-    compensate_um: Positive | None = Field(
-        None, le=200.0, description="also move the last passes against their form error, by at most this"
+    compensate_um: Number = Field(
+        0.0, ge=0.0, le=200.0, description="also move the last passes against their form error, by at most this; 0: not"
     )
     layer_mm: Positive = Field(le=1.0, description="thickness of the layers of the simulation")
     tolerance_mm: Positive = Field(0.001, ge=1e-6, le=0.05, description="how far chords may leave the edges of chips")

@@ -205,7 +205,7 @@ def compared_variants(tried: Tried, variable: Variant, constant: Variant) -> dic
             places, _depth_operations(places, tried.share, tried.corrections, False), constant.seconds,
             lambda planned: program_seconds(places, planned), lambda planned: tried.prove(planned, 0.4),
         )  # fmt: skip
-    if op.compensate_um is not None:
+    if op.compensate_um > 0.0:
         out["compensated"] = compensated(
             places,
             tried.planned["variable"],
