@@ -70,8 +70,8 @@ IN_FILE = [
     ('name = "vmc"', 'name = "vmc"\nfile = "a.toml"', "machine: both are stated: state either machine.name or "
      "machine.file"),
     ("number = 1", "number = 1\nside_radius_mm = 60.0", "cutter.0.side_radius_mm: chips of barrel cutters are not "
-     "simulated: state a flat, bull-nose or ball cutter, or the outline of the barrel as body_mm: it is then held against "
-     "part and fixture alone"),
+     "simulated: state a flat, bull-nose or ball cutter, or the outline of the barrel as body_mm: it is then "
+     "held against part and fixture alone"),
     ("number = 1", "", "cutter.0.number is missing: must be given, a cutter is never guessed"),
 ]  # fmt: skip
 

@@ -32,8 +32,8 @@ NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "ov
 #: keys by which shops and tool libraries state the large radius of a barrel cutter, and what is said of them
 BARREL_KEYS = ("barrel_radius_mm", "profile_radius_mm", "side_radius_mm")
 BARREL = (
-    "chips of barrel cutters are not simulated: state a flat, bull-nose or ball cutter, or the outline of the barrel as "
-    "body_mm: it is then held against part and fixture alone"
+    "chips of barrel cutters are not simulated: state a flat, bull-nose or ball cutter, or the outline of the barrel "
+    "as body_mm: it is then held against part and fixture alone"
 )
 
 
