@@ -1,5 +1,6 @@
 """Impellers that must be refused, each with its exact message."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 
 from chipload import examples
 from chipload.errors import InputError
+from chipload.geometry.sections import read_sections
 from chipload.jobs import check_job, load_job, run_job
 
 EXAMPLES = Path(examples.__file__).parent
@@ -84,6 +86,38 @@ def test_columns_that_no_line_names(hecc):
     assert refused(hecc) == (
         "impeller.sections.blade: main_07.txt: no line names the columns: state them, as X R*THETA R"
     )
+
+
+def test_a_splitter_that_stands_in_its_blade(hecc):
+    """As pyturbo-aero writes it: at the angle of its blade, here by the blade's own sections."""
+    text = hecc.read_text()
+    head, tail = text[: text.index("splitter = [")], text[text.index("hub = ") :]
+    names = re.findall(r"main_\d\d.txt", head)
+    hecc.write_text(f"{head}splitter = {names[2:]}\n{tail}")
+    message = refused(hecc)
+    found = re.fullmatch(
+        r"impeller\.sections\.splitter: stands in the blade: sections 1 to 9: up to ([\d.]+) mm of metal in common "
+        r"round the axis: must be 0: turn it about the axis by 12 deg, to the middle of the channel, or leave it out",
+        message,
+    )
+    assert found, message
+    # the whole of the blade is in common: its greatest thickness round the axis
+    sections = [read_sections([hecc.parent / name], "inch", True, "X R*THETA R")[0] for name in names[2:]]
+    assert float(found[1]) == pytest.approx(max(map(thickness, sections)), rel=0.02)
+
+
+def thickness(p):
+    """Greatest r dtheta [mm] at one z of a section, by its points."""
+    r, theta = np.hypot(p[:, 0], p[:, 1]), np.unwrap(np.arctan2(p[:, 1], p[:, 0]))
+    front, back = int(p[:, 2].argmax()), int(np.linalg.norm(p - p[p[:, 2].argmax()], axis=1).argmax())
+    ring = np.roll(np.arange(len(p)), -front)
+    end = int(np.flatnonzero(ring == back)[0])
+    one, other = ring[: end + 1], ring[end:][::-1]
+    # r along the section, for at the outlet z is the same all along
+    along = [r[k] - p[k, 2] for k in (one, other)]
+    at = along[0][(along[0] > along[1].min()) & (along[0] < along[1].max())]
+    thetas = [np.interp(at, np.maximum.accumulate(a), theta[k]) for a, k in zip(along, (one, other), strict=True)]
+    return float((np.interp(at, np.maximum.accumulate(along[0]), r[one]) * np.abs(thetas[0] - thetas[1])).max())
 
 
 def test_a_file_that_is_missing(hecc):

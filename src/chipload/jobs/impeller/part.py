@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
+from chipload.geometry.overlap import splitter_apart
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import Blade, checked, checked_diameter, loft, read_meridian, read_sections
 from chipload.geometry.sides import blade_of, foot_off, radius_of
@@ -88,15 +89,20 @@ def _of_shape(given: ShapeTable, blades: int, outer_diameter: float) -> Impeller
 def _of_sections(folder: Path, given: SectionsTable, blades: int, outer_diameter: float) -> Impeller:
     over = given.flow_along_x
 
-    def blade(names: tuple[str, ...], key: str) -> Blade:
+    def blade(names: tuple[str, ...], key: str) -> tuple[Blade, tuple[Floats, ...]]:
         try:
             found = read_sections([folder / name for name in names], given.unit, over, given.columns)
-            return loft(checked(found, outer_diameter))
+            return loft(checked(found, outer_diameter)), found
         except InputError as err:
             raise InputError(f"impeller.sections.{key}: {err}") from None
 
-    main = blade(given.blade, "blade")
-    splitter = blade(given.splitter, "splitter") if given.splitter else None
+    main, splitter = blade(given.blade, "blade")[0], None
+    if given.splitter:
+        splitter, sections = blade(given.splitter, "splitter")
+        try:
+            splitter_apart(splitter, main, math.tau / blades, sections)
+        except InputError as err:
+            raise InputError(f"impeller.sections.splitter: {err}") from None
     hub, shroud = (
         Revolved(read_meridian(folder / name, given.unit, over, side < 0), side)
         for name, side in ((given.hub, 1), (given.shroud, -1))
@@ -152,6 +158,10 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
     main, splitter = blade(given.plus, given.minus, ""), None
     if given.splitter_plus is not None and given.splitter_minus is not None:
         splitter = blade(given.splitter_plus, given.splitter_minus, "splitter_")
+        try:
+            splitter_apart(splitter, main, math.tau / blades)
+        except InputError as err:
+            raise InputError(f"impeller.step.splitter_plus and splitter_minus: {err}") from None
     return ImpellerPart(Impeller(main, splitter, hub, shroud, blades), tuple(said))
 
 
