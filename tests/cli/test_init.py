@@ -156,7 +156,7 @@ def test_a_program_that_never_starts_the_spindle(program: Path, tmp_path: Path) 
     program.write_text(silent)
     code, said, _ = call("init", program, tmp_path / "job")
     assert code == 0
-    assert "program.speed_rpm = 6000.0: the text cuts before it starts the spindle" in said
+    assert "program.speed_rpm = 6000.0: the text cuts with the spindle at rest; 150 m/min" in said
     assert "machine-spindle-off" not in said
     job = (tmp_path / "job" / "job.toml").read_text()
     assert tomllib.loads(job)["program"]["speed_rpm"] == 6000.0
@@ -171,6 +171,54 @@ def test_a_program_that_never_starts_the_spindle(program: Path, tmp_path: Path) 
         assert not [f for t in summary["tracks"] for f in t["findings"] if f["code"] == "machine-spindle-off"]
     assert worst[0] == worst[1]
     assert worst[0]["spindle_power_w"] > 0.0
+
+
+def test_a_speed_that_the_tool_change_stops_is_the_one_that_is_guessed(program: Path, tmp_path: Path) -> None:
+    """M6 stops the spindle that M3 S10000 started: its speed is known. One above the spindle's is its greatest."""
+    program.write_text(FUSION.replace("T3 M6\nS4000 M3", "(S9 of old) M3 S10000\nT3 M6"))
+    code, said, _ = call("init", program, tmp_path / "job")
+    assert code == 0
+    assert "program.speed_rpm = 10000.0: the text cuts with the spindle at rest; S10000 of the text" in said
+    program.write_text(FUSION.replace("T3 M6\nS4000 M3", "M3 S24000\nT3 M6"))
+    _, said, _ = call("init", program, tmp_path / "fast")
+    assert "speed_rpm = 15000.0: the text cuts with the spindle at rest; S24000 of the text, as far as" in said
+
+
+def test_a_program_whose_axes_no_machine_has(tmp_path: Path) -> None:
+    path = tmp_path / "quill.ngc"
+    path.write_text("G21 G90 F100\nG1 X1 B5 C5\nG1 W3\nM2\n")
+    code, _, said = call("init", path, tmp_path / "job")
+    assert code == 2
+    assert said == (
+        "chipload: quill.ngc: none of the machines vmc, xyzbc-trunnion, xyzac-trunnion, xyzbc-head-table has its axes: "
+        "line 3: W moves: machine vmc has the axes XYZ; line 3: W moves: machine xyzbc-trunnion has the axes CBXYZ; "
+        "line 3: W moves: machine xyzac-trunnion has the axes CAXYZ; "
+        "line 3: W moves: machine xyzbc-head-table has the axes CXYZB: name a machine that has (--on)\n"
+    )
+
+
+def test_a_table_of_numbers_is_no_program(tmp_path: Path) -> None:
+    path = tmp_path / "points.txt"
+    path.write_text("51.2 30.1 2.0\n52.2 30.1 2.0\n")
+    code, _, said = call("init", path, tmp_path / "job")
+    assert code == 2
+    assert said == (
+        "chipload: points.txt: neither NC text nor CL data nor a table with a heading of its columns: "
+        "line 1: character '5': begins no word\n"
+    )
+
+
+def test_a_program_without_known_motion_is_refused(tmp_path: Path) -> None:
+    """Its only motions wait for what the controller measures; a dwell is none."""
+    path = tmp_path / "cut.h"
+    path.write_text(
+        "BEGIN PGM CUT MM\nTOOL CALL 5 Z S700\nFN 18: SYSREAD Q11 = ID270 NR1 IDX1\nM3\n"
+        "CYCL DEF 9.0 DWELL\nCYCL DEF 9.1 TIME5\nL X+Q11 Y+0 F100\nEND PGM CUT MM\n"
+    )
+    code, _, said = call("init", path, tmp_path / "job")
+    assert code == 2
+    assert said.startswith("chipload: cut.h: no motion that is known: nothing to simulate: line 7: Q11 comes from ")
+    assert not (tmp_path / "job").exists()
 
 
 def test_comments_of_other_posts() -> None:

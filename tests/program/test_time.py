@@ -111,6 +111,15 @@ def test_what_the_machine_cannot_do():
     assert check_program(plunge([0, 0, 0], 5.0, 100.0, 1, "cut"), VMC)[0].code == "program-start"
 
 
+def test_a_dwell_while_the_spindle_starts_is_no_cut():
+    """A post that waits for the spindle before the first rapid begins with a rapid; before a cut it does not."""
+    wait = dwell([0, 0, 5], 5.0, 800.0, 1, "wait")
+    first = rapid([[0, 0, 5], [1, 0, 5]], 800.0, 1, "link")
+    assert "program-start" not in [f.code for f in check_program(Program.join([wait, first]), VMC)]
+    plain = Program.join([wait, plunge([0, 0, 0], 5.0, 100.0, 1, "cut")])
+    assert "program-start" in [f.code for f in check_program(plain, VMC)]
+
+
 def test_asking_no_more_than_the_peak_changes_no_time_and_less_does():
     """Short lines, arcs and corners: the peak is what the feed of a row may be lowered to for nothing."""
     rng = np.random.default_rng(4)

@@ -72,6 +72,8 @@ def check_program(program: Program, machine: Machine) -> tuple[Finding, ...]:
     report("machine-axis", tilted & (program.motion != DWELL) & (not machine.chain.rotary), tilt, text, tilt)
     first = "starts with a cutting motion: must start with a rapid to where it begins"
     start = np.zeros(len(program), dtype=np.bool_)
-    start[:1] = program.motion[:1] != RAPID
+    # a dwell while the spindle starts is no motion
+    moving = np.flatnonzero(program.motion != DWELL)[:1]
+    start[moving] = program.motion[moving] != RAPID
     report("program-start", start, none, first, none)
     return tuple(found)

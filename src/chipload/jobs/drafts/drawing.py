@@ -40,6 +40,8 @@ AXIAL_SMALL, SMALL = 0.3, 1.5
 ALLOWANCE = 0.025
 #: cutting speed [m/min], for aluminium with carbide
 CUTTING_M_MIN = 200.0
+#: layers that a note names
+LISTED = 8
 #: points along a contour that the size of the cutter is found on
 POINTS = 400
 #: gaps [mm] of a drawing that are flaws, if they are no greater than this share of its width and height
@@ -81,10 +83,10 @@ def _drawn(file: Path, machine: Machine) -> tuple[Drawing, Sequence[Contour], li
     whole = [layer for layer in layers if all(c.closed for c in _of_layer(drawing, layer))]
     if len(whole) < len(layers) and whole:
         best = max(whole, key=lambda layer: sum(abs(c.area) for c in _of_layer(drawing, layer)))
-        entries.append(Entry("layers", [best], f"the closed contours of those of {', '.join(layers)[:60]}", True))
+        entries.append(Entry("layers", [best], f"the closed contours of those of {_listed(layers)}", True))
         return drawing, _of_layer(drawing, best), entries
     example = str(layers[:1]).replace("'", '"')
-    note = f"layers that are read; the drawing has {', '.join(layers)[:60]}"
+    note = f"layers that are read; the drawing has {_listed(layers)}"
     entries.append(Entry("layers", note=note, example=example))
     if whole:
         return drawing, drawing.contours, entries
@@ -98,6 +100,12 @@ def _drawn(file: Path, machine: Machine) -> tuple[Drawing, Sequence[Contour], li
         return drawing, drawing.contours, entries
     why = f"{len(drawing.contours) - len(closed)} of {len(drawing.contours)} chains of lines close no contour"
     return drawing, closed, [*entries, Entry("open_chains", "dropped", why, True)]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """The first names of a list, and how many more there are."""
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return ", ".join(names[:LISTED]) + more
 
 
 def _origin(contours: Sequence[Contour], machine: Machine) -> list[Entry]:
@@ -294,12 +302,14 @@ def _rest(
     """Machine, material, cutter, operation and limits."""
     flutes = 2 if d < 4.0 else 3
     least, most = rpm_from_rad_s(machine.spindle_min), rpm_from_rad_s(machine.spindle_max)
-    speed = round(min(max(1000.0 * CUTTING_M_MIN / (math.pi * d), least), most), -1)
+    wanted = 1000.0 * CUTTING_M_MIN / (math.pi * d)
+    speed = round(min(max(wanted, least), most), -1)
     feed = round(min(FEED * d * flutes * speed, 60.0 * machine.feed_max), 0)
     radial = round(RADIAL * d, 4)
     key = "file" if named is not None and named.lower().endswith(".toml") else "name"
     own = Entry(key, named) if named is not None else Entry("name", "vmc", "chipload machines lists all", True)
-    cut = f"{CUTTING_M_MIN:g} m/min, carbide in aluminium"
+    cut = f"{math.pi * d * speed / 1000.0:.3g} m/min"
+    cut += ", carbide in aluminium" if least <= wanted <= most else f", as far as the spindle of {machine.name} turns"
     entries = [
         Entry("kind", kind),
         Entry("cutter", 1),
@@ -345,12 +355,13 @@ def _rest(
         if kind == "pocket"
         else "a common size"
     )
+    above = f"no file states it; flutes and {'one diameter' if d >= 5.0 else '5 mm'}"
     cutter = cutter_table(1, [])
     sized = tuple(
         Entry("diameter_mm", d, why, True) if e.key == "diameter_mm"
         else Entry(e.key, flutes, e.note, True) if e.key == "flutes"
         else Entry(e.key, max(2.5 * d, round(axial + 1.0, 3)), e.note, True) if e.key == "flute_length_mm"
-        else Entry(e.key, max(2.5 * d, round(axial + 1.0, 3)) + max(d, 5.0), e.note, True) if e.key == "overhang_mm"
+        else Entry(e.key, max(2.5 * d, round(axial + 1.0, 3)) + max(d, 5.0), above, True) if e.key == "overhang_mm"
         else e
         for e in cutter.entries
     )  # fmt: skip

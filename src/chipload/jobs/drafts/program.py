@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -45,6 +46,9 @@ LISTED = 8
 #: ends of the codes of findings that say nothing about the motions
 PLAIN = ("-unused", "-unknown", "-coolant")
 _LARGEST = 500_000_000
+#: the first speed of a text, outside its comments
+_SPEED = re.compile(r"(?<![A-Z_<\[])S\s*([0-9]+(?:\.[0-9]*)?)(?![0-9A-Z])", re.IGNORECASE)
+_COMMENTS = re.compile(r"\([^()\n]*\)|;[^\n]*")
 
 
 @dataclass(frozen=True)
@@ -99,6 +103,9 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     if any(f.code == "nc-diameter-unknown" for f in chosen.reading.findings):
         chosen = _read(path, known, _cutters(chosen.reading.program, known, header))
     program = chosen.reading.program
+    if not float(lengths(program).sum()) > 0.0:
+        left_out = next((f": {f}" for f in chosen.reading.findings if f.severity >= Severity.UNPROVEN), "")
+        raise InputError(f"{path.name}: no motion that is known: nothing to simulate{left_out}")
     block, stock_entries = _stock(program, known, header)
     cuts = _cutting(program)
     numbers = [int(n) for n in np.unique(program.tool[cuts])] if cuts.any() else [int(program.tool[-1])]
@@ -107,7 +114,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     }
     sizes = [_size(known.cutters.get(n) or header.cutters.get(n) or _of_table(known.tools, n)) for n in numbers]
     tables = [
-        _program_table(path, folder, chosen, known, min(sizes)),
+        _program_table(path, folder, chosen, known, min(sizes), text),
         _machine_table(chosen, known),
         DraftTable(
             "stock", (*stock_entries, _layer(deepest, sizes)), note="the block that the program starts from [mm]"
@@ -164,18 +171,40 @@ def _read(path: Path, known: Known, cutters: Mapping[int, Cutter] | None = None)
     elif ending not in ENDINGS:
         groups = (("linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"),)
     setup = Setup(cutters=cutters or {})
-    refused: list[InputError] = []
+    refused: list[tuple[Machine, InputError]] = []
     for name in MACHINES if known.machine is None else (known.machine,):
         machine = read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
         for dialects in groups:
             chosen = _best(path, known, machine, dialects, setup, refused)
             if chosen is not None:
                 return chosen
-    raise refused[0]
+    raise _refusal(path, refused, known.machine is None)
+
+
+def _refusal(path: Path, refused: Sequence[tuple[Machine, InputError]], shipped: bool) -> InputError:
+    """Why no machine reads a program: the first reason, or that of each machine where they differ by its axes."""
+    first: dict[str, str] = {}
+    for machine, err in refused:
+        first.setdefault(machine.name, str(err).removeprefix(f"{path.name}: "))
+    reasons = list(dict.fromkeys(first.values()))
+    if len(reasons) > 1 and shipped:
+        return InputError(
+            f"{path.name}: none of the machines {', '.join(first)} has its axes: {'; '.join(reasons)}: "
+            "name a machine that has (--on)"
+        )
+    why = reasons[0]
+    if "begins no word" in why:
+        return InputError(f"{path.name}: neither NC text nor CL data nor a table with a heading of its columns: {why}")
+    return refused[0][1]
 
 
 def _best(
-    path: Path, known: Known, machine: Machine, dialects: Sequence[str | None], setup: Setup, refused: list[InputError]
+    path: Path,
+    known: Known,
+    machine: Machine,
+    dialects: Sequence[str | None],
+    setup: Setup,
+    refused: list[tuple[Machine, InputError]],
 ) -> _Chosen | None:
     """The reading with the fewest gaps by one of the dialects; ``refused`` takes why others do not read it."""
     tools = read_tools(known.tools) if known.tools is not None else None
@@ -188,7 +217,7 @@ def _best(
                     path, machine, dialect=dialect, tools=tools, feed=own, text=known.text, setup=setup
                 )
             except InputError as err:
-                refused.append(err)
+                refused.append((machine, err))
                 if "feed" not in str(err):
                     break
                 continue
@@ -273,7 +302,7 @@ def _of_table(tools: Path | None, number: int) -> Stated:
     return own
 
 
-def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known, smallest: float) -> DraftTable:
+def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known, smallest: float, text: str) -> DraftTable:
     entries = [Entry("file", path.name if known.text is not None else relative(path, folder))]
     if chosen.dialect is not None:
         entries.append(Entry("dialect", chosen.dialect, "the one that leaves the fewest words unread", True))
@@ -285,22 +314,26 @@ def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known, smal
         entries.append(Entry("tools", note="LinuxCNC tool table: lengths, diameters", example='"shop.tbl"'))
     if chosen.feed is not None:
         entries.append(Entry("feed_mm_min", chosen.feed, "the text cuts before it states a feed", True))
-    speed = _speed(chosen, smallest)
+    speed = _speed(chosen, smallest, text)
     if speed is not None:
-        entries.append(Entry("speed_rpm", speed, "the text cuts before it starts the spindle; 150 m/min", True))
+        entries.append(Entry("speed_rpm", speed[0], f"the text cuts with the spindle at rest; {speed[1]}", True))
     offsets = Entry("work_offsets", note="origins in the machine", example="{ G54 = [0.0, 0.0, 0.0] }")
     return DraftTable("program", (*entries, offsets), note="the program; lengths here are in mm, whatever unit it has")
 
 
-def _speed(chosen: _Chosen, smallest: float) -> float | None:
-    """Spindle speed [rpm] for a program that cuts before it states one; None: it states one."""
+def _speed(chosen: _Chosen, smallest: float, text: str) -> tuple[float, str] | None:
+    """Spindle speed [rpm] for a program that cuts with the spindle at rest, and its reason; None: it never does."""
     program = chosen.reading.program
     first = int(np.argmax(program.spindle != 0.0)) if program.spindle.any() else len(program)
     if not _cutting(program)[:first].any():
         return None
-    wanted = 1000.0 * SPEED_M_MIN / (math.pi * smallest)
     low, high = rpm_from_rad_s(chosen.machine.spindle_min), rpm_from_rad_s(chosen.machine.spindle_max)
-    return round(min(max(float(f"{wanted:.2g}"), low), high), 3)
+    # a tool change stops the spindle that was started before it
+    own = next((float(hit[1]) for hit in _SPEED.finditer(_COMMENTS.sub(" ", text)) if float(hit[1]) > 0.0), None)
+    wanted = 1000.0 * SPEED_M_MIN / (math.pi * smallest) if own is None else own
+    speed = round(min(max(float(f"{wanted:.2g}") if own is None else own, low), high), 3)
+    why = f"S{own:g} of the text" if own is not None else f"{SPEED_M_MIN:g} m/min"
+    return speed, why if low <= wanted <= high else f"{why}, as far as the spindle of {chosen.machine.name} turns"
 
 
 def _machine_table(chosen: _Chosen, known: Known) -> DraftTable:

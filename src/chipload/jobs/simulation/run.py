@@ -28,6 +28,7 @@ from chipload.jobs.simulation.workpiece_compliance import (
     workpiece_compliance,
 )
 from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.program.read import ProgramReading, line_times, read_program, read_tools
 from chipload.program.setup import Setup
@@ -36,7 +37,7 @@ from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
 from chipload.simulation.engagement_samples import EngagementRecorder
-from chipload.simulation.estimate import LEANING, QUICK, SLOW, UPRIGHT, estimate
+from chipload.simulation.estimate import LEANING, QUICK, SLOW, UPRIGHT, estimate, slowest_step
 from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.loads import Cuts
 from chipload.simulation.moves import leans
@@ -112,7 +113,12 @@ def _step_times(job: ProgramJob, program: Program, stock: LayeredStock) -> tuple
     bodies = any(c.body and n in program.tool for n, c in job.cutters.items())
     if job.table.operation[0].engine == "layers" or stock.cut.any() or bodies:
         return QUICK, SLOW
-    return LEANING if leans(program).any() else UPRIGHT
+    if leans(program).any():
+        return LEANING
+    length = lengths(program)
+    share = {n: float(length[program.tool == n].sum()) for n in job.cutters}
+    slow = sum(share[n] * slowest_step(c) for n, c in job.cutters.items())
+    return UPRIGHT, slow / max(sum(share.values()), np.finfo(float).tiny)
 
 
 def text_to_change(
