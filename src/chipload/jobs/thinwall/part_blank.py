@@ -6,8 +6,8 @@ square lies within the side. Under a line C_nn would grow without bound with sma
 
 The cells are those of a workpiece under any program (:mod:`chipload.structure.cells`): the whole part in its clamps
 gives way, floor and neighbours too. The error is :data:`CORNER` times the difference to cells of :data:`COARSER`
-times the side in the finished state, :data:`FLOOR`, and all that a half space gives beneath the square (Johnson, Contact
-Mechanics, 1985, section 3.4). In the example `part/walls.toml` it is 11 to 41 %, where cells of 1.5 mm of order 3 find
+times the side in the finished state, :data:`FLOOR`, and all that a half space gives beneath the square (Johnson,
+Contact Mechanics, 1985, section 3.4). In the example `part/walls.toml` it is 11 to 41 %, where cells of 1.5 mm of order 3 find
 8 to 30 %.
 """
 
@@ -127,10 +127,9 @@ class PartBlank:
         along, up = (min(0.5, 0.5 * self.contact / size) for size in (length, height * (1.0 - one.foot)))
         normals = self.body.normals(a, b)[side]
         stock = (left[side].ravel() if places is None else np.zeros(1))[:, None] * normals
+        u, v = np.clip(a, along, 1.0 - along), np.clip(b, up, 1.0 - up)
         lines = [
-            [self.body.sides(np.clip(a, along, 1.0 - along) + t * along, np.clip(b, up, 1.0 - up) + s * up)[side] + stock
-             for s in (-1.0, 1.0)]
-            for t in ACROSS
+            [self.body.sides(u + t * along, v + s * up)[side] + stock for s in (-1.0, 1.0)] for t in ACROSS
         ]  # fmt: skip
         return np.moveaxis(np.array(lines), 1, 2), normals
 
