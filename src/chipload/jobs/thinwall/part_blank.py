@@ -7,8 +7,8 @@ square lies within the side. Under a line C_nn would grow without bound with sma
 The cells are those of a workpiece under any program (:mod:`chipload.structure.cells`): the whole part in its clamps
 gives way, floor and neighbours too. The error is :data:`CORNER` times the difference to cells of :data:`COARSER`
 times the side in the finished state, :data:`FLOOR`, and all that a half space gives beneath the square (Johnson,
-Contact Mechanics, 1985, section 3.4). In the example `part/walls.toml` it is 11 to 41 %, where cells of 1.5 mm of order 3 find
-8 to 30 %.
+Contact Mechanics, 1985, section 3.4). In the example `part/walls.toml` it is 11 to 41 %, where cells of 1.5 mm of order
+3 find 8 to 30 %.
 """
 
 from __future__ import annotations
