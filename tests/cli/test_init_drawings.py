@@ -128,7 +128,7 @@ def test_channels_that_no_cutter_has_room_in_are_cut_in_circles(tmp_path: Path) 
 
 
 def test_notes_say_what_a_small_cutter_really_turns(tmp_path: Path) -> None:
-    """2 mm at 15000 rpm, the greatest of vmc: pi 2 15 = 94.2 m/min; 5 mm of flutes and 5 mm more stick out."""
+    """2 mm at 15000 rpm, the greatest of vmc: pi 2 15 = 94.2 m/min; 3 mm of flutes and 2 mm more stick out."""
     path = tmp_path / "slot.dxf"
     doc = ezdxf.new(units=4)
     doc.modelspace().add_lwpolyline([(0, 0), (20, 0), (20, 2.8), (0, 2.8)], close=True)
@@ -137,4 +137,4 @@ def test_notes_say_what_a_small_cutter_really_turns(tmp_path: Path) -> None:
     assert code == 0
     assert "diameter_mm = 2.0" in said
     assert "speed_rpm = 15000.0: 94.2 m/min, as far as the spindle of vmc turns" in said
-    assert "overhang_mm = 10.0: no file states it; flutes and 5 mm" in said
+    assert "overhang_mm = 5.0: no file states it; flutes and one diameter" in said

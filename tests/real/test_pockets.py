@@ -77,3 +77,20 @@ def test_outline_of_862_pieces_has_a_finite_time():
     assert (took >= legs[moving] / feed * (1.0 - 3e-4)).all()
     assert (took <= rest_to_rest * (1.0 + 1e-6)).all()
     assert result.summary["time_s"] == h["t_s"][-1] >= took.sum()
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="no real drawings: set CHIPLOAD_DATA")
+def test_no_pass_is_made_twice_with_long_steps():
+    """Chords of a quarter radius leave a film along a round wall; the next pass met and left it, again and again."""
+    drawing = read_dxf(DATA / "missing_arc.dxf")
+
+    def progress(share, what):
+        assert not what.endswith("pass 20000")
+
+    region = Region.of([c for c in drawing.contours if c.closed])
+    path = clear_region(region, 3.0, math.acos(0.7), step=0.75, allowance=0.15, progress=progress)
+    points = np.column_stack([path.x, path.y]).round(6)
+    cut = path.kind == CUT
+    passes = [points[cut & (path.pass_number == k)].tobytes() for k in np.unique(path.pass_number[cut])]
+    assert len(set(passes)) == len(passes)
+    assert path.cleared_share > 0.97

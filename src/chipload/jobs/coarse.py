@@ -58,12 +58,14 @@ def coarser(loaded: LoadedJob) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        Its capability has no resolution to change.
+        Its capability has no resolution to change, or only pockets are cleared.
     """
     factors = FACTORS.get(loaded.capability.name)
     if factors is None:
         raise InputError(f"--coarse: a {loaded.capability.name} job has no steps that could be coarser: leave it out")
     table = loaded.job.table
+    if loaded.capability.name == "contour" and all(op.kind == "pocket" for op in table.operation):
+        raise InputError("--coarse: longer steps take more passes to clear a pocket, and leave more: leave it out")
     out = []
     for key, (factor, most) in factors.items():
         first, *rest = key.split(".")

@@ -27,19 +27,24 @@ LEANING, UPRIGHT = (0.6e-3, 8e-3), 0.1e-3
 FLAT, ROUND, TAPERED = 4e-3, 10e-3, 28e-3
 
 
-def estimate(steps: int, motions: int, quick: float = QUICK, slow: float = SLOW) -> str:
+def estimate(steps: int, motions: int, quick: float = QUICK, slow: float = SLOW, coarse: bool = True) -> str:
     """Steps, memory and processor time of a simulation, in a sentence; ``quick`` and ``slow`` are times of a step [s].
+
+    Where that is long, ``coarse`` says how a first answer is had.
 
     >>> estimate(200_000, 100_000)
     'estimate: 200000 steps, 610 MB of memory, 5 to 57 min; a first answer: run --coarse'
+    >>> estimate(40_000, 0, 0.4e-3, 8e-3)
+    'estimate: 40000 steps, 370 MB of memory, 20 s to 6 min; a first answer: run --coarse'
     >>> estimate(28, 8)
     'estimate: 28 steps, 350 MB of memory, 4 to 12 s'
     """
     low, high = START[0] + quick * steps, START[1] + slow * steps
     unit, name = (60.0, "min") if high > 300.0 else (1.0, "s")
-    hint = "; a first answer: run --coarse" if high > 300.0 else ""
+    least = f"{low / unit:.0f}" if low >= unit else f"{low:.0f} s"
+    hint = "; a first answer: run --coarse" if coarse and high > 300.0 else ""
     memory = (BASE + MOTION * motions + STEP * steps) / 1e6
-    return f"estimate: {steps} steps, {memory:.0f} MB of memory, {low / unit:.0f} to {high / unit:.0f} {name}{hint}"
+    return f"estimate: {steps} steps, {memory:.0f} MB of memory, {least} to {high / unit:.0f} {name}{hint}"
 
 
 def slowest_step(cutter: Cutter) -> float:

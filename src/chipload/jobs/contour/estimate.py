@@ -1,7 +1,7 @@
 """What clearing pockets will need, before it is planned.
 
 A step of a pass along a straight front clears the radial depth times the step; levels share one path. Measured on
-drawings and models of others (docs/real_programs.md), in processor time without the start: 0.6 to 5.5 ms for each such
+drawings and models of others (docs/real_programs.md), in processor time without the start: 0.2 to 5.5 ms for each such
 step, the more the more corners and narrow places a pocket has, whose passes overlap.
 """
 
@@ -14,7 +14,7 @@ from chipload.planning.pocket.request import Clearing
 from chipload.simulation.estimate import estimate
 
 #: processor time of a step [s], least and greatest
-QUICK, SLOW = 0.4e-3, 8e-3
+QUICK, SLOW = 0.15e-3, 8e-3
 
 
 def clearing_estimate(cleared: Iterable[tuple[float, Clearing, float]]) -> list[str]:
@@ -28,4 +28,4 @@ def clearing_estimate(cleared: Iterable[tuple[float, Clearing, float]]) -> list[
         len(asked.strategies) * area / (asked.radial_depth * min(asked.step, STEP * radius))
         for area, asked, radius in cleared
     )
-    return [estimate(round(steps), 0, QUICK, SLOW)] if steps else []
+    return [estimate(round(steps), 0, QUICK, SLOW, coarse=False)] if steps else []

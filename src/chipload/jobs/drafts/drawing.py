@@ -38,6 +38,8 @@ RADIAL, AXIAL, FEED = 0.15, 0.5, 0.005
 AXIAL_SMALL, SMALL = 0.3, 1.5
 #: material left on the wall of a pocket over the diameter
 ALLOWANCE = 0.025
+#: length of flutes over the diameter, as short end mills have it; least length [mm] between them and the holder
+FLUTES, NECK = 1.5, 2.0
 #: cutting speed [m/min], for aluminium with carbide
 CUTTING_M_MIN = 200.0
 #: layers that a note names
@@ -355,13 +357,15 @@ def _rest(
         if kind == "pocket"
         else "a common size"
     )
-    above = f"no file states it; flutes and {'one diameter' if d >= 5.0 else '5 mm'}"
+    flute = round(max(FLUTES * d, axial + 1.0), 3)
+    above = f"no file states it; flutes and {'one diameter' if d >= NECK else f'{NECK:g} mm'}"
     cutter = cutter_table(1, [])
     sized = tuple(
         Entry("diameter_mm", d, why, True) if e.key == "diameter_mm"
         else Entry(e.key, flutes, e.note, True) if e.key == "flutes"
-        else Entry(e.key, max(2.5 * d, round(axial + 1.0, 3)), e.note, True) if e.key == "flute_length_mm"
-        else Entry(e.key, max(2.5 * d, round(axial + 1.0, 3)) + max(d, 5.0), above, True) if e.key == "overhang_mm"
+        else Entry(e.key, flute, "no file states it; a short one, for one depth of cut", True)
+        if e.key == "flute_length_mm"
+        else Entry(e.key, round(flute + max(d, NECK), 3), above, True) if e.key == "overhang_mm"
         else e
         for e in cutter.entries
     )  # fmt: skip

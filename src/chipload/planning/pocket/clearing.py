@@ -203,6 +203,7 @@ class _Run:
         self.at = np.zeros(2)
         self.area = 0.0
         self.lately: list[tuple[float, float, float]] = []
+        self.made: set[int] = set()
         self.steps = 0
         self.most = 100_000 + int(20.0 * self.reachable.area / (step * radius * (1.0 - math.cos(limit))))
 
@@ -380,6 +381,11 @@ class _Run:
             segments, places, took, reason, at = self._pass(x, y, heading)
             if not len(segments):
                 continue
+            # the engagement of a pass that was made before is that of what its chords leave: it takes nothing
+            made = hash((np.round(segments[:, 0:4], 6) + 0.0).tobytes())
+            if made in self.made:
+                continue
+            self.made.add(made)
             if not self.rows or np.hypot(*(start - self.at)) > 1e-9:
                 self.add(start[None, :], LINK if clear else LIFT)
             self.passes += 1
