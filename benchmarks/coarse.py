@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-EXAMPLES = ("bracket", "pocket", "blade")
+EXAMPLES = ("bracket", "plate", "blade")
 
 
 def seconds(job: Path, out: Path, *more: str) -> tuple[float, dict[str, float]]:
