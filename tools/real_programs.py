@@ -48,6 +48,13 @@ FILES = {
     "nc/apt_dmu50/apt/Guincho_LLbar.apt": "APT",
     "cad/dxf_hsm_nibbler/gear.dxf": "drawing",
     "cad/dxf_hsm_nibbler/octagon.dxf": "drawing",
+    **{
+        f"cad/dxf_hsm_nibbler/{name}.dxf": "drawing"
+        for name in ("square_circle", "square2", "taper", "thrash", "test_polyline", "missing_arc", "triceratops")
+    },
+    **{f"cad/dxf_hsm_nibbler/{name}.dxf": "drawing" for name in ("text_at", "text_&", "involute", "slots")},
+    "cad/dxf_camotics/locket/seahorse.dxf": "drawing",
+    "cad/dxf_camotics/pattern.dxf": "drawing",
     "cad/nist_step/nist_ftc_11_asme1_rb.stp": "model",
     "cad/nist_step/nist_ctc_01_asme1_ap203.stp": "model",
     "machines_tools/better_tool_library/Shape/slittingsaw.fcstd": "FreeCAD document",

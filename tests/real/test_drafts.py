@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from chipload.errors import InputError
 from chipload.jobs import check_job, load_job
 from chipload.jobs.drafts.draft import write_draft
 from chipload.jobs.drafts.make import draft_of
@@ -41,3 +42,11 @@ def test_a_draft_of_a_real_file(name: str, tmp_path: Path) -> None:
     if kind == "contour":
         lines, _ = check_job(loaded)
         assert any(text.startswith("operation 0: pocket, cutter 1") for text in lines)
+
+
+def test_a_model_whose_largest_faces_are_no_wall_is_refused(tmp_path: Path) -> None:
+    """The job of its two largest curved faces could not be run: one of them folds."""
+    with pytest.raises(
+        InputError, match=r"the largest curved faces, 88 and 3, are no sides of a thin wall: .*; chipload"
+    ):
+        draft_of(DATA / "cad" / "impeller_kj66" / "impeller.step", tmp_path)

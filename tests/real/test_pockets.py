@@ -81,7 +81,7 @@ def test_outline_of_862_pieces_has_a_finite_time():
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="no real drawings: set CHIPLOAD_DATA")
 def test_no_pass_is_made_twice_with_long_steps():
-    """Chords of a quarter radius leave a film along a round wall; the next pass met and left it, again and again."""
+    """Two passes far apart took turns for tens of thousands of passes, each counting the same area as before."""
     drawing = read_dxf(DATA / "missing_arc.dxf")
 
     def progress(share, what):

@@ -30,7 +30,6 @@ MEASURED = {
     "wave": (6912, 19, BALL),
     "cat": (8404, 21, BALL),
     "bear": (18220, 98, BALL),
-    "cameo": (38417, 213, BALL),
     "Guincho_Lbar": (1554, 10, DRILL),
     "buildbotics": (5207, 76, ENGRAVER),
 }

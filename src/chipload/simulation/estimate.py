@@ -6,7 +6,7 @@ Measured on programs of 10,000 to 100,000 motions (docs/design/streaming.md): th
 The processor time of a step by layers depends on how many layers and chips it meets: 1.6 ms on a relief in thick
 layers, 3 ms in five axes (docs/design/real_programs.md), 17 ms where a drill of 3 mm meets 160 layers in each step. By
 moves of an upright axis a step of a finishing program takes 0.1 ms, one with chips 0.6 to 2.1 ms with a flat end mill,
-0.9 to 5.4 ms with a ball nose or a drill and 14 ms with an engraver, whose taper is looked at in many sections
+0.9 to 5.2 ms with a ball nose or a drill and 14 ms with an engraver, whose taper is looked at in many sections
 (docs/real_programs.md); where the axis leans 0.7 to 2.8 ms with 24 slices of a corner, and twice that with the 48 of a
 job (docs/design/engines.md). The estimate names the range, up to about twice what was measured.
 """

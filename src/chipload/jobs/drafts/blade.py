@@ -13,6 +13,7 @@ from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.geometry.sections import read_sections
 from chipload.geometry.step_faces import Face, Model
+from chipload.geometry.step_patch import patch_of
 from chipload.jobs.drafts.cutters import cutter_table
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
 from chipload.units import MM_PER
@@ -23,6 +24,8 @@ ENDINGS = (".curve", ".crv")
 COLUMNS = ("X R*THETA R", "X R THETA_DEG", "X Y Z")
 #: a blade is at least so large [mm] in the unit that is guessed
 LEAST_MM = 15.0
+#: how far the patch of a face may leave it [mm], as a thin wall has it
+FIT_MM = 0.001
 _NUMBERED = re.compile(r"^(.*?)(\d+)(\D*)$")
 
 
@@ -76,6 +79,14 @@ def draft_blade_model(file: Path, folder: Path, model: Model, machine: str | Non
             "turn the part, or simulate a program with it as [part]"
         )
     front, back = curved[:2]
+    try:
+        for face in (front, back):
+            patch_of(face, "its patch", FIT_MM)
+    except InputError as err:
+        raise InputError(
+            f"{file.name}: the largest curved faces, {front.number} and {back.number}, are no sides of a thin wall: "
+            f"{err}; chipload check {file.name} lists all faces: write the job with those of one blade"
+        ) from None
     rest: list[Face] = [f for f in model.faces if f not in (front, back)]
     clamp = min(rest, key=lambda f: float(f.low[2]), default=None)
     size = float(np.linalg.norm(front.high - front.low))

@@ -381,7 +381,7 @@ class _Run:
             segments, places, took, reason, at = self._pass(x, y, heading)
             if not len(segments):
                 continue
-            # the engagement of a pass that was made before is that of what its chords leave: it takes nothing
+            # a pass that was made before takes nothing, whatever its engagement counts
             made = hash((np.round(segments[:, 0:4], 6) + 0.0).tobytes())
             if made in self.made:
                 continue
