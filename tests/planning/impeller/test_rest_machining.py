@@ -64,6 +64,26 @@ def test_two_cutters_together_leave_what_neither_takes(face):
     assert np.abs(left - both).max() < 2e-3
 
 
+@pytest.mark.parametrize("pallet_deg", [0.0, 60.0, 90.0])
+def test_left_over_of_a_small_corner_is_its_sweep(pallet_deg):
+    """Balls of the corner's radius round the rim, swept straight along x: cylinders."""
+    cutter, B = CatalogueCutter(12.0, 1.0), math.radians(pallet_deg)
+    face = face_of(0, "plus", FLAT, 0, ((0.3, 0.7), (0.45, 0.55)), 0.1, 1.0)
+    u = np.linspace(-0.2, 1.2, 9)
+    contact = np.column_stack([40.0 * u, np.full(9, 15.0), np.zeros(9)])
+    one = track_of(np.column_stack([u, np.full(9, 0.5)]), contact, np.tile(UP, (9, 1)), TABLE, np.full(9, B), cutter, 0)
+    left = left_over(face, [(cutter, [one])])
+    axis, tip = one.axis[0], one.tip[0]
+    e = np.cross(axis, UP) / np.linalg.norm(np.cross(axis, UP))
+    round_ = np.linspace(0.0, math.tau, 200_000)
+    rim = tip + axis + 5.0 * (np.outer(np.cos(round_), e) + np.outer(np.sin(round_), np.cross(axis, e)))
+    for k, y in enumerate(30.0 * face.v):
+        near = np.abs(y - rim[:, 1]) < 1.0
+        height = (rim[near, 2] - np.sqrt(1.0 - (y - rim[near, 1]) ** 2)).min(initial=math.inf)
+        if height < 0.15:
+            assert np.abs(left[:, k] - height).max() < 2e-3
+
+
 def resting(pallets=((0.0, 2.0 * math.pi),)):
     far = np.array([[0.0, 0.0, -500.0]])
     scene = Scene(far, UP[None], np.zeros((1, 3, 3)), np.array([9]), far, np.array([9]), 1.0)

@@ -26,15 +26,13 @@ from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.lines import Flags, Line, LineMotion, Lines, Tracks, UnreachedSpan, stations, stretched
 from chipload.planning.impeller.ranges.ranges import FULL
-from chipload.planning.impeller.scallop_height import scallop_heights, shares
+from chipload.planning.impeller.scallop_height import pose_distance, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
 from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.track import ToolTrack, posed
 from chipload.progress import Progress, silent
 
 _MENDS, _ROUNDS = 6, 12
-#: distance of the places at which a scallop is looked for [mm]: with 1.5 a D 12 came out a third too high
-_FINE = 0.5
 _LINES = 5000
 #: of how far a pass stays below the scallop, how far from the border the outermost lines lie
 _INSIDE = 0.9
@@ -219,7 +217,7 @@ class _Stepper:
         """(n,) scallop between a line and one at q, the highest near each station; nan: one of them is not milled."""
         n = len(q)
         length = float(np.linalg.norm(np.diff(line.S, axis=0), axis=1).mean())
-        sub = 2 * max(1, math.ceil(0.5 * length / _FINE))
+        sub = 2 * max(1, math.ceil(0.5 * length / pose_distance(self.lines.cutter.corner_radius)))
         at = np.arange((n - 1) * sub + 1) / sub
         p, q0, q1 = (np.interp(at, np.arange(n), x) for x in (self.lines.p, line.q, q))
         B0, B1 = (_blended(x, at) for x in (line.pallet, pallet))

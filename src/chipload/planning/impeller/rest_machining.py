@@ -24,11 +24,12 @@ from chipload.planning.impeller import _scallop
 from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import LineMotion, Lines, stretched
 from chipload.planning.impeller.ranges.ranges import valid_ranges
+from chipload.planning.impeller.scallop_height import pose_distance
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.track import ToolTrack
 
-#: poses are no farther apart than this [mm]; points of a region that are tried
-_FINE, _SAMPLE = 0.5, 10
+#: points of a region that are tried
+_SAMPLE = 10
 #: width of the cells in which poses are looked for, as a share of the cutter's radius, and the least [mm]
 _CELL, _LEAST_CELL = 0.5, 2.0
 #: distance of grid points, and of rest passes, as a share of the step of a corner on a plane
@@ -118,7 +119,7 @@ def left_over(face: SurfaceGrid, passes: Sequence[tuple[CatalogueCutter, Sequenc
     normals = np.ascontiguousarray(face.normals.reshape(-1, 3))
     out = np.full(len(points), np.inf)
     for cutter, tracks in passes:
-        contact, tips, axes, of = _poses(tracks)
+        contact, tips, axes, of = _poses(tracks, pose_distance(cutter.corner_radius))
         if not len(contact):
             continue
         # two passes lie at most a radius apart: a point between them is within half of that from one of them
@@ -135,12 +136,12 @@ def left_over(face: SurfaceGrid, passes: Sequence[tuple[CatalogueCutter, Sequenc
     return out.reshape(face.points.shape[:2])
 
 
-def _poses(tracks: Sequence[ToolTrack]) -> tuple[Floats, Floats, Floats, Ints]:
-    """Contacts, tips, axes (n, 3) of tracks, close together, and which track each is of."""
+def _poses(tracks: Sequence[ToolTrack], fine: float) -> tuple[Floats, Floats, Floats, Ints]:
+    """Contacts, tips, axes (n, 3) of tracks, at most ``fine`` apart [mm], and which track each is of."""
     parts: list[list[Floats]] = [[], [], []]
     for t in tracks:
         length = np.concatenate([[0.0], np.linalg.norm(np.diff(t.tip, axis=0), axis=1).cumsum()])
-        at = np.linspace(0.0, length[-1], max(2, math.ceil(length[-1] / _FINE) + 1))
+        at = np.linspace(0.0, length[-1], max(2, math.ceil(length[-1] / fine) + 1))
         for part, x in zip(parts, (t.contact, t.tip, t.axis), strict=True):
             part.append(np.column_stack([np.interp(at, length, x[:, k]) for k in range(3)]))
     contact, tip, axis = (np.concatenate(x) if x else np.zeros((0, 3)) for x in parts)
