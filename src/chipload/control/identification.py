@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from chipload.control.logs import Log
 from chipload.control.spindle import Run, SpindleMap, estimate, first_order, identify_runs, known_rows
@@ -280,7 +280,8 @@ def _lag(runs: Sequence[Run], constant: float | None, changes: bool) -> tuple[fl
         if finer.fun < least:
             best, least = float(finer.x), float(finer.fun)
     count = sum(int(known_rows(run, tried[-1]).sum()) for run in runs)
-    allowed = least + float(chi2.ppf(0.95, 1)) / count
+    # of chi^2 with one degree of freedom, 95 %
+    allowed = least + 2.0 * float(gammaincinv(0.5, 0.95)) / count
     low = _edge(misfit, best, tried[0], allowed)
     return best, (max(low - 0.5 * period, 0.0), _edge(misfit, best, tried[-1], allowed) + 0.5 * period)
 

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import lfilter
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from chipload.errors import InputError
 
@@ -204,7 +204,7 @@ def identify_runs(
         torque_constant=constant,
         inertia=per_rate * constant,
         idle=found.values[2:] / scale_w ** np.arange(idle_terms),
-        half_width=float(student.ppf(0.5 + 0.5 * level, found.freedom)) * spread,
+        half_width=float(stdtrit(found.freedom, 0.5 + 0.5 * level)) * spread,
         level=level,
         speeds=(min(float(run.speed.min()) for run in runs), max(float(run.speed.max()) for run in runs)),
         light=light,
@@ -304,7 +304,7 @@ def idle_map(
         torque_constant=torque_constant,
         inertia=0.0,
         idle=found / scale ** np.arange(idle_terms),
-        half_width=np.concatenate([np.zeros(2), float(student.ppf(0.975, freedom)) * spread]),
+        half_width=np.concatenate([np.zeros(2), float(stdtrit(freedom, 0.975)) * spread]),
         level=0.95,
         speeds=(float(speed.min()), float(speed.max())),
         light=max(light, 2.0 * torque_constant * math.sqrt(variance)),

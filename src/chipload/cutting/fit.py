@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn, mean_forces
@@ -313,7 +313,7 @@ def concluded(
 
 def _student(freedom: int) -> float:
     """How many standard deviations hold 95 % on both sides."""
-    return float(student.ppf(0.975, freedom)) if freedom > 0 else math.nan
+    return float(stdtrit(freedom, 0.975)) if freedom > 0 else math.nan
 
 
 def predicted(fit: Fit, cut: MeasuredCut, theta: Floats, resonance: Floats | None = None) -> Floats:

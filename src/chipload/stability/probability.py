@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from chipload.errors import InputError
 from chipload.stability.cuts import DynamicCuts
@@ -66,12 +66,14 @@ def stable_probability(
     coefficients : (2, 2) float, relative covariance of the tangential and the radial coefficient
     samples : a power of 2
     """
+    from scipy.stats import qmc
+
     if samples < 2 or samples & (samples - 1):
         raise InputError(f"stable probability: samples = {samples}: must be a power of 2, 2 at least")
     count, root = len(cuts.damping), _root(coefficients)
     points = qmc.Sobol(3 * count + 2, scramble=True, rng=0).random(samples)
     stable = np.zeros(len(cuts))
-    for n in norm.ppf(np.clip(points, 1e-9, 1.0 - 1e-9)):
+    for n in ndtri(np.clip(points, 1e-9, 1.0 - 1e-9)):
         some = _sample(cuts, spread, root, n)
         found = largest_multipliers(some, per_wave=PER_WAVE, most=2 * count + SPARE, still=STILL)
         stable += np.abs(found) < 1.0

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from chipload.cutting.material import Material
 from chipload.errors import InputError
@@ -68,6 +68,8 @@ class Samples:
 
     def points(self, dimensions: int) -> NDArray[np.float64]:
         """(count, dimensions) points of a scrambled Sobol sequence in the unit cube."""
+        from scipy.stats import qmc
+
         sobol = qmc.Sobol(dimensions, rng=np.random.default_rng(self.seed))
         return np.asarray(sobol.random(1 << (self.count - 1).bit_length())[: self.count])
 
@@ -89,7 +91,7 @@ class Samples:
             return []
         factor = _root(material.variances)
         if normal is None:
-            normal = norm.ppf(np.clip(self.points(6), 1e-9, 1.0 - 1e-9))
+            normal = ndtri(np.clip(self.points(6), 1e-9, 1.0 - 1e-9))
         drawn = normal @ factor.T + np.array(material.coefficients)
         drawn[:, 0], drawn[:, 3] = np.clip(drawn[:, 0], 10.0, 2e4), np.clip(drawn[:, 3], 0.0, 1e3)
         names = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from scipy.stats import binomtest
-
 from chipload.errors import InputError
 from chipload.files import hash_of, is_file, read_regular
 from chipload.progress import Progress, silent
@@ -63,6 +61,8 @@ class Combination:
         """Wilson interval of the probability at 95 %; without samples the value itself."""
         if len(self.records) == 1:
             return self.probability, self.probability
+        from scipy.stats import binomtest
+
         found = binomtest(self.holding, len(self.records)).proportion_ci(0.95, method="wilson")
         return float(found.low), float(found.high)
 

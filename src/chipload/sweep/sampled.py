@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from chipload.cutting.material import Material, material_named, material_text, read_material
 from chipload.errors import InputError
@@ -84,7 +84,7 @@ def _files(
 ) -> list[SampleFiles]:
     material, modes = _material(loaded), _modes(loaded, folder)
     table = getattr(loaded.job.table, "dynamics", None)
-    normal = norm.ppf(np.clip(samples.points(COEFFICIENTS + OF_MODE * len(modes)), 1e-9, 1.0 - 1e-9))
+    normal = ndtri(np.clip(samples.points(COEFFICIENTS + OF_MODE * len(modes)), 1e-9, 1.0 - 1e-9))
     drawn = samples.of(material, normal[:, :COEFFICIENTS])
     materials = _written(out / MATERIALS, [material_text(one) for one in drawn], written)
     if table is None or not modes:
