@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -42,3 +44,28 @@ def test_what_a_task_raises_is_raised(processes: int) -> None:
         team.share(np.arange(3.0))
         with pytest.raises(TypeError):
             list(team.completed_shared(shared_sum, [("a",), ("b",)]))
+
+
+SCRIPT = """import os, sys
+from chipload.workers import Workers
+from worker_tasks import process_of, waits
+
+print("main", flush=True)
+with Workers(2).team() as team:
+    print(*{pid for _, pid in team.completed(process_of, [(k,) for k in range(8)])}, flush=True)
+    list(team.completed(waits, [(k,) for k in range(2)]))
+"""
+
+
+def test_processes_do_not_outlive_a_killed_caller_nor_run_its_script(tmp_path: Path) -> None:
+    """The script has no guard: its processes would run it again."""
+    (tmp_path / "script.py").write_text(SCRIPT)
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    words = [sys.executable, str(tmp_path / "script.py")]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, env=environment, text=True) as caller:
+        assert caller.stdout is not None
+        assert caller.stdout.readline() == "main\n"
+        assert caller.stdout.readline().split()
+        caller.kill()
+        # the pipe ends with the last of them
+        assert caller.communicate(timeout=60.0) == ("", None)

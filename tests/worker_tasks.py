@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,11 @@ def always_killed(value: int) -> int:
 def shared_sum(shared: Floats, value: float) -> float:
     """The sum of what is shared and a value."""
     return float(shared.sum()) + value
+
+
+def waits(_: int) -> None:
+    """Does not end by itself."""
+    time.sleep(600.0)
 
 
 def process_of(_: int) -> int:

@@ -9,7 +9,10 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
+import signal
+import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
@@ -17,7 +20,10 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from multiprocessing.connection import wait as wait_for
+from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Protocol
 
 from chipload.errors import ChiploadError, InputError
@@ -92,6 +98,10 @@ class Workers:
 class Team(Protocol):
     """Workers that stay for many groups of tasks."""
 
+    @property
+    def size(self) -> int:
+        """How many tasks are done at the same time, at least 1."""
+
     def share(self, value: Any) -> None:
         """Give the workers what the functions of :meth:`completed_shared` have as their first argument from now on."""
 
@@ -133,6 +143,10 @@ class _Alone:
     def __init__(self) -> None:
         self._value: Any = None
 
+    @property
+    def size(self) -> int:
+        return 1
+
     def share(self, value: Any) -> None:
         self._value = value
 
@@ -151,6 +165,11 @@ class _Pool(_Alone):
         super().__init__()
         self._processes, self._folder, self._shared = processes, folder, 0
         self._executor: ProcessPoolExecutor | None = None
+        self._closed = False
+
+    @property
+    def size(self) -> int:
+        return self._processes
 
     def share(self, value: Any) -> None:
         super().share(value)
@@ -179,7 +198,9 @@ class _Pool(_Alone):
                     del waiting[k]
                     yield k, value
             except BrokenProcessPool:
-                self.close()
+                if self._closed:
+                    raise
+                self._end()
                 # which of those that ran ended the worker is not known
                 for k in {*running.values()} & set(waiting):
                     waiting[k] += 1
@@ -200,7 +221,7 @@ class _Pool(_Alone):
         if self._executor is None:
             _single_threaded()
             # spawned: a fork would copy threads of the libraries in an unknown state
-            self._executor = ProcessPoolExecutor(self._processes, multiprocessing.get_context("spawn"))
+            self._executor = ProcessPoolExecutor(self._processes, _Context(), _begin)
         ahead = iter(numbers)
         for k in ahead:
             running[self._executor.submit(function, *tasks[k])] = k
@@ -215,7 +236,11 @@ class _Pool(_Alone):
                     running[self._executor.submit(function, *tasks[following])] = following
 
     def close(self) -> None:
-        """End the processes."""
+        """End the processes; also what another thread waits for."""
+        self._closed = True
+        self._end()
+
+    def _end(self) -> None:
         pool, self._executor = self._executor, None
         if pool is None:
             return
@@ -223,6 +248,35 @@ class _Pool(_Alone):
         pool.shutdown(wait=False, cancel_futures=True)
         for process in processes:
             process.terminate()
+
+
+class _Process(SpawnProcess):
+    """A process that does not run the script of the caller again, as one without a guard of its main part would."""
+
+    @staticmethod
+    def _Popen(process_obj: Any) -> Any:
+        main = sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            return SpawnProcess._Popen(process_obj)
+        finally:
+            sys.modules["__main__"] = main
+
+
+class _Context(SpawnContext):
+    Process = _Process
+
+
+def _begin() -> None:
+    """The first of a process: Ctrl-C is for the caller, which ends it, and it does not outlive the caller."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if (caller := multiprocessing.parent_process()) is not None:
+        threading.Thread(target=_end_with, args=(caller.sentinel,), daemon=True).start()
+
+
+def _end_with(sentinel: int) -> None:
+    wait_for([sentinel])
+    os._exit(1)
 
 
 def _single_threaded() -> None:
@@ -246,13 +300,15 @@ def _read(file: str) -> Any:
 def _client(address: str) -> Iterator[Any]:
     """A client of a cluster."""
     require_extra("cluster")
+    import dask
     from distributed import Client
 
     try:
         client = Client(address, timeout=10)
     except (OSError, ValueError) as err:
         raise InputError(f"--dask {address}: no scheduler answers: {err}") from None
-    with client:
+    # tiles of a stock go with their task, so that a worker that ends takes none with it
+    with client, dask.config.set({"distributed.admin.large-graph-warning-threshold": "2GB"}):
         yield client
 
 
@@ -262,6 +318,11 @@ class _Cluster(_Alone):
     def __init__(self, client: Any, address: str) -> None:
         super().__init__()
         self._client, self._address = client, address
+
+    @property
+    def size(self) -> int:
+        threads: dict[str, int] = self._client.nthreads()
+        return max(1, sum(threads.values()))
 
     def share(self, value: Any) -> None:
         self._value = self._client.scatter(value, broadcast=True, hash=False)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import os
+import signal
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.errors import Cancelled, ChiploadError, InputError
+from chipload.errors import Cancelled, InputError
 from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, Program
 from chipload.simulation import chips, swept_area
@@ -20,7 +22,7 @@ from chipload.simulation import strips as of_strips
 from chipload.simulation.checkpoint import Checkpoint
 from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
-from chipload.simulation.removal import Removal, Resolution
+from chipload.simulation.removal import Removal, Resolution, TakenByLayers
 from chipload.simulation.strips import Strips, strips_of
 from chipload.stock.layers import LayeredStock
 from simulation.test_chunks import BALL as ROUND
@@ -75,7 +77,7 @@ def test_strips_have_their_own_columns_and_a_halo() -> None:
 
 def test_every_process_count_gives_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(of_strips, "GAIN", 9.0)
-    monkeypatch.setattr(of_strips, "AHEAD", 1)
+    monkeypatch.setattr(of_strips, "ROUND", 2)
     monkeypatch.setattr(chips, "BLOCK", 64)
     program = across()
     known, whole = one(program)
@@ -117,17 +119,25 @@ def test_an_error_of_a_strip_is_that_of_one_process(monkeypatch: pytest.MonkeyPa
     assert told[0] == told[1]
 
 
-def test_a_process_that_ends_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_is_killed_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(of_strips, "GAIN", 9.0)
-    begin = Strips.__init__
+    monkeypatch.setattr(of_strips, "ROUND", 1)
+    monkeypatch.setattr(chips, "BLOCK", 64)
+    program = across()
+    _, whole = one(program)
+    killed, take = list[int](), Strips.next
 
-    def broken(self: Strips, *more: object) -> None:
-        begin(self, *more)  # type: ignore[arg-type]
-        self._processes[0].kill()
+    def broken(self: Any, *more: Any) -> TakenByLayers:
+        found = take(self, *more)
+        if not killed:
+            killed.append(min(self._team._executor._processes))
+            os.kill(killed[0], signal.SIGKILL)
+        return found
 
-    monkeypatch.setattr(Strips, "__init__", broken)
-    with pytest.raises(ChiploadError, match="state workers = 1"):
-        remove(across(), block(), CUTTERS, MATERIAL, ROUGH, processes=2)
+    monkeypatch.setattr(Strips, "next", broken)
+    stock = block()
+    assert bytes_of(remove(program, stock, CUTTERS, MATERIAL, ROUGH, processes=2), stock) == whole
+    assert killed
 
 
 class _Late:

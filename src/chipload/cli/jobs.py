@@ -42,7 +42,7 @@ def run(
         ),
     ] = False,
     workers: Annotated[
-        int, typer.Option("--workers", help="processes that search, plan and check an impeller job; 1: this one")
+        int, typer.Option("--workers", help="processes for an impeller job and for a simulation by layers; 1: this one")
     ] = 1,
     dask: Annotated[
         str | None,

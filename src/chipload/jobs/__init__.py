@@ -69,8 +69,8 @@ class Capability:
 #: every capability; a job file belongs to the first whose table it has
 CAPABILITIES = (
     Capability("torque", "torque_control", "TorqueJobTable"),
-    Capability("feeds", "program", "FeedsJobTable", resumes=True, inner="feeds"),
-    Capability("program", "program", "ProgramJobTable", resumes=True),
+    Capability("feeds", "program", "FeedsJobTable", resumes=True, spreads=True, inner="feeds"),
+    Capability("program", "program", "ProgramJobTable", resumes=True, spreads=True),
     Capability("impeller", "impeller", "ImpellerJobTable", resumes=True, spreads=True),
     Capability("thinwall", "wall", "ThinWallJobTable", resumes=True),
     Capability("fit", "measurement", "FitJobTable"),
@@ -258,7 +258,7 @@ def run_job(
         if not capability.spreads:
             raise InputError(
                 f"--workers, --dask: {_article(capability.name)} job has no parts that other processes can compute: "
-                "leave them out; a simulation by layers has operation.0.workers, chipload sweep runs many jobs"
+                "leave them out; chipload sweep runs many jobs"
             )
         more["workers"] = workers
     outcome = capability.module("run").run(loaded.job, progress, **more)

@@ -55,6 +55,7 @@ from chipload.simulation.strips import strips_for
 from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_min_from_mm_s
+from chipload.workers import Workers
 
 Floats = NDArray[np.float64]
 
@@ -77,7 +78,7 @@ def remove(
     times: Floats | None = None,
     accuracy: bool = True,
     workers: int = 2,
-    processes: int = 1,
+    processes: int | Workers = 1,
     engine: Engine = "layers",
     progress: Progress = silent,
 ) -> Removal:
@@ -98,8 +99,8 @@ def remove(
         and ``duration_s``; None: at the commanded feed, rapids take none
     accuracy : find ``energy_balance`` and ``resolution_error``, which costs some steps once more
     workers : threads that find areas ahead of the removal
-    processes : of layers, each with a strip of the stock (:mod:`chipload.simulation.strips`); the result does not
-        depend on threads and processes
+    processes : of layers, each with a strip of the stock (:mod:`chipload.simulation.strips`), as a number or as
+        :class:`chipload.workers.Workers`, also of a cluster; the result does not depend on threads and processes
     engine : ``layers`` or ``moves``; ``auto``: by moves what goes by moves, see :mod:`chipload.simulation.moves`, and
         else the whole program by layers, with a finding ``handed-over``
 
@@ -162,8 +163,6 @@ def _blocks_removed(
             found = None if strips is None else strips.next(steps, sums.piece)
             sums, some, cuts = remove_block(steps, stock, sums, setting, contact, found)
             yield sums, some, cuts
-        if strips is not None:
-            strips.finish()
 
 
 def block_of(setting: RunSettings) -> int:
@@ -242,11 +241,12 @@ def setting_of(
     interpolation: Interpolation,
     watch: Watch | None,
     workers: int,
-    processes: int = 1,
+    processes: int | Workers = 1,
 ) -> RunSettings:
     """What a run keeps to."""
     profiles = {n: profile_of(c, resolution) for n, c in cutters.items()}
-    return RunSettings(cutters, profiles, material, resolution, interpolation, watch, workers, None, processes)
+    shared = processes if isinstance(processes, Workers) else Workers(processes)
+    return RunSettings(cutters, profiles, material, resolution, interpolation, watch, workers, None, shared)
 
 
 def profile_of(cutter: Cutter, resolution: Resolution) -> Slices:

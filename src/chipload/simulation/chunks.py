@@ -44,6 +44,7 @@ from chipload.simulation.strips import strips_for
 from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
 from chipload.stock.shapes import read_shapes, shape_bytes
+from chipload.workers import Workers
 
 Floats = NDArray[np.float64]
 
@@ -83,7 +84,7 @@ def remove_in_chunks(
     times: Floats | None = None,
     also: Any = (),
     workers: int = 2,
-    processes: int = 1,
+    processes: int | Workers = 1,
     engine: Engine = "layers",
     progress: Progress = silent,
 ) -> Removal:
@@ -185,9 +186,7 @@ def _removed(
             waiting += len(steps)
             now = time.monotonic()
             due = unfinished.every_s == 0.0 or now - since >= max(unfinished.every_s, cost / SHARE)
-            if due and strips is not None and not strips.complete:
-                strips.ask()
-                due = False
+            due = due and (strips is None or strips.complete)
             if due or waiting >= MOST:
                 unfinished.add(stacked(columns))
                 columns, waiting = [], 0
@@ -195,8 +194,6 @@ def _removed(
                 unfinished.commit(state())
                 since = time.monotonic()
                 cost = since - now
-        if strips is not None:
-            strips.finish()
     if unfinished.parts:
         if columns:
             unfinished.add(stacked(columns))

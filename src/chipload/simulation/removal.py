@@ -20,6 +20,7 @@ from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.simulation.loads import Cuts, StepEngagement
 from chipload.simulation.moves import MoveRun
 from chipload.simulation.swept_area import Interpolation
+from chipload.workers import Workers
 
 Floats = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
@@ -156,7 +157,7 @@ class Removal:
 @dataclass(frozen=True, eq=False)
 class RunSettings:
     """What a run keeps to, step after step: see :func:`remove`; ``profiles`` are slices of the cutters;
-    ``moves`` the run by moves, None where it goes by layers; ``workers`` threads, ``processes`` strips of the layers.
+    ``moves`` the run by moves, None where it goes by layers; ``workers`` threads; ``processes`` have strips of layers.
     """
 
     cutters: Mapping[int, Cutter]
@@ -167,7 +168,7 @@ class RunSettings:
     watch: Watch | None
     workers: int
     moves: MoveRun | None = None
-    processes: int = 1
+    processes: Workers = field(default_factory=Workers)
 
 
 @dataclass(frozen=True, eq=False)

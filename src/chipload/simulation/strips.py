@@ -1,30 +1,25 @@
-"""Strips of a layered stock in processes of their own: each removes what reaches into its strip.
+"""Strips of a layered stock as tasks of other processes or of a cluster: each removes what reaches into its strip.
 
 Notation: a strip is a range of neighbouring columns (or rows) of the tiles of the stock; it **owns** the steps whose
 box has its middle in them. Its **halo** is the further columns that its own steps reach into. A tile depends on nothing
-but the removals from it, in their order. So a process that has the tiles of strip and halo, and makes all steps that
+but the removals from it, in their order. So a task that has the tiles of strip and halo, and makes all steps that
 reach into them, has the tiles under its own steps as one process has them, bit for bit: what it finds of its own
 steps, chip and tooth engagement, has the same bits too. Where the axis leans, how an area is found depends on material
 beyond it (:mod:`chipload.simulation.flute_end`); the halo then also holds what the steps of the halo ask for.
 
-The strips lie along x or along y, as blocks of steps are shared more evenly. Where the halos leave no gain there are
-no strips. The caller keeps the order: it takes the steps of a block from all strips, and computes loads and watches.
+A **round** is some blocks of steps, one task a strip; the tiles of a strip go into its task and come back with what it
+found. So a task that a killed worker had is done again from the same tiles. While the caller computes loads of one
+round, the next one is removed. The strips lie along x or along y, as the steps are shared more evenly; where the
+halos leave no gain there are none.
 """
 
 from __future__ import annotations
 
 import itertools
-import pickle
-import queue
-import signal
-import subprocess
-import sys
-import threading
-from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from types import TracebackType
-from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,15 +30,16 @@ from chipload.program.program import Program
 from chipload.simulation.flute_end import MOST
 from chipload.simulation.layer_removal import rank_of, removed_by_layers
 from chipload.simulation.removal import ChipAreas, RunSettings, TakenByLayers
-from chipload.simulation.steps import BLOCK, ROWS, Steps, steps_in_blocks
+from chipload.simulation.steps import BLOCK, ROWS, Steps, number_of_steps, steps_in_blocks
 from chipload.simulation.swept_area import Plan, near_stock, plan_of
 from chipload.stock.layers import LayeredStock
+from chipload.workers import Team, Workers
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: blocks of steps that a strip may be ahead of the caller
-AHEAD = 8
+#: blocks of steps of a round; the first is one block, so that the caller does not wait for all strips at the start
+ROUND = 8
 #: of a step that is only removed, over one whose chip and tooth engagement are found too: its time, an estimate
 HALO = 0.8
 #: strips are used where the longest is expected to take at most this share of the time of one process
@@ -62,18 +58,40 @@ class Strip:
 
 
 @dataclass(frozen=True, eq=False)
-class _Task:
-    """What the process of a strip begins with; ``stock`` is its part of the stock, ``plan`` that of the whole."""
+class _Run:
+    """What the tasks of all strips share; ``plan`` is that of the whole stock, ``size`` steps make a block."""
 
-    strip: Strip
-    borders: Floats
+    xs: Floats
+    ys: Floats
     plan: Plan
-    stock: LayeredStock
     program: Program
     setting: RunSettings
     size: int
-    first: int
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """A strip between two rounds: its part of the stock, the chip of most pieces before step ``first``."""
+
+    strip: Strip
+    stock: LayeredStock
     piece: ChipAreas | None
+    first: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What a strip found in a block: which of its steps it owns, what they took, and the tool and the chip of most
+    pieces where it is one of them.
+    """
+
+    own: Ints
+    taken: TakenByLayers
+    piece: tuple[int, ChipAreas] | None
+
+
+#: what a strip found in a block, or the error that ended it there
+Block = _Found | ChiploadError
 
 
 def strips_of(
@@ -181,97 +199,83 @@ def _cost(strips: list[Strip], low: Ints, middle: Ints, high: Ints, near: NDArra
         own = near & (middle >= strip.own[0]) & (middle <= strip.own[1])
         others = near & ~own & (high >= strip.whole[0]) & (low <= strip.whole[1])
         each.append(own + HALO * others)
-    starts = np.arange(0, len(near), AHEAD * BLOCK)
+    starts = np.arange(0, len(near), ROUND * BLOCK)
     return float(np.add.reduceat(np.array(each), starts, axis=1).max(axis=0).sum()) if len(near) else 0.0
 
 
 class Strips:
-    """The processes of some strips, which remove a program; a context manager.
+    """Some strips of a stock, of which a team removes a program.
 
     Parameters
     ----------
     strips : of :func:`strips_of`, at least one
-    size : steps of a block
+    beside : executor of one thread, which waits for the team
     stock : as it is before step ``first``
+    size : steps of a block
     piece : the chip of most pieces before it
+
+    Attributes
+    ----------
+    complete : whether the stock of the caller is that after the last block
     """
 
     def __init__(
-        self, strips: list[Strip], program: Program, stock: LayeredStock, setting: RunSettings, size: int,
-        first: int, piece: ChipAreas | None,
+        self, strips: list[Strip], team: Team, beside: ThreadPoolExecutor, program: Program, stock: LayeredStock,
+        setting: RunSettings, size: int, first: int, piece: ChipAreas | None,
     ) -> None:  # fmt: skip
-        self.strips, self.stock, self.cutters = strips, stock, setting.cutters
-        self.asked, self.complete, self._waits = False, False, False
-        own = replace(setting, watch=None, moves=None, workers=1, processes=1)
-        self._processes = list[subprocess.Popen[bytes]]()
-        self._found = list["queue.Queue[Any]"]()
-        for strip in strips:
-            borders = (stock.xs, stock.ys)[strip.axis]
-            task = _Task(strip, borders, plan_of(stock), part_of(stock, strip), program, own, size, first, piece)
-            process = subprocess.Popen(
-                # -P: nothing is imported from the folder that the command is given in
-                [sys.executable, "-P", "-c", "from chipload.simulation.strips import serve; serve()"],
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            )  # fmt: skip
-            found: queue.Queue[Any] = queue.Queue()
-            self._processes.append(process)
-            self._found.append(found)
-            threading.Thread(target=_read, args=(process, found), daemon=True).start()
-            _send(process, task)
-            for _ in range(AHEAD):
-                _send(process, False)
+        self.stock, self.cutters, self.complete = stock, setting.cutters, True
+        self._team, self._beside = team, beside
+        own = replace(setting, watch=None, moves=None, workers=1, processes=Workers())
+        team.share(_Run(stock.xs, stock.ys, plan_of(stock), program, own, size))
+        self._states = [_State(strip, part_of(stock, strip), piece, first) for strip in strips]
+        self._total = number_of_steps(program, setting.resolution.step_mm, setting.resolution.tolerance)
+        self._blocks = list[tuple[Block, ...]]()
+        self._coming = beside.submit(self._round, 1)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        for process in self._processes:
-            process.kill()
-            process.wait()
-            for pipe in (process.stdin, process.stdout):
-                if pipe is not None:
-                    pipe.close()
-
-    def ask(self) -> None:
-        """Ask for the stock: some blocks later it is that of the caller (``complete``)."""
-        self.asked = not self._waits
-        self._waits = True
+    def _round(self, blocks: int) -> list[tuple[list[Block], _State]]:
+        """The next blocks of all strips; what is found and the states after them."""
+        done = dict(self._team.completed_shared(removed_in_strip, [(state, blocks) for state in self._states]))
+        return [done[k] for k in range(len(done))]
 
     def next(self, steps: Steps, piece: ChipAreas | None) -> TakenByLayers:
         """What the next block of steps takes; ``piece``: the chip of most pieces before them."""
+        if not self._blocks:
+            done = self._coming.result()
+            self._states = [state for _, state in done]
+            # the shortest ends with an error
+            self._blocks = list(zip(*(found for found, _ in done), strict=False))
+            failed = any(isinstance(one, ChiploadError) for one in self._blocks[-1])
+            if not failed and self._states[0].first < self._total:
+                self._coming = self._beside.submit(self._round, ROUND)
         removed, gained = np.zeros((len(steps), 4)), np.zeros(len(steps))
-        bites, pieces, self.complete = [], list[ChipAreas](), False
-        for strip, process, found in zip(self.strips, self._processes, self._found, strict=True):
-            own, each, taken, tiles = _got(found)
-            removed[own], gained[own] = each.removed, each.gained
-            bites += each.engagement
+        bites, pieces = [], list[ChipAreas]()
+        for each in self._blocks.pop(0):
+            if isinstance(each, ChiploadError):
+                raise each
+            removed[each.own], gained[each.own] = each.taken.removed, each.taken.gained
+            bites += each.taken.engagement
             # of the cutters of the caller, not a copy
-            pieces += [] if taken is None else [replace(taken[1], cutter=self.cutters[taken[0]])]
-            if tiles is not None:
-                self._put(strip, tiles)
-                self.complete, self._waits = True, False
-            _send(process, self.asked)
-        self.asked = False
-        for each in sorted(pieces, key=lambda p: p.step):
-            if piece is None or rank_of(each.chips) > rank_of(piece.chips):
-                piece = each
+            pieces += [] if each.piece is None else [replace(each.piece[1], cutter=self.cutters[each.piece[0]])]
+        for one in sorted(pieces, key=lambda p: p.step):
+            if piece is None or rank_of(one.chips) > rank_of(piece.chips):
+                piece = one
         for more in gained[gained != 0.0].tolist():
             self.stock.tidied += more
+        self.complete = not self._blocks
+        for state in self._states if self.complete else ():
+            self._put(state)
         return TakenByLayers(removed, gained, sorted(bites, key=lambda b: b.step), piece)
 
-    def finish(self) -> None:
-        """After the last block: the stock of the caller as the strips left it."""
-        for strip, process, found in zip(self.strips, self._processes, self._found, strict=True):
-            _send(process, None)
-            self._put(strip, _got(found))
-        self.complete = True
-
-    def _put(self, strip: Strip, tiles: tuple[NDArray[Any], NDArray[np.bool_], Ints]) -> None:
-        at = _slice(strip.axis, strip.own)
-        self.stock.tiles[at], self.stock.room[at] = tiles[0], tiles[2]
-        self.stock.cut = self.stock.cut | tiles[1]
+    def _put(self, state: _State) -> None:
+        """The tiles of a strip into the stock of the caller."""
+        strip, part = state.strip, state.stock
+        to = _slice(strip.axis, strip.own)
+        at = _slice(strip.axis, (strip.own[0] - strip.whole[0], strip.own[1] - strip.whole[0]))
+        self.stock.tiles[to], self.stock.room[to] = part.tiles[at], part.room[at]
+        self.stock.cut = self.stock.cut | part.cut
 
 
+@contextmanager
 def strips_for(
     program: Program,
     stock: LayeredStock,
@@ -279,13 +283,16 @@ def strips_for(
     size: int,
     first: int = 0,
     piece: ChipAreas | None = None,
-) -> AbstractContextManager[Strips | None]:
+) -> Iterator[Strips | None]:
     """The strips of a run from step ``first`` on; None where it runs by moves, in one process, or they gain nothing."""
-    if setting.moves is not None or setting.processes < 2:
-        return nullcontext()
+    if setting.moves is not None or setting.processes.alone:
+        yield None
+        return
     fine = setting.resolution
-    strips = strips_of(program, stock, setting.cutters, fine.step_mm, fine.tolerance, setting.processes)
-    return Strips(strips, program, stock, setting, size, first, piece) if strips else nullcontext()
+    # the thread ends after the team, which ends what it waits for
+    with ThreadPoolExecutor(1) as beside, setting.processes.team() as team:
+        strips = strips_of(program, stock, setting.cutters, fine.step_mm, fine.tolerance, team.size)
+        yield Strips(strips, team, beside, program, stock, setting, size, first, piece) if strips else None
 
 
 def _slice(axis: int, columns: tuple[int, int]) -> tuple[slice, slice, slice]:
@@ -303,77 +310,26 @@ def part_of(stock: LayeredStock, strip: Strip) -> LayeredStock:
     return out
 
 
-def _send(process: subprocess.Popen[bytes], message: Any) -> None:
-    if process.stdin is None:
-        return
+def removed_in_strip(run: _Run, state: _State, blocks: int) -> tuple[list[Block], _State]:
+    """The next blocks of a strip; this is what a worker executes."""
+    # a copy: where the task is done again, it begins as it did
+    strip, stock, fine = state.strip, state.stock.copied(), run.setting.resolution
+    borders = (run.xs, run.ys)[strip.axis]
+    piece, at, out = state.piece, state.first, list[Block]()
+    steps_of_all = steps_in_blocks(run.program, fine.step_mm, fine.tolerance, size=run.size, first=at)
     try:
-        pickle.dump(message, process.stdin)
-        process.stdin.flush()
-    except BrokenPipeError:
-        # what is read from it says why
-        return
-
-
-def _read(process: subprocess.Popen[bytes], found: queue.Queue[Any]) -> None:
-    """Put all that a process sends into a queue."""
-    try:
-        while process.stdout is not None:
-            found.put(pickle.load(process.stdout))
-    except Exception:
-        # whatever it is, the caller waits for an answer
-        found.put(
-            ChiploadError("simulation: a process of a strip of the stock ended: free memory, or state workers = 1")
-        )
-
-
-def _got(found: queue.Queue[Any]) -> Any:
-    value = found.get()
-    if isinstance(value, BaseException):
-        raise value
-    return value
-
-
-def serve() -> None:
-    """The process of a strip: reads its task from the standard input, then a message for each block of steps (whether
-    its tiles are asked for after it), None for the tiles at the end; writes what it finds to the standard output.
-    """
-    # Ctrl-C is for the caller, which ends this process
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    given, out = sys.stdin.buffer, sys.stdout.buffer
-    sys.stdout = sys.stderr
-    try:
-        _serve(pickle.load(given), given, out)
-    except (EOFError, BrokenPipeError):
-        # the caller has ended
-        return
-    except Exception as error:
-        pickle.dump(error, out)
-        out.flush()
-
-
-def _serve(task: _Task, given: Any, out: Any) -> None:
-    strip, stock, fine = task.strip, task.stock, task.setting.resolution
-    inner = (strip.own[0] - strip.whole[0], strip.own[1] - strip.whole[0])
-    piece, at = task.piece, task.first
-
-    def tiles() -> tuple[NDArray[Any], NDArray[np.bool_], Ints]:
-        where = _slice(strip.axis, inner)
-        return stock.tiles[where], stock.cut, stock.room[where]
-
-    for steps in steps_in_blocks(task.program, fine.step_mm, fine.tolerance, size=task.size, first=task.first):
-        message = pickle.load(given)
-        low, high, near = near_stock(steps, task.plan, task.setting.cutters)
-        column = column_of(0.5 * (low[:, strip.axis] + high[:, strip.axis]), task.borders)
-        own = near & (column >= strip.own[0]) & (column <= strip.own[1])
-        found = removed_by_layers(steps, stock, at, task.setting, piece, own, task.plan)
-        new = found.piece if found.piece is not piece else None
-        fresh = None if new is None else (int(steps.tool[new.step - at]), new)
-        piece, at = found.piece, at + len(steps)
-        which = np.flatnonzero(own)
-        part = TakenByLayers(found.removed[which], found.gained[which], found.engagement, None)
-        pickle.dump((which, part, fresh, tiles() if message else None), out)
-        out.flush()
-    while pickle.load(given) is not None:
-        pass
-    pickle.dump(tiles(), out)
-    out.flush()
+        for steps in itertools.islice(steps_of_all, blocks):
+            low, high, near = near_stock(steps, run.plan, run.setting.cutters)
+            column = column_of(0.5 * (low[:, strip.axis] + high[:, strip.axis]), borders)
+            own = near & (column >= strip.own[0]) & (column <= strip.own[1])
+            found = removed_by_layers(steps, stock, at, run.setting, piece, own, run.plan)
+            new = found.piece if found.piece is not piece else None
+            fresh = None if new is None else (int(steps.tool[new.step - at]), new)
+            piece, at = found.piece, at + len(steps)
+            which = np.flatnonzero(own)
+            part = TakenByLayers(found.removed[which], found.gained[which], found.engagement, None)
+            out.append(_Found(which, part, fresh))
+    except ChiploadError as error:
+        # raised where the caller comes to this block
+        out.append(error)
+    return out, _State(strip, stock, piece, at)

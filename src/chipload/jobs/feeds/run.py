@@ -27,18 +27,22 @@ from chipload.simulation.checkpoint import Checkpoint
 from chipload.simulation.chips import remove
 from chipload.simulation.steps import steps_of
 from chipload.stock.layers import LayeredStock
+from chipload.workers import Workers
 
 #: resolution error that new feeds leave room for, over that at the programmed feeds: at the new ones other steps have
 #: the worst loads, whose error is not yet known (example feeds: 1.07 % before, 1.51 % after)
 SPARE = 2.0
 
 
-def run(job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> FeedsProgram:
+def run(
+    job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: Workers | None = None
+) -> FeedsProgram:
     """Simulate the program of a job, give it new feeds, and simulate its new text from fresh stock.
 
     Parameters
     ----------
     checkpoint : the folder that keeps what is finished of the last simulation; None: all is kept in memory
+    workers : processes or a cluster that remove strips of a layered stock; None: as the operation states
 
     Raises
     ------
@@ -46,6 +50,7 @@ def run(job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | Non
         A file cannot be read, the controller would refuse the program, its feeds cannot be changed in the text, or the
         stock and the cutters cannot be used.
     """
+    simulation.require_layers(job, workers)
     machine, share = simulation.machine_of(job), 0.1
     reading = simulation.read_for(job, machine, part_of(progress, 0.0, share))
     stock, material = stock_body(job, reading.program), material_of(job)
@@ -56,7 +61,7 @@ def run(job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | Non
     share = 0.55 if compliance is not None else share
     begin = 0.5 * (1.0 + share)
     feeds, reading = _new_feeds(
-        job, own, reading, stock, material, machine, compliance, part_of(progress, share, begin)
+        job, own, reading, stock, material, machine, compliance, part_of(progress, share, begin), workers
     )
     stock = stock_body(job, reading.program)
     last = part_of(progress, begin, 1.0)
@@ -64,7 +69,7 @@ def run(job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | Non
         job,
         machine,
         reading,
-        simulation.simulated(job, reading, stock, machine, material, checkpoint, compliance, last),
+        simulation.simulated(job, reading, stock, machine, material, checkpoint, compliance, last, workers),
     )
     return FeedsProgram(**vars(done), feeds=feeds)
 
@@ -86,6 +91,7 @@ def _new_feeds(
     machine: Machine,
     compliance: WorkpieceCompliance | None,
     progress: Progress,
+    workers: Workers | None,
 ) -> tuple[FeedResult, ProgramReading]:
     """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then. ``own``:
     the text as it is, and its dialect.
@@ -103,7 +109,7 @@ def _new_feeds(
     # as it is: what its loads are, and how well they are known
     before = remove(
         program, stock, job.cutters, material, fine, interpolation=op.interpolation, times=times, watch=bends,
-        engine=op.engine, processes=op.workers, progress=part_of(progress, 0.0, 0.5),
+        engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.0, 0.5),
     )  # fmt: skip
     before = with_columns(before, (*watched(gives), *CHECK_COLUMNS))
     more = bends if limits.keys() & {"deflection_um", "deflection_workpiece_um"} else None
@@ -118,7 +124,7 @@ def _new_feeds(
     allowed = remove(
         program, stock_body(job, reading.program), job.cutters, material, fine, interpolation=op.interpolation,
         times=times, watch=watching(steps, asked, job.cutters, material, machine, before.columns), accuracy=False,
-        engine=op.engine, processes=op.workers, progress=part_of(progress, 0.5, 1.0),
+        engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.5, 1.0),
     )  # fmt: skip
     return with_new_feeds(
         *own, reading, steps, before, allowed.columns, asked, job.cutters, machine,

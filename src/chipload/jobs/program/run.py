@@ -15,6 +15,7 @@ from chipload.jobs.simulation.run import (
     machine_of,
     program_of,
     read_for,
+    require_layers,
     simulated,
 )
 from chipload.jobs.simulation.workpiece import stock_body
@@ -24,20 +25,25 @@ from chipload.progress import Progress, part_of, silent
 from chipload.result import Provenance
 from chipload.simulation.checkpoint import Checkpoint
 from chipload.stock.layers import LayeredStock
+from chipload.workers import Workers
 
 
-def run(job: ProgramJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> ProgramResult:
+def run(
+    job: ProgramJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: Workers | None = None
+) -> ProgramResult:
     """Read the program of a job for its machine; simulate it where the job says so, with new speeds if it asks.
 
     Parameters
     ----------
     checkpoint : the folder that keeps what is finished, from which the run goes on; None: all is kept in memory
+    workers : processes or a cluster that remove strips of a layered stock; None: as the operation states
 
     Raises
     ------
     InputError
         A file cannot be read, the controller would refuse the program, or the stock and the cutters cannot be used.
     """
+    require_layers(job, workers)
     machine, begin = machine_of(job), 0.1 if job.simulates else 1.0
     reading = read_for(job, machine, part_of(progress, 0.0, begin))
     if not job.simulates:
@@ -51,11 +57,11 @@ def run(job: ProgramJob, progress: Progress = silent, checkpoint: Checkpoint | N
         seconds, end = float(line_times(reading, machine)[1].sum()), 0.5 * (1.0 + begin)
         speeds, reading = new_speeds(
             job, *own, reading, stock, material, machine, lambda text: read_for(job, machine, text=text), seconds,
-            compliance, part_of(progress, begin, end),
+            compliance, part_of(progress, begin, end), workers,
         )  # fmt: skip
         stock, begin = stock_body(job, reading.program), end
     last = part_of(progress, begin, 1.0)
-    done = simulated(job, reading, stock, machine, material, checkpoint, compliance, last)
+    done = simulated(job, reading, stock, machine, material, checkpoint, compliance, last, workers)
     program = program_of(job, machine, reading, done)
     return program if speeds is None else SpeedsProgram(**vars(program), speeds=speeds)
 

@@ -36,6 +36,7 @@ from chipload.simulation.chips import remove
 from chipload.simulation.loads import Cuts, Floats
 from chipload.stock.layers import LayeredStock
 from chipload.units import rpm_from_rad_s
+from chipload.workers import Workers
 
 #: a speed that gains less than this in margin stays as it is
 GAIN = 0.02
@@ -68,6 +69,7 @@ def new_speeds(
     seconds: float,
     workpiece: WorkpieceCompliance | None,
     progress: Progress,
+    workers: Workers | None = None,
 ) -> tuple[SpeedResult, ProgramReading]:
     """The text with new speeds, from what the program cuts of a stock, which changes; and what it does then.
 
@@ -87,7 +89,7 @@ def new_speeds(
 
     before = remove(
         program, stock, job.cutters, material, resolution_of(job, reading.program), interpolation=op.interpolation,
-        times=times, watch=watch, accuracy=False, engine=op.engine, processes=op.workers, progress=progress,
+        times=times, watch=watch, accuracy=False, engine=op.engine, processes=workers or op.workers, progress=progress,
     )  # fmt: skip
     before = with_columns(before, (*watched(gives), *CHECK_COLUMNS, *stability.columns))
     found = stability_of(job, stability, machine)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutting.material import Material
-from chipload.errors import Severity, grouped, worst_severity
+from chipload.errors import InputError, Severity, grouped, worst_severity
 from chipload.jobs.checks import CHECK_COLUMNS, with_checks
 from chipload.jobs.provenance import provenance_of, sources, title_of, versions
 from chipload.jobs.simulation.form_error import forming
@@ -45,6 +45,7 @@ from chipload.simulation.steps import StepBlocks
 from chipload.simulation.surface import collisions, difference, in_stock
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+from chipload.workers import Workers
 
 #: of a simulation, what one pass over its steps beside the removal takes
 SHARE = 0.2 / 3.0
@@ -137,6 +138,16 @@ def text_to_change(
     return own
 
 
+def require_layers(job: ProgramJob, workers: Workers | None) -> None:
+    """Refuse processes and a cluster where no layers are removed."""
+    if workers is None:
+        return
+    if not job.simulates:
+        raise InputError("--workers, --dask: the job reads its program and simulates nothing: leave them out")
+    if job.table.operation[0].engine == "moves":
+        raise InputError('--workers, --dask: share layers only: state engine = "layers" or leave them out')
+
+
 def simulated(
     job: ProgramJob,
     reading: ProgramReading,
@@ -146,8 +157,11 @@ def simulated(
     checkpoint: Checkpoint | None,
     compliance: WorkpieceCompliance | None,
     progress: Progress,
+    workers: Workers | None = None,
 ) -> SimulationResult:
-    """The program, run through the stock of the job; ``compliance``: of the workpiece, None: not known yet."""
+    """The program, run through the stock of the job; ``compliance``: of the workpiece, None: not known yet;
+    ``workers``: in place of those that the operation states.
+    """
     op: SimulateTable = job.table.operation[0]
     bodies = bodies_of(job, reading, stock, machine, material)
     program, times, fine, part = bodies.program, bodies.times, bodies.resolution, bodies.part
@@ -193,14 +207,14 @@ def simulated(
     if checkpoint is None:
         removal = remove(
             program, stock, job.cutters, material, fine, interpolation=op.interpolation, watch=watch, times=times,
-            engine=op.engine, processes=op.workers, progress=removing,
+            engine=op.engine, processes=workers or op.workers, progress=removing,
         )  # fmt: skip
     else:
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
         removal = remove_in_chunks(
             program, stock, job.cutters, material, fine, checkpoint, interpolation=op.interpolation, watch=watch,
             keeps={"engagement": recorder} | ({} if stability_watch is None else {"watch": stability_watch}),
-            times=times, engine=op.engine, processes=op.workers, progress=removing,
+            times=times, engine=op.engine, processes=workers or op.workers, progress=removing,
             also=(
                 versions(), sources(), repr((stiffness, job.table.workpiece)), repr(job.table.checks), formed,
                 None if stability_watch is None else stability_watch.dynamics,

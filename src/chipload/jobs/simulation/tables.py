@@ -106,7 +106,7 @@ class SimulateTable(Table):
         description="auto: moves, or layers if moves cannot do it; moves: exact; layers: polygons",
     )
     workers: Annotated[Count, Field(le=64)] = Field(
-        1, description="processes that share the stock in strips, of layers alone; the result does not depend on them"
+        1, description="processes that share a layered stock in strips; the result does not depend on them"
     )
     corner_slices: Count | None = Field(
         None,
