@@ -116,6 +116,10 @@ class WorkerDied(ChiploadError):
     """A worker died each time that it had a task."""
 
 
+class _Lost(WorkerDied):
+    """What a task on a cluster needs is on no worker."""
+
+
 def completed(
     function: Callable[..., Any], tasks: Sequence[Task], workers: int = 1, dask: str | None = None
 ) -> Iterator[tuple[int, Any]]:
@@ -325,10 +329,23 @@ class _Cluster(_Alone):
         return max(1, sum(threads.values()))
 
     def share(self, value: Any) -> None:
-        self._value = self._client.scatter(value, broadcast=True, hash=False)
+        super().share(value)
+        self._copies = self._client.scatter(value, broadcast=True, hash=False)
 
     def completed_shared(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
-        return self.completed(function, [(self._value, *task) for task in tasks])
+        waiting, tries = list(range(len(tasks))), 0
+        while waiting:
+            numbers = waiting.copy()
+            try:
+                for k, value in self.completed(function, [(self._copies, *tasks[number]) for number in numbers]):
+                    waiting.remove(numbers[k])
+                    yield numbers[k], value
+            except _Lost:
+                # the workers that had what is shared are gone
+                tries += 1
+                if tries > RETRIES:
+                    raise
+                self.share(self._value)
 
     def completed(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
         from distributed import KilledWorker, as_completed
@@ -345,8 +362,10 @@ class _Cluster(_Alone):
                 k = numbers[future]
                 try:
                     value = future.result()
-                except (KilledWorker, CancelledError) as err:
+                except KilledWorker as err:
                     raise WorkerDied(f"task {k + 1}: {err}") from None
+                except CancelledError as err:
+                    raise _Lost(f"task {k + 1}: {err}") from None
                 future.release()
                 yield k, value
             if batch or (time.monotonic() - seen > PATIENCE_S and client.nthreads()):
