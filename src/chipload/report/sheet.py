@@ -6,6 +6,7 @@ import base64
 import json
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from html import escape
 from typing import Any
 
@@ -112,6 +113,7 @@ def framed(
     return html.encode()
 
 
+@lru_cache(maxsize=4)
 def _library(name: str, script: str) -> str:
     """A script, compressed: a browser unpacks it itself."""
     data = base64.b64encode(zlib.compress(script.encode(), 9)).decode()
