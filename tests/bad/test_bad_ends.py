@@ -24,6 +24,7 @@ from chipload.report.folder import check_target
 from chipload.simulation.checkpoint import LAST, Checkpoint
 from chipload.stock.layers import LayeredStock
 from chipload.terminal import plain
+from slot_job import slot_job
 
 CLI = "from chipload.cli import main; main()"
 
@@ -193,7 +194,7 @@ def test_input_that_is_refused_before_the_work_begins_leaves_what_was_kept(tmp_p
 
 #: a small job of a capability that goes on where it was stopped, and of one that begins again
 SMALL = {
-    "chips": ("operation.0.step_mm=4",),
+    "slot": ('operation.0.engine="layers"',),
     "contour": ('operation.0.strategies=["plain"]', 'operation.0.use="plain"', "operation.0.step_mm=0.5"),
 }
 
@@ -202,9 +203,9 @@ SMALL = {
 def small(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[list[str], Path, bool]:
     """The command of a small job, its result folder, and whether a stopped run goes on."""
     name, out = request.param, tmp_path / "results" / "out"
-    job = copy_example(name, tmp_path / "job") / "job.toml"
+    job = slot_job(tmp_path / "job") if name == "slot" else copy_example(name, tmp_path / "job") / "job.toml"
     sets = [word for text in SMALL[name] for word in ("--set", text)]
-    return ["run", str(job), "--out", str(out), "--keep-s", "0", *sets], out, name == "chips"
+    return ["run", str(job), "--out", str(out), "--keep-s", "0", *sets], out, name == "slot"
 
 
 def ended_well(words: list[str], out: Path) -> str:

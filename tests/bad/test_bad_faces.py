@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import shutil
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -67,13 +69,21 @@ def corner():
 FACES = [face(IMPELLER.blade.plus), face(IMPELLER.blade.minus), turned(IMPELLER.hub), turned(IMPELLER.shroud)]
 
 
+@cache
+def step() -> bytes:
+    """The file of all faces, written once."""
+    with TemporaryDirectory() as folder:
+        written(Path(folder) / "impeller.step", *FACES)
+        return (Path(folder) / "impeller.step").read_bytes()
+
+
 @pytest.fixture
 def job(tmp_path):
     path = Path(shutil.copytree(EXAMPLES / "impeller", tmp_path / "job")) / "job.toml"
     text = path.read_text()
     first, last = text.index("[impeller.shape]"), text.index("[catalogue]")
     path.write_text(text[:first] + STEP + text[last:])
-    written(path.parent / "impeller.step", *FACES)
+    (path.parent / "impeller.step").write_bytes(step())
     return path
 
 

@@ -136,7 +136,7 @@ def test_a_program_is_checked_without_a_machine() -> None:
 
 
 def test_a_simulation_is_estimated(tmp_path: Path) -> None:
-    job = load_job(examples.copy_example("chips", tmp_path / "chips") / "job.toml")
+    job = load_job(examples.copy_example("chips", tmp_path / "chips") / "job.toml", ["operation.0.step_mm=3"])
     lines, _ = check_job(job)
     steps = len(run_job(job).outcome.simulated.removal.columns["line"])
     assert lines[-1].startswith(f"estimate: {steps} steps, ")
@@ -158,10 +158,10 @@ def test_a_limit_of_the_engagement_that_the_wall_alone_exceeds(tmp_path: Path) -
 def test_a_wall_that_does_not_carry_the_smallest_depth(tmp_path: Path) -> None:
     """The threshold is the limit over the compliance: a thousandth of the limit, a thousandth of the force."""
     folder = examples.copy_example("plate", tmp_path / "plate")
-    whole = CliRunner().invoke(app, ["check", str(folder / "job.toml")])
+    words = ["check", str(folder / "job.toml"), "--set", "wall.elements=[6,6]"]
+    whole = CliRunner().invoke(app, words)
     assert whole.exit_code == 0
     assert "cannot be held" not in whole.output
-    tight = ["--set", "limits.deflection_workpiece_um=0.05"]
-    done = CliRunner().invoke(app, ["check", str(folder / "job.toml"), *tight])
+    done = CliRunner().invoke(app, [*words, "--set", "limits.deflection_workpiece_um=0.05"])
     assert done.exit_code == 3
     assert "the limit cannot be held at" in done.output

@@ -85,7 +85,7 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
 
 
 def test_a_run_by_layers_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
-    engine = ("--set", 'operation.0.engine="layers"', "--set", "operation.0.step_mm=0.5")
+    engine = ("--set", 'operation.0.engine="layers"', "--set", "operation.0.step_mm=1.0")
     assert ended(start(folder, "layers", *engine)).returncode == 0
     killed = stop(folder, "killed-layers", signal.SIGKILL, *engine)
     assert killed.returncode == -signal.SIGKILL
@@ -116,7 +116,7 @@ stiffness_n_um = 9.0
 
 def test_a_run_with_modes_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
     """The margins of cuts that were met before are those of the first that was met: they belong to the state."""
-    job = (folder / "job.toml").read_text().replace("step_mm = 0.2", "step_mm = 0.5")
+    job = (folder / "job.toml").read_text().replace("step_mm = 0.2", "step_mm = 1.0")
     (folder / "modes.toml").write_text(job + DYNAMICS)
     assert ended(start(folder, "modes", file="modes.toml")).returncode in (0, 3)
     numbers = json.loads((folder / "modes" / "summary.json").read_text())["operations"][0]["stability"]
@@ -138,11 +138,11 @@ def test_a_run_with_modes_that_was_killed_goes_on_to_the_same_bytes(folder: Path
 def test_a_run_that_was_killed_reads_what_it_had_found_of_the_part(folder: Path) -> None:
     """The distances to the part are found before the removal: the run that goes on begins with neither."""
     trimesh.creation.box(bounds=[[0.0, -15.0, -5.0], [50.0, 15.0, -1.5]]).export(folder / "part.stl")
-    part = '[part]\nfile = "part.stl"\nunits = "mm"\nspacing_mm = 1.0\n'
+    part = '[part]\nfile = "part.stl"\nunits = "mm"\nspacing_mm = 2.0\n'
     job = (
         (folder / "job.toml")
         .read_text()
-        .replace("step_mm = 0.2", "step_mm = 0.5")
+        .replace("step_mm = 0.2", "step_mm = 1.0")
         .replace("[material]", part + "[material]")
     )
     (folder / "part.toml").write_text(job)
