@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -205,9 +206,9 @@ def compliance(
     out = np.zeros((force.size, 3, 3))
     for i, n in enumerate(modes.harmonics):
         spread = modes.repeat * np.sinc(n * width / (math.tau * modes.shell.radius_at(force.ravel())))
-        left = np.einsum("ij,kjc->kic", modes.inverse[i], rows, optimize=True)
-        right = left if rows is loads else np.einsum("ij,kjc->kic", modes.inverse[i], loads, optimize=True)
-        block = np.einsum("kia,kib->kab", left, right, optimize=True) * spread[:, None, None]
+        left = modes.inverse[i] @ rows
+        right = left if rows is loads else modes.inverse[i] @ loads
+        block = left.transpose(0, 2, 1) @ right * spread[:, None, None]
         c, d = np.cos(n * angle.ravel()), np.sin(n * angle.ravel())
         # u and w of forces along u and w go with cos; v with sin; a force along v makes the pattern a quarter wave on
         even = np.stack([c, d, c], axis=1)[:, :, None] * block
@@ -273,22 +274,36 @@ def stress(
             f"shell.stress: s = {s_force:g} mm: under a point force the stress has no limit; give the length and the "
             "width of the patch on which the cutter acts"
         )
+    strains = _strains_under_force(modes, s_force, at, angle, length, width)
+    return _stress_of(modes.shell, strains, outside).reshape(*shape, 3)
+
+
+def _strains_under_force(
+    modes: Ritz, s_force: float, s_point: Floats, theta: Floats, length: float, width: float
+) -> Floats:
+    """(k, 6) strains and changes of curvature under a unit normal force, as of :func:`stress`."""
     shell = modes.shell
     load = _loads(modes, np.array([s_force]), length)[0, :, 2]
-    strains = np.zeros((len(at), 6))
+    out = np.zeros((len(s_point), 6))
+    at, place = np.unique(s_point, return_inverse=True)
     basis = _basis(shell, modes.terms, at)
     for i, n in enumerate(modes.harmonics):
         q = modes.inverse[i].T @ (modes.inverse[i] @ load)
         q *= modes.repeat * np.sinc(n * width / (math.tau * float(shell.radius_at(s_force))))
-        c, d = np.cos(n * angle), np.sin(n * angle)
-        strains += np.stack([c, c, d, c, c, d], axis=1) * (_strains(shell, basis, at, int(n)) @ q)
+        c, d = np.cos(n * theta), np.sin(n * theta)
+        out += np.stack([c, c, d, c, c, d], axis=1) * (_strains(shell, basis, at, int(n)) @ q)[place]
+    return out
+
+
+def _stress_of(shell: Shell, strains: Floats, outside: bool) -> Floats:
+    """(k, 3) stress along s, round, shear on a face [MPa/N]."""
     z = 0.5 * shell.thickness if outside else -0.5 * shell.thickness
     es, et, g = (strains[:, j] + z * strains[:, 3 + j] for j in range(3))
     plane = shell.modulus / (1.0 - shell.poisson**2)
     along = plane * (es + shell.poisson * et)
     round_ = plane * (et + shell.poisson * es)
     shear = 0.5 * shell.modulus / (1.0 + shell.poisson) * g
-    return np.stack([along, round_, shear], axis=1).reshape(*shape, 3)
+    return np.stack([along, round_, shear], axis=1)
 
 
 def equivalent(stresses: ArrayLike) -> Floats:
@@ -307,13 +322,12 @@ def greatest_stress(modes: Ritz, s_force: float, length: float, width: float, an
     Both faces are asked, at ``angles`` places round at s = 0 (half the circle, the rest is its mirror image) and at the
     middle and the ends of the patch. An end with diaphragms or free counts like the clamp.
     """
-    theta = np.linspace(0.0, math.pi, angles)
-    under = np.array([s_force - 0.5 * length, s_force, s_force + 0.5 * length])
-    clamp, patch = 0.0, 0.0
-    for face in (True, False):
-        clamp = max(clamp, float(equivalent(stress(modes, s_force, 0.0, theta, face, length, width)).max()))
-        patch = max(patch, float(equivalent(stress(modes, s_force, under, 0.0, face, length, width)).max()))
-    return clamp, patch
+    theta = np.concatenate([np.linspace(0.0, math.pi, angles), np.zeros(3)])
+    at = np.concatenate([np.zeros(angles), s_force + 0.5 * length * np.array([-1.0, 0.0, 1.0])])
+    _require_on_wall(modes.shell, at, 0.0)
+    strains = _strains_under_force(modes, s_force, at, theta, length, width)
+    both = np.array([equivalent(_stress_of(modes.shell, strains, face)) for face in (True, False)])
+    return float(both[:, :angles].max()), float(both[:, angles:].max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -380,6 +394,7 @@ def _law(shell: Shell) -> Floats:
     return law
 
 
+@lru_cache(maxsize=64)
 def _polynomials(ends: str, which: int, terms: int) -> Floats:
     """(terms, terms + 2) Legendre coefficients of the functions of u, v or w (``which``) that hold the ends."""
     unit = np.eye(terms + 1)
@@ -393,6 +408,7 @@ def _polynomials(ends: str, which: int, terms: int) -> Floats:
     whole = legendre.legint(made, times, lbnd=-1, axis=1)
     columns = min(whole.shape[1], terms + 2)
     out[:, :columns] = whole[:, :columns]
+    out.setflags(write=False)
     return out
 
 
