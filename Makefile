@@ -25,15 +25,19 @@ $(VENV)/.ready: $(VENV)/.run requirements.lock
 	$(PIP) install --require-hashes -r requirements.lock
 	touch $@
 
-# kernels whose types are stated are compiled when they are imported: here once, beside the checks, not by every process
+# kernels whose types are stated are compiled when they are imported: here once, not by every process
 KERNELS := chipload.engagement.bricks.front._kernels, chipload.stability._kernels, chipload.stability.several._kernels
+CHECKED := $(VENV)/checked.log
 
+# the slow checks beside the tests, so that no core waits; what they say stands at the end
 test: setup
-	$(BIN)/python -c 'import $(KERNELS)' & compiled=$$!; \
-	{ $(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports \
-	&& $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site; }; checked=$$?; \
-	wait $$compiled && exit $$checked
-	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal -ra
+	$(BIN)/ruff check . && $(BIN)/ruff format --check .
+	{ $(BIN)/mypy && $(BIN)/lint-imports && $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site; } \
+	  > $(CHECKED) 2>&1 & checks=$$!; \
+	$(BIN)/python -c 'import $(KERNELS)' \
+	&& OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal -ra; tested=$$?; \
+	wait $$checks; checked=$$?; cat $(CHECKED); \
+	exit $$((tested ? tested : checked))
 
 # the tests marked core, within 3 minutes on two cores
 quick: setup

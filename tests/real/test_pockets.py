@@ -24,7 +24,7 @@ DATA = CAD / "dxf_hsm_nibbler"
 SEAHORSE = CAD / "dxf_camotics" / "locket" / "seahorse.dxf"
 #: drawing -> cutter radius [mm]; the radial depth is a fifth of it
 POCKETS = {
-    "arcs": 4.0,
+    "arcs": 6.0,
     "circle": 3.0,
     "circle_point": 8.0,
     "curve": 6.0,
