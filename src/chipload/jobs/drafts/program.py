@@ -240,7 +240,7 @@ def _stock(program: Program, known: Known, header: Header) -> tuple[Box, tuple[E
     for stated in (known.stock, header.stock):
         if stated is not None:
             (low, high), where = stated
-            sure = where.startswith(("BLK", "workpiece", "stock of"))
+            sure = where.startswith(("BLK", "workpiece", "stock of", "stockMin"))
             note = f"{where}" if sure else f"{where}: check it against the program's zero"
             return (low, high), (
                 Entry("low_mm", list(low), note, not sure), Entry("high_mm", list(high), note, not sure)
@@ -351,7 +351,9 @@ def _material_table(header: Header) -> DraftTable:
         name, where = header.material
         entry = Entry("name", name, f"by the comment ({where}); chipload materials lists all", True)
     else:
-        entry = Entry("name", "al7075-t6", "the file names no material; chipload materials lists all", True)
+        own = header.unknown_material
+        why = f"none that is shipped is like {own}" if own else "the file names no material"
+        entry = Entry("name", "al7075-t6", f"{why}; chipload materials lists all", True)
     return DraftTable("material", (entry,))
 
 
