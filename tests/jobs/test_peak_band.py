@@ -14,6 +14,7 @@ from chipload.errors import InputError
 from chipload.jobs import load_job, run_job
 from chipload.jobs.checks import PEAKS, DefaultChecks, with_peaks
 from chipload.jobs.fit.run import peak_excess
+from chipload.jobs.simulation.limits import program_limits
 from chipload.result import COLUMNS, LimitCheck, Verdict
 
 PROGRAM = "G21 G90 G94 G17 G54\nT1 M6\nS3000 M3\nG0 X-10 Y5 Z5\nG1 Z-1 F100\nX30 F400\nG0 Z5\nM2\n"
@@ -100,6 +101,26 @@ def test_means_are_not_peaks() -> None:
     check = LimitCheck("spindle_torque_nm", 10.0, 9.9, Verdict.HOLDS)
     own = replace(material_named("al7075-t6"), peak_excess=0.4, chip=(0.0, 0.05))
     assert with_peaks(check, DefaultChecks({}, own), {"chip_max_mm": np.array([0.1])}) is check
+
+
+def test_the_stress_of_a_workpiece_has_the_band_of_the_force() -> None:
+    """0.5 MPa per N: 300 N with a deviation of 20 % count as 300 (1 + 0.2) N at one deviation; then peaks by 40 %."""
+    strained = SimpleNamespace(strength=200.0, worst=lambda force: (0, 0.5 * float(force[0]), (0.0, 0.0, 0.0)))
+    own = replace(material_named("al7075-t6"), peak_excess=0.0)
+    columns = {"line": np.array([1]), "t_s": np.zeros(1), "force_n": np.array([300.0]), "force_sd_n": np.array([60.0])}
+
+    def stress(sigma: float, excess: float = 0.0) -> LimitCheck:
+        simulation = SimpleNamespace(
+            workpiece=SimpleNamespace(strained=strained, error=0.0), errors={}, limits={}, stability=None,
+            machine=None, checks=DefaultChecks({}, replace(own, peak_excess=excess), ("spindle",), sigma),
+        )  # fmt: skip
+        (found,) = program_limits(simulation, columns, "program")
+        return found
+
+    assert (stress(0.0).worst, stress(1.0).worst) == (150.0, pytest.approx(180.0))
+    assert stress(0.0, 0.3).state is Verdict.HOLDS
+    assert stress(0.0, 0.4).state is Verdict.UNPROVEN
+    assert stress(2.0).state is Verdict.EXCEEDS
 
 
 def cut(use: str, seen: float, *, axis: bool = True) -> SimpleNamespace:
