@@ -237,6 +237,9 @@ def test_comments_of_other_posts() -> None:
     created = read_header("(stockMin:0.00mm, -1.5mm, -12.70mm)\n(stockMax:4in, 100.00mm, 0.00mm)\nG21")
     assert created.stock is not None
     assert created.stock[0] == ((0.0, -1.5, -12.7), (101.6, 100.0, 0.0))
+    vectric = read_header("( Material Size)\n( X= 100.000, Y= 80.000, Z= 12.000)\nG21")
+    assert vectric.stock is not None
+    assert vectric.stock[0] == ((0.0, 0.0, -12.0), (100.0, 80.0, 0.0))
     siemens = read_header('WORKPIECE(,"",,"BOX",112,0,-20,-80,-5,-5,100,60)')
     assert siemens.stock is not None
     assert siemens.stock[0] == ((-5.0, -5.0, -20.0), (100.0, 60.0, 0.0))
@@ -257,6 +260,8 @@ def said_of(tools: str) -> dict[int, dict[str, object]]:
         ("N10 T7 M6 (BALL END MILL 6MM)", {7: {"diameter_mm": 6.0, "corner_radius_mm": 3.0}}),
         ('T2\n(1/4" ENDMILL)\nM6', {2: {"diameter_mm": 6.35}}),
         ("(DRILL 5.5 mm)\nG0 X1\nT3 M6", {}),
+        ("N120T1M06\nN130 (End Mill {6 mm})\nN140G00Z20.000", {1: {"diameter_mm": 6.0}}),
+        ("N120T1M06\nN130G00Z20.000\nN140 (End Mill {6 mm})", {}),
         ("(plate of 20 mm)\nT3 M6", {}),
         ("T1 M06 (3/8 4FL ENDMILL)", {1: {"diameter_mm": 9.525, "flutes": 4}}),
         ("(TOOL/MILL,3.17, 0.00, 0.00, 0.00)\nM6 T102", {102: {"diameter_mm": 3.17}}),
@@ -303,6 +308,19 @@ def test_a_drill_has_a_point_and_two_flutes(program: Path, tmp_path: Path) -> No
     (cutter,) = tomllib.loads((tmp_path / "job" / "job.toml").read_text())["cutter"]
     assert (cutter["diameter_mm"], cutter["bottom_deg"], cutter["flutes"]) == (8.0, 31.0, 2)
     assert cutter["name"] == "8. DRILL"
+
+
+def test_a_text_without_a_change_of_tools(program: Path, tmp_path: Path) -> None:
+    """T alone changes nothing: what cuts is tool 0, with the size of the only tool that the text names."""
+    program.write_text("(TOOL 2: 1/2 FLAT)\n" + FUSION[FUSION.index("G21") :].replace("T3 M6", "T2"))
+    call("init", program, tmp_path / "job")
+    (cutter,) = tomllib.loads((tmp_path / "job" / "job.toml").read_text())["cutter"]
+    assert (cutter["number"], cutter["diameter_mm"]) == (0, 12.7)
+
+
+def test_a_text_with_a_byte_order_mark(program: Path, tmp_path: Path) -> None:
+    program.write_bytes(b"\xef\xbb\xbf" + FUSION.replace("\n", "\r\n").encode())
+    assert call("init", program, tmp_path / "job")[0] == 0
 
 
 def test_a_program_that_begins_with_incremental_motion(tmp_path: Path) -> None:

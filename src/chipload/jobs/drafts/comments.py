@@ -34,13 +34,17 @@ _BLK = re.compile(
 )
 _WORKPIECE = re.compile(r"WORKPIECE\s*\(([^)]*)\"BOX\"([^)]*)\)", re.IGNORECASE)
 _STOCK_SIZE = re.compile(rf"Stock\s+Size\s+X{_NUMBER}\s*Y{_NUMBER}\s*Z{_NUMBER}", re.IGNORECASE)
+#: Vectric: width, length and thickness
+_MATERIAL_SIZE = re.compile(
+    rf"Material\s+Size\s*\)?\s*\(?\s*X\s*=\s*{_NUMBER}\s*,?\s*Y\s*=\s*{_NUMBER}\s*,?\s*Z\s*=\s*{_NUMBER}", re.IGNORECASE
+)
 #: a comment, and the tool that is defined behind it (Heidenhain)
 _TOOL_DEF = re.compile(r";([^\n]*)\n[^\n]*\bTOOL\s+(?:DEF|CALL)\s+(\d{1,8})\b", re.IGNORECASE)
 #: a tool called by its name: Sinumerik, Heidenhain
 _NAMED = re.compile(r'(?:\bT\d*\s*=\s*|\bTOOL\s+CALL\s+)"([^"\n]+)"', re.IGNORECASE)
 #: a change of tools by number, and a motion
-_CHANGE = re.compile(r"\bM0?6(?![0-9.])", re.IGNORECASE)
-_TOOL_WORD = re.compile(r"\bT\s*([0-9]{1,8})(?![0-9.=])", re.IGNORECASE)
+_CHANGE = re.compile(r"(?<![A-Z_<\[#])M0?6(?![0-9.])", re.IGNORECASE)
+_TOOL_WORD = re.compile(r"(?<![A-Z_<\[#])T\s*([0-9]{1,8})(?![0-9.=])", re.IGNORECASE)
 _MOTION = re.compile(r"(?<![A-Z_<\[#])[XYZ]\s*[-+.0-9\[#]", re.IGNORECASE)
 #: a comment that describes a tool, and the length in it
 _TOOL_KIND = re.compile(
@@ -159,28 +163,35 @@ def _nc_cutters(text: str, mm: float) -> dict[int, Stated]:
 
 
 def _at_changes(text: str) -> list[tuple[int, str]]:
-    """Tool numbers with the comment that describes the tool: on the line of its change, or just above it."""
+    """Tool numbers with the comment that describes the tool: on the line of its change, just above it, or below it and
+    before any motion.
+    """
     out: list[tuple[int, str]] = []
     above: list[str] = []
-    chosen = 0
+    chosen = waiting = 0
     for line in text.splitlines():
         words = _COMMENT.sub(" ", line)
         if found := _TOOL_WORD.search(words):
             chosen = int(found[1])
         said = [hit[1] or hit[2] or "" for hit in _COMMENT.finditer(line)]
         if _CHANGE.search(words) and chosen:
-            described = [
-                c
-                for c in (*said, *reversed(above))
-                if _TOOL_MILL.match(c) or (_TOOL_KIND.search(c) and _LENGTH.search(c))
-            ]
+            described = [c for c in (*said, *reversed(above)) if _of_a_tool(c)]
             out += [(chosen, described[0].strip())] if described else []
-            above = []
+            above, waiting = [], 0 if described else chosen
         elif _MOTION.search(words):
-            above = []
+            above, waiting = [], 0
         else:
+            below = [c for c in said if waiting and _of_a_tool(c)]
+            if below:
+                out.append((waiting, below[0].strip()))
+                waiting = 0
             above = [*above, *(said or [""])][-ABOVE:]
     return out
+
+
+def _of_a_tool(comment: str) -> bool:
+    """Whether a comment describes a tool with its size."""
+    return bool(_TOOL_MILL.match(comment) or (_TOOL_KIND.search(comment) and _LENGTH.search(comment)))
 
 
 def _described(name: str, mm: float, where: str = "") -> Stated:
@@ -280,6 +291,10 @@ def _stock(text: str, mm: float) -> tuple[Box, str] | None:
             return None
         if x0 < x1 and y0 < y1 and bottom < top:
             return ((x0, y0, bottom), (x1, y1, top)), "WORKPIECE"
+    if hit := _MATERIAL_SIZE.search(text):
+        x, y, z = (float(hit[k]) * mm for k in (1, 2, 3))
+        if min(x, y, z) > 0.0:
+            return ((0.0, 0.0, -z), (x, y, 0.0)), "Material Size, with the program's zero at its lower left and top"
     if hit := _STOCK_SIZE.search(text):
         x, y, z = (float(hit[k]) * mm for k in (1, 2, 3))
         if min(x, y, z) > 0.0:

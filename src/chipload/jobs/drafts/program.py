@@ -112,7 +112,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     deepest = {
         n: block[1][2] - float(program.p_work[cuts & (program.tool == n), 2].min(initial=block[1][2])) for n in numbers
     }
-    sizes = [_size(known.cutters.get(n) or header.cutters.get(n) or _of_table(known.tools, n)) for n in numbers]
+    sizes = [_size(next((s for s in _stated(n, known, header) if s), {})) for n in numbers]
     tables = [
         _program_table(path, folder, chosen, known, min(sizes), text),
         _machine_table(chosen, known),
@@ -139,7 +139,10 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
 
 def _stated(number: int, known: Known, header: Header) -> list[Stated]:
     """What is stated about a tool, the surest first."""
-    return [known.cutters.get(number, {}), _of_table(known.tools, number), header.cutters.get(number, {})]
+    stated = header.cutters.get(number, {})
+    if number == 0 and len(header.cutters) == 1:  # a text without a change of tools cuts with the one that it names
+        (stated,) = header.cutters.values()
+    return [known.cutters.get(number, {}), _of_table(known.tools, number), stated]
 
 
 def _cutters(program: Program, known: Known, header: Header) -> dict[int, Cutter]:
