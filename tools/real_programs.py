@@ -1,12 +1,13 @@
 """Run real files of other people and write their verdicts and times into docs/real_programs.md.
 
-    CHIPLOAD_DATA=... python tools/real_programs.py [NAME ...] [--limit-s 900] [--again] [--kept DIR]
+    CHIPLOAD_DATA=... python tools/real_programs.py [NAME ...] [--limit-s 600] [--again] [--kept DIR]
 
 ``chipload init`` drafts a job of each file of :data:`FILES`; ``chipload check`` estimates its run; ``chipload run
 --accept`` runs it, the shortest first, in a process of its own. What a file does not state is guessed, and the guesses
-are accepted. A file that takes longer than the limit, or that is refused, is recorded as such; a simulation that was
-stopped, or that the system ended, goes on from its checkpoint the next time. Files that have a verdict on the page are
-not run again unless ``--again`` asks for it. Times are processor times of a file, all its parts together.
+are accepted. A file that takes more processor time than the limit, or that is refused, is recorded as such; a
+simulation that was stopped, or that the system ended, goes on from its checkpoint the next time. Files that have a
+verdict on the page are not run again unless ``--again`` asks for it. Times are processor times of a file, all its parts
+together.
 """
 
 from __future__ import annotations
@@ -89,18 +90,18 @@ def row(name: str, kind: str, verdict: str, reason: str, seconds: float | None) 
 
 
 def timed(words: list[str], limit_s: float | None = None) -> tuple[int | None, str, str, float]:
-    """Exit code (None: stopped at the limit), the two texts and the processor time [s] of a command."""
+    """Exit code (None: stopped at the limit of processor time), the two texts and the processor time [s] of a command.
+
+    The system ends the process at the limit; its checkpoint is there.
+    """
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     line = [sys.executable, "-m", "chipload", *words]
     with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            out, err = process.communicate(timeout=limit_s)
-            code: int | None = process.returncode
-        except subprocess.TimeoutExpired:
-            process.send_signal(signal.SIGTERM)  # keeps its checkpoint
-            out, err = process.communicate()
-            code = None
+        if limit_s is not None:
+            resource.prlimit(process.pid, resource.RLIMIT_CPU, (math.ceil(limit_s), resource.RLIM_INFINITY))
+        out, err = process.communicate()
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    code = None if process.returncode == -signal.SIGXCPU else process.returncode
     return code, out, err, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
@@ -130,7 +131,7 @@ def run(folder: Path, limit_s: float) -> tuple[str, str, float]:
     folder.mkdir(parents=True, exist_ok=True)
     spent.write_text(f"{earlier + seconds:.1f}")
     if code is None or code < 0:
-        why = f"stopped after {limit_s:g} s by the clock" if code is None else f"ended by {signal.Signals(-code).name}"
+        why = f"stopped after {limit_s:g} s" if code is None else f"ended by {signal.Signals(-code).name}"
         return STOPPED, f"{why}{share(err)}; goes on in the next run", earlier + seconds
     return *read(code, out, err), earlier + seconds
 
@@ -154,7 +155,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the files and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="parts of the names of the files; none: all")
-    parser.add_argument("--limit-s", type=float, default=900.0, help="by the clock, for each file")
+    parser.add_argument("--limit-s", type=float, default=600.0, help="processor time of a call, for each file")
     parser.add_argument("--again", action="store_true", help="run files that have a verdict too")
     parser.add_argument("--kept", type=Path, default=KEPT, help="folder for jobs and checkpoints")
     chosen = parser.parse_args(arguments)

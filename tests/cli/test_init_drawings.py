@@ -92,8 +92,8 @@ def test_a_drawing_beyond_the_travel_is_moved_to_its_middle(tmp_path: Path) -> N
     code, _, said = call("init", path, tmp_path / "wide")
     assert (code, said) == (
         2,
-        "chipload: the drawing is 600 mm wide in Y, machine vmc travels 500 mm: name a larger one (--machine), or see "
-        "whether the unit is right\n",
+        "chipload: the drawing is 600 mm wide in Y, machine vmc travels 500 mm: name a larger one (--on of init, "
+        "--machine of simulate), or see whether the unit is right\n",
     )
 
 

@@ -128,5 +128,7 @@ def test_a_coarse_run_says_so(tmp_path: Path) -> None:
     assert "job-coarse" not in [f["code"] for f in fine["findings"]]
     assert coarse["provenance"]["overrides"] == list(asked)
     assert coarse["tracks"][0]["rows"] < 0.5 * fine["tracks"][0]["rows"]
+    sizes = [(tmp_path / n / "removal.npz").stat().st_size for n in ("fine", "coarse")]
+    assert sizes[1] < 0.5 * sizes[0]
     torque = [next(c["worst"] for c in s["limits"] if c["name"] == "torque_nm") for s in (fine, coarse)]
     assert torque[1] == pytest.approx(torque[0], rel=0.1)

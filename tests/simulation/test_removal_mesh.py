@@ -43,6 +43,15 @@ def test_a_slot_and_what_is_left_of_it_at_half() -> None:
     assert mesh.frame_of(140) == len(mesh.rows)
 
 
+def test_wider_cells_show_the_same_slot_with_fewer_faces() -> None:
+    """Cells four times as wide: the volume of the slot to a cell across."""
+    fine = removal_mesh(BOX, path(slot(15.0)), {1: FLAT})
+    wide = removal_mesh(BOX, path(slot(15.0)), {1: FLAT}, wider=4.0)
+    assert wide.cell == pytest.approx(4.0 * fine.cell, rel=0.3)
+    assert wide.volumes[-1] == pytest.approx(48000.0 - 60.0 * 10.0 * 5.0, rel=0.01)
+    assert len(wide.corners) < 0.25 * len(fine.corners)
+
+
 def test_paths_before_have_cut_the_first_frame() -> None:
     mesh = removal_mesh(BOX, path(slot(12.0)), {1: FLAT, 2: FLAT}, [path(slot(17.0), tool=2), path(slot(15.0))])
     assert mesh.volumes[0] == pytest.approx(48000.0 - 60.0 * 10.0 * 5.0, rel=0.002)

@@ -60,8 +60,8 @@ class Material:
     exponents : (m_t, m_r, m_a) of the size effect, from 0 to below 1; 0: none, the linear law
     cutter : what they were measured with: form, diameter, teeth, helix, rake, substrate
     speed : (lowest, highest) cutting speed they hold for [mm/s]; None: the source does not say
-    peak_excess : how far above what these coefficients predict the peaks of a force were measured, relative, in runs
-        that were not fitted; 0: not measured, or not above
+    peak_excess : how far above what these coefficients predict the peaks of a force were measured, relative, in the
+        worst of the runs; 0: not measured, or not above
     tangential : only the tangential force is known; the other coefficients are 0 and mean nothing: torque and power can
         be proved, directions and sizes of forces, deflections and stability cannot
     covariance : (6, 6), of (Ktc, Krc, Kac, Kte, Kre, Kae) in products of MPa and N/mm, from a fit; instead of

@@ -43,7 +43,9 @@ DIRECTED = (
     "force_n", "deflection_um", "deflection_workpiece_um", "form_error_um", "cutter_stress_mpa", "deflection_share",
 )  # fmt: skip
 #: columns that follow the greatest force of a turn, not its mean
-PEAKS = (*DIRECTED, "force_xy_n", "torque_nm")
+PEAKS = (
+    *DIRECTED, "force_xy_n", "force_normal_n", "force_over_allowable", "stress_mpa", "strength_share", "torque_nm",
+)  # fmt: skip
 #: columns that have the error of the force where they have none of their own
 WITH_FORCE = ("cutter_stress_mpa", "deflection_um", "deflection_workpiece_um")
 
@@ -169,7 +171,7 @@ def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
         return ()
     out = []
     k = int(np.argmax(thick))
-    if thick[k] > chip[1] * (1.0 + 1e-9):
+    if _beyond(checks, columns):
         text = (
             f"chips are up to {thick[k]:.4g} mm thick: the coefficients of {material.name} hold up to {chip[1]:g} mm, "
             "the loads beyond that are not known"
@@ -183,6 +185,15 @@ def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
         )
         out.append(_at_step("chip-below-coefficients", columns, int(thin[0]), text))
     return tuple(out)
+
+
+def _beyond(checks: DefaultChecks, columns: Columns) -> float:
+    """The thickest chip [mm] where it is above those that the coefficients were measured with; 0: none is."""
+    chip = checks.material.chip
+    if chip is None or "chip_range" in checks.off or "chip_max_mm" not in columns:
+        return 0.0
+    thickest = float(np.max(columns["chip_max_mm"], initial=0.0))
+    return thickest if thickest > chip[1] * (1.0 + 1e-9) else 0.0
 
 
 def _at_step(code: str, c: Columns, k: int, text: str) -> Finding:
@@ -224,7 +235,7 @@ def default_limits(
         rows, error = _could_be_greatest(columns, checks), load_error(errors, "deflection_share")
         check = check_limit("deflection_share", 1.0, columns, track=track, rows=rows, error=error, reason=direction)
         out.append(_rigid(check))
-    return tuple(with_peaks(check, checks.material) for check in out)
+    return tuple(with_peaks(check, checks, columns) for check in out)
 
 
 def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> NDArray[np.bool_]:
@@ -325,11 +336,21 @@ def peak_excess(material: Material, column: str) -> float:
     return material.peak_excess if column in PEAKS else 0.0
 
 
-def with_peaks(check: LimitCheck, material: Material) -> LimitCheck:
-    """A check of a peak that holds by prediction alone is unproven where measured peaks were that far above."""
-    excess = peak_excess(material, check.column.name)
-    if check.state is not Verdict.HOLDS or check.worst is None or excess == 0.0:
+def with_peaks(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> LimitCheck:
+    """A check of a peak that holds by prediction alone is unproven where measured peaks were that far above, and where
+    a chip is thicker than any that was measured: how far peaks are above there is not known.
+
+    Parameters
+    ----------
+    columns : of the track, a row a step; ``chip_max_mm`` among them, where it is known
+    """
+    if check.state is not Verdict.HOLDS or check.worst is None or check.column.name not in PEAKS:
         return check
+    material = checks.material
+    if material.chip is not None and (thickest := _beyond(checks, columns)):
+        reason = f"chips are up to {thickest:.4g} mm thick, {material.name} was measured up to {material.chip[1]:g} mm"
+        return replace(check, state=Verdict.UNPROVEN, reason=reason)
+    excess = peak_excess(material, check.column.name)
     if abs(check.worst) * (1.0 + check.resolution_error) * (1.0 + excess) <= check.limit:
         return check
     reason = f"measured peaks of {material.name} were up to {100.0 * excess:.3g} % above predicted ones"

@@ -50,6 +50,8 @@ FACTORS: Mapping[str, Mapping[str, tuple[float, float]]] = {
 }
 #: layers of a stock that states none, in smallest diameters; slices of corner radii that a program job does not state
 LAYER, SLICES = 0.2, 8
+#: cells of the stock that is shown are so many times as wide
+WIDER = 4.0
 
 
 def coarser(loaded: LoadedJob) -> tuple[str, ...]:
@@ -119,7 +121,10 @@ def _of_program(loaded: LoadedJob) -> list[str]:
 
 
 def marked(done: FinishedJob) -> FinishedJob:
-    """The result of a coarse run: nothing in it is proven."""
+    """The result of a coarse run: nothing in it is proven, and its stock is shown with wider cells."""
     text = "--coarse: a first answer with larger steps and thicker layers; run the job without it for a proof"
     finding = Finding("job-coarse", 0, text, Severity.UNPROVEN)
-    return replace(done, result=replace(done.result, findings=(finding, *done.result.findings)))
+    result = replace(done.result, findings=(finding, *done.result.findings))
+    blanks = done.presentation.blanks
+    shown = replace(done.presentation, blanks=lambda: {k: replace(blank, wider=WIDER) for k, blank in blanks().items()})
+    return replace(done, result=result, presentation=shown)

@@ -5,7 +5,8 @@ the tool table is what the controller compensates for; CUTTER of CL data and the
 was made for. Tools without a ``[[cutter]]`` are not compared: the table may hold tools that a text uses as allowances.
 
 Comments that are read: a tool number with a diameter, as ``T1 D=10. CR=0.``, ``TOOL 2 - DIA 6.0``, ``T3 = 8.0 MM END
-MILL``, ``TOOL: T1 = 10.0 dia.``; a number without a unit is in the unit that the text selects first.
+MILL``, ``TOOL: T1 = 10.0 dia.``, ``T1 | 1/4 FLAT ENDMILL | H1 | D1``; a number without a unit is in the unit that the
+text selects first, a fraction in inches. ``D1`` beside ``H1``, or with the number of the tool, is an offset.
 """
 
 from __future__ import annotations
@@ -29,12 +30,15 @@ SAME_MM = 1e-3
 SAME_ANGLE = math.radians(0.5)
 
 _COMMENT = re.compile(r"\(([^()\n]*)\)|;([^\n]*)")
-_TOOL = r"\bT(?:OOL)?\s*(?:NO\.?|NUMBER)?\s*[:#=]?\s*T?(?P<tool>[0-9]{1,8})\b"
-_VALUE = r"(?P<value>[0-9]+\.?[0-9]*|\.[0-9]+)(?![0-9./])\s*(?P<unit>MM|INCH(?:ES)?\b|IN\b|\")?"
+_TOOL = r"\bT(?:OOL)?\s*(?:NO\.?|NUMBER)?\s*[-:#=]?\s*T?(?P<tool>[0-9]{1,8})\b"
+_VALUE = r"(?P<value>[0-9]+/[0-9]+|[0-9]+\.?[0-9]*|\.[0-9]+)(?![0-9./])\s*(?P<unit>MM|INCH(?:ES)?\b|IN\b|\")?"
 _STATED = (
-    re.compile(rf"{_TOOL}[^()\n]{{0,80}}?\b(?:D|DIA\.?|DIAM\.?|DIAMETER)\s*[=:]?\s*{_VALUE}"),
-    re.compile(rf"{_TOOL}\s*[-=:|,]\s*{_VALUE}\s*(?:DIA|FLAT|BALL|BULL|END|MILL|ROUND|SLOT)"),
+    re.compile(rf"{_TOOL}[^()\n]{{0,80}}?\b(?:D\s*[=:]?|(?:DIAMETER|DIAM|DIA)\.?\s*[-=:]?)\s*{_VALUE}"),
+    re.compile(rf"{_TOOL}\s*[-=:|,]\s*{_VALUE}\s*(?:DIA|FLAT|BALL|BULL|END|MILL|ROUND|SLOT|DRILL|SPOT|CENTER)"),
 )
+#: D and the number of an offset: no point, no sign between them, no unit
+_OFFSET = re.compile(r"\bD([0-9]{1,8})\b(?![./]|\s*(?:MM|INCH|IN\b|\"))")
+_LENGTH_OFFSET = re.compile(r"\bH\s*[0-9]+\b")
 _UNITS = re.compile(r"\bG\s*(20|21|70|71)\b(?!\.)")
 
 
@@ -76,11 +80,31 @@ def _comments(text: str, own: float) -> Iterator[tuple[int, StatedDiameter]]:
             continue
         for comment in _COMMENT.finditer(line):
             said = (comment[1] if comment[1] is not None else comment[2]).upper()
-            hit = next((hit for hit in (pattern.search(said) for pattern in _STATED) if hit is not None), None)
-            if hit is not None and float(hit["value"]) > 0.0:
-                mm = own if hit["unit"] is None else MM_PER["mm" if hit["unit"] == "MM" else "inch"]
+            hits = (pattern.search(_without_offsets(said)) for pattern in _STATED)
+            hit = next((hit for hit in hits if hit is not None), None)
+            if hit is not None and (value := length_of(hit["value"], hit["unit"], own)) > 0.0:
                 shown = " ".join(said.split())[:60]
-                yield int(hit["tool"]), StatedDiameter(float(hit["value"]) * mm, f"the comment ({shown})", number)
+                yield int(hit["tool"]), StatedDiameter(value, f"the comment ({shown})", number)
+
+
+def _without_offsets(said: str) -> str:
+    """A comment without the numbers of offsets, which are no diameters."""
+    tool = re.search(_TOOL, said)
+    both = _LENGTH_OFFSET.search(said) is not None
+    return _OFFSET.sub(lambda hit: "" if both or (tool and tool["tool"] == hit[1]) else hit[0], said)
+
+
+def length_of(value: str, unit: str | None, own: float) -> float:
+    """A length [mm] of a comment; without a unit in that of the text, a fraction in inches; 0: of no meaning.
+
+    >>> length_of("1/4", None, 1.0), length_of("6.", "mm", 25.4), length_of(".5", None, 25.4)
+    (6.35, 6.0, 12.7)
+    """
+    over, _, below = value.partition("/")
+    mm = own if unit is None else MM_PER["mm" if unit.upper() == "MM" else "inch"]
+    if not below:
+        return float(over) * mm
+    return float(over) / float(below) * (MM_PER["inch"] if unit is None else mm) if float(below) > 0.0 else 0.0
 
 
 def agree(

@@ -28,12 +28,14 @@ class Blank:
     cutters : by tool number
     shapes : kind and profile (m, 2) [mm] of the parts of cutters that have more than :class:`Cutter` knows, as a neck
     before : tracks that have cut the same stock before this one, in their order
+    wider : how many times as wide as usual the cells are that the stock is shown with
     """
 
     mesh: trimesh.Trimesh | None
     cutters: Mapping[int, Cutter]
     shapes: Mapping[int, Sequence[tuple[str, NDArray[np.float64]]]] = field(default_factory=dict)
     before: tuple[str, ...] = ()
+    wider: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,7 +57,8 @@ def removal_meshes(result: Result, blanks: Mapping[str, Blank]) -> ShownStocks:
         before, cutters = _before(result, blanks, blank)
         cutters |= dict(blank.cutters)
         try:
-            out[k] = removal_mesh(blank.mesh, path, {n: c for n, c in cutters.items() if not c.body}, before)
+            solid = {n: c for n, c in cutters.items() if not c.body}
+            out[k] = removal_mesh(blank.mesh, path, solid, before, blank.wider)
         except InputError as err:
             refused[k] = str(err)
     return ShownStocks(out, refused)

@@ -86,7 +86,11 @@ class ToolPoses:
 
 
 def removal_mesh(
-    blank: trimesh.Trimesh, path: ToolPoses, cutters: Mapping[int, Cutter], before: Sequence[ToolPoses] = ()
+    blank: trimesh.Trimesh,
+    path: ToolPoses,
+    cutters: Mapping[int, Cutter],
+    before: Sequence[ToolPoses] = (),
+    wider: float = 1.0,
 ) -> RemovalMesh:
     """Run the tool along the rows through the blank.
 
@@ -95,6 +99,7 @@ def removal_mesh(
     blank : closed mesh [mm]
     cutters : by tool number; rows of other numbers take nothing
     before : paths that have cut the blank before; frame 0 is what they leave
+    wider : how many times as wide as usual the cells are; there are as many times fewer frames
 
     Examples
     --------
@@ -111,14 +116,14 @@ def removal_mesh(
     each = [_instants(p, cutters, np.isin(p.tool, list(cutters))) for p in every]
     instants = each[-1]
     low, high = (np.asarray(b, dtype=np.float64) for b in blank.bounds)
-    pitch = _pitch(high - low, radius, sum(len(i) for own in each for i in own))
+    pitch = wider * _pitch(high - low, radius, sum(len(i) for own in each for i in own))
     stock = TriDexel.of_mesh(blank, pitch)
     for earlier, runs in zip(before, each, strict=False):
         for places in runs:
             _removed(stock, earlier, places, cutters, pitch)
     net = SurfaceNet(stock)
     rows, volumes = list[int](), [_volume(net)]
-    ends = _frames(instants, path)
+    ends = _frames(instants, path, round(FRAMES / wider))
     sizes = {id(c): float(c.profile(0.1)[:, 0].max()) for c in cutters.values()}
     for run, frame in zip(_runs(instants, ends), range(1, len(ends) + 1), strict=True):
         changed: list[tuple[Floats, Floats]] = []
@@ -199,14 +204,14 @@ def _instants(path: ToolPoses, cutters: Mapping[int, Cutter], known: NDArray[np.
     return out
 
 
-def _frames(instants: list[Ints], path: ToolPoses) -> Ints:
-    """(m,) rows at which frames end: after equal lengths of path."""
+def _frames(instants: list[Ints], path: ToolPoses, most: int) -> Ints:
+    """(m,) rows at which frames end: after equal lengths of path, at most so many."""
     if not instants:
         return np.zeros(0, dtype=np.int64)
     rows = np.concatenate(instants)
     step = np.linalg.norm(np.diff(path.tip[rows], axis=0, prepend=path.tip[rows[:1]]), axis=1)
     s = np.cumsum(step + 1e-9)
-    wanted = s[-1] * np.arange(1, min(FRAMES, len(rows)) + 1) / min(FRAMES, len(rows))
+    wanted = s[-1] * np.arange(1, min(most, len(rows)) + 1) / min(most, len(rows))
     out: Ints = np.unique(rows[np.minimum(np.searchsorted(s, wanted), len(rows) - 1)])
     return out
 

@@ -75,7 +75,7 @@ def limits_of(machine: Machine, op: Operation, strategy: StrategyResult, track: 
         for name, limit in op.limits.items()
     )
     if op.checks is not None:
-        stated = tuple(with_peaks(check, op.checks.material) for check in stated)
+        stated = tuple(with_peaks(check, op.checks, columns) for check in stated)
     own = () if op.checks is None else default_limits(op.checks, machine, columns, track, {})
     step = np.cumsum(takes_time(columns)) - 1
     return tuple(c if c.row is None else replace(c, row=int(step[c.row])) for c in (*stated, *own))

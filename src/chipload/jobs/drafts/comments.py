@@ -1,7 +1,9 @@
 """What the comments and headers of a program state beside its motions: cutters, stock, material.
 
-Read are the forms of common posts: Fusion 360 (``T1 D=10. CR=0. - flat end mill``), FeatureCAM's APT (``INSERT/14MM CRB
-2FL 32 LOC``, ``CSI_SET_FLUTE_LENGTH``, ``INSERT/Stock Size``), Heidenhain (``BLK FORM``), Sinumerik (``WORKPIECE``).
+Read are the forms of common posts: Fusion 360 (``T1 D=10. CR=0. - flat end mill``), Mastercam (``T1 | 10. FLAT
+ENDMILL | H1``), FreeCAD (``TC: 5mm Endmill`` before ``M6 T1``), Carbide Create (``TOOL/MILL,3.17,0,0,0``,
+``stockMin``), FeatureCAM's APT (``INSERT/14MM CRB 2FL 32 LOC``, ``CSI_SET_FLUTE_LENGTH``, ``INSERT/Stock Size``),
+Heidenhain (``BLK FORM``), Sinumerik (``WORKPIECE``).
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from chipload.cutter.bodies import Profile, apt_body
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.program.apt.cutters import Shape, read_cutters
-from chipload.program.reconcile import tool_comments
+from chipload.program.reconcile import length_of, tool_comments
 from chipload.program.setup import FIRST_NAMED
 from chipload.units import MM_PER
 
@@ -32,21 +34,60 @@ _BLK = re.compile(
 )
 _WORKPIECE = re.compile(r"WORKPIECE\s*\(([^)]*)\"BOX\"([^)]*)\)", re.IGNORECASE)
 _STOCK_SIZE = re.compile(rf"Stock\s+Size\s+X{_NUMBER}\s*Y{_NUMBER}\s*Z{_NUMBER}", re.IGNORECASE)
+#: Vectric: width, length and thickness
+_MATERIAL_SIZE = re.compile(
+    rf"Material\s+Size\s*\)?\s*\(?\s*X\s*=\s*{_NUMBER}\s*,?\s*Y\s*=\s*{_NUMBER}\s*,?\s*Z\s*=\s*{_NUMBER}", re.IGNORECASE
+)
 #: a comment, and the tool that is defined behind it (Heidenhain)
 _TOOL_DEF = re.compile(r";([^\n]*)\n[^\n]*\bTOOL\s+(?:DEF|CALL)\s+(\d{1,8})\b", re.IGNORECASE)
 #: a tool called by its name: Sinumerik, Heidenhain
 _NAMED = re.compile(r'(?:\bT\d*\s*=\s*|\bTOOL\s+CALL\s+)"([^"\n]+)"', re.IGNORECASE)
+#: a change of tools by number, and a motion
+_CHANGE = re.compile(r"(?<![A-Z_<\[#])M0?6(?![0-9.])", re.IGNORECASE)
+_TOOL_WORD = re.compile(r"(?<![A-Z_<\[#])T\s*([0-9]{1,8})(?![0-9.=])", re.IGNORECASE)
+_MOTION = re.compile(r"(?<![A-Z_<\[#])[XYZ]\s*[-+.0-9\[#]", re.IGNORECASE)
+#: a comment that describes a tool, and the length in it
+_TOOL_KIND = re.compile(
+    r"^\s*TC:|MILL|CUTTER|\bDRILL|\bREAM|\bBALL|\bBULL|V-?BIT|ENGRAV|FR[AÄ]E?S|BOHRER|FRAISE|FORET", re.IGNORECASE
+)
+_UNIT = r"(?:MM\b|IN(?:CH(?:ES)?)?\b|\")"
+_LENGTH = re.compile(
+    rf"(?<![-+.0-9/A-Z])(?P<value>[0-9]+/[0-9]+(?![0-9/])|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?=\s*{_UNIT}))"
+    rf"\s*(?P<unit>{_UNIT})?",
+    re.IGNORECASE,
+)
+#: Carbide Create: diameter and corner radius of the tool, corners of the stock
+_TOOL_MILL = re.compile(rf"TOOL/MILL\s*,\s*{_NUMBER}\s*,\s*{_NUMBER}\s*,", re.IGNORECASE)
+_CORNER = re.compile(r"\(\s*stock(Min|Max)\s*:([^()\n]*)\)", re.IGNORECASE)
+#: lines above a change of tools whose comments may describe the tool
+ABOVE = 6
+#: what says that a number is no alloy: a date, a time, the name of a file or a program
+_DATE = re.compile(
+    r"\b(?:DATE|TIME|CREATED|OUTPUT|GENERATED|EXPORTED|POSTED|VERSION|COPYRIGHT|FILE|PROGRAM)\b|[0-9]{1,2}:[0-9]{2}|"
+    r"(?:JAN|FEB|MAR|APR|MAY|JUN|JUL|AUG|SEP|OCT|NOV|DEC)[A-Z]*[ .-]|[0-9][-./][0-9]+[-./][0-9]",
+    re.IGNORECASE,
+)
+#: a comment about a tool, and one in which a number may be an alloy
+_OF_TOOL = re.compile(r"^\W*T\s*[0-9]|\bTOOL|HIGH.SPEED|\bHSS\b|MILL\b|DRILL", re.IGNORECASE)
+_ALLOY = re.compile(
+    r"MATERIAL|STOCK|WERKSTOFF|WORKPIECE|ALLOY|BILLET|BLANK|PLATE|\b(?:AL|AA|EN|AISI|SAE)|\bT[0-9]{1,4}\b",
+    re.IGNORECASE,
+)
+_NAMED_MATERIAL = re.compile(r"\b(?:MATERIAL|WERKSTOFF|STOCK\s+MATERIAL)\s*[-:=]+\s*([^-:=\s][^\n]*)", re.IGNORECASE)
 _MATERIALS = (
     (r"STAINLESS|\b304L?\b|\b316L?\b|1\.43\d\d|1\.44\d\d|INOX", "group-14-stainless"),
     (r"INCONEL|NIMONIC|HASTELLOY", "group-34-nickel"),
     (r"NODULAR|DUCTILE IRON|\bGGG\d*\b", "group-17-nodular-iron"),
     (r"CAST IRON|GREY IRON|GRAY IRON|\bGG\d\d\b", "group-15-grey-iron"),
-    (r"\b4140\b|\b4340\b|42CRMO4", "group-7-steel"),
-    (r"STEEL|\b1045\b|\bC45\b|\b1018\b|\bS235|\bST37", "group-2-steel"),
+    (r"(?<![0-9])4140(?![0-9])|(?<![0-9])4340(?![0-9])|42CRMO4", "group-7-steel"),
+    (r"STEEL|(?<![0-9])1045(?![0-9])|\bC45\b|(?<![0-9])1018(?![0-9])|\bS235|\bST37", "group-2-steel"),
     (r"BRASS", "group-27-brass"),
-    (r"7075", "al7075-t6"),
-    (r"6082", "al6082-t6"),
-    (r"ALU|\b6061\b|\b2024\b|\b5083\b", "group-22-aluminium"),
+    (r"(?<![0-9])7075(?![0-9])", "al7075-t6"),
+    (r"(?<![0-9])6082(?![0-9])", "al6082-t6"),
+    (
+        r"\bALU|\bEN[ -]?AW\b|(?<![0-9])6061(?![0-9])|(?<![0-9])2024(?![0-9])|(?<![0-9])5083(?![0-9])",
+        "group-22-aluminium",
+    ),
 )
 
 
@@ -59,11 +100,13 @@ class Header:
     cutters : by tool number
     stock : corners of a block [mm], and where it stands
     material : a shipped name, and the comment
+    unknown_material : what a comment names as the material where none that is shipped is like it
     """
 
     cutters: Mapping[int, Stated] = field(default_factory=dict)
     stock: tuple[Box, str] | None = None
     material: tuple[str, str] | None = None
+    unknown_material: str = ""
 
 
 def read_header(text: str, apt: bool = False, mm: float = 1.0) -> Header:
@@ -80,7 +123,8 @@ def read_header(text: str, apt: bool = False, mm: float = 1.0) -> Header:
     ((0.0, 0.0, -24.0), (220.0, 220.0, 0.0))
     """
     cutters = _apt_cutters(text) if apt else _nc_cutters(text, mm)
-    return Header(cutters, _stock(text, mm), _material(text))
+    material = _material(text)
+    return Header(cutters, _stock(text, mm), material, "" if material else _unknown_material(text))
 
 
 def _nc_cutters(text: str, mm: float) -> dict[int, Stated]:
@@ -92,13 +136,21 @@ def _nc_cutters(text: str, mm: float) -> dict[int, Stated]:
         own.setdefault("diameter_mm", (d, where))
         if r > 0.0:
             own.setdefault("corner_radius_mm", (min(r, 0.5 * d), where))
-        if hit[4] and 0.0 < float(hit[4]) < 80.0 and "drill" not in hit[5].lower():
+        if hit[4] and "drill" in hit[5].lower() and 0.0 < float(hit[4]) <= 180.0:
+            own.setdefault("bottom_deg", (90.0 - 0.5 * float(hit[4]), where))
+        elif hit[4] and 0.0 < float(hit[4]) < 80.0:
             own.setdefault("taper_deg", (float(hit[4]), where))
         own.setdefault("name", (_kind(hit[5]), where))
     for number, statement in tool_comments(text).items():
         out.setdefault(number, {}).setdefault("diameter_mm", (statement.diameter, statement.where))
         if "BALL" in statement.where.upper():
             out[number].setdefault("corner_radius_mm", (0.5 * statement.diameter, statement.where))
+        if "|" in statement.where:
+            out[number].setdefault("name", (statement.where.split("|")[1].strip(), statement.where))
+    for number, comment in _at_changes(text):
+        own = out.setdefault(number, {})
+        for key, stated in _described(comment, mm).items():
+            own.setdefault(key, stated)
     for defined in _TOOL_DEF.finditer(text):
         own = out.setdefault(int(defined[2]), {})
         for key, stated in _described(defined[1], mm).items():
@@ -110,14 +162,50 @@ def _nc_cutters(text: str, mm: float) -> dict[int, Stated]:
     return {n: {k: v for k, v in own.items() if v[0] != ""} for n, own in out.items()}
 
 
+def _at_changes(text: str) -> list[tuple[int, str]]:
+    """Tool numbers with the comment that describes the tool: on the line of its change, just above it, or below it and
+    before any motion.
+    """
+    out: list[tuple[int, str]] = []
+    above: list[str] = []
+    chosen = waiting = 0
+    for line in text.splitlines():
+        words = _COMMENT.sub(" ", line)
+        if found := _TOOL_WORD.search(words):
+            chosen = int(found[1])
+        said = [hit[1] or hit[2] or "" for hit in _COMMENT.finditer(line)]
+        if _CHANGE.search(words) and chosen:
+            described = [c for c in (*said, *reversed(above)) if _of_a_tool(c)]
+            out += [(chosen, described[0].strip())] if described else []
+            above, waiting = [], 0 if described else chosen
+        elif _MOTION.search(words):
+            above, waiting = [], 0
+        else:
+            below = [c for c in said if waiting and _of_a_tool(c)]
+            if below:
+                out.append((waiting, below[0].strip()))
+                waiting = 0
+            above = [*above, *(said or [""])][-ABOVE:]
+    return out
+
+
+def _of_a_tool(comment: str) -> bool:
+    """Whether a comment describes a tool with its size."""
+    return bool(_TOOL_MILL.match(comment) or (_TOOL_KIND.search(comment) and _LENGTH.search(comment)))
+
+
 def _described(name: str, mm: float, where: str = "") -> Stated:
     """What the description of a tool states: ``14MM CRB 2FL 32 LOC FLUTE LEN 32.0 FLUTE EXT 60.0``."""
     where = where or f"the comment ({' '.join(name.split())[:50]})"
     out: Stated = {"name": (" ".join(name.split()), where)}
-    if found := re.search(rf"{_NUMBER}\s*MM\b", name, re.IGNORECASE):
-        out["diameter_mm"] = (float(found[1]), where)
+    if found := _TOOL_MILL.match(name):
+        d, r = float(found[1]) * mm, float(found[2]) * mm
+        own: Stated = {"diameter_mm": (d, where)} if d > 0.0 else {}
+        return own | ({"corner_radius_mm": (r, where)} if 0.0 < r <= 0.5 * d else {})
+    if (found := _LENGTH.search(name)) and (diameter := length_of(found["value"], found["unit"], mm)) > 0.0:
+        out["diameter_mm"] = (diameter, where)
         if re.search(r"\bBALL", name, re.IGNORECASE):
-            out["corner_radius_mm"] = (0.5 * float(found[1]), where)
+            out["corner_radius_mm"] = (0.5 * diameter, where)
     for word, key in (("LEN", "flute_length_mm"), ("EXT", "overhang_mm")):
         if found := re.search(rf"FLUTE\s+{word}\s+{_NUMBER}", name, re.IGNORECASE):
             out[key] = (float(found[1]) * mm, where)
@@ -190,6 +278,11 @@ def _stock(text: str, mm: float) -> tuple[Box, str] | None:
         low, high = corners["1"], corners["2"]
         if all(a < b for a, b in zip(low, high, strict=True)):
             return ((low[0], low[1], low[2]), (high[0], high[1], high[2])), "BLK FORM"
+    stated = {hit[1].lower(): _corner(hit[2], mm) for hit in _CORNER.finditer(text)}
+    if set(stated) == {"min", "max"}:
+        low, high = stated["min"], stated["max"]
+        if len(low) == len(high) == 3 and all(a < b for a, b in zip(low, high, strict=True)):
+            return ((low[0], low[1], low[2]), (high[0], high[1], high[2])), "stockMin, stockMax"
     if hit := _WORKPIECE.search(text):
         numbers = [part.strip() for part in hit[2].split(",")]
         try:
@@ -198,6 +291,10 @@ def _stock(text: str, mm: float) -> tuple[Box, str] | None:
             return None
         if x0 < x1 and y0 < y1 and bottom < top:
             return ((x0, y0, bottom), (x1, y1, top)), "WORKPIECE"
+    if hit := _MATERIAL_SIZE.search(text):
+        x, y, z = (float(hit[k]) * mm for k in (1, 2, 3))
+        if min(x, y, z) > 0.0:
+            return ((0.0, 0.0, -z), (x, y, 0.0)), "Material Size, with the program's zero at its lower left and top"
     if hit := _STOCK_SIZE.search(text):
         x, y, z = (float(hit[k]) * mm for k in (1, 2, 3))
         if min(x, y, z) > 0.0:
@@ -205,13 +302,32 @@ def _stock(text: str, mm: float) -> tuple[Box, str] | None:
     return None
 
 
+def _corner(text: str, mm: float) -> tuple[float, ...]:
+    """Coordinates [mm] of a corner: ``0.00mm, 0.00mm, -12.70mm``."""
+    found = re.finditer(rf"{_NUMBER}\s*(MM|IN)?", text, re.IGNORECASE)
+    return tuple(
+        float(hit[1]) * (mm if hit[2] is None else MM_PER["mm" if hit[2].upper() == "MM" else "inch"]) for hit in found
+    )
+
+
 def _material(text: str) -> tuple[str, str] | None:
     said = [" ".join((hit[1] or hit[2] or hit[3] or "").split()) for hit in _COMMENT.finditer(text)]
     for comment in said:
+        # a tool of high-speed steel is no workpiece of steel, and 2024 may be a year
+        if _OF_TOOL.search(comment):
+            continue
+        bare = _ALLOY.search(comment) is not None and _DATE.search(comment) is None
         for pattern, name in _MATERIALS:
-            # a tool of high-speed steel is no workpiece of steel
-            if re.search(pattern, comment, re.IGNORECASE) and not re.search(
-                r"\bT(?:OOL)?\s*\d|HIGH.SPEED|\bHSS\b|MILL|DRILL", comment, re.IGNORECASE
-            ):
+            hit = re.search(pattern, comment, re.IGNORECASE)
+            if hit is not None and (bare or not hit[0].isdigit()):
                 return name, comment[:60]
     return None
+
+
+def _unknown_material(text: str) -> str:
+    """What a comment names as the material."""
+    for hit in _COMMENT.finditer(text):
+        comment = " ".join((hit[1] or hit[2] or hit[3] or "").split())
+        if found := _NAMED_MATERIAL.search(comment):
+            return found[1].strip()[:60]
+    return ""

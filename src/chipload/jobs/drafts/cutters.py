@@ -61,7 +61,11 @@ def _guesses(stated: Mapping[str, tuple[Any, str]], deepest: float) -> dict[str,
         else:
             out["diameter_mm"] = (10.0, "no file states it")
     d = float(stated.get("shank_diameter_mm", stated.get("diameter_mm", out.get("diameter_mm", (10.0, ""))))[0])
-    out["flutes"] = (2 if d < 4.0 else 3, "no file states them; usual in aluminium")
+    drill = re.search(r"DRILL|BOHRER|FORET", str(stated["name"][0]) if "name" in stated else "", re.IGNORECASE)
+    out["flutes"] = (2 if d < 4.0 or drill else 3, "no file states them; a common number")
+    if drill and "corner_radius_mm" not in stated:
+        spot = re.search(r"SPOT|CENT(?:ER|RE)|NC.?DRILL|ZENTRIER|ANBOHR", str(stated["name"][0]), re.IGNORECASE)
+        out["bottom_deg"] = (45.0, "a point of 90 deg") if spot else (31.0, "a point of 118 deg, usual of drills")
     out["helix_deg"] = (30.0, "no file states it; usual of end mills")
     longest = float(stated["overhang_mm"][0]) if "overhang_mm" in stated else 3000.0
     if "flute_length_mm" in stated:

@@ -46,6 +46,8 @@ CUTTING_M_MIN = 200.0
 LISTED = 8
 #: points along a contour that the size of the cutter is found on
 POINTS = 400
+#: what is made of contours within contours
+NESTED = "the outermost are walls of pockets, those within them are islands that stay; part.layers chooses others"
 #: gaps [mm] of a drawing that are flaws, if they are no greater than this share of its width and height
 GAPS, GAP_SHARE = (0.02, 0.05, 0.1, 0.2, 0.5), 0.01
 #: of an open contour: largest diameter [mm], what its finish may leave [mm]; radius of the lead-in and depth of the
@@ -70,6 +72,8 @@ def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft
     if all(c.closed for c in contours):
         size, region, narrow = _cutter_for(contours)
         rest = _rest(on, machine, size, _axial(size), "pocket", narrow=narrow)
+        if len(contours) > 1:
+            notes = (f"{len(contours)} closed contours: {NESTED}", *notes)
         return Draft(
             f"Clear the pocket of {file.name}: {region:.4g} mm2 at constant engagement.", (*tables, *rest), notes
         )
@@ -129,7 +133,8 @@ def _origin(contours: Sequence[Contour], machine: Machine) -> list[Entry]:
         if high[k] - low[k] > most[k] - least[k]:
             raise InputError(
                 f"the drawing is {high[k] - low[k]:.6g} mm wide in {axis}, machine {machine.name} travels "
-                f"{most[k] - least[k]:g} mm: name a larger one (--machine), or see whether the unit is right"
+                f"{most[k] - least[k]:g} mm: name a larger one (--on of init, --machine of simulate), or see whether "
+                "the unit is right"
             )
     middle = [round(float(v), 3) for v in 0.5 * (low + high) - 0.5 * (least + most)]
     return [Entry("origin_mm", middle, f"the middle: the drawing lies beyond the travel of {machine.name}", True)]

@@ -112,7 +112,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     deepest = {
         n: block[1][2] - float(program.p_work[cuts & (program.tool == n), 2].min(initial=block[1][2])) for n in numbers
     }
-    sizes = [_size(known.cutters.get(n) or header.cutters.get(n) or _of_table(known.tools, n)) for n in numbers]
+    sizes = [_size(next((s for s in _stated(n, known, header) if s), {})) for n in numbers]
     tables = [
         _program_table(path, folder, chosen, known, min(sizes), text),
         _machine_table(chosen, known),
@@ -139,7 +139,10 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
 
 def _stated(number: int, known: Known, header: Header) -> list[Stated]:
     """What is stated about a tool, the surest first."""
-    return [known.cutters.get(number, {}), _of_table(known.tools, number), header.cutters.get(number, {})]
+    stated = header.cutters.get(number, {})
+    if number == 0 and len(header.cutters) == 1:  # a text without a change of tools cuts with the one that it names
+        (stated,) = header.cutters.values()
+    return [known.cutters.get(number, {}), _of_table(known.tools, number), stated]
 
 
 def _cutters(program: Program, known: Known, header: Header) -> dict[int, Cutter]:
@@ -240,7 +243,7 @@ def _stock(program: Program, known: Known, header: Header) -> tuple[Box, tuple[E
     for stated in (known.stock, header.stock):
         if stated is not None:
             (low, high), where = stated
-            sure = where.startswith(("BLK", "workpiece", "stock of"))
+            sure = where.startswith(("BLK", "workpiece", "stock of", "stockMin"))
             note = f"{where}" if sure else f"{where}: check it against the program's zero"
             return (low, high), (
                 Entry("low_mm", list(low), note, not sure), Entry("high_mm", list(high), note, not sure)
@@ -351,7 +354,9 @@ def _material_table(header: Header) -> DraftTable:
         name, where = header.material
         entry = Entry("name", name, f"by the comment ({where}); chipload materials lists all", True)
     else:
-        entry = Entry("name", "al7075-t6", "the file names no material; chipload materials lists all", True)
+        own = header.unknown_material
+        why = f"none that is shipped is like {own}" if own else "the file names no material"
+        entry = Entry("name", "al7075-t6", f"{why}; chipload materials lists all", True)
     return DraftTable("material", (entry,))
 
 

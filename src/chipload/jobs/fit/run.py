@@ -140,11 +140,11 @@ def _percent(said: Floats, seen: Floats) -> Floats:
 
 
 def peak_excess(comparisons: Sequence[Comparison]) -> float | None:
-    """How far measured peaks are above predicted ones in runs that were not fitted, relative; None: there is no run.
+    """How far measured peaks are above predicted ones, relative; None: there is no run.
 
-    Of each run and each direction (feed, across, axis, and the greatest force in the plane) the larger peak of each
-    turn over the predicted one: :data:`COVERED` of the turns are below, and the worst of these counts, to 4 digits. A
-    direction whose prediction is below :data:`SMALL` of the force in the plane is left out.
+    Of each run, fitted or kept back, and each direction (feed, across, axis, and the greatest force in the plane) the
+    larger peak of each turn over the predicted one: :data:`COVERED` of the turns are below, and the worst of these
+    counts, to 4 digits. A direction whose prediction is below :data:`SMALL` of the force in the plane is left out.
     """
     worst: list[float] = []
     for one in comparisons:
@@ -154,7 +154,7 @@ def peak_excess(comparisons: Sequence[Comparison]) -> float | None:
         seen = np.column_stack([np.maximum(np.abs(turns.high), np.abs(turns.low)), turns.plane])
         measured = np.append(one.cut.measured, one.cut.measured[:2].all())
         counts = measured & np.isfinite(predicted) & (predicted > SMALL * said.resultant)
-        if one.use == "predict" and counts.any():
+        if counts.any():
             worst.append(float((np.quantile(seen[:, counts], COVERED, axis=0) / predicted[counts]).max() - 1.0))
     return float(f"{max(0.0, *worst):.4g}") if worst else None
 
@@ -185,12 +185,12 @@ def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple
         text = "the uncertainty of the coefficients is not written: the covariance of all six is not known"
         found = (Finding("fit-covariance", 0, text),)
     excess = peak_excess(comparisons)
-    if excess is None:
-        text = 'no run was kept back (use = "predict"): how far peaks are above the prediction is not known'
+    if excess is not None:
+        text = f"90 % of the peaks of each run are at most {100.0 * excess:.3g} % above the prediction: limits on peaks"
+        found = (*found, Finding("fit-peaks", 0, f"{text} allow for that"))
+    if all(one.use == "fit" for one in comparisons):
+        text = 'no run was kept back (use = "predict"): how well other cuts are predicted is not known'
         found = (*found, Finding("fit-peaks", 0, text))
-    else:
-        text = f"90 % of the peaks measured in runs that were not fitted are at most {100.0 * excess:.3g} % above"
-        found = (*found, Finding("fit-peaks", 0, f"{text} the prediction: limits on peaks allow for that"))
     try:
         made = Material(
             name=table.name, source=f"{source}; {table.method} fit", workpiece=table.workpiece, cutter=said,

@@ -39,7 +39,7 @@ def program_limits(
         *stability_limits(
             own, simulation.limits, columns, track, simulation.errors, direction, simulation.checks.sigma
         ),
-        *_yield_limit(simulation, columns, track),
+        *_yield_limit(simulation, upper, track),
         *default_limits(simulation.checks, simulation.machine, columns, track, simulation.errors),
     )
 
@@ -55,7 +55,8 @@ def _yield_limit(simulation: SimulationResult, columns: Columns, track: str) -> 
     k, stress, place = own.worst(np.asarray(columns["force_n"], dtype=np.float64))
     state, why = state_of(stress, own.strength, error)
     line, t = int(columns["line"][k]), float(columns["t_s"][k])
-    return (LimitCheck("stress_mpa", own.strength, stress, state, track, k, line, place, t, error, why),)
+    check = LimitCheck("stress_mpa", own.strength, stress, state, track, k, line, place, t, error, why)
+    return (with_peaks(check, simulation.checks, columns),)
 
 
 def spindle_limits(machine: Machine, speeds: ArrayLike = ()) -> dict[str, float]:
@@ -89,7 +90,7 @@ def _stated(simulation: SimulationResult, columns: Columns, track: str, name: st
         reason = "no point of the part is finished"
     error = load_error(simulation.errors, column_of(name).name)
     check = check_limit(name, limit, columns, track=track, error=error, reason=reason)
-    return with_peaks(check, simulation.checks.material)
+    return with_peaks(check, simulation.checks, columns)
 
 
 def _difference(simulation: SimulationResult, columns: Columns, track: str, name: str, limit: float) -> LimitCheck:

@@ -81,14 +81,15 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
     c, out = one.columns, []
     for name, limit in walled.limits.items():
         if name == "form_error_um":
-            out.append(with_peaks(_form_error(walled, one, limit), walled.checks.material))
+            out.append(with_peaks(_form_error(walled, one, limit), walled.checks, c))
         else:
             check = check_limit(name, limit, c, track=one.name, error=error_of(walled, one, name))
-            out.append(with_peaks(check, walled.checks.material))
+            out.append(with_peaks(check, walled.checks, c))
     over, cuts = "force_over_allowable", c["force_normal_n"] > 0.0
-    out.append(check_limit(over, 1.0 + OVER, c, track=one.name, rows=cuts, error=error_of(walled, one, over)))
+    force = check_limit(over, 1.0 + OVER, c, track=one.name, rows=cuts, error=error_of(walled, one, over))
     strength = float(walled.settings["yield_mpa"])
-    out.append(_known("stress_mpa", strength, one.stress, one, error_of(walled, one, "stress_mpa")))
+    stress = _known("stress_mpa", strength, one.stress, one, error_of(walled, one, "stress_mpa"))
+    out += [with_peaks(check, walled.checks, c) for check in (force, stress)]
     gouge, tolerance = max(one.shape.gouge, -one.shape.nearest, 0.0), float(walled.settings["gouge_tolerance_mm"])
     place = (float(one.shape.at[0]), float(one.shape.at[1]), float(one.shape.at[2]))
     state, why = state_of(gouge, tolerance + one.shift)[0], ""

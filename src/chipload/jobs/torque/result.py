@@ -13,7 +13,7 @@ import numpy as np
 
 from chipload.control.override import STATUS
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks
+from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks, with_peaks
 from chipload.jobs.torque.numbers import operation_numbers
 from chipload.jobs.torque.outcome import (
     HELD,
@@ -85,7 +85,9 @@ def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[Limi
         check_limit(name, limit, columns, track=track, error=errors.get(column_of(name).name, 0.0))
         for name, limit in outcome.job.limits.items()
     )
-    found = (*stated, *default_limits(outcome.job.checks, outcome.job.machine, columns, track, errors))
+    checks = outcome.job.checks
+    held = (with_peaks(check, checks, columns) for check in stated)
+    found = (*held, *default_limits(checks, outcome.job.machine, columns, track, errors))
     return tuple(over_allowable(x, columns, errors["torque_nm"]) if x.name == OVER else x for x in found)
 
 

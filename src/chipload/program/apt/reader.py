@@ -92,4 +92,4 @@ def apt_text(path: Path) -> str:
     InputError
         It cannot be read or is too large.
     """
-    return read_regular(path, path.name, LONGEST_TEXT).decode("utf-8", "replace")
+    return read_regular(path, path.name, LONGEST_TEXT).decode("utf-8-sig", "replace")

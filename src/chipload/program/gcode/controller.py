@@ -288,6 +288,10 @@ class Controller:
     def place(self, axes: Iterable[int], motion: int) -> None:
         """Note which linear axes a block sends somewhere; ``motion`` its code, in tenths."""
         new = {k for k in axes if k < 3} - self.placed
+        if new and not self.state.absolute and motion in (0, 10, 20, 30):
+            axis = ", ".join(AXES[k].upper() for k in sorted(new))
+            said = f"G91: {axis} moves before any position is stated: the program's zero is taken as its start: begin "
+            self.once("nc-start-unknown", f"{said}with G90 and a position", Severity.UNPROVEN)
         unplaced = motion == 0 and bool(new)
         self.placed = {0, 1, 2} if motion > 0 and motion != NO_MOTION else self.placed | new
         if unplaced != self.unplaced:

@@ -135,4 +135,4 @@ def gcode_text(path: Path) -> str:
     InputError
         It cannot be read or is too large.
     """
-    return read_regular(path, path.name, LARGEST_FILE).decode("utf-8", "replace")
+    return read_regular(path, path.name, LARGEST_FILE).decode("utf-8-sig", "replace")

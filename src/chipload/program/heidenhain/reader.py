@@ -102,7 +102,7 @@ def read_heidenhain_file(path: str | Path, **options: object) -> tuple[Commands,
 
 def heidenhain_text(path: Path) -> str:
     """The text of a program's file."""
-    return read_regular(path, path.name, LONGEST_TEXT).decode("utf-8", "replace")
+    return read_regular(path, path.name, LONGEST_TEXT).decode("utf-8-sig", "replace")
 
 
 def tool_definitions(text: str) -> dict[int, StatedDiameter]:
