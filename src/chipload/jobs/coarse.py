@@ -120,6 +120,6 @@ def _of_program(loaded: LoadedJob) -> list[str]:
 
 def marked(done: FinishedJob) -> FinishedJob:
     """The result of a coarse run: nothing in it is proven."""
-    text = "--coarse: a first answer with larger steps and thicker layers; run the job without it for a proof"
+    text = "--coarse gives a first result with larger steps and thicker layers; run the job without it for a proof"
     finding = Finding("job-coarse", 0, text, Severity.UNPROVEN)
     return replace(done, result=replace(done.result, findings=(finding, *done.result.findings)))
