@@ -130,7 +130,7 @@ def main() -> None:
     chosen = parser.parse_args()
     head = f"| {chosen.jobs // 10 * 10} jobs on | time [s] | processor time [s] | bytes of all cases |"
     lines = [head, "|---|---:|---:|---|", *table(chosen.jobs)]
-    load = f"Load of the computer while it ran: {os.getloadavg()[1]:.0f}, on {os.cpu_count()} cores."
+    load = f"Load of the computer during the measurement: {os.getloadavg()[1]:.0f}, on {os.cpu_count()} cores."
     text = "\n".join([*lines, "", load])
     print(text)
     if chosen.write:

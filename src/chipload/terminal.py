@@ -1,4 +1,4 @@
-"""How a command ends and what it shows meanwhile: an exit code, one line where it fails, a bar while it runs."""
+"""Terminal output of a command: exit code, error lines and progress bar."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FAULT, WRONG, EXCEEDED, UNWRITTEN, STOPPED = 1, 2, 3, 4, 130
 
 
 def guarded(work: Callable[[], int], debug: bool) -> NoReturn:
-    """Run a command; every way it can end has its exit code and one line."""
+    """Run a command and end with its exit code; write one line for each error."""
     try:
         raise typer.Exit(work())
     except InputErrors as err:
@@ -60,20 +60,20 @@ def _fault(err: Exception, debug: bool) -> None:
     if debug:
         traceback.print_exc()
     write_line(
-        f"a fault of chipload: {type(err).__name__}: {err}. Please report it with the job file and the output of "
+        f"an error in chipload: {type(err).__name__}: {err}. Please report it with the job file and the output of "
         "the same command with --debug"
     )
 
 
 def write_line(text: str) -> None:
-    """One line on stderr; a reader of it that has gone is not waited for."""
+    """Write one line to stderr; ignore a closed stderr."""
     with contextlib.suppress(OSError, ValueError):
         typer.echo(f"chipload: {plain(' '.join(text.split()))}", err=True)
 
 
 @contextmanager
 def _stdout_refused() -> Iterator[None]:
-    """Turn a full disk behind stdout into an OutputError; a reader that has gone stays a BrokenPipeError."""
+    """Raise an OutputError if stdout is full; a closed stdout stays a BrokenPipeError."""
     try:
         yield
     except BrokenPipeError:
@@ -84,28 +84,28 @@ def _stdout_refused() -> Iterator[None]:
 
 
 def show(text: str) -> None:
-    """A line on stdout, without what would command the terminal.
+    """Write a line to stdout, with control characters shown as codes.
 
     Raises
     ------
     OutputError
-        Stdout takes no more, as on a full disk.
+        Stdout is full.
     BrokenPipeError
-        Its reader has gone.
+        Stdout is closed.
     """
     with _stdout_refused():
         typer.echo(plain(text))
 
 
 def write_bytes(data: bytes) -> None:
-    """A file on stdout, byte by byte.
+    """Write the bytes of a file to stdout.
 
     Raises
     ------
     OutputError
-        Stdout takes no more, as on a full disk.
+        Stdout is full.
     BrokenPipeError
-        Its reader has gone.
+        Stdout is closed.
     """
     with _stdout_refused():
         sys.stdout.flush()

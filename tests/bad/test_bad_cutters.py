@@ -21,7 +21,7 @@ JOB = {
     "overhang_mm": 35.0,
     "modulus_gpa": 580.0,
 }
-NEVER = "must be given, a cutter is never guessed"
+NEVER = "state it; dimensions of a cutter are never guessed"
 
 
 @pytest.mark.parametrize(
@@ -57,15 +57,15 @@ NEVER = "must be given, a cutter is never guessed"
             {"bottom_deg": 30.0, "taper_deg": 60.0},
             "cutter.taper_deg = 60: must be from 0 to below 90 - bottom_deg = 60",
         ),
-        ({"runout_mm": 0.01}, "cutter.runout_deg is missing: give it with runout_mm or leave both out"),
+        ({"runout_mm": 0.01}, "cutter.runout_deg is missing: state it with runout_mm, or leave both out"),
         ({"runout_mm": -0.01, "runout_deg": 0.0}, "cutter.runout_mm = -0.01: must be at least 0"),
         ({"shank_diameter_mm": 0.0}, "cutter.shank_diameter_mm = 0: must be above 0"),
-        ({"tool": 1}, "cutter.tool is given without cutter.file: give the tool table or leave it out"),
+        ({"tool": 1}, "cutter.tool is stated without cutter.file: state the file, or leave it out"),
         ({"file_unit": "cm"}, "cutter.file_unit = 'cm': must be mm or inch"),
         ({"file": "a.xml"}, "cutter.file = a.xml: must end in .fctb, .json, .tools, .p21, .camotics, .tbl"),
-        ({"file": "a.tbl"}, "cutter.tool is missing: a.tbl holds several tools: state which"),
-        ({"file": "a.tbl", "tool": 1}, "cutter.file_unit is missing: a.tbl does not state its unit: give mm or inch"),
-        ({"file": "a.fctb", "tool": 1}, "cutter.tool is for a file of several tools: leave it out with a.fctb"),
+        ({"file": "a.tbl"}, "cutter.tool is missing: a.tbl holds several tools; state the number of one"),
+        ({"file": "a.tbl", "tool": 1}, "cutter.file_unit is missing: a.tbl does not state its unit; state mm or inch"),
+        ({"file": "a.fctb", "tool": 1}, "cutter.tool applies to a file of several tools: leave it out for a.fctb"),
     ],
 )
 def test_table_is_refused(change, message):

@@ -311,7 +311,9 @@ def test_a_history_that_is_a_bomb(tmp_path: Path) -> None:
         for _ in range(13):
             writer.write_table(piece)
     assert (folder / "history.parquet").stat().st_size < 2_000_000
-    with pytest.raises(InputError, match=r"52000000 rows: the page shows at most 50000000: run it in longer steps"):
+    with pytest.raises(
+        InputError, match=r"52000000 rows: the page shows at most 50000000: run the job with longer steps"
+    ):
         open_result(tmp_path.resolve(), "result")
 
 

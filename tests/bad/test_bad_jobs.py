@@ -17,7 +17,7 @@ BY_SET = {
     "operation.0.feed_mm_min=fast": f"operation.0.feed_mm_min = 'fast': must be a number{FEED}",
     "operation.0.feed_mm_min=true": f"operation.0.feed_mm_min = True: must be a number{FEED}",
     "operation.0.feed_mm_min=1e6": f"operation.0.feed_mm_min = 1e+06: must be at most 100000{FEED}",
-    "cutter.0.diameter_mm=nan": "cutter.0.diameter_mm = nan: must be a finite number (from 0.01 to 1000)",
+    "cutter.0.diameter_mm=nan": "cutter.0.diameter_mm = nan: must be a finite number (diameter, from 0.01 to 1000)",
     "cutter.0.diameter_mm=-3": "cutter.0.diameter_mm = -3: must be above 0",
     "cutter.0.flutes=2.5": "cutter.0.flutes = 2.5: must be a whole number",
     "cutter.0.corner_radius_mm=8": "cutter.0.corner_radius_mm = 8: must be at most diameter_mm / 2 = 5",
@@ -38,7 +38,7 @@ BY_SET = {
     "stock=3": "stock = 3: must be a table, [stock]",
     "part.file=": "part.file = '': must not be empty",
     "part.units=inches": "part.units = 'inches': must be one of 'um', 'mm', 'cm', 'm', 'inch', 'foot'",
-    "limits.engagement_deg=0": "limits.engagement_deg = 0: must be above 0",
+    "limits.engagement_deg=0": "limits.engagement_deg = 0: must be above 0 (greatest engagement angle)",
     "operation.0.feed_mm_min=1"
     + "0" * 400: "operation.0.feed_mm_min: a number is too large: a whole number must be within 9223372036854775807",
 }
@@ -70,9 +70,9 @@ IN_FILE = [
     ('name = "vmc"', 'name = "vmc"\nfile = "a.toml"', "machine: both are stated: state either machine.name or "
      "machine.file"),
     ("number = 1", "number = 1\nside_radius_mm = 60.0", "cutter.0.side_radius_mm: chips of barrel cutters are not "
-     "simulated: state a flat, bull-nose or ball cutter, or the outline of the barrel as body_mm: it is then "
-     "held against part and fixture alone"),
-    ("number = 1", "", "cutter.0.number is missing: must be given, a cutter is never guessed"),
+     "simulated: state a flat, bull-nose or ball cutter, or the outline of the barrel as body_mm, which "
+     "is only checked for collisions"),
+    ("number = 1", "", "cutter.0.number is missing: state it; dimensions of a cutter are never guessed"),
 ]  # fmt: skip
 
 
@@ -107,7 +107,7 @@ def test_all_errors_are_listed(job_dir: Path) -> None:
     assert set(str(caught.value).splitlines()) == {
         f"job.toml: operation.0.feed_mm_min = -4: must be above 0{FEED}",
         "job.toml: operation.0.side = 'up': must be one of 'inside', 'outside', 'left', 'right'",
-        "job.toml: part.join_mm = -1: must be at least 0 (gaps up to this are closed and reported)",
+        "job.toml: part.join_mm = -1: must be at least 0 (gaps up to this width are closed and reported)",
     }
 
 
@@ -121,13 +121,13 @@ def test_errors_of_keys_tables_and_cutters_are_listed_together(job_dir: Path) ->
     with pytest.raises(InputErrors) as caught:
         load_job(path, ["limits.torque_nm=-1"])
     assert set(str(caught.value).splitlines()) == {
-        "job.toml: limits.torque_nm = -1: must be above 0",
+        "job.toml: limits.torque_nm = -1: must be above 0 (greatest torque on the cutter)",
         "job.toml: stock.top_mm: missing: state it (z of the top of the stock)",
         "job.toml: operation.0.lead_mm: missing: state it (kind = contour needs it)",
         "job.toml: operation.0.tolerance_mm: missing: state it (kind = contour needs it)",
         "job.toml: machine: none is stated: state either machine.name or machine.file",
-        "job.toml: cutter.0.flutes is missing: must be given, a cutter is never guessed",
-        "job.toml: cutter.0.overhang_mm is missing: must be given, a cutter is never guessed",
+        "job.toml: cutter.0.flutes is missing: state it; dimensions of a cutter are never guessed",
+        "job.toml: cutter.0.overhang_mm is missing: state it; dimensions of a cutter are never guessed",
     }
 
 
@@ -137,7 +137,7 @@ def test_a_misspelt_key_hides_only_what_it_leaves_missing(job_dir: Path) -> None
     with pytest.raises(InputErrors) as caught:
         load_job(path, ["limits.torque_nm=-1"])
     assert sorted(str(caught.value).splitlines()) == [
-        "job.toml: limits.torque_nm = -1: must be above 0",
+        "job.toml: limits.torque_nm = -1: must be above 0 (greatest torque on the cutter)",
         "job.toml: machine.nam: unknown key; did you mean name?",
         "job.toml: operation.0.leed_mm: unknown key; did you mean lead_mm?",
     ]

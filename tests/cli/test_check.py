@@ -132,7 +132,7 @@ def test_a_program_is_checked_without_a_machine() -> None:
     for file, machine in (("feeds/pocket.nc", "vmc"), ("trunnion/cone.cls", "xyzbc-trunnion")):
         done = CliRunner().invoke(app, ["check", str(place / file)])
         assert done.exit_code == 0
-        assert done.output.startswith(f"no machine is stated: read for {machine}; ")
+        assert done.output.startswith(f"no machine is stated: {machine} is assumed; ")
 
 
 def test_a_simulation_is_estimated(tmp_path: Path) -> None:

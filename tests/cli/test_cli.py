@@ -102,7 +102,7 @@ def test_a_fault_of_ours_ends_with_1_and_says_how_to_report(
     code, _, err = call(*words)
     assert code == 1
     assert err == (
-        "chipload: a fault of chipload: ZeroDivisionError: division by zero. Please report it with the job file and "
+        "chipload: an error in chipload: ZeroDivisionError: division by zero. Please report it with the job file and "
         "the output of the same command with --debug\n"
     )
     assert "Traceback" in call(*words, "--debug")[2]

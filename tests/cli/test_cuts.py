@@ -62,5 +62,5 @@ def test_proposed_filled_in_and_read_back(job: Path) -> None:
 def test_only_a_wall_is_calibrated(tmp_path: Path) -> None:
     path = examples.copy_example("contour", tmp_path / "c") / "job.toml"
     code, _, err = call("cuts", path, "--out", tmp_path / "cuts.csv")
-    assert (code, err) == (2, "chipload: job.toml: has no [wall]: calibration cuts are proposed for a thin wall\n")
+    assert (code, err) == (2, "chipload: job.toml: has no [wall]: calibration cuts need a thin-wall job\n")
     assert not (tmp_path / "cuts.csv").exists()

@@ -503,7 +503,7 @@ def test_a_draft_is_looked_at(program: Path, tmp_path: Path) -> None:
     assert (again, worst[1]) == (code, worst[0])
     assert same.splitlines()[-1] == "unproven: a first result"
     code, _, said = call("simulate", job, "--machine", "vmc")
-    assert (code, said) == (2, "chipload: --machine: job.toml is a job: state it there, or by --set\n")
+    assert (code, said) == (2, "chipload: --machine: job.toml is a job: state it there, or with --set\n")
 
 
 def test_damaged_documents_are_refused(tmp_path: Path) -> None:

@@ -58,7 +58,7 @@ def test_a_program_that_fits(files: Path):
     # 30 + 30 at each straight, two half circles of radius 10, 6 down and 6 up
     length = 2 * 30 + 2 * np.pi * 10 + 6 + 6
     assert re.search(rf"a\.ngc: 8 motions on machine vmc, {length:.6g} mm", out)
-    assert out.splitlines()[-1] == "within the limits of machine vmc"
+    assert out.splitlines()[-1] == "the program stays within the limits of machine vmc"
 
 
 def test_a_program_beyond_the_machine(files: Path):
@@ -83,8 +83,8 @@ def test_a_program_beyond_the_machine(files: Path):
         (["check", "a.ngc", "--machine", "vmc", "--dialect", "bosch"], "dialect = 'bosch': must be one of linuxcnc, "),
         (["convert", "a.ngc", "b.xyz", "--machine", "vmc"], "the ending .xyz cannot be written: must be one of .ngc "),
         (["convert", "p.cls", "b.ngc", "--machine", "vmc"], "program row "),
-        (["check", "a.ngc", "--machine", "vmc", "--set", "a=1"], "--set: belongs to a job"),
-        (["check", "a.toml", "--machine", "vmc"], "--machine: belongs to a program"),
+        (["check", "a.ngc", "--machine", "vmc", "--set", "a=1"], "--set: applies to a job"),
+        (["check", "a.toml", "--machine", "vmc"], "--machine: applies to a program"),
     ],
 )
 def test_refused(files: Path, monkeypatch, words, text):

@@ -27,7 +27,7 @@ def test_unattainable_is_a_result(job, tmp_path):
     assert summary["operations"][0]["torque_limit_nm"] == 0.0
     assert "controllers" not in summary["operations"][0]
     assert (tmp_path / "r" / "report.html").stat().st_size > 1000
-    assert "no feed would do; one of these would: a depth of cut of at most" in out
+    assert "no feed keeps the limits; one of these changes does: a depth of cut of at most" in out
     assert call("check", job)[0] == 0
 
 
@@ -40,7 +40,7 @@ def test_what_would_do_does(job):
     wall = float(out.split("a wall of at least ")[1].split(" mm")[0])
     code, out, _ = call("check", job, *hard, "--set", f"torque_control.shell.wall_mm={wall}")
     assert code == 0, out
-    assert "the limit of torque is about" in out
+    assert "torque limit of about" in out
 
 
 def test_check(job):
@@ -66,7 +66,7 @@ def test_check(job):
         ("[round]", '[program]\nfile = "x.ngc"\n[round]', "program, round: both are stated"),
         ("acceleration_mm_s2 = 1000.0", "acceleration_mm_s2 = 9000.0", "must be at most 3000, that of machine vmc"),
         ("cutter = 1", "cutter = 2", "round.cutter = 2: no [[cutter]] has this number"),
-        ("hold = 0.9\n", "", "override.hold: missing: state it (set point, as a share of the limit of torque)"),
+        ("hold = 0.9\n", "", "override.hold: missing: state it (set point, as a share of the torque limit)"),
         ("form_error_um = 30.0\n", "", "limits.form_error_um: missing: state it"),
         ("torque_over_percent = 5.0\n", "", "limits.torque_over_percent: missing: state it"),
         ("idle_error_share = 0.01\n", "", "spindle.idle_error_share: missing: state it"),

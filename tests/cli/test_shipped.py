@@ -96,8 +96,8 @@ def test_a_template_in_a_job(tmp_path: Path) -> None:
 
 
 def test_what_init_refuses(tmp_path: Path) -> None:
-    assert "missing folder: chipload init FILE DIR" in call("init", tmp_path / "a.nc")[2]
-    assert "a template needs no file: chipload init --material DIR" in call("init", "a", "b", "--material")[2]
+    assert "the folder is missing: use chipload init FILE DIR" in call("init", tmp_path / "a.nc")[2]
+    assert "a template takes no file: use chipload init --material DIR" in call("init", "a", "b", "--material")[2]
 
 
 def test_a_coarse_run_of_a_thin_wall_plans_what_is_cut(tmp_path: Path) -> None:

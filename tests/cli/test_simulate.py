@@ -271,13 +271,13 @@ def test_the_first_progress_comes_before_a_step_is_made(job: Path, monkeypatch: 
 def test_workers_share_layers_only(job: Path) -> None:
     code, _, err = call("check", job, "--set", "operation.0.workers=2", "--set", "operation.0.engine=moves")
     assert code == 2
-    assert "operation.0.workers = 2: shares layers only: state engine = 'layers' or leave it out" in err
+    assert "operation.0.workers = 2: applies to layers: state engine = 'layers' or leave it out" in err
 
 
 def test_check_reads_the_stock_and_cuts_nothing(job: Path) -> None:
     code, out, _ = call("check", job)
     assert code == 0
-    assert out.splitlines()[-2] == "job.toml: read; within the limits of machine vmc"
+    assert out.splitlines()[-2] == "job.toml: valid; the program stays within the limits of machine vmc"
     assert out.splitlines()[-1].startswith("estimate: 28 steps")
     assert sorted(p.name for p in job.parent.iterdir()) == ["job.toml", "slot.ngc"]
 

@@ -122,7 +122,7 @@ def test_a_limit_of_a_part_that_is_not_stated(job: Path, tmp_path: Path) -> None
     job.write_text(text.replace(text[text.index("[part]") : text.index("[[fixture]]")], ""))
     code, _, err = call("run", job, "--out", tmp_path / "r")
     assert code == 2
-    assert "job.toml: limits.gouge_mm: needs the part that should come out: state [part] or leave it out" in err
+    assert "job.toml: limits.gouge_mm: needs the finished part: state [part] or leave it out" in err
 
 
 TABLE = """[machine_table]

@@ -102,7 +102,7 @@ def test_an_air_run_alone(tmp_path):
     data = read_spindle(tmp_path / "s.toml", 600.0)
     assert data.torque[1] == math.inf
     assert data.values["inertia_kg_m2"] == pytest.approx(INERTIA, rel=0.05)
-    assert "no cut above that is logged" in out
+    assert "no log has a cut above that torque" in out
     assert call("spindle", log, "--air", log, "--out", tmp_path / "s.toml")[0] == 0
     assert "torque_constant_nm_a" not in tomllib.loads((tmp_path / "s.toml").read_text())
     with pytest.raises(InputError, match="log cuts of known torque, or state --torque-constant-nm-a"):

@@ -83,7 +83,7 @@ def test_the_command(tmp_path):
     assert "PYVCP = panel.xml" in done.stdout
     done = CliRunner().invoke(app, [*words, "--out", "log.csv"])
     assert done.exit_code == 2
-    assert "a panel is written without a run" in done.stderr
+    assert "--panel only writes the panel" in done.stderr
     done = CliRunner().invoke(app, [*words[:-1], str(tmp_path / "panel.txt")])
     assert done.exit_code == 2
     assert "must end with .xml" in done.stderr

@@ -131,7 +131,7 @@ def test_what_exchange_files_are_refused_for(tmp_path: Path) -> None:
         path.write_text(text)
         with pytest.raises(InputError, match=said):
             read_iso13399(path)
-    with pytest.raises(InputError, match=r"cutter\.tool is for a file of several tools"):
+    with pytest.raises(InputError, match=r"cutter\.tool applies to a file of several tools"):
         cutter_from_table({"number": 1, "file": "mill.p21", "tool": 3}, tmp_path)
 
 

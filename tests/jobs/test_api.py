@@ -219,7 +219,7 @@ def test_the_result_folder_is_that_of_a_run(history, tmp_path: Path) -> None:
         ({"stock": 3.0}, "stock: float: give a mesh, a file, or the keys of its table"),
         ({"stock": [BLOCK[1], BLOCK[0]]}, "each side must be above 0"),
         ({"stock": LayeredStock.block(*BLOCK, 1.0, 40.0), "layer_mm": 1.0}, "layer_mm: the stock has its own layers"),
-        ({"dialect": "fanuc"}, "dialect: is of a program's file: leave it out with a Program"),
+        ({"dialect": "fanuc"}, "dialect: applies to a program file: leave it out with a Program"),
         ({"program": Program.join([slot(1), slot(2)])}, "cutter: the program uses tools 1, 2: give one for each"),
         ({"program": "nowhere.ngc"}, "nowhere.ngc: cannot be read"),
         ({"stiffness": {"spindle": 1.0}}, "stiffness.spindle: unknown key; did you mean spindle_n_um"),

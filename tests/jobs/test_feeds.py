@@ -254,10 +254,10 @@ def test_the_table_of_feeds_alone_tells_the_kind_of_job(tmp_path: Path) -> None:
     assert load_job(tmp_path / "job.toml", asked).capability.name == "feeds"
     (tmp_path / "job.toml").write_text(JOB + "force_n = 620.0\n")
     assert load_job(tmp_path / "job.toml", ["operation.0.step_mm=3"]).capability.name == "feeds"
-    with pytest.raises(InputError, match="ask for speeds first, then for feeds of the new program"):
+    with pytest.raises(InputError, match="find speeds first, then feeds for the new program"):
         load_job(tmp_path / "job.toml", ["operation.0.speeds.least_rpm=5000"])
     (tmp_path / "job.toml").write_text(plain.replace("force_n = 620.0", ""))
-    with pytest.raises(InputError, match="no limit of a load is stated"):
+    with pytest.raises(InputError, match="no load limit is stated"):
         load_job(tmp_path / "job.toml", asked)
 
 

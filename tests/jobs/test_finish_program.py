@@ -200,7 +200,7 @@ def test_a_text_with_modes_that_would_change_the_passes_is_not_written_back(file
     made = job(tmp_path, text=text.replace(old, new), lines=(lines[0] + moved, lines[1] + moved), file=file)
     with pytest.raises(InputError) as err:
         run(made)
-    assert f"{file}: not written back: the text states {found}" in str(err.value)
+    assert f"{file}: not written back: the program contains {found}" in str(err.value)
 
 
 @pytest.mark.parametrize(
@@ -221,5 +221,5 @@ def test_refused(tmp_path, changes, text):
 
 def test_incremental_words_are_not_written_back(tmp_path):
     made = job(tmp_path, PROGRAM.replace("M5\nM2", "G91\nG0 Z5.\nG90\nM5\nM2"))
-    with pytest.raises(InputError, match=r"not written back: the text states G91"):
+    with pytest.raises(InputError, match=r"not written back: the program contains G91"):
         run(made)

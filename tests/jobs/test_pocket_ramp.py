@@ -65,5 +65,5 @@ def test_a_ramp_in_a_slot(tmp_path):
 
 def test_circles_need_a_bore(tmp_path):
     more = RAMP + 'strategies = ["pocket", "trochoidal"]\nuse = "pocket"\n'
-    with pytest.raises(InputError, match="entry = 'ramp': circles begin at a bore: state helix"):
+    with pytest.raises(InputError, match="entry = 'ramp': trochoidal passes begin at a bore: state helix"):
         checked(written(tmp_path, {"0": [SLOT]}, operation(more)))

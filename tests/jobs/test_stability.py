@@ -213,7 +213,7 @@ def test_one_s_word_for_two_tools_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.ngc").write_text(text)
     job = JOB.replace("[[operation]]", second + "[[operation]]").replace("MODES", MODES).replace("LIMITS", "")
     (tmp_path / "job.toml").write_text(job.replace("SPEEDS", "[operation.speeds]"))
-    with pytest.raises(InputError, match="line 3: S9000 holds for tools 1, 2"):
+    with pytest.raises(InputError, match="line 3: S9000 applies to tools 1, 2"):
         run_job(load_job(tmp_path / "job.toml"))
 
 
@@ -373,7 +373,7 @@ def test_windows_that_are_quiet_with_some_probability(tmp_path: Path) -> None:
 def test_a_probability_needs_all_three_spreads(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="state all of frequency_percent, damping_percent, stiffness_percent"):
         done(tmp_path, modes="damping_percent = 20.0\n" + MODES)
-    with pytest.raises(InputError, match=r"limits\.stable_probability: needs spreads"):
+    with pytest.raises(InputError, match=r"limits\.stable_probability: needs deviations"):
         done(tmp_path, limits="stable_probability = 0.9")
 
 
@@ -417,7 +417,7 @@ def test_teeth_that_are_not_evenly_spaced_have_a_margin_of_their_own(tmp_path):
     assert found["margin_min"] != pytest.approx(library_margin(9000, 1.5), rel=0.05)
     assert found["windows"]
     check = check_of(one, "sle_um")
-    assert (check.state, check.reason) == (Verdict.UNPROVEN, "the teeth of tool 1 are not alike")
+    assert (check.state, check.reason) == (Verdict.UNPROVEN, "the teeth of tool 1 differ")
 
 
 #: two passes along x, the second after a retract: 3 mm deep at half the diameter, then 0.4 of the depth in a full slot

@@ -75,7 +75,7 @@ def test_what_is_refused(folder: Path) -> None:
     (folder / "feeds.toml").write_text(JOB.replace("[limits]", f"{feeds}[limits]"))
     code, _, said = call("check", folder / "feeds.toml")
     assert code == 2
-    assert "operation.0.feeds: cutter 2 is a body (body_mm) whose load is not known: leave feeds out" in said
+    assert "operation.0.feeds: cutter 2 is a body (body_mm) whose load is unknown: leave feeds out" in said
     (folder / "moves.toml").write_text(JOB.replace('kind = "simulate"', 'kind = "simulate"\nengine = "moves"'))
     code, _, said = call("run", folder / "moves.toml", "--out", folder / "moves")
     assert code == 2

@@ -181,7 +181,7 @@ def test_no_torque_is_allowable(folder):
     """The edge alone bends the bar by more than 0.3 mm: the check says what would do, without a run."""
     code, out, _ = call("check", folder / "job.toml", "--set", "limits.form_error_um=200")
     assert code == 3
-    assert "no torque is allowable, by the deflection of the workpiece in line 5: no feed would do" in out
+    assert "no torque is allowable, by the deflection of the workpiece in line 5: no feed keeps the limits" in out
     for remedy in ("a depth of cut of at most", "a support near (", "times as stiff there (a wall"):
         assert remedy in out, out
     # as it says: half of the depth, less a little
@@ -190,7 +190,7 @@ def test_no_torque_is_allowable(folder):
     assert code in (0, 3), out
     code, out, _ = call("check", folder / "job.toml", *HELICAL)
     assert code == 0
-    assert "by a coarse simulation the limit of torque is about" in out
+    assert "a coarse simulation gives a torque limit of about" in out
     code, out, _ = call("check", folder / "job.toml", "--set", "limits.strength_share=0.01")
     assert code == 3
     assert "by the strength of the workpiece" in out
@@ -283,9 +283,11 @@ def test_keys_that_do_not_go_together(folder):
     told = "\n".join(str(x) for x in found.value.args)
     assert "workpiece.yield_mpa: missing: state it (limits.strength_share needs it)" in told
     assert "workpiece.density_kg_m3: not used by a torque job: leave it out" in told
-    assert "surprise.0.kind = thinner-wall: is of a [torque_control.shell]: state [real_stock] of a workpiece" in told
+    assert (
+        "surprise.0.kind = thinner-wall: applies to [torque_control.shell]: state [real_stock] for a workpiece" in told
+    )
     (folder / "both.toml").write_text(BAR + SHELL)
-    with pytest.raises(InputError, match=r"stock: goes without \[torque_control\.shell\]"):
+    with pytest.raises(InputError, match=r"stock: cannot be used with \[torque_control\.shell\]"):
         load_job(folder / "both.toml")
     (folder / "none.toml").write_text(TUBE)
     with pytest.raises(InputError, match=r"torque_control\.shell, workpiece: neither is stated"):

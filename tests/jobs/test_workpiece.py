@@ -167,7 +167,7 @@ def test_what_cannot_be_clamped_is_refused(job_file, old, new, message):
 def test_a_limit_needs_a_workpiece(job_file):
     text = job_file.read_text()
     job_file.write_text(re.sub(r"\[workpiece\].*?\[\[operation", "[[operation", text, flags=re.DOTALL))
-    with pytest.raises(InputError, match=r"limits.deflection_workpiece_um: needs what the workpiece is made of"):
+    with pytest.raises(InputError, match=r"limits.deflection_workpiece_um: needs the workpiece and its clamps"):
         loaded(job_file)
 
 

@@ -62,5 +62,5 @@ def test_bad_values_of_a_workpiece_are_refused(change, message):
 
 
 def test_a_limit_of_the_deflection_needs_a_workpiece():
-    with pytest.raises(InputError, match=r"limits.deflection_workpiece_um: needs what the workpiece is made of"):
+    with pytest.raises(InputError, match=r"limits.deflection_workpiece_um: needs the workpiece and its clamps"):
         run(None, deflection_workpiece_um=10.0)

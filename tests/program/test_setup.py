@@ -171,7 +171,7 @@ def test_the_command_line_gives_the_same(tmp_path: Path):
     code, out, _ = check(str(tmp_path / "free.ngc"), "--parameter", "#100=4.5")
     assert (code, "Z 4.5 to 4.5 mm" in out) == (0, True)
     for words, message in (
-        (("--parameter", "#100=a"), "--parameter #100=a: must be a name, = and numbers"),
-        (("--parameter", "#100=1,2"), "--parameter #100: 2 numbers: must be one"),
+        (("--parameter", "#100=a"), "--parameter #100=a: must have the form NAME=NUMBER, with commas between numbers"),
+        (("--parameter", "#100=1,2"), "--parameter #100: has 2 numbers: must have one"),
     ):
         assert message in check(str(tmp_path / "free.ngc"), *words)[2]

@@ -148,5 +148,5 @@ def test_the_command(tmp_path: Path, file: Path) -> None:
         assert "state csv" in said
     code, said = call("export", tmp_path / "result", "--out", tmp_path / "no", "--spindle", file)
     assert code == 2
-    assert "belongs to --load-monitor" in said
+    assert "applies to --load-monitor" in said
     assert not (tmp_path / "no").exists()

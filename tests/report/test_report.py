@@ -193,7 +193,7 @@ def test_a_result_read_back_is_the_result(outcome: Maker, tmp_path: Path) -> Non
         ('"name": "force_xy_n"', '"name": "<b>"', "limit <b>: not known: no column of a history has this name"),
         ('"worst": 95.0', '"worst": null', "without a value it can only be unproven"),
         ('"limit": 13.0', '"limit": 14.0', "limits differ from those of the tracks in use"),
-        ('"schema_version": 1', '"schema_version": 2', "is no result of schema version 1"),
+        ('"schema_version": 1', '"schema_version": 2', "is not a result of schema version 1"),
         ('"name": "feed"', '"name": "plain"', "must differ"),
     ],
 )

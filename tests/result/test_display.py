@@ -83,10 +83,10 @@ def test_values_that_are_not_known_do_not_spoil_a_plot(result):
 @pytest.mark.parametrize("method", ["to_pandas", "to_xarray", "plot"])
 def test_a_track_that_is_not_there_or_has_no_history(result, method):
     pytest.importorskip("pandas")
-    with pytest.raises(InputError, match="track 'none': is not in the result: it has backward"):
+    with pytest.raises(InputError, match="track 'none': is not in the result, which has backward"):
         getattr(result, method)(track="none")
     empty = replace(result.tracks[0], name="empty", in_use=False, blocks=lambda: iter(()))
-    with pytest.raises(InputError, match="track 'empty': has no history: these have one: backward"):
+    with pytest.raises(InputError, match="track 'empty': has no history; tracks with a history: backward"):
         getattr(replace(result, tracks=(*result.tracks, empty)), method)(track="empty")
 
 

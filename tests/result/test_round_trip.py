@@ -191,7 +191,9 @@ def test_another_version_of_the_schema_is_refused(folder, tmp_path):
     values = json.loads((folder / "summary.json").read_text())
     for change in ({"schema_version": 2}, {"verdict": "fine"}, {"more": 1}):
         (tmp_path / "summary.json").write_text(json.dumps(values | change))
-        with pytest.raises(InputError, match=r"is no result of schema version 1 \(1 differences\): run the job again"):
+        with pytest.raises(
+            InputError, match=r"is not a result of schema version 1 \(1 differences\): run the job again"
+        ):
             read_summary(tmp_path)
 
 

@@ -110,7 +110,7 @@ def test_keys(square) -> None:
     page.evaluate("document.querySelector('[role=combobox][aria-label=\"path coloured by\"]').focus()")
     page.keyboard.press("ArrowDown")
     stands_at(page, 50)
-    help_text = page.get_by_text("one step back or on")
+    help_text = page.get_by_text("one step back or forward")
     assert not help_text.is_visible()
     page.keyboard.press("?")
     help_text.wait_for(state="visible")

@@ -303,7 +303,7 @@ EMPTY = pa.table({c: pa.array([], pa.float64()) for c in ("t_s", "s_mm", "x_mm",
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda f: (f / "summary.json").write_text("[]"), "is no result of schema version 1"),
+        (lambda f: (f / "summary.json").write_text("[]"), "is not a result of schema version 1"),
         (lambda f: (f / "history.parquet").write_bytes(b"PAR1"), "cannot be read: run the job again"),
         (lambda f: (f / "history.parquet").unlink(), "is not in the opened folder"),
         (lambda f: pq.write_table(pa.table({"x_mm": [0.0]}), f / "history.parquet"), "no y_mm: nothing to show"),

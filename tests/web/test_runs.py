@@ -101,7 +101,7 @@ def test_ctrl_c_ends_the_page_and_its_run(browser, folder) -> None:
     page = browser.new_page()
     page.goto(served.address())
     job = folder / "contour" / "job.toml"
-    page.get_by_text("plans, proves and writes a result").wait_for()
+    page.get_by_text("plans, checks and writes a result").wait_for()
     assert "radial_depth_mm" in page.inner_text(".cl-job")
     page.locator(".cl-home .cl-entry").first.get_by_text("Run").click()
     page.locator(".cl-out input").fill("later")

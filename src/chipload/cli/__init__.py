@@ -1,8 +1,8 @@
-"""The command line: parse, call one function, show.
+"""The command line. Each command parses its options, calls one function and shows the result.
 
-Exit codes of every command: 0 done and every limit holds; 2 the input is wrong (one line, nothing written); 3 done, but
-a limit or a status does not hold; 4 the result cannot be written, what is kept of the work stays; 1 a fault of ours;
-130 stopped by Ctrl-C. Imports are late so that `--help` is quick.
+Exit codes of every command: 0 done, every limit holds; 2 the input is wrong (one line for each error, nothing is
+written); 3 done, but a limit is exceeded or unproven; 4 the result cannot be written, finished work is kept; 1 an error
+in chipload; 130 stopped by Ctrl-C. Heavy libraries are imported inside the commands so that `--help` is fast.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ app.registered_commands.sort(key=lambda c: ORDER.index(c.name or getattr(c.callb
 
 
 def main() -> NoReturn:
-    """Entry of the command ``chipload``."""
+    """Run the command ``chipload``."""
     try:
         for name in ("SIGTERM", "SIGHUP"):
             # under nohup a terminal that closes is ignored
@@ -43,5 +43,5 @@ def main() -> NoReturn:
 
 
 def _stop(_number: int, _frame: object) -> NoReturn:
-    """A polite kill, and a terminal that closes, stop as Ctrl-C does."""
+    """Treat SIGTERM and SIGHUP as Ctrl-C."""
     raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""The application of the command line and the options that several commands have."""
+"""The Typer application, and the options that several commands share."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Simulate, check and plan CNC milling of parts that are hard to mill.",
-    epilog="Exit codes: 0 every limit holds; 1 a fault of chipload; 2 wrong input, nothing is written; 3 a limit is "
+    epilog="Exit codes: 0 every limit holds; 1 an error in chipload; 2 wrong input, nothing is written; 3 a limit is "
     "exceeded or unproven; 4 the result cannot be written, finished work is kept; 130 stopped.",
 )
 
@@ -25,7 +25,7 @@ Sets = Annotated[
     typer.Option(
         "--set",
         metavar="KEY.PATH=VALUE",
-        help="override a key, e.g. cutter.0.diameter_mm=12; repeatable; files are relative to the job's folder",
+        help="override a key of the job, e.g. cutter.0.diameter_mm=12; repeatable; paths are relative to the job file",
     ),
 ]
 MachineName = Annotated[
@@ -34,7 +34,7 @@ MachineName = Annotated[
 Tools = Annotated[Path | None, typer.Option("--tools", metavar="FILE", help="LinuxCNC tool table (.tbl)")]
 DialectName = Annotated[
     str | None,
-    typer.Option("--dialect", help="linuxcnc, fanuc, sinumerik, heidenhain or apt; default: by the file's ending"),
+    typer.Option("--dialect", help="linuxcnc, fanuc, sinumerik, heidenhain or apt; default: by the file extension"),
 ]
 FeedIfUnsaid = Annotated[float | None, typer.Option("--feed-mm-min", help="feed of cuts before the program states one")]
 ParameterValues = Annotated[
@@ -48,7 +48,7 @@ WorkOffsets = Annotated[
     typer.Option(
         "--work-offset",
         metavar="CODE=X,Y,Z",
-        help="origin of a work offset in the machine, e.g. G55=80,0,0; repeatable",
+        help="origin of a work offset in machine coordinates, e.g. G55=80,0,0; repeatable",
     ),
 ]
 ToleranceMm = Annotated[
@@ -56,7 +56,7 @@ ToleranceMm = Annotated[
     typer.Option("--tolerance-mm", help="greatest deviation of the tip where a move with rotary axes is divided"),
 ]
 Accept = Annotated[bool, typer.Option("--accept", help="accept the guesses of a draft; the report lists them")]
-Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of a fault")]
+Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an error in chipload")]
 
 
 @app.callback(invoke_without_command=True)

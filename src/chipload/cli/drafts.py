@@ -1,4 +1,4 @@
-"""Commands for files without a job: init and simulate."""
+"""The commands ``chipload init`` and ``chipload simulate``, which take a file without a job."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from chipload.terminal import bar, guarded, show
 File = Annotated[
     Path,
     typer.Argument(
-        metavar="FILE", help="NC text, CL data, CAMotics project, DXF, STEP, FreeCAD document, or sections of a blade"
+        metavar="FILE", help="NC program, CL data, CAMotics project, DXF, STEP, FreeCAD document, or blade sections"
     ),
 ]
-Looked = Annotated[Path, typer.Argument(metavar="FILE", help="as of init, or the job.toml that init wrote")]
+Looked = Annotated[Path, typer.Argument(metavar="FILE", help="a file that init accepts, or the job.toml that it wrote")]
 
 
 MachineOf = Annotated[
     str | None,
-    typer.Option("--on", metavar="MACHINE", help="a shipped machine, or a file (.toml); default: guessed"),
+    typer.Option("--on", metavar="MACHINE", help="a shipped machine, or a file (.toml); default: a guess"),
 ]
 
 
@@ -36,19 +36,21 @@ def init(
     for_machine: MachineOf = None,
     tools: Tools = None,
     job: Annotated[
-        str | None, typer.Option("--job", metavar="NAME", help="CAM job of a FreeCAD document; else the first")
+        str | None, typer.Option("--job", metavar="NAME", help="CAM job of a FreeCAD document; default: the first")
     ] = None,
-    material: Annotated[bool, typer.Option("--material", help="write a template of a material into DIR")] = False,
-    machine: Annotated[bool, typer.Option("--machine", help="write a template of a machine into DIR")] = False,
-    catalogue: Annotated[bool, typer.Option("--catalogue", help="write a template of a catalogue into DIR")] = False,
-    controller: Annotated[bool, typer.Option("--controller", help="write a template of a torque controller")] = False,
+    material: Annotated[bool, typer.Option("--material", help="write a material template into DIR")] = False,
+    machine: Annotated[bool, typer.Option("--machine", help="write a machine template into DIR")] = False,
+    catalogue: Annotated[bool, typer.Option("--catalogue", help="write a cutter catalogue template into DIR")] = False,
+    controller: Annotated[
+        bool, typer.Option("--controller", help="write a torque controller template into DIR")
+    ] = False,
     fixture: Annotated[bool, typer.Option("--fixture", help="write a block as a fixture (STL) into DIR")] = False,
     debug: Debug = False,
 ) -> None:
-    """Write a job for a file, with guesses to confirm for all that the file does not state.
+    """Write a job for a file. Values that the file does not state are guesses for you to confirm.
 
-    An existing job is not overwritten. `chipload init --material DIR` writes a commented template of a material;
-    --machine, --catalogue, --controller and --fixture work likewise.
+    The command does not overwrite an existing job. `chipload init --material DIR` writes a commented material template;
+    --machine, --catalogue, --controller and --fixture do the same for other files.
     """
 
     def work() -> int:
@@ -57,15 +59,15 @@ def init(
         kinds = [name for name, wanted in zip(names, asked, strict=True) if wanted]
         if kinds:
             if folder is not None:
-                raise InputError(f"{file}: a template needs no file: chipload init --{kinds[0]} DIR")
+                raise InputError(f"{file}: a template takes no file: use chipload init --{kinds[0]} DIR")
             return _templates(kinds, file)
         if folder is None:
-            raise InputError(f"{file}: missing folder: chipload init FILE DIR")
+            raise InputError(f"{file}: the folder is missing: use chipload init FILE DIR")
         from chipload.jobs.drafts.draft import write_draft
         from chipload.jobs.drafts.make import draft_of
 
         if (folder / "job.toml").exists():
-            raise InputError(f"{folder / 'job.toml'}: already exists and is not overwritten: name another folder")
+            raise InputError(f"{folder / 'job.toml'}: already exists: name another folder")
         draft = draft_of(file, folder, machine=for_machine, tools=tools, job=job)
         written = write_draft(draft, folder)
         show(draft.title)
@@ -98,14 +100,14 @@ def _templates(kinds: list[str], folder: Path) -> int:
 def simulate(
     file: Looked,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="the result folder; default: only the verdict is shown")
+        Path | None, typer.Option("--out", metavar="DIR", help="the result folder; default: only show the verdict")
     ] = None,
     machine: MachineName = None,
     tools: Tools = None,
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """Run a file without a job. The guesses of `init` are accepted, so the verdict is never better than unproven."""
+    """Simulate a file without a job. It uses the guesses of `init`, so the verdict is never better than unproven."""
 
     def work() -> int:
         from tempfile import TemporaryDirectory
@@ -121,7 +123,7 @@ def simulate(
         written = file.suffix.lower() == ".toml"
         for option, value in (("machine", machine), ("tools", tools)):
             if written and value is not None:
-                raise InputError(f"--{option}: {file.name} is a job: state it there, or by --set")
+                raise InputError(f"--{option}: {file.name} is a job: state it there, or with --set")
         with TemporaryDirectory(prefix="chipload-") as above:
             job = file
             if not written:

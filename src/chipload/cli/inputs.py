@@ -1,4 +1,4 @@
-"""What options state, as the values that the functions of chipload take, and lines that several commands show."""
+"""Conversion of options into values for the functions of chipload, and lines that several commands show."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def setup_of(parameters: Sequence[str], work_offsets: Sequence[str]) -> Setup:
-    """What the controller holds, as options give it."""
+    """The parameters and work offsets of the controller, from the options."""
     from chipload.program.setup import Setup
 
     def pairs(option: str, texts: Sequence[str]) -> Iterator[tuple[str, list[float]]]:
@@ -26,17 +26,19 @@ def setup_of(parameters: Sequence[str], work_offsets: Sequence[str]) -> Setup:
             try:
                 yield name.strip(), [float(value) for value in values.split(",")]
             except ValueError:
-                raise InputError(f"--{option} {text}: must be a name, = and numbers") from None
+                raise InputError(
+                    f"--{option} {text}: must have the form NAME=NUMBER, with commas between numbers"
+                ) from None
 
     given = dict(pairs("parameter", parameters))
     for name, values in given.items():
         if len(values) != 1:
-            raise InputError(f"--parameter {name}: {len(values)} numbers: must be one")
+            raise InputError(f"--parameter {name}: has {len(values)} numbers: must have one")
     return Setup({name: values[0] for name, values in given.items()}, dict(pairs("work-offset", work_offsets)))
 
 
 def machine_of(name: str | None, tell: Callable[[str], None] = show) -> Machine:
-    """A shipped machine by name, or a file: TOML of ours or LinuxCNC's .ini, whose findings are told."""
+    """A shipped machine by name, or the machine of a file (.toml, or LinuxCNC's .ini, whose findings are shown)."""
     from chipload.machine.ini import read_ini
     from chipload.machine.machine import machine_named, machine_names, read_machine
 
@@ -51,7 +53,7 @@ def machine_of(name: str | None, tell: Callable[[str], None] = show) -> Machine:
 
 
 def feed_of(mm_min: float | None) -> float | None:
-    """A feed [mm/s] of one in mm/min."""
+    """Convert a feed from mm/min to mm/s."""
     if mm_min is None:
         return None
     if not 0.0 < mm_min < 1e9:
@@ -60,7 +62,7 @@ def feed_of(mm_min: float | None) -> float | None:
 
 
 def show_limits(result: Result) -> None:
-    """A line with the worst value of each limit, which the message of an unproven result may leave out."""
+    """Show the worst value of each limit in one line; the message of an unproven result may omit it."""
     known = [c for c in result.limits if c.worst is not None]
     worst = ", ".join(f"{c.column.label} {c.worst:.4g} of {c.limit:g} {c.column.unit}".strip() for c in known)
     if worst:

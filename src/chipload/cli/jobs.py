@@ -1,4 +1,4 @@
-"""Commands that run a job: run, fit, cuts."""
+"""The commands ``chipload run``, ``chipload fit`` and ``chipload cuts``."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ def run(
     coarse: Annotated[
         bool,
         typer.Option(
-            "--coarse", help="larger steps, about a tenth of the time; the verdict is never better than unproven"
+            "--coarse", help="use larger steps, about a tenth of the time; the verdict is never better than unproven"
         ),
     ] = False,
     workers: Annotated[
-        int, typer.Option("--workers", help="processes for an impeller job and for a simulation by layers; 1: this one")
+        int, typer.Option("--workers", help="number of processes that share an impeller job or a simulation by layers")
     ] = 1,
     dask: Annotated[
         str | None,
-        typer.Option("--dask", metavar="ADDRESS", help="address of a Dask scheduler, in place of --workers"),
+        typer.Option("--dask", metavar="ADDRESS", help="address of a Dask scheduler, instead of --workers"),
     ] = None,
     debug: Debug = False,
 ) -> None:
-    """Run a job: plan or read its programs, simulate and check them; write the result folder.
+    """Run a job: plan or read its programs, simulate and check them, and write the result folder.
 
     The same command continues a simulation or an impeller job that was stopped.
     """
@@ -86,7 +86,7 @@ def run(
                 if not kept.what_is_kept():
                     raise
                 raise Cancelled(
-                    f"{kept.what_is_kept()} in {kept.folder.name}: the same command continues from there, with "
+                    f"{kept.what_is_kept()} in {kept.folder.name}: the same command continues from there; with "
                     "--fresh it begins again"
                 ) from None
             kept.discard()
@@ -108,14 +108,14 @@ def fit(
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """Identify force coefficients from measured forces; write a material with intervals, and its predictions."""
+    """Identify force coefficients from measured forces; write a material and its predictions, with intervals."""
 
     def work() -> int:
         from chipload.jobs import load_job, run_job
 
         loaded = load_job(file, sets or ())
         if loaded.capability.name != "fit":
-            raise InputError(f"{file.name}: has no [[measurement]]: give it to chipload run")
+            raise InputError(f"{file.name}: has no [[measurement]]: use chipload run for this job")
         from chipload.report.folder import check_target, write_finished
 
         check_target(out)
@@ -134,16 +134,20 @@ def fit(
 @app.command()
 def cuts(
     job: JobFile,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="the table (CSV) for the measured values")],
-    sites: Annotated[int, typer.Option("--sites", help="places on the wall, at least 4")] = 6,
-    repeats: Annotated[int, typer.Option("--repeats", help="places that are cut twice, to find the scatter")] = 2,
-    steps: Annotated[int, typer.Option("--steps", help="depths below and above that of the model, each")] = 2,
-    bracket: Annotated[float, typer.Option("--bracket", help="factor from force to force")] = 1.25,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="the table (CSV) to fill in with measured values")],
+    sites: Annotated[int, typer.Option("--sites", help="number of places on the wall, at least 4")] = 6,
+    repeats: Annotated[
+        int, typer.Option("--repeats", help="number of places that are cut twice, to find the scatter")
+    ] = 2,
+    steps: Annotated[
+        int, typer.Option("--steps", help="number of depths below the modelled depth, and number above it")
+    ] = 2,
+    bracket: Annotated[float, typer.Option("--bracket", help="ratio of the forces of consecutive depths")] = 1.25,
     scatter_percent: Annotated[float, typer.Option("--scatter-percent", help="expected scatter of a single cut")] = 5.0,
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """Propose calibration cuts for a job with a [wall], to measure its allowable force; [threshold] names the table."""
+    """Propose calibration cuts that measure the allowable force of a [wall]. Name the table in [threshold]."""
 
     def work() -> int:
         from chipload.jobs import load_job
@@ -151,7 +155,7 @@ def cuts(
 
         read = load_job(job, sets or ()).job
         if not isinstance(read, ThinWallJob):
-            raise InputError(f"{job.name}: has no [wall]: calibration cuts are proposed for a thin wall")
+            raise InputError(f"{job.name}: has no [wall]: calibration cuts need a thin-wall job")
         from chipload.jobs.thinwall.run import propose
         from chipload.planning.thinwall.table import write_cuts
 
@@ -161,10 +165,10 @@ def cuts(
         for f in found.findings:
             show(str(f))
         show(
-            f"{len(found.site)} cuts at {len(found.sites)} places: interpolation misses {100.0 * found.bias:.2g} %, "
-            f"scatter brings {100.0 * found.noise:.2g} % (root mean square over the wall)"
+            f"{len(found.site)} cuts at {len(found.sites)} places: error of interpolation {100.0 * found.bias:.2g} %, "
+            f"error by scatter {100.0 * found.noise:.2g} % (root mean square over the wall)"
         )
-        show(f'fill in and name it in the job: [threshold] file = "{out.name}"')
+        show(f'fill in the table and name it in the job: [threshold] file = "{out.name}"')
         return 0
 
     guarded(work, debug)

@@ -1,4 +1,4 @@
-"""The command that asks an MTConnect agent."""
+"""The command ``chipload mtconnect``, which reads an MTConnect agent."""
 
 from __future__ import annotations
 
@@ -17,17 +17,19 @@ def mtconnect(
     source: Annotated[
         str, typer.Argument(metavar="SOURCE", help="address of an agent, e.g. http://127.0.0.1:5000, or an XML file")
     ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help=".toml: the machine; .csv: a log of its spindle")],
-    device: Annotated[str | None, typer.Option("--device", help="name of the device, where there are several")] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help=".toml: a machine file; .csv: a log of the spindle")
+    ],
+    device: Annotated[str | None, typer.Option("--device", help="name of the device, if there are several")] = None,
     component: Annotated[
-        str | None, typer.Option("--component", help="name of the spindle, where several components turn")
+        str | None, typer.Option("--component", help="name of the spindle, if several components rotate")
     ] = None,
     debug: Debug = False,
 ) -> None:
     """Read a machine's limits, or a log of its spindle, from an MTConnect agent.
 
-    A machine's file holds what the agent states; what it leaves open is a comment to be filled in. A log is for
-    `chipload spindle`.
+    The machine file holds the values that the agent states, and a comment to fill in for each value that it does not
+    state. The log is input for `chipload spindle`.
     """
 
     def work() -> int:
@@ -37,7 +39,7 @@ def mtconnect(
         ending = out.suffix.lower()
         if ending == ".toml":
             if component is not None:
-                raise InputError("--component: of a log: leave it out, or write --out spindle.csv")
+                raise InputError("--component: applies to a log: leave it out, or use --out spindle.csv")
             found = described(document(source, "probe"), device)
             write_whole(out, machine_text(found).encode("utf-8"))
             show(f"{found.name}: axes {', '.join(sorted(found.travel)) or 'none'}; fill in the comments of {out}")

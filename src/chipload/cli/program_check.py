@@ -1,4 +1,4 @@
-"""What `chipload check` says about a program."""
+"""The part of `chipload check` that reads a program and lists its findings."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from chipload.program.read import ProgramReading
     from chipload.program.setup import Setup
 
-#: [mm] where none is stated
+#: [mm] default tolerance
 TOLERANCE_MM = 0.001
-#: machines that a program is read for where none is stated: the first that has its axes
+#: default machines: the first that has the axes of the program is used
 GENERIC = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
 
 
 def finding_lines(reading: ProgramReading) -> list[str]:
-    """What was found in a program: first what leaves it unproven, then by line; the same in many lines is told once."""
+    """The findings of a program: first those that leave it unproven, then by line. Equal findings share one entry."""
     gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
     broken = set(map(id, reading.violations))
     rest = sorted((*(f for f in reading.findings if f not in gaps), *reading.violations), key=lambda f: f.line)
@@ -39,7 +39,7 @@ def check_program(
     tolerance_mm: float,
     setup: Setup,
 ) -> int:
-    """Check a program: what leaves it unproven, the other findings by line, then what it is."""
+    """Read a program, show its findings and a summary, and return the exit code."""
     from chipload.program.motions import lengths
     from chipload.program.read import line_times, read_program, read_tools
 
@@ -59,7 +59,7 @@ def check_program(
     else:
         raise refused[0]  # that of the simplest machine
     if machine is None:
-        show(f"no machine is stated: read for {on.name}; state yours with --machine, as its limits and times differ")
+        show(f"no machine is stated: {on.name} is assumed; name yours with --machine, as its limits and times differ")
     for line in finding_lines(reading):
         show(line)
     gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
@@ -71,6 +71,6 @@ def check_program(
         f"{seconds.sum() / 60.0:.4g} min; {box} mm"
     )
     count = len(reading.violations)
-    state = f"unproven: {gaps[0]}" if gaps else f"within the limits of machine {on.name}"
+    state = f"unproven: {gaps[0]}" if gaps else f"the program stays within the limits of machine {on.name}"
     show(f"{count} {'finding exceeds' if count == 1 else 'findings exceed'} the limits" if count else state)
     return EXCEEDED if reading.violations or gaps else 0

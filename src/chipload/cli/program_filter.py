@@ -1,4 +1,4 @@
-"""The command that the screen of LinuxCNC runs on a program before it loads it."""
+"""The command ``chipload filter``, which LinuxCNC runs on a program before it loads the program."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ INI, BAR = "INI_FILE_NAME", "AXIS_PROGRESS_BAR"
 
 @app.command("filter")
 def filter_program(
-    file: Annotated[Path, typer.Argument(metavar="PROGRAM", help="NC text, read as LinuxCNC does")],
+    file: Annotated[Path, typer.Argument(metavar="PROGRAM", help="NC program for LinuxCNC")],
     machine: MachineName = None,
     tools: Tools = None,
     allow_unproven: Annotated[
-        bool, typer.Option("--allow-unproven", help="load a program of which something could not be checked")
+        bool, typer.Option("--allow-unproven", help="also load a program that could not be checked completely")
     ] = False,
     debug: Debug = False,
 ) -> None:
-    """Check a program for LinuxCNC before it is loaded: the program on stdout, or nothing and exit code 3.
+    """Check a program before LinuxCNC loads it: write it to stdout, or write nothing and end with exit code 3.
 
-    For [FILTER] of the machine's ini. Findings go to stderr, which the screen shows. Without --machine the machine is
-    the one that LinuxCNC runs. A job of the same name beside the program, as part.toml beside part.ngc, is run: its
-    limits hold the program back too, and its report is in part-checked.
+    Name this command in [FILTER] of the machine's .ini. It writes findings to stderr, which the screen shows. The
+    default machine is the one that LinuxCNC runs. If a job of the same name stands beside the program, such as
+    part.toml beside part.ngc, the command runs it too: the program is not loaded if a limit of the job does not hold,
+    and the report is in part-checked.
     """
 
     def work() -> int:
@@ -41,15 +42,15 @@ def filter_program(
         data = read_regular(file, file.name, LARGEST_FILE)
         name = machine or os.environ.get(INI)
         if not name:
-            raise InputError(f"--machine: missing: name the machine's .ini; LinuxCNC states it in {INI}")
+            raise InputError(f"--machine: missing: name the .ini of the machine, or run LinuxCNC, which sets {INI}")
         states = [_read(file, name, tools)]
         if file.with_suffix(".toml").is_file():
             states.append(_run(file))
         if read_regular(file, file.name, LARGEST_FILE) != data:
-            raise InputError(f"{file.name}: has changed while it was checked: load it again")
+            raise InputError(f"{file.name}: changed during the check: load it again")
         worst = max(states)
         if worst is Severity.EXCEEDS or (worst is Severity.UNPROVEN and not allow_unproven):
-            open_ = "; `--allow-unproven` in the ini loads it" if worst is Severity.UNPROVEN else ""
+            open_ = "; add `--allow-unproven` in the .ini to load it" if worst is Severity.UNPROVEN else ""
             _tell(f"{file.name} is not loaded: {_WHY[worst]}{open_}")
             return EXCEEDED
         _progress(1.0, "checked")
@@ -63,10 +64,10 @@ _WHY = {Severity.EXCEEDS: "a limit is exceeded", Severity.UNPROVEN: "something c
 
 
 def _read(file: Path, name: str, tools: Path | None) -> Severity:
-    """Read the program for its machine, with the work offsets that LinuxCNC saved, and tell what is found.
+    """Read the program for its machine with the work offsets that LinuxCNC saved, and write the findings.
 
-    Travel of a machine without rotary axes is told alone: where the work offset is, the screen knows, which asks before
-    the cycle starts.
+    Leaving the travel of a machine without rotary axes is reported but does not block the program: it depends on the
+    work offset, and the screen asks before the cycle starts.
     """
     from chipload.cli.inputs import machine_of
     from chipload.cli.program_check import TOLERANCE_MM, finding_lines
@@ -90,7 +91,7 @@ def _read(file: Path, name: str, tools: Path | None) -> Severity:
 
 
 def _run(file: Path) -> Severity:
-    """Run the job beside the program, write its result and tell its verdict."""
+    """Run the job beside the program, write its result and its verdict."""
     from chipload.jobs import load_job, run_job
     from chipload.report.folder import check_target, write_finished
     from chipload.result import Verdict
@@ -99,7 +100,9 @@ def _run(file: Path) -> Severity:
     loaded = load_job(path)
     named = getattr(loaded.job, "program_file", None)
     if named is None or not Path(named).samefile(file):
-        raise InputError(f"{path.name}: is not a job of {file.name}: name it in [program] file, or rename the job")
+        raise InputError(
+            f"{path.name}: is not a job of {file.name}: name the program in [program] file, or rename the job"
+        )
     check_target(out)
     done = run_job(loaded, _progress)
     target = write_finished(done.result, done.presentation, out)

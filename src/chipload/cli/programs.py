@@ -1,4 +1,4 @@
-"""Commands that read a file without a job: check and convert."""
+"""The commands ``chipload check`` and ``chipload convert``."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from chipload.cli.program_check import TOLERANCE_MM, check_program
 from chipload.errors import InputError, Severity, grouped, worst_severity
 from chipload.terminal import EXCEEDED, bar, guarded, show
 
-#: findings of a machine that break nothing
+#: findings of a machine that do not affect the exit code
 HARMLESS = ("machine-singular", "machine-rewind", "machine-offset")
 
 
@@ -44,11 +44,11 @@ def check(
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
-    """Read a job or any file that a job names, and list all errors. Nothing is run or written.
+    """Read a job, or any file that a job can name, and list all errors. Nothing is simulated or written.
 
-    FILE is a job, which is read with all files that it names; a program, which is read as its controller reads it, on
-    machine vmc (or one with the rotary axes that it needs) if none is stated; a fit; a STEP file, whose faces are
-    listed; or a drawing, mesh, machine, material or tool table.
+    FILE is one of these: a job, read with all files that it names; a program, read as its controller reads it (the
+    default machine is vmc, or one with the rotary axes that the program needs); a fit; a STEP file, whose faces are
+    listed; a drawing, mesh, machine, material or tool table.
     """
 
     def work() -> int:
@@ -56,7 +56,7 @@ def check(
 
         job = file.suffix.lower() == ".toml"
         if sets and not job:
-            raise InputError("--set: belongs to a job: leave it out for another file")
+            raise InputError("--set: applies to a job: leave it out for other files")
         if not job and file.suffix.lower() not in BY_ENDING:
             setup = setup_of(parameters or (), work_offsets or ())
             return check_program(file, machine, tools, dialect, feed_mm_min, tolerance_mm, setup)
@@ -69,7 +69,7 @@ def check(
             ("work-offset", work_offsets or None),
         ):
             if value is not None:
-                raise InputError(f"--{option}: belongs to a program: in a job state it in the file")
+                raise InputError(f"--{option}: applies to a program: in a job, state it in the job file")
         found = inspect_file(file, sets or ())
         lines, holds = found if found is not None else ([], True)
         for text in lines:
@@ -81,22 +81,22 @@ def check(
 
 @app.command()
 def convert(
-    source: Annotated[Path, typer.Argument(metavar="PROGRAM", help="NC text or CL data")],
+    source: Annotated[Path, typer.Argument(metavar="PROGRAM", help="NC program or CL data")],
     target: Annotated[
-        Path, typer.Argument(metavar="FILE", help="the new file; its ending determines the format: .ngc, .nc, .apt")
+        Path, typer.Argument(metavar="FILE", help="the new file; its extension sets the format: .ngc, .nc, .apt")
     ],
     machine: MachineName = None,
     from_machine: Annotated[
-        str | None, typer.Option("--from", metavar="MACHINE", help="the machine of the source, if it is another one")
+        str | None, typer.Option("--from", metavar="MACHINE", help="machine of the source; default: --machine")
     ] = None,
     tools: Tools = None,
     dialect: DialectName = None,
     feed_mm_min: FeedIfUnsaid = None,
     tolerance_mm: ToleranceMm = TOLERANCE_MM,
-    tcp: Annotated[bool, typer.Option("--tcp", help="program the tip (TCP) while rotary axes move")] = False,
+    tcp: Annotated[bool, typer.Option("--tcp", help="write positions of the tip (TCP) while rotary axes move")] = False,
     debug: Debug = False,
 ) -> None:
-    """Convert a program for another machine, or to CL data. The new program is not verified; its first line says so."""
+    """Convert a program for another machine, or to CL data. The new program is not verified."""
 
     def work() -> int:
         from chipload.files import write_whole

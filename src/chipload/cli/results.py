@@ -1,4 +1,4 @@
-"""Commands that copy examples and show or export results."""
+"""The commands ``chipload example``, ``chipload view`` and ``chipload export``."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def example(
                 show(f"{key:12} {title}")
             return 0
         if folder is None:
-            raise InputError(f"example {name}: missing folder: chipload example {name} DIR")
+            raise InputError(f"example {name}: the folder is missing: use chipload example {name} DIR")
         show(f"copied: chipload run {copy_example(name, folder) / 'job.toml'} --out result")
         return 0
 
@@ -38,11 +38,13 @@ def example(
 @app.command()
 def view(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="a result folder, a job, or a folder that holds them")],
-    port: Annotated[int | None, typer.Option("--port", min=1, max=65535, help="default: 8170, or a free port")] = None,
+    port: Annotated[
+        int | None, typer.Option("--port", min=1, max=65535, help="port of the page; default: 8170, or a free port")
+    ] = None,
     open_browser: Annotated[bool, typer.Option("--open/--no-open", help="open the page in the browser")] = True,
     debug: Debug = False,
 ) -> None:
-    """Show results and run jobs of a folder in the browser, on this computer only. Ctrl-C ends it."""
+    """Show results and run jobs of a folder in the browser, on this computer only. Stop with Ctrl-C."""
 
     def work() -> int:
         from chipload.web.serve import serve
@@ -57,25 +59,33 @@ def view(
 def export(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="a result folder of chipload run")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="a new or empty folder for the files")],
-    csv: Annotated[bool, typer.Option("--csv", help="history.csv: a row for each step, units in the names")] = False,
-    vtk: Annotated[bool, typer.Option("--vtk", help="paths .vtp; chips, maps, stock .vtu; stock .stl")] = False,
-    glb: Annotated[bool, typer.Option("--glb", help="chips .glb, a body for each chip, with its numbers")] = False,
-    sheet: Annotated[bool, typer.Option("--sheet", help="setup.html; with chipload[export] setup.pdf")] = False,
+    csv: Annotated[
+        bool, typer.Option("--csv", help="write history.csv: one row for each step, units in the column names")
+    ] = False,
+    vtk: Annotated[
+        bool, typer.Option("--vtk", help="write paths (.vtp), chips, maps and stock (.vtu), and the stock (.stl)")
+    ] = False,
+    glb: Annotated[bool, typer.Option("--glb", help="write chips (.glb), one body for each chip")] = False,
+    sheet: Annotated[
+        bool, typer.Option("--sheet", help="write the setup sheet: setup.html, and setup.pdf with chipload[export]")
+    ] = False,
     load_monitor: Annotated[
         str | None,
         typer.Option(
             "--load-monitor",
             metavar="FORMAT",
-            help="reference loads of the spindle: csv, a row a section; heidenhain, AFC-LOAD of each tool",
+            help="write reference loads of the spindle; csv: a row for each section; heidenhain: AFC-LOAD of each tool",
         ),
     ] = None,
     spindle: Annotated[
         Path | None,
-        typer.Option("--spindle", metavar="FILE", help="written by chipload spindle --power: the motor's power"),
+        typer.Option(
+            "--spindle", metavar="FILE", help="file of chipload spindle --power; reference loads are motor power then"
+        ),
     ] = None,
     debug: Debug = False,
 ) -> None:
-    """Write a result as CSV, VTK, GLB and a setup sheet for the machine; without an option, these four."""
+    """Export a result as CSV, VTK, GLB and a setup sheet. Without a format option, write all four."""
 
     def work() -> int:
         from chipload.report.export import KINDS, export_result

@@ -1,4 +1,4 @@
-"""Commands that list what comes with chipload: machines, materials, cutters, examples."""
+"""The commands that list the machines, materials, cutters and examples that come with chipload."""
 
 from __future__ import annotations
 

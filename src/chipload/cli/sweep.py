@@ -1,4 +1,4 @@
-"""The command that runs many jobs."""
+"""The command ``chipload sweep``."""
 
 from __future__ import annotations
 
@@ -20,11 +20,13 @@ def sweep(
     ],
     over: Annotated[
         list[str] | None,
-        typer.Option("--over", metavar="KEY.PATH=A,B,C", help="values of a key; repeatable; all combinations are run"),
+        typer.Option("--over", metavar="KEY.PATH=A,B,C", help="values of a key; repeatable; runs all combinations"),
     ] = None,
     samples: Annotated[
         int,
-        typer.Option("--samples", help="samples of force coefficients and modes for each combination; 0: as stated"),
+        typer.Option(
+            "--samples", help="samples of force coefficients and modes for each combination; 0: only the stated values"
+        ),
     ] = 0,
     seed: Annotated[int, typer.Option("--seed", help="seed of the samples")] = 1,
     confidence: Annotated[
@@ -34,12 +36,12 @@ def sweep(
     dask: Annotated[
         str | None,
         typer.Option(
-            "--dask", metavar="ADDRESS", help="address of a Dask scheduler, e.g. tcp://host:8786, in place of --workers"
+            "--dask", metavar="ADDRESS", help="address of a Dask scheduler, e.g. tcp://host:8786, instead of --workers"
         ),
     ] = None,
     debug: Debug = False,
 ) -> None:
-    """Run a job for all combinations of values; write a table, a plot and the fastest job that holds."""
+    """Run a job for all combinations of values, and write a table, a plot and the fastest job that holds."""
 
     def work() -> int:
         from chipload.sweep.cases import Samples

@@ -1,4 +1,4 @@
-"""The command that finds modes in hammer tests."""
+"""The command ``chipload tap``, which fits modes to hammer tests."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ def tap(
     ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="the modes (TOML), for [dynamics] file")],
     direction: Annotated[
-        list[str] | None, typer.Option("--direction", help="x or y of the machine, one for each file in order")
+        list[str] | None,
+        typer.Option("--direction", help="x or y of the machine, one for each file in order; repeatable"),
     ] = None,
     unit: Annotated[
         str | None, typer.Option("--unit", help="m/N, mm/N, um/N, m/s/N or m/s2/N, if the file does not state it")
     ] = None,
-    tool: Annotated[int | None, typer.Option("--tool", min=0, help="tool number; none: every tool")] = None,
+    tool: Annotated[int | None, typer.Option("--tool", min=0, help="tool number; default: every tool")] = None,
     from_hz: Annotated[float | None, typer.Option("--from-hz", min=0.0, help="lowest frequency of the fit")] = None,
     to_hz: Annotated[float | None, typer.Option("--to-hz", min=0.0, help="highest frequency of the fit")] = None,
     debug: Debug = False,
 ) -> None:
-    """Fit modes to hammer tests at the tip of a tool; a poor fit is refused."""
+    """Fit modes to hammer tests at the tip of a tool. A poor fit is refused."""
 
     def work() -> int:
         from chipload.files import write_whole

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from chipload.control.hal import HalJob
     from chipload.control.identification import IdentifiedSpindle
 
-#: share of pairs below which a cut is not distinguished from air
+#: share of correctly ordered pairs below which the signal does not distinguish a cut from air
 TOLD_APART = 0.8
 
 
@@ -38,7 +38,9 @@ def hal(
     ] = None,
     power_pin: Annotated[
         str | None,
-        typer.Option("--power-pin", metavar="PIN", help="pin or signal with its power [W], in place of the current"),
+        typer.Option(
+            "--power-pin", metavar="PIN", help="pin or signal with the spindle's power [W], instead of the current"
+        ),
     ] = None,
     speed_pin: Annotated[
         str | None,
@@ -51,7 +53,7 @@ def hal(
         typer.Option(
             "--spindle-override-pin",
             metavar="PIN",
-            help="pin or signal with the spindle override in force, e.g. halui.spindle.0.override.value, for the panel",
+            help="pin or signal with the current spindle override, for the panel, e.g. halui.spindle.0.override.value",
         ),
     ] = None,
     python: Annotated[
@@ -59,14 +61,14 @@ def hal(
     ] = "/usr/bin/python3",
     panel: Annotated[
         Path | None,
-        typer.Option("--panel", metavar="FILE", help="write the panel (PyVCP, .xml) and its .hal beside it, and leave"),
+        typer.Option("--panel", metavar="FILE", help="only write the panel (PyVCP, .xml), and its .hal file beside it"),
     ] = None,
     debug: Debug = False,
 ) -> None:
-    """Control the torque on a running LinuxCNC: a HAL component that sets the feed override. Ctrl-C ends it.
+    """Limit the torque on a running LinuxCNC: a HAL component that sets the feed override. Stop with Ctrl-C.
 
-    The torque is estimated from the spindle's current and speed (--current-pin, --speed-pin). Without these options the
-    file states the `source`.
+    The torque is estimated from the current and the speed of the spindle (--current-pin, --speed-pin). Without these
+    options, `source` in the file states where the torque comes from.
     """
 
     def work() -> int:
@@ -76,14 +78,12 @@ def hal(
         from chipload.files import write_whole
 
         if current_pin is not None and power_pin is not None:
-            raise InputError("--current-pin, --power-pin: state one of them, what the spindle was identified from")
+            raise InputError("--current-pin, --power-pin: state only the one that the spindle was identified from")
         name_of = "--current-pin" if power_pin is None else "--power-pin"
         measured = current_pin if power_pin is None else power_pin
         if (measured is None) != (speed_pin is None):
             missing, there = ("--speed-pin", name_of) if speed_pin is None else (name_of, "--speed-pin")
-            raise InputError(
-                f"{missing}: missing: with {there} state both: the torque is estimated from current and speed"
-            )
+            raise InputError(f"{missing}: missing: state it with {there}: the torque is estimated from both")
         job, sources = load_hal(file), {}
         if panel is not None:
             return _write_panel(job, panel, name, out)
@@ -101,14 +101,14 @@ def hal(
                 pins,
                 stop=lambda: bool(asked),
                 notice=lambda reason, s: typer.echo(
-                    f"stopped the machine: {reason} at {s:.4g} mm: it stays stopped until this command ends", err=True
+                    f"machine stopped: {reason} at {s:.4g} mm; it stays stopped until this command ends", err=True
                 ),
             )
         if out is not None:
             write_whole(out, table_of(record).encode("ascii"))
         show(
             f"{len(record.rows)} steps, ended: {record.ended}; greatest torque {1e-3 * record.torque_max:.4g} N m, "
-            f"limit held {1e-3 * job.override.torque_ref:.4g} N m"
+            f"set point {1e-3 * job.override.torque_ref:.4g} N m"
         )
         return 0 if record.ended == "path" else EXCEEDED
 
@@ -116,20 +116,20 @@ def hal(
 
 
 def _write_panel(job: HalJob, file: Path, name: str, out: Path | None) -> int:
-    """The panel of a controller and the lines of HAL that connect it."""
+    """Write the panel of a controller and the HAL lines that connect it."""
     from chipload.control.linuxcnc.panel import panel_hal, panel_xml
     from chipload.files import write_whole
 
     if out is not None:
-        raise InputError("--panel, --out: a panel is written without a run: state one of them")
+        raise InputError("--panel, --out: --panel only writes the panel: state one of them")
     if file.suffix.lower() != ".xml":
-        raise InputError(f"--panel {file}: must end with .xml: its lines of HAL stand beside it, in .hal")
+        raise InputError(f"--panel {file}: must end with .xml; its HAL lines are written beside it, to a .hal file")
     wires = file.with_suffix(".hal")
     write_whole(file, panel_xml(job).encode("utf-8"))
     write_whole(wires, panel_hal(name).encode("utf-8"))
     show(f"written: {file}, {wires}")
-    show(f"under AXIS: [DISPLAY] PYVCP = {file.name}, [HAL] POSTGUI_HALFILE = {wires.name}")
-    show(f"by itself: loadusr -Wn pyvcp pyvcp -c pyvcp {file.name}, then source {wires.name}")
+    show(f"in AXIS: [DISPLAY] PYVCP = {file.name}, [HAL] POSTGUI_HALFILE = {wires.name}")
+    show(f"in its own window: loadusr -Wn pyvcp pyvcp -c pyvcp {file.name}, then source {wires.name}")
     return 0
 
 
@@ -146,9 +146,9 @@ def spindle(
     air: Annotated[
         list[Path] | None, typer.Option("--air", metavar="LOG", help="a log in which nothing is cut; repeatable")
     ] = None,
-    power: Annotated[bool, typer.Option("--power", help="use the column of power, not that of current")] = False,
+    power: Annotated[bool, typer.Option("--power", help="use the power column instead of the current")] = False,
     torque_constant_nm_a: Annotated[
-        float | None, typer.Option("--torque-constant-nm-a", help="torque constant of the data sheet")
+        float | None, typer.Option("--torque-constant-nm-a", help="torque constant from the data sheet")
     ] = None,
     efficiency: Annotated[
         float | None, typer.Option("--efficiency", help="efficiency of the spindle, if known; with --power")
@@ -157,14 +157,15 @@ def spindle(
         float | None, typer.Option("--sensor-lag-s", help="time constant of the sensor, if known")
     ] = None,
     flutes: Annotated[
-        int | None, typer.Option("--flutes", help="flutes of the cutter, for the tooth passing frequency")
+        int | None, typer.Option("--flutes", help="number of flutes, for the tooth passing frequency")
     ] = None,
     debug: Debug = False,
 ) -> None:
-    """Identify a spindle from logs: its torque for a current or power, the valid range and the intervals.
+    """Identify a spindle from logs: the torque as a function of current or power, its valid range and intervals.
 
-    Columns that are known by name: time_s, speed_rpm, current_a or power_w, torque_nm (0 for the idle spindle). Each
-    log is predicted from the others. Exit code 3: the current does not distinguish a cut from the idle spindle.
+    Logs may have the columns time_s, speed_rpm, current_a or power_w, and torque_nm (0 for the idle spindle). To test
+    the result, each log is predicted from the others. Exit code 3: the signal does not distinguish a cut from the idle
+    spindle.
     """
 
     def work() -> int:
@@ -204,7 +205,7 @@ def spindle(
 
 
 def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
-    """What was identified, a line each."""
+    """The identified values, one line each."""
     from chipload.control.identification import aliased
     from chipload.units import rpm_from_rad_s
 
@@ -218,7 +219,7 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
     out = [
         f"{name}: {constant} ({how})"
         if found.constant_known is not None
-        else f"{name}: not known: no cut of known torque; torques below are in {unit}",
+        else f"{name}: unknown, because no log has a cut of known torque; torques below are in {unit}",
         f"idle {'power over speed' if power else 'current'}: "
         + " + ".join(
             f"{scale * float(x):.4g}{' w' if k else ''} +- {scale * float(h):.2g}"
@@ -228,7 +229,7 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
         f"{60.0 * scale * found.idle.half_width:.2g} {unit}/min",
         f"inertia: {1e-6 * f.inertia * 1e3:.4g} kg m2 +- {1e-6 * float(f.half_width[1]) * 1e3:.2g}"
         if found.inertia_found and found.constant_known is not None
-        else "inertia: not known" + ("" if found.inertia_found else ": the speed does not change"),
+        else "inertia: unknown" + ("" if found.inertia_found else ", because the speed does not change"),
         f"lag: {1e3 * sensor.lag:.3g} ms, {1e3 * sensor.lag_interval[0]:.3g} to {1e3 * sensor.lag_interval[1]:.3g}; "
         f"noise {scale * sensor.noise:.3g} {unit}, step {scale * sensor.step:.3g} {unit}",
     ]
@@ -238,16 +239,16 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
             f"valid for torques from {least:.3g} to {most:.4g} N m, {low:.5g} to {high:.5g} rpm, below "
             f"{sensor.bandwidth:.3g} Hz"
             if most < math.inf
-            else f"valid for torques above {least:.3g} N m, below {sensor.bandwidth:.3g} Hz; no cut above that is "
-            "logged"
+            else f"valid for torques above {least:.3g} N m, below {sensor.bandwidth:.3g} Hz; no log has a cut above "
+            "that torque"
         )
     torque = "N m" if found.constant_known is not None else unit
     per = 1e-3 if found.constant_known is not None else scale
     for answer in found.predictions:
-        text = f"held out {answer.name}: error {per * answer.rms:.3g} {torque} rms, {per * answer.mean:+.3g} mean"
+        text = f"prediction of {answer.name}: error {per * answer.rms:.3g} {torque} rms, {per * answer.mean:+.3g} mean"
         if answer.greatest > 0.0:
             text += f", of {per * answer.greatest:.4g} at most ({100.0 * answer.rms / answer.greatest:.2g} %)"
-        text += f", {100.0 * answer.covered:.3g} % inside their interval"
+        text += f", {100.0 * answer.covered:.3g} % within the interval"
         if math.isfinite(answer.apart):
             told = "distinguished from air" if answer.apart >= TOLD_APART else "not distinguished from air"
             text += f"; cuts {told}: {100.0 * answer.apart:.3g} % of pairs in order (50 %: chance)"
@@ -257,7 +258,8 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
         seen = aliased(passing, 1.0 / sensor.period)
         inside = seen < sensor.bandwidth
         out.append(
-            f"tooth passing frequency {passing:.4g} Hz: readings at {1.0 / sensor.period:.4g} Hz show it at "
-            f"{seen:.3g} Hz, " + ("inside the bandwidth: it is read as a torque" if inside else "above the bandwidth")
+            f"tooth passing frequency {passing:.4g} Hz: sampling at {1.0 / sensor.period:.4g} Hz shifts it to "
+            f"{seen:.3g} Hz, "
+            + ("inside the bandwidth, where it looks like torque" if inside else "above the bandwidth")
         )
     return out

@@ -1,7 +1,6 @@
-"""The `[[cutter]]` table of a job: the cutter's numbers, or the file that has them.
+"""The `[[cutter]]` table of a job: the dimensions of a cutter, or a file that states them.
 
-A number stands in the job or in the file; the job's stands where both have it. One that stands in neither is named and
-refused, never guessed.
+A value in the job overrides that of the file. A value that neither states is an error; it is never guessed.
 """
 
 from __future__ import annotations
@@ -29,11 +28,11 @@ ENDINGS = (".fctb", ".json", ".tools", ".p21", ".camotics", ".tbl")
 NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "overhang_mm", "modulus_gpa")
 
 
-#: keys by which shops and tool libraries state the large radius of a barrel cutter, and what is said of them
+#: keys by which shops and tool libraries state the large radius of a barrel cutter, and the message about them
 BARREL_KEYS = ("barrel_radius_mm", "profile_radius_mm", "side_radius_mm")
 BARREL = (
     "chips of barrel cutters are not simulated: state a flat, bull-nose or ball cutter, or the outline of the barrel "
-    "as body_mm: it is then held against part and fixture alone"
+    "as body_mm, which is only checked for collisions"
 )
 
 
@@ -43,54 +42,61 @@ def _rows(value: Any) -> Any:
 
 
 class CutterTable(BaseModel):
-    """Keys of one ``[[cutter]]``: its own numbers, or those of a file.
+    """A cutter: its dimensions, or a file that states them.
 
     ``file`` is a FreeCAD tool bit (`.fctb`), a tool library of Fusion 360 or HSMWorks (`.json`, `.tools`), tool data of
     ISO 13399 (`.p21`), a CAMotics project (`.camotics`) or a LinuxCNC tool table (`.tbl`), with ``tool`` the number in
-    it and ``file_unit`` the unit of the lengths of a tool table, which does not say it.
+    it and ``file_unit`` the unit of the lengths of a tool table, which does not state its unit.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
-    number: int | None = Field(None, ge=0)
-    name: str | None = None
-    diameter_mm: float | None = Field(None, description=f"from {THINNEST:g} to {WIDEST:g}")
-    flutes: int | None = Field(None, description=f"at most {MOST_FLUTES}")
-    helix_deg: float | None = None
-    flute_length_mm: float | None = None
-    overhang_mm: float | None = Field(None, description=f"at most {LONGEST:g}")
-    modulus_gpa: float | None = None
-    corner_radius_mm: float | None = None
-    corner_e_mm: float | None = None
-    corner_f_mm: float | None = None
-    bottom_deg: float | None = None
-    taper_deg: float | None = None
-    runout_mm: float | None = None
-    runout_deg: float | None = None
-    pitch_deg: Annotated[tuple[float, ...] | None, BeforeValidator(_rows)] = Field(
-        None, description="angle of each tooth to the one before it, tooth 0 first, together 360; none: all alike"
+    number: int | None = Field(None, ge=0, description="tool number in the program")
+    name: str | None = Field(None, description="name shown in the report")
+    diameter_mm: float | None = Field(None, description=f"diameter, from {THINNEST:g} to {WIDEST:g}")
+    flutes: int | None = Field(None, description=f"number of teeth, at most {MOST_FLUTES}")
+    helix_deg: float | None = Field(None, description="helix angle, right-handed, below 80")
+    flute_length_mm: float | None = Field(None, description="length of the cutting edges along the axis")
+    overhang_mm: float | None = Field(None, description=f"length from the holder to the tip, at most {LONGEST:g}")
+    modulus_gpa: float | None = Field(None, description="Young's modulus of the cutter: carbide 580, steel 210")
+    corner_radius_mm: float | None = Field(None, description="corner radius; half the diameter: ball nose; default 0")
+    corner_e_mm: float | None = Field(
+        None, description="APT parameter e: radial position of the centre of the corner; default: tangent corner"
     )
-    shank_diameter_mm: float | None = None
+    corner_f_mm: float | None = Field(
+        None, description="APT parameter f: axial position of the centre of the corner; default: tangent corner"
+    )
+    bottom_deg: float | None = Field(None, description="angle of the bottom, APT parameter alpha; default 0")
+    taper_deg: float | None = Field(None, description="half angle of a tapered flank, APT parameter beta; default 0")
+    runout_mm: float | None = Field(None, description="offset of the cutter's axis from the spindle's axis; default 0")
+    runout_deg: float | None = Field(None, description="direction of the runout, from tooth 0; required with runout_mm")
+    pitch_deg: Annotated[tuple[float, ...] | None, BeforeValidator(_rows)] = Field(
+        None, description="angle from the previous tooth to each tooth, tooth 0 first, 360 in all; default: equal"
+    )
+    shank_diameter_mm: float | None = Field(None, description="diameter of the shank; default: diameter_mm")
     holder_mm: Annotated[tuple[tuple[float, float], ...] | None, BeforeValidator(_rows)] = Field(
-        None, description="length and diameter of the holder's parts, upwards from the overhang"
+        None, description="length and diameter of each section of the holder, upwards from the overhang"
     )
     body_mm: Annotated[tuple[tuple[float, float], ...] | None, BeforeValidator(_rows)] = Field(
-        None, description="radius and height over the tip of a tool of another shape: a body, its chips not simulated"
+        None,
+        description="profile of a tool whose chips are not simulated: radius and height above the tip of each corner",
     )
     tip_n_um: float | None = Field(
-        None, description="measured stiffness of the tip across the axis; in place of grip, holder and spindle"
+        None, description="measured stiffness of the tip across the axis; replaces grip, holder and spindle stiffness"
     )
     gullet_mm2: float | None = Field(None, description="area between two teeth in a section across the axis")
-    chip_ratio: float | None = Field(None, description="volume of loose chips over the volume cut")
+    chip_ratio: float | None = Field(None, description="volume of loose chips over the volume cut, at least 1")
     fluted_factor: float | None = Field(None, description="equivalent diameter of the fluted part over diameter_mm")
-    tool_material: Literal["carbide", "hss"] | None = Field(None, description="none: by modulus_gpa, steel below 350")
+    tool_material: Literal["carbide", "hss"] | None = Field(
+        None, description="material of the cutter; default: by modulus_gpa, steel below 350"
+    )
     strength_mpa: float | None = Field(None, description="rupture strength of carbide, yield strength of steel")
-    safety_factor: float | None = Field(None, description="strength over the stress that is allowed")
+    safety_factor: float | None = Field(None, description="strength over allowable stress")
     stress_concentration: float | None = Field(None, description="stress at a notch over that of a smooth bar")
-    file: str | None = Field(None, description=f"tool data: {', '.join(ENDINGS)}")
-    tool: int | None = Field(None, description="number of the tool in the file, where it holds several")
+    file: str | None = Field(None, description=f"file with tool data: {', '.join(ENDINGS)}")
+    tool: int | None = Field(None, description="number of the tool in a file of several tools")
     file_unit: Literal["mm", "inch"] | None = Field(
-        None, description="unit of a tool table (.tbl), which does not state it"
+        None, description="unit of a tool table (.tbl), which does not state its unit"
     )
 
     def cutter(self, folder: str | Path = ".") -> Cutter:
@@ -109,7 +115,7 @@ class CutterTable(BaseModel):
             values = {"flutes": 1, "helix_deg": 0.0, "modulus_gpa": 210.0, **sizes, **values}
         where = f": {self.file} does not state it" if self.file else ""
         missing = [
-            f"cutter.{key} is missing{where}: must be given, a cutter is never guessed"
+            f"cutter.{key} is missing{where}: state it; dimensions of a cutter are never guessed"
             for key in NEEDED
             if key not in values
         ]
@@ -117,7 +123,7 @@ class CutterTable(BaseModel):
             raise InputErrors(*missing) if len(missing) > 1 else InputError(missing[0])
         if ("runout_mm" in values) != ("runout_deg" in values):
             lacks, has = ("runout_deg", "runout_mm") if "runout_mm" in values else ("runout_mm", "runout_deg")
-            raise InputError(f"cutter.{lacks} is missing: give it with {has} or leave both out")
+            raise InputError(f"cutter.{lacks} is missing: state it with {has}, or leave both out")
         return Cutter(
             diameter=values["diameter_mm"],
             flutes=values["flutes"],
@@ -145,20 +151,20 @@ class CutterTable(BaseModel):
         )
 
     def _from_file(self, folder: Path) -> dict[str, Any]:
-        """What ``file`` says, under the keys of the job."""
+        """Values of ``file`` by the keys of the job."""
         if self.file is None:
             for key in ("tool", "file_unit"):
                 if getattr(self, key) is not None:
-                    raise InputError(f"cutter.{key} is given without cutter.file: give the tool table or leave it out")
+                    raise InputError(f"cutter.{key} is stated without cutter.file: state the file, or leave it out")
             return {}
         path = folder / self.file
         kind = path.suffix.lower()
         if kind not in ENDINGS:
             raise InputError(f"cutter.file = {self.file}: must end in {', '.join(ENDINGS)}")
         if kind in (".fctb", ".p21") and self.tool is not None:
-            raise InputError(f"cutter.tool is for a file of several tools: leave it out with {self.file}")
+            raise InputError(f"cutter.tool applies to a file of several tools: leave it out for {self.file}")
         if self.file_unit is not None and kind != ".tbl":
-            raise InputError(f"cutter.file_unit is for a tool table (.tbl): leave it out with {self.file}")
+            raise InputError(f"cutter.file_unit applies to a tool table (.tbl): leave it out for {self.file}")
         if kind == ".fctb":
             return self._checked(read_fctb(path))
         if kind == ".p21":
@@ -166,11 +172,11 @@ class CutterTable(BaseModel):
         if kind in (".json", ".tools"):
             return self._checked(read_fusion_tool(path, self.tool))
         if self.tool is None:
-            raise InputError(f"cutter.tool is missing: {self.file} holds several tools: state which")
+            raise InputError(f"cutter.tool is missing: {self.file} holds several tools; state the number of one")
         if kind == ".camotics":
             return read_camotics_tool(path, self.tool)
         if self.file_unit is None:
-            raise InputError(f"cutter.file_unit is missing: {self.file} does not state its unit: give mm or inch")
+            raise InputError(f"cutter.file_unit is missing: {self.file} does not state its unit; state mm or inch")
         return dict(read_tool_table(path, self.tool, self.file_unit))
 
     @staticmethod
@@ -180,7 +186,7 @@ class CutterTable(BaseModel):
 
 
 def _strength(values: Mapping[str, Any]) -> ToolStrength:
-    """What is stated of the cutter's strength; what is not has the values of :class:`ToolStrength`."""
+    """The strength of the cutter; values that are not stated are the defaults of :class:`ToolStrength`."""
     names = {"strength_mpa": "mpa", "safety_factor": "safety_factor", "stress_concentration": "concentration"}
     stated = {field: values[key] for key, field in names.items() if key in values}
     material = ToolMaterial(values["tool_material"]) if "tool_material" in values else None
@@ -209,7 +215,7 @@ def cutter_from_table(table: Mapping[str, Any], folder: str | Path = ".") -> Cut
 
 
 def _first(err: ValidationError, table: Mapping[str, Any]) -> str:
-    """The first thing that is wrong with a table, in our words."""
+    """The message of the first error in a table."""
     row = err.errors()[0]
     key = ".".join(str(x) for x in row["loc"])
     if row["type"] == "extra_forbidden":

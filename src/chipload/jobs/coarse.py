@@ -122,7 +122,7 @@ def _of_program(loaded: LoadedJob) -> list[str]:
 
 def marked(done: FinishedJob) -> FinishedJob:
     """The result of a coarse run: nothing in it is proven, and its stock is shown with wider cells."""
-    text = "--coarse: a first answer with larger steps and thicker layers; run the job without it for a proof"
+    text = "--coarse gives a first result with larger steps and thicker layers; run the job without it for a proof"
     finding = Finding("job-coarse", 0, text, Severity.UNPROVEN)
     result = replace(done.result, findings=(finding, *done.result.findings))
     blanks = done.presentation.blanks

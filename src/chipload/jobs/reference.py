@@ -1,4 +1,4 @@
-"""Every key of every kind of job, as a page: made from the tables that read the file, so that it cannot differ."""
+"""The reference page of the job file (docs/jobs.md), generated from the tables that validate a job."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from chipload.jobs.tables import SourceTable
 
 HEAD = """# The job file
 
-A job is one TOML file: what is made, of what, on which machine, with which cutters, and the limits. Every key carries
-its unit in its name. Unknown keys are refused with the nearest known one. Paths are relative to the job file.
+A job is one TOML file. It states the part, the stock, the machine, the cutters, the material and the limits. The name
+of a key contains its unit. chipload refuses an unknown key and names the nearest known one. Paths are relative to the
+job file.
 
-`chipload check job.toml` lists all that is wrong in a job and in the files that it names. `--set key.path=value`
-changes a key for one run. `chipload init FILE DIR` writes a job for a program, a drawing, a model or sections of a
-blade. Its guesses are marked; a table with `confirm = true` holds some, and `chipload run` refuses the job until that
-key is deleted or `--accept` takes all guesses as they are. The commonest job runs a program through a stock:
+`chipload check job.toml` lists all errors in a job and in the files that it names. `--set key.path=value` changes a key
+for one run. `chipload init FILE DIR` writes a job for a program, a drawing, a model or the sections of a blade. It
+marks each table that holds guesses with `confirm = true`; `chipload run` refuses the job until you delete that key, or
+takes all guesses as they are with `--accept`. The most common job simulates a program in a stock:
 
 ```toml
 [program]
@@ -55,18 +56,18 @@ step_mm = 0.5
 force_n = 1500.0
 ```
 
-In the tables below a key is *required*, has a *default*, or is *optional*. Some keys are required by a kind or a
-shape only; their description, or the message of `chipload check`, says so. The values under *example* show how a
-value is written; they are no recommendation.
+In the tables below a key is *required*, has a *default*, or is *optional*. Some optional keys are required by one kind
+or one shape; their description, or the message of `chipload check`, states this. The column *example* shows how to
+write a value; it is not a recommendation.
 """
-#: kinds of jobs, commonest first, and what each is for
+#: kinds of jobs, most common first, and the heading of each
 KINDS = {
-    "program": "Jobs that run a program: simulate it, choose its spindle speeds",
+    "program": "Jobs that simulate a program or choose its spindle speeds",
     "feeds": "Jobs that give a program new feeds",
     "contour": "Jobs that plan contours and pockets",
-    "thinwall": "Jobs that cut a thin wall",
-    "impeller": "Jobs that mill an impeller",
-    "torque": "Jobs that hold the torque on a thin tube, a cone or a workpiece",
+    "thinwall": "Jobs that plan thin walls",
+    "impeller": "Jobs that plan an impeller",
+    "torque": "Jobs that limit the torque on a thin tube, a cone or a workpiece",
     "fit": "Jobs that fit force coefficients to measured forces",
 }
 #: how a value is written, by the key or by the table and the key

@@ -1,7 +1,6 @@
-"""The tables of a job file: which keys there are, their units and their ranges.
+"""Types and tables that the job files of all capabilities share: numbers, sources, limits, checks.
 
-Every key carries its unit in its name. Nothing that matters is guessed: a feed, a tool, a side or a limit that is not
-stated is asked for.
+The name of a key contains its unit. A missing feed, tool, side or limit is an error; it is never guessed.
 """
 
 from __future__ import annotations
@@ -123,14 +122,14 @@ def stated(value: Value | None, key: str) -> Value:
 
 
 class SourceTable(Table):
-    """A shipped thing by name, or a file of one's own."""
+    """The name of one that comes with chipload, or the path of your own file."""
 
     name: Text | None = None
     file: Text | None = None
 
 
 class Limits(Table):
-    """Limits by name; what is not stated is not checked, and the report says so."""
+    """Limits by name. The report lists a limit that the job does not state as not checked."""
 
     @property
     def stated(self) -> dict[str, float]:
@@ -139,21 +138,29 @@ class Limits(Table):
 
     @property
     def unstated(self) -> tuple[str, ...]:
-        """Names of the others, so that nothing holds the job against them."""
+        """Names of the limits that the job does not state; they are not checked."""
         return tuple(k for k, v in self.model_dump().items() if v is None)
 
 
 class ChecksTable(Table):
-    """Checks that are made unless a key is false; the report lists what is switched off."""
+    """Default checks. `false` switches a check off; the report lists the checks that are off."""
 
-    cutter_strength: bool = Field(True, strict=True, description="stress of the cutter against its strength")
-    flute_length: bool = Field(True, strict=True, description="no shank in material above the flutes")
-    chip_space: bool = Field(True, strict=True, description="chip space, if gullet_mm2 is stated")
-    chip_range: bool = Field(True, strict=True, description="chip thickness within the range of the coefficients")
-    spindle: bool = Field(True, strict=True, description="torque and power of the machine's spindle")
-    rigid_model: bool = Field(True, strict=True, description="deflection against feed per tooth and radial depth")
-    deflection_of_feed: Positive = Field(2.0, description="greatest deflection over the feed per tooth")
-    deflection_of_depth: Positive = Field(0.25, description="greatest deflection over the radial depth")
+    cutter_strength: bool = Field(True, strict=True, description="check the stress of the cutter against its strength")
+    flute_length: bool = Field(True, strict=True, description="check that the cutter does not cut above its flutes")
+    chip_space: bool = Field(True, strict=True, description="check the chip space, if gullet_mm2 is stated")
+    chip_range: bool = Field(
+        True, strict=True, description="check that the chip thickness is within the range of the coefficients"
+    )
+    spindle: bool = Field(True, strict=True, description="check torque and power of the machine's spindle")
+    rigid_model: bool = Field(
+        True, strict=True, description="check that the deflection is within the range of the rigid force model"
+    )
+    deflection_of_feed: Positive = Field(
+        2.0, description="range of the rigid model: greatest ratio of the deflection to the feed per tooth"
+    )
+    deflection_of_depth: Positive = Field(
+        0.25, description="range of the rigid model: greatest ratio of the deflection to the radial depth"
+    )
 
     @property
     def off(self) -> tuple[str, ...]:

@@ -63,7 +63,9 @@ def diagram_figure(
     """
     made = diagram(move, cutter, height, tolerance)
     if made.covered is None:
-        raise InputError(f"diagram: height = {height:g} mm: the cutter never is in this layer: choose one that it cuts")
+        raise InputError(
+            f"diagram: height = {height:g} mm: the cutter is never in this layer: choose a layer that it cuts"
+        )
     figure = make_subplots(rows=1, cols=2, column_widths=[0.5, 0.5], horizontal_spacing=0.09)
     outward = np.where(np.isnan(made.V), np.nan, (made.V > 0.0).astype(np.float64))
     shade = [[0.0, "rgba(255,255,255,0)"], [1.0, OUTWARD]]

@@ -75,7 +75,7 @@ def export_result(
     if monitor is not None:
         files |= _load_monitor(result, monitor, spindle)
     elif spindle is not None:
-        raise InputError("--spindle: belongs to --load-monitor: state both")
+        raise InputError("--spindle: applies to --load-monitor: state both")
     if not files:
         raise InputError(f"{folder}: nothing to export: name one of {', '.join(KINDS)}")
     _write(files, out)
@@ -86,8 +86,7 @@ def _load_monitor(result: Result, monitor: str, spindle: Path | None) -> dict[st
     why = UNPUBLISHED.get(monitor.lower().lstrip("."))
     if why is not None:
         raise InputError(
-            f"--load-monitor {monitor}: the format of its file is not published: {why}: state csv, whose numbers are "
-            "to be entered"
+            f"--load-monitor {monitor}: the format of its file is not published: {why}: use csv and enter its numbers"
         )
     if monitor not in MONITORS:
         raise InputError(f"--load-monitor {monitor}: must be one of {', '.join(MONITORS)}")

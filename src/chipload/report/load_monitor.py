@@ -37,7 +37,7 @@ UNPUBLISHED = {
     "siemens": "the limits of its monitors are entered on pages that the machine's maker designs",
     "sinumerik": "the limits of its monitors are entered on pages that the machine's maker designs",
     "fanuc": "the limits of its monitors are entered on pages that the machine's maker designs",
-    "afc.dep": "the control makes this file itself, from the table that heidenhain writes",
+    "afc.dep": "the control makes this file itself, from the table of format heidenhain",
 }
 #: limit that knows the rated power of the spindle
 POWER_LIMIT = "spindle_power_w"
@@ -201,9 +201,7 @@ def _motor(section: LoadSection, file: Path) -> Power:
     """The motor's power for that at the cutter; efficiency and idle power may differ by what the file states."""
     found = read_spindle(file, section.speed)
     if found.source != "power":
-        raise InputError(
-            f"--spindle {file}: input = {found.source}: must be power: identify it by chipload spindle --power"
-        )
+        raise InputError(f"--spindle {file}: input = {found.source}: must be power: run chipload spindle with --power")
     values = found.values
     efficiency, wrong = values["torque_constant_nm_a"], values.get("torque_constant_error_share", 0.0)
     free = section.speed * (values["idle_a"][0] + values["idle_a"][1] * section.speed)

@@ -182,5 +182,5 @@ def read_removal(path: Path, track: int) -> RemovalMesh | None:
         raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
     corners, seen = arrays["corners"], arrays["seen"]
     if corners.ndim != 3 or corners.shape[1:] != (4, 3) or seen.shape != (len(corners), 2):
-        raise InputError(f"{path.name}: damaged: its parts do not fit each other: run the job again")
+        raise InputError(f"{path.name}: damaged: its parts do not match: run the job again")
     return RemovalMesh(**arrays)

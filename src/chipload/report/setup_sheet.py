@@ -45,7 +45,7 @@ def setup_sheet(result: Result) -> bytes:
         *(["<h2>Tools and travel</h2>", *tools] if tools else []),
         "<h2>Limits</h2>",
         *limits_table(tracks),
-        *(["<h2>Guesses, to be checked at the machine</h2>", items(_short(guesses))] if guesses else []),
+        *(["<h2>Guesses to check at the machine</h2>", items(_short(guesses))] if guesses else []),
         *(["<h2>Not checked</h2>", items(_short(result.unchecked))] if result.unchecked else []),
         "<h2>Inputs</h2>",
         definitions(dict(result.provenance.inputs)),
@@ -93,9 +93,9 @@ def _blocks(result: Result, limits: int, room: int) -> list[Block]:
     out += [SheetLine(f"Tools {numbers}; motions [mm]: {box}") for numbers, box in _travel(result)[:room]]
     out += [SheetLine("Limits", True, 1.2), listed if checks else SheetLine("No limit was checked.")]
     if len(checks) > limits:
-        out.append(SheetLine(f"{len(checks) - limits} more limits in report.html; none of them is in a worse state."))
+        out.append(SheetLine(f"{len(checks) - limits} more limits in report.html; none has a worse state."))
     for title, texts in (
-        ("Guesses, to be checked at the machine", _guesses(result)),
+        ("Guesses to check at the machine", _guesses(result)),
         ("Not checked", result.unchecked),
     ):
         if texts:

@@ -91,7 +91,7 @@ def faces_file(
 def _points(points: ArrayLike) -> NDArray[np.float64]:
     p = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     if len(p) == 0:
-        raise InputError("export: no point: there is nothing to write")
+        raise InputError("export: no points: there is nothing to write")
     return p
 
 

@@ -1,4 +1,4 @@
-"""Every quantity of chipload's results: its column name, unit, label and meaning, once.
+"""The table of all quantities in results: column name, unit, label and meaning of each.
 
 The table is used for the fields of history.parquet, the limits, the report, the page and docs/columns.md. A limit has
 the name of the column that it bounds; :data:`BOUNDED` lists the few limits that bound a column of another name.
@@ -20,7 +20,7 @@ class Column:
     ----------
     name : of the column, with the unit in it
     unit : as printed; empty for a count or a word
-    label : as a person reads it
+    label : name shown to the user
     meaning : one sentence
     signed : whether a limit bounds its size, whatever the sign
     least : whether a limit is the least value that is allowed
@@ -48,12 +48,12 @@ _ROWS = (
     ("operation", "", "operation", "number of the operation in the job, from 0"),
     ("track", "", "track", "the strategy, variant, controller or program that the row belongs to"),
     ("pass", "", "pass", "name of the pass or section of the program"),
-    ("line", "", "line", "line of the program's text; 0: none"),
+    ("line", "", "line", "line of the program; 0: none"),
     ("tool", "", "tool", "tool number"),
     ("motion", "", "motion", "rapid, line, arc or dwell"),
     ("rapid", "", "rapid", "whether the step is a rapid"),
     ("s_mm", "mm", "path", "length of the tip's path up to the end of the step"),
-    ("t_s", "s", "time", "time on the machine at the end of the step, with rapids but the one from an unknown place"),
+    ("t_s", "s", "time", "time at the end of the step, with all rapids but the first, whose start is unknown"),
     ("duration_s", "s", "duration", "time that the step takes on the machine"),
     ("cutting_s", "s", "cutting time", "time of the step at the commanded feed"),
     ("x_mm", "mm", "x", "tip in the workpiece frame"),
@@ -82,11 +82,11 @@ _ROWS = (
     ("chip_volume_mm3", "mm\u00b3", "chip volume", "volume that the step removes"),
     ("engaged_volume_mm3", "mm\u00b3", "engaged volume", "volume that the engaged edge sweeps in the step"),
     ("cutting_work_j", "J", "cutting work", "work of the torque without the edge coefficients"),
-    ("chip_areas", "", "chip areas", "separate areas of the chip: on one layer, or by moves of the edge"),
-    ("chip_layers", "", "chip layers", "layers of the stock that lose material"),
+    ("chip_areas", "", "chip areas", "number of separate areas of the chip: on a layer, or along the edge (moves)"),
+    ("chip_layers", "", "chip layers", "number of layers of the stock that lose material"),
     ("flute_fill", "", "chip space", "loose chip volume of a tooth over the volume of its flute"),
     # loads
-    ("force_n", "N", "force", "greatest size of the force on the cutter over a revolution"),
+    ("force_n", "N", "force", "greatest magnitude of the force on the cutter over a revolution"),
     ("force_xy_n", "N", "force across the axis", "greatest force on the cutter across its axis over a revolution"),
     ("force_x_n", "N", "force x", "force on the cutter where the force across the axis is greatest"),
     ("force_y_n", "N", "force y", "force on the cutter where the force across the axis is greatest"),
@@ -100,16 +100,16 @@ _ROWS = (
     ("force_x_min_n", "N", "least force x", "least value over a revolution"),
     ("force_y_min_n", "N", "least force y", "least value over a revolution"),
     ("force_z_min_n", "N", "least force z", "least value over a revolution"),
-    ("force_sd_n", "N", "standard deviation of force", "of the greatest force, by the spread of the coefficients"),
-    ("torque_sd_nm", "N m", "standard deviation of torque", "of greatest torque, by the spread of the coefficients"),
-    ("torque_mean_sd_nm", "N m", "standard deviation of mean torque", "by the spread of the coefficients"),
-    ("power_sd_w", "W", "standard deviation of power", "of the mean power, by the spread of the coefficients"),
-    ("force_normal_n", "N", "normal force", "greatest force that presses on the surface that the step leaves"),
+    ("force_sd_n", "N", "standard deviation of force", "of the greatest force, from the spread of the coefficients"),
+    ("torque_sd_nm", "N m", "standard deviation of torque", "of the greatest torque, from the spread of coefficients"),
+    ("torque_mean_sd_nm", "N m", "standard deviation of mean torque", "from the spread of the coefficients"),
+    ("power_sd_w", "W", "standard deviation of power", "of the mean power, from the spread of the coefficients"),
+    ("force_normal_n", "N", "normal force", "greatest force normal to the surface that the step leaves"),
     ("force_normal_planned_n", "N", "planned normal force", "normal force that the plan expects"),
     ("force_allowable_n", "N", "allowable normal force", "normal force that the workpiece allows at the place"),
     ("force_over_allowable", "", "force over allowable", "normal force over allowable normal force"),
     ("torque_nm", "N m", "torque", "greatest torque on the cutter over a revolution"),
-    ("torque_mean_nm", "N m", "mean torque", "mean torque over a revolution, which the spindle has to give"),
+    ("torque_mean_nm", "N m", "mean torque", "mean torque over a revolution, which the spindle must supply"),
     ("torque_measured_nm", "N m", "measured torque", "torque as the controller measures it"),
     ("torque_planned_nm", "N m", "planned torque", "mean torque that the plan expects at the programmed feed"),
     ("torque_allowable_nm", "N m", "allowable torque", "torque that the workpiece allows at the place"),
@@ -119,44 +119,44 @@ _ROWS = (
     ("strength_share", "", "stress over strength", "greatest equivalent stress of the workpiece over its strength"),
     ("stress_mpa", "MPa", "workpiece stress", "greatest equivalent stress of the workpiece"),
     # deflection and form error
-    ("deflection_um", "\u00b5m", "deflection", "distance by which cutter and workpiece part"),
+    ("deflection_um", "\u00b5m", "deflection", "relative displacement of cutter and workpiece"),
     ("deflection_cutter_um", "\u00b5m", "cutter deflection", "deflection of cutter, holder and spindle"),
     ("deflection_workpiece_um", "\u00b5m", "workpiece deflection", "deflection of the workpiece"),
-    ("deflection_share", "", "deflection over model range", "deflection over the greatest that the rigid model covers"),
+    ("deflection_share", "", "deflection over model range", "deflection over the range of the rigid force model"),
     ("form_error_um", "\u00b5m", "form error", "material left on the surface by deflection; negative: removed", True),
-    ("form_points", "", "finished points", "points of the part's surface that the step finishes"),
+    ("form_points", "", "finished points", "number of points of the part's surface that the step finishes"),
     ("axial_overrun_mm", "mm", "cut above the flutes", "engaged length of the cutter above its flutes"),
     # vibration
-    ("stability_margin", "", "stability margin", "factor on the cutting force, and for straight teeth on the depth of "
-     "cut, at which the step begins to chatter; 3: 3 or more; 0: not known", False, True),
-    ("stable_probability", "", "probability of stability", "that the step does not chatter, by the spread of modes and "
-     "coefficients; 0: it surely chatters, or is not known", False, True),
+    ("stability_margin", "", "stability margin", "factor by which the cutting force (with straight teeth, the depth of "
+     "cut) could grow before the step chatters; 3: 3 or more; 0: unknown", False, True),
+    ("stable_probability", "", "probability of stability", "probability that the step does not chatter, from the "
+     "spread of modes and coefficients; 0: it certainly chatters, or unknown", False, True),
     ("chatter_hz", "Hz", "chatter frequency", "frequency of chatter at the stability margin; 0: the margin is 3"),
-    ("chatter_mode", "", "chatter mode", "number of the mode that chatters, from 1 as in the job; 0: none"),
+    ("chatter_mode", "", "chatter mode", "number of the mode that chatters, from 1 in the order of the job; 0: none"),
     ("sle_um", "\u00b5m", "surface location error", "material left on the wall by forced vibration; negative: removed; "
-     "0 where the step chatters or makes no wall", True),
-    # forces that are measured, beside those of the force model
+     "0 if the step chatters or makes no wall", True),
+    # measured forces, and predicted ones to compare
     ("rotation_deg", "deg", "rotation", "rotation of tooth 0 from the beginning of a slot"),
     ("force_feed_n", "N", "force along the feed", "predicted force on the cutter along the feed"),
     ("force_across_n", "N", "force across the feed", "predicted force on the cutter to the left of the feed"),
     ("force_axis_n", "N", "force along the axis", "predicted force on the cutter along its axis"),
-    ("force_feed_measured_n", "N", "measured force along the feed", "mean turn of the measured force"),
-    ("force_across_measured_n", "N", "measured force across the feed", "mean turn of the measured force"),
-    ("force_axis_measured_n", "N", "measured force along the axis", "mean turn of the measured force"),
-    ("mean_percent", "%", "error of mean force", "predicted less measured mean force, of the measured", True),
-    ("peak_percent", "%", "error of peak force", "predicted less measured peak force, of the measured", True),
+    ("force_feed_measured_n", "N", "measured force along the feed", "measured force, averaged over revolutions"),
+    ("force_across_measured_n", "N", "measured force across the feed", "measured force, averaged over revolutions"),
+    ("force_axis_measured_n", "N", "measured force along the axis", "measured force, averaged over revolutions"),
+    ("mean_percent", "%", "error of mean force", "predicted minus measured mean force, over the measured one", True),
+    ("peak_percent", "%", "error of peak force", "predicted minus measured peak force, over the measured one", True),
     # geometry of the part
     ("gouge_mm", "mm", "gouge", "deepest cut into the part"),
-    ("excess_mm", "mm", "excess", "most material over the part where the cutter came near it"),
+    ("excess_mm", "mm", "excess", "greatest thickness left on the part where the cutter came near it"),
     ("scallop_mm", "mm", "scallop height", "height of the material left between two passes"),
-    ("clearance_mm", "mm", "clearance", "least distance of shank and holder to anything they must not touch"),
-    ("tool_clearance_mm", "mm", "tool clearance", "least distance of the whole tool from points of the walls, but for "
+    ("clearance_mm", "mm", "clearance", "least distance of shank and holder from what they must not touch"),
+    ("tool_clearance_mm", "mm", "tool clearance", "least distance of the whole tool from points of the walls, except "
      "the wall that a pass mills; 20: 20 or more"),
-    ("table_deg", "deg", "table angle", "between the axis of the pallet and the tool axis"),
+    ("table_deg", "deg", "table angle", "angle between the axis of the pallet and the tool axis"),
     ("pallet_deg", "deg", "pallet angle", "direction of the tool axis about the axis of the pallet"),
-    ("largest_diameter_mm", "mm", "largest diameter", "of the largest cutter that reaches a contact point"),
-    ("unreached_points", "", "unreached contact points", "contact points that no cutter of the catalogue reaches"),
-    ("uncertified_points", "", "uncertified contact points", "contact points whose largest cutter is not certified"),
+    ("largest_diameter_mm", "mm", "largest diameter", "diameter of the largest cutter that reaches a contact point"),
+    ("unreached_points", "", "unreached contact points", "number of contact points that no cutter reaches"),
+    ("uncertified_points", "", "uncertified contact points", "number of points whose largest cutter is uncertified"),
     ("time_s", "s", "program time", "time of the program on the machine"),
 )  # fmt: skip
 

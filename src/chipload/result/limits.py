@@ -1,4 +1,4 @@
-"""A limit against the worst value that was found, and its state.
+"""Limit checks: comparison of a limit with the worst value of its column, and the resulting state.
 
 Notation: e relative error of a column, from the resolution of the calculation and from the spread of coefficients; a
 value v stands for v - e |v| .. v + e |v|. A limit that lies above this band holds, one below it is exceeded, one inside
@@ -106,7 +106,7 @@ class LimitCheck:
         least = self.column.least
         if self.worst is None:
             bound = "at least" if least else "at most"
-            return f"{self.column.label} of {bound} {self.limit:g}{unit} is not known: {self.reason}"
+            return f"{self.column.label} of {bound} {self.limit:g}{unit} is unknown: {self.reason}"
         if self.state is Verdict.EXCEEDS:
             beyond = "is below" if least else "exceeds"
             return f"{self.column.label} {self.worst:.4g}{unit} {beyond} {self.limit:g}{unit} {self.where}".rstrip()
@@ -138,7 +138,7 @@ def state_of(
     if not (math.isfinite(worst) and math.isfinite(limit)) or math.isnan(error):
         raise ValueError(f"value {worst} and limit {limit} must be finite, error {error} a number")
     if math.isinf(error):
-        return Verdict.UNPROVEN, reason or "the resolution of the calculation makes an error of unknown size"
+        return Verdict.UNPROVEN, reason or "the resolution of the calculation causes an error of unknown size"
     band = error * abs(worst)
     if least:
         worst, limit = -worst, -limit
@@ -149,7 +149,7 @@ def state_of(
     if worst + band > limit:
         return (
             Verdict.UNPROVEN,
-            f"the value is known to {100.0 * error:.{0 if error >= 0.1 else 1}f} %, and the limit lies within that",
+            f"the value is known to {100.0 * error:.{0 if error >= 0.1 else 1}f} %, and the limit lies within this",
         )
     return Verdict.HOLDS, ""
 

@@ -35,14 +35,14 @@ def read_summary(folder: str | Path) -> Summary:
     path = Path(folder) / SUMMARY
     try:
         if path.stat().st_size > LARGEST_SUMMARY:
-            raise InputError(f"{path}: is larger than {LARGEST_SUMMARY} bytes: no summary of chipload")
+            raise InputError(f"{path}: is larger than {LARGEST_SUMMARY} bytes: not a summary of chipload")
         return Summary.model_validate_json(path.read_bytes())
     except OSError as err:
         raise InputError(f"{path}: cannot be read: {err.strerror}: name a result folder") from None
     except ValidationError as err:
         raise InputError(
-            f"{path}: is no result of schema version {SCHEMA_VERSION} ({err.error_count()} differences): run the job "
-            "again"
+            f"{path}: is not a result of schema version {SCHEMA_VERSION} ({err.error_count()} differences): run the "
+            "job again"
         ) from None
 
 

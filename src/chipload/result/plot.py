@@ -52,7 +52,7 @@ def columns_figure(
         if name not in drawable:
             raise InputError(f"plot: column {name!r}: not known: the nearest is {nearest(name, drawable)}")
     if not names:
-        raise InputError("plot: no column is named: name at least one, as force_n")
+        raise InputError("plot: no column is named: name at least one, such as force_n")
     bound = {column_of(k).name: v for k, v in limits.items() if not k.startswith("spindle")}
     across = np.asarray(columns[x])
     lines = np.asarray(columns.get("line", np.zeros(len(across), dtype=np.int64)))

@@ -1,4 +1,4 @@
-"""The result of a job of any kind: verdict, limits, tracks, findings, maps and where the numbers come from."""
+"""The result of a job of any capability: verdict, limits, tracks, findings, surface maps and provenance."""
 
 from __future__ import annotations
 
@@ -228,7 +228,7 @@ class Result:
     def _chosen(self, name: str) -> Track:
         names = [one.name for one in self.tracks]
         if not names or (name and name not in names):
-            raise InputError(f"track {name!r}: is not in the result: it has {', '.join(names) or 'none'}")
+            raise InputError(f"track {name!r}: is not in the result, which has {', '.join(names) or 'none'}")
         return self.track(name or names[0])
 
     def _history(self, name: str) -> Columns:
@@ -237,7 +237,7 @@ class Result:
         if not columns:
             with_history = [one.name for one in self.tracks if any(True for _ in one.blocks())]
             raise InputError(
-                f"track {chosen.name!r}: has no history: these have one: {', '.join(with_history) or 'none'}"
+                f"track {chosen.name!r}: has no history; tracks with a history: {', '.join(with_history) or 'none'}"
             )
         return columns
 

@@ -28,7 +28,7 @@ from chipload.web.result import PageResult, PageTrack
 #: parts of a cutter: kind and profile (m, 2)
 Parts = list[tuple[str, NDArray[np.float64]]]
 
-UNKNOWN = "A pointer stands for the cutter: no job in the opened folder and no CL data of this result state its shape."
+UNKNOWN = "The cutter is drawn as a pointer: no job in the opened folder and no CL data of this result state its shape."
 
 
 def cutters_of(result: PageResult, track: PageTrack, size: float) -> tuple[dict[int, Parts], str]:

@@ -33,11 +33,11 @@ from chipload.web.result_view import VERDICTS, ResultView
 from chipload.web.runs import JobRun
 
 KEYS = (
-    ("\u2190 \u2192", "one step back or on; with Shift twenty"),
-    ("\u2191 \u2193", "the line of the program before or after"),
+    ("\u2190 \u2192", "one step back or forward; with Shift twenty"),
+    ("\u2191 \u2193", "previous or next line of the program"),
     ("Home, End", "to the beginning, to the end"),
     ("Space", "play, pause"),
-    ("1 2 3 4", "look from a corner, from above, from the front, from the side"),
+    ("1 2 3 4", "view from a corner, from above, from the front, from the side"),
     ("t", "the next operation or strategy"),
     ("o", "open a result or a job"),
     ("?", "this list"),
@@ -186,8 +186,8 @@ class Page:
                     ui.label(key).classes("cl-key")
                     ui.label(meaning)
             ui.label(
-                "Click a plot, a line of the program, a limit or a finding to go there. Drag in the 3D view turns it, "
-                "the wheel zooms, the right button shifts. Drag in a plot zooms it, a double click undoes that."
+                "Click a plot, a line of the program, a limit or a finding to jump to its step. Drag in the 3D view turns "
+                "it, the wheel zooms, the right button shifts. Drag in a plot zooms it, a double click undoes that."
             ).classes("cl-note")
 
     # -- opening ------------------------------------------------------------------------------------------------
@@ -215,7 +215,7 @@ class Page:
                 ui.label(self._called(job)).classes("cl-dialog-title")
                 with ui.element("div").classes("cl-entry"):
                     _button("Run", lambda: self._ask(job), "play_arrow").mark(f"run-{job}")
-                    ui.label("plans, proves and writes a result; it can be stopped").classes("cl-note")
+                    ui.label("plans, checks and writes a result; you can stop it").classes("cl-note")
                 with ui.element("div").classes("cl-job-two"):
                     with ui.element("div").classes("cl-scroll cl-job"):
                         JobForm(resolve_name(self.opened.root, job), lambda values: self._ask(job, values))
@@ -225,7 +225,7 @@ class Page:
 
     def _listed(self, found: list[FolderEntry], all_seen: bool) -> None:
         if not all_seen:
-            ui.label(f"The folder holds more than {ENTRIES} files: only so many were read.").classes("cl-note")
+            ui.label(f"The folder holds more than {ENTRIES} files; the others were not read.").classes("cl-note")
         if not found:
             ui.label("This folder holds no result and no job. `chipload example` copies one.").classes("cl-note")
         for f in found:
@@ -262,7 +262,7 @@ class Page:
         out = f"{last}-changed" if overrides else last
         self.ask.clear()
         with self.ask:
-            ui.label(f"{self._called(job)}: its result goes into this folder of the opened one:").classes("cl-note")
+            ui.label(f"{self._called(job)}: folder for the result, in the opened folder:").classes("cl-note")
             where = ui.input(value=out).props("dense outlined").classes("cl-out").mark("out")
             for text in overrides:
                 ui.label(text).classes("cl-note cl-changed")
@@ -280,7 +280,7 @@ class Page:
         root = self.opened.root
         try:
             if self.runs.now is not None and not self.runs.now.over:
-                raise InputError("a job runs already: stop it first")
+                raise InputError("a job is running: stop it first")
             path = resolve_name(root, job)
             if not is_job(path):
                 raise InputError(f"{job}: is no longer a job")

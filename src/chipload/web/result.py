@@ -148,7 +148,7 @@ def open_result(root: Path, name: str) -> PageResult:
         raise InputError(f"{name}/{HISTORY}: cannot be read: run the job again") from None
     if found.num_rows > ROWS:
         raise InputError(
-            f"{name}/{HISTORY}: {found.num_rows} rows: the page shows at most {ROWS}: run it in longer steps"
+            f"{name}/{HISTORY}: {found.num_rows} rows: the page shows at most {ROWS}: run the job with longer steps"
         )
     drawn = tuple(f.name for f in schema if f.name not in BELONGS and _drawable(f.type))
     wanted = ["t_s", "s_mm", *PLACE, *AXIS, "line", "tool"]

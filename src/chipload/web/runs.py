@@ -62,7 +62,7 @@ class JobRun:
         self._process = process
         told, warned = process.stdout, process.stderr
         if told is None or warned is None:
-            self.state, self.code, self.message = "failed", 1, "the process has no pipes"
+            self.state, self.code, self.message = "failed", 1, "the process has no input or output"
             return
         faults = asyncio.create_task(_tail(warned))
         async for line in told:

@@ -50,14 +50,14 @@ def bodies(result: PageResult) -> tuple[tuple[SceneBody, ...], str]:
     try:
         path = result.file(SCENE)
     except InputError:
-        return (), "This result has no scene: only its path is shown."
+        return (), "This result has no scene; only its path is shown."
     try:
         if path.stat().st_size > LARGEST:
             return (), f"{SCENE} is larger than {LARGEST // 1_000_000} MB: only the path is shown."
         out = scene_bodies(path.read_bytes())
     except Exception:  # a reader of foreign files may fail in any way; the page says so
         return (), f"{SCENE} cannot be read: only the path is shown."
-    return out, bodies_note(out) if out else "The scene of this result holds no body: only the path is shown."
+    return out, bodies_note(out) if out else "The scene of this result has no bodies; only the path is shown."
 
 
 def covered_bodies(solids: Sequence[SceneBody]) -> tuple[str, ...]:
@@ -135,7 +135,7 @@ def page_scene(
         cell = float(removal.cell.max())
         notice += f" The stock is drawn in cells of {cell:.2g} mm, in {len(removal.rows)} frames."
     elif any(b.kind == "stock" for b in solids):
-        notice += " The stock does not change with the slider: this result holds one state of it."
+        notice += " The stock does not change with the slider, because this result holds only one state of it."
     if removal is None:
         notice = f"{notice} {refused_stock(result, track)}".strip()
     size = 0.25 * float(np.linalg.norm(np.ptp(track.place, axis=0)))

@@ -69,7 +69,7 @@ def source_of(result: PageResult, track: PageTrack) -> TrackText | None:
         original = find_by_hash(result.root, wanted)
         if original is not None and original.stat().st_size <= LARGEST:
             return TrackText(original.name, _lines(original), track.line, "")
-        note = f"CL data of {wanted.rsplit(' sha256 ', 1)[0]}, whose own text is not in the opened folder"
+        note = f"CL data of {wanted.rsplit(' sha256 ', 1)[0]}; the original program is not in the opened folder"
     for name in track.own.programs:
         try:
             path = result.file(name)

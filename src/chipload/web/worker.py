@@ -51,14 +51,14 @@ def work(job: str, out: str, *overrides: str) -> dict[str, Any]:
         known = is_full(err)
         return {"code": 4 if known else 1, "message": str(cannot_write("the disk", err)) if known else _fault(err)}
     except (KeyboardInterrupt, Cancelled):
-        why = f"{held}: the next run goes on from there" if held else "nothing was written"
+        why = f"{held}: the next run continues from there" if held else "nothing was written"
         return {"code": 130, "message": f"stopped: {why}"}
     except Exception as err:
         return {"code": 1, "message": _fault(err)}
 
 
 def _fault(err: Exception) -> str:
-    return f"a fault of chipload: {type(err).__name__}: {err}"
+    return f"an error in chipload: {type(err).__name__}: {err}"
 
 
 class Teller:

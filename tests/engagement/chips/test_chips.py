@@ -111,5 +111,5 @@ def test_figure_shows_pieces_in_the_same_colours_on_both():
     for found in by_name.values():
         assert len({colour for _, colour in found}) == 1
     assert figure.layout.title.text == "a step"
-    with pytest.raises(InputError, match="the cutter never is in this layer"):
+    with pytest.raises(InputError, match="the cutter is never in this layer"):
         diagram_figure(move, FLAT, 100.0)

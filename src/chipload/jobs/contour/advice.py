@@ -84,7 +84,9 @@ def greatest_engagement(
             "feed_mm_min or axial_depth_mm"
         )
     if by is None:
-        what = "limits.engagement_deg" if most < GREATEST_DEG else "no limit below the greatest that is planned"
+        what = (
+            "limits.engagement_deg" if most < GREATEST_DEG else "no limit below the greatest engagement that is planned"
+        )
         return EngagementAdvice(math.radians(most), f"engagement {most:.4g} deg, by {what}")
     while high - low > CLOSE_DEG:
         middle = 0.5 * (low + high)

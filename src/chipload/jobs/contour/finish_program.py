@@ -209,7 +209,7 @@ def finish_contours(finish: FinishProgram, cutter: Cutter, milling: str, side: s
     walls = offset([path], -cutter.radius if right else cutter.radius)
     if len(walls) != 1:
         raise InputError(
-            f"part.file = {finish.file.name}: the wall beside the path has {len(walls)} parts: must be one"
+            f"part.file = {finish.file.name}: the wall beside the path has {len(walls)} parts: must have one"
         )
     sides = (
         ("left", "right") if not path.closed else ("inside", "outside") if path.area > 0.0 else ("outside", "inside")
@@ -264,7 +264,7 @@ def _with_level(finish: FinishProgram, planned: Program, machine: Machine) -> tu
     """The text with the semi-finish passes of one level, and its motions."""
     found = MODES.get(finish.dialect, _MODES).search(_COMMENT.sub(" ", finish.text))
     if found is not None:
-        raise InputError(f"{finish.file.name}: not written back: the text states {found[0]}")
+        raise InputError(f"{finish.file.name}: not written back: the program contains {found[0]}")
     rows = _semifinish_rows(planned)
     p, k = finish.program, finish.safe
     line = int(p.line[k])

@@ -115,7 +115,7 @@ def _contradictions(table: ContourJobTable, cutters: Mapping[int, Cutter]) -> It
 def _wrong_stock(table: ContourJobTable) -> Iterator[str]:
     """What contradicts a stock that an earlier result left."""
     if any(op.kind != "pocket" for op in table.operation):
-        yield "stock.file: only pockets begin in the stock of an earlier result: leave it out for the other kinds"
+        yield "stock.file: only pockets can continue from an earlier result: leave it out for other kinds"
     if table.part.stock_layers:
         yield "stock.file and part.stock_layers: state one of them: the file holds the outline"
     for k, op in enumerate(table.operation):
@@ -133,7 +133,10 @@ def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int,
     if op.side in ("left", "right"):
         yield f"{at}.side = '{op.side}': must be inside or outside of a pocket"
     if op.entry == "ramp" and "trochoidal" in (op.strategies or ()):
-        yield f"{at}.entry = 'ramp': circles begin at a bore: state helix, or leave trochoidal out of {at}.strategies"
+        yield (
+            f"{at}.entry = 'ramp': trochoidal passes begin at a bore: state helix, or leave trochoidal out of "
+            f"{at}.strategies"
+        )
     if op.rest_of is None:
         return
     if op.rest_of >= k or table.operation[op.rest_of].kind != "pocket":
@@ -141,7 +144,7 @@ def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int,
         return
     before = table.operation[op.rest_of]
     if before.tabs is not None:
-        yield f"{at}.rest_of = {op.rest_of}: that operation leaves tabs, which are not known to this one"
+        yield f"{at}.rest_of = {op.rest_of}: that operation leaves tabs, which this one does not know"
     deep, own_depth = depth_of(before), depth_of(op, finished=True)
     if own_depth > deep + 1e-9:
         yield (

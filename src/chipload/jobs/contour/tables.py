@@ -33,150 +33,166 @@ STRATEGIES: Mapping[str, tuple[str, ...]] = {
 
 
 class PartTable(Table):
-    """What is to be made: a drawing (DXF), a model (STEP), or the finish path of a program (NC, CL data)."""
+    """The contours to be milled: a drawing (DXF), a model (STEP), or the finish path of a program (NC, CL data)."""
 
-    file: Text
-    units: Unit | None = Field(None, description="overrides the units of the drawing")
-    units_if_unstated: Unit | None = Field(None, description="units of a drawing that names none")
+    file: Text = Field(description="path of the drawing, the model or the program")
+    units: Unit | None = Field(None, description="unit that replaces the unit of the drawing")
+    units_if_unstated: Unit | None = Field(None, description="unit of a drawing that states none")
     layers: tuple[Text, ...] = Field(
-        (), description="layers that are read; none: all that the drawing shows, neither off nor frozen"
+        (), description="layers to read; default: all layers that are neither off nor frozen"
     )
-    join_mm: NotNegative = Field(0.01, le=10.0, description="gaps up to this are closed and reported")
+    join_mm: NotNegative = Field(0.01, le=10.0, description="gaps up to this width are closed and reported")
     open_chains: Literal["kept", "dropped"] = Field(
-        "kept", description="`dropped`: lines that close no contour, as centre lines, are left out and reported"
+        "kept", description="dropped: lines that close no contour, such as centre lines, are left out and reported"
     )
-    tolerance_mm: Positive = Field(0.001, ge=1e-6, le=1.0, description="how far arcs may leave splines and ellipses")
+    tolerance_mm: Positive = Field(
+        0.001, ge=1e-6, le=1.0, description="greatest deviation of arcs from splines and ellipses"
+    )
     stock_layers: tuple[Text, ...] = Field(
-        (), description="layers of a drawing that hold the outline of the stock of a pocket; none: material everywhere"
+        (), description="layers with the outline of the stock of a pocket; default: material everywhere"
     )
     lines: tuple[LineNumber, ...] = Field(
         (),
-        description="first and last line of a program that make the wall, of each height in turn, from above; none: "
-        "all that cuts below the stock's top",
+        description="first and last line of a program that mill the wall, for each height in turn from the top; "
+        "default: all lines that cut below the top of the stock",
     )
     labels: tuple[Text, ...] = Field(
         (),
         max_length=2,
-        description="in place of lines: a text of the program (block number, comment) behind which the wall begins, at "
-        "each height anew, and one before which it ends; none: where the cut ends",
+        description="instead of lines: a text of the program (block number, comment) after which the wall begins at "
+        "each height, and one before which it ends; without the second it ends where the cut ends",
     )
     face_z_mm: Number | None = Field(None, description="height of the planar face of a STEP file")
     origin_mm: tuple[Number, Number] = Field(
-        (0.0, 0.0), description="place of a drawing or a model that is X0 Y0 of the job and of the program"
+        (0.0, 0.0), description="point of the drawing or model that becomes X0 Y0 of the job and the program"
     )
 
 
 class StockTable(Table):
-    """What it is made from."""
+    """The stock."""
 
     top_mm: Number = Field(description="z of the top of the stock")
     file: Text | None = Field(
         None,
-        description="stock.npz of an earlier result: pockets cut what stands in it; none: material everywhere, or as "
-        "part.stock_layers, holes_mm and rest_of say",
+        description="stock.npz of an earlier result, which pockets continue to cut; default: material everywhere, "
+        "except as stated by part.stock_layers, holes_mm and rest_of",
     )
 
 
 class FloorFinishTable(Table):
-    """The finish pass of the floor of a pocket, which takes floor_allowance_mm."""
+    """The finish pass of the floor of a pocket, which removes floor_allowance_mm."""
 
     feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's centre")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
 
 
 class WallFinishTable(Table):
-    """The finish passes of the walls of a pocket, which take allowance_mm within the same engagement."""
+    """The finish passes of the walls of a pocket, which remove allowance_mm within the same engagement."""
 
     feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's centre")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
     axial_depth_mm: Positive | None = Field(
-        None, description="greatest depth of a level; none: the whole depth of the pocket in one"
+        None, description="greatest depth of a level; default: the whole depth of the pocket at once"
     )
-    allowance_mm: NotNegative = Field(0.0, description="left on the walls in turn")
+    allowance_mm: NotNegative = Field(0.0, description="allowance that the wall finish leaves on the walls")
 
 
 class TabsTable(Table):
-    """Strips that stay over the floor of a pocket, straight across it, and hold what it cuts out."""
+    """Tabs: strips straight across the floor of a pocket that hold the piece that is cut out."""
 
     at_mm: tuple[tuple[Number, Number], ...] = Field(
-        min_length=1, description="x, y of each on the wall of what is held"
+        min_length=1, description="x, y of each tab on the wall of the piece that it holds"
     )
-    width_mm: Positive
-    height_mm: Positive = Field(description="of their tops over the floor")
+    width_mm: Positive = Field(description="width of a tab")
+    height_mm: Positive = Field(description="height of a tab above the floor")
 
 
 class OperationTable(Table):
-    """One operation; which keys it needs depends on its kind, see :data:`NEEDS`."""
+    """One operation. The required keys depend on its kind."""
 
-    kind: Literal["contour", "forward", "pocket"]
+    kind: Literal["contour", "forward", "pocket"] = Field(description="kind of the operation")
     cutter: Count = Field(description="number of a [[cutter]]")
-    milling: Literal["down", "up"]
+    milling: Literal["down", "up"] = Field(description="down milling (climb) or up milling (conventional)")
     radial_depth_mm: Positive | None = Field(None, description="depth of cut across the wall")
-    axial_depth_mm: Positive = Field(description="depth of cut along the axis; of a pocket, the greatest of a level")
+    axial_depth_mm: Positive = Field(
+        description="depth of cut along the axis; for a pocket, the greatest depth of a level"
+    )
     feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's centre")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
-    step_mm: Positive = Field(ge=1e-4, le=10.0, description="step of the history")
+    step_mm: Positive = Field(ge=1e-4, le=10.0, description="longest step of the history")
     clearance_mm: Positive = Field(description="height of rapids above the top of the stock")
     side: Literal["inside", "outside", "left", "right"] | None = Field(
-        None, description="where the cutter runs; outside of a pocket: around the contours, within the stock"
+        None,
+        description="side of the contour on which the cutter runs; outside for a pocket: around the contours, within "
+        "the stock",
     )
     strategies: tuple[Strategy, ...] | None = Field(
-        None, description="compared: plain, backward, feed of a contour; pocket, trochoidal of a pocket, none: pocket"
+        None,
+        description="strategies to compare: plain, backward, feed for a contour; pocket, trochoidal for a pocket "
+        "(default pocket)",
     )
-    use: Strategy | None = Field(None, description="the strategy whose program is released")
-    joint: Literal["sharp", "clothoid"] | None = None
+    use: Strategy | None = Field(None, description="strategy whose program is released")
+    joint: Literal["sharp", "clothoid"] | None = Field(
+        None, description="how the parts of a reshaped path are joined: with a corner, or with a clothoid"
+    )
     semifinish_depth_mm: Positive | None = Field(
         None, le=100.0, description="radial depth of the first pass on a straight wall"
     )
-    passes: Count | None = Field(None, description="passes before the finish pass, or passes of forward")
+    passes: Count | None = Field(
+        None, description="number of passes before the finish pass; for kind forward, number of passes"
+    )
     tolerance_mm: Positive | None = Field(
-        None, ge=1e-6, le=1.0, description="how far eased joints may leave the drawing"
+        None, ge=1e-6, le=1.0, description="greatest deviation of rounded joints from the drawing"
     )
     lead_mm: Positive | None = Field(None, le=1000.0, description="radius of the lead-in")
-    allowance_mm: NotNegative | None = Field(None, description="left on the wall, by clearing where it is finished")
-    floor_allowance_mm: NotNegative | None = Field(None, description="left on the floor by clearing; none: 0")
+    allowance_mm: NotNegative | None = Field(
+        None, description="allowance on the wall; with wall_finish, the allowance that clearing leaves"
+    )
+    floor_allowance_mm: NotNegative | None = Field(
+        None, description="allowance that clearing leaves on the floor; default 0"
+    )
     floor_finish: FloorFinishTable | None = Field(
-        None, description="finish pass of the floor; none: it keeps floor_allowance_mm"
+        None, description="finish pass of the floor; default: the floor keeps floor_allowance_mm"
     )
     wall_finish: WallFinishTable | None = Field(
-        None, description="finish passes of the walls; none: they keep allowance_mm"
+        None, description="finish passes of the walls; default: the walls keep allowance_mm"
     )
-    tabs: TabsTable | None = Field(None, description="strips that stay over the floor; none: nothing stays")
+    tabs: TabsTable | None = Field(None, description="tabs that hold what is cut out; default: no tabs")
     link_feed_mm_min: Positive | None = Field(
-        None, le=1e5, description="feed of links through cleared space; none: the machine's greatest feed"
+        None, le=1e5, description="feed of links through cleared space; default: the greatest feed of the machine"
     )
-    link_lift_mm: NotNegative | None = Field(None, description="clearance of long links above the floor; none: 0.1")
+    link_lift_mm: NotNegative | None = Field(None, description="height of long links above the floor; default 0.1")
     engagement_deg: Literal["limit"] | Engagement | None = Field(
         None,
-        description="engagement that a pocket keeps, instead of radial_depth_mm; limit: the greatest within all limits",
+        description="engagement of a pocket, instead of radial_depth_mm; limit: the greatest that all limits allow",
     )
     entry: Literal["helix", "ramp"] | None = Field(
-        None, description="into the solid: a helical bore, or a ramp to and fro along a straight line; none: helix"
+        None, description="entry into the solid: helical bore, or ramp to and fro along a straight line; default helix"
     )
     depth_mm: Positive | None = Field(
-        None, description="of the pocket, cut in equal levels of at most axial_depth_mm; none: one level"
+        None, description="depth of the pocket, cut in equal levels of at most axial_depth_mm; default: one level"
     )
     holes_mm: tuple[Hole, ...] | None = Field(
-        None, description="pre-drilled holes to enter by, as deep as the pocket: x, y, diameter of each"
+        None, description="pre-drilled holes for the entry, as deep as the pocket: x, y and diameter of each"
     )
     rest_of: int | None = Field(
         None,
         ge=0,
-        description="number of an earlier pocket operation, from 0: rest machining of what its larger cutter left",
+        description="rest machining after an earlier pocket operation with a larger cutter: its number, from 0",
     )
 
 
 class ContourLimitsTable(Limits):
-    """What a planned program must not exceed."""
+    """Limits of a planned program."""
 
-    engagement_deg: Positive | None = Field(None, le=180.0)
-    force_xy_n: Positive | None = None
-    torque_nm: Positive | None = None
-    form_error_um: Positive | None = None
+    engagement_deg: Positive | None = Field(None, le=180.0, description="greatest engagement angle")
+    force_xy_n: Positive | None = Field(None, description="greatest force across the axis")
+    torque_nm: Positive | None = Field(None, description="greatest torque on the cutter")
+    form_error_um: Positive | None = Field(None, description="greatest form error by deflection of the cutter")
 
 
 class ContourJobTable(Table):
-    """The whole file of a job that is planned."""
+    """The job file of a job that plans contours or pockets."""
 
     part: PartTable
     stock: StockTable
@@ -192,7 +208,7 @@ class ContourJobTable(Table):
 ALWAYS = {"kind", "cutter", "milling", "axial_depth_mm", "feed_mm_min", "speed_rpm", "step_mm"}
 
 
-#: keys that each kind needs beside those that all need
+#: further keys that each kind needs
 NEEDS: Mapping[str, tuple[str, ...]] = {
     "contour": ("side", "strategies", "joint", "radial_depth_mm", "semifinish_depth_mm", "tolerance_mm", "lead_mm"),
     "forward": ("side", "radial_depth_mm", "lead_mm"),
@@ -200,7 +216,7 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
 }
 
 
-#: keys that each kind also understands
+#: optional keys of each kind
 MAY: Mapping[str, tuple[str, ...]] = {
     "contour": ("use", "passes"),
     "forward": ("passes",),

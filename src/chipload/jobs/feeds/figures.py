@@ -28,8 +28,8 @@ CAUSES = {
     "fastest": "the greatest feed that the job allows",
     "machine": "the acceleration and the rates of the machine",
     "air": "the feed in air",
-    "programmed": "programmed feed kept: the line cuts nothing, or films only",
-    "slowest": "the least feed that the job allows, although a limit asks for less",
+    "programmed": "programmed feed kept: the line cuts nothing, or only thin films",
+    "slowest": "the least feed that the job allows, although a limit requires less",
 }
 #: lines that the report lists
 LISTED = 60

@@ -38,10 +38,10 @@ def load(path: Path, table: FeedsJobTable, overrides: Sequence[str]) -> FeedsJob
 
 def _contradictions(table: FeedsJobTable) -> Iterator[str]:
     if table.operation[0].speeds is not None:
-        yield "operation.0.speeds: with feeds: ask for speeds first, then for feeds of the new program"
+        yield "operation.0.speeds: cannot be used with feeds: find speeds first, then feeds for the new program"
     if not any(getattr(table.limits, name) is not None for name in LOADS):
         yield (
-            f"operation.0.feeds: no limit of a load is stated, so nothing would hold them: state at least one of "
+            f"operation.0.feeds: no load limit is stated, so nothing would bound the feeds: state at least one of "
             f"{', '.join(LOADS)} in [limits]"
         )
 

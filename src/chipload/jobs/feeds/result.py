@@ -25,7 +25,7 @@ def result_of(program: FeedsProgram) -> Result:
         found=_rubbing(own), blocks=lambda: _with_cause(simulation, own),
     )  # fmt: skip
     numbers = {"feeds": feed_numbers(own, simulation, tracks[0].limits, time_s, name)}
-    note = f"The program takes {time_s:.4g} s, before {own.seconds_before:.4g} s."
+    note = f"The program takes {time_s:.4g} s instead of {own.seconds_before:.4g} s."
     return program_result("feeds", program, tracks, numbers, note)
 
 

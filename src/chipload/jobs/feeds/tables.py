@@ -9,29 +9,35 @@ from chipload.jobs.tables import NotNegative, Positive, Table
 
 
 class FeedsTable(Table):
-    """New feeds for the lines of the program, as fast as the stated limits of loads allow; the path stays."""
+    """New feeds for the lines of the program, as fast as the stated limits allow. The path does not change."""
 
-    slowest_percent: Positive = Field(le=100.0, description="least feed of a line that cuts, of the programmed one")
-    fastest_percent: Positive = Field(ge=100.0, le=1e4, description="greatest feed of a line that cuts, likewise")
+    slowest_percent: Positive = Field(
+        le=100.0, description="least feed of a line that cuts, in percent of the programmed feed"
+    )
+    fastest_percent: Positive = Field(
+        ge=100.0, le=1e4, description="greatest feed of a line that cuts, in percent of the programmed feed"
+    )
     fastest_mm_min: Positive | None = Field(None, le=1e6, description="greatest feed of a line that cuts")
     tooth_feed_least_mm: Positive | None = Field(
-        None, description="least feed per tooth of a line that cuts, so that it does not rub"
+        None, description="least feed per tooth of a line that cuts, to avoid rubbing"
     )
     air_mm_min: Positive | None = Field(
-        None, le=1e6, description="feed of a line without a cut, if it is slower; none: unchanged"
+        None, le=1e6, description="feed of a line that cuts nothing, if it is slower; default: unchanged"
     )
     change_least_percent: NotNegative = Field(
-        5.0, lt=100.0, description="a feed that could rise by less than this stays that of the line before"
+        5.0,
+        lt=100.0,
+        description="a line keeps the feed of the previous line if its own could be faster by less than this",
     )
 
 
 class FeedsOperationTable(SimulateTable):
-    """Simulate the program, give its lines new feeds, simulate the new text from fresh stock."""
+    """Simulate the program, give its lines new feeds, and simulate the new program from fresh stock."""
 
     feeds: FeedsTable = Field(description="new feeds for the lines of the program")
 
 
 class FeedsJobTable(SimulationJobTable):
-    """The whole file of a job that changes the feeds of a program."""
+    """The job file of a job that changes the feeds of a program."""
 
     operation: tuple[FeedsOperationTable, ...] = Field(min_length=1, max_length=1)

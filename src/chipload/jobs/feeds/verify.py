@@ -40,7 +40,7 @@ def require_same(old: Program, new: Program, line: Ints, factor: Floats) -> None
         wrong, at = bool(off.any()), int(old.line[np.argmax(off)])
     if wrong:
         where = f"line {at}: " if at else ""
-        raise InputError(f"{where}its feed cannot be set by a word of its own: convert the program first")
+        raise InputError(f"{where}its feed cannot be set by its own F word: convert the program first")
 
 
 def rubbing_lines(

@@ -181,7 +181,7 @@ def _require_sources(made: ProgramJobTable) -> None:
     errors.texts += clamp_errors(made)
     errors.refuse()
     if made.operation[0].speeds is not None:
-        raise InputError("speeds: are changed in the text of a job's program: write a job (chipload run)")
+        raise InputError("speeds: can only be changed in the program of a job: write a job and use chipload run")
 
 
 def _with_cutters(
@@ -213,7 +213,7 @@ def _reading(
     if isinstance(program, Program):
         for key, value in (("dialect", dialect), ("feed_mm_min", feed)):
             if value is not None:
-                raise InputError(f"{key}: is of a program's file: leave it out with a Program")
+                raise InputError(f"{key}: applies to a program file: leave it out with a Program")
         return reading_of(program, machine, tolerance=tolerance)
     speed = None if feed is None else mm_s_from_mm_min(feed)
     setup = Setup(cutters=cutters or {})

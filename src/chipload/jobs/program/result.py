@@ -42,7 +42,7 @@ def result_of(program: ProgramResult) -> Result:
             f"tool {t.tool} {f'in lines {t.lines[0]} to {t.lines[1]} ' if count[t.tool] > 1 else ''}{t.rpm:g} rpm"
             for t in own.tools
         )
-        note = f"The program takes {time_s:.4g} s, before {own.seconds_before:.4g} s; {tools}."
+        note = f"The program takes {time_s:.4g} s instead of {own.seconds_before:.4g} s; {tools}."
         return program_result("program", program, tracks, numbers, note)
     return program_result("program", program, (_track(program),), numbers)
 

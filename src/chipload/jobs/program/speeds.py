@@ -145,23 +145,23 @@ def _new_text(text: str, program: Program, wanted: Floats, added: Mapping[int, f
         if len(tools) > 1:
             named = ", ".join(map(str, tools.tolist()))
             raise InputError(
-                f"line {word.line}: S{word.rpm:g} holds for tools {named}: write an S word behind each tool change"
+                f"line {word.line}: S{word.rpm:g} applies to tools {named}: write an S word after each tool change"
             )
         if len(new) > 1:
             raise InputError(
-                f"line {word.line}: S{word.rpm:g} holds in two zones of tool {tools[0]}: write an S word between them"
+                f"line {word.line}: S{word.rpm:g} applies to two zones of tool {tools[0]}: write an S word between them"
             )
         speeds[word.line] = round(rpm_from_rad_s(float(new[0])), 6)
     if (changed & (under < 0)).any():
         raise InputError(
-            f"line {program.line[changed & (under < 0)][0]}: cuts at a speed that no S word above it states"
+            f"line {program.line[changed & (under < 0)][0]}: cuts at a speed that no earlier S word states"
         )
     feeds: dict[int, float] = {}
     for row in np.flatnonzero((program.motion != RAPID) & (program.motion != DWELL)).tolist():
         line, speed = int(program.line[row]), abs(float(program.spindle[row]))
         factor = float(wanted[row]) / speed if not np.isnan(wanted[row]) and speed > 0.0 else 1.0
         if feeds.setdefault(line, factor) != factor:
-            raise InputError(f"line {line}: moves at two speeds: write them on lines of their own")
+            raise InputError(f"line {line}: moves at two speeds: write each on a separate line")
     scaled = {line: 1.0 if abs(f - 1.0) < 1e-9 else f for line, f in feeds.items()}
     return with_speeds(text, speeds, scaled, added)
 
@@ -183,4 +183,4 @@ def _same(old: Program, new: Program, wanted: Floats) -> None:
         wrong, at = bool(off.any()), int(old.line[np.argmax(off)])
     if wrong:
         where = f"line {at}: " if at else ""
-        raise InputError(f"{where}its speed cannot be set by words of its own: convert the program first")
+        raise InputError(f"{where}its speed cannot be set by its own S word: convert the program first")

@@ -29,7 +29,7 @@ def clamp_errors(table: SimulationJobTable) -> Iterator[str]:
     limited = table.limits.deflection_workpiece_um is not None
     given = table.stiffness is not None and table.stiffness.work_n_um is not None
     if limited and table.workpiece is None and not given:
-        yield "limits.deflection_workpiece_um: needs what the workpiece is made of and its clamps: state [workpiece]"
+        yield "limits.deflection_workpiece_um: needs the workpiece and its clamps: state [workpiece]"
     if table.workpiece is None:
         return
     if given:

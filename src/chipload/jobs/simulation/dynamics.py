@@ -73,7 +73,7 @@ def dynamics_of(
     listed = [*table.mode, *(read_modes(folder / table.file) if table.file is not None else ())]
     density = None if workpiece is None else workpiece.density_kg_m3
     if not listed and density is None:
-        raise InputError("dynamics: no mode: state [[dynamics.mode]] or file (chipload tap makes one)")
+        raise InputError("dynamics: has no mode: state [[dynamics.mode]], or a file of chipload tap")
     unknown: list[str] = []
     known: list[tuple[int, ModeTable, float]] = []
     for k, mode in enumerate(listed, 1):

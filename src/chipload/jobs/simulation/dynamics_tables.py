@@ -1,4 +1,4 @@
-"""The tables of a job about vibration: modes of cutter and workpiece, and speeds that are asked for."""
+"""The job tables of vibration: modes of cutter and workpiece, process damping and new spindle speeds."""
 
 from __future__ import annotations
 
@@ -19,37 +19,41 @@ Direction = Annotated[
 
 
 class ModeTable(Table):
-    """A mode of vibration at the cutter's tip, or of the workpiece where it is cut."""
+    """A mode of vibration at the tip of the cutter, or of the workpiece where it is cut."""
 
-    tool: Count | None = Field(None, description="tool number; none: every tool")
-    of: Literal["cutter", "workpiece"] = Field("cutter", description="cutter: with holder and spindle")
+    tool: Count | None = Field(None, description="tool number; default: every tool")
+    of: Literal["cutter", "workpiece"] = Field(
+        "cutter", description="vibrating body; cutter includes holder and spindle"
+    )
     frequency_hz: Positive = Field(description="natural frequency")
-    damping_ratio: Positive | None = Field(None, lt=1.0, description="not stated: stability is unproven")
+    damping_ratio: Positive | None = Field(None, lt=1.0, description="damping ratio; without it, stability is unproven")
     stiffness_n_um: Positive | None = Field(None, description="modal stiffness")
-    mass_kg: Positive | None = Field(None, description="modal mass, in place of stiffness_n_um")
-    direction: Direction = Field(description="x, y, z, [x, y] or [x, y, z] of the machine")
+    mass_kg: Positive | None = Field(None, description="modal mass, instead of stiffness_n_um")
+    direction: Direction = Field(description="direction in machine coordinates: x, y, z, [x, y] or [x, y, z]")
 
 
 class ProcessDampingTable(Table):
-    """Damping by a worn edge that rubs, most at low speeds; without it none is counted, which is the safe side."""
+    """Damping by a worn edge that rubs, greatest at low speeds. To leave it out is the safe assumption."""
 
-    indentation_n_mm3: Positive = Field(description="force per volume that the edge displaces, of workpiece and edge")
-    wear_land_mm: Positive = Field(description="width of the wear land: state the least that it will have")
-    friction: NotNegative = Field(0.0, description="between edge and workpiece")
+    indentation_n_mm3: Positive = Field(description="indentation force of the edge per displaced volume")
+    wear_land_mm: Positive = Field(description="least width of the wear land during the cut")
+    friction: NotNegative = Field(0.0, description="coefficient of friction between edge and workpiece")
 
 
 class DynamicsTable(Table):
-    """Modes of vibration of cutter and workpiece: with them every step has a stability margin."""
+    """Modes of vibration of cutter and workpiece. They give each step a stability margin."""
 
-    file: Text | None = Field(None, description="modes as [[mode]], as chipload tap writes them")
-    mode: tuple[ModeTable, ...] = Field((), description="modes in the job")
+    file: Text | None = Field(None, description="file with [[mode]] tables, as chipload tap writes it")
+    mode: tuple[ModeTable, ...] = Field((), description="modes stated in the job")
     frequency_percent: NotNegative | None = Field(
-        None, lt=100.0, description="standard deviation of the frequencies; stated with the next two: each step has a "
-        "probability of stability",
+        None, lt=100.0, description="standard deviation of the natural frequencies; with it and the next two keys, "
+        "each step has a probability of stability",
     )  # fmt: skip
-    damping_percent: NotNegative | None = Field(None, lt=100.0, description="of the damping ratios")
-    stiffness_percent: NotNegative | None = Field(None, lt=100.0, description="of the stiffnesses")
-    process_damping: ProcessDampingTable | None = Field(None, description="by worn edges; none: not counted")
+    damping_percent: NotNegative | None = Field(None, lt=100.0, description="standard deviation of the damping ratios")
+    stiffness_percent: NotNegative | None = Field(
+        None, lt=100.0, description="standard deviation of the modal stiffnesses"
+    )
+    process_damping: ProcessDampingTable | None = Field(None, description="damping by worn edges; default: left out")
 
 
 class ModesFileTable(Table):
@@ -60,11 +64,11 @@ class ModesFileTable(Table):
 
 
 class SpeedsTable(Table):
-    """New spindle speeds with the greatest stability margin, one a tool or one a zone; the feed per tooth stays."""
+    """New spindle speeds with the greatest stability margin for each tool or zone, at unchanged feed per tooth."""
 
     by: Literal["tool", "zone"] = Field(
-        "tool", description="zone: where one speed is not quiet for all passes of a tool, it changes between passes, "
-        "out of the material",
+        "tool", description="tool: one speed for each tool; zone: if no speed is quiet for all passes of a tool, the "
+        "speed changes between passes, outside the material",
     )  # fmt: skip
-    least_rpm: Positive | None = Field(None, description="none: that of the machine")
-    most_rpm: Positive | None = Field(None, description="none: that of the machine")
+    least_rpm: Positive | None = Field(None, description="least speed; default: that of the machine")
+    most_rpm: Positive | None = Field(None, description="greatest speed; default: that of the machine")

@@ -37,8 +37,8 @@ from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 
-SPREAD = "\u00b1 is twice the standard deviation that the spread of the material's coefficients gives."
-NO_SPREAD = "The material states neither a spread nor a covariance of its coefficients, so the forces have no band."
+SPREAD = "\u00b1 is two standard deviations, from the spread of the material's coefficients."
+NO_SPREAD = "The material states neither a spread nor a covariance of its coefficients, so the forces have no interval."
 #: rows of the figure: lines (column, name, colour), the title of their axis, and the limit
 ROWS = (
     (

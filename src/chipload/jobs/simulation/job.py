@@ -80,7 +80,7 @@ def program_job(
             tools = cutters(table.cutter, folder)
         changed = [key for key in ("feeds", "speeds") if getattr(table.operation[0], key, None) is not None]
         errors.texts += [
-            f"operation.0.{changed[0]}: cutter {n} is a body (body_mm) whose load is not known: leave {changed[0]} out"
+            f"operation.0.{changed[0]}: cutter {n} is a body (body_mm) whose load is unknown: leave {changed[0]} out"
             for n, cutter in tools.items()
             if cutter.body and changed
         ]
@@ -137,7 +137,7 @@ def _contradictions(table: SimulationJobTable) -> Iterator[str]:
             yield "stock.layer_mm: leave it out: the layers of an earlier result stay"
     for k, op in enumerate(table.operation):
         if op.workers > 1 and op.engine == "moves":
-            yield f"operation.{k}.workers = {op.workers}: shares layers only: state engine = 'layers' or leave it out"
+            yield f"operation.{k}.workers = {op.workers}: applies to layers: state engine = 'layers' or leave it out"
     yield from clamp_errors(table)
     plate = table.machine_table
     for axis, low, high in zip("XYZ", plate.low_mm, plate.high_mm, strict=True) if plate is not None else ():
@@ -145,7 +145,7 @@ def _contradictions(table: SimulationJobTable) -> Iterator[str]:
             yield f"machine_table.low_mm: {axis} = {low:g}: must be below high_mm, {axis} = {high:g}"
     for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if table.part is None and getattr(table.limits, key) is not None:
-            yield f"limits.{key}: needs the part that should come out: state [part] or leave it out"
+            yield f"limits.{key}: needs the finished part: state [part] or leave it out"
     if table.dynamics is None:
         for key in ("stability_margin", "stable_probability", "sle_um"):
             if getattr(table.limits, key) is not None:
@@ -153,7 +153,10 @@ def _contradictions(table: SimulationJobTable) -> Iterator[str]:
         if table.operation[0].speeds is not None:
             yield "operation.0.speeds: needs modes of vibration: state [dynamics] or leave it out"
     elif table.limits.stable_probability is not None and table.dynamics.frequency_percent is None:
-        yield "limits.stable_probability: needs spreads: state frequency_percent, damping_percent and stiffness_percent"
+        yield (
+            "limits.stable_probability: needs deviations of the modes: state frequency_percent, damping_percent and "
+            "stiffness_percent"
+        )
     if not table.limits.stated:
         names = ", ".join(ProgramLimitsTable.model_fields)
         yield f"limits: none is stated, so nothing would be checked: state at least one of {names}"

@@ -94,7 +94,7 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
     """What was not checked: limits that are not stated, and bodies that nothing was compared with."""
     simulation = program.simulated
     if simulation is None:
-        return ("removal, engagement, forces and collisions: the program was read, not simulated",)
+        return ("removal, engagement, forces and collisions: the program was only read, not simulated",)
     # where modes are stated a margin of 1 is checked
     always = () if simulation.stability is None else ("stability_margin",)
     missing = [name for name in simulation.limit_table.unstated if name not in always]
@@ -108,7 +108,7 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
     if simulation.collisions.no_holder:
         out.append(f"holders of tools {', '.join(map(str, simulation.collisions.no_holder))}: not stated")
     if simulation.rigid:
-        out.append(f"compliance that is not stated counts as rigid: {', '.join(simulation.rigid)}")
+        out.append(f"stiffness not stated, taken as rigid: {', '.join(simulation.rigid)}")
     return tuple(out)
 
 

@@ -104,9 +104,9 @@ def check_lines(job: ProgramJob, done: ProgramResult, passes: int) -> tuple[list
         needs = [estimate(passes * bodies.steps, len(done.reading.program), *_step_times(job, bodies.program, stock))]
     found = [text for _, text in grouped((*done.reading.findings, *done.reading.violations))]
     count = len(done.reading.violations)
-    message = f"{count} finding{'s exceed' if count > 1 else ' exceeds'} the limits" if count else "within the limits"
+    state = f"{count} finding{'s exceed' if count > 1 else ' exceeds'}" if count else "the program stays within"
     holds = not count and worst_severity(done.reading.findings) < Severity.UNPROVEN
-    return [*found, f"{job.path.name}: read; {message} of machine {done.machine.name}", *needs], holds
+    return [*found, f"{job.path.name}: valid; {state} the limits of machine {done.machine.name}", *needs], holds
 
 
 def _step_times(job: ProgramJob, program: Program, stock: LayeredStock) -> tuple[float, float]:

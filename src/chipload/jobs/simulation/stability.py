@@ -183,7 +183,7 @@ def stability_limits(
     cutting = cutting_rows(columns)
     reason = direction or stability.reason(np.unique(np.asarray(columns["tool"])[cutting]))
     if not reason and (margin[cutting] == 0.0).any():
-        reason = "the margin of some steps is not known"
+        reason = "the margin of some steps is unknown"
     error = (
         MARGIN_ERROR
         + stability.frequency_share
@@ -193,12 +193,12 @@ def stability_limits(
     for name, limit in limits.items():
         why = reason
         if name == "sle_um" and not why and (margin[cutting] < 1.0).any():
-            why = "where a step chatters the error is not a number"
+            why = "the error of a step that chatters is undefined"
         if name == "sle_um" and any(stability.watch.material.exponents):
             why = f"material {stability.watch.material.name} has a size effect"
         uneven = [t for t in np.unique(np.asarray(columns["tool"])[cutting]).tolist() if stability.watch.uneven(int(t))]
         if name == "sle_um" and uneven:
-            why = f"the teeth of tool {int(uneven[0])} are not alike"
+            why = f"the teeth of tool {int(uneven[0])} differ"
         spatial = [
             t for t in np.unique(np.asarray(columns["tool"])[cutting]).tolist() if stability.watch.spatial(int(t))
         ]

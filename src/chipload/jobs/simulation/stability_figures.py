@@ -61,8 +61,8 @@ def stability_sections(
     if stability.watch.spatial(int(what["tool"])):
         axial = "Cutter and workpiece move along the axis as well"
     body += [
-        '<p class="note">The margin is the factor on the cutting force at which a step begins to chatter; below 1 it '
-        f"chatters. {axial}{left_out}.</p>",
+        '<p class="note">The margin is the factor by which the cutting force could grow before a step chatters; below '
+        f"1 it chatters. {axial}{left_out}.</p>",
         table(["", ""], rows),
     ]
     if speeds is not None:
@@ -89,15 +89,15 @@ def stability_sections(
             cells = [[f"{w['low_rpm']:.5g}", f"{w['high_rpm']:.5g}", f"{w['probability']:.3g}"] for w in some]
             body += [
                 f"<h3>Speeds that are quiet with {share} %</h3>",
-                '<p class="note">Probability of the cut that is nearest to chatter at each speed, by the stated '
-                "spreads of the modes and those of the coefficients.</p>",
+                '<p class="note">Probability that the cut with the least margin does not chatter at each speed, from '
+                "the stated deviations of the modes and the spread of the coefficients.</p>",
                 table(["from [rpm]", "to [rpm]", "greatest probability"], cells, numbers=(0, 1, 2)),
             ]
     if what.get("variance_shares"):
         cells = [[escape(name), f"{100.0 * share:.0f}"] for name, share in what["variance_shares"].items()]
         body += [
             "<h3>What to measure next</h3>",
-            '<p class="note">Of the cut that is nearest to chatter: how much of its uncertainty each value makes.</p>',
+            '<p class="note">Share of each value in the uncertainty of the cut with the least margin.</p>',
             table(["value", "share of the variance [%]"], cells[:MEASURED], numbers=(1,)),
         ]
     tool = int(what["tool"])
@@ -105,8 +105,8 @@ def stability_sections(
     if drawn is not None:
         body += [
             "<h3>Stability chart</h3>",
-            '<p class="note">Of the cut that is nearest to chatter: above the line it chatters. Dots are the different '
-            "cuts of the tool, which have a limit of their own; a red one is below the wanted margin.</p>",
+            '<p class="note">Limit of the cut with the least margin: above the line it chatters. Dots are the '
+            "different cuts of the tool, each with its own limit; a red dot is below the wanted margin.</p>",
             figure(
                 "stability", chart_figure(drawn, tool, stability, None if speeds is None else speeds.stability), figures
             ),

@@ -31,7 +31,7 @@ def workpiece_section(simulation: SimulationResult, figures: dict[str, go.Figure
         f"<p>{len(own.steps.states)} states of removal in cells of {own.cell:.3g} mm, {own.unknowns} unknowns; the "
         f"thinnest wall left is {own.wall:.3g} mm. The greatest deflection is known to {100.0 * own.error:.2g} %, of "
         f"which {100.0 * own.state_change:.2g} % is the change between states.</p>",
-        "<h3>Lines that bend it most</h3>",
+        "<h3>Lines with the greatest deflection</h3>",
         table(["line", "deflection [\u00b5m]"], rows, numbers=(0, 1)),
     ]
     if own.modes is not None:
@@ -56,12 +56,12 @@ def bent_section(bent: BentWorkpiece, where: str, figures: dict[str, go.Figure])
 
 
 def _frequencies(modes: FollowedModes, figures: dict[str, go.Figure]) -> list[str]:
-    """Natural frequencies through the removal."""
+    """Natural frequencies as material is removed."""
     f = modes.state_frequency
     rows = [[str(k + 1), *(f"{value:.4g}" for value in (f[0, k], f[:, k].max(), f[-1, k]))] for k in range(f.shape[1])]
     head = ["mode", "before [Hz]", "greatest [Hz]", "after [Hz]"]
     return [
-        "<h3>Natural frequencies through the removal</h3>",
+        "<h3>Natural frequencies as material is removed</h3>",
         f'<p class="note">In {len(modes.states)} states, known to {100.0 * modes.error:.2g} %.</p>',
         table(head, rows, numbers=(0, 1, 2, 3)),
         figure("frequencies", frequency_figure(modes), figures),

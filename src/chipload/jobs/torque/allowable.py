@@ -175,6 +175,6 @@ def limit_text(planned: CutSteps, limit: PathLimit, where: str) -> str:
     """The limit of a coarse simulation, in a sentence."""
     feed = feed_at(planned, limit, limit.step)
     return (
-        f"by a coarse simulation the limit of torque is about {1e-3 * limit.torque:.2g} N m, {where}; the feed must be "
-        f"at most {feed:.3g} mm/min there, {mm_min_from_mm_s(float(planned.feed[limit.step])):.4g} are programmed"
+        f"a coarse simulation gives a torque limit of about {1e-3 * limit.torque:.2g} N m, {where}; the feed there "
+        f"must be at most {feed:.3g} mm/min, {mm_min_from_mm_s(float(planned.feed[limit.step])):.4g} are programmed"
     )

@@ -153,13 +153,15 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
             raise InputError(f"{job.program_file.name}: exceeds a limit of the machine: {reading.violations[0]}")
         gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
         if gaps:
-            raise InputError(f"{job.program_file.name}: {gaps[0]}: what is not read cannot be controlled")
+            raise InputError(
+                f"{job.program_file.name}: {gaps[0]}: chipload cannot control a line that it does not read"
+            )
         program = with_tool(reading.program, job.cutters)
     if np.abs(program.axis - (0.0, 0.0, 1.0)).max() > 1e-9:
         raise InputError("program: the cutter's axis leans: must be +Z all along; use a cutter with the wall's taper")
     cuts = program.motion != RAPID
     if not cuts.any():
-        raise InputError("program: no motion at a feed: nothing to control")
+        raise InputError("program: has no feed motion: there is nothing to control")
     speeds = np.unique(program.spindle[cuts])
     if len(speeds) != 1 or speeds[0] == 0.0:
         raise InputError(
@@ -352,7 +354,7 @@ def step_points(removal: Removal, program: Program) -> Floats:
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if (length == 0.0).any():
         line = int(c["line"][own][int(np.argmin(length))])
-        raise InputError(f"line {line}: the tip stands still: it must move along the path")
+        raise InputError(f"line {line}: the tip stands still: must move along the path")
     return points
 
 

@@ -64,12 +64,12 @@ def _sections(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]
     return [
         *body,
         "<h2>On a machine</h2>",
-        f"<p><code>0-override</code> beside <code>chipload hal {HAL}</code> holds the torque along "
-        f"<code>{PATH}</code>, which has the path, its planned torque in two parts, the true one for a "
-        "trial without a spindle, and the allowable torque over the limit (<code>relief</code>). "
-        "<code>--current-pin</code> and <code>--speed-pin</code> name where HAL has the current and the speed of the "
-        "spindle. <code>0-feedforward</code> has the feeds that the planned "
-        "torque allows written into it, for a machine that measures nothing.</p>",
+        f"<p>Run the program <code>0-override</code> together with <code>chipload hal {HAL}</code>, which limits the "
+        f"torque along <code>{PATH}</code>. That file holds the path, its planned torque in two parts, the true torque "
+        "for a trial without a spindle, and the allowable torque over the limit (<code>relief</code>). "
+        "<code>--current-pin</code> and <code>--speed-pin</code> name the HAL pins with the current and the speed of "
+        "the spindle. <code>0-feedforward</code> contains the feeds that the planned torque allows, for a machine "
+        "without measurement.</p>",
     ]
 
 
@@ -86,30 +86,29 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     body = ["<h2>Allowable torque</h2>"]
     if outcome.attainable and isinstance(outcome.wall, ClampedWorkpiece):
         line = (
-            f"<p>The limit is <b>{what['torque_limit_nm']:.4g} N m</b>, mean over a revolution. It comes from {why}, "
-            f"at ({place}) mm, where the workpiece allows a force of {where['force_n']:.4g} N. Its compliance there is "
-            f"known to {100.0 * outcome.wall.planned.error:.2g} %: the limit is made for one that is greater by as "
-            f"much. Elsewhere the workpiece allows more, up to {where['relief_max']:.3g} times as much torque; the "
-            "controller holds the same share of what is allowable everywhere, "
-            f"{where['held_nm']:.4g} N m here. The workpiece as it really is would allow "
-            f"{where['true_wall_nm']:.4g} N m.</p>"
+            f"<p>The torque limit is <b>{what['torque_limit_nm']:.4g} N m</b>, mean over a revolution. It comes from "
+            f"{why}, at ({place}) mm, where the workpiece allows a force of {where['force_n']:.4g} N. The compliance "
+            f"there is known to {100.0 * outcome.wall.planned.error:.2g} %; the limit includes that error. Elsewhere "
+            f"the workpiece allows up to {where['relief_max']:.3g} times as much torque. The set point of the "
+            "controller is the same share of the allowable torque everywhere, "
+            f"{where['held_nm']:.4g} N m here. The real workpiece would allow {where['true_wall_nm']:.4g} N m.</p>"
         )
         body.append(line)
     if outcome.attainable and isinstance(outcome.wall, ShellWall):
         body.append(
-            f"<p>The limit is <b>{what['torque_limit_nm']:.4g} N m</b>, mean over a revolution. It comes from {why}, "
-            f"at ({place}) mm: the wall of {outcome.wall.thinnest:.4g} mm (as thin as the tolerance lets it be) and "
-            f"the cutter allow {where['force_n']:.4g} N along the normal there. Elsewhere the wall allows more, up to "
-            f"{where['relief_max']:.3g} times as much torque; the controller holds the same share of what is allowable "
-            f"everywhere, {where['held_nm']:.4g} N m here. The wall as it really is, {outcome.wall.real:.4g} mm, would "
-            f"allow {where['true_wall_nm']:.4g} N m. The closed formula of one tooth, which knows no engagement, says "
-            f"{where['one_tooth_formula_nm']:.3g} N m.</p>"
+            f"<p>The torque limit is <b>{what['torque_limit_nm']:.4g} N m</b>, mean over a revolution. It comes from "
+            f"{why}, at ({place}) mm, where the wall of {outcome.wall.thinnest:.4g} mm (the least that the tolerance "
+            f"allows) and the cutter allow {where['force_n']:.4g} N along the normal. Elsewhere the wall allows up to "
+            f"{where['relief_max']:.3g} times as much torque. The set point of the controller is the same share of the "
+            f"allowable torque everywhere, {where['held_nm']:.4g} N m here. The real wall of {outcome.wall.real:.4g} "
+            f"mm would allow {where['true_wall_nm']:.4g} N m. The closed formula for one tooth, which neglects the "
+            f"engagement, gives {where['one_tooth_formula_nm']:.3g} N m.</p>"
         )
     said = what.get("surface_off_um")
     if said is not None:
         body.append(
-            f"<p>What the program leaves lies {said['min']:.3g} to {said['max']:.3g} µm from the finished surface of "
-            "the job, without deflection.</p>"
+            f"<p>Without deflection, the surface that the program leaves lies {said['min']:.3g} to {said['max']:.3g} "
+            "µm from the finished surface of the job.</p>"
         )
     spindle = [f"spindle: {name} {value:+g}" for name, value in asdict(outcome.control.deviation).items() if value]
     surprises = [*outcome.job.surprises, *spindle] or ["none"]
@@ -128,7 +127,7 @@ def _unrolled(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]
         return []
     return [
         "<h3>On the unrolled wall</h3>",
-        '<p class="note">Each place of the path by its angle and height, all in one scale; dashed: the angle of a '
+        '<p class="note">Each point of the path by its angle and height, with one colour scale; dashed: the angle of a '
         "surprise.</p>",
         figure("unrolled", unrolled(outcome), figures),
     ]
@@ -141,24 +140,24 @@ def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[s
         title = (
             f"{1e3 * case.loop.latency:g} ms latency, steps of {100.0 * case.quantum:g} %"
             if case.quantum or case.loop.latency
-            else "Without latency, any override"
+            else "Without latency, continuous override"
         )
         body += [
             f"<h3>{title}</h3>",
             _table(outcome, case),
-            f"<p>{drawn.NAMES[HELD]}: {by['shorter_percent']:.3g} % shorter than the constant feed that respects the "
-            f"limit everywhere, {by['shorter_than_model_percent']:.3g} % shorter than the model's derated schedule; "
-            f"{by['of_possible_percent']:.3g} % of what is physically possible; form error "
-            f"{by['form_error_change_percent']:+.3g} % against the constant feed's.</p>",
+            f"<p>{drawn.NAMES[HELD]}: {by['shorter_percent']:.3g} % shorter than the greatest constant feed that keeps "
+            f"the limit, {by['shorter_than_model_percent']:.3g} % shorter than the model's derated schedule, "
+            f"{by['of_possible_percent']:.3g} % of the physically possible gain; form error "
+            f"{by['form_error_change_percent']:+.3g} % compared with the constant feed.</p>",
         ]
     plain, late = outcome.control.cases
     lost = late.runs[HELD].outcome.time - plain.runs[HELD].outcome.time
     body += [
-        f"<p>Latency and steps cost {lost:.3g} s with the model, and move its greatest torque from "
+        f"<p>Latency and override steps cost {lost:.3g} s with the model, and change its greatest torque from "
         f"{1e-3 * plain.runs[HELD].outcome.load_max:.4g} to {1e-3 * late.runs[HELD].outcome.load_max:.4g} N m.</p>",
-        '<p class="note">The constant feed and the derated schedule are the fastest that respect the limit everywhere, '
-        "deviations and all, which nobody knows beforehand. The last row is the shortest time that is physically "
-        "possible: the torque at its limit at every instant.</p>",
+        '<p class="note">The constant feed and the derated schedule are the fastest that keep the limit everywhere '
+        "with all deviations, which are unknown beforehand. The last row is the shortest time that is physically "
+        "possible: the torque is at its limit at every instant.</p>",
         f"<h3>Along the path, {1e3 * late.loop.latency:g} ms latency</h3>",
         figure("path", drawn.along(outcome, late, "path"), figures),
         "<h3>Over time</h3>",
@@ -193,7 +192,7 @@ def _table(outcome: TorqueResult, case: ControllerCase) -> str:
         "override", "ended",
     )  # fmt: skip
     units = (
-        f'<p class="note">Torque at most {100.0 * most / torque_nm:.4g} % of what is allowable; form '
+        f'<p class="note">Limits: torque {100.0 * most / torque_nm:.4g} % of the allowable torque; form '
         "error in µm, at most "
         f"{outcome.job.limits['form_error_um']:g}; stress in MPa, at most "
         f"{outcome.job.limits['strength_share'] * outcome.wall.strength:g}.</p>"
@@ -223,40 +222,42 @@ def _wall(wall: ShellWall, outcome: TorqueResult, figures: dict[str, go.Figure])
     a, b, c = solid.counts
     share = 100.0 * float(wall.oval.share[1]) / whole
     beam = (
-        f"A beam with shear gives {1e3 * wall.oval.beam:.3g} µm: it is wrong by {whole / wall.oval.beam:.3g} times."
+        f"A beam with shear gives {1e3 * wall.oval.beam:.3g} µm, {whole / wall.oval.beam:.3g} times too little."
         if wall.oval.beam is not None
-        else f"There is no beam for a cone; its first harmonic, which a beam would have, is {share:.3g} % of it."
+        else f"There is no beam model of a cone; its first harmonic, the bending of a beam, is {share:.3g} % of it."
     )
     return [
         "<h2>Compliance of the wall</h2>",
-        f"<p>Under 1 N at the free end the wall of {wall.thinnest:.4g} mm is deflected by "
-        f"{1e3 * whole:.4g} µm, nearly all of it by becoming oval. {beam}</p>",
+        f"<p>A force of 1 N at the free end deflects the wall of {wall.thinnest:.4g} mm by {1e3 * whole:.4g} µm, "
+        f"nearly all of it because the section becomes oval. {beam}</p>",
         figure("oval", drawn.ovalised(wall), figures),
-        "<h3>Second opinion: the same wall by finite elements</h3>",
+        "<h3>Comparison with finite elements</h3>",
         f'<p class="note">Half of the wall by {a} x {b} x {c} hexahedra of 20 nodes (half round, along, through), '
         f"{solid.nodes} nodes; the same force on the same area, displacement of the end of the depth of cut.</p>",
-        table(("from the clamp [mm]", "shell [µm/N]", "hexahedra [µm/N]", "apart [%]"), rows, numbers=(0, 1, 2, 3)),
+        table(
+            ("from the clamp [mm]", "shell [µm/N]", "hexahedra [µm/N]", "difference [%]"), rows, numbers=(0, 1, 2, 3)
+        ),
     ]
 
 
 def _estimate(e: SpindleEstimate, outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     rows = [
         ["noise of the estimate, from its sensor, closed form [N m]", f"{1e-3 * e.noise:.3g}"],
-        ["the same, seen in the run [N m]", f"{1e-3 * e.seen:.3g}"],
+        ["noise of the estimate in the simulated run [N m]", f"{1e-3 * e.seen:.3g}"],
         ["lag of sensor and filter [ms]", f"{1e3 * e.lag:.3g}"],
         ["greatest error by that lag, while the torque changes [N m]", f"{1e-3 * e.behind:.3g}"],
         ["bandwidth of both [Hz]", f"{e.bandwidth:.3g}"],
         ["resolution: noise, quantisation, idle map [N m]", f"{1e-3 * e.resolution:.3g}"],
-        ["share by which the torque constant may be wrong [%]", f"{100.0 * e.constant_error:.3g}"],
+        ["uncertainty of the torque constant [%]", f"{100.0 * e.constant_error:.3g}"],
         ["valid for torques from, to [N m]", f"{1e-3 * e.range[0]:.3g}, {1e-3 * e.range[1]:.3g}"],
         [f"tooth passing frequency {e.aliased[0]:.4g} Hz, as the readings show it [Hz]", f"{e.aliased[1]:.3g}"],
-        ["lighter than this is not trusted: nothing is sped up on it [N m]", f"{1e-3 * e.light:.3g}"],
-        ["share of the time in cut that is lighter [%]", f"{100.0 * e.light_share:.3g}"],
+        ["torque below which the estimate is not trusted and the feed does not rise [N m]", f"{1e-3 * e.light:.3g}"],
+        ["share of the cutting time below that torque [%]", f"{100.0 * e.light_share:.3g}"],
     ]
     return [
         "<h2>Torque estimate from the spindle</h2>",
         table(("", ""), rows, numbers=(1,)),
-        f"<p>Not to be trusted: torques below {1e-3 * e.light:.3g} N m"
+        f"<p>Do not trust torques below {1e-3 * e.light:.3g} N m"
         f"; changes within {3e3 * e.lag:.3g} ms; speeds other than the programmed one, for which the idle current is "
         "not stated.</p>",
         figure("measured", drawn.measured(outcome), figures),
@@ -272,8 +273,8 @@ def _rules(fuzzy: FuzzyTable, figures: dict[str, go.Figure]) -> list[str]:
     ]
     return [
         f"<h2>The fuzzy controller: {escape(fuzzy.name)}</h2>",
-        '<p class="note">Triangles over the centres; min, max and centroid. The answer moves the trim: the share of '
-        "the limit that the model may plan with.</p>",
+        '<p class="note">Triangular sets, minimum, maximum and centroid. The output changes the trim: the share of '
+        "the limit that the model may use.</p>",
         table(head, rows),
         figure("surface", drawn.answers(fuzzy), figures),
     ]

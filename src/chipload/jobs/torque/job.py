@@ -17,8 +17,8 @@ from chipload.jobs.sources import entries_of, sources_and_cutters, unknown_cutte
 from chipload.jobs.tables import stated
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable, TorqueJobTable
 
-ONE_PROGRAM = "state a [program] with a file, or a [round] that is made"
-ONE_WALL = "state the wall by [torque_control.shell], or [stock] and [workpiece] of any part"
+ONE_PROGRAM = "state a [program] with a file, or a [round] to generate one"
+ONE_WALL = "state [torque_control.shell] of a wall, or [stock] and [workpiece] of any part"
 #: tables that go with a workpiece and not with a shell
 OF_WORKPIECE = ("stock", "real_stock", "workpiece")
 #: keys that each kind of surprise needs beside `share`
@@ -125,7 +125,7 @@ def missing(values: Mapping[str, Any]) -> list[str]:
 def _wrong_workpiece(table: TorqueJobTable) -> Iterator[str]:
     """What keys of a job on a workpiece contradict."""
     if table.round is not None:
-        yield "round: goes round a [torque_control.shell]: state a [program] with a file for a workpiece"
+        yield "round: needs [torque_control.shell]: state a [program] with a file for a workpiece"
     for key in ("stock", "real_stock"):
         solid = getattr(table, key)
         if solid is None:
@@ -148,7 +148,7 @@ def _wrong_shell(table: TorqueJobTable, shell: ShellTable) -> Iterator[str]:
     at = "torque_control.shell"
     for key in OF_WORKPIECE:
         if getattr(table, key) is not None:
-            yield f"{key}: goes without [torque_control.shell]: {ONE_WALL}"
+            yield f"{key}: cannot be used with [torque_control.shell]: {ONE_WALL}"
     if table.limits.deflection_workpiece_um is not None:
         yield "limits.deflection_workpiece_um: needs [workpiece]: state form_error_um, or [workpiece] for the shell"
     f = math.radians(shell.angle_deg)
@@ -190,7 +190,7 @@ def _wrong_round(shell: ShellTable, ask: RoundTable, tools: Mapping[int, Cutter]
 def _wrong_surprise(at: str, surprise: SurpriseTable, shell: ShellTable | None) -> Iterator[str]:
     """What keys of a surprise contradict; ``shell`` None: on a workpiece."""
     if shell is None and surprise.kind not in WORKPIECE_SURPRISES:
-        yield f"{at}.kind = {surprise.kind}: is of a [torque_control.shell]: state [real_stock] of a workpiece"
+        yield f"{at}.kind = {surprise.kind}: applies to [torque_control.shell]: state [real_stock] for a workpiece"
         return
     needs = (WORKPIECE_SURPRISES if shell is None else SURPRISES)[surprise.kind]
     for key in ("at_deg", "at_mm", "width_mm", "ramp_mm", "edge_share"):

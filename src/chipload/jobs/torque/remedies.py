@@ -94,10 +94,10 @@ def remedy_text(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) ->
     found = remedies(job, shell, planned, limit)
     if not found:
         return (
-            "no feed would do, and no depth of cut, wall, clamp or overhang alone: state a sharper cutter or wider "
-            "limits"
+            "no feed keeps the limits, and no change of depth of cut, wall, clamp or overhang alone does: state a "
+            "sharper cutter or wider limits"
         )
-    return f"no feed would do; one of these would: {'; '.join(found)}; or a sharper cutter"
+    return f"no feed keeps the limits; one of these changes does: {'; '.join(found)}; or a sharper cutter"
 
 
 def _allowed(job: TorqueJob, modes: Ritz, place: HardestPlace) -> float:

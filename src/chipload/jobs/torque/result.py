@@ -57,10 +57,10 @@ def result_of(outcome: TorqueResult) -> Result:
             *unchecked_checks(outcome.job.checks),
             *(f"limit {name}: not stated" for name in outcome.job.unchecked),
             *(() if outcome.control.cases else ("cutter strength, chips and spindle: no controller was run",)),
-            "chatter and runout beyond that of the cutter: not calculated",
-            "the wall has one thickness, that at the end of the cut"
+            "chatter, and runout beyond that of the cutter: not calculated",
+            "the wall is taken with its final thickness throughout"
             if isinstance(outcome.wall, ShellWall)
-            else "holder and spindle: count as rigid",
+            else "holder and spindle: taken as rigid",
         ),
         provenance=outcome.job.provenance,
         note=_note(outcome),

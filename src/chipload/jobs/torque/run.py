@@ -124,7 +124,9 @@ def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Materi
     ask = job.table.limits
     return TorqueInputs(
         title=title_of(job.path),
-        program_name=job.program_file.name if job.program_file is not None else "made: down the wall and once round",
+        program_name=job.program_file.name
+        if job.program_file is not None
+        else "generated: a helix down the wall and one turn at the bottom",
         program=program,
         machine=machine,
         limits=ask.stated,
@@ -166,7 +168,7 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
         f"{job.path.name}: {what}; "
         f"{len(program)} motions on machine {machine.name}, stock of {stock.volume():.5g} mm3, material "
         f"{material.name}, controller {table.name}, {len(job.table.surprise)} surprises",
-        f"the spindle holds limits of torque from {1e-3 * least:.3g} N m",
+        f"the controller can hold torque limits from {1e-3 * least:.3g} N m up",
         text,
         estimate(4 * count, len(program)),
     ], attainable

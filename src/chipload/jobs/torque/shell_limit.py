@@ -76,7 +76,7 @@ def preview_of_shell(job: TorqueJob, program: Program, material: Material, machi
     """The limit of torque by a coarse simulation of the plan, in a sentence, and whether there is one."""
     rough = coarser(job)
     if counted(program, job.cutters, resolution_of(rough)) > MOST_PREVIEWED:
-        return "the limit of torque is found when the job is run", True
+        return "the run finds the torque limit", True
     planned = cut(rough, program, shell_stock(rough, program), material, machine.rapid, silent)
     _, limit = limit_of(rough, planned)
     where = f"by the wall's {limit.by}, {planned.far[limit.step]:.3g} mm from the clamp"

@@ -127,7 +127,7 @@ def ovalised(wall: ShellWall) -> go.Figure:
         figure.add_trace(
             go.Scatter(x=ends, y=[1e3 * wall.oval.beam] * 2, mode="lines", line=style, name=whole), row=1, col=2
         )
-    figure.update_xaxes(title_text="harmonic round the wall (1: as a beam, 2: oval)", dtick=1, row=1, col=2)
+    figure.update_xaxes(title_text="harmonic around the wall (1: bending of a beam, 2: oval)", dtick=1, row=1, col=2)
     figure.update_polars(radialaxis={"visible": False})
     figure.update_layout(legend={"orientation": "h", "y": -0.15, "x": 0.0})
     return _styled(figure, 430)

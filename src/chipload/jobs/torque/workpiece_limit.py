@@ -62,7 +62,7 @@ def preview_on_workpiece(job: TorqueJob, program: Program, material: Material, m
     rough = replace(rough, table=rough.table.model_copy(update={"workpiece": few}))
     stock = stated(rough.table.stock, "stock")
     if counted(program, job.cutters, resolution_of(simulation_of(rough, stock), program)) > MOST_PREVIEWED:
-        return "the limit of torque is found when the job is run", True
+        return "the run finds the torque limit", True
     planned = workpiece_cut(rough, stock, program, material, machine.rapid)
     margin = planned.compliance.error
     limit = limit_on_workpiece(planned.loads, responses_of(rough, planned, margin=margin))
@@ -78,10 +78,10 @@ def remedy_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit)
     found = remedies_on_workpiece(job, planned, limit)
     if not found:
         return (
-            "no feed would do, and no depth of cut, clamp, wall or overhang alone: state a sharper cutter or wider "
-            "limits"
+            "no feed keeps the limits, and no change of depth of cut, clamp, wall or overhang alone does: state a "
+            "sharper cutter or wider limits"
         )
-    return f"no feed would do; one of these would: {'; '.join(found)}; or a sharper cutter"
+    return f"no feed keeps the limits; one of these changes does: {'; '.join(found)}; or a sharper cutter"
 
 
 def remedies_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit) -> list[str]:

@@ -64,7 +64,7 @@ LEFT_OUT = frozenset({61, 62})
 #: tapping: LinuxCNC's code and the M code that starts its spindle
 TAPPING = {840: (840, 3), 740: (740, 4), 842: (840, 3), 843: (740, 4)}
 FINE_BORING, BORING = 760, 860
-#: end of what is not on, or what does not concern the path
+#: end of what is not on, or what does not affect the path
 IDLE = frozenset(
     {50, 51, 80, 81, 90, 110, 130, 131, 150, 220, 230, 250, 260, 270, 491, 495, 500, 501, 600, 620, 630, 641, 670}
     | {531, 690, 691, 692, 693, 1030, 1130, 1870}

@@ -230,7 +230,7 @@ class BlockInterpreter:
             elif m == 19:
                 if not 0.0 <= block.words.get("r", 0.0) <= 360.0:
                     raise InputError(f"M19: R{block.words['r']:g}: must be from 0 to 360")
-                c.once("nc-ignored", "M19: orienting the spindle does not concern the path")
+                c.once("nc-ignored", "M19: orienting the spindle does not affect the path")
             elif m in (70, 71, 72, 73):
                 self._save(m)
             elif m in _IGNORED:
@@ -239,7 +239,7 @@ class BlockInterpreter:
                 elif m == 9:
                     state.flood = state.mist = False
                 code, what = _IGNORED[m]
-                c.once(code, f"M{m}: {what} does not concern the path and is left out")
+                c.once(code, f"M{m}: {what} does not affect the path; it is ignored")
             elif m in USER_M:
                 c.once("nc-user-code", f"M{m}: is the machine builder's own: what it does is not known here")
             elif m in (428, 429, 430):

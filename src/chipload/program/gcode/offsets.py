@@ -194,8 +194,8 @@ def _check_length(c: Controller, code: int, number: int) -> None:
     if number not in (c.tools or {}):
         c.once(
             "nc-length-unknown",
-            f"{shown(code)} H{number}: no length of tool {number} is known, it counts as 0: state Z of tool {number} "
-            "in a tool table (program.tools)",
+            f"{shown(code)} H{number}: the length of tool {number} is unknown and counts as 0: state Z of tool "
+            f"{number} in a tool table (program.tools)",
         )
     elif code == 430 and c.dialect == "linuxcnc" and number != c.state.tool:
         c.once(

@@ -243,7 +243,7 @@ def _code(block: Block, c: Controller, code: int) -> None:
     elif code == 500 or 505 <= code <= 599:
         choose(c, f"G{code}", 0 if code == 500 else code - 500)
     elif code in NO_MEANING:
-        c.once("nc-ignored", f"G{code}: does not concern the path")
+        c.once("nc-ignored", f"G{code}: does not affect the path")
     elif code in SYNCHRONISED:
         block.g.append(330)
         if SYNCHRONISED[code] is not None:
@@ -269,7 +269,7 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
         _left_out(block, c, name)
         return
     if text.startswith('"') or name.startswith("$") or name in IDLE:
-        c.once("nc-ignored", f"{name}: does not concern the path and is left out")
+        c.once("nc-ignored", f"{name}: does not affect the path; it is ignored")
         return
     if re.fullmatch(r"R[0-9]{1,4}", name):
         block.sets.append((int(name[1:]), _value(text, c)))
@@ -318,7 +318,7 @@ def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
     elif name in JUMPS:
         _keyword(block, c, name)
     elif name in IDLE:
-        c.once("nc-ignored", f"{name}: does not concern the path and is left out")
+        c.once("nc-ignored", f"{name}: does not affect the path; it is ignored")
     else:
         c.leave_out("nc-call", f"{name}({arguments.strip()[:60]}): cycles and calls are not read: left out")
 
@@ -385,7 +385,7 @@ def _keyword(block: Block, c: Controller, word: str, body: str = "") -> None:
     elif word in CURVES or word.startswith(("CYCLE", "POCKET", "SLOT", "HOLES")):
         _left_out(block, c, word)
     elif word in IDLE:
-        c.once("nc-ignored", f"{word}: does not concern the path and is left out")
+        c.once("nc-ignored", f"{word}: does not affect the path; it is ignored")
     elif re.fullmatch(rf"(?:N[0-9]+\s*)?{re.escape(word)}\s*", body):
         c.leave_out("nc-call", f"{word[:40]}: calls a program that is not here: left out")
     else:

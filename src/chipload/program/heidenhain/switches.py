@@ -50,7 +50,7 @@ def before(s: ConversationalState, codes: list[int]) -> None:
             s.feed = None
         if m in (7, 8, 9, 13, 14):
             word = 9 if m == 9 else 8
-            s.note("nc-coolant", f"M{word}: coolant does not concern the path and is left out")
+            s.note("nc-coolant", f"M{word}: coolant does not affect the path; it is ignored")
 
 
 def after(s: ConversationalState, codes: list[int]) -> None:
