@@ -22,6 +22,10 @@ FULL, EMPTY = -1, -2
 ARCS = 24
 #: capsules whose part of a rim is remembered while it is looked at
 KNOWN = 64
+#: rows of the array in which a rim is given back: its arcs, then the room to work in: what is left of a piece and what
+#: is left after the next capsule, the remembered capsules with their number of arcs, and the ends of these
+LEFT, NEXT, SEEN, ENDS = ARCS, ARCS + 16, ARCS + 50, ARCS + 50 + KNOWN
+RIM = ENDS + 2 * KNOWN
 #: capsules that enter a cell before it is pruned for the first time, at least
 MORE = 12
 #: parts that a cell is pruned in, each way, and those of a part that no one capsule holds
@@ -134,9 +138,9 @@ def covered(ax, ay, bx, by, r, R):
 
 
 @njit(cache=True, nogil=True)
-def covered_by_arc(cx, cy, rho, t0, sweep, r, R, out):
+def covered_by_arc(cx, cy, rho, t0, sweep, r, R, out, row):
     """Arcs of the circle of radius r about the origin that lie in the capsule of radius R about an arc: their number
-    (0 to 2), and their ends in ``out``.
+    (0 to 2), and their ends in ``out`` from ``row`` on.
 
     Notation: C the centre of the axis, L its distance; c(t) = C + rho e(t); alpha(t) the direction and d(t) the
     distance of c(t), h(d) half the angle that its disc covers. The discs that meet the circle are a window of t about
@@ -150,10 +154,10 @@ def covered_by_arc(cx, cy, rho, t0, sweep, r, R, out):
         if rho >= reach:
             return 0
         if rho <= R - r:
-            out[0, 0], out[0, 1] = -math.pi, math.pi
+            out[row, 0], out[row, 1] = -math.pi, math.pi
             return 1
         h = half_width(rho, r, R)
-        out[0, 0], out[0, 1] = t0 - h, t0 + sweep + h
+        out[row, 0], out[row, 1] = t0 - h, t0 + sweep + h
         return 1
     bound = (L * L + rho * rho - reach * reach) / (2.0 * L * rho)
     if bound >= 1.0:
@@ -173,11 +177,12 @@ def covered_by_arc(cx, cy, rho, t0, sweep, r, R, out):
         lo, hi = 1e9, -1e9
         for k in range(6):
             if k < 2:
-                t = ta if k == 0 else tb
-                x, y = cx + rho * math.cos(t), cy + rho * math.sin(t)
+                x, y = xa, ya
+                if k == 1:
+                    x, y = cx + rho * math.cos(tb), cy + rho * math.sin(tb)
                 d = math.sqrt(x * x + y * y)
                 if d <= R - r:
-                    out[0, 0], out[0, 1] = -math.pi, math.pi
+                    out[row, 0], out[row, 1] = -math.pi, math.pi
                     return 1
                 ahead = half_width(d, r, R)
                 behind = -ahead
@@ -196,7 +201,7 @@ def covered_by_arc(cx, cy, rho, t0, sweep, r, R, out):
                 px, py = cx + e * ux, cy + e * uy
                 ahead = math.atan2(x * py - y * px, x * px + y * py)
                 behind = ahead
-            step = math.atan2(y, x) - first
+            step = 0.0 if k == 0 else math.atan2(y, x) - first
             if rho > L:  # the origin is inside: the direction only grows
                 step -= 2.0 * math.pi * math.floor((step + 1e-9) / (2.0 * math.pi))
             else:
@@ -205,25 +210,28 @@ def covered_by_arc(cx, cy, rho, t0, sweep, r, R, out):
             lo = min(lo, first + step + behind)
         # the nearest disc of all may hold the whole circle
         if ta <= m <= tb and abs(L - rho) <= R - r:
-            out[0, 0], out[0, 1] = -math.pi, math.pi
+            out[row, 0], out[row, 1] = -math.pi, math.pi
             return 1
-        out[count, 0], out[count, 1] = lo, hi
+        out[row + count, 0], out[row + count, 1] = lo, hi
         count += 1
     return count
 
 
 @njit(cache=True, nogil=True)
-def covered_by_capsule(q, ox, oy, tx, ty, heading, r, R, axis, out):
-    """Arcs of the circle of radius r about O, from T, in capsule q: their number and, in ``out``, their ends."""
+def covered_by_capsule(q, ox, oy, tx, ty, heading, r, R, axis, out, row):
+    """Arcs of the circle of radius r about O, from T, in capsule q: their number and, in ``out`` from ``row`` on, their
+    ends.
+    """
     if axis[q, 8] > 0.0:
         cx, cy = axis[q, 4] - ox, axis[q, 5] - oy
         return covered_by_arc(
-            cx * tx + cy * ty, cy * tx - cx * ty, axis[q, 6], axis[q, 7] - heading, axis[q, 8], r, R, out
+            cx * tx + cy * ty, cy * tx - cx * ty, axis[q, 6], axis[q, 7] - heading, axis[q, 8], r, R, out, row
         )
     ax, ay = axis[q, 0] - ox, axis[q, 1] - oy
     bx, by = axis[q, 2] - ox, axis[q, 3] - oy
-    out[0, 0], out[0, 1] = covered(ax * tx + ay * ty, ay * tx - ax * ty, bx * tx + by * ty, by * tx - bx * ty, r, R)
-    return 1 if out[0, 0] <= out[0, 1] else 0
+    lo, hi = covered(ax * tx + ay * ty, ay * tx - ax * ty, bx * tx + by * ty, by * tx - bx * ty, r, R)
+    out[row, 0], out[row, 1] = lo, hi
+    return 1 if lo <= hi else 0
 
 
 @njit(cache=True, nogil=True)
@@ -231,27 +239,32 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
     """Uncut arcs of the circle of radius r about O; ``out[k] = lo, hi`` from T, counter-clockwise; returns the count.
 
     The front half ``[-pi/2, pi/2]``, or the ``whole`` circle ``[-pi/2, 3 pi/2]``.
+    ``out`` is as of :func:`uncut_between`.
+    """
+    m = round(math.pi / grid[6])
+    return uncut_between(ox, oy, tx, ty, r, R, 0, 2 * m if whole else m, grid, head, link, axis, out)
+
+
+@njit(cache=True, nogil=True)
+def uncut_between(ox, oy, tx, ty, r, R, begin, end, grid, head, link, axis, out):
+    """Uncut arcs of some pieces of the circle of radius r about O, as of :func:`uncut`; piece k begins at
+    ``-pi/2 + k grid[6]``.
+
+    ``out`` (RIM, 2) is also the room that the loop works in: allocating it took longer than looking at the rim.
     """
     x0, y0, h, piece = grid[0], grid[1], grid[2], grid[6]
     nx, ny = int(grid[3]), int(grid[4])
-    m = round(math.pi / piece)
-    if whole:
-        m *= 2
     half = 0.5 * r * piece
-    ulo = np.empty(16)
-    uhi = np.empty(16)
-    vlo = np.empty(34)
-    vhi = np.empty(34)
     # what each capsule covers of the circle is found once: the last one of each place, its number of arcs, their ends
-    known = np.full(KNOWN, -1)
-    parts = np.empty(KNOWN, dtype=np.int64)
-    ends = np.empty((KNOWN, 2, 2))
+    for k in range(SEEN, ENDS):
+        out[k, 0] = -1.0
     count = 0
     held = -1  # the capsule that held the last piece whole: often it holds the next one too
     heading = math.atan2(ty, tx)
     ca, sa = math.cos(piece), math.sin(piece)
-    c, s = math.cos(-0.5 * math.pi + 0.5 * piece), math.sin(-0.5 * math.pi + 0.5 * piece)
-    for k in range(m):
+    c = math.cos(-0.5 * math.pi + (begin + 0.5) * piece)
+    s = math.sin(-0.5 * math.pi + (begin + 0.5) * piece)
+    for k in range(begin, end):
         mx, my = ox + r * (c * tx - s * ty), oy + r * (c * ty + s * tx)
         a0 = -0.5 * math.pi + k * piece
         a1 = a0 + piece
@@ -263,7 +276,7 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
         if at == EMPTY or (at >= 0 and held >= 0 and axis_distance(mx, my, axis, held) <= R - half):
             continue
         n = 1
-        ulo[0], uhi[0] = a0, a1
+        out[LEFT, 0], out[LEFT, 1] = a0, a1
         while at >= 0:
             q = link[at, 1]
             at = link[at, 0]
@@ -273,73 +286,68 @@ def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
             if d <= R - half:
                 n, held = 0, q
                 break
-            at_q = q % KNOWN
-            if known[at_q] != q:
-                known[at_q] = q
-                parts[at_q] = covered_by_capsule(q, ox, oy, tx, ty, heading, r, R, axis, ends[at_q])
-            for side in range(parts[at_q]):
-                lo, hi = ends[at_q, side, 0], ends[at_q, side, 1]
+            seen, ends = SEEN + q % KNOWN, ENDS + 2 * (q % KNOWN)
+            if out[seen, 0] != q:
+                out[seen, 0] = q
+                out[seen, 1] = covered_by_capsule(q, ox, oy, tx, ty, heading, r, R, axis, out, ends)
+            for side in range(int(out[seen, 1])):
+                lo, hi = out[ends + side, 0], out[ends + side, 1]
                 # of the turns of the covered arc those that can reach into [a0, a1]
                 turns = math.ceil((a0 - hi) / (2.0 * math.pi)) * 2.0 * math.pi
                 lo += turns
                 hi += turns
                 while lo < a1 and n > 0:
                     kept = 0
-                    for v in range(n):
-                        if lo > ulo[v]:
-                            vlo[kept], vhi[kept] = ulo[v], min(lo, uhi[v])
+                    for v in range(LEFT, LEFT + n):
+                        if lo > out[v, 0]:
+                            out[NEXT + kept, 0], out[NEXT + kept, 1] = out[v, 0], min(lo, out[v, 1])
                             kept += 1
-                        if hi < uhi[v]:
-                            vlo[kept], vhi[kept] = max(hi, ulo[v]), uhi[v]
+                        if hi < out[v, 1]:
+                            out[NEXT + kept, 0], out[NEXT + kept, 1] = max(hi, out[v, 0]), out[v, 1]
                             kept += 1
                     n = min(kept, 16)
                     for v in range(n):
-                        ulo[v], uhi[v] = vlo[v], vhi[v]
+                        out[LEFT + v, 0], out[LEFT + v, 1] = out[NEXT + v, 0], out[NEXT + v, 1]
                     lo += 2.0 * math.pi
                     hi += 2.0 * math.pi
             if n == 0:
                 break
-        for v in range(n):
-            if count and ulo[v] - out[count - 1, 1] <= 1e-12:
-                out[count - 1, 1] = uhi[v]
+        for v in range(LEFT, LEFT + n):
+            if count and out[v, 0] - out[count - 1, 1] <= 1e-12:
+                out[count - 1, 1] = out[v, 1]
             elif count < ARCS:
-                out[count, 0], out[count, 1] = ulo[v], uhi[v]
+                out[count, 0], out[count, 1] = out[v, 0], out[v, 1]
                 count += 1
     return count
 
 
 @njit(cache=True, nogil=True)
-def keep_one(px, py, hd, at, link, axis, R, keep):
-    """Mark a capsule of the chain that holds the whole square part (centre P, half diagonal hd); whether one does."""
-    k = 0
+def keep_one(px, py, hd, near, m, axis, R, keep):
+    """Mark, of the m chain entries in ``near``, one whose capsule holds the whole square part (centre P, half diagonal
+    hd); whether one does.
+    """
     found = -1
-    while at >= 0:
-        q = link[at, 1]
-        if axis_distance(px, py, axis, q) <= R - hd:
-            found = k
-            if keep[k]:
+    for v in range(m):
+        if axis_distance(px, py, axis, near[0, v]) <= R - hd:
+            found = near[1, v]
+            if keep[found]:
                 break
-        at = link[at, 0]
-        k += 1
     if found >= 0:
         keep[found] = True
     return found >= 0
 
 
 @njit(cache=True, nogil=True)
-def keep_all(px, py, hd, at, link, axis, R, keep):
-    """Mark every capsule of the chain that reaches the square part."""
-    k = 0
-    while at >= 0:
-        q = link[at, 1]
-        if not keep[k] and axis_distance(px, py, axis, q) < R + hd:
+def keep_all(px, py, hd, near, m, axis, R, keep):
+    """Mark every capsule of ``near`` that reaches the square part."""
+    for v in range(m):
+        k = near[1, v]
+        if not keep[k] and axis_distance(px, py, axis, near[0, v]) < R + hd:
             keep[k] = True
-        at = link[at, 0]
-        k += 1
 
 
 @njit(cache=True, nogil=True)
-def keep_fine(px, py, hd, at, link, axis, R, keep):
+def keep_fine(px, py, hd, near, m, axis, R, keep):
     """Mark what the square part needs, cut into FINER x FINER; whether it is cleared.
 
     Of a chain of over LONG capsules, as where passes take next to nothing again and again, each of these that no one
@@ -350,17 +358,17 @@ def keep_fine(px, py, hd, at, link, axis, R, keep):
     for a in range(FINER):
         for b in range(FINER):
             x, y = px + (a - 0.5 * (FINER - 1)) * side, py + (b - 0.5 * (FINER - 1)) * side
-            if keep_one(x, y, hd / FINER, at, link, axis, R, keep):
+            if keep_one(x, y, hd / FINER, near, m, axis, R, keep):
                 continue
             if len(keep) <= LONG:
-                keep_all(x, y, hd / FINER, at, link, axis, R, keep)
+                keep_all(x, y, hd / FINER, near, m, axis, R, keep)
                 whole = False
                 continue
             for c in range(FINER):
                 for d in range(FINER):
                     u, v = x + ((c + 0.5) / FINER - 0.5) * side, y + ((d + 0.5) / FINER - 0.5) * side
-                    if not keep_one(u, v, hd / FINER / FINER, at, link, axis, R, keep):
-                        keep_all(u, v, hd / FINER / FINER, at, link, axis, R, keep)
+                    if not keep_one(u, v, hd / FINER / FINER, near, m, axis, R, keep):
+                        keep_all(u, v, hd / FINER / FINER, near, m, axis, R, keep)
                         whole = False
     return whole
 
@@ -384,6 +392,7 @@ def prune(cell, grid, head, link, used, axis, R):
     if used + n + int(grid[7]) > len(link):
         return used
     keep = np.zeros(n, dtype=np.bool_)
+    near = np.empty((2, n), dtype=np.int64)  # capsules that reach a part, and their places in the chain
     side = 2.0 * reach / PARTS
     hd = side * math.sqrt(0.5)
     whole = True
@@ -392,8 +401,26 @@ def prune(cell, grid, head, link, used, axis, R):
             px, py = cx - reach + (a + 0.5) * side, cy - reach + (b + 0.5) * side
             if (px - cx) ** 2 + (py - cy) ** 2 >= (reach + hd) ** 2:
                 continue
-            if not keep_one(px, py, hd, first, link, axis, R, keep):
-                whole = keep_fine(px, py, hd, first, link, axis, R, keep) and whole
+            found = -1
+            m = 0
+            k = 0
+            at = first
+            while at >= 0:
+                q = link[at, 1]
+                d = axis_distance(px, py, axis, q)
+                if d <= R - hd:
+                    found = k
+                    if keep[k]:
+                        break
+                elif d < R + hd:
+                    near[0, m], near[1, m] = q, k
+                    m += 1
+                at = link[at, 0]
+                k += 1
+            if found >= 0:
+                keep[found] = True
+            else:
+                whole = keep_fine(px, py, hd, near, m, axis, R, keep) and whole
     if whole:
         head[cell] = EMPTY
         return used

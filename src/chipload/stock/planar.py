@@ -27,6 +27,8 @@ CELLS = 8
 CELL_LIMIT = 8_000_000
 #: relative step of the rim inside the disc: touches less deep than this part of R are none
 TOUCH = 1e-9
+#: status of a cell that is wholly cleared
+EMPTY = _kernels.EMPTY
 
 
 class PlanarStock:
@@ -74,7 +76,8 @@ class PlanarStock:
         self.used = 0
         self.axis: Floats = np.zeros((1 << 12, 9))
         self.capsules = 0
-        self._arcs: Floats = np.zeros((_kernels.ARCS, 2))
+        #: a rim is given back here, and looked at
+        self.rim: Floats = np.zeros((_kernels.RIM, 2))
 
     def reserve(self, capsules: int) -> None:
         """Make room for so many more capsules."""
@@ -117,10 +120,8 @@ class PlanarStock:
         """
         (ox, oy), (tx, ty) = np.asarray(centre, dtype=np.float64), np.asarray(heading, dtype=np.float64)
         r = self.radius * (1.0 - TOUCH)
-        n = _kernels.uncut(
-            ox, oy, tx, ty, r, self.radius, whole, self.grid, self.head, self.link, self.axis, self._arcs
-        )
-        return self._arcs[:n].copy()
+        n = _kernels.uncut(ox, oy, tx, ty, r, self.radius, whole, self.grid, self.head, self.link, self.axis, self.rim)
+        return self.rim[:n].copy()
 
     def engagement(self, centre: ArrayLike, heading: ArrayLike) -> float:
         """Engagement angle [rad]: all that is uncut on the front half of the rim."""

@@ -9,7 +9,7 @@ import pytest
 
 from chipload.planning.pocket._fit import engagement_along
 from chipload.planning.pocket._kernels import angle_at
-from chipload.stock._kernels import ARCS
+from chipload.stock._kernels import RIM
 from chipload.stock.planar import TOUCH, PlanarStock
 
 #: thickness [mm] of a wall that two slots leave
@@ -22,7 +22,7 @@ def test_a_thin_wall_between_two_places_is_not_missed(start: float) -> None:
     stock = PlanarStock((-4.0, -4.0, 4.0, 4.0), 1.0)
     far = 1.0 + 0.5 * WALL
     stock.remove([[-far, -4.0, -far, 4.0], [far, -4.0, far, 4.0]])
-    held = (1.0 - TOUCH, 1.0, stock.grid, stock.head, stock.link, stock.axis, np.empty((ARCS, 2)))
+    held = (1.0 - TOUCH, 1.0, stock.grid, stock.head, stock.link, stock.axis, np.empty((RIM, 2)))
     dense = max(angle_at(x, 0.0, 1.0, 0.0, *held) for x in np.linspace(start, start + 0.8, 4001))
     assert dense == pytest.approx(2.0 * math.acos(1.0 - WALL), abs=0.01)
     along = np.array([start, 0.0, start + 0.8, 0.0, 0.0, 0.0, 0.0])

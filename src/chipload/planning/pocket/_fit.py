@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
-from chipload.planning.pocket._kernels import allowed, angle_at
-from chipload.stock._kernels import ARCS, remove_segment
+from chipload.planning.pocket._kernels import allowed, angle_at, room
+from chipload.stock._kernels import remove_segment
 
 #: radii of arcs / R, least and greatest
 LEAST, GREATEST = 0.35, 2000.0
@@ -106,6 +105,16 @@ def place(seg, w):
 
 
 @njit(cache=True, nogil=True)
+def position(seg, w):
+    """(x, y) at the share w of a segment, as :func:`place`."""
+    if seg[6] == 0.0:
+        return seg[0] + w * (seg[2] - seg[0]), seg[1] + w * (seg[3] - seg[1])
+    ux, uy = seg[0] - seg[4], seg[1] - seg[5]
+    c, s = math.cos(w * seg[6]), math.sin(w * seg[6])
+    return seg[4] + (c * ux - s * uy), seg[5] + (s * ux + c * uy)
+
+
+@njit(cache=True, nogil=True)
 def share_of(seg, x, y):
     """Share of a segment at the place nearest to a vertex on it."""
     if seg[6] == 0.0:
@@ -134,11 +143,16 @@ def in_region(seg, R, slack, grid, flag, edges, rows, row_edges):
 
     Between two places a wall as tight as R and an arc as tight as 0.35 R come nearer by at most 5e-5 R.
     """
-    n = max(2, math.ceil(segment_length(seg) / (EVERY * R)))
-    for k in range(1, n):
-        x, y, t = place(seg, k / n)
+    length = segment_length(seg)
+    n = max(2, math.ceil(length / (EVERY * R)))
+    k = 0
+    while k + 1 < n:
+        k += 1
+        x, y = position(seg, k / n)
         if allowed(x, y, grid, flag, edges, rows, row_edges):
+            k += int(room(x, y, grid, flag) * n / length)
             continue
+        x, y, t = place(seg, k / n)
         nx, ny = -slack * math.sin(t), slack * math.cos(t)
         if not (
             allowed(x + nx, y + ny, grid, flag, edges, rows, row_edges)
@@ -202,7 +216,7 @@ def farthest(p, i, last, guess, tau, slack, R, seg, grid, flag, edges, rows, row
 
 @njit(cache=True, nogil=True)
 def write_segments(p, i, last, whole, tau, limit, spacing, slack, R, touch, segments, done, places, capsule, used, grid,
-                   head, count, link, axis, flag, edges, rows, row_edges):  # fmt: skip
+                   head, count, link, axis, arcs, seg, flag, edges, rows, row_edges):  # fmt: skip
     """Lines and arcs through the vertices i to ``last`` of ``p`` (n, 4), each removed from the stock as it is written.
 
     A segment takes as many vertices as lie within tau of it, as stay in the centre region and as keep E at or below
@@ -211,8 +225,6 @@ def write_segments(p, i, last, whole, tau, limit, spacing, slack, R, touch, segm
     could still grow is left unless ``whole``. Where even a step alone would exceed the limit, writing ends before it.
     Returns (whether it did not, vertex reached, segments, capsules, chain entries).
     """
-    arcs = np.empty((ARCS, 2))
-    seg = np.empty(7)
     r = R * (1.0 - touch)
     guess = 4
     while i < last:

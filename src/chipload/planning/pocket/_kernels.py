@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
-from chipload.stock._kernels import ARCS, uncut
+from chipload.engagement.moves.borrowed._kernels import borrowed
+from chipload.stock._kernels import uncut, uncut_between
 
 #: a turn to the left [rad] that is tried again with half the step
 SHARP = 0.2
@@ -21,6 +21,8 @@ SHARP = 0.2
 CLOSE = 4e-4
 #: an arc does not end nearer to a wall than this part of R
 FILM = 1e-3
+#: an edge of the centre region is at least so many cells away from a place in a cell that is flagged as inside
+AWAY = 0.7
 #: length of an arc over that of a straight step; greatest turn of an arc to the left over that to the right
 LONGER, SMOOTH = 2.0, 1.5
 
@@ -37,6 +39,21 @@ def allowed(x, y, grid, flag, edges, rows, row_edges):
     if f != 2:
         return f == 1
     return crossings(x, y, j, edges, rows, row_edges)
+
+
+@njit(cache=True, nogil=True)
+def room(x, y, grid, flag):
+    """Distance [mm] around O that is in the centre region for certain, 0 where an edge may be near.
+
+    ``mark`` flags the 3 x 3 cells about places of an edge that are half a cell apart: no edge comes nearer to a cell
+    flagged 1 than three quarters of one.
+    """
+    h = grid[2]
+    nx, ny = int(grid[3]), int(grid[4])
+    i, j = math.floor((x - grid[0]) / h), math.floor((y - grid[1]) / h)
+    if i < 0 or j < 0 or i >= nx or j >= ny or flag[j * nx + i] != 1:
+        return 0.0
+    return AWAY * h
 
 
 @njit(cache=True, nogil=True)
@@ -115,6 +132,8 @@ def step_allowed(ox, oy, th, phi, l, slack, grid, flag, edges, rows, row_edges):
     no nearer than (l / 8)^2 / (8 R), 7e-6 R.
     """
     tx, ty = math.cos(th + phi), math.sin(th + phi)
+    if room(ox + 0.5 * l * tx, oy + 0.5 * l * ty, grid, flag) > 0.5 * l:
+        return True
     if not allowed(ox + l * tx, oy + l * ty, grid, flag, edges, rows, row_edges):
         return False
     for k in (4, 2, 6, 3, 5, 1, 7):
@@ -227,6 +246,9 @@ def arc_allowed(x, y, th, phi, l, margin, grid, flag, edges, rows, row_edges):
     """Whether an arc stays in the centre region, by every 16th of it. An end within ``margin`` of a wall on the
     right is refused: a straight step reaches the wall itself, so that no film stays on it.
     """
+    ex, ey, et = arc_place(x, y, th, 0.5 * phi, 0.5 * l)
+    if room(ex, ey, grid, flag) > 0.5 * l + margin:
+        return True
     ex, ey, et = arc_place(x, y, th, phi, l)
     if not allowed(ex, ey, grid, flag, edges, rows, row_edges):
         return False
@@ -314,22 +336,26 @@ def chord_step(x, y, th, guess, step, limit, right, left, slack, r, R, grid, hea
 
 
 @njit(cache=True, nogil=True)
-def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, flag, edges, rows, row_edges):
+def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, arcs, flag, edges, rows, row_edges):
     """Whether a straight link between two freed centres meets no material, nor leaves the centre region.
 
     Discs are tested a spacing d apart, each larger by d^2 / (8 R), so that together they cover the capsule; d is fine
     near the ends, where the cutter may touch what it came from. The centre is asked for every 0.01 R.
     """
-    arcs = np.empty((ARCS, 2))
+    grid, head, link, axis, arcs = borrowed((grid, head, link, axis, arcs))
+    flag, edges, rows, row_edges = borrowed((flag, edges, rows, row_edges))
     dx, dy = x1 - x0, y1 - y0
     length = math.sqrt(dx * dx + dy * dy)
     if length <= 1e-9:
         return True
     tx, ty = dx / length, dy / length
     n = math.ceil(length / (0.01 * R))
-    for k in range(1, n):
-        if not allowed(x0 + k * dx / n, y0 + k * dy / n, grid, flag, edges, rows, row_edges):
+    k = 1
+    while k < n:
+        x, y = x0 + k * dx / n, y0 + k * dy / n
+        if not allowed(x, y, grid, flag, edges, rows, row_edges):
             return False
+        k += 1 + int(room(x, y, grid, flag) * n / length)
     t = 0.0
     while t < length:
         near = min(t, length - t)
@@ -347,13 +373,21 @@ def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, flag, edg
 
 
 @njit(cache=True, nogil=True)
-def open_sides(points, normals, eps, least, R, touch, grid, head, link, axis, flag, edges, rows, row_edges, out):
-    """Whether material can be cut beside each point: O moved by eps along its normal is allowed and meets some."""
-    arcs = np.empty((ARCS, 2))
+def open_sides(points, normals, which, eps, least, R, touch, grid, head, link, axis, arcs, flag, edges, rows, row_edges,
+               out):  # fmt: skip
+    """If material can be cut beside each of some points: O moved by eps along its normal is allowed and meets some."""
+    grid, head, link, axis, arcs = borrowed((grid, head, link, axis, arcs))
+    flag, edges, rows, row_edges = borrowed((flag, edges, rows, row_edges))
     r = R * (1.0 - touch)
-    for k in range(len(points)):
+    m = round(math.pi / grid[6])
+    for v in range(len(which)):
+        k = which[v]
         nx, ny = normals[k, 0], normals[k, 1]
         x, y = points[k, 0] + eps * nx, points[k, 1] + eps * ny
-        out[k] = False
+        out[v] = False
         if allowed(x, y, grid, flag, edges, rows, row_edges):
-            out[k] = angle_at(x, y, nx, ny, r, R, grid, head, link, axis, arcs) > least
+            total = 0.0
+            for q in range(uncut_between(x, y, nx, ny, r, R, m // 3, m - m // 3, grid, head, link, axis, arcs)):
+                total += arcs[q, 1] - arcs[q, 0]
+            # the middle third of the front is often enough
+            out[v] = total > least or angle_at(x, y, nx, ny, r, R, grid, head, link, axis, arcs) > least

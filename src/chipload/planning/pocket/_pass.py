@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
+from chipload.engagement.moves.borrowed._kernels import borrowed
 from chipload.planning.pocket._fit import write_segments
 from chipload.planning.pocket._kernels import (
     LONGER,
@@ -19,7 +19,7 @@ from chipload.planning.pocket._kernels import (
     chord_step,
     wall_heading,
 )
-from chipload.stock._kernels import ARCS, uncut
+from chipload.stock._kernels import uncut
 
 RUNNING, LOST, BLOCKED = 0, 1, 2
 #: steps are written at the latest when they are so long / R, or turn by so much [rad]
@@ -73,7 +73,7 @@ def not_written(steps, written, n):
 
 @njit(cache=True, nogil=True)
 def run_pass(state, step, limit, most, right, left, lost, tau, slack, R, touch, steps, segments, places, numbers, grid,
-             head, count, link, axis, flag, edges, rows, row_edges):  # fmt: skip
+             head, count, link, axis, arcs, seg, flag, edges, rows, row_edges):  # fmt: skip
     """One pass, until it ends or ``steps`` is full.
 
     Parameters
@@ -84,12 +84,15 @@ def run_pass(state, step, limit, most, right, left, lost, tau, slack, R, touch, 
     right, left : greatest turn of a whole step; ``lost``: length without material that ends the pass
     steps : (n, 5) x, y, heading, sweep of each vertex and mm^2 taken up to it, row 0 the start
     segments, places : as of :func:`write_segments`
+    arcs, seg : (RIM, 2) and (7,), room to work in
     numbers : capsules and chain entries used; vertices written; segments; mm^2 that they take; steps made
 
     In the open a step is an arc that continues the last one; along a wall and in corners it is straight. Steps without
     material at the end are not written.
     """
-    arcs = np.empty((ARCS, 2))
+    state, steps, segments, places, numbers, seg = borrowed((state, steps, segments, places, numbers, seg))
+    grid, head, count, link, axis, arcs = borrowed((grid, head, count, link, axis, arcs))
+    flag, edges, rows, row_edges = borrowed((flag, edges, rows, row_edges))
     r = R * (1.0 - touch)
     capsule, used = int(numbers[0]), int(numbers[1])
     x, y, th, bend, idle, last = state[0], state[1], state[2], state[3], state[4], state[5]
@@ -138,7 +141,7 @@ def run_pass(state, step, limit, most, right, left, lost, tau, slack, R, touch, 
             whole = tight or held > 2.0 * HELD * R or turned > 2.0 * TURNED
             ok, written, done, capsule, used = write_segments(
                 steps, written, n, whole, tau, most, step, slack, R, touch, segments, done, places, capsule, used, grid,
-                head, count, link, axis, flag, edges, rows, row_edges,
+                head, count, link, axis, arcs, seg, flag, edges, rows, row_edges,
             )  # fmt: skip
             if not ok:
                 reason = BLOCKED
@@ -148,7 +151,7 @@ def run_pass(state, step, limit, most, right, left, lost, tau, slack, R, touch, 
     if ok and end > written and (taken >= 1e-5 * R * R or written > 0):
         ok, written, done, capsule, used = write_segments(
             steps, written, end, True, tau, most, step, slack, R, touch, segments, done, places, capsule, used, grid,
-            head, count, link, axis, flag, edges, rows, row_edges,
+            head, count, link, axis, arcs, seg, flag, edges, rows, row_edges,
         )  # fmt: skip
         if not ok:
             reason = BLOCKED

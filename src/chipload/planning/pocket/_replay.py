@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
+from chipload.engagement.moves.borrowed._kernels import borrowed
 from chipload.planning.pocket._fit import place
-from chipload.stock._kernels import ARCS, remove_segment, uncut
+from chipload.stock._kernels import remove_segment, uncut
 from chipload.stock.planar import TOUCH
 
 #: curvature x R above which the cutter meets what the same arc has just cut
@@ -20,14 +20,16 @@ KEPT = 4
 
 
 @njit(cache=True, nogil=True)
-def replay(segments, motion, share, block, R, angle, most, count, phi, capsule, used, grid, head, chains, link, axis):
+def replay(segments, motion, share, block, R, angle, most, count, phi, capsule, used, grid, head, chains, link, axis,
+           arcs, seg):  # fmt: skip
     """Engagement at the end of the pieces ``block`` (rising), the greatest along each, and the arcs in immersion.
 
     A motion is taken from the stock when its last piece is measured; one that bends so much that it meets its own cut,
     piece by piece. Returns (capsules, chain entries).
     """
-    arcs = np.empty((ARCS, 2))
-    seg = np.empty(7)
+    segments, motion, share, block, seg = borrowed((segments, motion, share, block, seg))
+    angle, most, count, phi = borrowed((angle, most, count, phi))
+    grid, head, chains, link, axis, arcs = borrowed((grid, head, chains, link, axis, arcs))
     r = R * (1.0 - TOUCH)
     for i in block:
         for c in range(7):

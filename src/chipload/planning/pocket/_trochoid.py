@@ -7,20 +7,19 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
+from chipload.engagement.moves.borrowed._kernels import borrowed
 from chipload.planning.pocket._kernels import angle_at
-from chipload.stock._kernels import ARCS
 
 
 @njit(cache=True, nogil=True)
-def circle_engagement(xc, yc, rho, n, r, R, limit, grid, head, link, axis, met):
+def circle_engagement(xc, yc, rho, n, r, R, limit, grid, head, link, axis, arcs, met):
     """Greatest E at n places of a circle that the centre runs counter-clockwise; ``met`` (n,) whether there is any.
 
     Ends early above the limit.
     """
-    arcs = np.empty((ARCS, 2))
+    grid, head, link, axis, arcs, met = borrowed((grid, head, link, axis, arcs, met))
     most = 0.0
     for k in range(n):
         a = 2.0 * math.pi * k / n

@@ -205,6 +205,7 @@ class _Run:
         self.lately: list[tuple[float, float, float]] = []
         self.made: set[int] = set()
         self.steps = 0
+        self.room = tuple(np.empty((CHUNK, columns)) for columns in (5, 8, 3))
         self.most = 100_000 + int(20.0 * self.reachable.area / (step * radius * (1.0 - math.cos(limit))))
 
     # -- rows -----------------------------------------------------------------------------------------------
@@ -369,6 +370,7 @@ class _Run:
                 s.head,
                 s.link,
                 s.axis,
+                s.rim,
                 *self.reach.arguments(),
             )
         )
@@ -411,17 +413,18 @@ class _Run:
         segments, places, took, reason = [], [], 0.0, _pass.RUNNING
         while reason == _pass.RUNNING and self.steps <= self.most:
             s.reserve(ROOM)
-            steps, made, at = (np.zeros((CHUNK, columns)) for columns in (5, 8, 3))
+            steps, made, at = self.room
             numbers = np.zeros(6)
             numbers[:2] = s.capsules, s.used
             reason = _pass.run_pass(
                 state, self.step, self.limit, self.most_engaged, right, TURN_LEFT, IDLE * R,
                 FIT * min(R, FIT_UP_TO), SLACK * min(R, SLACK_UP_TO), R, TOUCH, steps, made, at, numbers,
-                s.grid, s.head, s.count, s.link, s.axis, *self.reach.arguments(),
+                s.grid, s.head, s.count, s.link, s.axis, s.rim, np.empty(7),
+                *self.reach.arguments(),
             )  # fmt: skip
             s.capsules, s.used = int(numbers[0]), int(numbers[1])
-            segments.append(made[: int(numbers[3])])
-            places.append(at[1 : int(numbers[2]) + 1])
+            segments.append(made[: int(numbers[3])].copy())
+            places.append(at[1 : int(numbers[2]) + 1].copy())
             took += float(numbers[4])
             self.steps += int(numbers[5])
             if reason == _pass.RUNNING:
@@ -438,7 +441,7 @@ class _Run:
             raised[0] = True
             sweep = np.where(raised, 0.0, rows[:, 7])
             points, breaks = polyline(rows[:, 0:2], rows[:, 5:7], sweep, raised, 2.0 * CHORD * self.radius)
-            self.remainder.take(points, breaks)
+            self.remainder.take_from(self.stock, points, breaks)
             self.taken = len(self.rows)
         return self.remainder
 

@@ -1,11 +1,14 @@
-"""What is left of the reachable region after a path: area, contours and places, by another method than the stock.
+"""What is left of the reachable region after a path: area, contours and places.
 
 Notation: R [mm] cutter radius. The swept area is the union of the path's buffers (shapely); its arcs are polygons whose
-corners lie on the circle, so that it is less than the truth by at most 2e-5 R.
+corners lie on the circle, so that it is less than the truth by at most 2e-5 R. While a pocket is planned the cells that
+the stock knows to be wholly cleared are taken away as squares, and buffers only of the path near the others;
+:func:`leftover` asks no stock.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +16,7 @@ import shapely
 from numpy.typing import NDArray
 
 from chipload.geometry.contour import Contour, Region
+from chipload.stock.planar import EMPTY, PlanarStock
 
 Floats = NDArray[np.float64]
 Place = tuple[float, float, float]
@@ -20,7 +24,7 @@ Place = tuple[float, float, float]
 #: corners of a buffer in a quarter turn
 CORNERS = 128
 #: path points in one buffer
-CHUNK = 64
+CHUNK = 128
 #: pieces narrower than this part of R are the polygons' own and count only in the area
 NARROW = 2e-3
 #: most pieces that are reported one by one
@@ -41,6 +45,47 @@ def swept(points: Floats, breaks: NDArray[np.bool_], radius: float) -> shapely.G
     return shapely.union_all(out)
 
 
+def cleared_squares(stock: PlanarStock) -> shapely.Geometry:
+    """Union of the cells of a stock that are wholly cleared."""
+    x0, y0, h = stock.grid[:3].tolist()
+    nx, ny = int(stock.grid[3]), int(stock.grid[4])
+    empty = np.zeros((ny, nx + 2), dtype=np.int8)
+    empty[:, 1:-1] = (stock.head == EMPTY).reshape(ny, nx)
+    change = np.diff(empty, axis=1)
+    (row, begin), (_, end) = np.nonzero(change == 1), np.nonzero(change == -1)
+    boxes = shapely.box(x0 + begin * h, y0 + row * h, x0 + end * h, y0 + (row + 1) * h)
+    return shapely.union_all(boxes)
+
+
+def near_partly_cleared(
+    stock: PlanarStock, points: Floats, breaks: NDArray[np.bool_]
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """The legs of a polyline whose discs may reach a cell that is cleared in part, as of :func:`swept`.
+
+    What reaches no such cell lies in cells that are cleared, and a cell that nothing reaches loses nothing.
+    """
+    x0, y0, h = stock.grid[:3].tolist()
+    nx, ny = int(stock.grid[3]), int(stock.grid[4])
+    n = math.ceil(stock.radius / h) + 2  # cells that a disc about a place of a cell may reach to either side, and one
+    partly = np.zeros((ny + 2 * n + 1, nx + 2 * n + 1), dtype=np.int64)
+    partly[n + 1 : n + 1 + ny, n + 1 : n + 1 + nx] = (stock.head >= 0).reshape(ny, nx)
+    total = partly.cumsum(axis=0).cumsum(axis=1)
+    w = 2 * n + 1
+    near = total[w:, w:] - total[:-w, w:] - total[w:, :-w] + total[:-w, :-w] > 0
+    before = np.where(breaks[:, None], points, np.vstack([points[:1], points[:-1]]))
+    leg = np.hypot(*(points - before).T)
+    parts = np.maximum(1, np.ceil(leg / h).astype(np.int64))
+    k = np.repeat(np.arange(len(points)), parts)
+    share = (np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts) + 1) / parts[k]
+    at = before[k] + share[:, None] * (points - before)[k]
+    i = np.clip(((at[:, 0] - x0) / h).astype(np.int64), 0, nx - 1)
+    j = np.clip(((at[:, 1] - y0) / h).astype(np.int64), 0, ny - 1)
+    kept = np.zeros(len(points), dtype=bool)
+    np.logical_or.at(kept, k, near[j, i])
+    needed = kept | np.append(kept[1:] & ~breaks[1:], False)
+    return points[needed], (breaks | ~kept)[needed]
+
+
 class PocketRemainder:
     """What is left of a region, less and less of it as a path goes on; each part of the path is taken away once."""
 
@@ -54,6 +99,14 @@ class PocketRemainder:
         """Take away what the discs along a part of the path sweep, as in :func:`swept`."""
         if len(points):
             self.rest = shapely.difference(self.rest, swept(points, breaks, self.radius))
+
+    def take_from(self, stock: PlanarStock, points: Floats, breaks: NDArray[np.bool_]) -> None:
+        """Take away what is cleared of a stock: the squares of its cleared cells, and what a part of the path sweeps
+        that comes near a cell that is cleared in part. All that was cut before this part was taken so already.
+        """
+        if len(points):
+            self.rest = shapely.difference(self.rest, cleared_squares(stock))
+            self.take(*near_partly_cleared(stock, points, breaks))
 
     def parts(self) -> tuple[float, tuple[Contour, ...], list[tuple[float, tuple[float, float]]]]:
         """Area [mm^2] left, contours of the pieces that are no mere film, and (area, place) of each, greatest first."""

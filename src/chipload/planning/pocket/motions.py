@@ -184,7 +184,8 @@ def replayed(
             stock.reserve(int(need.sum()) + 8)
             stock.capsules, stock.used = _replay.replay(
                 motions.segments, samples.motion, samples.share, block, radius, angle, most, count, phi,
-                stock.capsules, stock.used, stock.grid, stock.head, stock.count, stock.link, stock.axis,
+                stock.capsules, stock.used, stock.grid, stock.head, stock.count, stock.link, stock.axis, stock.rim,
+                np.empty(7),
             )  # fmt: skip
     return Engagement(angle, count, np.clip(phi, 0.0, math.pi)), most
 

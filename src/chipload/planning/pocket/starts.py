@@ -33,31 +33,30 @@ TRIES = 12
 
 
 class Starts:
-    """All places of the path so far; ``alive`` may still be open, ``open`` were when last looked at.
+    """All places of the path so far, and those that may still be open.
 
-    The arrays are views of buffers that double when they are full: a pass costs the time of its own places, and of
-    those that are alive.
+    ``live`` are the indices of these, rising; ``fresh`` whether each was not looked at since the stock near it changed.
+    After :meth:`search` all of them are open. The arrays of all places are views of buffers that double when they are
+    full: a pass costs the time of its own places, and of those that are live.
     """
 
     def __init__(self, radius: float, step: float) -> None:
         self.radius, self.step = radius, step
         self.count = 0
+        self.live = np.zeros(0, dtype=np.int64)
+        self.fresh = np.zeros(0, dtype=bool)
         self._buffers: dict[str, NDArray[Any]] = {
             "p": np.zeros((0, 2)),
             "normal": np.zeros((0, 2)),
             "rank": np.zeros(0, dtype=np.int64),
             "first": np.zeros(0, dtype=bool),
-            "alive": np.zeros(0, dtype=bool),
-            "open": np.zeros(0, dtype=bool),
-            "fresh": np.zeros(0, dtype=bool),  # not looked at since the stock near it changed
         }
         self._show()
 
     def _show(self) -> None:
         """The views of the places that there are."""
         used = {name: values[: self.count] for name, values in self._buffers.items()}
-        self.p, self.normal, self.rank = used["p"], used["normal"], used["rank"]
-        self.first, self.alive, self.open, self.fresh = used["first"], used["alive"], used["open"], used["fresh"]
+        self.p, self.normal, self.rank, self.first = used["p"], used["normal"], used["rank"], used["first"]
 
     def add(self, points: Floats, headings: Floats) -> None:
         """Places of a pass: right side in its order, left side in the other, and ahead of where it ended."""
@@ -71,9 +70,6 @@ class Starts:
             "normal": np.vstack([right, -right[::-1], np.column_stack([np.cos(fan), np.sin(fan)])]),
             "rank": np.repeat([0, 2, 3], [n, n, 3]),
             "first": first,
-            "alive": True,
-            "open": False,
-            "fresh": True,
         }
         before, self.count = self.count, self.count + len(first)
         for name, values in self._buffers.items():
@@ -84,38 +80,40 @@ class Starts:
             self._buffers[name][before : self.count] = new[name]
         self._show()
         reach = 2.2 * self.radius  # a rim that far away meets nothing that this pass took
-        k = np.flatnonzero(self.alive)
-        near = (self.p[k] >= points.min(axis=0) - reach) & (self.p[k] <= points.max(axis=0) + reach)
-        self.fresh[k] |= near.all(axis=1)
+        p = self.p[self.live]
+        near = ((p >= points.min(axis=0) - reach) & (p <= points.max(axis=0) + reach)).all(axis=1)
+        self.live = np.concatenate([self.live, np.arange(before, self.count)])
+        self.fresh = np.concatenate([self.fresh | near, np.ones(self.count - before, dtype=bool)])
 
     def revive(self) -> None:
         """Let every place be looked at again."""
-        self.alive[:] = self.fresh[:] = True
+        self.live, self.fresh = np.arange(self.count), np.ones(self.count, dtype=bool)
 
     def search(self, stock: PlanarStock, reach: Reach, depth: float) -> None:
         """Find the open places: material within ``depth`` x R beside them that the cutter may go to.
 
         Only those near the last pass are asked again: elsewhere the stock is as it was.
         """
-        k = np.flatnonzero(self.alive & self.fresh)
-        out = np.zeros(len(k), dtype=bool)
+        asked = np.flatnonzero(self.fresh)
+        out = np.zeros(len(asked), dtype=bool)
         _kernels.open_sides(
-            self.p[k], self.normal[k], depth * self.radius, LEAST, self.radius, TOUCH,
-            stock.grid, stock.head, stock.link, stock.axis, *reach.arguments(), out,
+            self.p, self.normal, self.live[asked], depth * self.radius, LEAST, self.radius, TOUCH,
+            stock.grid, stock.head, stock.link, stock.axis, stock.rim, *reach.arguments(), out,
         )  # fmt: skip
-        self.open[k] = self.alive[k] = out
-        self.fresh[:] = False
+        kept = ~self.fresh
+        kept[asked] = out
+        self.live = self.live[kept]
+        self.fresh = np.zeros(len(self.live), dtype=bool)
 
     def nearest(self, at: Floats, linked: Callable[[Floats], bool]) -> int | None:
         """The start to go to: of the long runs on the right side, else of the short ones, else of the left side, else
         ahead of a pass's end, the nearest that a straight link reaches, else the nearest.
         """
-        before = np.concatenate([[False], self.open[:-1]])
-        k = np.flatnonzero(self.open & (self.first | ~before))
-        if len(k) == 0:
+        if len(self.live) == 0:
             return None
-        ends = np.flatnonzero(np.append(~self.open | self.first, True))
-        length = ends[np.searchsorted(ends, k, side="right")] - k
+        begins = np.flatnonzero(self.first[self.live] | np.append(True, np.diff(self.live) != 1))
+        k = self.live[begins]
+        length = np.diff(np.append(begins, len(self.live)))
         rank = self.rank[k]
         rank[(rank == 0) & (length < SHORT * self.radius / self.step)] = 1
         k = k[rank == rank.min()]
@@ -130,15 +128,18 @@ class Starts:
     def drop(self, k: int) -> None:
         """A start from which nothing could be cut: it and its near followers are not tried again."""
         n = max(1, round(0.2 * self.radius / self.step))
-        for i in range(k, min(k + n, len(self.p))):
-            if i > k and (self.first[i] or not self.open[i]):
-                break
-            self.alive[i] = self.open[i] = False
+        at = int(np.searchsorted(self.live, k))
+        end = at + 1
+        while end < min(at + n, len(self.live)) and self.live[end] == k + end - at and not self.first[self.live[end]]:
+            end += 1
+        self._forget(np.arange(at, end))
 
     def abandon(self, centre: Floats, far: float) -> None:
         """Places within ``far`` of a centre are not tried again until :meth:`revive`."""
-        near = np.hypot(*(self.p - centre).T) <= far
-        self.alive[near] = self.open[near] = False
+        self._forget(np.flatnonzero(np.hypot(*(self.p[self.live] - centre).T) <= far))
+
+    def _forget(self, which: NDArray[np.int64]) -> None:
+        self.live, self.fresh = np.delete(self.live, which), np.delete(self.fresh, which)
 
     def candidates(self, k: int) -> Iterator[tuple[float, float, float]]:
         """(x, y, heading) to begin with for the start k: a little before it on its own path, then at it."""

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from chipload.geometry.contour import Region
 from chipload.geometry.distance import distance
 from chipload.lazy import LateModule
-from chipload.stock._kernels import ARCS
 from chipload.stock.planar import TOUCH, PlanarStock
 
 _fit = LateModule("chipload.planning.pocket._fit")
@@ -52,7 +51,6 @@ class Trochoid:
         self.off = radius + allowance
         self.limit, self.most_engaged = limits
         self.seg = np.empty(7)
-        self.scratch = np.empty((ARCS, 2))
         self.met = np.zeros(PLACES, dtype=np.bool_)
 
     def circles(self, line: Floats, rho: float) -> Iterator[tuple[Floats, Floats]]:
@@ -126,7 +124,7 @@ class Trochoid:
         return float(
             _trochoid.circle_engagement(
                 centre[0], centre[1], rho, PLACES, self.radius * (1.0 - TOUCH), self.radius, limit, s.grid, s.head,
-                s.link, s.axis, self.met,
+                s.link, s.axis, s.rim, self.met,
             )
         )  # fmt: skip
 
@@ -155,6 +153,6 @@ class Trochoid:
         s, R = self.stock, self.radius
         return float(
             _fit.engagement_along(
-                seg, SPACING * R, self.most_engaged, R * (1.0 - TOUCH), R, s.grid, s.head, s.link, s.axis, self.scratch
+                seg, SPACING * R, self.most_engaged, R * (1.0 - TOUCH), R, s.grid, s.head, s.link, s.axis, s.rim
             )
         )
