@@ -4,8 +4,9 @@
 
 On both sides of the blade by formula with the source's dimensions, 10 x 10 contact points each, scallop 0.25 mm: the
 path of D 14 r 1.5 and of D 20 r 2 at every table angle, with steps along the blade and up it, at the pallet angle with
-the widest step-over of those that are valid, and at the one with the narrowest. Writes `wu2019_paths.svg` and prints
-the tables of `docs/papers.md`.
+the widest step-over of those that are valid, and at the one with the narrowest. Then the largest cutter for all of a
+side, the larger ones of two patches, and diameter, corner radius and pallet angles of single contact points at 35, 45
+and 55 deg. Writes `wu2019_paths.svg` and prints the tables of `docs/papers.md`.
 
 Reference: [Wu2019]: D 20 r 2 for D 14 r 1.5, path 677.23 for 1,196.33 mm.
 """
@@ -16,7 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from chipload.cutter.catalogue import CatalogueCutter
+from chipload.cutter.catalogue import CatalogueCutter, catalogue_named
+from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.ranges.ranges import valid_ranges
@@ -29,6 +31,10 @@ SIDES, STEPS = ("plus", "minus"), ("along", "up")
 SCALLOP, STEP_B = 0.25, math.radians(5.0)
 #: share of a side that a cutter must reach at a table angle
 WHOLE = 0.94
+#: diameters and corner radius [mm] of the source's catalogue; its scallops on the narrow patch and on the wide one
+SIZES, CORNER, NARROW, WIDE = np.arange(10.0, 81.0, 2.0), 2.0, 0.1, 0.06
+#: table angles [deg] of the source's tables of contact points; the grid line of u that is shown
+SHOWN, LINE = (35.0, 45.0, 55.0), 5
 
 
 def surfaces():
@@ -43,7 +49,7 @@ def valid_angles(ranges):
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
-def widths(surface, point, cutter, table, pallets, steps):
+def widths(surface, point, cutter, table, pallets, steps, scallop=SCALLOP):
     """Step-overs [mm] of a contact point at pallet angles; ``steps`` along the blade (paths up it) or up it."""
     scene, grid = surface.scene, surface.scene.contact.reshape(*surface.shape, 3)
     axis = 1 if steps == "along" else 0
@@ -54,7 +60,7 @@ def widths(surface, point, cutter, table, pallets, steps):
     out = np.zeros(len(pallets))
     K = np.tile(scene.curvature[point], (len(pallets), 1, 1))
     D = np.tile(along, (len(pallets), 1))
-    out[ok] = step_over(N[ok], T[ok], D[ok], K[ok], cutter.rho, cutter.corner_radius, SCALLOP)
+    out[ok] = step_over(N[ok], T[ok], D[ok], K[ok], cutter.rho, cutter.corner_radius, scallop)
     return out
 
 
@@ -102,6 +108,113 @@ def same_angle(found, side):
         ratios += [v / path["D 14 r 1.5", *k[1:]] for k, v in path.items()
                    if k[0] == "D 20 r 2" and k[1] == side and ("D 14 r 1.5", *k[1:]) in path]  # fmt: skip
     return min(ratios), max(ratios)
+
+
+def reach(surface, cutter):
+    """By table angle which of the contact points (a, b) a cutter reaches."""
+    out = {}
+    for table in TABLES.tolist():
+        found = valid_ranges(surface.scene, cutter, math.radians(table), workers=2).ranges
+        out[table] = np.array([len(rows) > 0 for rows in found]).reshape(surface.shape)
+    return out
+
+
+def largest(surface):
+    """The largest cutter for all of a side, its table angle, and how many points the next size misses at its best."""
+    sizes = [(d, reach(surface, CatalogueCutter(d, CORNER))) for d in SIZES.tolist()]
+    whole = [(d, table) for d, found in sizes for table, at in found.items() if at.all()]
+    diameter = max(whole)[0]
+    table = min(t for d, t in whole if d == diameter)
+    missed = min(int((~at).sum()) for d, found in sizes if d == diameter + 2.0 for at in found.values())
+    return diameter, table, missed
+
+
+def two_patches(surface, diameter, larger):
+    """The longest run of strips of u for a larger cutter at one table angle, the rest for the largest of all.
+
+    Returns
+    -------
+    (strips, table angle, path [mm]) of the larger cutter at the scallop WIDE, then (strips, table angle, path) of the
+    other one at NARROW; paths at the widest step-over of valid pallet angles.
+    """
+    wide = CatalogueCutter(larger, CORNER)
+    best = (0, 0, 0.0)
+    for table, at in reach(surface, wide).items():
+        edge = np.flatnonzero(np.diff(np.concatenate([[0], at.all(axis=1).astype(int), [0]])))
+        best = max([best, *((int(b - a), -int(a), table) for a, b in zip(edge[::2], edge[1::2], strict=True))])
+    count, first, table = best[0], -best[1], best[2]
+    strips = np.zeros(surface.shape[0], dtype=bool)
+    strips[first : first + count] = True
+    narrow = CatalogueCutter(diameter, CORNER)
+    angle = max(t for t, at in reach(surface, narrow).items() if at.all())
+    rows = ((wide, table, strips, WIDE), (narrow, angle, ~strips, NARROW))
+    return tuple((np.flatnonzero(own), t, path(surface, own, cutter, t, h)) for cutter, t, own, h in rows)
+
+
+def path(surface, strips, cutter, table, scallop):
+    """Path [mm] on strips of u at the widest step-over of valid pallet angles, steps along the blade."""
+    points = np.flatnonzero(np.repeat(strips, surface.shape[1]))
+    found = valid_ranges(surface.scene, cutter, math.radians(table), points=points, workers=2).ranges
+    total = 0.0
+    for k, ranges in zip(points.tolist(), found, strict=True):
+        w = widths(surface, k, cutter, math.radians(table), valid_angles(ranges), "along", scallop)
+        total += surface.area[k] / w.max()
+    return float(total)
+
+
+def contact_points(surface):
+    """Largest cutter and its widest range of B [deg] of the contact points of one grid line, by table angle."""
+    points = LINE + surface.shape[1] * np.arange(surface.shape[0])
+    out = {}
+    for table in SHOWN:
+        answer = largest_cutters(surface.scene, catalogue_named("wu2019"), math.radians(table), 0.0, workers=2)
+        rows = []
+        for k in points.tolist():
+            cutter = answer.catalogue.cutters[answer.cutter[k]] if answer.cutter[k] >= 0 else None
+            spans = np.degrees(answer.ranges[k])
+            span = spans[(spans[:, 1] - spans[:, 0]).argmax()] if len(spans) else None
+            rows.append((cutter, span))
+        out[table] = rows
+    return out
+
+
+def patch_tables(sides):
+    """The tables of cutters, patches and contact points of docs/papers.md."""
+    lines = ["| | source | " + " | ".join(f"{side} side here" for side in sides) + " |", "|---|---|---|---|"]
+    found = {side: largest(surface) for side, surface in sides.items()}
+    rows = {
+        "largest for all of it": ["D 20 at 45 deg", *(f"D {d:g} at {t:g} deg" for d, t, _ in found.values())],
+        "one size more, at its best table angle": [
+            "D 22 gouges",
+            *(f"D {d + 2:g} gouges at {n} of 100 points" for d, _, n in found.values()),
+        ],
+    }
+    parts = [two_patches(surface, found[side][0], found[side][0] + 4.0) for side, surface in sides.items()]
+    for k, (name, cusp, source) in enumerate((("wide", WIDE, "D 22"), ("narrow", NARROW, "D 20"))):
+        cells = []
+        for (side, surface), both in zip(sides.items(), parts, strict=True):
+            strips, table, length = both[k]
+            d = found[side][0] + (4.0 if k == 0 else 0.0)
+            if len(strips):
+                u = surface.u[strips]
+                cells.append(f"D {d:g} at {table:g} deg, u {u.min():.2f} to {u.max():.2f}, {length:.0f} mm")
+            else:
+                cells.append("none")
+        rows[f"{name} patch, cusp {cusp:g} mm"] = [source, *cells]
+    lines += [f"| {name} | " + " | ".join(cells) + " |" for name, cells in rows.items()]
+    surface = sides["plus"]
+    points = contact_points(surface)
+    lines += ["", "| u | " + " | ".join(f"{t:g} deg: D, r [mm]; B [deg]" for t in SHOWN) + " |", "|---:|---|---|---|"]
+    for k, u in enumerate(surface.u.tolist()):
+        cells = []
+        for table in SHOWN:
+            cutter, span = points[table][k]
+            cells.append(
+                "not reached" if cutter is None
+                else f"{cutter.diameter:g}, {cutter.corner_radius:g}; {span[0]:.1f} to {span[1]:.1f}"
+            )  # fmt: skip
+        lines.append(f"| {u:.2f} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
 
 
 def picture(found):
@@ -168,8 +281,10 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "docs")
     given = parser.parse_args()
-    result = paths()
+    blade = surfaces()
+    result = paths(blade)
     (given.out / "wu2019_paths.svg").write_text(picture(result))
     print(tables(result))
+    print(patch_tables(blade))
     for where, (share, best, worst) in result.items():
         print(*where, f"{share:.3f} {best:.0f} {worst:.0f}")

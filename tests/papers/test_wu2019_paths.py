@@ -8,9 +8,11 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from chipload.planning.impeller.compare import gouges
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.planning.impeller.compare import clear_somewhere, gouges
 from chipload.planning.impeller.ranges.ranges import valid_ranges
 
 ROOT = Path(__file__).parents[2]
@@ -68,3 +70,26 @@ def test_the_pallet_angles_are_clear_by_the_test_of_the_source(sides):
                 (ranges,) = valid_ranges(surface.scene, cutter, math.radians(45.0), points=[k]).ranges
                 for B in wu2019.valid_angles(ranges)[::3]:
                     assert gouges(surface.scene, k, cutter, math.radians(45.0), float(B)) is None
+
+
+def test_the_page_states_patches_and_contact_points(sides):
+    page = (ROOT / "docs" / "papers.md").read_text()
+    for line in wu2019.patch_tables(sides).splitlines():
+        assert line in page
+
+
+def test_the_larger_cutter_gouges_on_the_narrow_patch_and_nowhere_on_the_wide_one(sides):
+    """The source's gouge test, D 22 on the wide patch, D 18 on the other; D 22 for all gouges at every table angle."""
+    surface = sides["plus"]
+    (wide, table, _), (narrow, angle, _) = wu2019.two_patches(surface, 18.0, 22.0)
+    count = surface.shape[1]
+    degree = np.radians(np.arange(0.0, 360.0, 1.0))
+    for strips, diameter, at in ((wide, 22.0, table), (narrow, 18.0, angle)):
+        cutter = CatalogueCutter(diameter, 2.0)
+        for k in (int(i) * count + j for i in strips for j in (0, count - 1)):
+            (rows,) = valid_ranges(surface.scene, cutter, math.radians(at), points=[k]).ranges
+            low, high = rows[(rows[:, 1] - rows[:, 0]).argmax()]
+            assert gouges(surface.scene, k, cutter, math.radians(at), 0.5 * (low + high)) is None
+    for at, reached in wu2019.reach(surface, CatalogueCutter(22.0, 2.0)).items():
+        stuck = int(np.flatnonzero(~reached.ravel())[0])
+        assert not clear_somewhere(surface.scene, stuck, CatalogueCutter(22.0, 2.0), math.radians(at), degree)
