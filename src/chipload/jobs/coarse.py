@@ -23,6 +23,8 @@ SIMULATION: Mapping[str, tuple[float, float]] = {
     "part.spacing_mm": (3.0, 1e3),
     "fixture.spacing_mm": (3.0, 1e3),
     "machine_table.spacing_mm": (3.0, 1e3),
+    "workpiece.states": (0.25, 200.0),
+    "workpiece.cell_mm": (2.0, 1e3),
 }
 #: the same by capability
 FACTORS: Mapping[str, Mapping[str, tuple[float, float]]] = {
