@@ -23,8 +23,8 @@ Place = tuple[float, float, float]
 
 #: corners of a buffer in a quarter turn
 CORNERS = 128
-#: path points in one buffer
-CHUNK = 128
+#: path points in one buffer, and the angle [rad] by which its line turns, at most
+CHUNK, TURNS = 128, 4.0
 #: pieces narrower than this part of R are the polygons' own and count only in the area
 NARROW = 2e-3
 #: most pieces that are reported one by one
@@ -34,15 +34,23 @@ WORTH = 0.5
 
 
 def swept(points: Floats, breaks: NDArray[np.bool_], radius: float) -> shapely.Geometry:
-    """Union of the discs of ``radius`` [mm] along the polyline ``points`` (n, 2); no leg leads to a true break."""
-    out = []
-    at = np.flatnonzero(breaks)
-    for a, b in zip(at, np.append(at[1:], len(points)), strict=True):
+    """Union of the discs of ``radius`` [mm] along the polyline ``points`` (n, 2); no leg leads to a true break.
+
+    A buffer of a line that turns much costs the square of its vertices, many short lines cost the ends of their
+    buffers: a line is buffered in parts that turn by at most ``TURNS``.
+    """
+    leg = np.diff(points, axis=0, prepend=points[:1])
+    turn = np.diff(np.arctan2(leg[:, 1], leg[:, 0]), prepend=0.0)
+    turned = np.cumsum(np.abs(turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))))
+    parts = np.floor(turned / TURNS)
+    begins = np.flatnonzero(breaks | np.append(True, parts[1:] != parts[:-1]))
+    run = np.append(np.flatnonzero(breaks)[1:], len(points))[np.cumsum(breaks)[begins] - 1]  # end of its run
+    lines = []
+    for a, b, end in zip(begins, np.append(begins[1:], len(points)), run, strict=True):
         for k in range(a, b, CHUNK):
-            p = points[k : min(k + CHUNK + 1, b)]
-            line = shapely.linestrings(p) if len(p) > 1 else shapely.points(p[0])
-            out.append(shapely.buffer(line, radius, quad_segs=CORNERS))
-    return shapely.union_all(out)
+            p = points[k : min(k + CHUNK + 1, b + 1, end)]
+            lines.append(shapely.linestrings(p) if len(p) > 1 else shapely.points(p[0]))
+    return shapely.union_all(shapely.buffer(np.array(lines), radius, quad_segs=CORNERS))
 
 
 def cleared_squares(stock: PlanarStock) -> shapely.Geometry:
