@@ -11,7 +11,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import machine_named
 from chipload.planning.impeller.coverage import between_lines
-from chipload.planning.impeller.lines import LineMotion
+from chipload.planning.impeller.lines import LineMotion, stations
 from chipload.planning.impeller.links import Link, linked, safe_height
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.passes import surface_joint
@@ -52,6 +52,27 @@ def machined(request, impeller, scene):
         joint=surface_joint([mender] * len(tracks.tracks)),
     )  # fmt: skip
     return request.param, tracks, way, program_of(way.moves, 90.0, 1)
+
+
+def test_the_last_pass_lies_at_its_full_step_beyond_the_border(machined):
+    along, tracks, _, _ = machined
+    across = 1 if along == "u" else 0
+    low, high = BOX[across]
+    # each line at its farthest: the last one passes the border, the one before does not
+    farthest = [max(t.at[:, across].max() for t in tracks.tracks if t.line == k) for k in range(tracks.lines)]
+    assert farthest[-1] > high
+    assert min(t.at[:, across].min() for t in tracks.tracks) > low
+    assert max(farthest[:-2]) < high
+
+
+def test_stations_are_as_close_as_asked(impeller):
+    surface, chord = impeller.blade.plus, 0.5  # far coarser than 1.5 mm would be
+    for along in ("u", "v"):
+        P, Q = (0.05, 0.95), (0.3, 0.9)
+        p = np.linspace(*P, stations(surface, along, P, Q, chord, 1.5))
+        for q in np.linspace(*Q, 7):
+            line = surface.at(p, q) if along == "u" else surface.at(q, p)
+            assert np.linalg.norm(np.diff(line, axis=0), axis=1).mean() <= 1.5
 
 
 def test_no_gouge_and_scallop_as_asked(impeller, machined):

@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 
 from chipload.jobs.impeller.blanks import blanks_of
 from chipload.jobs.impeller.checks import program_sections
+from chipload.jobs.impeller.contact_tables import contact_table
 from chipload.jobs.impeller.outcome import ImpellerResult, Searched, for_all, largest, uncertified_text, unreached_text
 from chipload.jobs.impeller.partitions import divided_sections
 from chipload.jobs.impeller.programs import program_files
@@ -73,6 +74,10 @@ def _surface(k: int, op: Searched, figures: dict[str, go.Figure]) -> list[str]:
         '<p class="note">For each table angle the contact point that admits least; the dashed line is proved: no '
         "cutter of that corner radius above it mills every reachable contact point there.</p>",
         figure(f"table-{k}", table_figure(op), figures),
+        "<h3>Contact points at three table angles</h3>",
+        '<p class="note">Of contact points on the middle line the largest cutter of the catalogue at a table angle, '
+        "and the widest range of pallet angles in which it is clear of every check point.</p>",
+        table(*contact_table(op), numbers=(0, 1)),
         "<h3>Pallet angles</h3>",
         f'<p class="note">{_ranges_note(op)}</p>',
         figure(f"ranges-{k}", ranges_figure(op), figures),

@@ -381,9 +381,17 @@ class Lines:
         return self.surface.at(u, v), self.surface.normal(u, v)
 
 
-def stations(surface: BSplinePatch, along: str, P: tuple[float, float], Q: tuple[float, float], chord: float) -> int:
-    """Points of a line, so that its chords are within a half of ``chord`` of the surface."""
+def stations(
+    surface: BSplinePatch, along: str, P: tuple[float, float], Q: tuple[float, float], chord: float, apart: float
+) -> int:
+    """Points of a line, so that its chords are within a half of ``chord`` of the surface, at most ``apart`` [mm]."""
     lines = np.linspace(*Q, 5)
+    p = np.linspace(*P, 33)
+    longest = max(
+        float(np.linalg.norm(np.diff(surface.at(p, q) if along == "u" else surface.at(q, p), axis=0), axis=1).sum())
+        for q in lines
+    )
+    least = math.ceil(longest / apart) + 1
     for count in (9, 13, 17, 25, 33, 49, 65, 97, 129, 193, 257, 385, 513):
         p = np.linspace(*P, 2 * count - 1)
         worst = 0.0
@@ -392,7 +400,7 @@ def stations(surface: BSplinePatch, along: str, P: tuple[float, float], Q: tuple
             middle = 0.5 * (S[:-2:2] + S[2::2])
             worst = max(worst, float(np.linalg.norm(S[1::2] - middle, axis=1).max()))
         if worst <= 0.5 * chord:
-            return count
+            return max(count, least)
     raise InputError(f"finish.chord = {chord:g} mm: more than 513 points a line: raise it")
 
 

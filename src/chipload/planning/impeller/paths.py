@@ -40,8 +40,12 @@ _LESS = 0.6  # least share of a step that is tried where a line came out too hig
 _USED = 0.9  # of what is aimed at, the mean scallop that is enough
 _STILL = 5e-3  # share by which a step may still change
 _SPLIT = math.radians(45.0)  # from station to station: further the pallet does not turn in one piece of a line
+#: stations of a line are no farther apart than this [mm]
+_STATION = 1.5
 #: tangent of the angle by which a line may run askew to the parameter lines; least share of a step that it keeps there
 _SKEW, _HELD = 0.6, 0.4
+#: by how much a step may grow along the line [mm/mm]
+_GROWTH = 0.2
 
 
 @dataclass(frozen=True)
@@ -95,7 +99,8 @@ def finishing(
     P, Q = box if along == "u" else box[::-1]
     if not (0.0 <= P[0] < P[1] <= 1.0 and 0.0 <= Q[0] < Q[1] <= 1.0):
         raise InputError(f"box = {box}: must be ascending, within 0..1")
-    p = stretched(surface, along, P, Q, stations(surface, along, P, Q, how.motion.chord), how.overrun)
+    count = stations(surface, along, P, Q, how.motion.chord, _STATION)
+    p = stretched(surface, along, P, Q, count, how.overrun)
     need = (p >= P[0]) & (p <= P[1])
     job = Lines(surface, along, p, scene, number, cutter, table, how.motion, pallets, workers)
     step = _Stepper(job, how.scallop, how.aim, need)
@@ -114,9 +119,9 @@ def finishing(
         open_ = use & ~step.done(line, Q[1])
         if not open_[need].any():
             return Tracks(tuple(tracks), tuple(missed), number_of + 1)
-        line = step.next(line, Q[1])
         # where the pass of the line before has reached the border there is nothing left
         use = binary_dilation(open_)
+        line = step.next(line, Q[1], use & need)
     raise InputError(f"finish.scallop = {how.scallop:g} mm: more than {_LINES} lines: raise it")
 
 
@@ -140,7 +145,7 @@ class _Stepper:
         w = np.full(len(q), np.inf)
         for _ in range(_MENDS):
             _, behind = self._reach(line)
-            w = np.minimum(w, self._even(_INSIDE * behind))
+            w = np.minimum(w, self._even(line, _INSIDE * behind))
             inside = self.lines.line(q + self._dq(line, w), line.pallet)
             if len(inside.sections) > len(line.sections):
                 break
@@ -161,19 +166,31 @@ class _Stepper:
         out: Flags = (line.q + self._dq(line, w) >= border)[near]
         return out
 
-    def next(self, line: Line, end: float) -> Line:
-        """The next line towards ``end``, so that the scallop between is as high as asked.
+    def next(self, line: Line, border: float, use: Flags) -> Line:
+        """The next line, so that the scallop between is as high as asked.
+
+        It may lie beyond the border, as the last one of a patch does, if all that is in ``use`` is reached there.
+        """
+        free = self._next(line, 1.0)
+        if not (free.q[use] > border).any():
+            return free
+        inside = self._next(line, border)
+        lost = [int((use & np.isnan(one.pallet)).sum()) for one in (free, inside)]
+        return free if (lost[0], len(free.sections)) <= (lost[1], len(inside.sections)) else inside
+
+    def _next(self, line: Line, end: float) -> Line:
+        """The next line, no farther than ``end``.
 
         The step is first laid out for the pallet angles of this line, then for those of the new one.
         """
         ahead, behind = self._reach(line)
-        w = self._even(ahead + behind)
+        w = self._even(line, ahead + behind)
         B, most = line.pallet, self.scallop * (0.5 + 0.5 * self.aim)
         less = np.ones(len(w))
         best: tuple[float, Line] | None = None
         for _ in range(_MENDS):
             w = self._step(line, w, B)
-            out = self.lines.line(self._moved(line, less * w, end), B)
+            out = self.lines.line(self._moved(line, self._even(line, less * w), end), B)
             scallop = self._scallop(line, out.q, out.pallet)
             # what is used of the scallop where the line is not at the border; below 0: by how much it is too high
             inner = scallop[np.isfinite(scallop) & (out.q < end)]
@@ -204,7 +221,7 @@ class _Stepper:
             if not np.isfinite(ratio).any() or (np.nanmin(ratio) > 0.99 and np.nanmax(ratio) < 1.03):
                 break
             new = np.minimum(
-                self._even(np.where(np.isfinite(ratio), w * ratio, np.nan)),
+                self._even(line, np.where(np.isfinite(ratio), w * ratio, np.nan)),
                 self.lines.cutter.rho + self.lines.cutter.corner_radius,
             )
             still = np.abs(new - w).max() < _STILL * w.max()
@@ -262,14 +279,18 @@ class _Stepper:
         out: Floats = (Sq * np.cross(line.N, line.d)).sum(axis=1)
         return out
 
-    def _even(self, w: Floats) -> Floats:
+    def _even(self, line: Line, w: Floats) -> Floats:
         """Steps without jumps along the line, nowhere above those given; where there are none, of the nearest."""
         known = np.flatnonzero(np.isfinite(w))
         if len(known) == 0:
             r, h = self.lines.cutter.corner_radius, self.scallop
             return np.full(len(w), 2.0 * math.sqrt(2.0 * max(r, h) * h))
         near = known[np.abs(known[None] - np.arange(len(w))[:, None]).argmin(axis=1)]
-        out: Floats = np.minimum(gaussian_filter1d(w[near], 1.0, mode="nearest"), w[near])
+        w = w[near]
+        size = np.linalg.norm(np.diff(line.S, axis=0), axis=1)
+        far = np.concatenate([[0.0], np.cumsum(_GROWTH * size)])
+        held = (w[None] + np.abs(far[:, None] - far[None])).min(axis=1)
+        out: Floats = np.minimum(gaussian_filter1d(held, 1.0, mode="nearest"), held)
         return out
 
     def _straight(self, line: Line, q: Floats) -> Floats:

@@ -34,6 +34,9 @@ _SAMPLE = 10
 _CELL, _LEAST_CELL = 0.5, 2.0
 #: distance of grid points, and of rest passes, as a share of the step of a corner on a plane
 _GRID, _STEP = 0.45, 0.85
+#: distance of poses by which what is left is counted, over that by which steps are laid out: a point beside the highest
+#: of a scallop, counted by the pass that is farther away, must not come out above it
+_FINER = 0.5
 #: stations of a rest pass are no farther apart than this [mm]
 _STATIONS = 1.5
 
@@ -119,7 +122,7 @@ def left_over(face: SurfaceGrid, passes: Sequence[tuple[CatalogueCutter, Sequenc
     normals = np.ascontiguousarray(face.normals.reshape(-1, 3))
     out = np.full(len(points), np.inf)
     for cutter, tracks in passes:
-        contact, tips, axes, of = _poses(tracks, pose_distance(cutter.corner_radius))
+        contact, tips, axes, of = _poses(tracks, _FINER * pose_distance(cutter.corner_radius))
         if not len(contact):
             continue
         # two passes lie at most a radius apart: a point between them is within half of that from one of them
