@@ -186,8 +186,8 @@ class Page:
                     ui.label(key).classes("cl-key")
                     ui.label(meaning)
             ui.label(
-                "Click a plot, a line of the program, a limit or a finding to jump to its step. Drag in the 3D view turns "
-                "it, the wheel zooms, the right button shifts. Drag in a plot zooms it, a double click undoes that."
+                "Click a plot, a line of the program, a limit or a finding to jump to its step. In the 3D view, drag "
+                "to turn, use the wheel to zoom and the right button to pan. Drag in a plot to zoom, double-click to undo."
             ).classes("cl-note")
 
     # -- opening ------------------------------------------------------------------------------------------------
