@@ -187,8 +187,8 @@ class Page:
                     ui.label(meaning)
             ui.label(
                 "Click a plot, a line of the program, a limit or a finding to jump to its step. In the 3D view, "
-                "drag to turn, scroll to zoom, drag with the right button to pan. In a plot, drag to zoom, double-click "
-                "to undo."
+                "drag to turn, scroll to zoom, drag with the right button to pan. In a plot, drag to zoom, "
+                "double-click to undo."
             ).classes("cl-note")
 
     # -- opening ------------------------------------------------------------------------------------------------
