@@ -114,7 +114,7 @@ def test_a_job_is_not_overwritten(program: Path, tmp_path: Path) -> None:
     before = (tmp_path / "job" / "job.toml").read_bytes()
     code, _, said = call("init", program, tmp_path / "job")
     assert code == 2
-    assert said.startswith(f"chipload: {tmp_path / 'job' / 'job.toml'}: already exists and is not overwritten")
+    assert said.startswith(f"chipload: {tmp_path / 'job' / 'job.toml'}: already exists: name another folder")
     assert (tmp_path / "job" / "job.toml").read_bytes() == before
 
 

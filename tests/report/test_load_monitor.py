@@ -145,7 +145,7 @@ def test_the_command(tmp_path: Path, file: Path) -> None:
         assert code == 2
         assert f"--load-monitor {name}: the format of its file is not published" in said
         assert why in said
-        assert "state csv" in said
+        assert "use csv" in said
     code, said = call("export", tmp_path / "result", "--out", tmp_path / "no", "--spindle", file)
     assert code == 2
     assert "applies to --load-monitor" in said

@@ -93,7 +93,7 @@ def test_a_check_refuses_an_error_below_zero_and_a_missing_value_that_holds():
         (LimitCheck("flute_fill", 1.0, 1.5, E), "chip space 1.5 exceeds 1"),
         (
             LimitCheck("power_w", 900.0, None, U, reason="no speed is stated"),
-            "power of at most 900 W is not known: no speed is stated",
+            "power of at most 900 W is unknown: no speed is stated",
         ),
         (LimitCheck("torque_nm", 3.0, 2.9, U, reason="coarse"), "torque 2.9 of 3 N m, unproven: coarse"),
         (LimitCheck("spindle_power_w", 900.0, 100.0, H), "spindle power 100 of 900 W"),

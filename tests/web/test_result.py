@@ -320,7 +320,7 @@ def test_a_scene_that_cannot_be_read_is_said(root: Path) -> None:
     (root / "r" / "scene.glb").write_bytes(b"glTF nothing")
     assert scene.bodies(open_result(root, "r")) == ((), "scene.glb cannot be read: only the path is shown.")
     (root / "r" / "scene.glb").unlink()
-    assert scene.bodies(open_result(root, "r"))[1] == "This result has no scene: only its path is shown."
+    assert scene.bodies(open_result(root, "r"))[1] == "This result has no scene; only its path is shown."
 
 
 def test_texts_are_escaped(root: Path) -> None:

@@ -1,4 +1,4 @@
-"""Tables of a job from values: a name, a file or the keys themselves."""
+"""Conversion of values (a name, a file or keys) into the tables of a job."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the feed override does while the program runs: spindle, controller, plant."""
+"""Torque control while a program runs: spindle model, controllers, plant and the HAL component."""
 
 from __future__ import annotations
 

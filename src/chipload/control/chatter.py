@@ -1,4 +1,4 @@
-"""Chatter in the signal of a spindle, and the speed that is taken instead.
+"""Detection of chatter in the signal of a spindle, and choice of a quiet speed.
 
 Notation: y samples of torque or current at f_s [Hz]; n speed of the spindle [rev/s]; a window of N samples, without its
 mean, under a Hann window; P power of a line of its spectrum. A steady cut repeats itself with each revolution, so that

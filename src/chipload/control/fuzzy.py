@@ -1,4 +1,4 @@
-"""What a fuzzy table answers to an error and its change.
+"""Fuzzy tables: the output for an error and its change.
 
 Notation: e error, d its change, both over their span, so within [-1, 1] (what lies outside counts as the end); sets are
 triangles over centres c_0 < c_1 < ..., each from its left neighbour to its right one; a, b memberships.

@@ -1,4 +1,4 @@
-"""The controller of a LinuxCNC that runs: where the machine is, what the torque is, which override it is sent.
+"""The controller of a running LinuxCNC: read the position and the torque, and send the feed override.
 
     pins (x, y, z, velocity, current, speed)  ->  s on the path, torque  ->  override.step  ->  pin `feed`, pin `beat`
 

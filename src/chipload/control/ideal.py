@@ -1,4 +1,4 @@
-"""What controllers are compared with: the shortest time that is physically possible, and a PI controller by a rule.
+"""References for the comparison of controllers: the shortest possible time, and a PI controller with tuned gains.
 
 Notation: F programmed feed, o(s) = min(cap, (T r - edge) / cut) the override at which the true torque is the limit T
 times the relief r; v <= o F, and the axes accelerate by a at most: v_i+1^2 <= v_i^2 + 2 a ds, both ways. Nobody who

@@ -1,4 +1,4 @@
-"""A spindle from its logs: torque constant, idle map, inertia, lag, noise, step, drift, and where that holds.
+"""Identification of a spindle from logs: torque constant, idle map, inertia, lag, noise, drift and valid range.
 
 Notation as in :mod:`chipload.control.spindle`. Of power P the quotient P / w takes the place of the current, so that
 K_T is the efficiency, and P_idle = i_0 w + i_1 w^2: friction and what grows with the speed. The lag of the sensor is

@@ -1,4 +1,4 @@
-"""What a log of a cut says: columns of a CSV, by name and unit.
+"""Logs of a cut: columns of a CSV file, by name and unit.
 
 Notation: t time [s], w spindle speed [rad/s], I spindle current [A], T torque [N mm], f feed [mm/s].
 

@@ -1,4 +1,4 @@
-"""Which feed override is sent, now: a controller's answer within rules that keep the part and the cutter whole.
+"""The feed override: the output of a controller within rules that protect the part and the cutter.
 
 Notation: T measured torque [N mm], T_ref the torque that is held; o override (feed over programmed feed); q the trim
 that the controller moves; e = (T_ref - T) / T_ref, d its change since the last step; f in [-1, 1] the fuzzy answer to

@@ -1,4 +1,4 @@
-"""Torque, feed and spindle along a program under an override: the loop that a controller is tried in.
+"""Simulation of torque, feed and spindle along a program under an override, to test controllers.
 
 Notation: s [mm] along the path; F(s) programmed feed [mm/s], o the override, v the feed that the axes reach on the way
 to o F; torque averaged over a revolution T(s) = edge(s) + cut(s) v / F (w_0 / w), so cut is the part that goes with the

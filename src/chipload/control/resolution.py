@@ -1,4 +1,4 @@
-"""Which torque a spindle can tell from none, and which limit of torque it can therefore hold.
+"""The least torque that a spindle resolves, and the least torque limit that it can hold.
 
 Notation: K_T torque constant [N mm/A]; n [A] standard deviation of a reading of the current, q [A] its step; p time
 between two readings [s], t time constant of the filter [s], g = min(p / t, 1) its gain; I_0 [A] current of the free

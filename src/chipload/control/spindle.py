@@ -1,4 +1,4 @@
-"""What torque the spindle's current means, how surely, and where it means nothing.
+"""Estimate of the cutting torque from the spindle's current, with its interval and valid range.
 
 Notation: w spindle speed [rad/s], I current [A], T torque of cutting [N mm], J inertia [N mm s^2], K_T [N mm/A],
 I_idle(w) = i_0 + i_1 w + ... [A] the current of the free spindle:

@@ -1,4 +1,4 @@
-"""The file of an identified spindle: what ``chipload spindle`` writes and a job's ``[spindle] file`` reads.
+"""The file of an identified spindle, written by ``chipload spindle`` and read from ``[spindle] file``.
 
 A spindle that is identified from its power has the keys ``efficiency``, ``idle_w`` (friction [W s], [W s^2]: times the
 speed and its square), ``noise_w`` and ``power_step_w``; the others are those of a job's ``[spindle]``.

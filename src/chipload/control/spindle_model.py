@@ -1,4 +1,4 @@
-"""What is known of a spindle, and how far the real one differs from it.
+"""The model of a spindle, and the deviation of the real spindle from it.
 
 The controller believes the first; the simulated machine turns the second. Both are the same where no deviation is
 stated.

@@ -1,4 +1,4 @@
-"""The cutters that a shop has or can buy: their sizes and what is above the cutting part.
+"""Catalogues of cutters: dimensions, and the shank and holder above the cutting part.
 
 Notation: from the tip upwards the cutting part (diameter, corner radius, cutting length), a neck up to the neck length,
 the shank up to where the cutter leaves the holder (reach), the holder above. A part that is left out is not there: with

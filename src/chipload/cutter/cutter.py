@@ -1,4 +1,4 @@
-"""A cutter: the seven numbers of APT, its teeth, and how far it stands out of the holder.
+"""A cutter: the seven parameters of APT, its teeth and its overhang.
 
 Notation (APT): d diameter where bottom and flank lines meet, r corner radius, e radial and f axial distance of the
 corner circle's centre from the tip, alpha [rad] angle of the bottom with the plane normal to the axis, beta [rad] angle

@@ -1,4 +1,4 @@
-"""The cutting edge in slices along the cutter's profile: where it is, which way it faces, how it lags.
+"""The cutting edge in slices along the profile of the cutter: position, normal and lag.
 
 Notation: s [mm] length along the profile, 0 where the bottom line ends, below 0 on the bottom line, rising through the
 corner and the flank to the end of the flutes; rho [mm] distance from the axis, z [mm] height above the tip; R half the

@@ -1,4 +1,4 @@
-"""Strength of a cutter's own material: what its sections may carry before it breaks or bends for good.
+"""The strength of a cutter's material: the allowable stress of its sections.
 
 Carbide is brittle: its greatest tensile stress is held against the transverse rupture strength (ISO 3327, a bar without
 notch in bending). High-speed steel yields first: its equivalent stress by von Mises is held against the yield strength.

@@ -1,4 +1,4 @@
-"""Lines and arcs, offsets, drawings."""
+"""Geometry: lines and arcs, offsets, drawings, meshes, surfaces and their files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loose lines and arcs joined to contours.
+"""Joining of loose lines and arcs to contours.
 
 Notation: a **part** is a contour as the file has it, often a single segment; it has two **ends**, numbered 2 k (start)
 and 2 k + 1. Ends are joined in pairs, the nearest first: those that coincide, then those within ever wider gaps up to

@@ -1,4 +1,4 @@
-"""A DXF drawing becomes contours of lines and arcs in mm.
+"""The reader of DXF drawings, which returns contours of lines and arcs in mm.
 
 Notation: OCS the frame of a flat entity, WCS that of the drawing; an entity with the extrusion (0, 0, -1) is seen from
 below: its x is mirrored and its arcs turn the other way. Bulge = tan(sweep / 4). Splines and ellipses become biarcs.

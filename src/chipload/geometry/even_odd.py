@@ -1,4 +1,4 @@
-"""Closed contours that cross, touch or overlap become contours of the same area that do neither.
+"""Conversion of contours that cross, touch or overlap into separate contours of the same area (even-odd rule).
 
 Notation: a **piece** runs along a contour from one meeting of contours to the next; it bounds the area if it has an
 odd number of windings about the one of its sides and an even number about the other.

@@ -1,4 +1,4 @@
-"""A file that native code reads is read in a process of its own, with limits of time and memory.
+"""Reading of files by native code in a separate process with limits of time and memory.
 
 The CAD kernel ends the process, or never ends, on some damaged files. What is asked of it is therefore done in a child:
 the same interpreter, which reads one file and answers calls on it until it is closed. Its death is an ``InputError``.

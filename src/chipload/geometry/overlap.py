@@ -1,4 +1,4 @@
-"""Metal that two blades of an impeller have in common, such as a splitter that crosses its blade.
+"""The metal that two blades of an impeller share, such as a splitter that crosses its blade.
 
 Notation: z axis of rotation, r radius, theta angle about z. On the circle of one r and z a blade takes the arc from its
 `minus` to its `plus` side, for a side is met once on it (``sides.py``). Blades stand a pitch apart.

@@ -1,4 +1,4 @@
-"""All sections of a blade in one table, both sides beside each other, as pyturbo-aero writes them.
+"""Tables with all sections of a blade, both sides beside each other, as pyturbo-aero writes them.
 
 Format: a line of names, ``span_index,ss_x,ss_y,ss_z,ps_x,ps_y,ps_z`` or ``span_index,ss_x,ss_r,ss_th,ps_x,ps_r,ps_th``,
 then for each section, from hub to shroud, a line for each place from leading to trailing edge: the point of the suction

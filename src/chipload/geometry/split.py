@@ -1,4 +1,4 @@
-"""Segments cut where they meet into pieces, and pieces chained to contours.
+"""Splitting of segments at their intersections, and chaining of the pieces to contours.
 
 Notation: a **piece** is a part of a segment between two **nodes**; a node is a place where ends or meetings of segments
 are one point.

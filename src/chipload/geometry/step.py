@@ -1,4 +1,4 @@
-"""A planar horizontal face of a STEP part becomes contours of lines and arcs in mm; the whole part triangles.
+"""The reader of STEP parts: contours of a planar horizontal face, and triangles of the whole part.
 
 Notation: z [mm] the height of a face whose normal is along Z. Lines and circles stay what they are, other edges become
 biarcs. The CAD kernel converts the file's unit to mm; it runs in a process of its own, see

@@ -1,4 +1,4 @@
-"""The faces of a STEP part: numbered, named by number or by a point on them, and what one is made of.
+"""The faces of a STEP part, named by number or by a point on them.
 
 Notation: a face is a piece of a surface S(u, v) [mm] of the CAD kernel, trimmed by loops of edges; its first loop goes
 round it, others are holes. Faces are numbered from 1 in the order of the file. The kernel converts the file's unit to

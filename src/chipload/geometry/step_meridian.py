@@ -1,4 +1,4 @@
-"""Faces of a STEP part that are of revolution become the meridional curve of a hub or a shroud.
+"""Conversion of faces of revolution of a STEP part into the meridional curve of a hub or a shroud.
 
 Notation: the axis is z after a rotation R of the file's frame; r, z [mm] of a point. Of a face of revolution either the
 lines of equal u or those of equal v are its meridians; a plane across the axis has straight ones. Where blades stand on

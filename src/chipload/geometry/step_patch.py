@@ -1,4 +1,4 @@
-"""A four-sided face of a STEP part as a B-spline patch of our own.
+"""A four-sided face of a STEP part as a B-spline patch.
 
 Notation: face S(u, v) [mm] of the CAD kernel; its loop of edges as curves in (u, v). Where the loop is a box of
 parameter lines and S is polynomial, poles and knots are taken as they are, once, and the kernel is not asked again.

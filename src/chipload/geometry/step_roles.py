@@ -1,4 +1,4 @@
-"""What the faces of a STEP part may be of an impeller: sides of its blades, tips, its hub; guessed from their sizes.
+"""Guesses of the role of each face of an impeller: sides of its blades, tips, hub.
 
 Faces of one kind whose areas are nearly the same, as many as blades or twice as many, are faces of the blades: those of
 the largest area the sides. The largest other face that is of revolution about an axis of the file, and neither a plane

@@ -1,4 +1,4 @@
-"""Programs: made, checked, timed, written."""
+"""Programs: construction, checks, times, readers and writers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a program asks of a machine that the machine does not give, row by row.
+"""Checks of a program against the limits of a machine, row by row.
 
 Notation: a row's line is that of its source where it has one; rows are counted from 0.
 """

@@ -1,4 +1,4 @@
-"""Cutter radius compensation: the path of the tool's centre beside a programmed contour (G41 and G42).
+"""Cutter radius compensation: the path of the tool centre beside a programmed contour (G41 and G42).
 
 Notation: positions in the plane are complex numbers, first axis + i second axis. ``r`` is the tool's radius, ``s`` the
 side (+1 left, -1 right), ``a -> b`` a programmed motion, ``m`` the offset of its start and ``e`` that of its end: r

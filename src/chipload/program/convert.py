@@ -1,4 +1,4 @@
-"""A program written for another machine, or as CL data.
+"""Conversion of a program for another machine, or to CL data.
 
 What the motions do not say goes along by its line: coolant and stops as words, all else as comments, so that nothing is
 lost without a trace.

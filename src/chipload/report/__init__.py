@@ -1,4 +1,4 @@
-"""The result folder, its report, its figures and its scene. The only package that draws."""
+"""Report, figures and scene of a result, and the result folder. Only this package draws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The undeformed chips of a track as bodies: what the stock loses between two frames of removal.npz.
+"""The undeformed chips of a track as bodies: the material removed between two frames of removal.npz.
 
 Notation: as :mod:`chipload.simulation.removal_mesh`; the chip of frame i is the stock of frame i - 1 less that of frame
 i. Its surface is the surface of the stock that is gone in frame i, and the new one of frame i turned round.

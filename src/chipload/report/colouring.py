@@ -1,4 +1,4 @@
-"""How a path is coloured by a column: which rows it is drawn through, what exceeds a limit, values on the stock."""
+"""Colours of a path by a column: the rows that are drawn, the rows beyond a limit, values on the stock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The boundary construction diagram beside the chip, pieces in the same colours on both.
+"""The diagram of the boundary of a chip beside the chip, with equal colours for equal pieces.
 
 Notation: theta [deg] around the section of the cutter across, t from the start to the end of the move up; shaded where
 the edge of the section moves outward.

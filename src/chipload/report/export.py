@@ -1,4 +1,4 @@
-"""A result as files for other programs: CSV, VTK, STL, and the setup sheet."""
+"""Export of a result to other programs: CSV, VTK, STL and the setup sheet."""
 
 from __future__ import annotations
 

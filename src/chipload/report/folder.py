@@ -1,4 +1,4 @@
-"""A result folder appears whole or not at all.
+"""The result folder, which is written completely or not at all.
 
 Everything is written into a new folder beside the target and then renamed. A result of ours that is already there is
 replaced at that moment; anything else that is there is left alone and refused.

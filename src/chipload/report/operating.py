@@ -1,4 +1,4 @@
-"""Where a track operates in the stability charts of its tools: spindle speed and margin of each row."""
+"""The operating points of a track in the stability charts of its tools: spindle speed and margin of each row."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""report.html: one skeleton for every capability.
+"""report.html: one layout for every capability.
 
 The verdict and its message come first, then the limits, the tracks, the sections of the capability, findings, what was
 not checked, and where the numbers come from.

@@ -1,4 +1,4 @@
-"""How a capability presents its result: its part of the report, its scene and its files."""
+"""The presentation of a capability's result: its part of the report, its scene and its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""removal.npz: the stock of each track at all its rows, made from the blank and the history, and read again."""
+"""removal.npz: the stock of each track at all its rows, calculated from the blank and the history."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the scenes of all capabilities share: colours and the number of rows that are drawn."""
+"""Colours and numbers of rows that the scenes of all capabilities share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drawn contours as triangles, and the pieces that a path is drawn in."""
+"""Drawn contours as triangles, and the pieces in which a path is drawn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The sheet that pages are made of: style, frame, tables, figures; one file that opens without a network and prints."""
+"""The layout of printed and self-contained pages: style, frame, tables, figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surface maps as the 3D view shows them: values on a surface, the limit as isolines, the surface bent."""
+"""Surface maps for the 3D view: values on a surface, the limit as isolines, the deformed surface."""
 
 from __future__ import annotations
 

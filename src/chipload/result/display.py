@@ -1,4 +1,4 @@
-"""What a notebook shows of a result: its message, limits, tracks and findings as HTML."""
+"""HTML of a result for notebooks: message, limits, tracks and findings."""
 
 from __future__ import annotations
 

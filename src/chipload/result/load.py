@@ -1,4 +1,4 @@
-"""Read a result folder back."""
+"""Reading of a result folder."""
 
 from __future__ import annotations
 

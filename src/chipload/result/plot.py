@@ -1,4 +1,4 @@
-"""Any columns of a history, one below the other, against time or path."""
+"""Plots of any columns of a history, one below the other, against time or path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Long columns as the few points that show all their extremes."""
+"""Reduction of long columns to few points that keep all extremes."""
 
 from __future__ import annotations
 

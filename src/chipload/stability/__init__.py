@@ -1,4 +1,4 @@
-"""Chatter: how far a cut is from it, at which speeds it is quiet, and where the forced motion leaves the wall."""
+"""Stability of cuts: chatter margin, quiet spindle speeds, surface location error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stability over speed and axial depth: the chart, and the depth at which a cut begins to chatter.
+"""The stability chart over speed and axial depth, and the critical depth of a cut.
 
 Notation: growth = log |mu|; above 0 the cut chatters. The chart is evaluated on every fourth speed and depth; cells
 whose corners differ in sign, or whose least |growth| is small against the spread of the corners, are halved; the rest

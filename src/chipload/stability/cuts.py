@@ -1,4 +1,4 @@
-"""Cuts as the stability kernels take them: tooth engagement, force coefficients, speed, modes.
+"""Cuts in the form that the stability kernels need: tooth engagement, force coefficients, speed, modes.
 
 Notation: as in :mod:`chipload.stability.directional._kernels`. On a slice whose outward normal makes the angle kappa
 with the axis, a displacement r across the axis changes the chip thickness by sin(kappa) u.r, and the force across the

@@ -1,4 +1,4 @@
-"""Several delays: teeth that are not evenly spaced, runout, and three directions; the map of their period.
+"""Cuts with several delays (uneven pitch, runout) or three directions: the map of their period.
 
 Notation: pitch of tooth j, the angle by which it follows the tooth before it. A tooth cuts what another one left: the
 one before it, or with runout the m-th before it where m h + (r_j - r_(j-m)) sin(kappa) is the least, as in

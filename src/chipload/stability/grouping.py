@@ -1,4 +1,4 @@
-"""Steps that cut alike, told once: what a program asks of the stability kernels is a few hundred cuts, not every step.
+"""Grouping of steps that cut alike, so that a program needs a few hundred stability calculations.
 
 Steps are alike where speed, feed direction and engagement are, after rounding: immersion outward to 0.1 deg, places on
 the edge to 0.01 mm, the direction to 1 deg, chip thickness to 1 % where the coefficients have exponents (it does not

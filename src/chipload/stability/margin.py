@@ -1,4 +1,4 @@
-"""How far cuts are from chatter: the greatest multiplier, and the factor on the force at which it is 1.
+"""The stability margin of cuts: the greatest multiplier, and the factor on the force at which it is 1.
 
 Notation: mu the greatest multiplier of the map of one tooth period; |mu| < 1: a disturbance dies out. The margin is the
 factor on all cutting coefficients, and for straight teeth on the axial depth, at which |mu| = 1: below 1 the cut

@@ -1,4 +1,4 @@
-"""How sure it is that a cut is stable, where modes and coefficients are known to some per cent.
+"""The probability that a cut is stable, from the deviations of modes and coefficients.
 
 Notation: every frequency, damping ratio and stiffness, and the tangential and the radial coefficient, is its value
 times 1 + s n with s its relative standard deviation and n normal; those of different modes are independent. The

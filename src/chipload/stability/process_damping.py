@@ -1,4 +1,4 @@
-"""Process damping: a worn edge that moves into the wave it cuts displaces material under its wear land.
+"""Process damping: the force of a worn edge that displaces material under its wear land.
 
 Notation: K_sp indentation coefficient [N/mm^3], L_w width of the wear land [mm], mu friction, v cutting speed, r' speed
 of the cutter from the work, nu outward normal of the slice, e as everywhere. Under the land lies the volume

@@ -1,4 +1,4 @@
-"""Quiet speeds: the least margin of several cuts over spindle speeds, its windows, and the speed to take.
+"""Quiet speeds: the least margin of several cuts over spindle speed, its windows, and the best speed.
 
 Notation: margin as in :mod:`chipload.stability.margin`; at a speed the least over all cuts counts. A window is a range
 of the speeds that were looked at in which it is at least what is wanted. The speed to take has the greatest least

@@ -1,4 +1,4 @@
-"""Surface location error: where the forced vibration of a stable cut leaves the wall.
+"""Surface location error: the form error that forced vibration of a stable cut leaves on the wall.
 
 Notation: a stable motion without runout has the tooth period, so that r(t) = r(t - tau) and the regenerative force is
 0: the motion is that of the modes under the force of the rigid model, r_k = G(i k 2 pi / tau) F_k for each harmonic.

@@ -1,4 +1,4 @@
-"""Spindle speeds of a tool that cuts in several passes: as few as give each pass the margin that it can have.
+"""Zones: as few spindle speeds for the passes of a tool as give each pass its best margin.
 
 Notation: margin (p, s) of p passes in their order at s speeds, the least over the cuts of a pass. Between two passes
 the cutter is out of the material, so that its speed can change there. A pass can have its greatest margin over the

@@ -1,4 +1,4 @@
-"""The page: jobs and results of one folder in the browser of this computer."""
+"""The page in the browser: results and jobs of one folder, on this computer only."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shapes that the browser fetches: kept by their hash, the oldest go first. Nothing else can be fetched by a name."""
+"""Cache of the shapes that the browser fetches, by hash; the oldest are removed first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tracks against one another: their key numbers with the differences, and which rows belong together.
+"""Comparison of tracks: key numbers with their differences, and corresponding rows.
 
 By time, rows belong together that are reached at the same moment. By path, rows that have gone the same share of the
 way: of each pass where both tracks have the same passes in the same order, else of the whole path.

@@ -1,4 +1,4 @@
-"""The shape of the cutter that a track was run with, by tool number.
+"""The shape of each cutter of a track, by tool number.
 
 The result holds it beside its stock (removal.npz). Else it is that of the job where the opened folder has the job that
 the result was made from (by its hash), else the CUTTER of CL data: the result's own, or the program where the folder

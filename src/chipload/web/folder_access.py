@@ -1,4 +1,4 @@
-"""What of the opened folder may be read: results and jobs in it, nothing outside it.
+"""Access to files: results and jobs inside the opened folder, and nothing outside it.
 
 A **name** is a path relative to the opened folder, with `/`. It is followed to what it really is (links resolved)
 before anything is opened; what then lies outside the folder is refused.

@@ -1,4 +1,4 @@
-"""Access to the page: only browsers of this computer that were given its address, and only from this page.
+"""Access to the page: only browsers of this computer that have its address, and only requests of the page.
 
 A page of another site may make a browser send requests to 127.0.0.1, also under a host name of its own that resolves to
 this computer. So every request must name this host and this port, a websocket must come from this page, nothing but GET

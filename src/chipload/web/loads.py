@@ -1,4 +1,4 @@
-"""The load of each tool and of each line of a program: time and length in cut, the greatest of each load."""
+"""The load of each tool and each program line: time and length in cut, and the greatest value of each load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page: open what the folder holds, run a job and stop it, see a result, drive it with the keyboard."""
+"""The page: shows the folder, runs and stops jobs, shows a result, handles the keyboard."""
 
 from __future__ import annotations
 
@@ -186,8 +186,9 @@ class Page:
                     ui.label(key).classes("cl-key")
                     ui.label(meaning)
             ui.label(
-                "Click a plot, a line of the program, a limit or a finding to jump to its step. Drag in the 3D view turns "
-                "it, the wheel zooms, the right button shifts. Drag in a plot zooms it, a double click undoes that."
+                "Click a plot, a line of the program, a limit or a finding to jump to its step. In the 3D view, "
+                "drag to turn, scroll to zoom, drag with the right button to pan. In a plot, drag to zoom, "
+                "double-click to undo."
             ).classes("cl-note")
 
     # -- opening ------------------------------------------------------------------------------------------------

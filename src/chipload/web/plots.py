@@ -1,4 +1,4 @@
-"""The linked plots: chosen columns, one over the other, against time or path; a cursor stands in all of them."""
+"""The linked plots: chosen columns, one above the other, against time or path, with a common cursor."""
 
 from __future__ import annotations
 

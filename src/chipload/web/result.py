@@ -1,4 +1,4 @@
-"""A result as the page shows it: its summary, and its history in tracks.
+"""A result in the form that the page needs: summary, and history by tracks.
 
 The rows of a track follow one another in history.parquet. Columns are read from
 history.parquet when they are asked for, so that a long history costs only what is looked at.

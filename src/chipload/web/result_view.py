@@ -1,4 +1,4 @@
-"""One result on the page: its panels, and the row that they all stand at.
+"""One result on the page: its panels and their common row.
 
 The row is the one thing that moves: slider, plots, lines, table and keys set it, every panel follows.
 """

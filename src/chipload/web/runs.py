@@ -1,4 +1,4 @@
-"""A job runs in a process of its own: it tells where it is, can be stopped, and ends when the page does.
+"""A job in a separate process: reports progress, can be stopped, and ends with the page.
 
 Notation: the process writes a JSON value a line: ``{"done": 0..1, "what": text}`` while it works and at its end
 ``{"code": exit code of `chipload run`, "message": text}``. It stops when its input closes, so that no run outlives the

@@ -1,4 +1,4 @@
-"""What the 3D view shows of a result folder: the documents that its viewer asks for."""
+"""The documents of a result folder that the 3D view shows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Serve the page of one folder on 127.0.0.1 until Ctrl-C, and end its runs with it."""
+"""The web server of the page on 127.0.0.1; it runs until Ctrl-C and ends its jobs with it."""
 
 from __future__ import annotations
 

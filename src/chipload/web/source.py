@@ -1,4 +1,4 @@
-"""The text of the program that a track ran, and the line of each row of its history.
+"""The program of a track, and the line of each row of its history.
 
 The text is the one with new feeds where the result holds one, else the original where the opened folder has it (found
 by the hash that the result states), else the program that the result holds for the machine, else its CL data. Where

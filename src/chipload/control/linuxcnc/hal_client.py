@@ -1,4 +1,4 @@
-"""The client of HAL: a process of the system's Python that owns the pins, and one line there and back each exchange.
+"""The client of HAL: a process of the system's Python that owns the pins and exchanges lines of text.
 
 LinuxCNC's modules are built for one Python, which is seldom the one that chipload runs in. So nothing of them is
 imported here: :mod:`chipload.control.linuxcnc.pins` is run by that Python, and numbers go through its pipes.

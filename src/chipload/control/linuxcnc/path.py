@@ -1,4 +1,4 @@
-"""Where the machine is on the path, and the torque there, by the model and in truth.
+"""The place of the machine on the path, and the planned and true torque there.
 
 Notation: p_k points of the path [mm], s_k their distance along it; p position of the machine; of the pieces within a
 window about the last s the one nearest to p is taken,

@@ -1,4 +1,4 @@
-"""The pins of the component in HAL: a program of its own, for the Python that LinuxCNC's modules belong to.
+"""The HAL pins of the component: a separate program for the Python interpreter that has LinuxCNC's modules.
 
 It uses the standard library and `hal` only, and is passive: each line on its input is one exchange, and when its input
 ends, it leaves HAL. The first line is JSON: {"name": component, "pins": [[name, type, direction], ...], "signals":

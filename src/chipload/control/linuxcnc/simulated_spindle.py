@@ -1,4 +1,4 @@
-"""A simulated cut and spindle for a machine that really moves: what its spindle would measure.
+"""A simulated cut and spindle for a running LinuxCNC: the values that its spindle would measure.
 
 Notation as in :mod:`chipload.control.plant`, whose spindle this is, and the same order of sums; there the axes are
 simulated too, here place and feed are the machine's own. Between two readings of the machine the two parts of the

@@ -1,4 +1,4 @@
-"""The engagement that the limits of a job allow (`engagement_deg = "limit"`): found, not asked.
+"""The greatest engagement within all limits of a job (`engagement_deg = "limit"`).
 
 The greatest engagement at which every stated limit and every default check holds at the feed, the speed and the depth
 of the operation, wherever on the front half of the rim the stock lies: at the wall, in the middle, at the other side.

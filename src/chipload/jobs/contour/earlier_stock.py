@@ -1,4 +1,4 @@
-"""The stock that an earlier result left (`stock.npz`), as the material that a pocket finds before it begins."""
+"""The remaining stock of an earlier result (`stock.npz`) as the initial stock of a pocket."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What clearing pockets will need, before it is planned.
+"""Estimate of the time and memory to plan pockets.
 
 A step of a pass along a straight front clears the radial depth times the step; levels share one path. Measured on
 drawings and models of others (docs/real_programs.md), in processor time without the start: 0.2 to 5.5 ms for each such

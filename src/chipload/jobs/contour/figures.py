@@ -1,4 +1,4 @@
-"""How the result of contours and pockets is presented: sections of the report, scene, programs."""
+"""The report of contours and pockets: sections, scene, programs."""
 
 from __future__ import annotations
 

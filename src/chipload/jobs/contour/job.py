@@ -1,4 +1,4 @@
-"""A job whose program is planned in the plane: a drawing, what is cut from it and how."""
+"""The job that plans contours and pockets: checks of its tables."""
 
 from __future__ import annotations
 

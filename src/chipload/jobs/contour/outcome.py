@@ -1,4 +1,4 @@
-"""What planning contours and pockets gives: strategies of each operation, and what the simulation found in each."""
+"""The outcome of contours and pockets: the strategies of each operation, and their simulation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The programs of a result as text, RS-274 and APT CL data, both headed by whether they were verified."""
+"""The programs of a result in RS-274 and as APT CL data; the first line states whether a program is verified."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A job from beginning to end: its files are read, each operation planned, each program checked by the simulation.
+"""The run of a contour or pocket job: read the files, plan each operation, check each program by simulation.
 
 Nothing is written here: the outcome is a value, and the report room writes it.
 """

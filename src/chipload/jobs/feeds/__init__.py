@@ -1,4 +1,4 @@
-"""Jobs that give a program new feeds: its own text with other F words, simulated again."""
+"""Jobs that give a program new feeds: new F words, simulated again."""
 
 from __future__ import annotations
 

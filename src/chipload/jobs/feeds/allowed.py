@@ -1,4 +1,4 @@
-"""New feeds for a program that exists: from what its steps cut to its own text with other F words.
+"""New feeds of a program: from the engagement of its steps to new F words.
 
 Notation: a factor is the new feed over the programmed one, see :mod:`chipload.planning.feeds`. The loads of a step at
 other feeds are those of the same bites, thicker or thinner; runout is added after that. The new text is read again, and

@@ -1,4 +1,4 @@
-"""How the result of new feeds is presented: a part of the report of a simulation, and the new text."""
+"""The report of new feeds: an additional section of the report of a simulation."""
 
 from __future__ import annotations
 

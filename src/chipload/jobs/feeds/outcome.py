@@ -1,4 +1,4 @@
-"""New feeds of a program, and the program with them."""
+"""The outcome of new feeds, and the program with them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A job that gives a program new feeds: simulated as it is, given its feeds, simulated again from fresh stock."""
+"""The run of a feeds job: simulate the program, find feeds, simulate the new program from fresh stock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A text with new feeds against what was asked: the same program at the wanted feeds, and no line that rubs."""
+"""Verification of a program with new feeds: the same motions, the requested feeds, and no line that rubs."""
 
 from __future__ import annotations
 

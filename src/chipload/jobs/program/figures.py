@@ -1,4 +1,4 @@
-"""How the result of a program is presented."""
+"""The report of a simulated program."""
 
 from __future__ import annotations
 

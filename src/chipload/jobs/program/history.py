@@ -1,4 +1,4 @@
-"""What a simulation gives back in Python: columns, pictures, numbers, and the files of a result."""
+"""The history of a simulation in Python: columns, plots, numbers and result files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A job that reads a program, and with an operation runs it through a stock."""
+"""The job that reads a program and, with an operation, simulates it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A job that runs a program: read for its machine, and with an operation run through the stock."""
+"""The run of a program job: read the program for its machine and, with an operation, simulate it."""
 
 from __future__ import annotations
 

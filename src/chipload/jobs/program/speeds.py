@@ -1,4 +1,4 @@
-"""New spindle speeds for a program that exists: from the margins of its steps to its own text with other S words.
+"""New spindle speeds of a program: from the margins of its steps to new S words.
 
 One speed a tool, the one with the greatest least margin of those cuts of the tool that are nearest to chatter or
 longest in cut; or one a zone, see :mod:`chipload.jobs.program.zones`. The feed per tooth stays. The new text is read

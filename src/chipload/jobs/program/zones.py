@@ -1,4 +1,4 @@
-"""Passes of a program, and the zones of them that have a spindle speed of their own.
+"""The passes of a program, and the zones with separate spindle speeds.
 
 A pass is what a tool cuts from one line that is wholly out of the material to the next. Its speed can change in the
 first line behind the pass before it; S words that stand between two passes are used.

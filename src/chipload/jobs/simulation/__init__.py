@@ -1,4 +1,4 @@
-"""The simulation of a program in its stock, as the jobs ``program`` and ``feeds`` both state it."""
+"""The simulation of a program in its stock, shared by the jobs ``program`` and ``feeds``."""
 
 from __future__ import annotations
 

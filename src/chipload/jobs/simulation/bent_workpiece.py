@@ -1,4 +1,4 @@
-"""The workpiece as it bends in the step that bends it most, and the support that would help there most.
+"""The workpiece in the step with the greatest deflection, and the support that would reduce it most.
 
 The force is the greatest of that step at the programmed feed, along the mean of its revolution. Supports are tried one
 at a time on upright surfaces, :data:`JACK` stiff along the normal, no nearer to the contact than the cutter's diameter.

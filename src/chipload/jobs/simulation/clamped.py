@@ -1,4 +1,4 @@
-"""The clamps of a job, on the stock that it names."""
+"""The clamps of a job: checks of their tables, and their places on the stock."""
 
 from __future__ import annotations
 

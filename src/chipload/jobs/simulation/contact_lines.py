@@ -1,4 +1,4 @@
-"""Where the steps of a program touch the workpiece, and the stock before some of them.
+"""The contact lines of the steps of a program, and the stock before some of them.
 
 The program is run through the stock once ahead, for this alone: what a step touches and what is left then do not depend
 on the feed.

@@ -1,4 +1,4 @@
-"""Modes of every tool of a job, as far as they are stated.
+"""The modes of every tool of a job.
 
 A mode without damping or stiffness is left out, and what it is of is named: stability is then unproven.
 """

@@ -1,4 +1,4 @@
-"""How the result of a simulated program is presented: sections of the report, scene, programs."""
+"""The report of a simulated program: sections, scene, programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Form error of a stated part, step by step while it is cut: what tool and work that give way leave on its surface.
+"""The form error of a stated part, step by step: the material that deflection leaves on its surface.
 
 Notation: a point of the part is made by the step whose tool comes nearest to it; the error there is that of
 :mod:`chipload.simulation.deflection`, at the moment when an edge makes the point, positive where material is left.

@@ -1,4 +1,4 @@
-"""A job that runs a program which exists through a stock: its tables checked against one another."""
+"""The job that simulates an existing program: checks of its tables."""
 
 from __future__ import annotations
 

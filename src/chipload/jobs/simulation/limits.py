@@ -1,4 +1,4 @@
-"""Limits of a simulated program: those of the job, and those that are checked by default."""
+"""The limit checks of a simulated program: those of the job, and the default checks."""
 
 from __future__ import annotations
 

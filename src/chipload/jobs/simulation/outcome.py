@@ -1,4 +1,4 @@
-"""What running a program gives: what it does on the machine and in the stock."""
+"""The outcome of a program: its motions on the machine, and its simulation in the stock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is left on the part, drawn: gouge in red, finished in grey, excess in blue; and what ran into what.
+"""Figures of the part (gouge in red, finished in grey, excess in blue) and of collisions.
 
 Notation: distance [mm] of the part's points from the tool, below 0 gouge, above 0 excess; what is more than ``look`` is
 not known and drawn pale.

@@ -1,4 +1,4 @@
-"""What is left on the part, and what ran into what, as numbers of an operation in summary.json."""
+"""Gouge, excess and collisions as numbers of an operation in summary.json."""
 
 from __future__ import annotations
 

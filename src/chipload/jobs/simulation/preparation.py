@@ -1,4 +1,4 @@
-"""What the simulation of a program needs before its first step: read, checked, and the same for a check and a run."""
+"""Preparation of a simulation before its first step, the same for a check and a run."""
 
 from __future__ import annotations
 

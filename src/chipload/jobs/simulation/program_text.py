@@ -1,4 +1,4 @@
-"""The text of a program whose words can be changed."""
+"""The text of a program whose F or S words can be changed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Read the program of a job, find the compliance of its workpiece, run it through its stock."""
+"""The run of a simulation: read the program, find the compliance of its workpiece, simulate it in its stock."""
 
 from __future__ import annotations
 

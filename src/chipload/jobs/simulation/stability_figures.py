@@ -1,4 +1,4 @@
-"""The part of the report about chatter: the step nearest to it, quiet speeds, the chart, the margin along the path."""
+"""The report section on chatter: the step with the least margin, quiet speeds, chart, margin along the path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the stability of a run was asked so far, as a file of its state.
+"""The stored results of stability calculations of a run, for its checkpoint.
 
 Notation: a program is cut by t tools with n different cuts in all, of b rows; cut i has the key ``keys[ends[i - 1]:
 ends[i]]`` and the values ``values[i]``. Cuts of one tool follow one another, in the order in which they were met.

@@ -1,4 +1,4 @@
-"""The watch that asks for the stability of every step of a simulation, and keeps what it asked.
+"""The observer of a simulation that requests the stability of every step and stores the answers.
 
 Steps that cut alike are asked once, see :mod:`chipload.stability.grouping`; where the modes of the workpiece are
 followed through its removal each step has modes of its own and is asked by itself.

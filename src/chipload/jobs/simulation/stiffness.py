@@ -1,4 +1,4 @@
-"""What gives way under a cutter of a job: its own bars, holder, spindle and work, as far as they are stated.
+"""The stiffness of cutter, holder, spindle and workpiece of a job, as far as it is stated.
 
 Notation: a stiffness that is not stated counts as infinite, so that every deflection is then a lower bound; what was
 taken so is named.

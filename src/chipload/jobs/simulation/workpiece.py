@@ -1,4 +1,4 @@
-"""The bodies of a job that runs a program: its stock in layers, the part that should come out, the fixtures."""
+"""The bodies of a simulation: stock in layers, finished part, fixtures."""
 
 from __future__ import annotations
 

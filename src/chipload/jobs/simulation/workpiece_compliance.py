@@ -1,4 +1,4 @@
-"""How far the workpiece of a job gives way, step by step, and how well that is known.
+"""The deflection of the workpiece of a job, step by step, and its error.
 
 The program is run ahead, the stock is kept every few steps, and its compliance is solved in a few of these states. What
 the cells do to the result is found at the worst places: there the same states are solved in cells of :data:`COARSER`

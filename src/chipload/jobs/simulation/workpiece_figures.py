@@ -1,4 +1,4 @@
-"""The workpiece in the report: bent in its worst step, what limits it, what would help."""
+"""The workpiece in the report: deformed in its worst step, its limits and the best support."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Jobs that hold the torque on a thin tube or cone by a feed override, and compare controllers."""
+"""Jobs that limit the torque on a thin tube, a cone or a workpiece, and compare controllers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the wall allows along a program: plan and truth cut, the limit of torque, the path of the controllers."""
+"""The torque limit along a program: planned and true cut, and the path for the controllers."""
 
 from __future__ import annotations
 

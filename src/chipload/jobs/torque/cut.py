@@ -1,4 +1,4 @@
-"""What a program cuts from the stock of a thin tube or cone, as planned and as it really is.
+"""The cut of a program in the stock of a thin tube or cone, as planned and in reality.
 
 Notation: z height [mm], s distance from the clamp along the wall, f half angle: z = z_0 +- s cos f; r_0 + s sin f the
 radius of the middle surface; the wall t / cos f wide across Z, its outer edge t / (2 cos f) outside that.

@@ -1,4 +1,4 @@
-"""How the result of a torque-controlled program is presented: sections of the report, scene, files."""
+"""The report of a torque job: sections, scene, files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a machine takes from the result: the path and the controller for `chipload hal`, and two programs.
+"""The files of a torque job for the machine: path and controller for `chipload hal`, and two programs.
 
 `0-override.ngc` has the programmed feeds and takes the override; `0-feedforward.ngc` has the feeds that the model
 allows written into it, for a machine without a controller: nothing is measured there.

@@ -1,4 +1,4 @@
-"""A job that holds the torque on a thin tube, a cone or a clamped workpiece."""
+"""The job that limits the torque on a thin tube, a cone or a clamped workpiece: checks of its tables."""
 
 from __future__ import annotations
 

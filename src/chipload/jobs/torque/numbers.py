@@ -1,4 +1,4 @@
-"""The numbers of a torque-controlled program in summary.json: the limit, the controllers, the wall."""
+"""The numbers of a torque job in summary.json: limit, controllers, wall."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What holding the torque gave: the limit of wall or workpiece, each controller with and without latency, what holds.
+"""The outcome of a torque job: the limit of wall or workpiece, and each controller with and without latency.
 
 Torques are held against what the wall bears at their place: `torque_nm_max` is the torque over its relief, so that it
 compares with the one limit, that of the place where the wall bears least; `torque_raw_nm_max` is the torque itself.

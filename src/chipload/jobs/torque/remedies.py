@@ -1,4 +1,4 @@
-"""What would make the torque allowable where the edge force alone is too much for the wall, each change by itself.
+"""Remedies if the edge force alone is too great for the wall: each change that would make a torque allowable.
 
 Notation: F_e edge force at a step, in proportion to its depth of cut; F_lim = min(d / (C_w + C_t), S / g) as in
 :mod:`chipload.control.wall`, for another depth of cut, wall, free length or overhang. A change would do where F_lim

@@ -1,4 +1,4 @@
-"""The result of a torque-controlled program: a track for each controller and latency, limits, findings.
+"""The result of a torque job: a track for each controller and latency, limits, findings.
 
 The verdict stands on the fuzzy controller with the model of the cut and the latency that the job states.
 """

@@ -1,4 +1,4 @@
-"""A job that holds the torque: that which the wall or the workpiece allows, and the controllers that hold it."""
+"""The run of a torque job: find the torque limit, then run the controllers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A thin wall and the torque that it allows: for the result, and coarsely for a check."""
+"""The torque that a thin wall allows, for the result and, coarsely, for a check."""
 
 from __future__ import annotations
 

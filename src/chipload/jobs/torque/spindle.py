@@ -1,4 +1,4 @@
-"""The spindle of a job: what the controller believes of it, from the job and its file, and what it resolves."""
+"""The spindle of a job: the controller's model from the job and its file, and its resolution."""
 
 from __future__ import annotations
 

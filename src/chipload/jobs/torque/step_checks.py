@@ -1,4 +1,4 @@
-"""What the default checks of a torque-controlled program need of each step, and their columns for a controller.
+"""The data of each step for the default checks of a torque job, and their columns for a controller.
 
 Notation: k a step of the path; r the feed over the programmed one, with the droop of the spindle. The loads of the
 teeth are convex in r, so between two feeds the straight line lies above the stress of the cutter. The chip thickness

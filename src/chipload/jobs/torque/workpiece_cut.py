@@ -1,4 +1,4 @@
-"""What a program cuts from a clamped workpiece, and the torque that the workpiece allows along it.
+"""The cut of a program in a clamped workpiece, and the torque that the workpiece allows along it.
 
 Notation: o the override; D(o) = D_e + D_c o greatest distance over a revolution by which workpiece and cutter part
 along the normal of the surface that a step leaves, anywhere on its contact line (their whole deflection where it leaves

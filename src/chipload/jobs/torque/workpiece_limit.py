@@ -1,4 +1,4 @@
-"""A clamped workpiece and the torque that it allows: for the result, and coarsely for a check; what would help.
+"""The torque that a clamped workpiece allows, for the result and, coarsely, for a check; and remedies.
 
 Notation as in :mod:`chipload.jobs.torque.workpiece_cut`. Where D_e or W_e alone reaches its limit d no feed would do.
 Each change by itself would where the response of the edge is then at most d / :data:`MARGIN`: a depth of cut in

@@ -1,4 +1,4 @@
-"""CYCLE records: holes in CL data to motions.
+"""CYCLE records: the motions of holes in CL data.
 
 Notation: a hole is at a point of the surface, its depth d [mm] counted from there against the tool's axis; rapto c and
 rtrcto h [mm] are counted from there along it. A step is ``(kind, height, value)``: RAPID or LINE to a height above the

@@ -1,4 +1,4 @@
-"""In which coordinates the points of CL data are: CSYS, TRNTYP, ROTABL, TLAXIS.
+"""The coordinates of points in CL data: CSYS, TRNTYP, ROTABL, TLAXIS.
 
 Notation: p_work in the one work frame, p in the coordinates of the text; R (3, 3), t (3,) with p_work = R (p - t), a
 direction a_work = R a. CSYS/a11,a12,a13,t1,a21,a22,a23,t2,a31,a32,a33,t3 describes a coordinate system whose axes, in

@@ -1,4 +1,4 @@
-"""What the records of CL data do, one after the other.
+"""Execution of the records of CL data, one after the other.
 
 Notation: ``mm`` in one unit of the text; p, a a point and the tool's axis as the text gives them, w, b the same in the
 work frame. Between records stand the units, the coordinates, a pending RAPID or CIRCLE, and the cycle that cuts holes.

@@ -1,4 +1,4 @@
-"""CL data to a Program.
+"""The reader of CL data, which returns a Program.
 
 Notation: a record is WORD/arg,arg,... GOTO/x,y,z[,i,j,k] moves the tip straight, after CIRCLE/x,y,z,i,j,k[,r] on an arc
 counter-clockwise about (i, j, k) through (x, y, z); ends over one another are a full turn. RAPID holds for one motion,

@@ -1,4 +1,4 @@
-"""Text of CL data to records.
+"""The parser of CL data, which returns records.
 
 Notation: WORD/arg,arg,... is a record, a word with arguments. At a ``$`` it goes on on the next line; what follows that
 and what follows ``$$`` is a comment. Blanks around words and numbers do not count, nor do small letters; the text of

@@ -1,1 +1,1 @@
-"""How the cutting force answers a displacement, cell by cell of a tooth period."""
+"""The change of the cutting force by a displacement, for each cell of a tooth period."""

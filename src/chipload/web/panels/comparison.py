@@ -1,4 +1,4 @@
-"""Key numbers of tracks that are compared, and what each has more or less than the first."""
+"""The panel with the key numbers of compared tracks and their differences from the first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the teeth cut where the 3D view stands: chip, thickness, force and torque over a revolution.
+"""The panel of the cut at the current step: chip, chip thickness, force and torque over a revolution.
 
 The browser draws it from the document of the 3D view (viewer/src/cut.ts) and follows it by itself.
 """

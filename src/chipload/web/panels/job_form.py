@@ -1,4 +1,4 @@
-"""The keys of a job as a form: what is entered is checked at once; a run takes the changed values, the file stays."""
+"""The form with the keys of a job. It checks input at once; a run uses the changed values, the file stays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The limit table, and what else does not hold or was noticed; a click goes to the place."""
+"""The panel with the limits and findings of a track; a click selects the place."""
 
 from __future__ import annotations
 

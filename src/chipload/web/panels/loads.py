@@ -1,4 +1,4 @@
-"""Tools over time and the lines of the program by their load; a click goes to the place."""
+"""The panel with the tools over time and the program lines by load; a click selects the place."""
 
 from __future__ import annotations
 

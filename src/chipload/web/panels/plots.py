@@ -1,4 +1,4 @@
-"""The linked plots: choose columns and what they stand against; the cursor follows, a click moves the slider."""
+"""The panel with the linked plots of chosen columns; the cursor follows the row, a click selects one."""
 
 from __future__ import annotations
 

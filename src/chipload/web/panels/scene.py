@@ -1,4 +1,4 @@
-"""The 3D view: bodies, the stock at the row, the path in the colours of a column, the cutter, marks.
+"""The 3D view: bodies, stock at the row, path coloured by a column, cutter, marks.
 
 The view itself runs in the browser (viewer/src, built into report/viewer/viewer.js): it moves by itself while a track
 is played and tells the row. Here are its controls, and what it is told.

@@ -1,4 +1,4 @@
-"""The lines of the program: the one at the row stands out and is kept in sight, a click on a line goes there."""
+"""The panel with the program; it highlights the line of the row, and a click on a line selects it."""
 
 from __future__ import annotations
 
