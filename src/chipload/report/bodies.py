@@ -103,11 +103,11 @@ def fewer_triangles(
     for _ in range(HALVINGS):
         cell = 0.5 * (wide + narrow)
         key = np.floor((vertices - low) / max(cell, 1e-9)).astype(np.int64)
-        _, number = np.unique(key, axis=0, return_inverse=True)
+        _, number = np.unique(_as_one(key), return_inverse=True)
         joined = number.ravel()[faces]
         solid = (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 2] != joined[:, 0])
         # two triangles of the same corners cover each other
-        kept = np.unique(np.sort(joined[solid], axis=1), axis=0, return_index=True)[1]
+        kept = np.unique(_as_one(np.sort(joined[solid], axis=1)), return_index=True)[1]
         if len(kept) <= most:
             wide, best = cell, (number.ravel(), joined[solid][np.sort(kept)])
         else:
@@ -120,6 +120,17 @@ def fewer_triangles(
     first = np.unique(number, return_index=True)[1]
     moved = float(np.linalg.norm(mean[number] - vertices, axis=1).max())
     return mean, index, colours if colours.ndim == 1 else colours[first], moved
+
+
+def _as_one(rows: Ints) -> Ints:
+    """(n,) numbers that are equal and in order where rows (n, 3) of numbers from 0 on are.
+
+    >>> _as_one(np.array([[0, 0, 2], [0, 1, 0], [0, 0, 2]])).argsort(kind="stable").tolist()
+    [0, 2, 1]
+    """
+    if len(rows) and int(rows.max()) >= 1 << 21:
+        return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1], dtype=np.int64).ravel()
+    return np.asarray((rows[:, 0] << 42) | (rows[:, 1] << 21) | rows[:, 2])
 
 
 def _body(name: str, mesh: trimesh.Trimesh, most: int) -> SceneBody:

@@ -32,7 +32,7 @@ By moves the stock has no layers. The earlier steps that reach into the box are 
 step with MORE times the slices and half the angle between rotations, once at the same instants, for f - c, and once in
 halves, for what exceeds the worst: where the contact is exact, a load that differs between the halves of a step, as
 where the cutter enters, is no error of the resolution unless it is greater than any that was found. FLOOR is that of
-:data:`MOVES_FLOOR`, about what 99 of 100 moves of the benchmark are off by (docs/design/engines.md), for of all
+:data:`MOVES_FLOOR`, within which 99 of 100 moves of the benchmark are (docs/design/engines.md), for of all
 steps a few are computed once more; where all cutters have a straight flank and a flat bottom, on which slices are
 exact, it is that of the layers. Where an axis leans it is :data:`LEANING_MOVES_FLOOR` for any cutter.
 

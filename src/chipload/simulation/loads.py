@@ -17,6 +17,7 @@ from chipload.cutter.slices import Slices
 from chipload.cutting.band import mean_band, peak_band
 from chipload.cutting.force import forces_over_turn, in_work, mean_forces
 from chipload.cutting.material import Material
+from chipload.cutting.revolution.revolution import first_greatest
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
 from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
@@ -215,8 +216,8 @@ def bands_of_steps(
     if not material.has_band:
         return {}
     force, torque, theta = turn
-    at_force = theta[np.linalg.norm(force, axis=2).argmax(axis=1)]
-    force_sd, torque_sd = peak_band(engagement, cutter, material, at_force, theta[torque.argmax(axis=1)])
+    at_force, at_torque = theta[first_greatest(np.linalg.norm(force, axis=2))], theta[first_greatest(torque)]
+    force_sd, torque_sd = peak_band(engagement, cutter, material, at_force, at_torque)
     mean_sd = mean_band(engagement, cutter, material)[1]
     values = (force_sd, torque_sd / 1000.0, mean_sd / 1000.0, mean_sd * np.abs(spindle) / 1000.0)
     return dict(zip(BANDS, values, strict=True))

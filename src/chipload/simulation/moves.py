@@ -26,14 +26,17 @@ from chipload.cutting.band import deviations, peak_band, turned_basis
 from chipload.cutting.material import Material
 from chipload.cutting.revolution.revolution import loads_over_turn
 from chipload.engagement.bricks.stock import BrickStock
-from chipload.engagement.moves.stock import Engaged, MoveStock
+from chipload.engagement.moves.stock import Engaged, MoveStock, cutter_row
 from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
 from chipload.errors import InputError
+from chipload.lazy import LateModule
 from chipload.program.program import Program
 from chipload.simulation.loads import BANDS, LOADS, ONE_SIDE, Cuts, engaged_work
 from chipload.simulation.steps import ROWS, Steps, steps_in_blocks
 from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
+
+skew = LateModule("chipload.engagement.moves.skew._kernels")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -331,30 +334,41 @@ def engagement_of(found: Engaged, entries: Ints, steps: Steps, cutter: Cutter) -
         raise InputError(f"line {line}: cuts with the spindle at rest: start it (M3 S) before the cut")
     hand = np.where(spindle > 0.0, 1.0, -1.0)
     tooth = math.tau / (cutter.flutes * np.abs(spindle)) / steps.seconds[step]
+    if found.frames is None:
+        return _upright(found, entries, (steps.p1 - steps.p0)[step] * tooth[:, None], hand, cutter)
     start, of, span, piece = _spans(found, entries)
     # psi is counted from the motion counter-clockwise, phi from n in the sense of the spindle
-    turn = hand[of]
+    turn, slices = hand[of], found.slices[piece]
     low = 0.5 * math.pi - np.where(turn > 0.0, span[:, 1], -span[:, 0])
     wide = np.clip(span[:, 1] - span[:, 0], 0.0, math.tau)
     low = low - math.tau * np.floor(low / math.tau)
-    slices = found.slices[piece]
-    if found.frames is not None:
-        frame = found.frames[entries] * np.stack([np.ones(len(hand)), hand, np.ones(len(hand))], axis=1)[:, :, None]
-        s0, s1, along, across, rise = slices[:, [0, 1, 6, 7, 8]].T
-        motion = np.column_stack([along, -rise, turn * across]) * tooth[of][:, None]
-    else:
-        feed = (steps.p1 - steps.p0)[step] * tooth[:, None]
-        size = np.hypot(feed[:, 0], feed[:, 1])
-        upright = size <= 1e-12 * np.abs(feed[:, 2])
-        T = np.where(upright[:, None], [[1.0, 0.0]], feed[:, :2] / np.where(upright, 1.0, size)[:, None])
-        frame = np.zeros((len(entries), 3, 3))
-        frame[:, 0, :2] = T
-        frame[:, 1, 0], frame[:, 1, 1] = -hand * T[:, 1], hand * T[:, 0]
-        frame[:, 2, 2] = 1.0
-        s0, s1, _, _, sk, ck = slices.T
-        motion = np.column_stack([sk * size[of], -ck * feed[of, 2], 0.0 * low])
+    frame = found.frames[entries] * np.stack([np.ones(len(hand)), hand, np.ones(len(hand))], axis=1)[:, :, None]
+    s0, s1, along, across, rise = slices[:, [0, 1, 6, 7, 8]].T
+    motion = np.column_stack([along, -rise, turn * across]) * tooth[of][:, None]
     rows = np.column_stack([low, low + wide, s0, s1, motion])
     return ToothEngagement(start, rows, np.full(len(rows), -1), piece, _slices(found.slices, cutter), frame)
+
+
+def _upright(found: Engaged, entries: Ints, feed: Floats, hand: Floats, cutter: Cutter) -> ToothEngagement:
+    """The tooth engagement of some entries of an upright cutter; ``feed`` (m, 3): motion a tooth [mm]."""
+    size = np.hypot(feed[:, 0], feed[:, 1])
+    plunge = size <= 1e-12 * np.abs(feed[:, 2])
+    T = np.where(plunge[:, None], [[1.0, 0.0]], feed[:, :2] / np.where(plunge, 1.0, size)[:, None])
+    frame = np.zeros((len(entries), 3, 3))
+    frame[:, 0, :2] = T
+    frame[:, 1, 0], frame[:, 1, 1] = -hand * T[:, 1], hand * T[:, 0]
+    frame[:, 2, 2] = 1.0
+    room = skew.PARTS * int(np.diff(found.start)[entries].sum())
+    begin, slices = np.empty(len(entries) + 2, dtype=np.int64), np.ascontiguousarray(found.slices)
+    rows, rows_of, table = np.empty((room, 7)), np.empty(room, dtype=np.int64), np.empty((len(slices) + room, 7))
+    count = skew.tooth_rows(
+        entries, found.start, np.ascontiguousarray(found.span), np.ascontiguousarray(found.slice), slices,
+        cutter_row(cutter), edge_lag(cutter), hand, size, np.ascontiguousarray(feed[:, 2]), begin, rows, rows_of, table,
+    )  # fmt: skip
+    # as large as they are, for they may be kept
+    return ToothEngagement(
+        begin[:-1], rows[:count].copy(), np.full(count, -1), rows_of[:count].copy(), table[: begin[-1]].copy(), frame
+    )
 
 
 def _spans(found: Engaged, entries: Ints) -> tuple[Ints, Ints, Floats, Ints]:

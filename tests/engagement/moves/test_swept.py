@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from chipload.engagement.moves._kernels import swept
-from chipload.engagement.moves.stock import cutter_row
-from engagement.moves.field import CUTTERS, least_height
+from chipload.cutter.cutter import Cutter
+from chipload.engagement.moves._kernels import from_ball, off_ball, swept
+from chipload.engagement.moves.border._kernels import crossing
+from chipload.engagement.moves.stock import MoveStock, cutter_row
+from engagement.moves.field import BALL, CUTTERS, FLAT, least_height
 
 MOVES = {
     "level": (3.0, -2.0, 0.0),
@@ -54,3 +58,48 @@ def test_the_border_itself_is_swept(kind: str) -> None:
     z = least_height(cutter, m[:3], m[:3], 100.0 + 0.0 * rho, 2.0 + rho, 1)
     assert all(swept(m, row, 103.0, 2.0 + r, h) for r, h in zip(rho, z, strict=True))
     assert not any(swept(m, row, 103.0, 2.0 + r, h - 1e-6) for r, h in zip(rho, z, strict=True))
+
+
+@pytest.mark.parametrize("way", MOVES)
+def test_a_ball_of_the_index_is_that_of_a_row(way: str) -> None:
+    """Without a division, and with the reciprocals that the index keeps."""
+    row, u, random = cutter_row(BALL), np.array(MOVES[way]), np.random.default_rng(4)
+    square = [(u[:2] ** 2).sum(), (u**2).sum()]
+    moves = np.array([[1.0, 2.0, -3.0, *u, *(1.0 / s if s > 0.0 else 0.0 for s in square)]])
+    for x, y, z in random.uniform(-9.0, 9.0, (500, 3)).tolist():
+        known = from_ball(moves[0, :6].copy(), row[1], x, y, z)
+        assert off_ball(moves, 0, row[1], x, y, z) == pytest.approx(known, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("way", ["level", "ramp down", "ramp up", "short", "long ramp"])
+@pytest.mark.parametrize("cutter", [BALL, FLAT], ids=["ball", "flat"])
+def test_the_border_of_a_move_on_a_circle(cutter: Cutter, way: str) -> None:
+    """Against the containment of directions beside it, which halving finds."""
+    stock = MoveStock(np.array([-80.0, -80.0, -30.0]), np.array([80.0, 80.0, 30.0]), {1: cutter})
+    a = np.array([1.0, 2.0, -3.0])
+    stock.skip(a[None], a[None] + MOVES[way], np.array([1]))
+    m, row, index, random = np.array([*a, *MOVES[way]]), cutter_row(cutter), stock._index(), np.random.default_rng(6)
+    T, found = np.array([0.6, 0.8]), 0
+    for _ in range(4000):
+        px, py = a[:2] + random.uniform(-5.0, 5.0, 2) + random.uniform(0.0, 1.0) * np.array(MOVES[way][:2])
+        z, rho = a[2] + random.uniform(-1.0, 4.0), random.uniform(0.3, 4.0)
+        one = random.uniform(-math.pi, math.pi)
+        other = one + random.uniform(-0.35, 0.35)
+
+        def inside(psi: float, px: float = px, py: float = py, z: float = z, rho: float = rho) -> bool:
+            c, s = math.cos(psi), math.sin(psi)
+            return bool(swept(m, row, px + rho * (c * T[0] - s * T[1]), py + rho * (c * T[1] + s * T[0]), z))
+
+        if inside(one) or not inside(other):
+            continue
+        low, high = one, other
+        for _ in range(40):
+            mid = 0.5 * (low + high)
+            low, high = (low, mid) if inside(mid) else (mid, high)
+        u, s = (math.cos(one), math.sin(one)), (math.cos(other), math.sin(other))
+        dc, ds, bc, bs = crossing(px, py, z, rho, T, *u, *s, 0, index)
+        off = math.remainder(math.atan2(ds, dc) - low, math.tau)
+        assert abs(off) < 1e-6, (off, one, other)
+        assert not inside(math.atan2(bs, bc))
+        found += 1
+    assert found > 50

@@ -2,8 +2,9 @@
 
 Notation as in :mod:`chipload.cutting.revolution._kernels`: at a rotation the edge of a bite lies at the immersions
 theta - last .. theta - first, of which p .. q cut. A lever is a polynomial of the third degree in the height above the
-tip. Where all of a bite's edge cuts, its points of Gauss lie at the same lag at every rotation, and their sine and
-cosine come from those of the rotations, which are one table.
+tip. Where all of a bite's edge cuts, its points of Gauss lie at the same lag at every rotation: as there, its load is a
+sum of cosine and sine of the rotation and of twice it, the factors of which are added where that begins and taken away
+where it ends.
 Oracles: :func:`chipload.cutting._strength.in_sections_over_turn` and
 :func:`chipload.simulation.bending._kernels.bent_many`, which integrate bite by bite and rotation by rotation.
 """
@@ -30,39 +31,105 @@ def lever(poly, z):
     return poly[0] + z * (poly[1] + z * (poly[2] + z * poly[3]))
 
 
-@njit(cache=True, nogil=True)
-def whole(acc, m0, m1, at, table, lag, w, u, rho, share):
-    """Add a point of the edge to ``acc`` for the rotations ``m0`` to ``m1``, which are the entries ``at`` on of the
-    table: ``u`` its levers, ``share`` of the edge [mm].
+@njit(cache=True, nogil=True, inline="always")
+def whole(v, lag, w, u, rho, share):
+    """Add a point of the edge to the factors ``v`` of the rotations at which all of its edge cuts: ``u`` its levers,
+    ``share`` of the edge [mm].
+
+    With x, y the cosine and sine of the rotation and X, Y those of twice it the axial force is -(v0 + v1 x + v2 y) and
+    the torque v3 + v4 x + v5 y. A lateral load has six factors: along T -(k0 + k2 x + k3 y + k4 X + k5 Y), along n
+    k1 + k2 y - k3 x + k4 Y - k5 X. From v6 on are those of the moment of the axial force, along n and against T, from
+    v12 on those of each lever.
     """
-    cl = math.cos(lag)
-    sl = math.sin(lag)
-    at_, bt, ct, ar, br, cr = w[0] * share, w[1] * share, w[2] * share, w[3] * share, w[4] * share, w[5] * share
-    a0, a1, a2 = w[6] * share, w[7] * share, w[8] * share
-    levers = len(u)
-    u0 = u[0]
-    u1 = u[1]
-    for m in range(m0, m1):
-        x = table[0, at + m]
-        y = table[1, at + m]
-        C = x * cl + y * sl
-        S = y * cl - x * sl
-        t = at_ + bt * S + ct * C
-        r = ar + br * S + cr * C
-        a = -(a0 + a1 * S + a2 * C)
-        along = -(t * C + r * S)
-        across = t * S - r * C
-        acc[0, m] += a
-        acc[1, m] += rho * t
-        acc[2, m] += rho * a * S
-        acc[3, m] += rho * a * C
-        acc[4, m] += u0 * along
-        acc[5, m] += u0 * across
-        acc[6, m] += u1 * along
-        acc[7, m] += u1 * across
-        for f in range(2, levers):
-            acc[4 + 2 * f, m] += u[f] * along
-            acc[5 + 2 * f, m] += u[f] * across
+    c = math.cos(lag)
+    s = math.sin(lag)
+    c2 = c * c - s * s
+    s2 = 2.0 * c * s
+    v[0] += share * w[6]
+    v[1] += share * (w[8] * c - w[7] * s)
+    v[2] += share * (w[7] * c + w[8] * s)
+    k = share * rho
+    v[3] += k * w[0]
+    v[4] += k * (w[2] * c - w[1] * s)
+    v[5] += k * (w[1] * c + w[2] * s)
+    a = 0.5 * w[7]
+    b = 0.5 * w[8]
+    v[6] += k * b
+    v[7] += k * a
+    v[8] += k * w[6] * c
+    v[9] += k * w[6] * s
+    v[10] += k * (b * c2 - a * s2)
+    v[11] += k * (a * c2 + b * s2)
+    a = 0.5 * (w[1] + w[5])
+    b = 0.5 * (w[2] - w[4])
+    k0 = 0.5 * (w[2] + w[4])
+    k1 = 0.5 * (w[1] - w[5])
+    k2 = w[0] * c - w[3] * s
+    k3 = w[0] * s + w[3] * c
+    k4 = b * c2 - a * s2
+    k5 = a * c2 + b * s2
+    for f in range(len(u)):
+        k = share * u[f]
+        j = 12 + 6 * f
+        v[j] += k * k0
+        v[j + 1] += k * k1
+        v[j + 2] += k * k2
+        v[j + 3] += k * k3
+        v[j + 4] += k * k4
+        v[j + 5] += k * k5
+
+
+@njit(cache=True, nogil=True, inline="always")
+def between(sums, m0, m1, v, c, s):
+    """Add the factors ``v`` to ``sums[m0]``, where they begin, and take them from ``sums[m1]``, where they end; the
+    rotations are counted from one whose cosine and sine are ``c`` and ``s``. The last column counts what cuts.
+    """
+    c2 = c * c - s * s
+    s2 = 2.0 * c * s
+    last = len(v)
+    for m, sign in ((m0, 1.0), (m1, -1.0)):
+        for j in (0, 3):
+            sums[m, j] += sign * v[j]
+            sums[m, j + 1] += sign * (v[j + 1] * c + v[j + 2] * s)
+            sums[m, j + 2] += sign * (v[j + 2] * c - v[j + 1] * s)
+        for j in range(6, last, 6):
+            sums[m, j] += sign * v[j]
+            sums[m, j + 1] += sign * v[j + 1]
+            sums[m, j + 2] += sign * (v[j + 2] * c + v[j + 3] * s)
+            sums[m, j + 3] += sign * (v[j + 3] * c - v[j + 2] * s)
+            sums[m, j + 4] += sign * (v[j + 4] * c2 + v[j + 5] * s2)
+            sums[m, j + 5] += sign * (v[j + 5] * c2 - v[j + 4] * s2)
+        sums[m, last] += sign
+
+
+@njit(cache=True, nogil=True)
+def summed(sums, table, v, acc):
+    """Add what cuts whole at each rotation to ``acc`` (4 + 2 f, m); ``table`` (2, .) of cosines and sines."""
+    last = len(v)
+    v[:] = 0.0
+    n = 0.0
+    for m in range(acc.shape[1]):
+        if sums[m, last] == 0.0 and n == 0.0:
+            continue
+        n += sums[m, last]
+        if n == 0.0:
+            # nothing is left but rounding
+            v[:] = 0.0
+            continue
+        for j in range(last):
+            v[j] += sums[m, j]
+        x = table[0, m]
+        y = table[1, m]
+        xx = x * x - y * y
+        yy = 2.0 * x * y
+        acc[0, m] -= v[0] + v[1] * x + v[2] * y
+        acc[1, m] += v[3] + v[4] * x + v[5] * y
+        acc[2, m] -= v[7] + v[8] * y - v[9] * x + v[10] * yy - v[11] * xx
+        acc[3, m] -= v[6] + v[8] * x + v[9] * y + v[10] * xx + v[11] * yy
+        for j in range(12, last, 6):
+            f = j // 3
+            acc[f, m] -= v[j] + v[j + 2] * x + v[j + 3] * y + v[j + 4] * xx + v[j + 5] * yy
+            acc[f + 1, m] += v[j + 1] + v[j + 2] * y - v[j + 3] * x + v[j + 4] * yy - v[j + 5] * xx
 
 
 @njit(cache=True, nogil=True)
@@ -107,11 +174,14 @@ def over_turn(start, rows, tooth, piece, slices, table, teeth, count, alike, c, 
     """
     w = np.empty(9)
     u = np.empty(len(polys))
+    v = np.empty(12 + 6 * len(polys))
+    sums = np.empty((count + 1, len(v) + 1))
     parts = teeth if alike else 1
     step = TAU / parts / count
     for i in range(len(start) - 1):
         acc = out[i]
         acc[:] = 0.0
+        sums[:] = 0.0
         for r in range(start[i], start[i + 1]):
             k = piece[r]
             p = rows[r, 0]
@@ -157,6 +227,7 @@ def over_turn(start, rows, tooth, piece, slices, table, teeth, count, alike, c, 
                 pieces = max(math.ceil((last - first) / PIECE), 1)
                 h = size / pieces
                 points = points_of(rate * h)
+                v[:] = 0.0
                 for b in range(pieces):
                     for g in range(points):
                         s = sa + h * (b + 0.5 + 0.5 * NODES[points, g])
@@ -164,12 +235,12 @@ def over_turn(start, rows, tooth, piece, slices, table, teeth, count, alike, c, 
                         for f in range(len(u)):
                             u[f] = lever(polys[f], z)
                         lag = first if straight else base + rate * s
-                        at = a0
-                        while at < a1:
-                            turn = at // count
-                            to = min(a1, (turn + 1) * count)
-                            whole(
-                                acc, at - turn * count, to - turn * count, (turn % parts) * count, table, lag, w, u,
-                                rho, 0.5 * h * WEIGHTS[points, g],
-                            )  # fmt: skip
-                            at = to
+                        whole(v, lag, w, u, rho, 0.5 * h * WEIGHTS[points, g])
+                at = a0
+                while at < a1:
+                    turn = at // count
+                    to = min(a1, (turn + 1) * count)
+                    k = (turn % parts) * count
+                    between(sums, at - turn * count, to - turn * count, v, table[0, k], table[1, k])
+                    at = to
+        summed(sums, table, v, acc)

@@ -2,7 +2,9 @@
 
 Notation as in :mod:`chipload.cutting._kernels`. Over the part lo .. hi of the immersion in which a bite's edge lies at
 a rotation the load of the edge is (I(hi) - I(lo)) / rate, I the integral of the load of a mm over the immersion:
-products of sine and cosine. These of all rotations come from one table.
+products of sine and cosine. These of all rotations come from one table. Where all of the edge cuts, its load is a sum
+of cosine and sine of the rotation and of twice it, the factors of which are added where that begins and taken away
+where it ends: a bite costs the same however many rotations it cuts.
 Oracle: :func:`chipload.cutting.force.forces_over_turn`, which integrates bite by bite and rotation by rotation.
 """
 
@@ -16,6 +18,8 @@ from numba import njit, types
 TAU = 2.0 * math.pi
 #: an edge that lags by less than this over a bite counts as one that does not [rad]
 STRAIGHT = 1e-5
+#: loads that differ by no more than this share are alike: rounding does not say which rotation has the greatest
+ALIKE = 1e-7
 #: entries whose angles [rad] and places [mm] differ by no more than this, and whose chips by no more than this share,
 #: have the same loads: those of the first of them
 SAME = 1e-8
@@ -43,55 +47,92 @@ def weights(along, offset, across, sine, cosine, c, out):
     out[8] = ka * across
 
 
-@njit(cache=True, nogil=True)
-def add(acc, m0, m1, at, step, back, table, first, last, p, q, w, size, arm, rate):
-    """Add the loads of a bite to ``acc`` (4, m), rows along T, n, the axis and torque, for the rotations ``m0`` to
-    ``m1``, which begin at ``back`` [rad] and are the entries ``at`` on of the table (2, .) of cosines and sines.
+@njit(cache=True, nogil=True, inline="always")
+def add_whole(sums, m0, m1, cl, sl, one, two, w, size, arm):
+    """Add the loads of an edge that cuts whole at the rotations ``m0`` to ``m1``: to ``sums[m0]`` what begins there,
+    from ``sums[m1]`` what ends.
 
-    The edge lies at the immersions theta - last .. theta - first, of which p .. q cut; ``size`` its length [mm] where
-    it does not lag, ``rate`` [rad/mm] its lag.
+    With x, y the cosine and sine of the rotation and X, Y those of twice it the force along T is
+    -(s0 + s2 x + s3 y + s4 X + s5 Y), along n s1 + s2 y - s3 x + s4 Y - s5 X, along the axis -(s6 + s7 x + s8 y) and
+    the torque s9 + s10 x + s11 y; s12 counts what cuts. ``cl``, ``sl``: of the lag of the middle of the edge, ``one``
+    and ``two`` the means of the cosine and of that of twice the angle over it, from its middle.
     """
-    straight = last - first < STRAIGHT
-    # rotations at which all of the edge cuts
-    k0 = m0 if straight else min(max(math.ceil((p + last - back) / step), m0), m1)
-    k1 = m1 if straight else max(min(math.floor((q + first - back) / step) + 1, m1), k0)
-    if k1 > k0:
-        add_whole(acc, k0, k1, at, table, 0.5 * (first + last), 0.5 * (last - first), w, size, arm)
-    if k1 - k0 < m1 - m0:
-        add_part(acc, m0, k0, k1, m1, at, step, back, table, first, last, p, q, w, arm, rate)
+    p = size * one * w[0]
+    q = size * one * w[3]
+    a = 0.5 * size * two * (w[1] + w[5])
+    b = 0.5 * size * two * (w[2] - w[4])
+    c2 = cl * cl - sl * sl
+    s2 = 2.0 * cl * sl
+    k0 = 0.5 * size * (w[2] + w[4])
+    k1 = 0.5 * size * (w[1] - w[5])
+    k2 = p * cl - q * sl
+    k3 = p * sl + q * cl
+    k4 = b * c2 - a * s2
+    k5 = a * c2 + b * s2
+    u = size * one
+    k6 = size * w[6]
+    k7 = u * (w[8] * cl - w[7] * sl)
+    k8 = u * (w[7] * cl + w[8] * sl)
+    k9 = arm * size * w[0]
+    k10 = arm * u * (w[2] * cl - w[1] * sl)
+    k11 = arm * u * (w[1] * cl + w[2] * sl)
+    for m, sign in ((m0, 1.0), (m1, -1.0)):
+        sums[m, 0] += sign * k0
+        sums[m, 1] += sign * k1
+        sums[m, 2] += sign * k2
+        sums[m, 3] += sign * k3
+        sums[m, 4] += sign * k4
+        sums[m, 5] += sign * k5
+        sums[m, 6] += sign * k6
+        sums[m, 7] += sign * k7
+        sums[m, 8] += sign * k8
+        sums[m, 9] += sign * k9
+        sums[m, 10] += sign * k10
+        sums[m, 11] += sign * k11
+        sums[m, 12] += sign
 
 
 @njit(cache=True, nogil=True)
-def add_whole(acc, m0, m1, at, table, mid, half, w, size, arm):
-    """:func:`add` where all of the edge cuts, half an angle to both sides of the lag ``mid``: closed forms over it."""
-    at_, bt, ct, ar, br, cr = size * w[0], size * w[1], size * w[2], size * w[3], size * w[4], size * w[5]
-    a0, a1, a2 = size * w[6], size * w[7], size * w[8]
-    one = 1.0
-    two = 1.0
-    if half > 0.5 * STRAIGHT:
-        one = math.sin(half) / half
-        two = one * math.cos(half)
-    cl = math.cos(mid)
-    sl = math.sin(mid)
-    for m in range(m0, m1):
-        x = table[0, at + m]
-        y = table[1, at + m]
-        C = x * cl + y * sl
-        S = y * cl - x * sl
-        co = C * one
-        si = S * one
-        sc = S * C * two
-        ss = 0.5 - (0.5 - S * S) * two
-        cc = 1.0 - ss
-        acc[0, m] -= at_ * co + (bt + cr) * sc + ct * cc + ar * si + br * ss
-        acc[1, m] += at_ * si + bt * ss + (ct - br) * sc - ar * co - cr * cc
-        acc[2, m] -= a0 + a1 * si + a2 * co
-        acc[3, m] += arm * (at_ + bt * si + ct * co)
+def summed(sums, table, acc):
+    """Add what cuts whole at each rotation to ``acc`` (4, m): ``table`` (4, m) of x, y, X and Y."""
+    s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = s9 = s10 = s11 = n = 0.0
+    for m in range(acc.shape[1]):
+        if sums[m, 12] != 0.0 or n > 0.0:
+            n += sums[m, 12]
+            s0 += sums[m, 0]
+            s1 += sums[m, 1]
+            s2 += sums[m, 2]
+            s3 += sums[m, 3]
+            s4 += sums[m, 4]
+            s5 += sums[m, 5]
+            s6 += sums[m, 6]
+            s7 += sums[m, 7]
+            s8 += sums[m, 8]
+            s9 += sums[m, 9]
+            s10 += sums[m, 10]
+            s11 += sums[m, 11]
+            if n == 0.0:
+                # nothing is left but rounding
+                s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = s9 = s10 = s11 = 0.0
+                continue
+            x = table[0, m]
+            y = table[1, m]
+            xx = table[2, m]
+            yy = table[3, m]
+            acc[0, m] -= s0 + s2 * x + s3 * y + s4 * xx + s5 * yy
+            acc[1, m] += s1 + s2 * y - s3 * x + s4 * yy - s5 * xx
+            acc[2, m] -= s6 + s7 * x + s8 * y
+            acc[3, m] += s9 + s10 * x + s11 * y
 
 
 @njit(cache=True, nogil=True)
 def add_part(acc, m0, k0, k1, m1, at, step, back, table, first, last, p, q, w, arm, rate):
-    """:func:`add` where the edge is cut off at an end: from ``m0`` to ``k0`` and from ``k1`` to ``m1``."""
+    """Add the loads of a bite to ``acc`` (4, m), rows along T, n, the axis and torque, for the rotations ``m0`` to
+    ``k0`` and ``k1`` to ``m1``, at which the edge is cut off at an end; they begin at ``back`` [rad] and are the
+    entries ``at`` on of the table of cosines and sines.
+
+    The edge lies at the immersions theta - last .. theta - first, of which p .. q cut; ``rate`` [rad/mm] its lag.
+    """
     at_, bt, ct, ar, br, cr, a0, a1, a2 = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8]
     cf = math.cos(first)
     sf = math.sin(first)
@@ -156,6 +197,52 @@ def same(i, j, start, rows, tooth, piece, slices, frame, left):
     return True
 
 
+@njit(cache=True, nogil=True, inline="always")
+def thickest(p, q, along, across):
+    """Greatest along sin(phi) + across cos(phi) of the immersion p .. q."""
+    cp = math.cos(p)
+    sp = math.sin(p)
+    cq = math.cos(q)
+    sq = math.sin(q)
+    # it rises at p and falls at q: over less than half a turn the crest lies between them
+    crest = along * cp >= across * sp and along * cq <= across * sq
+    if q - p >= 0.5 * TAU:
+        top = math.atan2(along, across)
+        crest = top + TAU * math.ceil((p - top) / TAU) <= q
+    return math.hypot(along, across) if crest else max(along * sp + across * cp, along * sq + across * cq)
+
+
+@njit(cache=True, nogil=True)
+def greatest(acc, frame, left, i, out):
+    """Fill the greatest and least loads of ``out[i]``, as of :func:`over_turn`, from those at each rotation; ``acc`` is
+    overwritten.
+    """
+    out[i, :] = 0.0
+    out[i, 3:6] = -math.inf
+    out[i, 6:9] = math.inf
+    out[i, 11] = -math.inf
+    for m in range(acc.shape[1]):
+        size2 = 0.0
+        away = 0.0
+        for d in range(3):
+            f = acc[0, m] * frame[i, 0, d] + acc[1, m] * frame[i, 1, d] + acc[2, m] * frame[i, 2, d]
+            out[i, 3 + d] = max(out[i, 3 + d], f)
+            out[i, 6 + d] = min(out[i, 6 + d], f)
+            size2 += f * f
+            away -= f * left[i, d]
+        acc[0, m] = size2
+        out[i, 9] = max(out[i, 9], size2)
+        out[i, 11] = max(out[i, 11], acc[3, m])
+        out[i, 14] = max(out[i, 14], away)
+    for m in range(acc.shape[1] - 1, -1, -1):
+        # the first of those that are alike
+        if acc[0, m] >= (1.0 - 2.0 * ALIKE) * out[i, 9]:
+            out[i, 15] = m
+        if acc[3, m] >= out[i, 11] - ALIKE * abs(out[i, 11]):
+            out[i, 16] = m
+    out[i, 9] = math.sqrt(out[i, 9])
+
+
 @njit(
     types.void(
         _RI, _RF[1], _RI, _RI, _RF[1], _RF[1], _RF[2], types.int64, types.int64, types.boolean, _RF[0], _RF[1], _F2
@@ -166,12 +253,22 @@ def same(i, j, start, rows, tooth, piece, slices, frame, left):
 def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, alike, c, left, out):
     """Loads of each entry over a period of ``count`` rotations, the pitch where all teeth are ``alike``.
 
+    ``table`` (2, .): cosines and sines of the rotations of a revolution that are looked at.
     ``out`` (n, 17): mean, greatest and least x, y, z of the force in the frame of the work, its greatest size, mean and
     greatest torque [N mm], 0, thickest chip, greatest force against ``left``, numbers of the rotations at which force
     and torque are greatest. The means are left to the caller.
     """
     acc = np.empty((4, count))
+    sums = np.empty((count + 1, 13))
     w = np.empty(9)
+    turned = np.empty((4, count))
+    for m in range(count):
+        x = table[0, m]
+        y = table[1, m]
+        turned[0, m] = x
+        turned[1, m] = y
+        turned[2, m] = x * x - y * y
+        turned[3, m] = 2.0 * x * y
     # where all teeth are alike each is the one before a pitch later, and a period of the pitch takes all in
     parts = teeth if alike else 1
     step = TAU / parts / count
@@ -182,6 +279,7 @@ def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, ali
             continue
         known = i
         acc[:] = 0.0
+        sums[:] = 0.0
         chip = 0.0
         for r in range(start[i], start[i + 1]):
             k = piece[r]
@@ -193,20 +291,25 @@ def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, ali
             weights(along, offset, across, slices[k, 3], slices[k, 4], c, w)
             rate = slices[k, 6]
             size = rows[r, 3] - rows[r, 2]
-            crest = math.atan2(along, across)
-            crest += TAU * math.ceil((p - crest) / TAU)
-            h = math.hypot(along, across)
-            if crest > q:
-                h = max(along * math.sin(p) + across * math.cos(p), along * math.sin(q) + across * math.cos(q))
-            chip = max(chip, h + offset)
+            chip = max(chip, thickest(p, q, along, across) + offset)
             one = tooth[r] >= 0
             for j in range(1 if one or alike else teeth):
                 lag = slices[k, 5] + rate * (rows[r, 2] - slices[k, 0])
                 lag += TAU * (tooth[r] if one else j) / teeth
                 last = lag + rate * size
-                if last - lag < STRAIGHT:
-                    lag = 0.5 * (lag + last)
-                    last = lag
+                straight = last - lag < STRAIGHT
+                mid = 0.5 * (lag + last)
+                half = 0.5 * (last - lag)
+                even = 1.0
+                twice = 1.0
+                if straight:
+                    lag = mid
+                    last = mid
+                else:
+                    even = math.sin(half) / half
+                    twice = even * math.cos(half)
+                cm = math.cos(mid)
+                sm = math.sin(mid)
                 # rotations at which part of the edge cuts
                 m0 = math.ceil((p + lag) / step)
                 m1 = math.ceil((q + last) / step)
@@ -214,30 +317,21 @@ def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, ali
                     turn = m0 // count
                     m2 = min(m1, (turn + 1) * count)
                     back = step * turn * count
-                    add(
-                        acc, m0 - turn * count, m2 - turn * count, (turn % parts) * count, step, back, table, lag,
-                        last, p, q, w, size, slices[k, 1], rate,
-                    )  # fmt: skip
+                    at = (turn % parts) * count
+                    a0 = m0 - turn * count
+                    a1 = m2 - turn * count
+                    # rotations at which all of it cuts
+                    k0 = a0 if straight else min(max(math.ceil((p + last - back) / step), a0), a1)
+                    k1 = a1 if straight else max(min(math.floor((q + lag - back) / step) + 1, a1), k0)
+                    if k1 > k0:
+                        ca = table[0, at]
+                        sa = table[1, at]
+                        add_whole(
+                            sums, k0, k1, cm * ca + sm * sa, sm * ca - cm * sa, even, twice, w, size, slices[k, 1]
+                        )  # fmt: skip
+                    if k1 - k0 < a1 - a0:
+                        add_part(acc, a0, k0, k1, a1, at, step, back, table, lag, last, p, q, w, slices[k, 1], rate)
                     m0 = m2
-        out[i, :] = 0.0
-        out[i, 3:6] = -math.inf
-        out[i, 6:9] = math.inf
-        out[i, 11] = -math.inf
-        for m in range(count):
-            size2 = 0.0
-            away = 0.0
-            for d in range(3):
-                f = acc[0, m] * frame[i, 0, d] + acc[1, m] * frame[i, 1, d] + acc[2, m] * frame[i, 2, d]
-                out[i, 3 + d] = max(out[i, 3 + d], f)
-                out[i, 6 + d] = min(out[i, 6 + d], f)
-                size2 += f * f
-                away -= f * left[i, d]
-            if size2 > out[i, 9]:
-                out[i, 9] = size2
-                out[i, 15] = m
-            if acc[3, m] > out[i, 11]:
-                out[i, 11] = acc[3, m]
-                out[i, 16] = m
-            out[i, 14] = max(out[i, 14], away)
-        out[i, 9] = math.sqrt(out[i, 9])
+        summed(sums, turned, acc)
+        greatest(acc, frame, left, i, out)
         out[i, 13] = chip

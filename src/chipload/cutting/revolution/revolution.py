@@ -32,6 +32,16 @@ def rotations(cutter: Cutter, rotation: float) -> int:
     return max(math.ceil(pitch / rotation), 8)
 
 
+def first_greatest(loads: Floats) -> NDArray[np.int64]:
+    """(n,) number of the first rotation at which a load (n, m) is as good as the greatest.
+
+    >>> first_greatest(np.array([[1.0, 2.0 - 1e-12, 2.0], [0.0, 0.0, -1.0]])).tolist()
+    [1, 0]
+    """
+    most = loads.max(axis=1, keepdims=True)
+    return np.asarray((loads >= most - _kernels.ALIKE * np.abs(most)).argmax(axis=1))
+
+
 def loads_over_turn(
     bites: ToothEngagement, cutter: Cutter, material: Material, rotation: float, left: ArrayLike
 ) -> tuple[Floats, Floats, Floats]:
@@ -83,7 +93,7 @@ def _one_by_one(bites: ToothEngagement, cutter: Cutter, material: Material, coun
             np.zeros(len(bites)),
             bites.chip_max(),
             -np.einsum("nmi,ni->nm", turned, left).min(axis=1).clip(None, 0.0),
-            size.argmax(axis=1),
-            torque.argmax(axis=1),
+            first_greatest(size),
+            first_greatest(torque),
         ]
     )

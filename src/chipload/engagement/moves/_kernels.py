@@ -1,7 +1,8 @@
 """Compiled loops of swept volumes and of the index of moves; arrays and scalars only.
 
-Notation: a move is a row (x, y, z, ux, uy, uz) of the tip at its start and of what it goes [mm]; a cutter is a row of
-:func:`chipload.engagement.moves.stock.cutter_rows`; g(rho) [mm] is the height of the cutter's surface above its tip at
+Notation: a move is a row (x, y, z, ux, uy, uz) of the tip at its start and of what it goes [mm], in the index followed
+by 1 / (ux^2 + uy^2) and 1 / (ux^2 + uy^2 + uz^2), 0 where it does not go; a cutter is a row of
+:func:`chipload.engagement.moves.stock.cutter_row`; g(rho) [mm] is the height of the cutter's surface above its tip at
 the distance rho from its axis. The axis stands along z. With d(t) the distance of a point (x, y, z) from the axis and
 w(t) its height above the tip at the time t, the point was swept if F(t) = g(d(t)) - w(t) is below 0 somewhere in 0..1;
 g rises and is convex, so that F is convex. A cell of the index is a square of the plan: above ``ceil`` is air, from
@@ -99,6 +100,28 @@ def from_ball(m, r, x, y, z):
     dz = w - t * uz
     if dz > 0.0:
         t = clamped(along, h2)
+        dz = 0.0
+    dx = qx - t * ux
+    dy = qy - t * uy
+    return dx * dx + dy * dy + dz * dz
+
+
+@njit(cache=True, nogil=True, inline="always")
+def off_ball(moves, e, r, x, y, z):
+    """:func:`from_ball` of a move of the index, without a division and with one branch."""
+    qx = x - moves[e, 0]
+    qy = y - moves[e, 1]
+    w = z - moves[e, 2] - r
+    ux = moves[e, 3]
+    uy = moves[e, 4]
+    uz = moves[e, 5]
+    along = qx * ux + qy * uy
+    t = (along + w * uz) * moves[e, 7]
+    t = 0.0 if t < 0.0 else (1.0 if t > 1.0 else t)
+    dz = w - t * uz
+    if dz > 0.0:
+        t = along * moves[e, 6]
+        t = 0.0 if t < 0.0 else (1.0 if t > 1.0 else t)
         dz = 0.0
     dx = qx - t * ux
     dy = qy - t * uy
@@ -260,31 +283,43 @@ def place(x, y, grid, shape):
     return i * shape[1] + j
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
+def swept_by(e, x, y, z, index):
+    """Whether a point is in the volume that a move of the index swept."""
+    moves = index[6]
+    of = index[7]
+    cutters = index[8]
+    k = of[e]
+    if cutters[k, KIND] == BALL:
+        r = cutters[k, CORNER]
+        return off_ball(moves, e, r, x, y, z) < (r + EPS) * (r + EPS)
+    return swept(moves[e], cutters[k], x, y, z)
+
+
+@njit(cache=True, nogil=True, inline="always")
 def what_is(x, y, z, index, hint):
     """MATERIAL, AIR, or the number of a move that swept the point; ``hint`` is asked first.
 
     ``index``: grid, shape, level, list_at, kept, reach, moves, cutter of each, cutters, and of the initial stock low,
-    high, first, ids, faces.
+    high, first, ids, faces. Its arrays are many numbers to a call: this function, which is called most, has none.
     """
+    grid = index[0]
     level = index[2]
-    cell = place(x, y, index[0], index[1])
+    cell = place(x, y, grid, index[1])
     if cell < 0 or z >= level[cell, 1] - EPS:
         return AIR
     if level[cell, 2] <= z < level[cell, 0] - EPS:
         return MATERIAL
-    moves = index[6]
-    of = index[7]
-    cutters = index[8]
-    if hint >= 0 and swept(moves[hint], cutters[of[hint]], x, y, z):
+    if hint >= 0 and swept_by(hint, x, y, z, index):
         return hint
     kept = index[4]
     reach = index[5]
-    at = index[3][cell, 0]
-    for k in range(at + index[3][cell, 1] - 1, at - 1, -1):
+    lists = index[3]
+    at = lists[cell, 0]
+    for k in range(at + lists[cell, 1] - 1, at - 1, -1):
         if z > reach[k] - EPS:
             e = kept[k]
-            if e != hint and swept(moves[e], cutters[of[e]], x, y, z):
+            if e != hint and swept_by(e, x, y, z, index):
                 return e
     return MATERIAL if in_solid(x, y, z, index[9], index[10], index[11], index[12], index[13], cell) else AIR
 

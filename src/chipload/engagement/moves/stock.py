@@ -191,7 +191,7 @@ class MoveStock:
         self.lists = np.zeros((cells, 4), dtype=np.int64)
         self.kept, self.reach = np.empty(1 << 16, dtype=np.int32), np.empty(1 << 16, dtype=np.float32)
         self.used = np.zeros(1, dtype=np.int64)
-        self.moves, self.of, self.count = np.empty((1024, 6)), np.empty(1024, dtype=np.int64), 0
+        self.moves, self.of, self.count = np.empty((1024, 8)), np.empty(1024, dtype=np.int64), 0
         self.body, self.more = body, MORE
         self.first, self.ids = np.zeros(cells + 1, dtype=np.int64), np.empty(0, dtype=np.int32)
         self.faces = np.empty((0, 12))
@@ -230,7 +230,10 @@ class MoveStock:
             self.moves = np.concatenate([self.moves, np.empty_like(self.moves)])
             self.of = np.concatenate([self.of, np.empty_like(self.of)])
         end = self.count + len(p0)
-        self.moves[self.count : end] = np.hstack([p0, p1 - p0])
+        way = p1 - p0
+        square = np.column_stack([(way[:, :2] ** 2).sum(axis=1), (way**2).sum(axis=1)])
+        over = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
+        self.moves[self.count : end] = np.hstack([p0, way, over])
         numbers, at = np.unique(tool, return_inverse=True)
         self.of[self.count : end] = np.array([self.tools[n] for n in numbers.tolist()], dtype=np.int64)[at.ravel()]
         self.count = end

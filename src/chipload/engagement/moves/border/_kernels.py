@@ -16,10 +16,9 @@ from chipload.engagement.moves._kernels import (
     EPS,
     KIND,
     MATERIAL,
-    from_ball,
-    from_track,
     section,
     swept,
+    swept_by,
     what_is,
 )
 
@@ -27,85 +26,113 @@ from chipload.engagement.moves._kernels import (
 NARROW, TURNS = 1e-8, 200
 #: angle beside a border, at which what is there is asked [rad]
 BESIDE = 5e-5
-#: most values that are asked for a border
-SECANTS = 60
+#: most arcs that are asked for a border, and change of its direction at which it is found
+ARCS, CLOSE = 60, 2e-6
 
 
 @njit(cache=True, nogil=True)
+def halved(px, py, z, rho, T, cu, su, cs, ss, m, c):
+    """:func:`crossing` of any move by halving."""
+    near = BESIDE / math.sqrt((cu - cs) ** 2 + (su - ss) ** 2)
+    low = 0.0
+    high = 1.0
+    while high - low >= near:
+        at = 0.5 * (low + high)
+        dc = cu + at * (cs - cu)
+        ds = su + at * (ss - su)
+        size = rho / math.sqrt(dc * dc + ds * ds)
+        x = px + size * (dc * T[0] - ds * T[1])
+        y = py + size * (dc * T[1] + ds * T[0])
+        if swept(m, c, x, y, z):
+            high = at
+        else:
+            low = at
+    at = 0.5 * (low + high)
+    dc = cu + at * (cs - cu)
+    ds = su + at * (ss - su)
+    size = 1.0 / math.sqrt(dc * dc + ds * ds)
+    dc *= size
+    ds *= size
+    bc = cu + low * (cs - cu)
+    bs = su + low * (ss - su)
+    size = 1.0 / math.sqrt(bc * bc + bs * bs)
+    bc *= size
+    bs *= size
+    return dc, ds, bc, bs
+
+
+@njit(cache=True, nogil=True, inline="always")
 def crossing(px, py, z, rho, T, cu, su, cs, ss, e, index):
     """Direction at which what the move ``e`` swept begins between the directions u, not swept by it, and s, swept, and
     a direction just before it, not swept.
 
-    Where the move sweeps a disc or is that of a ball, its distance from the point decides: zero of a smooth function,
-    found by secants; else by halving.
+    Where the move sweeps a disc or is that of a ball, the cutter at any time of the move meets the circle in an arc
+    whose ends are known. From s on the end of the arc at the time when the cutter is nearest is in the swept volume and
+    nearer to its border; that is repeated, and is exact where the time stays. Else the border is found by halving.
     """
-    m = index[6][e]
-    c = index[8][index[7][e]]
-    ball = c[KIND] == BALL
-    first, last, far2, disc = section(m, c, z)
-    if ball:
-        far2 = (c[CORNER] + EPS) ** 2
-    width = math.sqrt((cu - cs) ** 2 + (su - ss) ** 2)
-    near = BESIDE / width
-    low = 0.0
-    high = 1.0
-    at = 0.0
-    if ball or disc:
-        # at the ends first, then where the secant of the last two values has its zero, if that is between the bounds
-        before_at = 0.0
-        before_v = 0.0
-        for i in range(SECANTS):
-            dc = cu + at * (cs - cu)
-            ds = su + at * (ss - su)
-            size = rho / math.sqrt(dc * dc + ds * ds)
-            x = px + size * (dc * T[0] - ds * T[1])
-            y = py + size * (dc * T[1] + ds * T[0])
-            v = (from_ball(m, c[CORNER], x, y, z) if ball else from_track(m, first, last, x, y)) - far2
-            if i == 0:
-                before_v = v
-                at = 1.0
-                if v <= 0.0:
-                    at = 0.0
-                    break
-                continue
-            if v < 0.0:
-                high = at
-            elif i == 1:
+    moves = index[6]
+    cutters = index[8]
+    of = index[7]
+    ball = cutters[of[e], KIND] == BALL
+    disc = ball
+    first = 0.0
+    last = 1.0
+    r = cutters[of[e], CORNER]
+    far2 = (r + EPS) * (r + EPS)
+    if not ball:
+        first, last, far2, disc = section(moves[e], cutters[of[e]], z)
+    dc = cs
+    ds = ss
+    if disc:
+        # the way from s to u: counter-clockwise above 0
+        turn = 1.0 if cs * su - ss * cu > 0.0 else -1.0
+        ux = moves[e, 3] * T[0] + moves[e, 4] * T[1]
+        uy = moves[e, 4] * T[0] - moves[e, 3] * T[1]
+        # of the circle's middle, along and across T
+        qx = (px - moves[e, 0]) * T[0] + (py - moves[e, 1]) * T[1]
+        qy = (py - moves[e, 1]) * T[0] - (px - moves[e, 0]) * T[1]
+        uz = moves[e, 5]
+        w = z - moves[e, 2] - r
+        for _ in range(ARCS):
+            along = (qx + rho * dc) * ux + (qy + rho * ds) * uy
+            dz = 0.0
+            if ball:
+                t = (along + w * uz) * moves[e, 7]
+                t = 0.0 if t < 0.0 else (1.0 if t > 1.0 else t)
+                dz = w - t * uz
+            if dz > 0.0 or not ball:
+                t = along * moves[e, 6]
+                t = first if t < first else (last if t > last else t)
+                dz = 0.0
+            vx = qx - t * ux
+            vy = qy - t * uy
+            v2 = vx * vx + vy * vy
+            if v2 == 0.0:
                 break
-            else:
-                low = at
-            to = at + v * (at - before_at) / (before_v - v) if v != before_v else high
-            if not low < to < high:
-                to = 0.5 * (low + high)
-            before_at = at
-            before_v = v
-            done = abs(to - at) < 0.2 * near or high - low < near
-            at = to
-            if done:
+            size = 1.0 / math.sqrt(v2)
+            vx *= size
+            vy *= size
+            k = 0.5 * (far2 - v2 - rho * rho - dz * dz) / rho * size
+            k = -1.0 if k < -1.0 else (1.0 if k > 1.0 else k)
+            n = turn * math.sqrt(1.0 - k * k)
+            before_c = dc
+            before_s = ds
+            dc = k * vx + n * vy
+            ds = k * vy - n * vx
+            if abs(dc - before_c) + abs(ds - before_s) < CLOSE:
                 break
-        before = max(low, min(at, high) - near)
+        gone = turn * BESIDE
+        bc = dc - gone * ds - 0.5 * gone * gone * dc
+        bs = ds + gone * dc - 0.5 * gone * gone * ds
+        if turn * (bc * su - bs * cu) <= 0.0:
+            bc = cu
+            bs = su
     else:
-        while high - low >= near:
-            at = 0.5 * (low + high)
-            dc = cu + at * (cs - cu)
-            ds = su + at * (ss - su)
-            size = rho / math.sqrt(dc * dc + ds * ds)
-            if swept(m, c, px + size * (dc * T[0] - ds * T[1]), py + size * (dc * T[1] + ds * T[0]), z):
-                high = at
-            else:
-                low = at
-        at = 0.5 * (low + high)
-        before = low
-    dc = cu + at * (cs - cu)
-    ds = su + at * (ss - su)
-    size = 1.0 / math.sqrt(dc * dc + ds * ds)
-    bc = cu + before * (cs - cu)
-    bs = su + before * (ss - su)
-    over = 1.0 / math.sqrt(bc * bc + bs * bs)
-    return dc * size, ds * size, bc * over, bs * over
+        dc, ds, bc, bs = halved(px, py, z, rho, T, cu, su, cs, ss, moves[e], cutters[of[e]])
+    return dc, ds, bc, bs
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def border(px, py, z, rho, T, cm, sm, ca, sa, e, index):
     """Psi between a direction in material (cm, sm) and one in air (ca, sa) where the material ends; ``e`` the move that
     swept the latter, or AIR.
@@ -136,7 +163,7 @@ def border(px, py, z, rho, T, cm, sm, ca, sa, e, index):
     return math.atan2(sm + sa, cm + ca)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def ridge(px, py, z, rho, T, ca, sa, cb, sb, ea, eb, index):
     """Whether there is material between two directions in air, a swept by the move ``ea``, b by ``eb``, and a direction
     in it: from the border of one move on to that of the next until b is reached.
@@ -150,7 +177,7 @@ def ridge(px, py, z, rho, T, ca, sa, cb, sb, ea, eb, index):
             return False, 0.0, 0.0
         x = px + rho * (cb * T[0] - sb * T[1])
         y = py + rho * (cb * T[1] + sb * T[0])
-        if swept(index[6][ea], index[8][index[7][ea]], x, y, z):
+        if swept_by(ea, x, y, z, index):
             return False, 0.0, 0.0
         _, _, bc, bs = crossing(px, py, z, rho, T, cb, sb, ca, sa, ea, index)
         f = what_is(px + rho * (bc * T[0] - bs * T[1]), py + rho * (bc * T[1] + bs * T[0]), z, index, eb)

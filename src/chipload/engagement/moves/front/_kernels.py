@@ -14,7 +14,7 @@ import math
 
 from numba import njit, types
 
-from chipload.engagement.moves._kernels import AIR, FLUTE, MATERIAL, WIDE, keep, what_is
+from chipload.engagement.moves._kernels import AIR, FLUTE, MATERIAL, WIDE, keep, swept_by, what_is
 from chipload.engagement.moves.border._kernels import border, ridge
 from chipload.engagement.moves.borrowed._kernels import borrowed
 from chipload.engagement.moves.edge._kernels import add_slice, candidates, sliced, windows
@@ -36,46 +36,62 @@ CORNER = 0.985
 ALONG = 1e-9
 
 
-@njit(cache=True, nogil=True)
-def intervals(p, T, rho, z, low, high, end, apart, index, out):
-    """Parts of low .. high in material on the circle of a slice: rows (from, to) of ``out``; their number.
+@njit(cache=True, nogil=True, inline="always")
+def intervals(p, T, rho, z, low, high, end, apart, index, out, begin):
+    """Parts of low .. high in material on the circle of a slice: rows (from, to) of ``out`` from ``begin`` on; their
+    number.
 
     -end .. end is the front; where it ends the contact is judged just beside.
     """
+    count = begin
     first = max(low, BESIDE - end) if end < PI else low
     last = min(high, end - BESIDE) if end < PI else high
-    if last <= first:
-        return 0
-    n = max(math.ceil((last - first) / apart), 1)
+    n = max(math.ceil((last - first) / apart), 1) if last > first else -1
     d = (last - first) / n
     c = math.cos(first)
     s = math.sin(first)
     cd = math.cos(d)
     sd = math.sin(d)
-    count = 0
     before = AIR
     inside = False
     c0 = c
     s0 = s
+    x0 = 0.0
+    y0 = 0.0
     for i in range(n + 1):
-        f = what_is(p[0] + rho * (c * T[0] - s * T[1]), p[1] + rho * (c * T[1] + s * T[0]), z, index, before)
-        if i > 0 and f != MATERIAL and not inside and f != before:
-            found, cr, sr = ridge(p[0], p[1], z, rho, T, c0, s0, c, s, before, f, index)
-            if found:
-                out[count, 0] = border(p[0], p[1], z, rho, T, cr, sr, c0, s0, before, index)
-                out[count, 1] = border(p[0], p[1], z, rho, T, cr, sr, c, s, f, index)
-                count += 1
-        if f == MATERIAL and not inside:
+        x = p[0] + rho * (c * T[0] - s * T[1])
+        y = p[1] + rho * (c * T[1] + s * T[0])
+        f = what_is(x, y, z, index, before)
+        # directions of which one is in material, and the borders on both of its sides or on one
+        cm = c0 if inside else c
+        sm = s0 if inside else s
+        borders = 0
+        if (f == MATERIAL) != inside:
             if i > 0:
-                psi = border(p[0], p[1], z, rho, T, c, s, c0, s0, before, index)
+                borders = 1
             else:
-                psi = -end if first < 2.0 * BESIDE - end else first
-            out[count, 0] = psi
-            inside = True
-        elif f != MATERIAL and inside:
-            out[count, 1] = border(p[0], p[1], z, rho, T, c0, s0, c, s, f, index)
-            count += 1
-            inside = False
+                out[count, 0] = -end if first < 2.0 * BESIDE - end else first
+                inside = True
+        elif i > 0 and f != MATERIAL and f != before:
+            # the move that swept one of both places may have swept the other, and all between
+            alone = swept_by(f, x0, y0, z, index) if f >= 0 else swept_by(before, x, y, z, index)
+            if not alone:
+                found, cm, sm = ridge(p[0], p[1], z, rho, T, c0, s0, c, s, before, f, index)
+                borders = 2 if found else 0
+        for _ in range(borders):
+            # towards the sample before, but where the material ends
+            back = not inside
+            psi = border(
+                p[0], p[1], z, rho, T, cm, sm, c0 if back else c, s0 if back else s, before if back else f, index
+            )
+            if inside:
+                out[count, 1] = psi
+                count += 1
+            else:
+                out[count, 0] = psi
+            inside = not inside
+        x0 = x
+        y0 = y
         if f != MATERIAL:
             before = f
         c0 = c
@@ -84,7 +100,7 @@ def intervals(p, T, rho, z, low, high, end, apart, index, out):
     if inside:
         out[count, 1] = end if last > end - 2.0 * BESIDE else last
         count += 1
-    return count
+    return count - begin
 
 
 @njit(cache=True, nogil=True)
@@ -121,6 +137,9 @@ def engaged(p, u, c, T, parts, flank, index, near, levels, scratch, spans, mine,
     ``out``: volume of the step, pieces, least and greatest height of a slice, sum of the normals at ends of the front
     by length (x, y, z), that length, 1 where there is material above the flutes, length of the edge. False: no room.
     """
+    # what a call passes counts again
+    index = borrowed(index)
+    p, u, c, T, near, levels, scratch, spans = borrowed((p, u, c, T, near, levels, scratch, spans))
     out[:] = 0.0
     hu = math.hypot(u[0], u[1])
     grid = index[0]
@@ -151,9 +170,7 @@ def engaged(p, u, c, T, parts, flank, index, near, levels, scratch, spans, mine,
         high = min(scratch[k, 10], end)
         if low >= high:
             continue
-        found = intervals(
-            p, T, rho, p[2] + scratch[k, 6], low, high, end, min(apart / rho, APART), index, spans[total:]
-        )
+        found = intervals(p, T, rho, p[2] + scratch[k, 6], low, high, end, min(apart / rho, APART), index, spans, total)
         if found == 0:
             continue
         if probe:

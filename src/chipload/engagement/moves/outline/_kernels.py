@@ -8,9 +8,10 @@ Oracle: shapely unions of the swept sections, in tests/engagement/moves.
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit, types
 
-from chipload.engagement.moves._kernels import EPS, place, swept
+from chipload.engagement.moves._kernels import AIR, EPS, MATERIAL, place, swept
 from chipload.engagement.moves.borrowed._kernels import borrowed
 from chipload.engagement.moves.front._kernels import INDEX
 
@@ -22,20 +23,28 @@ HALVINGS = 14
 def was_swept(x, y, z, index, tops):
     """Whether a move swept a point of the body's box."""
     cell = place(x, y, index[0], index[1])
-    if cell < 0:
-        return False
+    return cell >= 0 and swept_in(cell, x, y, z, index, tops, -1) != MATERIAL
+
+
+@njit(cache=True, nogil=True)
+def swept_in(cell, x, y, z, index, tops, hint):
+    """The number of a move that swept a point of a cell, AIR where the level of the cell says that one did, MATERIAL
+    where none did; ``hint`` is asked first.
+    """
     ceil = index[2][cell, 1]
     if z >= ceil:
-        return ceil < tops[cell]
+        return AIR if ceil < tops[cell] else MATERIAL
     if z < index[2][cell, 0] - EPS:
         # below all that moves swept here
-        return False
+        return MATERIAL
+    if hint >= 0 and swept(index[6][hint], index[8][index[7][hint]], x, y, z):
+        return hint
     at = index[3][cell, 0]
     for k in range(at + index[3][cell, 1] - 1, at - 1, -1):
         e = index[4][k]
-        if z > index[5][k] and swept(index[6][e], index[8][index[7][e]], x, y, z):
-            return True
-    return False
+        if z > index[5][k] and e != hint and swept(index[6][e], index[8][index[7][e]], x, y, z):
+            return e
+    return MATERIAL
 
 
 @njit(cache=True, nogil=True)
@@ -91,9 +100,23 @@ def marked(z, xs, ys, index, tops, inside):
     index = borrowed(index)
     tops = borrowed(tops)
     inside[:] = False
-    for i in range(1, len(xs) - 1):
-        for j in range(1, len(ys) - 1):
-            inside[i, j] = was_swept(xs[i], ys[j], z, index, tops)
+    grid = index[0]
+    n = len(xs)
+    m = len(ys)
+    # cells of the first row of the index, to which those of the first column are added
+    column = np.empty(m, np.int64)
+    for j in range(1, m - 1):
+        column[j] = place(grid[0], ys[j], grid, index[1])
+    for i in range(1, n - 1):
+        row = place(xs[i], grid[1], grid, index[1])
+        hint = AIR
+        for j in range(1, m - 1):
+            if row < 0 or column[j] < 0:
+                continue
+            found = swept_in(row + column[j], xs[i], ys[j], z, index, tops, hint)
+            inside[i, j] = found != MATERIAL
+            if found >= 0:
+                hint = found
 
 
 @njit(types.int64(_B2, _I1, _I1, _I1), cache=True, nogil=True)

@@ -1,0 +1,1 @@
+"""Tooth engagement of the contact, with parts of slices on which the borders of the contact run askew."""
