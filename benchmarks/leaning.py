@@ -72,8 +72,10 @@ def main() -> None:
     print("| runs | column | p50, p95, p99 [%] | sum [%] | greatest [%] |\n|---|---|---|---|---|")
     for case in of_others(args.boat):
         if case.name == "boat, five axes":
-            coarse, _ = simulated(case, "moves", SLICES // 2, FLANK, 2.0)
-            compared(f"{case.name}: 12 slices, 24", coarse, simulated(case, "moves", SLICES, 0.5 * FLANK, 2.0)[0])
+            simulated(replace(case, program=head(case.program, 12)), "moves", SLICES // 2, FLANK, 2.0)
+            coarse, fast = simulated(case, "moves", SLICES // 2, FLANK, 2.0)
+            fine, slow = simulated(case, "moves", SLICES, 0.5 * FLANK, 2.0)
+            compared(f"{case.name}: 12 slices {fast:.0f} /s, 24 slices {slow:.0f} /s", coarse, fine)
     for case in of_impeller(args.planned, args.rows) if args.planned else ():
         for step_mm in (2.0, 0.5):
             one, fast = simulated(case, "moves", SLICES // 2, FLANK, step_mm)

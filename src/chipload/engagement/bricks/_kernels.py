@@ -1,8 +1,8 @@
 """Compiled loops of what a cutter sweeps whose axis leans or turns; arrays and scalars only.
 
 Notation: a move is a row: tip p0 at the start, what it goes u [mm], axis a0 at the start, direction b across it to
-which the axis turns, by which angle theta [rad], the length of u, n = a0 x b, and a and b at the end; at the time t in
-0..1 the tip is p0 + t u and the axis A = a0 cos(t theta) + b sin(t theta). A cutter is a row of
+which the axis turns, by which angle theta [rad], the length of u, n = a0 x b, and how a point goes in the cutter's
+frame; at the time t in 0..1 the tip is p0 + t u and the axis A = a0 cos(t theta) + b sin(t theta). A cutter is a row of
 :func:`chipload.engagement.bricks.stock.cutter_row`; rho, w [mm] are the distance of a point from the axis and its
 height above the tip. The cutter is convex and closed at the end of its flutes; f(t) is the distance of a point out of
 it, negative within.
@@ -20,16 +20,21 @@ import math
 
 from numba import njit
 
-from chipload.engagement.moves._kernels import CORNER, EPS, FLAT, FLUTE, KIND, WIDE, E, F
+from chipload.engagement.moves._kernels import CORNER, EPS, FLAT, FLUTE, KIND, TB, WIDE, Z2, E, F
 
-#: columns of a move: u from, a0 from, b from, theta, length of u
-U, A0, B, THETA, LENGTH = 3, 6, 9, 12, 13
+#: columns of a move: u from, a0 from, b from, theta, length of u, n from
+U, A0, B, THETA, LENGTH, N = 3, 6, 9, 12, 13, 14
+#: what a point at the first tip goes in the frame of the cutter along n, b and a, cosine of theta less 1, its sine, and
+#: the part of M that does not depend on the point, over theta
+ALONG_X, ALONG_Y, ALONG_W, TURNED, SINE, BEND = range(17, 23)
 #: further columns of a cutter: sine and cosine of the angles of bottom and flank
 SIN_A, COS_A, SIN_B, COS_B = range(12, 16)
 #: a least distance that lies between bounds this near to each other is known [mm]
 KNOWN = 1e-11
 #: most intervals that wait
 WAIT = 64
+#: share of a ball's radius to which its distance is found
+NEAR = 0.1
 
 
 @njit(cache=True, nogil=True)
@@ -99,25 +104,34 @@ def outside(m, c, t, x, y, z):
 
 @njit(cache=True, nogil=True)
 def least(m, c, x, y, z, above, below, near, wait):
+    """:func:`least_from` the time at which the point is nearest to the axis, if it goes along its chord."""
+    x0, y0, _, dx, dy, _, _ = chord(m, x, y, z)
+    return least_from(m, c, x, y, z, nearest_time(x0, y0, dx, dy), above, below, near, wait)
+
+
+@njit(cache=True, nogil=True)
+def least_from(m, c, x, y, z, start, above, below, near, wait):
     """Bounds (low, high) of the least f over the move. They end where low >= above, where high < below, or where they
-    are ``near`` to each other; ``wait`` (WAIT, 6) is room.
+    are ``near`` to each other; ``start`` is the time that is looked at first, ``wait`` (WAIT, 6) is room.
     """
-    f1, s1 = outside(m, c, 1.0, x, y, z)
-    if f1 < below:
-        return -math.inf, f1
-    theta = m[THETA]
-    bend = 0.0
-    if theta > 0.0:
-        away = math.sqrt((x - m[0]) ** 2 + (y - m[1]) ** 2 + (z - m[2]) ** 2) + m[LENGTH]
-        bend = theta * (theta * away + 2.0 * m[LENGTH])
-    if s1 <= 0.0 and f1 - 0.5 * bend >= above:
-        return f1 - 0.5 * bend, f1
-    f0, s0 = outside(m, c, 0.0, x, y, z)
-    if f0 < below:
-        return -math.inf, f0
-    if s0 >= 0.0 and f0 - 0.5 * bend >= above:
-        return f0 - 0.5 * bend, f0
-    high = min(f0, f1)
+    f, s = outside(m, c, start, x, y, z)
+    if f < below:
+        return -math.inf, f
+    bend = m[THETA] * (m[THETA] * math.sqrt((x - m[0]) ** 2 + (y - m[1]) ** 2 + (z - m[2]) ** 2) + m[BEND])
+    rest = 1.0 - start
+    low = min(f, f - (s + 0.5 * bend * start) * start, f + (s - 0.5 * bend * rest) * rest)
+    if low >= above:
+        return low, f
+    f0, s0, f1, s1 = f, s, f, s
+    if start > 0.0:
+        f0, s0 = outside(m, c, 0.0, x, y, z)
+        if f0 < below:
+            return -math.inf, f0
+    if start < 1.0:
+        f1, s1 = outside(m, c, 1.0, x, y, z)
+        if f1 < below:
+            return -math.inf, f1
+    high = min(f, min(f0, f1))
     low = high
     wait[0, 0] = 0.0
     wait[0, 1] = f0
@@ -126,6 +140,14 @@ def least(m, c, x, y, z, above, below, near, wait):
     wait[0, 4] = f1
     wait[0, 5] = s1
     count = 1
+    if 0.0 < start < 1.0:
+        wait[0, 3] = wait[1, 0] = start
+        wait[0, 4] = wait[1, 1] = f
+        wait[0, 5] = wait[1, 2] = s
+        wait[1, 3] = 1.0
+        wait[1, 4] = f1
+        wait[1, 5] = s1
+        count = 2
     turns = 0
     while count > 0:
         count -= 1
@@ -172,6 +194,35 @@ def least(m, c, x, y, z, above, below, near, wait):
     return low, high
 
 
+@njit(cache=True, nogil=True, inline="always")
+def chord(m, x, y, z):
+    """A point in the frame of the cutter: where it begins, across (along n and b) and along the axis, how far it goes
+    along each until the end, and by how much its way may be off the line between.
+    """
+    qx = x - m[0]
+    qy = y - m[1]
+    qz = z - m[2]
+    x0 = qx * m[14] + qy * m[15] + qz * m[16]
+    y0 = qx * m[9] + qy * m[10] + qz * m[11]
+    w0 = qx * m[6] + qy * m[7] + qz * m[8]
+    theta = m[THETA]
+    if theta == 0.0:
+        return x0, y0, w0, m[ALONG_X], m[ALONG_Y], m[ALONG_W], 0.0
+    dy = m[ALONG_Y] + y0 * m[TURNED] - w0 * m[SINE]
+    dw = m[ALONG_W] + w0 * m[TURNED] + y0 * m[SINE]
+    return x0, y0, w0, m[ALONG_X], dy, dw, 0.125 * theta * (theta * math.sqrt(y0 * y0 + w0 * w0) + m[BEND])
+
+
+@njit(cache=True, nogil=True, inline="always")
+def nearest_time(x, y, dx, dy):
+    """Time in 0..1 at which a point that goes from (x, y) by (dx, dy) is nearest to the axis."""
+    along = -(x * dx + y * dy)
+    if along <= 0.0:
+        return 0.0
+    size = dx * dx + dy * dy
+    return along / size if along < size else 1.0
+
+
 @njit(cache=True, nogil=True)
 def nearest(x, y, dx, dy, first, last):
     """Square of the least distance from the axis of a point that goes from (x, y) by (dx, dy) at times first..last."""
@@ -202,35 +253,144 @@ def in_cylinder(x, y, w, dx, dy, dw, wide, low, high):
 
 
 @njit(cache=True, nogil=True)
+def beside(m, t, x0, y0, w0):
+    """Of a point at a time: the square of its distance from the axis, the rate of that, and its height above the tip;
+    (x0, y0, w0) as of :func:`chord`.
+    """
+    cosine, sine = turn(m, t)
+    c1 = 1.0 + m[TURNED]
+    # what the tip goes along b and a at the start
+    ub = -(c1 * m[ALONG_Y] + m[SINE] * m[ALONG_W])
+    ua = -(c1 * m[ALONG_W] - m[SINE] * m[ALONG_Y])
+    yt = y0 - t * ub
+    wt = w0 - t * ua
+    x = x0 + t * m[ALONG_X]
+    y = yt * cosine - wt * sine
+    w = wt * cosine + yt * sine
+    rate = ua * sine - ub * cosine - m[THETA] * w
+    return x * x + y * y, 2.0 * (x * m[ALONG_X] + y * rate), w
+
+
+@njit(cache=True, nogil=True)
+def beside_flank(m, c, t, x0, y0, w0, dx, dy, off):
+    """1: a point was swept by a cutter's cylinder, 0: it was not, -1: not known.
+
+    Newton's step from the time t to the least distance from the axis; its square h has a second derivative of at least
+    2 (x'^2 + y'^2 - |y| M), so that h there is above the least one by no more than h'^2 over twice that.
+    """
+    bend = 8.0 * off
+    t = min(max(t - 0.5 * beside(m, t, x0, y0, w0)[1] / (dx * dx + dy * dy + 1e-300), 0.0), 1.0)
+    h, rate, w = beside(m, t, x0, y0, w0)
+    far = (c[WIDE] + EPS) ** 2
+    if h < far:
+        return 1 if -EPS < w < c[FLUTE] + EPS else -1
+    slope = max(abs(dy) - 0.5 * bend, 0.0)
+    curve = 2.0 * (dx * dx + slope * slope - (max(abs(y0), abs(y0 + dy)) + off) * bend)
+    if curve > 0.0:
+        if (t > 0.0 or rate < 0.0) and (t < 1.0 or rate > 0.0):
+            h -= 0.5 * rate * rate / curve
+        if h >= far:
+            return 0
+    return -1
+
+
+@njit(cache=True, nogil=True)
 def swept(m, c, x, y, z, wait):
     """Whether a point is in the volume that a move sweeps.
 
     Where the axis is fixed the point goes along a line in the frame of the cutter; where it turns it is never farther
     than M / 8 from the line between its first and its last place there. What a cylinder as much wider or narrower says
-    settles most points; for a flat mill with a fixed axis that is all.
+    settles most points; for a flat mill with a fixed axis that is all. For a flank alone a step of Newton settles most
+    others, see :func:`beside_flank`.
     """
-    qx = x - m[0]
-    qy = y - m[1]
-    qz = z - m[2]
-    x0 = qx * m[14] + qy * m[15] + qz * m[16]
-    y0 = qx * m[9] + qy * m[10] + qz * m[11]
-    w0 = qx * m[6] + qy * m[7] + qz * m[8]
-    theta = m[THETA]
-    off = EPS
-    if theta > 0.0:
-        away = math.sqrt(qx * qx + qy * qy + qz * qz) + m[LENGTH]
-        off += 0.125 * theta * (theta * away + 2.0 * m[LENGTH])
-    qx -= m[3]
-    qy -= m[4]
-    qz -= m[5]
-    dx = qx * m[14] + qy * m[15] + qz * m[16] - x0
-    dy = qx * m[20] + qy * m[21] + qz * m[22] - y0
-    dw = qx * m[17] + qy * m[18] + qz * m[19] - w0
-    if not in_cylinder(x0, y0, w0, dx, dy, dw, c[WIDE] + off, -off, c[FLUTE] + off):
+    x0, y0, w0, dx, dy, dw, bow = chord(m, x, y, z)
+    t = nearest_time(x0, y0, dx, dy)
+    x1 = x0 + t * dx
+    y1 = y0 + t * dy
+    far = x1 * x1 + y1 * y1
+    off = bow + EPS
+    wide = c[WIDE]
+    tall = c[FLUTE]
+    if far >= (wide + off) ** 2:
         return False
+    least_w = min(w0, w0 + dw)
+    most_w = max(w0, w0 + dw)
+    if most_w <= -off or least_w >= tall + off:
+        return False
+    whole = least_w > -off and most_w < tall + off
+    if not whole and not in_cylinder(x0, y0, w0, dx, dy, dw, wide + off, -off, tall + off):
+        return False
+    w = w0 + t * dw
     if c[KIND] == FLAT:
-        if theta == 0.0:
+        if m[THETA] == 0.0:
             return True
-        if in_cylinder(x0, y0, w0, dx, dy, dw, c[WIDE] - off, off, c[FLUTE] - off):
+        if far < (wide - off) ** 2 and off < w < tall - off:
             return True
-    return least(m, c, x, y, z, EPS, EPS, KNOWN, wait)[1] < EPS
+        if not whole and in_cylinder(x0, y0, w0, dx, dy, dw, wide - off, off, tall - off):
+            return True
+    elif from_profile(c, math.sqrt(far), w)[0] < (-off if m[THETA] > 0.0 else EPS):
+        return True
+    if c[TB] == 0.0 and least_w > c[Z2] + off:
+        known = beside_flank(m, c, t, x0, y0, w0, dx, dy, bow)
+        if known >= 0:
+            return known == 1
+    elif c[KIND] == FLAT:
+        h, _, w = beside(m, t, x0, y0, w0)
+        if h < (wide + EPS) ** 2 and -EPS < w < tall + EPS:
+            return True
+    return least_from(m, c, x, y, z, t, EPS, EPS, KNOWN, wait)[1] < EPS
+
+
+@njit(cache=True, nogil=True)
+def gap(m, c, x, y, z):
+    """About the least f of a point over a move, for the search of where it is 0: f near the time at which the point is
+    nearest to the axis, and where the corner or the bottom decide after two steps along its rate.
+    """
+    x0, y0, w0, dx, dy, dw, _ = chord(m, x, y, z)
+    t = nearest_time(x0, y0, dx, dy)
+    if m[THETA] > 0.0:
+        size = dx * dx + dy * dy + 1e-300
+        for _ in range(2):
+            t = min(max(t - 0.5 * beside(m, t, x0, y0, w0)[1] / size, 0.0), 1.0)
+        h, _, w = beside(m, t, x0, y0, w0)
+    else:
+        w = w0 + t * dw
+        h = (x0 + t * dx) ** 2 + (y0 + t * dy) ** 2
+    rho = math.sqrt(h)
+    f, _, nw = from_profile(c, rho, w)
+    if nw == 0.0:
+        return f
+    f, s = outside(m, c, t, x, y, z)
+    size = dx * dx + dy * dy + dw * dw
+    if size == 0.0:
+        return f
+    to = min(max(t - s * c[WIDE] / size, 0.0), 1.0)
+    f1, s1 = outside(m, c, to, x, y, z)
+    if s1 != s:
+        f2, _ = outside(m, c, min(max(to - s1 * (to - t) / (s1 - s), 0.0), 1.0), x, y, z)
+        f1 = min(f1, f2)
+    return min(f, f1)
+
+
+@njit(cache=True, nogil=True)
+def around(m, c, x, y, z, r, wait):
+    """Of a ball of radius r about a point: 1: the move sweeps all of it, 0: none, -1: some of it, or that is not
+    known.
+    """
+    x0, y0, w0, dx, dy, dw, off = chord(m, x, y, z)
+    t = nearest_time(x0, y0, dx, dy)
+    far = (x0 + t * dx) ** 2 + (y0 + t * dy) ** 2
+    out = r + off
+    if far >= (c[WIDE] + out) ** 2:
+        return 0
+    least_w = min(w0, w0 + dw)
+    if max(w0, w0 + dw) <= -out or least_w >= c[FLUTE] + out:
+        return 0
+    if from_profile(c, math.sqrt(far), w0 + t * dw)[0] < -out:
+        return 1
+    if c[TB] == 0.0 and least_w > c[Z2] + out:
+        return -1
+    low, high = least_from(m, c, x, y, z, t, r, -r, NEAR * r, wait)
+    if low >= r:
+        return 0
+    return 1 if high < -r else -1

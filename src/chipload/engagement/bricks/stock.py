@@ -73,9 +73,11 @@ def move_rows(p0: Floats, p1: Floats, a0: Floats, a1: Floats) -> Floats:
     across = across - (across * a0).sum(axis=1)[:, None] * a0
     b = across / np.linalg.norm(across, axis=1)[:, None]
     cosine, sine = np.cos(theta)[:, None], np.sin(theta)[:, None]
-    u = p1 - p0
-    ends = (np.cross(a0, b), a0 * cosine + b * sine, b * cosine - a0 * sine)
-    return np.column_stack([p0, u, a0, b, theta, np.linalg.norm(u, axis=1), *ends])
+    u, n = p1 - p0, np.cross(a0, b)
+    length = np.linalg.norm(u, axis=1)
+    way = (-(u * v).sum(axis=1) for v in (n, b * cosine - a0 * sine, a0 * cosine + b * sine))
+    bend = (theta + 2.0) * length
+    return np.column_stack([p0, u, a0, b, theta, length, n, *way, -2.0 * np.sin(0.5 * theta) ** 2, np.sin(theta), bend])
 
 
 class BrickStock:
@@ -120,7 +122,7 @@ class BrickStock:
         self.shape = np.array([*count, *blocks], dtype=np.int64)
         self.blocks = np.full(int(blocks.prod()), index.UNTOUCHED, dtype=np.int32)
         self.bricks, self.alive = np.empty((64 * index.MANY, 3), dtype=np.int32), np.empty(64, dtype=np.int32)
-        self.kept, self.used = np.empty(1 << 16, dtype=np.int32), np.zeros(2, dtype=np.int64)
+        self.kept, self.used = np.empty(1 << 16, dtype=np.int32), np.array([0, 0, -1])
         self.moves, self.of, self.count = np.empty((1024, 23)), np.empty(1024, dtype=np.int64), 0
         self.body, self.more, self.floor = body, MORE, math.inf
         self.plan, self.plan_shape = self.grid[[0, 1, 3, 4]].copy(), self.shape[:2].copy()
@@ -219,8 +221,9 @@ class BrickStock:
         apart = min(front.BRICKS * float(self.grid[3:].min()) / wide, moves_front.APART)
         room = int(math.tau / (apart * min(front.SLICES / pieces, 1.0))) + 8
         return (
-            np.empty((room, 2)), np.empty(5), np.empty(9), np.empty(9), np.empty((3, 2)), np.empty((RANGES, 3)),
+            np.empty((room, 2)), np.empty(5), np.empty(9), np.empty(9), np.empty((3, 2)), np.zeros((3, RANGES, 7)),
             np.empty((_kernels.WAIT, 6)), np.empty(18), np.zeros(1), np.empty(2, dtype=np.int64),
+            np.zeros(3, dtype=np.int64),
         )  # fmt: skip
 
     def _run(self, moves: Floats, tool: Ints, instants: Ints, pieces: int, flank_mm: Mapping[int, float]) -> Engaged:
@@ -243,7 +246,7 @@ class BrickStock:
             )
             if at == len(moves):
                 break
-            if state[1] == 1:
+            if state[1] > 0:
                 self._grow()
             else:
                 slices = np.concatenate([slices, np.empty_like(slices)])

@@ -11,17 +11,19 @@ import math
 
 from numba import njit
 
-from chipload.engagement.bricks._kernels import swept
-from chipload.engagement.bricks.index._kernels import what_is
+from chipload.engagement.bricks._kernels import gap, swept
+from chipload.engagement.bricks.index._kernels import solid, what_is
 from chipload.engagement.moves._kernels import AIR, MATERIAL
 from chipload.engagement.moves.border._kernels import BESIDE, NARROW, TURNS
 
 PI = math.pi
 #: beside the end of the front, where the contact is judged [rad]
 ASIDE = 1e-4
+#: most values of a distance that are asked for its zero
+SECANTS = 12
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def asked(ring, c, s, index, hint, wait):
     """What is at a direction of the circle."""
     return what_is(
@@ -30,7 +32,7 @@ def asked(ring, c, s, index, hint, wait):
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def swept_at(ring, c, s, e, index, wait):
     """Whether the move e swept a direction of the circle."""
     return swept(
@@ -39,55 +41,111 @@ def swept_at(ring, c, s, e, index, wait):
     )  # fmt: skip
 
 
+@njit(cache=True, nogil=True, inline="always")
+def gap_at(ring, c, s, e, index):
+    """About the distance of a direction of the circle out of what the move e swept."""
+    return gap(
+        index[6][e], index[8][index[7][e]], ring[0] + c * ring[3] + s * ring[6], ring[1] + c * ring[4] + s * ring[7],
+        ring[2] + c * ring[5] + s * ring[8],
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, inline="always")
+def solid_at(ring, c, s, index):
+    """Whether a direction of the circle is in the initial body."""
+    return solid(
+        ring[0] + c * ring[3] + s * ring[6], ring[1] + c * ring[4] + s * ring[7], ring[2] + c * ring[5] + s * ring[8],
+        index,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def between(cu, su, cs, ss, part):
+    """Direction at a part of the chord from u to s."""
+    dc = cu + part * (cs - cu)
+    ds = su + part * (ss - su)
+    size = 1.0 / math.sqrt(dc * dc + ds * ds)
+    return dc * size, ds * size
+
+
 @njit(cache=True, nogil=True)
 def crossing(ring, cu, su, cs, ss, e, index, wait):
     """Direction at which what the move ``e`` swept begins between u, not swept by it, and s, swept, and a direction
-    just before it, not swept.
+    just before it, not swept; for AIR, where the initial body ends.
+
+    The zero of the distance by secants is asked whether it is the border; else, and where there is no distance, by
+    halving.
     """
-    while True:
-        dc = cu + cs
-        ds = su + ss
-        size = 1.0 / math.sqrt(dc * dc + ds * ds)
-        dc *= size
-        ds *= size
-        if (cu - cs) ** 2 + (su - ss) ** 2 < BESIDE * BESIDE:
-            return dc, ds, cu, su
-        if swept_at(ring, dc, ds, e, index, wait):
-            cs = dc
-            ss = ds
+    low = 0.0
+    high = 1.0
+    near = 0.5 * BESIDE / math.sqrt((cu - cs) ** 2 + (su - ss) ** 2)
+    if e >= 0 and near < 0.25:
+        f0 = gap_at(ring, cu, su, e, index)
+        f1 = gap_at(ring, cs, ss, e, index)
+        if f0 > 0.0 > f1:
+            a = 0.0
+            b = 1.0
+            at = 0.5
+            side = 0
+            for _ in range(SECANTS):
+                to = b - f1 * (b - a) / (f1 - f0)
+                if abs(to - at) < 0.2 * near or b - a < near:
+                    at = to
+                    break
+                at = to
+                dc, ds = between(cu, su, cs, ss, at)
+                f = gap_at(ring, dc, ds, e, index)
+                if f > 0.0:
+                    a = at
+                    f0 = f
+                    # an end that stays counts half
+                    if side == 1:
+                        f1 *= 0.5
+                    side = 1
+                else:
+                    b = at
+                    f1 = f
+                    if side == -1:
+                        f0 *= 0.5
+                    side = -1
+            before = max(at - 0.8 * near, 0.0)
+            after = min(at + 0.8 * near, 1.0)
+            dc, ds = between(cu, su, cs, ss, before)
+            bc, bs = between(cu, su, cs, ss, after)
+            if before > 0.0 and swept_at(ring, dc, ds, e, index, wait):
+                high = before
+            elif after < 1.0 and not swept_at(ring, bc, bs, e, index, wait):
+                low = after
+            else:
+                bc, bs = between(cu, su, cs, ss, at)
+                return bc, bs, dc, ds
+    while high - low > 2.0 * near:
+        at = 0.5 * (low + high)
+        dc, ds = between(cu, su, cs, ss, at)
+        if swept_at(ring, dc, ds, e, index, wait) if e >= 0 else not solid_at(ring, dc, ds, index):
+            high = at
         else:
-            cu = dc
-            su = ds
+            low = at
+    dc, ds = between(cu, su, cs, ss, 0.5 * (low + high))
+    bc, bs = between(cu, su, cs, ss, low)
+    return dc, ds, bc, bs
 
 
 @njit(cache=True, nogil=True)
 def border(ring, cm, sm, ca, sa, e, index, wait):
     """Psi between a direction m in material and one a in air where the material ends; ``e`` the move that swept the
-    latter, or AIR.
+    latter, or AIR outside the body.
     """
     for _ in range(TURNS):
         if (cm - ca) ** 2 + (sm - sa) ** 2 < NARROW:
             break
-        if e < 0:
-            bc = cm + ca
-            bs = sm + sa
-            size = 1.0 / math.sqrt(bc * bc + bs * bs)
-            bc *= size
-            bs *= size
-            dc = bc
-            ds = bs
-        else:
-            dc, ds, bc, bs = crossing(ring, cm, sm, ca, sa, e, index, wait)
+        dc, ds, bc, bs = crossing(ring, cm, sm, ca, sa, e, index, wait)
         f = asked(ring, bc, bs, index, e, wait)
         if f == MATERIAL:
-            if e >= 0:
-                return math.atan2(ds, dc)
-            cm = bc
-            sm = bs
-        else:
-            ca = bc
-            sa = bs
-            e = f
+            return math.atan2(ds, dc)
+        ca = bc
+        sa = bs
+        e = f
     return math.atan2(sm + sa, cm + ca)
 
 

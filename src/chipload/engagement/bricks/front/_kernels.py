@@ -20,17 +20,10 @@ import math
 import numpy as np
 from numba import njit, types
 
-from chipload.engagement.bricks._kernels import (
-    A0,
-    COS_B,
-    LENGTH,
-    THETA,
-    B,
-    turn,
-)
+from chipload.engagement.bricks._kernels import A0, COS_B, LENGTH, THETA, B, turn
+from chipload.engagement.bricks.chain._kernels import joined
 from chipload.engagement.bricks.index._kernels import INDEX, enter
 from chipload.engagement.bricks.places._kernels import (
-    ALIKE,
     ALONG_N,
     ALONG_T,
     ARC,
@@ -46,11 +39,10 @@ from chipload.engagement.bricks.places._kernels import (
     TIP,
     WAY,
     contact,
-    place_of,
-    places,
     reach,
 )
-from chipload.engagement.moves._kernels import FLUTE, RHO1, TA, TB, Z2
+from chipload.engagement.bricks.slices._kernels import sliced
+from chipload.engagement.moves._kernels import FLUTE, RHO1, TA, TB, WIDE, Z2
 from chipload.engagement.moves.borrowed._kernels import borrowed
 from chipload.engagement.moves.front._kernels import APART, JUMP, STEADY, turns
 
@@ -60,6 +52,8 @@ __all__ = ["APART", "BRICKS", "SLICES", "run"]
 FILM = 1e-3
 #: slices whose ends are no farther apart than this follow one another [mm]
 BESIDE = 1e-9
+#: a step that goes no farther to both sides of its middle, over the greatest radius, has one search for what is near
+NEAR = 0.4
 
 
 @njit(cache=True, nogil=True)
@@ -102,22 +96,21 @@ def instant(m, t, height, at):
 
 @njit(cache=True, nogil=True)
 def engaged(at, c, nodes, flank, index, work, slices, rows, owner, row_at, out):
-    """What is engaged at an instant.
+    """What is engaged at an instant, within the ranges of the profile that :func:`reach` gave.
 
     Spans (psi from, to, from T) go to ``rows`` from ``row_at[0]`` on, their slices to ``slices`` from ``row_at[1]``: s
     from, s to, rho, w from, sin, cos kappa, along, across and rise of the motion. ``out``: volume of the step, pieces,
     least and greatest height, sum of the normals at ends of the front by length (x, y, z), that length, 1 where there
     is material above the flutes, length of the edge. False: no room.
     """
-    spans, to, ring, front, ranges, found_at, wait = work[0], work[1], work[2], work[3], work[4], work[5], work[6]
+    spans, to, ring, front, ranges, wait = work[0], work[1], work[2], work[3], work[4], work[6]
+    known, counts = work[5], work[10]
     out[:] = 0.0
     out[2] = math.inf
     out[3] = -math.inf
-    reach(at, c, index, ranges)
     # share of the angle between two samples
     front[8] = min(SLICES / (len(nodes) - 1), 1.0)
-    row = row_at[0]
-    have = row_at[1]
+    begin = row_at[0]
     most = len(nodes) - 1
     for part in range(3):
         a = ranges[part, 0]
@@ -137,58 +130,19 @@ def engaged(at, c, nodes, flank, index, work, slices, rows, owner, row_at, out):
         looks = max(LOOKS, 2 * most // 3)
         if part == FLANK:
             looks = max(looks, min(math.ceil(size / flank), 4 * looks))
-        for n in range(places(at, c, part, a, b, looks, index, wait, to, ring, front, spans, found_at)):
-            s0 = found_at[n, 0]
-            s1 = found_at[n, 1]
-            many = most
-            if part == FLANK:
-                many = math.ceil((s1 - s0) / c[COS_B] / flank - 1e-9)
-                if found_at[n, 2] > ALIKE:
-                    many = max(many, most // 2)
-            elif part == BOTTOM:
-                many = most // 2
-            many = max(many, 1)
-            pieces = (many + most - 1) // most
-            order = (many + pieces - 1) // pieces
-            for i in range(pieces * order):
-                first = s0 + (s1 - s0) * (i // order) / pieces
-                step = (s1 - s0) / pieces
-                k = i % order
-                place_of(c, part, first + step * nodes[order, k, 0], to)
-                from_s = to[4]
-                from_w = to[1]
-                place_of(c, part, first + step * nodes[order, k, 1], to)
-                to_s = to[4]
-                to_w = to[1]
-                found = contact(at, c, part, first + step * nodes[order, k, 2], index, wait, to, ring, front, spans)
-                if found == 0:
-                    continue
-                if have == len(slices) or row + found > len(rows):
-                    return False
-                added(at, spans, found, ring, front, to, from_s, to_s, to_w - from_w, out)
-                for j in range(found):
-                    rows[row, 0] = spans[j, 0] + front[4]
-                    rows[row, 1] = spans[j, 1] + front[4]
-                    owner[row] = have
-                    row += 1
-                slices[have, 0] = from_s
-                slices[have, 1] = to_s
-                slices[have, 2] = to[0]
-                slices[have, 3] = from_w
-                slices[have, 4] = to[2]
-                slices[have, 5] = to[3]
-                slices[have, 6] = front[0]
-                slices[have, 7] = front[1]
-                slices[have, 8] = front[2]
-                have += 1
+        found = sliced(
+            at, c, part, a, b, looks, flank, known[part], counts[part], nodes, index, work, slices, rows, owner, row_at,
+            out,
+        )  # fmt: skip
+        if found < 0:
+            return False
+        counts[part] = found
     # above the flutes
     if ranges[FLANK, 1] >= c[FLUTE] and contact(at, c, FLANK, c[FLUTE], index, wait, to, ring, front, spans) > 0:
         out[8] = 1.0
-    total = row - row_at[0]
+    total = row_at[0] - begin
     if total > 0:
-        out[1] = areas_of(rows, owner, slices, row_at[0], total, np.empty(total, np.int64), np.empty(total))
-    row_at[0] = row
-    row_at[1] = have
+        out[1] = areas_of(rows, owner, slices, begin, total, np.empty(total, np.int64), np.empty(total))
     return True
 
 
@@ -228,47 +182,6 @@ def areas_of(rows, owner, slices, first, count, room, area):
     return areas
 
 
-@njit(cache=True, nogil=True)
-def added(at, spans, found, ring, front, to, from_s, to_s, rise_w, out):
-    """Add what a slice engages to ``out`` of :func:`engaged`."""
-    rho = to[0]
-    sk = to[2]
-    ck = to[3]
-    ds = to_s - from_s
-    side = math.sqrt(front[0] * front[0] + front[1] * front[1])
-    end = front[3]
-    # half the slice along its profile
-    half = 0.5 * abs(rise_w) * abs(at[AXIS + 2]) + 0.5 * ds * ck * math.hypot(at[ALONG_T + 2], at[ALONG_N + 2])
-    size = math.hypot(ring[5], ring[8])
-    crest = math.atan2(ring[8], ring[5])
-    for i in range(found):
-        a = spans[i, 0]
-        b = spans[i, 1]
-        out[0] += (side * (math.sin(b) - math.sin(a)) - front[2] * (b - a)) * rho * ds
-        low = ring[2] + min(
-            ring[5] * math.cos(a) + ring[8] * math.sin(a), ring[5] * math.cos(b) + ring[8] * math.sin(b)
-        )
-        high = ring[2] + max(
-            ring[5] * math.cos(a) + ring[8] * math.sin(a), ring[5] * math.cos(b) + ring[8] * math.sin(b)
-        )
-        for k in range(-1, 2):
-            if a < crest + TAU * k < b:
-                high = ring[2] + size
-            if a < crest + PI + TAU * k < b:
-                low = ring[2] - size
-        out[2] = min(out[2], low - half)
-        out[3] = max(out[3], high + half)
-        for e in (a, b):
-            if end < PI and abs(abs(e) - end) < 1e-12:
-                for d in range(3):
-                    out[4 + d] += ds * (
-                        sk * (math.cos(e) * ring[3 + d] + math.sin(e) * ring[6 + d]) / max(rho, 1e-9)
-                        - ck * at[AXIS + d]
-                    )
-                out[7] += ds
-    out[9] += ds
-
-
 _F1, _F2, _F3, _I1, _I2 = (
     types.float64[::1],
     types.float64[:, ::1],
@@ -276,9 +189,9 @@ _F1, _F2, _F3, _I1, _I2 = (
     types.int64[::1],
     types.int64[:, ::1],
 )
-#: room for :func:`run`: spans, place, ring, front, ranges, places, intervals that wait, instant, rate so far, rows and
-#: slices so far
-WORK = types.Tuple((_F2, _F1, _F1, _F1, _F2, _F2, _F2, _F1, _F1, _I1))
+#: room for :func:`run`: spans, place, ring, front, ranges, places of each part, intervals that wait, instant, rate so
+#: far, rows and slices so far, number of places of each part
+WORK = types.Tuple((_F2, _F1, _F1, _F1, _F2, _F3, _F2, _F1, _F1, _I1, _I1))
 
 
 @njit(
@@ -293,18 +206,19 @@ def run(begin, instants, state, index, work, nodes, flank, slices, rows, owner, 
     ----------
     instants : (n,) at how many times a step is looked at, the middles of so many equal parts of it; 0: not at all.
         Steps that do not cut as the one before them, or not alike all along, get more
-    state : number of the move that is the first step; 1 where the engagement of step ``begin`` is known; rows, slices
+    state : number of the move that is the first step; 1 where the engagement of step ``begin`` is known, 2 where it is
+        joined with the one before it, too; rows, slices
         and entries so far; instants of a step that gets more, and of one that enters or leaves, of each of its parts
     index : see :mod:`chipload.engagement.bricks.index._kernels`; the moves of these steps are in it
     nodes : (N + 1, N, 3) from, to and node of so many parts of 0..1
     flank : longest slice of the flank of each cutter [mm]
     slices, rows, owner, out : see :func:`engaged`; ``out`` has 9 more columns: T, N and A
     entry : (m, 3) step, instant and first row of each instant that cuts
-    used : (2,) room taken of lists, and of blocks
+    used : (3,) room taken of lists, and of blocks, and the number of the last move
 
     Returns
     -------
-    The number of steps, or the one at which room ran out: ``state[1]`` 0: of rows, 1: of lists or blocks.
+    The number of steps, or the one at which room ran out: ``state[1]`` 0: of rows, 2: of lists or blocks.
     """
     # the caller keeps all of them
     index = borrowed(index)
@@ -321,21 +235,32 @@ def run(begin, instants, state, index, work, nodes, flank, slices, rows, owner, 
         c = index[8][tool]
         if state[1] == 0:
             count = instants[k]
-            fine = False
+            each = 1
+            row_at[0] = state[2]
+            row_at[1] = state[3]
+            entries = state[4]
+            # what of the profile is near material is found once, unless the cutter goes far
+            slack = 0.5 * (m[LENGTH] + m[THETA] * (c[FLUTE] + c[WIDE]))
+            once = slack < c[WIDE] * NEAR
+            if once and count > 0:
+                instant(m, 0.5, c[FLUTE], at)
+                reach(at, c, index, slack, work[4])
             while count > 0:
-                row_at[0] = state[2]
-                row_at[1] = state[3]
-                entries = state[4]
                 middle = 0.0
                 low = math.inf
                 high = -math.inf
                 way = m[LENGTH] + m[THETA] * c[FLUTE]
-                ends = 1 if not fine and turns(index[6], q, state[0] + n) else 0
+                ends = 1 if each == 1 and turns(index[6], q, state[0] + n) else 0
                 for i in range(count + ends):
+                    # the middle of each part was looked at
+                    if each > 1 and i % each == each // 2:
+                        continue
                     if entries == len(out):
                         return k
                     t = (i + 0.5) / count if i < count else 1.0 - 0.5 / (count * state[6])
                     instant(m, t, c[FLUTE], at)
+                    if not once:
+                        reach(at, c, index, 0.0, work[4])
                     before = row_at[0]
                     slices_before = row_at[1]
                     if not engaged(at, c, nodes, flank[tool], index, work, slices, rows, owner, row_at, out[entries]):
@@ -357,21 +282,30 @@ def run(begin, instants, state, index, work, nodes, flank, slices, rows, owner, 
                         entry[entries, 1] = i
                         entry[entries, 2] = before
                         entries += 1
-                if instants[k] == 1 and not fine:
+                if instants[k] == 1 and each == 1:
                     low = min(low, rate[0])
                     high = max(high, rate[0])
                     rate[0] = middle
-                if fine or state[6] == 1 or high - low <= STEADY * high:
+                if each > 1 or state[6] == 1 or high - low <= STEADY * high:
                     break
-                fine = True
-                count *= state[5] if high - low < JUMP * high else state[6]
+                each = state[5] if high - low < JUMP * high else state[6]
+                count *= each
+                for i in range(state[4], entries):
+                    entry[i, 1] = entry[i, 1] * each + each // 2
+                if each == 1:
+                    break
             instants[k] = count
             if count > 0:
                 state[2] = row_at[0]
                 state[3] = row_at[1]
                 state[4] = entries
             state[1] = 1
-        if not enter(q, m, c, index, used, work[6]):
+        if state[1] == 1:
+            last = used[2]
+            if last < 0 or index[7][last] != tool or not joined(index[6][last], m, c):
+                used[2] = q
+            state[1] = 2
+        if not enter(used[2], m, c, index, used, work[6]):
             return k
         state[1] = 0
     return n

@@ -1,9 +1,10 @@
 """Compiled loops of the index of moves in bricks; arrays and scalars only.
 
 Notation: a brick is a cell of the initial body's box; 8 x 8 x 8 of them are a block. Of a block that no move has
-reached, or that one has swept all of, nothing is kept; of the others each brick is air, or has a list of the moves that
-sweep a part of it. A brick is swept whole where the distance of its centre into the cutter is at least half its
-diagonal, and is not touched where the distance out of it is. Lists have no limit.
+reached nothing is kept, of one that a move has swept all of its number; of the others each brick has the number of the
+move that swept all of it, -1 less that in place of a length, or a list of the moves that sweep a part of it. A brick is
+swept whole where the distance of its centre into the cutter is at least half its diagonal, and is not touched where the
+distance out of it is. Lists have no limit.
 
 ``index``: grid (sides from, sides of a brick), shape (bricks, blocks), blocks, bricks (where the list begins, its
 length, its room), kept moves, bricks of each block that are no air, moves, cutter of each, cutters, and of the initial
@@ -16,15 +17,13 @@ import math
 
 from numba import njit, types
 
-from chipload.engagement.bricks._kernels import A0, THETA, B, U, least, swept
+from chipload.engagement.bricks._kernels import A0, THETA, B, U, around, chord, nearest_time, swept
 from chipload.engagement.moves._kernels import AIR, EPS, FLUTE, MATERIAL, WIDE, in_solid, place
 
 #: bricks along a side of a block, and in it
 SIDE, MANY = 8, 512
-#: of a block: no move has reached it; all of it was swept
-UNTOUCHED, SWEPT = -1, -2
-#: share of half the diagonal to which the distance of a brick is found
-NEAR = 0.1
+#: of a block: no move has reached it; a place outside the box; BY less the number of the move that swept all of it
+UNTOUCHED, OUTSIDE, BY = -1, -2, -3
 
 _F1, _F2, _I1, _S1, _S2 = (
     types.float64[::1],
@@ -36,7 +35,7 @@ _F1, _F2, _I1, _S1, _S2 = (
 INDEX = types.Tuple((_F1, _I1, _S1, _S2, _S1, _S1, _F2, _I1, _F2, _F1, _F1, _F1, _I1, _F2, _I1, _S1, _F2))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def solid(x, y, z, index):
     """Whether a point is in the initial body."""
     low = index[9]
@@ -59,9 +58,9 @@ def solid(x, y, z, index):
     return in_solid(x, y, z, low, high, index[14], index[15], faces, cell)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def brick_of(x, y, z, grid, shape, blocks):
-    """Row of a point's brick; below 0: what its block is, or SWEPT outside the box."""
+    """Row of a point's brick; below 0: what its block is, or OUTSIDE."""
     i = math.floor((x - grid[0]) / grid[3])
     j = math.floor((y - grid[1]) / grid[4])
     k = math.floor((z - grid[2]) / grid[5])
@@ -73,34 +72,45 @@ def brick_of(x, y, z, grid, shape, blocks):
     if k == shape[2]:
         k -= 1
     if i < 0 or j < 0 or k < 0 or i >= shape[0] or j >= shape[1] or k >= shape[2]:
-        return SWEPT
+        return OUTSIDE
     block = blocks[((i >> 3) * shape[4] + (j >> 3)) * shape[5] + (k >> 3)]
     if block < 0:
         return int(block)
     return int(block) * MANY + ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def what_is(x, y, z, index, hint, wait):
-    """MATERIAL, AIR, or the number of a move that swept the point; ``hint`` is asked first."""
+    """MATERIAL, the number of a move that swept the point, AIR outside the body; ``hint`` is asked first."""
     row = brick_of(x, y, z, index[0], index[1], index[2])
-    if row == SWEPT:
+    if row == OUTSIDE:
         return AIR
-    if row >= 0:
+    if row != UNTOUCHED:
         bricks = index[3]
-        count = bricks[row, 1]
-        if count < 0:
-            return AIR
         moves = index[6]
         of = index[7]
         cutters = index[8]
+        by = int(-1 - bricks[row, 1] if row >= 0 else BY - row)
+        if by >= 0:
+            # hold on to the move that swept what is beside
+            if hint >= 0 and hint != by and swept(moves[hint], cutters[of[hint]], x, y, z, wait):
+                return hint
+            return by
         if hint >= 0 and swept(moves[hint], cutters[of[hint]], x, y, z, wait):
             return hint
         kept = index[4]
         at = bricks[row, 0]
-        for k in range(at + count - 1, at - 1, -1):
+        for k in range(at + bricks[row, 1] - 1, at - 1, -1):
             e = int(kept[k])
-            if e != hint and swept(moves[e], cutters[of[e]], x, y, z, wait):
+            if e == hint:
+                continue
+            # most are far away
+            x0, y0, w0, dx, dy, dw, bow = chord(moves[e], x, y, z)
+            t = nearest_time(x0, y0, dx, dy)
+            over = cutters[of[e], WIDE] + bow + EPS
+            if (x0 + t * dx) ** 2 + (y0 + t * dy) ** 2 >= over * over or max(w0, w0 + dw) + bow <= -EPS:
+                continue
+            if swept(moves[e], cutters[of[e]], x, y, z, wait):
                 return e
     return MATERIAL if solid(x, y, z, index) else AIR
 
@@ -149,14 +159,15 @@ def appended(q, row, bricks, kept, used):
 
 
 @njit(cache=True, nogil=True)
-def enter(q, m, c, index, used, wait):
-    """Enter a move into the bricks that it may shape; False where lists (``used[0]``) or blocks (``used[1]``) have no
-    room: then call again.
+def enter(q, step, c, index, used, wait):
+    """Enter the move q into the bricks that it may shape where it makes a ``step``, the last of it; False where lists
+    (``used[0]``) or blocks (``used[1]``) have no room: then call again.
     """
+    m = index[6][q]
     grid, shape, blocks, bricks, kept, alive = index[0], index[1], index[2], index[3], index[4], index[5]
-    i0, i1 = span(m, c, 0, grid[0], grid[3], shape[0])
-    j0, j1 = span(m, c, 1, grid[1], grid[4], shape[1])
-    k0, k1 = span(m, c, 2, grid[2], grid[5], shape[2])
+    i0, i1 = span(step, c, 0, grid[0], grid[3], shape[0])
+    j0, j1 = span(step, c, 1, grid[1], grid[4], shape[1])
+    k0, k1 = span(step, c, 2, grid[2], grid[5], shape[2])
     r = 0.5 * math.sqrt(grid[3] * grid[3] + grid[4] * grid[4] + grid[5] * grid[5])
     far = SIDE * r
     if i0 > i1 or j0 > j1 or k0 > k1:
@@ -166,16 +177,16 @@ def enter(q, m, c, index, used, wait):
             for bk in range(k0 >> 3, (k1 >> 3) + 1):
                 at = (bi * shape[4] + bj) * shape[5] + bk
                 block = int(blocks[at])
-                if block == SWEPT:
+                if block <= BY or (block >= 0 and alive[block] == 0):
                     continue
                 x = grid[0] + SIDE * (bi + 0.5) * grid[3]
                 y = grid[1] + SIDE * (bj + 0.5) * grid[4]
                 z = grid[2] + SIDE * (bk + 0.5) * grid[5]
-                low, high = least(m, c, x, y, z, far, -far, NEAR * far, wait)
-                if low >= far:
+                covered = around(m, c, x, y, z, far, wait)
+                if covered == 0:
                     continue
-                if high < -far:
-                    blocks[at] = SWEPT
+                if covered == 1:
+                    blocks[at] = BY - q
                     continue
                 a0, a1 = SIDE * bi, min(SIDE * bi + SIDE, shape[0])
                 b0, b1 = SIDE * bj, min(SIDE * bj + SIDE, shape[1])
@@ -197,16 +208,14 @@ def enter(q, m, c, index, used, wait):
                             if bricks[row + (k & 7), 1] < 0:
                                 continue
                             z = grid[2] + (k + 0.5) * grid[5]
-                            low, high = least(m, c, x, y, z, r, -r, NEAR * r, wait)
-                            if low >= r:
+                            covered = around(m, c, x, y, z, r, wait)
+                            if covered == 0:
                                 continue
-                            if high < -r:
-                                bricks[row + (k & 7), 1] = -1
+                            if covered == 1:
+                                bricks[row + (k & 7), 1] = -1 - q
                                 alive[block] -= 1
                             elif not appended(q, row + (k & 7), bricks, kept, used):
                                 return False
-                if alive[block] == 0:
-                    blocks[at] = SWEPT
     return True
 
 

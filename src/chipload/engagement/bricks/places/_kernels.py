@@ -12,7 +12,7 @@ from numba import njit
 
 from chipload.engagement.bricks._kernels import COS_A, COS_B, SIN_A, SIN_B, from_profile
 from chipload.engagement.bricks.circle._kernels import intervals
-from chipload.engagement.bricks.index._kernels import MANY, SIDE, SWEPT, UNTOUCHED
+from chipload.engagement.bricks.index._kernels import BY, MANY, SIDE, UNTOUCHED
 from chipload.engagement.moves._kernels import CORNER, FLUTE, RHO1, RHO2, TA, TB, WIDE, Z2, E, F
 from chipload.engagement.moves.front._kernels import ALONG, APART
 
@@ -33,18 +33,21 @@ TIP, ALONG_T, ALONG_N, AXIS, RATE, WAY = 0, 3, 6, 9, 12, 15
 
 
 @njit(cache=True, nogil=True)
-def reach(at, c, index, ranges):
-    """Ranges of the bottom [mm], the corner [rad] and the flank [mm] that may be in material: rows (from, to)."""
+def reach(at, c, index, slack, ranges):
+    """Ranges of the bottom [mm], the corner [rad] and the flank [mm] that may be in material where the cutter is, or no
+    farther away than ``slack`` [mm]: rows (from, to).
+    """
     grid, shape, blocks, bricks = index[0], index[1], index[2], index[3]
     ranges[:, 0] = math.inf
     ranges[:, 1] = -math.inf
     r = 0.5 * math.sqrt(grid[3] * grid[3] + grid[4] * grid[4] + grid[5] * grid[5])
-    far = SIDE * r
+    far = SIDE * r + slack
+    r += slack
     first = np.empty(3, np.int64)
     last = np.empty(3, np.int64)
     for d in range(3):
         a = at[AXIS + d]
-        across = c[WIDE] * math.sqrt(max(1.0 - a * a, 0.0)) + 1e-6
+        across = c[WIDE] * math.sqrt(max(1.0 - a * a, 0.0)) + slack + 1e-6
         low = at[TIP + d] + min(c[FLUTE] * a, 0.0) - across
         high = at[TIP + d] + max(c[FLUTE] * a, 0.0) + across
         first[d] = max(0, math.floor((low - grid[d]) / grid[3 + d]))
@@ -57,7 +60,7 @@ def reach(at, c, index, ranges):
         for bj in range(first[1] >> 3, (last[1] >> 3) + 1):
             for bk in range(first[2] >> 3, (last[2] >> 3) + 1):
                 block = int(blocks[(bi * shape[4] + bj) * shape[5] + bk])
-                if block == SWEPT:
+                if block <= BY or (block >= 0 and index[5][block] == 0):
                     continue
                 x = grid[0] + SIDE * (bi + 0.5) * grid[3] - at[TIP]
                 y = grid[1] + SIDE * (bj + 0.5) * grid[4] - at[TIP + 1]
@@ -78,6 +81,8 @@ def reach(at, c, index, ranges):
                                 continue
                             z = grid[2] + (k + 0.5) * grid[5] - at[TIP + 2]
                             w = x * at[AXIS] + y * at[AXIS + 1] + z * at[AXIS + 2]
+                            if w - r > c[Z2] and ranges[FLANK, 0] <= w - r and w + r <= ranges[FLANK, 1]:
+                                continue
                             rho = math.sqrt(max(x * x + y * y + z * z - w * w, 0.0))
                             reached(c, rho, w, r, ranges)
 
@@ -178,12 +183,23 @@ def contact(at, c, part, s, index, wait, to, ring, front, spans):
 
 
 @njit(cache=True, nogil=True)
-def apart_at(at, c, part, a, b, na, nb, ea, eb, index, wait, to, ring, front, spans):
+def apart_at(at, c, part, a, b, na, nb, ea, eb, guess, index, wait, to, ring, front, spans):
     """Whether the contact jumps between two places of the profile with na, nb spans and the angles ea, eb in contact,
-    and where: the number of spans is another, or the angle.
+    and where: the number of spans is another, or the angle; then the spans and angles on both sides of it. A ``guess``
+    between them is asked for first, just beside it.
     """
-    for half in range(HALVINGS):
+    near = (b - a) / 2.0**HALVINGS
+    half = 0
+    before = a < guess - 0.5 * near
+    after = guess + 0.5 * near < b
+    while b - a > 1.001 * near:
         s = 0.5 * (a + b)
+        if before and a < guess - 0.5 * near < b:
+            s = guess - 0.5 * near
+        elif after and a < guess + 0.5 * near < b:
+            s = guess + 0.5 * near
+            after = False
+        before = False
         n = contact(at, c, part, s, index, wait, to, ring, front, spans)
         e = front[7]
         change = abs(eb - ea)
@@ -192,7 +208,7 @@ def apart_at(at, c, part, a, b, na, nb, ea, eb, index, wait, to, ring, front, sp
             left = n != na
         else:
             if half > 0 and n == na and max(one, abs(eb - e)) < SHARE * change:
-                return False, 0.0
+                return False, 0.0, na, ea, nb, eb
             left = n != na or one > abs(eb - e)
         if left:
             b = s
@@ -202,16 +218,20 @@ def apart_at(at, c, part, a, b, na, nb, ea, eb, index, wait, to, ring, front, sp
             a = s
             na = n
             ea = e
-    return True, 0.5 * (a + b)
+        half += 1
+    return True, 0.5 * (a + b), na, ea, nb, eb
 
 
 @njit(cache=True, nogil=True)
-def places(at, c, part, a, b, looks, index, wait, to, ring, front, spans, out):
-    """Ranges of a part of the profile that are in contact: rows (from, to, by how much the angle in contact differs
-    within) of ``out``; their number.
+def places(at, c, part, a, b, looks, known, index, wait, to, ring, front, spans, out):
+    """Ranges of a part of the profile that are told apart by where the contact jumps: rows of ``out`` (to, spans and
+    angle in contact just before it, spans and angle just after it, by how much the angle differs within); their number.
+    Ranges beyond the room of ``out`` are as one. In the first ``known`` rows of ``out`` are those of another instant.
     """
     count = 0
-    begin = a
+    borders = max(known - 1, 0)
+    for k in range(borders):
+        out[k, 6] = out[k, 0]
     inset = 1e-6 * (b - a)
     s0 = a
     n0 = 0
@@ -222,25 +242,36 @@ def places(at, c, part, a, b, looks, index, wait, to, ring, front, spans, out):
         s = min(max(a + (b - a) * i / looks, a + inset), b - inset)
         n = contact(at, c, part, s, index, wait, to, ring, front, spans)
         e = front[7]
-        if i > 0 and (n != n0 or abs(e - e0) > LEAP):
-            jumps, border = apart_at(at, c, part, s0, s, n0, n, e0, e, index, wait, to, ring, front, spans)
-            if jumps and (n0 == 0 or count < len(out)):
-                if n0 > 0:
-                    out[count, 0] = begin
-                    out[count, 1] = border
-                    out[count, 2] = high - low
-                    count += 1
-                begin = border
-                low = math.inf
-                high = 0.0
+        if i > 0 and (n != n0 or abs(e - e0) > LEAP) and count < len(out) - 1:
+            guess = math.inf
+            for k in range(borders):
+                if s0 < out[k, 6] < s:
+                    guess = out[k, 6]
+            jumps, border, na, ea, nb, eb = apart_at(
+                at, c, part, s0, s, n0, n, e0, e, guess, index, wait, to, ring, front, spans
+            )
+            if jumps:
+                # the angle beside the border counts: it may change only there
+                low = min(low, ea)
+                high = max(high, ea)
+                out[count, 0] = border
+                out[count, 1] = na
+                out[count, 2] = ea
+                out[count, 3] = nb
+                out[count, 4] = eb
+                out[count, 5] = high - low
+                count += 1
+                low = eb
+                high = eb
         low = min(low, e)
         high = max(high, e)
         s0 = s
         n0 = n
         e0 = e
-    if high > 0.0 and count < len(out):
-        out[count, 0] = begin
-        out[count, 1] = b
-        out[count, 2] = high - low
-        count += 1
-    return count
+    out[count, 0] = b
+    out[count, 1] = n0
+    out[count, 2] = e0
+    out[count, 3] = 0.0
+    out[count, 4] = 0.0
+    out[count, 5] = high - low
+    return count + 1

@@ -1,0 +1,1 @@
+"""Steps of one line as one move of the index."""
