@@ -164,7 +164,7 @@ class FlankPose:
             raise InputError(
                 f"depth_mm = {d[wrong[0]]:g}: must be above 0 and at most {self.deepest:.6g}, the radius of the cutter"
             )
-        piece, s_from, s_to, rho, sine, left, table = self._pieces(nodes)
+        piece, s_from, s_to, rho, sine, left, table = self._profile(nodes)
         inner = np.minimum(d[:, None], left)
         cosine = (self.cutter.radius - inner) / rho
         psi = np.where(inner > 0.0, np.arccos(np.clip(cosine, 0.0, 1.0)), 0.0)
@@ -176,7 +176,7 @@ class FlankPose:
         start = np.concatenate([[0], np.cumsum(np.bincount(step, minlength=len(d)))])
         return ToothEngagement(start, rows, np.full(len(rows), -1), piece[k], table)
 
-    def _pieces(self, nodes: int) -> tuple[NDArray[np.int64], Floats, Floats, Floats, Floats, Floats, Floats]:
+    def _profile(self, nodes: int) -> tuple[NDArray[np.int64], Floats, Floats, Floats, Floats, Floats, Floats]:
         """Pieces of the profile that may cut: slice, s from, s to, rho and sin(kappa) (k,), what the row before has
         left in front of each (k,) [mm], and the table of slices.
         """
