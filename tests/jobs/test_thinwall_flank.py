@@ -13,7 +13,7 @@ from chipload.errors import InputError
 from chipload.examples import copy_example
 from chipload.jobs import load_job, run_job
 from chipload.jobs.thinwall.inputs import read_wall
-from chipload.jobs.thinwall.run import run
+from chipload.jobs.thinwall.run import propose, run
 from chipload.planning.thinwall.blank import SIDES
 from chipload.report.folder import write_result
 from chipload.structure.places import normals_of, on_cut, on_side, weights
@@ -160,6 +160,11 @@ def test_result_holds(folder, tmp_path):
 def test_refused(folder, change, message):
     with pytest.raises(InputError, match=message):
         read_wall(job(folder, *change, number=2).job)
+
+
+def test_no_calibration_cuts(folder):
+    with pytest.raises(InputError, match=r"contact = flank: calibration cuts are proposed for contact = corner only"):
+        propose(job(folder, number=3).job, 2, 0.1, 0.5, 3, 1)
 
 
 def test_only_plates(folder):

@@ -209,6 +209,8 @@ def propose(
     """
     if job.walls:
         raise InputError("wall: calibration cuts are proposed for one [wall] of a shape only")
+    if job.operation.contact == "flank":
+        raise InputError("operation.0.contact = flank: calibration cuts are proposed for contact = corner only")
     inputs = read_wall(job)
     if len(inputs.operations) > 1:
         raise InputError("operation: calibration cuts are proposed for one operation: state the one to calibrate alone")
