@@ -19,6 +19,7 @@ from chipload.planning.thinwall.blank import SIDES
 from chipload.planning.thinwall.chatter import WallCutting, WallMotion, quietest_speed, stable_depths
 from chipload.planning.thinwall.passes import ThresholdOf, WallPass
 from chipload.planning.thinwall.paths import rows_of
+from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.planning.thinwall.threshold import Threshold
 from chipload.result import LimitCheck, check_limit
 from chipload.simulation.removal import Removal
@@ -186,7 +187,9 @@ def chatter_of(inputs: WallInputs) -> WallChatter | None:
             np.array([m.frequency_hz for m in table.mode]), np.array([m.damping_ratio for m in table.mode]),
             PER_UM * np.array([m.stiffness_n_um for m in table.mode]), np.tile([1.0, 0.0], (len(table.mode), 1)),
         )  # fmt: skip
-    cutting = WallCutting(inputs.cut.posture, inputs.cut.material, modes, table.damping_ratio, table.margin)
+    pose = inputs.cut.posture
+    assert isinstance(pose, CutterPose)  # a job with a flank has no [dynamics]
+    cutting = WallCutting(pose, inputs.cut.material, modes, table.damping_ratio, table.margin)
     own = inputs.job.operation.speed_rpm
     low, high = (rad_s_from_rpm(x or own) for x in (table.least_rpm, table.most_rpm))
     present = inputs.cut.pass_motion.spindle

@@ -6,8 +6,8 @@ Notation: u, v parameters of a side; i, j elements along the wall and up it; del
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import trimesh
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from chipload.cutting.material import material_named, need_directions, read_material
 from chipload.errors import Finding, InputError
+from chipload.geometry.mesh import read_mesh
 from chipload.geometry.sections import checked, loft, read_sections
 from chipload.geometry.thin_wall import ThinWall, blade, plate, through_sections
 from chipload.jobs.provenance import title_of
@@ -27,12 +28,15 @@ from chipload.jobs.thinwall.program_rows import program_rows
 from chipload.jobs.thinwall.tables import SHAPES
 from chipload.jobs.thinwall.wall_operation import DepthRules, WallCut, WallOperation, wall_operation
 from chipload.machine.machine import machine_named, read_machine
-from chipload.planning.thinwall.blank import SIDES, FinishSurface, WallBlank
+from chipload.planning.thinwall.blank import SIDES, ContactLine, FinishSurface, WallBlank
 from chipload.planning.thinwall.finish_rows import FinishSide
+from chipload.planning.thinwall.flank_rows import FlankSide
+from chipload.planning.thinwall.flank_stock import FlankPose
 from chipload.planning.thinwall.linking import FineSide
 from chipload.planning.thinwall.passes import ThresholdOf
 from chipload.planning.thinwall.table import read_cuts
 from chipload.planning.thinwall.threshold import Experiments, Threshold, calibrated, modelled
+from chipload.simulation.surface import fine as points_of_mesh
 from chipload.structure.grid import from_map
 from chipload.structure.solid import SolidWorkpiece
 
@@ -42,6 +46,8 @@ Floats = NDArray[np.float64]
 FACETS = (96, 64)
 #: the finished wall may be cut into by the chord of its rows and by so much [mm], for those of chips and facets
 GOUGE = 0.003
+#: part of the contact line of a tooth that its force is spread over
+BEARS = 0.5
 #: share of a step-over that rows may be farther apart: a height of whole step-overs, with rounded digits, stays so
 SLACK = 1e-4
 
@@ -84,11 +90,13 @@ class WallBody:
         """The part with walls; None: one wall."""
         return self.elastic if isinstance(self.elastic, PartBlank) else None
 
-    def compliance(self, left: Sequence[Floats], number: int) -> Floats:
-        """C_nn of the places of a side while stock ``left`` is on all sides, (p,) [mm/N]."""
+    def compliance(self, left: Sequence[Floats], number: int, line: ContactLine | None = None) -> Floats:
+        """C_nn of the places of a side while stock ``left`` is on all sides, (p,) [mm/N]; of a wall that is
+        cut with the flank that of a contact line.
+        """
         if isinstance(self.elastic, PartBlank):
             return self.elastic.compliance(left, number)
-        return self.elastic.compliance(left, SIDES[number])
+        return self.elastic.compliance(left, SIDES[number], line)
 
     def wall_of(self, number: int) -> int:
         """Number of the wall of a side."""
@@ -103,6 +111,7 @@ class WallInputs:
     ----------
     operations : in the order of cutting
     findings : while it was read
+    neighbours : points of what stands beside one wall, by name
     """
 
     job: ThinWallJob
@@ -110,6 +119,7 @@ class WallInputs:
     body: WallBody
     operations: tuple[WallOperation, ...]
     findings: tuple[Finding, ...]
+    neighbours: Mapping[str, Floats] = field(default_factory=dict)
 
     @property
     def cut(self) -> WallCut:
@@ -120,6 +130,23 @@ class WallInputs:
     def depths(self) -> DepthRules:
         """From what the depths of the last operation follow."""
         return self.operations[-1].depths
+
+    @property
+    def line(self) -> ContactLine | None:
+        """Where the flank bears on the wall, from the lower end of a contact line: at its upper end, where the wall
+        gives way most, over half the length that one tooth bears on with the smallest depth: its force is not even
+        along that. None: the corner radius cuts.
+        """
+        pose = self.cut.posture
+        if not isinstance(pose, FlankPose):
+            return None
+        height = self.body.shape.size()[1] * (1.0 - self.body.foot)
+        return ContactLine(abs(pose.step) / height, BEARS * pose.tooth_line(self.depths.law.limits.smallest) / height)
+
+    @property
+    def surface_line(self) -> ContactLine | None:
+        """Where the flank bears while it makes a point of the surface: from there up. None: the corner radius cuts."""
+        return None if self.line is None else ContactLine(self.line.length, self.line.length)
 
     @property
     def corner_radius(self) -> float:
@@ -154,7 +181,7 @@ class WallInputs:
         """Finish surface at the places."""
         return self._surface(side, *self.body.places)
 
-    def fine(self, side: int, operation: int = -1) -> FineSide:
+    def fine(self, side: int, operation: int = -1) -> FineSide | FlankSide:
         """Finish surface at the contact points of an operation: a step apart along the wall, a row apart up it."""
         own = self.operations[operation]
         u, v = np.linspace(0.0, 1.0, 65), np.linspace(self.body.foot, 1.0, 33)
@@ -164,9 +191,10 @@ class WallInputs:
         n = max(math.ceil(along / own.table.step_mm), self._chords(side, own.table.chord_mm), 2) + 1
         m = math.ceil(up / abs(own.cut.step_over) - SLACK) + 1
         u, v = np.linspace(0.0, 1.0, n), np.linspace(self.body.foot, 1.0, m)
-        return FineSide(self._surface(side, u, v), u, v)
+        made = FlankSide if own.table.contact == "flank" else FineSide
+        return made(self._surface(side, u, v), u, v)
 
-    def sides_of(self, operation: int) -> tuple[FineSide | FinishSide, ...]:
+    def sides_of(self, operation: int) -> tuple[FineSide | FinishSide | FlankSide, ...]:
         """Sides with stock, each with the rows of an operation: planned, or those of its program."""
         rows = self.operations[operation].rows
         if rows is not None:
@@ -197,7 +225,7 @@ class WallInputs:
         """Thresholds of the sides with stock under a deflection that is allowed [mm]."""
 
         def limited(left: Sequence[Floats], side: int) -> Threshold:
-            C = self.body.compliance(self.both(left), self.body.side_numbers[side])
+            C = self.body.compliance(self.both(left), self.body.side_numbers[side], self.line)
             return modelled(C, deflection, self.depths.factor)
 
         def measured(left: Sequence[Floats], side: int) -> Threshold:
@@ -264,7 +292,18 @@ def read_wall(job: ThinWallJob) -> WallInputs:
         body=_part_body(job, shape, step_over) if isinstance(shape, PartShape) else _wall_body(job, shape, sides, foot),
         operations=tuple(operations),
         findings=findings,
+        neighbours=_neighbours(job),
     )
+
+
+def _neighbours(job: ThinWallJob) -> dict[str, Floats]:
+    """Points of the neighbours of one wall, by name."""
+    out = {}
+    for k, table in enumerate(job.table.neighbour):
+        key = f"neighbour.{k}"
+        mesh = read_mesh(job.path.parent / table.file, unit=table.units, chord_mm=table.chord_mm, key=f"{key}.file")
+        out[f"neighbour {k}"] = points_of_mesh(mesh, table.spacing_mm, key)[0]
+    return out
 
 
 def _pair(values: tuple[float, ...]) -> tuple[float, float]:

@@ -126,6 +126,7 @@ def _contradictions(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Ite
     for k, op in enumerate(table.operation):
         yield from _of_operation(op, k, tools, feet, max(stock, default=0.0))
     yield from _of_several(table, min(stock, default=0.0))
+    yield from _of_flanks(table, tools)
 
 
 def _of_operation(
@@ -140,7 +141,7 @@ def _of_operation(
             "ball nose or a bull nose"
         )
     yield from _of_rows(op, where)
-    if op.rows is None and (op.step_over_mm is None) == (op.scallop_um is None):
+    if op.rows is None and op.contact == "corner" and (op.step_over_mm is None) == (op.scallop_um is None):
         said = "none is" if op.step_over_mm is None else "both are"
         yield f"{where}: {said} stated: state either step_over_mm or scallop_um"
     for key, foot in feet:
@@ -158,12 +159,59 @@ def _of_operation(
 
 def _of_rows(op: WallOperationTable, where: str) -> Iterator[str]:
     """Keys of planned rows that a finishing program gives, or that are missing without one."""
+    if op.contact == "flank":
+        yield from _of_flank_keys(op, where)
+        return
+    if op.axial_depth_mm is not None:
+        yield f"{where}.axial_depth_mm: for contact = flank only: leave it out"
     for key in ("milling", "lean_deg", "lead_deg"):
         if op.rows is None and getattr(op, key) is None:
             yield f"{where}.{key}: missing: state it, or a finishing program as {where}.rows"
     for key in ("milling", "lean_deg", "lead_deg", "step_over_mm", "scallop_um"):
         if op.rows is not None and getattr(op, key) is not None:
             yield f"{where}.{key}: not used with {where}.rows, whose program gives it: leave it out"
+
+
+def _of_flank_keys(op: WallOperationTable, where: str) -> Iterator[str]:
+    """Keys that flank contact needs, and those that it does not use."""
+    for key in ("milling", "axial_depth_mm"):
+        if getattr(op, key) is None:
+            yield f"{where}.{key}: missing: state it (contact = flank needs it)"
+    for key in ("rows", "lean_deg", "lead_deg", "step_over_mm", "scallop_um"):
+        if getattr(op, key) is not None:
+            yield f"{where}.{key}: not used with contact = flank, whose axis stands along the wall: leave it out"
+
+
+def _of_flanks(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
+    """What flank contact contradicts: the wall, other operations, and how long cutter and flutes are."""
+    flanks = [k for k, op in enumerate(table.operation) if op.contact == "flank"]
+    if not flanks:
+        return
+    where, wall = f"operation.{flanks[0]}.contact = flank", table.wall
+    if not isinstance(wall, WallTable) or wall.shape != "plate":
+        yield f"{where}: a flank touches a plane wall along a line: state [wall] shape = plate, or contact = corner"
+        return
+    if len(table.operation) > 1:
+        yield f"{where}: for one operation only: plan each operation in a job of its own"
+    for key in ("threshold", "dynamics"):
+        if getattr(table, key) is not None:
+            yield f"{key}: for contact = corner only: leave it out"
+    op, height = table.operation[flanks[0]], wall.height_mm
+    if op.cutter not in tools or height is None:
+        return
+    cutter = tools[op.cutter]
+    beside = height - wall.foot_mm + cutter.corner_radius
+    if cutter.overhang <= beside:
+        yield (
+            f"cutter.{op.cutter}.overhang_mm = {cutter.overhang:g}: must be above {beside:g}: the cutter stands along "
+            "the wall, and its holder would run into it"
+        )
+    thinner = cutter.shank_diameter is not None and cutter.shank_diameter < cutter.diameter
+    if cutter.flute_length < beside and not thinner:
+        yield (
+            f"cutter.{op.cutter}.flute_length_mm = {cutter.flute_length:g}: must be at least {beside:g}, from the last "
+            "row to the free edge, or shank_diameter_mm below the diameter: the shank would rub on the wall"
+        )
 
 
 def _of_several(table: ThinWallJobTable, least: float) -> Iterator[str]:
@@ -205,6 +253,8 @@ def _of_parts_only(table: ThinWallJobTable) -> Iterator[str]:
 
 def _part_contradictions(table: ThinWallJobTable, walls: Sequence[FaceWallTable]) -> Iterator[str]:
     """What the walls of a part lack, and keys that they do not use."""
+    if table.neighbour:
+        yield "neighbour: for one [wall] only: leave it out; what stands beside a [[wall]] belongs to the part"
     if not walls:
         yield "wall: has no entry: state at least one [[wall]]"
     if table.part is None:

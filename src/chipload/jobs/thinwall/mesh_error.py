@@ -15,16 +15,19 @@ is 8.3 %, and they find 7.3 %.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
+from scipy.sparse import csc_array
 
 from chipload.geometry.thin_wall import ThinWall
 from chipload.jobs.thinwall.inputs import WallInputs
-from chipload.planning.thinwall.blank import SIDES
+from chipload.planning.thinwall.blank import SIDES, line_nodes
 from chipload.structure.grid import from_map
 from chipload.structure.places import MeshPlaces, normals_of, points_of
-from chipload.structure.solid import SolidWorkpiece, factorise, loads
+from chipload.structure.solid import Factored, SolidWorkpiece, factorise, loads
 
 Floats = NDArray[np.float64]
 
@@ -53,14 +56,28 @@ def mesh_error(inputs: WallInputs, used: Floats, side: int) -> Floats:
         along = np.linspace(0.0, 1.0, times * i + 1)
         rows = np.interp(np.linspace(0.0, j, times * j + 1), np.arange(j + 1), up)
         solid = finished_wall(shape, (minus, plus), along, rows, times * wall.foot, times, wall.solid)
-        a, b = np.meshgrid(u * times * i, np.interp(v, rows, np.arange(len(rows))), indexing="ij")
-        b = np.maximum(b, times * wall.foot + ABOVE)
-        spread.append(
-            spread_compliance(solid, a.ravel(), b.ravel(), inputs.body.side_numbers[side]).reshape(used.shape)
+        top, seen = _heights(inputs, v)
+        a = np.repeat(u * times * i, len(v))
+        b, *line = (
+            np.tile(np.maximum(np.interp(x, rows, np.arange(len(rows))), times * wall.foot + ABOVE), len(u))
+            for x in (top, *seen)
         )
+        number = inputs.body.side_numbers[side]
+        spread.append(spread_compliance(solid, a, b, number, line).reshape(used.shape))
     change = spread[1] - spread[0]
     most = spread[1] + (change + np.abs(change)) / 3.0
     return np.maximum(most / used - 1.0, 0.0)
+
+
+def _heights(inputs: WallInputs, v: Floats) -> tuple[Floats, Floats]:
+    """Parameters v at which the force of places acts (m,), and those of the points of Gauss of the line that it is
+    spread over, (k, m); none where it acts at the place.
+    """
+    if inputs.line is None:
+        return v, np.zeros((0, len(v)))
+    foot = inputs.body.foot
+    top, bottom = inputs.line.ends((v - foot) / (1.0 - foot))
+    return foot + (1.0 - foot) * top, foot + (1.0 - foot) * line_nodes(bottom, top)[0]
 
 
 def error_at(places: tuple[Floats, Floats], error: Floats, u: Floats, v: Floats) -> Floats:
@@ -115,15 +132,37 @@ def finished_wall(
     )
 
 
-def spread_compliance(solid: SolidWorkpiece, a: Floats, b: Floats, side: int) -> Floats:
+def spread_compliance(solid: SolidWorkpiece, a: Floats, b: Floats, side: int, line: Sequence[Floats] = ()) -> Floats:
     """(k,) compliance [mm/N] along the normal of a side under a force that is spread through the thickness.
 
     Parameters
     ----------
     a, b : (k,) places, counted in elements along and up
     side : 0 for k-, 1 for k+
+    line : b of the points of Gauss up the line that the force is spread over, of which ``b`` is the upper end; none: it
+        acts at the places
     """
-    grid, factored = solid.grid, factorise(solid)
+    factored = factorise(solid)
+    acts = _through(factored, a, b, side)
+    seen = acts
+    if line:
+        shares = line_nodes(b, b)[1]
+        seen = shares[0] * _through(factored, a, line[0], side)
+        for w, up in zip(shares[1:], line[1:], strict=True):
+            seen = seen + w * _through(factored, a, up, side)
+    out = np.empty(len(a))
+    for at in range(0, len(a), TOGETHER):
+        some = slice(at, at + TOGETHER)
+        out[some] = np.einsum("fp,fp->p", seen[:, some].toarray(), factored.solve(acts[:, some].toarray()))
+    return out
+
+
+def _through(factored: Factored, a: Floats, b: Floats, side: int) -> csc_array:
+    """Unit forces along the normal of a side, spread through the thickness, as columns (f, k) over the free degrees of
+    freedom.
+    """
+    solid = factored.solid
+    grid = solid.grid
     i, j, layers = grid.counts
     kept = solid.kept.reshape(*grid.counts, 2)
     ei, ej = np.minimum(a.astype(np.int64), i - 1), np.minimum(b.astype(np.int64), j - 1)
@@ -146,11 +185,7 @@ def spread_compliance(solid: SolidWorkpiece, a: Floats, b: Floats, side: int) ->
     force = next(forces)
     for one in forces:
         force = force + one
-    out = np.empty(len(a))
-    for at in range(0, len(a), TOGETHER):
-        some = force[:, at : at + TOGETHER].toarray()
-        out[at : at + TOGETHER] = np.einsum("fp,fp->p", some, factored.solve(some))
-    return out
+    return force
 
 
 def _depth(solid: SolidWorkpiece, places: MeshPlaces) -> Floats:

@@ -1,11 +1,14 @@
-"""Whether shank and holder run into the part while its walls are cut: the floor, other walls, links and stock among it.
+"""Whether a tool runs into what stands beside a wall: the part, or the neighbours of one wall; links are among it.
 
 What the cutting part runs into is found by the chips: a rapid that cuts, a gouge in the section of any layer.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+
+import numpy as np
 
 from chipload.jobs.simulation.workpiece import stock_points
 from chipload.jobs.tables import stated
@@ -15,6 +18,29 @@ from chipload.program.program import Program
 from chipload.simulation.steps import steps_of
 from chipload.simulation.surface import Collision, collisions, fine, in_stock
 from chipload.stock.layers import LayeredStock
+
+#: points of one wall are so far apart [mm]
+SPACING = 1.0
+
+
+def wall_collisions(inputs: WallInputs, legs: Sequence[PassProgram]) -> tuple[Collision, ...]:
+    """Where shank and holder come into one finished wall, and they or the cutting part into its neighbours.
+
+    Raises
+    ------
+    InputError
+        The points of a neighbour would be too many.
+    """
+    op, shape = inputs.job.operation, inputs.body.shape
+    cutters = {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
+    steps = steps_of(Program.join([leg.program for leg in legs]), op.step_mm, op.tolerance_mm)
+    length, height, _ = shape.size()
+    parameters = (np.linspace(0.0, 1.0, math.ceil(size / SPACING) + 1) for size in (length, height))
+    u, v = np.meshgrid(*parameters, indexing="ij")
+    wall = np.concatenate([p.reshape(-1, 3) for p in shape.sides(u, v)])
+    return collisions(
+        steps, cutters, {"wall": wall, **inputs.neighbours}, op.tolerance_mm, above_only=frozenset(["wall"])
+    )
 
 
 def part_collisions(inputs: WallInputs, uncut: LayeredStock, legs: Sequence[PassProgram]) -> tuple[Collision, ...]:

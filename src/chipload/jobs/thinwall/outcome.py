@@ -93,7 +93,7 @@ class Shape:
     at : (3,) float [mm], where the gouge is
     points : how many were looked at
     nearest : least distance of the cutter to the finished wall along the path [mm]; below 0: it gouges
-    collisions : of shank and holder with a part
+    collisions : of the tool with a part, or with one wall and its neighbours
     """
 
     gouge: float

@@ -21,7 +21,7 @@ from chipload.jobs.thinwall.chatter import WallChatter, chatter_of
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.jobs.thinwall.mesh_error import error_at, mesh_error
 from chipload.jobs.thinwall.part_shape import PartShape
-from chipload.planning.thinwall.blank import FinishSurface
+from chipload.planning.thinwall.blank import ContactLine, FinishSurface
 from chipload.planning.thinwall.passes import ThresholdOf
 from chipload.planning.thinwall.threshold import Threshold, modelled
 from chipload.stock.layers import LayeredStock
@@ -48,6 +48,9 @@ def wall_stock(inputs: WallInputs) -> LayeredStock:
     low = (inputs.lowest_row if inputs.body.part else inputs.foot_height) - inputs.corner_radius
     if isinstance(inputs.body.shape, PartShape):
         stock.refine_at(inputs.body.shape.levels())
+    if inputs.line is not None:  # the ends of the flank, row by row
+        rows = np.concatenate([inputs.fine(s).surface.points[0, :, 2] for s in inputs.body.side_numbers])
+        stock.refine_at(np.unique(np.concatenate([rows, rows - inputs.corner_radius]).round(9)))
     stock.refine(max(low, float(stock.bounds[0])), float(stock.bounds[-1]), layer)
     return stock
 
@@ -70,7 +73,7 @@ class Places:
     surfaces: tuple[FinishSurface, ...]
     chatter: WallChatter | None = None
     keep: KeptRecords | None = None
-    _solved: dict[tuple[bytes, int], Floats] = field(default_factory=dict)
+    _solved: dict[tuple[bytes, int, ContactLine | None], Floats] = field(default_factory=dict)
     _errors: dict[int, Floats] = field(default_factory=dict)
 
     @cached_property
@@ -93,18 +96,24 @@ class Places:
         v = self.inputs.body.places[1]
         return [np.array([np.interp(v, self.v, row) for row in D]) for D in left]
 
-    def compliance(self, left: Sequence[Floats], side: int) -> Floats:
-        """C_nn at the elements' places of a side with stock ``left`` at these places on all sides."""
+    def compliance(self, left: Sequence[Floats], side: int, *, of_surface: bool = False) -> Floats:
+        """C_nn at the elements' places of a side with stock ``left`` at these places on all sides.
+
+        Parameters
+        ----------
+        of_surface : of the points of the surface that a flank makes, not of its contact line
+        """
         states = self.inputs.both(self.coarse(left))
-        key = (b"".join(D.tobytes() for D in states), side)
+        line = self.inputs.surface_line if of_surface else self.inputs.line
+        key = (b"".join(D.tobytes() for D in states), side, line)
         if key not in self._solved:
             body = self.inputs.body
             number = body.side_numbers[side]
-            known = ("compliance", number, tuple(states))
+            known = ("compliance", number, tuple(states), line and (line.reach, line.length))
             C = (
-                self.keep(known, lambda: body.compliance(states, number))
+                self.keep(known, lambda: body.compliance(states, number, line))
                 if self.keep
-                else body.compliance(states, number)
+                else body.compliance(states, number, line)
             )
             self._solved[key] = C.reshape(body.elastic.shape)
         return self._solved[key]

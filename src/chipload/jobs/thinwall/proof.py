@@ -7,20 +7,21 @@ logarithm, see :mod:`chipload.jobs.thinwall.places`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from chipload.jobs.checks import check_columns
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.jobs.thinwall.load_error import SimulatedPass, load_error
 from chipload.jobs.thinwall.mesh_error import error_at
-from chipload.jobs.thinwall.neighbours import part_collisions
+from chipload.jobs.thinwall.neighbours import part_collisions, wall_collisions
 from chipload.jobs.thinwall.outcome import Finish, Shape
 from chipload.jobs.thinwall.places import Places, between
 from chipload.planning.thinwall.blank import SIDES
@@ -30,7 +31,7 @@ from chipload.program.program import Program
 from chipload.progress import Progress
 from chipload.simulation.chips import remove, stacked
 from chipload.simulation.contact_points import touched
-from chipload.simulation.deflection import form_error, step_deflections
+from chipload.simulation.deflection import Contacts, form_error, step_deflections
 from chipload.simulation.removal import Removal, Resolution
 from chipload.simulation.section_deviation import nearest, section_deviation
 from chipload.stock.layers import LayeredStock
@@ -41,8 +42,12 @@ from chipload.structure.stress import greatest
 
 Floats = NDArray[np.float64]
 
+#: direction up a wall
+UP = np.array([0.0, 0.0, 1.0])
 #: places of a step at which the wall is judged: its beginning, middle and end
 JUDGED, MIDDLE = (0.0, 0.5, 1.0), 1
+#: rotations of a flank between which greatest forces are looked for [rad]: its bites begin and end all at once
+FLANK_TURN = math.radians(0.25)
 #: variants whose stock is even
 EVEN = ("constant", "unconstrained")
 #: points of a finished side, along and up
@@ -134,7 +139,9 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         parts.append(columns)
         stress = max(stress, _stress(inputs, places.coarse(left), number, columns))
         if k == last[p.side]:
-            finish[number] = _finish(inputs, removal, number, C, error, bars)
+            finish[number] = _finish(
+                inputs, removal, number, places.compliance(left, p.side, of_surface=True), error, bars
+            )
     whole = stacked(parts)  # a pass that cuts films alone has no bands
     find = partial(load_error, simulated, inputs.cut.material)
     return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(places, stock, legs), stress, find)
@@ -158,11 +165,18 @@ def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Ma
         return 0.0
     solid = inputs.body.wall.state(inputs.both(left))
     grid = solid.grid
-    places = on_side(grid, SIDES[number], [columns["u"][k]], [_rows(inputs, float(columns["v"][k])) / grid.counts[1]])
+    v = float(_acting(inputs, columns["v"][k]))
+    places = on_side(grid, SIDES[number], [columns["u"][k]], [_rows(inputs, v) / grid.counts[1]])
     places = on_cut(places, solid.kept, SIDES[number])
     force = weights(grid, places).T @ (columns["force_normal_n"][k] * normals_of(grid, places, SIDES[number]))
     foot = np.arange(len(grid.elements)).reshape(grid.counts)[:, 0].ravel()
     return greatest(solid, displacement(factorise(solid), force), foot)
+
+
+def _acting(inputs: WallInputs, v: ArrayLike) -> Floats:
+    """Parameters v at which the force of contacts is judged: of a flank the upper ends of its contact lines."""
+    at, foot = np.asarray(v, dtype=np.float64), inputs.body.foot
+    return at if inputs.line is None else foot + (1.0 - foot) * inputs.line.ends((at - foot) / (1.0 - foot))[0]
 
 
 def _rows(inputs: WallInputs, v: float) -> float:
@@ -183,7 +197,8 @@ def _columns(
     """Columns of a pass: those of the removal, and what its contact points feel.
 
     The force of a step acts anywhere in it: threshold and compliance are the worst of its beginning, middle and end, so
-    that edges and corners of the wall are among them. `contact_*_mm` is the place of that threshold; `u`, `v` and
+    that edges and corners of the wall are among them. `contact_*_mm` is the place of that threshold, the upper end of a
+    contact line; `u`, `v` and
     `depth_mm` are those of the middle. `compliance_error` is the greatest error of the compliance by its mesh there.
     """
     inputs = places.inputs
@@ -205,12 +220,15 @@ def _columns(
     place, values = spots[MIDDLE]
     u, v = uv[MIDDLE]
     if removal.cuts:
-        found = step_deflections(removal, inputs.cut.material, place, work=gives.max(axis=0), bars=bars)
+        found = _deflections(inputs, removal, place, gives.max(axis=0), bars)
     else:  # a pass that takes only films: its loads are not known, as its load_error says
         found = dict.fromkeys(("work_mm", "cutter_mm", "deflection_mm", "force_normal_n"), np.zeros(n))
     weakest, each = allowable.argmin(axis=0), np.arange(len(u))
     threshold = allowable[weakest, each]
     judged = np.stack([spot.point for spot, _ in spots])[weakest, each]
+    if inputs.line is not None:  # along the wall, which is plane
+        up = np.stack([_acting(inputs, b) - b for _, b in uv])[weakest, each]
+        judged = judged + (up * inputs.body.shape.size()[1])[:, None] * UP
     columns |= {
         "deflection_workpiece_um": 1000.0 * found["work_mm"],
         "deflection_cutter_um": 1000.0 * found["cutter_mm"],
@@ -235,6 +253,22 @@ def _columns(
     columns["side"] = np.full(n, leg.side)
     columns["operation"] = np.full(n, leg.operation)
     return columns
+
+
+def _deflections(
+    inputs: WallInputs, removal: Removal, place: Contacts, gives: Floats, bars: Mapping[int, Any]
+) -> dict[str, NDArray[Any]]:
+    """Greatest deflections and normal force of the steps; a flank may also pull the wall towards it, in up milling."""
+    material = inputs.cut.material
+    if inputs.line is None:
+        return step_deflections(removal, material, place, work=gives, bars=bars)
+    both = [
+        step_deflections(
+            removal, material, replace(place, normal=s * place.normal), work=gives, bars=bars, rotation=FLANK_TURN
+        )
+        for s in (1.0, -1.0)
+    ]
+    return {name: np.maximum(values, both[1][name]) for name, values in both[0].items()}
 
 
 def _finish(
@@ -270,7 +304,7 @@ def _finish(
 
 
 def _shape(places: Places, stock: LayeredStock, legs: Sequence[PassProgram]) -> Shape:
-    """Path and stock beside the finished wall, shank and holder beside a part."""
+    """Path and stock beside the finished wall, the tool beside its neighbours or the part."""
     inputs = places.inputs
     length, height, _ = inputs.body.shape.size()
     u, v = np.meshgrid(
@@ -286,5 +320,5 @@ def _shape(places: Places, stock: LayeredStock, legs: Sequence[PassProgram]) -> 
     gap = min(gaps, key=lambda one: one.distance)
     found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.corner_radius)
     at = found.at if found.gouge > -gap.distance else gap.at
-    touched = () if inputs.body.part is None else part_collisions(inputs, places.uncut, legs)
+    touched = wall_collisions(inputs, legs) if inputs.body.part is None else part_collisions(inputs, places.uncut, legs)
     return Shape(found.gouge, found.left, at, found.points, gap.distance, touched)

@@ -65,11 +65,11 @@ def result_of(walled: ThinWallResult) -> Result:
 
 def _unchecked_bodies(walled: ThinWallResult) -> tuple[str, ...]:
     """What is not held against one another."""
-    if not isinstance(walled.geometry.shape, PartShape):
-        return ("holder, clamp and machine: no collision check",)
     cutters = walled.planning.cutters
+    alone = not isinstance(walled.geometry.shape, PartShape) and not walled.settings.get("neighbours")
     return (
         *(f"holder of tool {number}: not stated" for number, cutter in cutters.items() if not cutter.holder),
+        *(["neighbours: none is stated"] if alone else []),
         "clamps and machine: no collision check",
     )
 

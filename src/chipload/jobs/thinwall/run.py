@@ -81,6 +81,8 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
         settings["operations"] = [
             {k: v for k, v in one.model_dump().items() if v is not None} for one in job.table.operation
         ]
+    if job.table.neighbour:
+        settings["neighbours"] = [one.model_dump(exclude_none=True) for one in job.table.neighbour]
     if inputs.body.part is not None:
         grid = inputs.body.part.grid
         settings["part"] = {
@@ -207,6 +209,8 @@ def propose(
     """
     if job.walls:
         raise InputError("wall: calibration cuts are proposed for one [wall] of a shape only")
+    if job.operation.contact == "flank":
+        raise InputError("operation.0.contact = flank: calibration cuts are proposed for contact = corner only")
     inputs = read_wall(job)
     if len(inputs.operations) > 1:
         raise InputError("operation: calibration cuts are proposed for one operation: state the one to calibrate alone")
@@ -239,6 +243,7 @@ def _provenance(job: ThinWallJob, inputs: WallInputs) -> Provenance:
     files |= {k: v for k, v in named.items() if isinstance(v, Path)}
     files |= {f"section {k}": f for k, f in enumerate(job.section_files)}
     files |= {} if job.part_file is None else {"part": job.part_file}
+    files |= {f"neighbour {k}": job.path.parent / one.file for k, one in enumerate(job.table.neighbour)}
     rows = [o.rows for o in job.table.operation]
     files |= {f"rows {k}": job.path.parent / name for k, name in enumerate(rows) if name is not None}
     files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}

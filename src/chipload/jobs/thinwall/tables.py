@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from chipload.cutter.table import CutterTable
-from chipload.jobs.simulation.tables import ClampTable
+from chipload.jobs.simulation.tables import ClampTable, FixtureTable
 from chipload.jobs.tables import (
     ChecksTable,
     Count,
@@ -167,6 +167,12 @@ class WallOperationTable(Table):
         "it gives direction, lean and step-over; none: rows are planned",
     )
     milling: Literal["down", "up"] | None = Field(None, description="needed without rows")
+    contact: Literal["corner", "flank"] = Field(
+        "corner",
+        description="what touches the surface: the corner radius of a ball or bull nose, or the flank of an end mill "
+        "whose axis stands along the wall",
+    )
+    axial_depth_mm: Positive | None = Field(None, description="of flank contact: from row to row along the axis")
     feed_mm_min: Positive = Field(le=1e5, description="feed of the centre of the cutter's corner radius")
     speed_rpm: Positive = Field(le=1e6)
     lean_deg: Positive | None = Field(
@@ -180,7 +186,10 @@ class WallOperationTable(Table):
     leave_mm: NotNegative = Field(
         0.0, description="stock on every side for the operation after this one; 0 in the last one, which finishes"
     )
-    slope: Positive = Field(le=1.0, description="greatest change of depth per length along the surface")
+    slope: Positive = Field(
+        le=1.0,
+        description="greatest change of depth per length along the surface; of a flank from row to row up the wall",
+    )
     reserve: NotNegative = Field(
         lt=1.0, description="share by which the planner keeps below the threshold for what its force model leaves out"
     )
@@ -213,6 +222,11 @@ class ThinWallJobTable(Table):
 
     wall: Walls
     part: FacePartTable | None = Field(None, description="needed by [[wall]]")
+    neighbour: tuple[FixtureTable, ...] = Field(
+        (),
+        description="what stands beside one [wall], in its coordinates, as the next blades of a blisk: no part of a "
+        "tool may touch it",
+    )
     workpiece: WallWorkpieceTable
     machine: SourceTable
     material: SourceTable

@@ -94,6 +94,7 @@ def _depth_operations(places: Places, share: float, corrections: Corrections, ev
             o.leave,
             o.depths.slope,
             c,
+            o.table.contact == "flank",
         )
         for o, c in zip(places.inputs.operations, corrections, strict=True)
     ]
@@ -243,6 +244,8 @@ def _measured(places: Places, one: Variant, before: Corrections, *, even_stock: 
             k = np.flatnonzero(cut & (c["side"] == side))
             ratio = c["force_normal_n"][k] / law.force(c["depth_mm"][k])
             new = found((places.u, v), c["u"][k], c["v"][k], ratio)
+            if operation.table.contact == "flank":  # no row is on the free edge: the one below reaches up to it
+                new[:, -1] = new[:, -2]
             if len(v) != len(places.v):
                 known = np.stack([np.interp(v, places.v, row) for row in old])
                 new = np.where(np.isnan(new), known, new)

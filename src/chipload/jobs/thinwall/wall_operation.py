@@ -18,6 +18,7 @@ from chipload.jobs.thinwall.program_rows import ProgramRows
 from chipload.jobs.thinwall.tables import WallOperationTable
 from chipload.machine.machine import Machine
 from chipload.planning.thinwall.depth import DepthRange, Measure
+from chipload.planning.thinwall.flank_stock import FlankPose, Pose
 from chipload.planning.thinwall.force_table import ForceTable, greatest_law
 from chipload.planning.thinwall.paths import PassMotion
 from chipload.planning.thinwall.plane_stock import CutterPose
@@ -32,7 +33,7 @@ class WallCut:
     cutter: Cutter
     material: Material
     machine: Machine
-    posture: CutterPose
+    posture: Pose
     pass_motion: PassMotion
     step_over: float
     scallop: float
@@ -101,14 +102,18 @@ def wall_operation(
     cutter = job.cutters[op.cutter]
     feed, spindle = mm_s_from_mm_min(op.feed_mm_min), rad_s_from_rpm(op.speed_rpm)
     feed_per_tooth = feed * math.tau / (spindle * cutter.flutes)
-    poses = _planned_poses(op, number, cutter, feed_per_tooth) if rows is None else rows.poses(cutter, feed_per_tooth)
+    poses: tuple[Pose, ...] = (
+        _planned_poses(op, number, cutter, feed_per_tooth) if rows is None else rows.poses(cutter, feed_per_tooth)
+    )
+    # between rows: an axial depth apart where the flank cuts
     step_over = abs(stated(poses[0].step, f"operation.{number}.step_over_mm"))
     # step-over^2 / 8 r of a plane; the stock has the scallops of the pass before, which may be one of the one before
-    scallop = step_over**2 / (8.0 * cutter.corner_radius)
+    scallop = 0.0 if op.contact == "flank" else step_over**2 / (8.0 * cutter.corner_radius)
     met = scallop if before is None else max(scallop, before.cut.scallop)
     limits = DepthRange(op.depth_min_mm, op.depth_max_mm)
+    sloped = 0.0 if op.contact == "flank" else op.slope  # a flank meets the steps of its own rows
     (law, worst), (even, _) = (
-        greatest_law(poses, material, limits, slope=slope, scallop=met, measure="greatest") for slope in (op.slope, 0.0)
+        greatest_law(poses, material, limits, slope=slope, scallop=met, measure="greatest") for slope in (sloped, 0.0)
     )
     posture = poses[worst]
     return WallOperation(
@@ -135,10 +140,11 @@ def wall_operation(
     )
 
 
-def _planned_poses(
-    op: WallOperationTable, number: int, cutter: Cutter, feed_per_tooth: float
-) -> tuple[CutterPose, ...]:
+def _planned_poses(op: WallOperationTable, number: int, cutter: Cutter, feed_per_tooth: float) -> tuple[Pose, ...]:
     """How the cutter stands along planned rows."""
+    if op.contact == "flank":
+        deep = stated(op.axial_depth_mm, f"operation.{number}.axial_depth_mm")
+        return (FlankPose(cutter, feed_per_tooth, deep if op.milling == "down" else -deep),)
     lean, lead = (stated(getattr(op, key), f"operation.{number}.{key}") for key in ("lean_deg", "lead_deg"))
     step = _step_over(op, number, cutter) * (-1.0 if op.milling == "down" else 1.0)
     tilt = -math.copysign(math.radians(lean), step)

@@ -61,7 +61,7 @@ def _motion(inputs: WallInputs, number: int) -> OperationMotion:
     """How an operation goes over the sides."""
     cut = inputs.operations[number].cut
     allowance = max(inputs.body.allowance)
-    reach = math.sqrt(2.0 * cut.cutter.corner_radius * allowance)
+    reach = math.sqrt(2.0 * cut.posture.meets * allowance)
     margins = Margins(
         BEYOND + reach, inputs.top + SAFE * cut.cutter.radius, SAG * (cut.pass_motion.clearance - allowance)
     )

@@ -20,16 +20,29 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array
 
 from chipload.errors import InputError
 from chipload.planning.thinwall.threshold import Threshold, modelled
 from chipload.structure.modes import modes
 from chipload.structure.places import MeshPlaces, normals_of, on_cut, on_side, points_of, weights
-from chipload.structure.solid import SolidWorkpiece, compliance, factorise
+from chipload.structure.solid import SolidWorkpiece, compliance, factorise, loads
 
 Floats = NDArray[np.float64]
 Side = Literal["k-", "k+"]
 SIDES: tuple[Side, Side] = ("k-", "k+")
+#: points of Gauss along a contact line
+LINE_POINTS = 3
+#: right-hand sides at once
+TOGETHER = 64
+#: in the row above the foot
+ABOVE = 1e-9
+
+
+def line_nodes(bottom: Floats, top: Floats) -> tuple[Floats, Floats]:
+    """Points of Gauss (k, p) between ends (p,), and their shares (k,) of the length."""
+    x, w = np.polynomial.legendre.leggauss(LINE_POINTS)
+    return bottom + 0.5 * (x[:, None] + 1.0) * (top - bottom), 0.5 * w
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +72,36 @@ class FinishSurface:
             raise InputError("surface: normals must be unit vectors")
         if not self.allowance > 0.0:
             raise InputError(f"surface.allowance_mm = {self.allowance:g}: must be above 0")
+
+
+@dataclass(frozen=True)
+class ContactLine:
+    """The part of a contact line up a wall that bears at once, from a place on the line's lower end.
+
+    Parameters
+    ----------
+    reach : of its upper end above the place; at most to the free edge
+    length : of it, downwards from there; both as shares of the height above the foot
+    """
+
+    reach: float
+    length: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.length <= self.reach <= 1.0:
+            raise InputError(
+                f"contact line: length {self.length:g} and reach {self.reach:g} of the height above the foot: need "
+                "0 < length <= reach <= 1"
+            )
+
+    def ends(self, share: Floats) -> tuple[Floats, Floats]:
+        """Upper and lower ends of the line of places at shares of the height above the foot.
+
+        >>> [x.round(3).tolist() for x in ContactLine(0.2, 0.1).ends(np.array([0.5, 0.95]))]
+        [[0.7, 1.0], [0.6, 0.9]]
+        """
+        top = np.minimum(share + self.reach, 1.0)
+        return top, top - self.length
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +210,16 @@ class WallBlank:
         """
         return modelled(self.compliance(left, side), deflection, factor)
 
-    def compliance(self, left: Sequence[Floats], side: Side) -> Floats:
-        """C_nn of the places of a side while stock ``left`` is on both, (p,) [mm/N]."""
+    def compliance(self, left: Sequence[Floats], side: Side, line: ContactLine | None = None) -> Floats:
+        """C_nn of the places of a side while stock ``left`` is on both, (p,) [mm/N].
+
+        Parameters
+        ----------
+        line : that the force is spread over evenly; the displacement is that of its upper end. None: at the place
+        """
         solid = self.state(left)
+        if line is not None:
+            return self._line_compliance(solid, side, line)
         places = on_cut(self._places(side), solid.kept, side)
         n = normals_of(solid.grid, places, side)
         clamped = self._clamped(places)
@@ -179,6 +229,31 @@ class WallBlank:
         )
         C[clamped] = C[~clamped].min()
         return C
+
+    def _line_compliance(self, solid: SolidWorkpiece, side: Side, line: ContactLine) -> Floats:
+        """Displacement of the upper end of a line under a force spread over it: by Betti's theorem the mean
+        displacement of the line under the same force at its upper end.
+        """
+        j = solid.grid.counts[1]
+        along, share = np.meshgrid(
+            np.linspace(0.0, 1.0, self.shape[0]), np.linspace(0.0, 1.0, self.shape[1]), indexing="ij"
+        )
+        top, bottom = line.ends(share.ravel())
+
+        def force(at: Floats) -> csc_array:
+            up = (self.foot + np.maximum(at, ABOVE) * (j - self.foot)) / j
+            places = on_cut(on_side(solid.grid, side, along.ravel(), np.minimum(up, 1.0)), solid.kept, side)
+            return loads(factored, places, normals_of(solid.grid, places, side))
+
+        factored = factorise(solid)
+        nodes, shares = line_nodes(bottom, top)
+        seen = sum((w * force(at) for at, w in zip(nodes[1:], shares[1:], strict=True)), shares[0] * force(nodes[0]))
+        acts = force(top)
+        out = np.empty(len(top))
+        for at in range(0, len(top), TOGETHER):
+            some = slice(at, at + TOGETHER)
+            out[some] = (seen[:, some].toarray() * factored.solve(acts[:, some].toarray())).sum(axis=0)
+        return out
 
     def modes(self, left: Sequence[Floats], side: Side, count: int) -> tuple[Floats, Floats]:
         """Lowest modes while stock ``left`` is on both sides: frequencies (count,) [Hz] and their shapes at the places

@@ -26,7 +26,7 @@ from chipload.cutting.force import forces_over_turn, mean_forces
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import with_runout
 from chipload.errors import InputError
-from chipload.planning.thinwall.plane_stock import CutterPose, engagement_of_depths
+from chipload.planning.thinwall.flank_stock import FlankPose, Pose
 from chipload.progress import Progress, silent
 
 Floats = NDArray[np.float64]
@@ -38,6 +38,8 @@ THRESHOLD, DEEPEST, INFEASIBLE = 0, 1, 2
 LOOKS = 49
 #: share of the feed that stands for the edge alone
 NO_FEED = 1e-6
+#: rotations between which the greatest force is looked for; bites of a flank begin and end all at once
+STEP_DEG, FLANK_STEP_DEG = 1.0, 0.25
 #: depths whose bites are held at once
 BLOCK = 256
 
@@ -98,22 +100,22 @@ class Depths:
 
 
 def normal_force(
-    posture: CutterPose,
+    posture: Pose,
     material: Material,
     depths: ArrayLike,
     *,
     measure: Measure,
     nodes: int | None = None,
-    step_deg: float = 1.0,
+    step_deg: float | None = None,
 ) -> Floats:
     """F_n of depths (n,) [mm], (n,) float [N].
 
     Parameters
     ----------
-    measure : ``greatest`` size over the revolution, sampled ``step_deg`` apart, or the size of the ``mean``
+    measure : ``greatest`` size over the revolution, or the size of the ``mean``
     nodes : as of :func:`chipload.planning.thinwall.plane_stock.engagement_of_depths`; None: 8 of a mean (1e-4 of a
-    ball's),
-        16 of the greatest (1 to 4 %: bites come and go at once, which makes it rather too great)
+        ball's), 16 of the greatest (1 to 4 %: bites come and go at once, which makes it rather too great)
+    step_deg : between the rotations at which the greatest is looked for; None: 1, of a flank 0.25
 
     Examples
     --------
@@ -122,6 +124,7 @@ def normal_force(
     >>> from chipload.cutter.cutter import Cutter
     >>> ball = Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5, corner_radius=5.0)
     >>> plain = Material("plain", 1500.0, 600.0, 0.0, 0.0, 0.0, 0.0, source="made up for this example")
+    >>> from chipload.planning.thinwall.plane_stock import CutterPose
     >>> normal_force(CutterPose(ball, 0.05, None), plain, [0.5], measure="mean").round(4).tolist()
     [18.1437]
     >>> round(4 * 600 * 0.05 * 0.95 / math.tau, 4)
@@ -134,9 +137,10 @@ def normal_force(
     N = posture.frame[:, 2]
     cutter = posture.cutter
     turn = math.tau / (cutter.flutes if cutter.teeth_alike else 1)
-    theta = np.linspace(0.0, turn, max(8, math.ceil(math.degrees(turn) / step_deg)), endpoint=False)
+    apart = step_deg or (FLANK_STEP_DEG if isinstance(posture, FlankPose) else STEP_DEG)
+    theta = np.linspace(0.0, turn, max(8, math.ceil(math.degrees(turn) / apart)), endpoint=False)
     for at in range(0, len(d), BLOCK):
-        bites = engagement_of_depths(posture, d[at : at + BLOCK], nodes or (8 if measure == "mean" else 16))
+        bites = posture.engagement(d[at : at + BLOCK], nodes or (8 if measure == "mean" else 16))
         if measure == "mean":
             out[at : at + BLOCK] = np.abs(mean_forces(bites, cutter, material)[0] @ N)
         else:
@@ -146,7 +150,7 @@ def normal_force(
 
 
 def largest_depths(
-    posture: CutterPose,
+    posture: Pose,
     material: Material,
     thresholds: ArrayLike,
     limits: DepthRange,
@@ -166,7 +170,7 @@ def largest_depths(
         raise InputError("threshold: a place has none above 0 N")
     if limits.greatest > posture.deepest:
         raise InputError(
-            f"depth_max_mm = {limits.greatest:g}: must be at most {posture.deepest:.6g}, where the flank begins to cut"
+            f"depth_max_mm = {limits.greatest:g}: must be at most {posture.deepest:.6g}, {posture.deepest_is}"
         )
 
     def force(d: Floats) -> Floats:
@@ -233,7 +237,7 @@ def _below(
 
 
 def _helps(
-    posture: CutterPose, material: Material, threshold: float, depth: float, measure: Measure
+    posture: Pose, material: Material, threshold: float, depth: float, measure: Measure
 ) -> tuple[float, float | None, float | None]:
     """Force of the edge alone, feed per tooth and diameter that bring the force of ``depth`` to the threshold."""
 
@@ -248,14 +252,15 @@ def _helps(
     def at_diameter(diameter: float) -> float:
         return float(normal_force(_scaled(posture, diameter), material, [depth], measure=measure)[0])
 
-    ratio = max(depth / posture.deepest, abs(posture.step or 0.0) / posture.cutter.diameter)
+    across = 0.0 if isinstance(posture, FlankPose) else abs(posture.step or 0.0) / posture.cutter.diameter
+    ratio = max(depth / posture.deepest, across)
     smallest = 1.001 * ratio * posture.cutter.diameter
     if smallest >= posture.cutter.diameter or at_diameter(smallest) > threshold:
         return edge, None, None
     return edge, None, _bisect(at_diameter, threshold, smallest, posture.cutter.diameter)
 
 
-def _scaled(posture: CutterPose, diameter: float) -> CutterPose:
+def _scaled(posture: Pose, diameter: float) -> Pose:
     cutter = posture.cutter
     corner = cutter.corner_radius * diameter / cutter.diameter
     other = replace(cutter, diameter=diameter, corner_radius=corner, corner_e=None, corner_f=None, shank_diameter=None)

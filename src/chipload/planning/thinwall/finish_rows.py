@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from chipload.planning.thinwall.contact import SideAt
+from chipload.planning.thinwall.flank_stock import Pose
 from chipload.planning.thinwall.passes import NOTHING, WallPass
 from chipload.planning.thinwall.paths import Rows
-from chipload.planning.thinwall.plane_stock import CutterPose
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class FinishSide:
     rows: tuple[FinishRow, ...]
     foot: float
 
-    def laid(self, p: WallPass, places: tuple[Floats, Floats], posture: CutterPose) -> tuple[Rows, Floats, Floats]:
+    def laid(self, p: WallPass, places: tuple[Floats, Floats], posture: Pose) -> tuple[Rows, Floats, Floats]:
         """Rows of a pass, and the parameters (r, s, 2) and the planned depth (r, s) [mm] of their contact points.
 
         ``posture`` is not asked: the axes are those of the program.

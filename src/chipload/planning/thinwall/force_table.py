@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.planning.thinwall.depth import DepthRange, Measure, normal_force
-from chipload.planning.thinwall.plane_stock import CutterPose
+from chipload.planning.thinwall.flank_stock import Pose
 
 Floats = NDArray[np.float64]
 
@@ -50,12 +50,12 @@ class ForceTable:
 
 
 def law_of(
-    posture: CutterPose, material: Material, limits: DepthRange, *, measure: Measure, looks: int | None = None
+    posture: Pose, material: Material, limits: DepthRange, *, measure: Measure, looks: int | None = None
 ) -> ForceTable:
     """Table of F_n; 128 depths a decade: between them it is right to 1e-4 of what :func:`normal_force` says."""
     if limits.greatest > posture.deepest:
         raise InputError(
-            f"depth_max_mm = {limits.greatest:g}: must be at most {posture.deepest:.6g}, where the flank begins to cut"
+            f"depth_max_mm = {limits.greatest:g}: must be at most {posture.deepest:.6g}, {posture.deepest_is}"
         )
     decades = math.log10(limits.greatest / limits.smallest)
     d = np.geomspace(limits.smallest, limits.greatest, looks or math.ceil(A_DECADE * decades) + 2)
@@ -63,7 +63,7 @@ def law_of(
 
 
 def law_on_stock(
-    posture: CutterPose, material: Material, limits: DepthRange, *, slope: float, scallop: float, measure: Measure
+    posture: Pose, material: Material, limits: DepthRange, *, slope: float, scallop: float, measure: Measure
 ) -> ForceTable:
     """Table of F_n on stock that is not plane: deeper below the contact point, with scallops of the pass before on it.
 
@@ -83,14 +83,13 @@ def law_on_stock(
     """
 
     def met(d: Floats) -> Floats:
-        return np.asarray(d + scallop + slope * np.sqrt(2.0 * posture.cutter.corner_radius * (d + scallop)))
+        return np.asarray(d + scallop + slope * np.sqrt(2.0 * posture.meets * (d + scallop)))
 
     deepest = float(met(np.array(limits.greatest)))
     if deepest > posture.deepest:
         raise InputError(
             f"depth_max_mm = {limits.greatest:g}: the cutter meets stock of {deepest:.4g} mm with scallops of "
-            f"{scallop:.3g} mm and a slope of {slope:g}: must be at most {posture.deepest:.4g}, where the flank "
-            "begins to cut"
+            f"{scallop:.3g} mm and a slope of {slope:g}: must be at most {posture.deepest:.4g}, {posture.deepest_is}"
         )
     plane = law_of(posture, material, DepthRange(limits.smallest, deepest, limits.tolerance), measure=measure)
     d = np.geomspace(limits.smallest, limits.greatest, len(plane.depths))
@@ -98,7 +97,7 @@ def law_on_stock(
 
 
 def greatest_law(
-    poses: Sequence[CutterPose],
+    poses: Sequence[Pose],
     material: Material,
     limits: DepthRange,
     *,

@@ -25,9 +25,10 @@ from scipy.interpolate import PchipInterpolator
 from chipload.errors import InputError
 from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.finish_rows import FinishSide
+from chipload.planning.thinwall.flank_rows import FlankSide
+from chipload.planning.thinwall.flank_stock import Pose
 from chipload.planning.thinwall.passes import WallPass
 from chipload.planning.thinwall.paths import PassMotion, Rows, placed, rows_of
-from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.program.program import LINE, RAPID, Program
 
 Floats = NDArray[np.float64]
@@ -51,7 +52,7 @@ class FineSide:
     u: Floats
     v: Floats
 
-    def laid(self, p: WallPass, places: tuple[Floats, Floats], posture: CutterPose) -> tuple[Rows, Floats, Floats]:
+    def laid(self, p: WallPass, places: tuple[Floats, Floats], posture: Pose) -> tuple[Rows, Floats, Floats]:
         """Rows of a pass, and the parameters (r, s, 2) and the planned depth (r, s) [mm] of their contact points."""
         low, high = (refined(d, places, (self.u, self.v)) for d in (p.low, p.high))
         rows = rows_of(self.surface, low, high, posture)
@@ -94,7 +95,7 @@ class OperationMotion:
     margins : of its links
     """
 
-    sides: Sequence[FineSide | FinishSide]
+    sides: Sequence[FineSide | FinishSide | FlankSide]
     pass_motion: PassMotion
     margins: Margins
 
@@ -177,7 +178,7 @@ def link_passes(
 
 def _pass_program(
     p: WallPass,
-    side: FineSide | FinishSide,
+    side: FineSide | FinishSide | FlankSide,
     places: tuple[Floats, Floats],
     pass_motion: PassMotion,
     margins: Margins,

@@ -169,6 +169,18 @@ def in_operations(surfaces: Sequence[FinishSurface], leaves: Sequence[float], pl
     return Plan(out[0].name, tuple(p for plan in out for p in plan.passes), tuple(weak))
 
 
+def in_steps(values: Floats) -> Floats:
+    """Stock (n, m) lowered so that it is one along each row and does not grow up the wall; on the free edge that of the
+    row which reaches there.
+
+    >>> in_steps(np.array([[0.3, 0.2, 0.25, 0.1], [0.4, 0.3, 0.3, 0.2]])).tolist()
+    [[0.3, 0.2, 0.2, 0.2], [0.3, 0.2, 0.2, 0.2]]
+    """
+    lowered = np.minimum.accumulate(values.min(axis=0))
+    lowered[-1] = lowered[-2]
+    return np.tile(lowered, (len(values), 1))
+
+
 def _no_sliver(low: Floats, high: Floats, allowance: float, smallest: float) -> Floats:
     """Stock before a pass: the allowance where it is reached, else at least the smallest depth below it."""
     rest = np.maximum(np.minimum(high, allowance - smallest), low)
@@ -184,6 +196,7 @@ def variable(
     order: Order = "alternately",
     corrections: Sequence[Floats] | None = None,
     leave: float = 0.0,
+    steps: bool = False,
     most: int = 200,
     progress: Progress = silent,
 ) -> Plan:
@@ -198,6 +211,8 @@ def variable(
     order : of the sides; one after the other: the first one whole while the second has all of its stock
     corrections : c of each side, (n, m) float above 0; None: 1
     leave : [mm] stock that stays on every side
+    steps : a pass leaves the same stock along each row, and no more of it up the wall: a flank reaches over the rows
+        before
     most : passes on a side before it is given up
 
     Raises
@@ -225,6 +240,7 @@ def variable(
             infeasible |= {(side, int(i), int(j)) for i, j in np.argwhere(weak)}
             depth = lower_envelope(surfaces[side].points, np.maximum(depth, law.limits.smallest), slope)
             high = _no_sliver(D[side], D[side] + depth, a, law.limits.smallest)
+            high = in_steps(high) if steps else high
             done.append(planned_pass(side, D[side], high, threshold, law, c[side]))
             D[side] = high
             progress(

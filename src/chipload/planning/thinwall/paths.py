@@ -25,8 +25,8 @@ from scipy.spatial import cKDTree
 from chipload.errors import InputError
 from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.contact import across
+from chipload.planning.thinwall.flank_stock import Pose
 from chipload.planning.thinwall.passes import NOTHING, WallPass
-from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.program.program import LINE, RAPID, Program
 
 Floats = NDArray[np.float64]
@@ -45,7 +45,7 @@ class PassMotion:
     clearance : [mm] along the normal, between pieces
     """
 
-    posture: CutterPose
+    posture: Pose
     feed: float
     rapid: float
     spindle: float
@@ -90,7 +90,7 @@ def offset_normals(points: Floats, normals: Floats) -> Floats:
     return _unit(n * side)
 
 
-def rows_of(surface: FinishSurface, low: Floats, high: Floats, posture: CutterPose) -> Rows:
+def rows_of(surface: FinishSurface, low: Floats, high: Floats, posture: Pose) -> Rows:
     """Rows over the surface that is left at ``low``, stock before at ``high`` (n, m) [mm].
 
     Between the places of the surface points and normals are interpolated straight.
@@ -126,7 +126,7 @@ def rows_of(surface: FinishSurface, low: Floats, high: Floats, posture: CutterPo
     return Rows(contact, normal, _unit(t - (t * normal).sum(axis=2, keepdims=True) * normal), cut)
 
 
-def placed(rows: Rows, posture: CutterPose) -> tuple[Floats, Floats, Floats]:
+def placed(rows: Rows, posture: Pose) -> tuple[Floats, Floats, Floats]:
     """Tip [mm], axis and middle C of the corner circle's centres [mm] at the contact points, (r, s, 3) float each."""
     if rows.axis is not None:
         r, e, height = posture.cutter.apt[1:4]
@@ -201,7 +201,7 @@ def pass_programs(
     )
 
 
-def gouges(rows: Rows, surface: FinishSurface, low: Floats, posture: CutterPose, tolerance: float) -> NDArray[np.int64]:
+def gouges(rows: Rows, surface: FinishSurface, low: Floats, posture: Pose, tolerance: float) -> NDArray[np.int64]:
     """Contact points (g, 2), row and number, where the corner of the cutter is too great for a concave surface.
 
     A point of the surface that lies nearer to the disk of the corner circle's centres than r - ``tolerance`` [mm].

@@ -120,6 +120,20 @@ class CutterPose:
         return self.cutter.corner_radius * (1.0 - math.sin(self.beta))
 
     @property
+    def deepest_is(self) -> str:
+        """What ``deepest`` is, in a message."""
+        return "where the flank begins to cut"
+
+    @property
+    def meets(self) -> float:
+        """Radius [mm] of the circle that the cutter meets the stock with, in the plane of feed and normal."""
+        return self.cutter.corner_radius
+
+    def engagement(self, depths: ArrayLike, nodes: int = 8) -> ToothEngagement:
+        """Tooth engagement on stock of given depths: :func:`engagement_of_depths`."""
+        return engagement_of_depths(self, depths, nodes)
+
+    @property
     def centre(self) -> Floats:
         """C, (3,) float [mm], seen from the point where the cutter touches z = 0."""
         r, e = self.cutter.apt[1:3]

@@ -48,6 +48,7 @@ class DepthOperation:
     leave : [mm] stock that it leaves on every side
     slope : greatest change of its depth along the surface
     corrections : of the law's forces, side by side
+    steps : its passes leave steps, one a row
     """
 
     threshold_of: ThresholdOf
@@ -55,6 +56,7 @@ class DepthOperation:
     leave: float = 0.0
     slope: float = 1.0
     corrections: Corrections = None
+    steps: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +124,14 @@ def limited_to(
         def planned(k: int, found: Sequence[FinishSurface], leave: float) -> Plan:
             one = operations[k]
             return variable(
-                found, one.threshold_of, one.law, one.slope, order=order, corrections=one.corrections, leave=leave
+                found,
+                one.threshold_of,
+                one.law,
+                one.slope,
+                order=order,
+                corrections=one.corrections,
+                leave=leave,
+                steps=one.steps,
             )
 
         return planned
