@@ -132,3 +132,10 @@ def test_the_length_of_another_tool_leaves_the_result_unproven():
     tools = read_tool_table("T1 P1 D8 Z40\nT2 P2 D8 Z50\n")[0]
     _, findings = read_gcode("T1 M6\nG43 H2\nG0 Z5\nM2", tools=tools)
     assert [(f.code, f.severity) for f in findings] == [("nc-length-of-another-tool", Severity.UNPROVEN)]
+
+
+@pytest.mark.parametrize(("dialect", "severity"), [("linuxcnc", Severity.UNPROVEN), ("fanuc", Severity.NOTE)])
+def test_the_offset_of_another_tool_is_named_without_a_tool_table(dialect, severity):
+    for h, found in (("H3", [severity]), ("H4", [])):
+        _, findings = read_gcode(f"T4 M6\nG43 {h}\nG0 Z5.\nM30", dialect=dialect)
+        assert [f.severity for f in findings if f.code == "nc-length-of-another-tool"] == found

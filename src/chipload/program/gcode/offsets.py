@@ -191,17 +191,21 @@ def _check_length(c: Controller, code: int, number: int) -> None:
     """Findings on a length that is not known or is another tool's."""
     if number == 0:
         return
-    if number not in (c.tools or {}):
+    known, tool = number in (c.tools or {}), c.state.tool
+    if not known:
         c.once(
             "nc-length-unknown",
             f"{shown(code)} H{number}: the length of tool {number} is unknown and counts as 0: state Z of tool "
             f"{number} in a tool table (program.tools)",
         )
-    elif code == 430 and c.dialect == "linuxcnc" and number != c.state.tool:
+    if code == 430 and number != tool and (known or tool != 0):
+        # H names a tool for LinuxCNC, an offset register for the others, which by custom has the number of its tool
+        own = c.dialect == "linuxcnc"
         c.once(
             "nc-length-of-another-tool",
-            f"G43 H{number}: tool {c.state.tool} is in the spindle: the length of tool {number} is taken for it",
-            Severity.UNPROVEN,
+            f"G43 H{number}: tool {tool} is in the spindle: "
+            + (f"the length of tool {number} is taken for it" if own else f"check that offset {number} is its length"),
+            Severity.UNPROVEN if own else Severity.NOTE,
         )
 
 
