@@ -55,6 +55,14 @@ def test_left_over_is_the_scallop_of_a_ball(face):
     assert np.abs(left - scallop(30.0 * face.v, lines, 5.0)).max() < 2e-3
 
 
+def test_left_over_is_no_higher_than_the_scallop_where_poses_of_passes_are_not_side_by_side():
+    """A point of the crest is as far from either pass: its height is the same, whichever has the nearest pose."""
+    fine = face_of(0, "plus", FLAT, 0, ((0.2, 0.8), (0.2, 0.8)), 0.1, 5.0, 0.25)
+    lines = np.arange(0.0, 31.0, 1.9)
+    left = left_over(fine, [(BALL, [track(y, low=-0.2 - 0.003 * k) for k, y in enumerate(lines)])])
+    assert np.abs(left - scallop(30.0 * fine.v, lines, 5.0)).max() < 2e-4
+
+
 def test_two_cutters_together_leave_what_neither_takes(face):
     lines, more = np.arange(0.0, 20.0, 1.9), np.arange(19.5, 31.0, 1.4)
     left = left_over(face, [(BALL, [track(y) for y in lines]), (SMALL, [track(y, SMALL) for y in more])])
