@@ -268,8 +268,9 @@ def test_the_first_progress_comes_before_a_step_is_made(job: Path, monkeypatch: 
         run_job(loaded, stop, kept)
 
 
-def test_workers_share_layers_only(job: Path) -> None:
-    code, _, err = call("check", job, "--set", "operation.0.workers=2", "--set", "operation.0.engine=moves")
+@pytest.mark.parametrize("engine", ["auto", "moves"])
+def test_workers_share_layers_only(job: Path, engine: str) -> None:
+    code, _, err = call("check", job, "--set", "operation.0.workers=2", "--set", f"operation.0.engine={engine}")
     assert code == 2
     assert "operation.0.workers = 2: applies to layers: state engine = 'layers' or leave it out" in err
 

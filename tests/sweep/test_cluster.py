@@ -205,6 +205,7 @@ def test_a_job_without_such_parts_is_refused(job_dir, tmp_path):
     for job, more, said in (
         (job_dir / "job.toml", (), "a contour job has no parts that other processes can compute"),
         (slot, ("--set", "operation.0.engine=moves"), "share layers only"),
+        (slot, ("--set", "operation.0.engine=auto"), "share layers only"),
     ):
         done = CliRunner().invoke(app, ["run", str(job), *words, "2", *more])
         assert done.exit_code == 2

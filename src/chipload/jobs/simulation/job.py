@@ -136,7 +136,7 @@ def _contradictions(table: SimulationJobTable) -> Iterator[str]:
         if saved and stock.layer_mm is not None:
             yield "stock.layer_mm: leave it out: the layers of an earlier result stay"
     for k, op in enumerate(table.operation):
-        if op.workers > 1 and op.engine == "moves":
+        if op.workers > 1 and op.engine != "layers":
             yield f"operation.{k}.workers = {op.workers}: applies to layers: state engine = 'layers' or leave it out"
     yield from clamp_errors(table)
     plate = table.machine_table

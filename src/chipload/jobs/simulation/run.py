@@ -139,12 +139,12 @@ def text_to_change(
 
 
 def require_layers(job: ProgramJob, workers: Workers | None) -> None:
-    """Refuse processes and a cluster where no layers are removed."""
+    """Refuse processes and a cluster unless the job states that layers are removed."""
     if workers is None:
         return
     if not job.simulates:
         raise InputError("--workers, --dask: the job reads its program and simulates nothing: leave them out")
-    if job.table.operation[0].engine == "moves":
+    if job.table.operation[0].engine != "layers":
         raise InputError('--workers, --dask: share layers only: state engine = "layers" or leave them out')
 
 
