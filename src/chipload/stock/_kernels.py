@@ -254,7 +254,7 @@ def uncut_between(ox, oy, tx, ty, r, R, begin, end, grid, head, link, axis, out)
     """
     x0, y0, h, piece = grid[0], grid[1], grid[2], grid[6]
     nx, ny = int(grid[3]), int(grid[4])
-    half = 0.5 * r * piece
+    half, cells = 0.5 * r * piece, 1.0 / h
     # what each capsule covers of the circle is found once: the last one of each place, its number of arcs, their ends
     for k in range(SEEN, ENDS):
         out[k, 0] = -1.0
@@ -269,7 +269,7 @@ def uncut_between(ox, oy, tx, ty, r, R, begin, end, grid, head, link, axis, out)
         a0 = -0.5 * math.pi + k * piece
         a1 = a0 + piece
         c, s = c * ca - s * sa, s * ca + c * sa
-        i, j = int((mx - x0) / h), int((my - y0) / h)
+        i, j = int((mx - x0) * cells), int((my - y0) * cells)
         at = FULL
         if 0 <= i < nx and 0 <= j < ny:
             at = head[j * nx + i]

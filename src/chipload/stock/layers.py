@@ -440,7 +440,9 @@ class LayeredStock:
             chips[at] = list(joined[alike])
 
     def _met(self, turn: Ints, rows: Ints, given: Shapes) -> tuple[Ints, Ints, Ints, Ints]:
-        """Tiles under the boxes of the shapes numbered ``turn``: of each the shape, the layer, row and column."""
+        """Tiles whose boxes the boxes of the shapes numbered ``turn`` reach into: of each the shape, the layer, row and
+        column. A tile without an area has no box.
+        """
         x0, y0, x1, y1 = shapely.bounds(given[turn]).reshape(-1, 4).T
         i0, j0 = (np.maximum(np.searchsorted(b, low, "right") - 1, 0) for b, low in ((self.xs, x0), (self.ys, y0)))
         i1, j1 = (
@@ -451,7 +453,10 @@ class LayeredStock:
         count = wide * tall
         of = np.repeat(np.arange(len(turn)), count)
         at = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
-        return turn[of], rows[turn][of], j0[of] + at // wide[of], i0[of] + at % wide[of]
+        layer, j, i = rows[turn][of], j0[of] + at // wide[of], i0[of] + at % wide[of]
+        a0, b0, a1, b1 = shapely.bounds(self.tiles[layer, j, i]).reshape(-1, 4).T
+        near = (a0 < x1[of]) & (a1 > x0[of]) & (b0 < y1[of]) & (b1 > y0[of])
+        return turn[of][near], layer[near], j[near], i[near]
 
     def _tidy(self, layer: Ints, j: Ints, i: Ints, tidy: float) -> None:
         """Leave vertices out of tiles that have twice as many as when they were last tidied."""

@@ -51,7 +51,8 @@ def test_a_plan_leaves_what_the_discs_along_its_path_do_not_reach() -> None:
     area, contours, _ = leftover(centre_region(centre_region(region, R), -R), points, breaks, R)
     assert area > 0.01
     assert path.leftover_mm2 == pytest.approx(area, abs=1e-3)
-    assert len(path.leftover) == len(contours)
+    # which films are too narrow to be drawn may differ
+    assert sum(c.area for c in path.leftover) == pytest.approx(sum(c.area for c in contours), abs=5e-3)
 
 
 def test_squares_that_are_cleared_lie_in_the_capsule_and_near_legs_leave_out_what_is_far() -> None:
