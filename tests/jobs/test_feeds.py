@@ -323,6 +323,24 @@ def test_the_chip_of_another_instant_grows_no_more_than_the_feed(tmp_path: Path)
     assert 0.12 < after["chip_max_mm"][own].max() <= 0.178
 
 
+def test_a_chip_that_runout_makes_does_not_shrink_with_the_feed(tmp_path: Path) -> None:
+    """The thickest chip of a line is not at the instant of its greatest force, and runout makes a part of it that stays
+    where the line is cut more slowly (found by random ways).
+    """
+    ways = (
+        "F500\nG1 X0.00 Y7.77 Z-2.70\nG1 X-2.17 Y15.36 Z-0.80\nG1 X0.00 Y22.40 Z-3.79 F285\n"
+        "G1 X-2.20 Y2.12 Z-1.11 F748\nG1 X-13.02 Y-4.71 Z-2.66\nG1 X-12.97 Y-10.04 Z-0.80\n"
+        "G1 X0.00 Y-20.30 Z0.75\nG0 Z9\nM2\n"
+    )
+    job = JOB.replace("helix_deg = 0.0\n", "helix_deg = 30.0\nrunout_mm = 0.01\nrunout_deg = 20.0\n")
+    read = done(tmp_path, HEAD + "G0 X-9 Y0\nG0 Z-2\n" + ways, "force_n = 213\nchip_max_mm = 0.020\n", job=job)
+    feeds, after = read.outcome.feeds, read.outcome.simulated.removal.columns
+    (k,) = np.flatnonzero(feeds.line == 9)
+    thickest = after["chip_max_mm"][after["line"] == 9].max()
+    assert thickest > 0.0
+    assert thickest <= 0.020 or feeds.by[k] == "slowest"
+
+
 @settings(max_examples=6, deadline=None, phases=[Phase.generate])
 @given(st.data())
 def test_what_is_said_to_hold_holds(tmp_path_factory, data) -> None:

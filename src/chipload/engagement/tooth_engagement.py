@@ -190,6 +190,30 @@ def with_runout(bites: ToothEngagement, cutter: Cutter) -> ToothEngagement:
     return ToothEngagement(start, rows, tooth, own, slices, bites.frame)
 
 
+def thickest_of_teeth(plain: ArrayLike, cutter: Cutter, sine: ArrayLike = 1.0) -> Floats:
+    """Thickest chip that any tooth cuts where all would cut ``plain`` without runout, as an array [mm].
+
+    max_j min_m (m h + (r_j - r_(j-m)) sin(kappa)), see :func:`with_runout`. It grows with h, is at least h, and O(N^2).
+
+    Parameters
+    ----------
+    plain, sine : (...) h [mm] and sin(kappa), of shapes that fit one another
+
+    Examples
+    --------
+    Radii 0.01 mm apart: the longer tooth cuts 0.01 mm more, but never more than both would without runout.
+
+    >>> cutter = Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5, runout=(0.005, 0.0))
+    >>> thickest_of_teeth([0.05, 0.005], cutter).round(6).tolist()
+    [0.06, 0.01]
+    """
+    h, s = np.broadcast_arrays(np.asarray(plain, dtype=np.float64), np.asarray(sine, dtype=np.float64))
+    radii, turns, N = tooth_radii(cutter), turns_before(cutter), cutter.flutes
+    behind = (np.arange(N)[:, None] - np.arange(1, N + 1)) % N
+    more = radii[:, None] - radii[behind]
+    return np.asarray((turns * h[..., None, None] + more * s[..., None, None]).min(axis=-1).max(axis=-1))
+
+
 def turns_before(cutter: Cutter) -> Floats:
     """(N, N) float: of tooth j and m = 1 .. N, the angle of the m pitches before it over 2 pi / N."""
     N = cutter.flutes

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.cutting.strength import allowed_stress, cutter_stress
+from chipload.engagement.tooth_engagement import thickest_of_teeth
 from chipload.jobs.checks import DefaultChecks, load_error, peak_excess, upper_loads
 from chipload.jobs.feeds.outcome import FeedResult
 from chipload.jobs.feeds.tables import FeedsTable
@@ -45,6 +46,8 @@ FASTEST, MACHINE, AIR, LIMITED = 0, 1, 2, 3
 STRESS = "cutter_stress_mpa"
 #: the thickest chip of a step
 CHIP = "chip_max_mm"
+#: angles kappa at which a chip with runout is looked at, and halvings of what it is without
+KAPPAS, HALVINGS = 41, 40
 #: columns of the removal in which a watch says what each step allows
 _FACTOR, _BY = "feed_factor", "feed_by"
 
@@ -99,7 +102,7 @@ def watching(
 
     ``before`` are the columns at the programmed feeds. A watch gets the instant of a step with the greatest force;
     where another has more torque its loads are raised to that, in the same ratio at any feed. A thicker chip of another
-    grows with the feed at most in proportion: what runout adds to a chip does not depend on the feed.
+    instant is that of :func:`_chip_of_instant`.
     """
     least, most, by = _bounds(steps, asked.table, cutters, machine)
 
@@ -112,8 +115,10 @@ def watching(
             if name in before
         }
         chip = np.where(beyond.get(CHIP, 1.0) > 1.0, before[CHIP][cuts.step], 0.0) if CHIP in before else 0.0
+        chip_at = _chip_of_instant(np.broadcast_to(chip, low.shape), cuts.cutter, cuts.engagement.slices[:, 3])
 
         def ratios(factor: Floats) -> Floats:
+            thickest = chip_at(factor)
             moved = at_feeds(cuts, factor)
             loads: dict[str, Floats] = greatest_loads(moved, material, asked.rotation, asked.checks.sigma > 0.0)
             if asked.more is not None:
@@ -124,7 +129,7 @@ def watching(
             limits = {**asked.limits, STRESS: allowed_stress(moved.cutter)}
             return np.array(
                 [
-                    np.maximum(upper[column] * beyond.get(column, 1.0), factor * chip if column == CHIP else 0.0)
+                    np.maximum(upper[column] * beyond.get(column, 1.0), thickest if column == CHIP else 0.0)
                     * (1.0 + asked.error(name))
                     / limits[name]
                     for name in asked.feed_limits
@@ -137,6 +142,37 @@ def watching(
         return {_FACTOR: factor, _BY: np.where(factor == high, by[cuts.step], worst).astype(np.float64)}
 
     return watch
+
+
+def _chip_of_instant(chip: Floats, cutter: Cutter, sines: Floats) -> Callable[[Floats], Floats]:
+    """The thickest chip [mm] at a factor on the feed, from that of an instant at the programmed feed.
+
+    Without runout it goes with the feed. What runout adds does not depend on the feed, so a slower feed makes a chip
+    thinner by less. The greatest for any angle kappa of the edge counts, since that of the instant is not known.
+
+    Parameters
+    ----------
+    chip : (n,) at the programmed feed [mm], 0 where the instant does not count
+    sines : sin(kappa) of the slices of the cutter
+    """
+    counts = np.flatnonzero(chip > 0.0)
+    if cutter.teeth_alike or not len(counts):
+        return lambda factor: factor * chip
+    sine = np.unique(np.linspace(float(sines.min()), float(sines.max()), KAPPAS))
+    least = np.zeros((len(counts), len(sine)))
+    # without runout it is at most what it is with it
+    most = np.repeat(chip[counts, None], len(sine), axis=1)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (least + most)
+        thicker = thickest_of_teeth(middle, cutter, sine) >= chip[counts, None]
+        least, most = np.where(thicker, least, middle), np.where(thicker, middle, most)
+
+    def at(factor: Floats) -> Floats:
+        out = factor * chip
+        out[counts] = thickest_of_teeth(factor[counts, None] * most, cutter, sine).max(axis=1)
+        return out
+
+    return at
 
 
 def with_new_feeds(
