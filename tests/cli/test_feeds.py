@@ -186,7 +186,7 @@ def test_an_unproven_text_says_so_in_its_first_line(job: Path, tmp_path: Path) -
         ),
         ("fastest_percent = 400.0", "", "operation.0.feeds.fastest_percent: missing"),
         ("fastest_percent = 400.0", "fastest_percent = 400.0\nfaster = 1", "operation.0.feeds.faster: unknown key"),
-        ("force_n = 350.0\ndeflection_um = 14.0\n", "gouge_mm = 0.1\n", "limits.gouge_mm: needs the part"),
+        ("force_n = 350.0\ndeflection_um = 14.0\n", "gouge_mm = 0.1\n", "limits.gouge_mm: needs the finished part"),
         ("(for all of it)", "\no7 if [1 GT 0]", "feeds are changed only in a program without jumps"),
     ],
 )

@@ -164,7 +164,7 @@ def test_ctrl_c_says_what_is_kept_and_how_to_go_on(folder: Path, how: signal.Sig
     stopped = stop(folder, out, how)
     assert stopped.returncode == 130
     assert re.fullmatch(
-        rf"chipload: stopped: \d+ steps are kept in {out}.unfinished: the same command continues from there, with "
+        rf"chipload: stopped: \d+ steps are kept in {out}.unfinished: the same command continues from there; with "
         r"--fresh it begins again\n",
         stopped.stderr,
     )
