@@ -72,7 +72,9 @@ def test_a_limit_of_the_machine_holds_it_back(folder: Path) -> None:
 def test_what_could_not_be_checked_holds_it_back_until_allowed(folder: Path) -> None:
     code, out, err = call(folder, "open.ngc")
     assert (code, out) == (3, b"")
-    assert err.splitlines()[-1].startswith("open.ngc is not loaded: something could not be checked; add `--allow-unproven`")
+    assert err.splitlines()[-1].startswith(
+        "open.ngc is not loaded: something could not be checked; add `--allow-unproven`"
+    )
     code, out, _ = call(folder, "open.ngc", "--allow-unproven")
     assert (code, out) == (0, (folder / "open.ngc").read_bytes())
 
