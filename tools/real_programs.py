@@ -64,13 +64,15 @@ FILES = {
 NOT_RUN, STOPPED, REFUSED, FAILED = "not run", "not finished", "refused", "failed"
 HEAD = """# Real programs, run whole
 
-Files of other people, each drafted by `chipload init FILE DIR` and run from its beginning to its end by
-`chipload run DIR/job.toml --accept`. What a file does not state (cutter, stock, machine) is guessed and accepted, so
-that a verdict rests on guesses: a gouge or a rapid through stock may be that of a guessed stock. `make real` runs all
-files that have no verdict yet, the shortest first by the estimate of `chipload check`, and writes this page; a file
-that was stopped goes on where it was. Times are processor times, the compiling of kernels included where a run was the
-first. A row with *{not_run}* waits for the next `make real`; the longest that its run may take by the estimate stands
-beside it.
+This page shows what chipload makes of whole files of other people, for users who want to know how far their own files
+will lead. `chipload init FILE DIR` drafts a job for each file, and `chipload run DIR/job.toml --accept` runs it from
+beginning to end. What a file does not state (cutter, stock, machine) is guessed and accepted. A verdict therefore
+depends on guesses: a gouge, or a rapid through stock, may be one of a guessed stock.
+
+`make real` runs all files that have no verdict, the shortest first by the estimate of `chipload check`, and writes this
+page. A stopped file continues where it was. Times are processor times. They include the compilation of kernels where a
+run was the first. A row with *{not_run}* waits for the next `make real`, and states the longest time that its run may
+take by the estimate.
 
 | file | kind | verdict | first reason | time [s] |
 |---|---|---|---|---:|
