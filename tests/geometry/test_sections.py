@@ -92,7 +92,7 @@ def test_refused_sections():
         checked(good[:1])
     with pytest.raises(InputError, match="section 2: 8 points: must be at least 12"):
         checked((good[0], good[1][::20]))
-    with pytest.raises(InputError, match="section 2: out of order: lies not between sections 1 and 3"):
+    with pytest.raises(InputError, match="section 2: is not between sections 1 and 3"):
         checked((good[0], good[3], good[1], good[4]))
     crossed = good[1].copy()
     crossed[20:60] = crossed[20:60][::-1]

@@ -126,7 +126,7 @@ def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -
     if back.any():
         k = int(back.argmax()) + 2
         raise InputError(
-            f"section {k}: out of order: lies not between sections {k - 1} and {k + 1}: sort hub to shroud"
+            f"section {k}: is not between sections {k - 1} and {k + 1}: sort the sections from hub to shroud"
         )
     if outer_diameter is not None:
         found = 2.0 * max(float(np.hypot(p[:, 0], p[:, 1]).max()) for p in sections)
