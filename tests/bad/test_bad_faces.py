@@ -120,7 +120,7 @@ ON_PLUS = ", ".join(f"{x:.9f}" for x in IMPELLER.blade.plus.at(0.05, 0.0)[0])
          "39.35 mm: check flow, and that the axis goes through the origin"),
         ("hub = [3]", "hub = [3, 3]", "impeller.step.hub: face 3 appears twice: name each face once"),
         ("hub = [3]", "hub = [3, 4]",
-         "impeller.step.hub: face 4 begins 24 mm from the end of face 3: state those between"),
+         "impeller.step.hub: face 4 begins 24 mm from the end of face 3: state the faces between them"),
         ("hub = [3]", "hub = []",
          "job.toml: impeller.step.hub = []: must name at least one face, or a file of points"),
         ('flow = "-z"', 'flow = "-y"',
@@ -202,7 +202,7 @@ def test_a_face_of_a_side_twice(job):
 def test_a_hub_with_a_corner(job):
     written(job.parent / "impeller.step", *FACES[:2], *corner(), FACES[3])
     assert refused(job, "hub = [3]\nshroud = [4]", "hub = [3, 4]\nshroud = [5]") == (
-        "impeller.step.hub: faces 3 and 4 meet at 90 deg: must join smoothly: state those along the channel only"
+        "impeller.step.hub: faces 3 and 4 meet at 90 deg: must join smoothly: state only the faces along the channel"
     )
 
 

@@ -118,7 +118,7 @@ def test_refused_files(tmp_path):
     with pytest.raises(InputError, match="line 3: not numbers"):
         read_sections([bad], "mm")
     bad.write_text("X Y Z\n1 2 3\n1 2\n")
-    with pytest.raises(InputError, match="line 3: 2 numbers: must be as many in every line"):
+    with pytest.raises(InputError, match="line 3: 2 numbers: must be 2 or 3, the same in every line"):
         read_sections([bad], "mm")
     bad.write_text("X Y Z\n0 1 2 3 4 5 6\n")
     with pytest.raises(InputError, match=r"7 numbers: .*: write each section to a file of its own, a line X Y Z for"):

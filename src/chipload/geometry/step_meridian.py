@@ -70,7 +70,8 @@ def joined(part: Part, numbers: Sequence[int], R: Floats, key: str, tips: bool) 
         piece, next_number = left.pop(k), rest.pop(k).number
         if gap[k] > JOIN:
             raise InputError(
-                f"{key}: face {next_number} begins {gap[k]:.4g} mm from the end of face {number}: state those between"
+                f"{key}: face {next_number} begins {gap[k]:.4g} mm from the end of face {number}: state the faces "
+                "between them"
             )
         if np.linalg.norm(piece[-1] - out[-1]) < np.linalg.norm(piece[0] - out[-1]):
             piece = piece[::-1]
@@ -79,7 +80,7 @@ def joined(part: Part, numbers: Sequence[int], R: Floats, key: str, tips: bool) 
         if turn > SMOOTH:
             raise InputError(
                 f"{key}: faces {number} and {next_number} meet at {np.degrees(turn):.3g} deg: must join smoothly: "
-                "state those along the channel only"
+                "state only the faces along the channel"
             )
         out, number = np.concatenate([out, piece[1:]]), next_number
     return out

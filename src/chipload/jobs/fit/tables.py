@@ -30,7 +30,7 @@ class ChannelsTable(Table):
     feed: str | None = Field(None, description='column of the force along the feed, with its sign, as "-Fy"')
     across: str | None = Field(None, description="column of the force across the feed")
     axis: str | None = Field(None, description="column of the force along the axis of the cutter")
-    on: Literal["work", "cutter"] = Field(description="on which the measured force acts")
+    on: Literal["work", "cutter"] = Field(description="body on which the measured force acts")
 
 
 class DynamometerTable(Table):

@@ -219,7 +219,7 @@ class ImpellerOperationTable(Table):
         0.05, le=1.0, description="greatest depth of a wall in a certified cutter between check points"
     )
     around: Annotated[int, Field(ge=0, le=20)] = Field(
-        1, description="number of bodies beyond the channel that are checked"
+        1, description="number of bodies beyond the channel, on either side, that are checked"
     )
     table_deg: tuple[Number, ...] | None = Field(
         None, min_length=1, description="table angles that are searched; none: all"

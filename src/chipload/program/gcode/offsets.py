@@ -252,8 +252,8 @@ def in_machine_unknown(c: Controller, name: str, axes: Axes) -> bool:
     if set(axes) & {0, 1} and 2 not in axes and c.retracted != here:
         c.once(
             "nc-machine-coordinates",
-            f"{name}: moves in the machine's coordinates, and where {_offset_name(number)} lies in them is not known: "
-            "it is left out: state it in program.work_offsets",
+            f"{name}: moves in the machine's coordinates, where the origin of {_offset_name(number)} is not known: "
+            "the motion is left out: state it in program.work_offsets",
             Severity.UNPROVEN,
         )
     else:

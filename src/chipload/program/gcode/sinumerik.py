@@ -259,7 +259,9 @@ def _code(block: Block, c: Controller, code: int) -> None:
 
 def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple[str, str, float]]) -> None:
     if name in ("A3", "B3", "C3", "A2", "B2", "C2", "A4", "B4", "C4", "A5", "B5", "C5", "LEAD", "TILT"):
-        raise NotReadError(f"{name}: tool directions as vectors or angles to the surface are not read: post with axes")
+        raise NotReadError(
+            f"{name}: tool directions as vectors or angles to the surface are not read: output rotary axes"
+        )
     if name == "T" and text.startswith('"'):
         number = c.named_tools.setdefault(text, FIRST_NAMED + len(c.named_tools))
         c.once("nc-tool-unknown", f"tool {text}: has no number: it is taken as T{number} with length 0")
