@@ -113,19 +113,19 @@ ON_PLUS = ", ".join(f"{x:.9f}" for x in IMPELLER.blade.plus.at(0.05, 0.0)[0])
          "impeller.step.plus = [0, 0, 25]: lies 49.51 mm off the nearest face, 2: must be within 0.01 mm of a face "
          "(mm, in the frame of the file)"),
         ("plus = 1\nminus = 2", "plus = 2\nminus = 1",
-         "impeller.step.plus and minus: from the minus side to the plus side are 31.26 deg of metal of a pitch of "
-         "32.73: must be less than half: plus faces a growing angle about the axis: change them"),
+         "impeller.step.plus and minus: metal fills 31.26 deg of the pitch of 32.73 deg from minus to plus: must be "
+         "less than half: exchange the sides: plus faces a growing angle about the axis"),
         ("hub = [3]", "hub = [1]",
-         "impeller.step.hub: face 1 is not of revolution about the axis: round it radius or height change by 39.35 mm: "
-         "check flow, and that the axis goes through the origin"),
+         "impeller.step.hub: face 1 is not of revolution about the axis: radius and height round it change by "
+         "39.35 mm: check flow, and that the axis goes through the origin"),
         ("hub = [3]", "hub = [3, 3]", "impeller.step.hub: face 3 appears twice: name each face once"),
         ("hub = [3]", "hub = [3, 4]",
-         "impeller.step.hub: face 4 begins 24 mm from the end of face 3: state those between"),
+         "impeller.step.hub: face 4 begins 24 mm from the end of face 3: state the faces between them"),
         ("hub = [3]", "hub = []",
          "job.toml: impeller.step.hub = []: must name at least one face, or a file of points"),
         ('flow = "-z"', 'flow = "-y"',
-         "impeller.step.hub: face 3 is not of revolution about the axis: round it radius or height change by 65.59 mm: "
-         "check flow, and that the axis goes through the origin"),
+         "impeller.step.hub: face 3 is not of revolution about the axis: radius and height round it change by "
+         "65.59 mm: check flow, and that the axis goes through the origin"),
         ("outer_diameter_mm = 223.0", "outer_diameter_mm = 5664.2",
          "impeller.step.plus and minus: faces: outer diameter 223 mm: must be 5664.2 as stated: smaller by 25.4, as "
          "inch read as mm"),
@@ -202,7 +202,7 @@ def test_a_face_of_a_side_twice(job):
 def test_a_hub_with_a_corner(job):
     written(job.parent / "impeller.step", *FACES[:2], *corner(), FACES[3])
     assert refused(job, "hub = [3]\nshroud = [4]", "hub = [3, 4]\nshroud = [5]") == (
-        "impeller.step.hub: faces 3 and 4 meet at 90 deg: must go on smoothly: state those along the channel only"
+        "impeller.step.hub: faces 3 and 4 meet at 90 deg: must join smoothly: state only the faces along the channel"
     )
 
 
@@ -216,8 +216,8 @@ def test_a_fit_that_is_not_kept(job):
     solid = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), 80.0, 30.0, math.pi).Shape()
     written(job.parent / "impeller.step", TopExp_Explorer(solid, TopAbs_FACE).Current(), *FACES[1:])
     text = refused(job, "plus = 1", "plus = 1\nfit_mm = 1e-12")
-    assert text.startswith("impeller.step.plus: face 1 is left by its fit by ")
-    assert text.endswith(" mm: must be at most fit_mm = 1e-12: state more, or have the face written in smooth parts")
+    assert text.startswith("impeller.step.plus: the fit of face 1 deviates by ")
+    assert text.endswith(" mm: must be at most fit_mm = 1e-12: raise it, or export the face in smooth parts")
 
 
 def test_sections_that_are_a_model(tmp_path):

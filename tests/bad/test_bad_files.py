@@ -347,7 +347,7 @@ def test_the_order_of_sections_does_not_depend_on_their_points() -> None:
 
     rings = tuple(ring(dense if k == 2 else angle, 2.0 * k) for k in range(5))
     assert checked(rings) == rings
-    with pytest.raises(InputError, match="section 2: out of order"):
+    with pytest.raises(InputError, match="section 2: is not between sections 1 and 3"):
         checked((rings[0], rings[3], rings[1]))
 
 

@@ -40,7 +40,7 @@ def changed(path, old, new):
 def test_sections_out_of_order(hecc):
     changed(hecc, '  "main_05.txt",\n  "main_06.txt",\n', '  "main_06.txt",\n  "main_05.txt",\n')
     assert refused(hecc) == (
-        "impeller.sections.blade: section 5: out of order: lies not between sections 4 and 6: sort hub to shroud"
+        "impeller.sections.blade: section 5: is not between sections 4 and 6: sort the sections from hub to shroud"
     )
 
 
@@ -96,8 +96,8 @@ def test_a_splitter_that_stands_in_its_blade(hecc):
     hecc.write_text(f"{head}splitter = {names[2:]}\n{tail}")
     message = refused(hecc)
     found = re.fullmatch(
-        r"impeller\.sections\.splitter: stands in the blade: sections 1 to 9: up to ([\d.]+) mm of metal in common "
-        r"round the axis: must be 0: turn it about the axis by 12 deg, to the middle of the channel, or leave it out",
+        r"impeller\.sections\.splitter: overlaps the blade: sections 1 to 9: up to ([\d.]+) mm round the axis: "
+        r"must not overlap: turn it about the axis by 12 deg, to the middle of the channel, or leave it out",
         message,
     )
     assert found, message
@@ -152,8 +152,8 @@ def test_a_file_that_is_missing(hecc):
          "beside a pass"),
         ("scallop_mm = 0.1", "scallop_inch = 0.004",
          "job.toml: operation.0.scallop_inch: unknown key; did you mean scallop_mm?"),
-        ("blades = 11", "blades = 1", "job.toml: impeller.blades = 1: must be at least 2 (how many, evenly round; as "
-         "many splitters)"),
+        ("blades = 11", "blades = 1", "job.toml: impeller.blades = 1: must be at least 2 (number of blades, evenly "
+         "spaced, and of splitters, if there are any)"),
     ],
 )  # fmt: skip
 def test_a_wrong_line(formula, old, new, message):
@@ -198,10 +198,10 @@ def test_a_cutter_picked_by_hand_that_is_not_in_the_catalogue(formula):
     [
         ("17.0", "impeller.fillet_mm = 17: larger than half of the channel: two fillets overlap by 0.4496 mm on the "
          "hub: state a smaller one"),
-        ("30.0", "impeller.fillet_mm = 30: blade plus: a ball of 30 mm reaches above the side at u = 0.213: state "
+        ("30.0", "impeller.fillet_mm = 30: blade plus: a fillet of 30 mm reaches above the side at u = 0.213: state "
          "a smaller one"),
-        ("0.0", "job.toml: impeller.fillet_mm = 0: must be above 0 (fillets between sides and hub, which meet without "
-         "them; sides begin above theirs)"),
+        ("0.0", "job.toml: impeller.fillet_mm = 0: must be above 0 (radius of fillets between sides and hub, which the "
+         "model does not have; sides begin above them)"),
     ],
 )  # fmt: skip
 def test_fillets_that_do_not_fit(formula, fillet, message):

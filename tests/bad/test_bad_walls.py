@@ -124,7 +124,7 @@ def test_a_table_of_experiments_with_one_place(tmp_path: Path) -> None:
 def test_experiments_on_a_line() -> None:
     line = Experiments(np.array([[0.0, 1.0], [0.5, 1.0], [1.0, 1.0]]), np.array([20.0, 30.0, 20.0]))
     assert said(lambda: calibrated(line, [[0.5, 0.5]], 1.0)) == (
-        "experiments: all places lie on a line: add one off it"
+        "experiments: all places lie on a line: add a place off it"
     )
 
 
@@ -238,8 +238,8 @@ def with_sections(job: Path, heights, edge: float, allowance) -> None:
     ("heights", "edge", "allowance", "says"),
     [
         ((40.0, 50.0, 60.0), 0.1, (0.4, 0.4), "chipload: element 0: det(dx/dxi) = -1.00107 mm^3: must be above 0"),
-        ((40.0, 60.0, 50.0), 0.1, (0.4, 0.4), "chipload: section 2: out of order: lies not between sections 1 and 3"),
-        ((40.0, 50.0, 50.0), 0.1, (0.4, 0.4), "chipload: section 2: out of order: lies not between sections 1 and 3"),
+        ((40.0, 60.0, 50.0), 0.1, (0.4, 0.4), "chipload: section 2: is not between sections 1 and 3"),
+        ((40.0, 50.0, 50.0), 0.1, (0.4, 0.4), "chipload: section 2: is not between sections 1 and 3"),
         (
             (40.0, 50.0, 60.0),
             0.0,

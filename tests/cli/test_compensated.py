@@ -52,8 +52,8 @@ def test_a_table_without_the_diameter_leaves_the_result_unproven_and_says_so_fir
     code, out, _, summary = run(tmp_path, table="T1 P1 Z50\n")
     assert code == 3
     assert out.startswith(
-        "Unproven: line 7: G41 D1: the tool table states no D for tool 1, with "
-        "it the controller compensates by 0: the 10 mm of cutter 1 are taken: write D10 in the table"
+        "Unproven: line 7: G41 D1: the tool table states no D for tool 1, so "
+        "the controller compensates by 0: the 10 mm of cutter 1 are taken: write D10 in the table"
     )
     op = summary["operations"][0]
     assert (summary["verdict"], {x["state"] for x in summary["limits"]}) == ("unproven", {"holds"})

@@ -217,7 +217,7 @@ def test_a_program_without_known_motion_is_refused(tmp_path: Path) -> None:
     )
     code, _, said = call("init", path, tmp_path / "job")
     assert code == 2
-    assert said.startswith("chipload: cut.h: no motion that is known: nothing to simulate: line 7: Q11 comes from ")
+    assert said.startswith("chipload: cut.h: no motion that can be read: nothing to simulate: line 7: Q11 comes from ")
     assert not (tmp_path / "job").exists()
 
 

@@ -82,7 +82,7 @@ def test_circles_and_squares_at_random(seed):
 
 
 def test_what_encloses_nothing_is_refused():
-    with pytest.raises(InputError, match=r"^part: contours cross at \(9, 0\) and enclose no area that is clear"):
+    with pytest.raises(InputError, match=r"^part: contours cross at \(9, 0\) and enclose no definite area"):
         even_odd([Contour.polyline([[0, 0], [9, 0], [9, 5], [9, 0]], closed=True)])
     with pytest.raises(InputError, match="contour open at"):
         even_odd([Contour.polyline([[0, 0], [9, 0], [9, 5]], closed=False)])

@@ -161,7 +161,7 @@ def test_distance_from_a_hub():
 
 
 def test_refused():
-    with pytest.raises(InputError, match=r"^a ball of 40 mm reaches above the side at u = 0$"):
+    with pytest.raises(InputError, match=r"^a fillet of 40 mm reaches above the side at u = 0$"):
         filleted(wall(0.0), PLANE, 40.0)
-    with pytest.raises(InputError, match=r"^no ball of 1 mm lies in the corner of side and hub at u = 0: "):
+    with pytest.raises(InputError, match=r"^no fillet of 1 mm fits between side and hub at u = 0: "):
         filleted(through([[[20, 0, 1], [20, 0, 9]], [[80, 0, 1], [80, 0, 9]]], [0, 1], [0, 1]), PLANE, 1.0)

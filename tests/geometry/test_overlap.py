@@ -58,7 +58,7 @@ def test_apart(turn):
 @pytest.mark.parametrize("turn", [11.9, 33.1])
 def test_refused(turn):
     sections = elliptic((30.0, 50.0), 6.0, at_deg=turn)
-    with pytest.raises(InputError, match=r"^stands in the blade: sections 1 to 2: up to 0\.087.* mm of metal"):
+    with pytest.raises(InputError, match=r"^overlaps the blade: sections 1 to 2: up to 0\.087.* mm round the axis"):
         splitter_apart(loft(sections), loft(BLADE), PITCH, sections)
 
 

@@ -55,7 +55,7 @@ def test_refused(plate, change, text):
         ("operation.0.depth_min_mm=0.5", "depth_min_mm = 0.5: must be above 0 and below depth_max_mm = 0.4"),
         ("operation.0.scallop_um=2500.0", "operation.0.scallop_um = 2500: must be below 2000, half the radius"),
         ("wall.foot_mm=18.0", "must be below 0.8 of the wall's height"),
-        ("wall.elements=[8, 1]", "must be above 1, those of the foot: state more"),
+        ("wall.elements=[8, 1]", "must be above 1, those of the foot: raise it"),
     ],
 )
 def test_refused_when_it_is_made(plate, change, text):

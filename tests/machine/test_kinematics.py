@@ -318,7 +318,7 @@ def test_axes_that_cannot_reach_every_point_are_refused():
         Axis("Z", True, (0, 0, 1)),
     ]
     machine = replace(machine_named("vmc"), chain=Chain(tuple(ways)))
-    with pytest.raises(InputError, match="directions of X, Y, Z lie in a plane"):
+    with pytest.raises(InputError, match="the axes X, Y, Z lie in one plane"):
         inverse(machine, np.zeros((1, 3)), [[1.0, 0.0, 0.0]])
     spin = Axis("C", True, (0, 0, 1))
     machine = replace(machine, chain=Chain((ways[0], ways[1], Axis("Z", True, (0, 0, 1)), ways[2], spin)))

@@ -152,7 +152,7 @@ def test_what_is_asked_for_must_be_there(agent: str, tmp_path: Path) -> None:
     for name, text, message in (
         ("a", streams(0, 100).replace("Amperage", "Load"), "no sample of the spindle's current"),
         ("b", streams(0, 100).replace("2026-03", "spring"), "must be a date and time of ISO 8601"),
-        ("c", '<!DOCTYPE x [<!ENTITY a "b">]><x/>', "entities are not read"),
+        ("c", '<!DOCTYPE x [<!ENTITY a "b">]><x/>', "a DOCTYPE or ENTITY declaration, which MTConnect does not use"),
         ("d", "<html/>", "MTConnectDevices or MTConnectStreams is read"),
         ("e", "<MTConnectStreams>", "not XML"),
     ):

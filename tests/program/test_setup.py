@@ -30,7 +30,7 @@ def test_two_work_offsets_without_origins_are_unproven(tmp_path: Path):
     reading = read(tmp_path, TWO)
     assert gaps(reading) == [("nc-offset-unset", 5)]
     text = next(f.text for f in reading.findings if f.code == "nc-offset-unset")
-    assert text == ("G55: its origin is not known here and counts as the machine's: state it in program.work_offsets")
+    assert text == ("G55: its origin is not known and is taken as the machine's: state it in program.work_offsets")
 
 
 def test_one_work_offset_needs_no_origin(tmp_path: Path):
@@ -164,7 +164,7 @@ def test_the_command_line_gives_the_same(tmp_path: Path):
 
     code, out, _ = check(str(tmp_path / "part.ngc"))
     assert (code, out.splitlines()[0].split(":")[:2]) == (3, ["line 5", " G55"])
-    assert "unproven: line 5: G55: its origin is not known here" in out
+    assert "unproven: line 5: G55: its origin is not known and is taken as the machine's" in out
     code, out, _ = check(str(tmp_path / "part.ngc"), "--work-offset", "G55=80,5,-10", "--work-offset", "G54=0,0,0")
     assert code == 0
     assert "X 0 to 81, Y 0 to 7, Z -7 to 5 mm" in out

@@ -101,7 +101,7 @@ def test_what_the_machine_cannot_do():
             "machine-spindle",
             "row 1: spindle 9.5493 rpm: machine vmc turns from 60 to 15000 rpm (2 rows, the first is 1)",
         ),
-        ("machine-spindle-off", "row 3: feeds with the spindle at rest: set its speed"),
+        ("machine-spindle-off", "row 3: cuts with the spindle at rest: state a spindle speed"),
     ]
     assert check_program(cut([[0, 0, 0], [9, 0, 0]]), VMC) == ()
     # an arc whose ends are inside and whose bulge is not

@@ -128,7 +128,7 @@ def test_it_is_searched(tmp_path):
 
 
 def test_sides_that_are_changed_are_refused(tmp_path):
-    with pytest.raises(Exception, match="must be less than half: plus faces a growing angle about the axis: change"):
+    with pytest.raises(Exception, match="must be less than half: exchange the sides: plus faces a growing angle"):
         check_job(load_job(job(tmp_path, plus=1, minus=3)))
 
 

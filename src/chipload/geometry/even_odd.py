@@ -69,7 +69,7 @@ def even_odd(contours: Sequence[Contour]) -> tuple[tuple[Contour, ...], Floats]:
         if made and all(c.closed for c in made):
             return made, places
     x, y = places[0]
-    raise InputError(f"part: contours cross at ({x:.6g}, {y:.6g}) and enclose no area that is clear: draw one of them")
+    raise InputError(f"part: contours cross at ({x:.6g}, {y:.6g}) and enclose no definite area: draw one of them")
 
 
 def _raw(contours: Sequence[Contour]) -> RawSegments:

@@ -70,7 +70,9 @@ def filleted(side: BSplinePatch, hub: Revolved, radius: float) -> Filleted:
         if off <= FIT:
             return made
         u = np.sort(np.concatenate([u, (0.5 * (u[1:] + u[:-1]))[away > 0.2 * FIT]]))
-    raise InputError(f"the fillet of {radius:g} mm is left by its patches by {off:.4g} mm: must be at most {FIT:g} mm")
+    raise InputError(
+        f"the patches of the fillet of {radius:g} mm deviate from it by {off:.4g} mm: must be at most {FIT:g} mm"
+    )
 
 
 def _made(side: BSplinePatch, hub: Revolved, radius: float, u: Floats) -> tuple[Filleted, Floats]:
@@ -138,7 +140,7 @@ def _touched(side: BSplinePatch, hub: Revolved, radius: float, u: Floats | list[
     below, above = clearance(low), np.full(len(at), np.nan)
     if (below >= 0.0).any():
         raise InputError(
-            f"no ball of {radius:g} mm lies in the corner of side and hub at u = {at[below.argmax()]:.3g}: they must "
+            f"no fillet of {radius:g} mm fits between side and hub at u = {at[below.argmax()]:.3g}: they must "
             "meet in a corner"
         )
     for v in _SCAN[1:]:
@@ -150,7 +152,7 @@ def _touched(side: BSplinePatch, hub: Revolved, radius: float, u: Floats | list[
             break
     else:
         where = at[np.isnan(high).argmax()]
-        raise InputError(f"a ball of {radius:g} mm reaches above the side at u = {where:.3g}")
+        raise InputError(f"a fillet of {radius:g} mm reaches above the side at u = {where:.3g}")
     # false position, the end that stays weighed by half
     out: Floats = high
     for _ in range(_STEPS):

@@ -89,7 +89,7 @@ def splitter_apart(splitter: Blade, blade: Blade, pitch: float, sections: Sequen
         high = 100.0 * np.tile(V, 2)[found.length[: len(sides)] > 0.0]
         where = f"{high.min():.0f} to {high.max():.0f} % of its height"
     raise InputError(
-        f"stands in the blade: {where}: up to {most:.3g} mm of metal in common round the axis: must be 0: turn it "
+        f"overlaps the blade: {where}: up to {most:.3g} mm round the axis: must not overlap: turn it "
         f"about the axis by {abs(math.degrees(found.turn)):.3g} deg, to the middle of the channel, or leave it out"
     )
 

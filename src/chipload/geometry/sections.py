@@ -91,7 +91,7 @@ def read_meridian(path: str | Path, unit: str, over: bool = False, shroud: bool 
         return np.stack([r, -z if over else z], axis=-1)
     rows = [row for block in _blocks(Path(path)) for row in block[1]]
     if len({len(row) for row in rows}) > 1:
-        raise InputError(f"{path}: blocks of 2 and of 3 columns: must be as many in every block")
+        raise InputError(f"{path}: blocks of 2 and of 3 columns: must have the same number in every block")
     p = _finite(np.array(rows) * scale, Path(path))
     if p.shape[1] == 3:
         p = np.stack([p[:, 2], np.hypot(p[:, 0], p[:, 1])], axis=-1)
@@ -126,7 +126,7 @@ def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -
     if back.any():
         k = int(back.argmax()) + 2
         raise InputError(
-            f"section {k}: out of order: lies not between sections {k - 1} and {k + 1}: sort hub to shroud"
+            f"section {k}: is not between sections {k - 1} and {k + 1}: sort the sections from hub to shroud"
         )
     if outer_diameter is not None:
         found = 2.0 * max(float(np.hypot(p[:, 0], p[:, 1]).max()) for p in sections)
@@ -301,7 +301,7 @@ def _blocks(path: Path) -> list[tuple[list[str], list[list[float]]]]:
             raise InputError(f"{path} line {k}: a number is not finite: {line.strip()[:40]!r}")
         if len(row) not in (2, 3) or (blocks[-1][1] and len(row) != len(blocks[-1][1][0])):
             remedy = "" if len(row) < 4 else ": write each section to a file of its own, a line X Y Z for each point"
-            raise InputError(f"{path} line {k}: {len(row)} numbers: must be as many in every line, 2 or 3{remedy}")
+            raise InputError(f"{path} line {k}: {len(row)} numbers: must be 2 or 3, the same in every line{remedy}")
         blocks[-1][1].append(row)
     blocks = [b for b in blocks if b[1]]
     if not blocks:

@@ -44,8 +44,8 @@ def blade_of(plus: BSplinePatch, minus: BSplinePatch, hub: Revolved, shroud: Rev
     between = middle % pitch
     if between > 0.5 * pitch:
         raise InputError(
-            f"from the minus side to the plus side are {math.degrees(between):.4g} deg of metal of a pitch of "
-            f"{math.degrees(pitch):.4g}: must be less than half: plus faces a growing angle about the axis: change them"
+            f"metal fills {math.degrees(between):.4g} deg of the pitch of {math.degrees(pitch):.4g} deg from minus to "
+            "plus: must be less than half: exchange the sides: plus faces a growing angle about the axis"
         )
     minus = minus.turned(middle - between)
     return Blade(facing(plus, 1.0), facing(minus, -1.0))

@@ -70,7 +70,8 @@ def joined(part: Part, numbers: Sequence[int], R: Floats, key: str, tips: bool) 
         piece, next_number = left.pop(k), rest.pop(k).number
         if gap[k] > JOIN:
             raise InputError(
-                f"{key}: face {next_number} begins {gap[k]:.4g} mm from the end of face {number}: state those between"
+                f"{key}: face {next_number} begins {gap[k]:.4g} mm from the end of face {number}: state the faces "
+                "between them"
             )
         if np.linalg.norm(piece[-1] - out[-1]) < np.linalg.norm(piece[0] - out[-1]):
             piece = piece[::-1]
@@ -78,8 +79,8 @@ def joined(part: Part, numbers: Sequence[int], R: Floats, key: str, tips: bool) 
         turn = abs(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
         if turn > SMOOTH:
             raise InputError(
-                f"{key}: faces {number} and {next_number} meet at {np.degrees(turn):.3g} deg: must go on smoothly: "
-                "state those along the channel only"
+                f"{key}: faces {number} and {next_number} meet at {np.degrees(turn):.3g} deg: must join smoothly: "
+                "state only the faces along the channel"
             )
         out, number = np.concatenate([out, piece[1:]]), next_number
     return out
@@ -115,7 +116,7 @@ def meridian_in(face: KernelFace, R: Floats, key: str, tips: bool) -> Floats:
         return _tip(face, R, key)
     if min(round_u, round_v) > ROUND:
         raise InputError(
-            f"{key}: face {face.number} is not of revolution about the axis: round it radius or height change by "
+            f"{key}: face {face.number} is not of revolution about the axis: radius and height round it change by "
             f"{min(round_u, round_v):.4g} mm: check flow, and that the axis goes through the origin"
         )
     if round_u <= round_v:

@@ -263,8 +263,8 @@ def _fitted(face: KernelFace, surface: Any, loop: list[_Piece], side: int, key: 
 
 def _left(face: KernelFace, key: str, best: float, fit: float) -> InputError:
     return InputError(
-        f"{key}: face {face.number} is left by its fit by {best:.4g} mm: must be at most fit_mm = {fit:g}: state more, "
-        "or have the face written in smooth parts"
+        f"{key}: the fit of face {face.number} deviates by {best:.4g} mm: must be at most fit_mm = {fit:g}: raise it, "
+        "or export the face in smooth parts"
     )
 
 

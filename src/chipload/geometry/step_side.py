@@ -120,8 +120,8 @@ def side_of(faces: Sequence[Face], key: str, fit: float, R: Floats, hub: Revolve
         if off <= fit:
             return SampledSide(patch, numbers, off, looked, edge)
     raise InputError(
-        f"{key}: {names}: a patch along rulings from hub to shroud leaves them by {best:.4g} mm: must be at most "
-        f"fit_mm = {fit:g}: state more, or have the side written in smooth faces"
+        f"{key}: {names}: a patch along rulings from hub to shroud deviates by {best:.4g} mm: must be at most "
+        f"fit_mm = {fit:g}: raise it, or export the side in smooth faces"
     )
 
 
@@ -275,7 +275,8 @@ def _met(parts: Sequence[_Trimmed], places: Floats, key: str, names: str) -> tup
     if best.max() > MET:
         r, z = places[int(best.argmax())]
         raise InputError(
-            f"{key}: {names}: not met at r {r:.4g}, z {z:.4g} mm between hub and shroud, nearest {best.max():.3g} mm: "
+            f"{key}: {names}: no face at r {r:.4g}, z {z:.4g} mm between hub and shroud; the nearest is "
+            f"{best.max():.3g} mm away: "
             "state all faces of the side, or sections instead of faces"
         )
     return points, normals, float(best.max())

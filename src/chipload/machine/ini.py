@@ -115,12 +115,12 @@ def _machine(ini: Ini, findings: list[Finding], path: Path) -> Machine:
     if rapid is None:
         rapid = max(axis.rate for axis in axes if not axis.rotary) / mm
         findings.append(
-            Finding("ini-velocity", 0, f"[TRAJ] MAX_LINEAR_VELOCITY is missing: {rapid:g} of the fastest axis")
+            Finding("ini-velocity", 0, f"[TRAJ] MAX_LINEAR_VELOCITY is missing: {rapid:g} of the fastest axis is taken")
         )
     most, least = (_number(ini, "SPINDLE_0", f"{key}_FORWARD_VELOCITY") for key in ("MAX", "MIN"))
     if most is None:
         findings.append(
-            Finding("ini-spindle", 0, "[SPINDLE_0] MAX_FORWARD_VELOCITY is missing: no greatest speed is known")
+            Finding("ini-spindle", 0, "[SPINDLE_0] MAX_FORWARD_VELOCITY is missing: spindle speeds have no upper limit")
         )
     return Machine(
         name=ini.value("EMC", "MACHINE") or path.stem,

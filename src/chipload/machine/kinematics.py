@@ -180,7 +180,9 @@ def with_tip(
     flat = np.abs(np.linalg.det(columns)) < _FLAT
     if flat.any():
         row = int(np.flatnonzero(flat)[0])
-        raise InputError(f"row {row}: directions of X, Y, Z lie in a plane: must reach every point: hold another angle")
+        raise InputError(
+            f"row {row}: the axes X, Y, Z lie in one plane and do not reach every point: hold another angle"
+        )
     target = np.asarray(tip, dtype=np.float64) @ chain.R_machine_work.T + _zero(chain, work_zero)
     out[:, :3] = np.linalg.solve(columns, (target - point)[..., None])[..., 0]
     return out

@@ -98,7 +98,7 @@ def document(source: str, path: str = "", query: str = "") -> Element:
         label = f"MTConnect {source}"
         data = read_regular(Path(source), label, MOST_BYTES, "cut it into parts")
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise InputError(f"{label}: a document type: MTConnect has none, and entities are not read")
+        raise InputError(f"{label}: a DOCTYPE or ENTITY declaration, which MTConnect does not use: take it out")
     try:
         root = ElementTree.fromstring(data)
     except ElementTree.ParseError as err:

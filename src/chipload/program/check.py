@@ -65,12 +65,12 @@ def check_program(program: Program, machine: Machine) -> tuple[Finding, ...]:
     )
     report("machine-spindle", turning & (over > 1.0 + 1e-12), over, text, rpm_from_rad_s(1.0) * speed)
     none = np.zeros(len(program))
-    report("machine-spindle-off", cuts & ~turning, none, "feeds with the spindle at rest: set its speed", none)
+    report("machine-spindle-off", cuts & ~turning, none, "cuts with the spindle at rest: state a spindle speed", none)
     tilt = np.degrees(np.arccos(np.clip(program.axis[:, 2], -1.0, 1.0)))
     tilted = (np.hypot(program.axis[:, 0], program.axis[:, 1]) > 1e-9) | (program.axis[:, 2] < 0.0)
     text = f"axis tilted by {{:g}} deg: machine {machine.name} has three axes"
     report("machine-axis", tilted & (program.motion != DWELL) & (not machine.chain.rotary), tilt, text, tilt)
-    first = "starts with a cutting motion: must start with a rapid to where it begins"
+    first = "starts with a cutting motion: must start with a rapid to the start of the cut"
     start = np.zeros(len(program), dtype=np.bool_)
     # a dwell while the spindle starts is no motion
     moving = np.flatnonzero(program.motion != DWELL)[:1]

@@ -140,7 +140,7 @@ def test_refused():
         )
     with pytest.raises(InputError, match="depth_min_mm = 0"):
         DepthRange(0.0, 1.0)
-    with pytest.raises(InputError, match="threshold: a place has none above 0"):
+    with pytest.raises(InputError, match="threshold: a place of the wall has no threshold above 0"):
         largest_depths(CutterPose(BALL, 0.05, None), RADIAL, [0.0], DepthRange(0.1, 1.0), measure="mean")
 
 

@@ -213,7 +213,7 @@ def test_what_can_not_be_proposed_is_refused() -> None:
     xyz, F = np.zeros((20, 3)), np.full(20, 30.0)
     for message, change in (
         ("experiments.count = 2: must be from 3 to 20", {"count": 2}),
-        ("all candidates lie on a line: allow one off it", {"candidates": [0, 1, 2, 3]}),
+        ("all candidates lie on a line: add a candidate off it", {"candidates": [0, 1, 2, 3]}),
         ("bracket = 1, steps = 2: must be above 1", {"bracket": 1.0}),
         ("experiments.repeats = 9: must be from 0 to count = 4", {"repeats": 9}),
         ("experiments.scatter = -1: must be at least 0", {"scatter": -1.0}),
@@ -223,7 +223,7 @@ def test_what_can_not_be_proposed_is_refused() -> None:
             given["count"] = 3
         with pytest.raises(InputError, match=message):
             propose_cuts(x, xyz, F, LAW, given.pop("count"), given.pop("scatter"), **given)
-    with pytest.raises(InputError, match=r"the smallest depth 0.05 mm costs 5 N, the greatest force wanted is 1.4 N"):
+    with pytest.raises(InputError, match=r"the smallest depth 0.05 mm needs 5 N, the greatest force to try is 1.4 N"):
         propose_cuts(x, xyz, np.full(20, 1.0), LAW, 4, 0.1, bracket=1.4, steps=1)
     far = propose_cuts(x, xyz, np.full(20, 500.0), LAW, 4, 0.1, bracket=1.4, steps=1)
     assert len(far.findings) == 4

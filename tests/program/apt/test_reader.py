@@ -117,7 +117,7 @@ def test_a_row_that_only_turns_counts_degrees():
     program, findings = read("GOTO/0,0,0\nGOTO/0,0,0,0,1,0")
     assert program.feed[2] == pytest.approx(math.radians(1.0))
     assert [f.code for f in findings] == ["apt-turn"]
-    with pytest.raises(InputError, match="line 7: a feed in degrees a minute and the tip moves"):
+    with pytest.raises(InputError, match="line 7: a feed in degrees a minute, but the tip moves"):
         read("FEDRAT/90,DPM\nGOTO/0,0,0")
 
 
@@ -251,7 +251,7 @@ def test_tap_turns_back():
         ("GOTO/1,2", "line 6: GOTO/1,2: has 2 numbers: must have 3 or 6"),
         ("GOTO/1,2,1E10", "'1E10' must be a number of at most 1e\\+09"),
         ("GOTO/1,2,3,0,0,0", "must have a length above 0"),
-        ("TRACUT/M1", "line 6: TRACUT/M1: changes the coordinates or the order in a way that is not read"),
+        ("TRACUT/M1", "line 6: TRACUT/M1: changes the coordinates or the order of the records and is not read"),
         ("FEDRAT/INVERS,3", "line 6: FEDRAT/INVERS,3: must have one number"),
         ("SPINDL/300,SFM,CLW", "must have one number and RPM"),
         ("LOADTL/1.5", "must be a whole number"),

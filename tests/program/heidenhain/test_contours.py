@@ -90,7 +90,7 @@ def test_arcs_by_radius():
         assert np.degrees(arc_sweeps(c)[1]) == pytest.approx(degrees)
     c, _ = read("L X+0 Y+0 Z+0 FMAX", "CR X+10 Y+0 R+5 DR+ F600")
     np.testing.assert_allclose(c.centre[1], [5.0, 0.0], atol=1e-6)
-    with pytest.raises(InputError, match="CR: the radius 4 mm does not reach from start to end: 10 mm apart"):
+    with pytest.raises(InputError, match="CR: R = 4 mm: start and end are 10 mm apart: must be at least half of that"):
         read("L X+0 Y+0 Z+0 FMAX", "CR X+10 Y+0 R+4 DR+ F600")
 
 

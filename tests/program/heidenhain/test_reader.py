@@ -127,7 +127,7 @@ def test_what_the_controller_knows_may_be_given():
         ("L X+1", "a cut has no feed: give F"),
         ("L X+1 F AUTO", "F AUTO: the feed of a tool table is not known: give a number"),
         ("L X+1 F0", "F0: must be above 0 and below 1e+06"),
-        ("CALL LBL 4", "LBL 4 is not there"),
+        ("CALL LBL 4", "LBL 4 is missing"),
         ("Q1 = Q2", "Q2 is read before it is set: set it"),
         ("Q1 = 1 / 0", "formula: division by 0"),
         ("Q1 = ( 1", "formula: a bracket is not closed"),
@@ -148,7 +148,7 @@ def test_a_loop_without_end_is_stopped(monkeypatch):
     monkeypatch.setattr("chipload.program.heidenhain.reader.MOST_BLOCKS", 5000)
     with pytest.raises(InputError, match="more than 5000 blocks are carried out"):
         read("LBL 1", "FN9: IF 1 EQU 1 GOTO LBL 1")
-    with pytest.raises(InputError, match="more than 20 calls inside one another"):
+    with pytest.raises(InputError, match="calls are nested deeper than 20"):
         read("LBL 1", "CALL LBL 1")
 
 

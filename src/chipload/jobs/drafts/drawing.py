@@ -341,7 +341,7 @@ def _rest(
     if kind == "pocket":
         entries.append(Entry("allowance_mm", round(ALLOWANCE * d, 3), "left on the wall for finishing", True))
         engagement = math.degrees(math.acos(1.0 - 2.0 * RADIAL))
-        limit = Entry("engagement_deg", round(1.1 * engagement, 1), "a tenth above that of a straight front", True)
+        limit = Entry("engagement_deg", round(1.1 * engagement, 1), "a tenth above that along a straight wall", True)
     else:
         entries += [
             Entry("side", side, "of the contour in its direction; or inside, outside", True),

@@ -105,7 +105,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     program = chosen.reading.program
     if not float(lengths(program).sum()) > 0.0:
         left_out = next((f": {f}" for f in chosen.reading.findings if f.severity >= Severity.UNPROVEN), "")
-        raise InputError(f"{path.name}: no motion that is known: nothing to simulate{left_out}")
+        raise InputError(f"{path.name}: no motion that can be read: nothing to simulate{left_out}")
     block, stock_entries = _stock(program, known, header)
     cuts = _cutting(program)
     numbers = [int(n) for n in np.unique(program.tool[cuts])] if cuts.any() else [int(program.tool[-1])]

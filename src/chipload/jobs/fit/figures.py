@@ -62,7 +62,7 @@ def sections(done: FitResult, figures: dict[str, go.Figure]) -> list[str]:
     ]
     known: dict[str, str] = {"method": fit.method, "degrees of freedom": str(fit.search.freedom)}
     if fit.method == "instantaneous":
-        known["harmonics of the spindle that count"] = str(fit.search.harmonics)
+        known["harmonics of the spindle speed that are used"] = str(fit.search.harmonics)
         known["runout"] = f"{fit.cutter.runout[0] * 1000.0:.3g} µm"
         for key, (w0, zeta) in zip(CHANNELS, fit.channels.resonance, strict=True):
             rings = f"{w0 / math.tau:.4g} Hz, damping {zeta:.3g}" if math.isfinite(w0) else "taken as rigid"

@@ -67,10 +67,12 @@ def missing(values: Mapping[str, Any]) -> list[str]:
     if isinstance(channels, Mapping) and not set(CHANNELS) & set(channels):
         found.append('channels: name at least one of feed, across, axis, as feed = "-Fy"')
     if values.get("method") == "instantaneous" and "band_hz" not in values:
-        found.append("band_hz: missing: state how far the harmonics count, below the resonance of the dynamometer")
+        found.append(
+            "band_hz: missing: state up to which frequency harmonics are used, below the resonance of the dynamometer"
+        )
     uses = [m.get("use") for _, m in entries_of(values, "measurement")]
     if uses and "fit" not in uses:
-        found.append("measurement: none has use = fit: mark those that the coefficients come from")
+        found.append("measurement: none has use = fit: set it for those that the coefficients are fitted to")
     return found
 
 

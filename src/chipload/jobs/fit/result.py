@@ -76,7 +76,7 @@ def _check(c: Comparison, track: str, name: str, limit: float, errors: Floats) -
     """The greatest error of the channels that were measured; one that has none leaves the limit unproven."""
     known = np.isfinite(errors)
     lost = [CHANNELS[k] for k in np.flatnonzero(c.cut.measured & ~known)]
-    reason = f"{', '.join(lost)}: no error is known" if lost else ""
+    reason = f"{', '.join(lost)}: no error could be calculated" if lost else ""
     if not known.any():
         return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason=reason or "no channel was measured")
     worst = float(np.abs(errors[known]).max())

@@ -182,14 +182,14 @@ def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple
     if np.isfinite(fit.coefficients.covariance).all():
         covariance = tuple(tuple(float(f"{v:.9g}") for v in row) for row in fit.coefficients.covariance)
     else:
-        text = "the uncertainty of the coefficients is not written: the covariance of all six is not known"
+        text = "the uncertainty of the coefficients is not written: the covariance of all six is unknown"
         found = (Finding("fit-covariance", 0, text),)
     excess = peak_excess(comparisons)
     if excess is not None:
         text = f"90 % of the peaks of each run are at most {100.0 * excess:.3g} % above the prediction: limits on peaks"
         found = (*found, Finding("fit-peaks", 0, f"{text} allow for that"))
     if all(one.use == "fit" for one in comparisons):
-        text = 'no run was kept back (use = "predict"): how well other cuts are predicted is not known'
+        text = 'no run has use = "predict": the error of the prediction of other cuts is unknown'
         found = (*found, Finding("fit-peaks", 0, text))
     try:
         made = Material(

@@ -19,45 +19,45 @@ from chipload.jobs.tables import Limits, Number, Positive, Table, Text
 class EngagementTable(Table):
     """What the cutter meets: the same in every file."""
 
-    milling: Literal["slot", "up", "down"]
-    axial_depth_mm: Positive
-    radial_depth_mm: Positive | None = None
+    milling: Literal["slot", "up", "down"] = Field(description="kind of cut")
+    axial_depth_mm: Positive = Field(description="axial depth of cut")
+    radial_depth_mm: Positive | None = Field(None, description="radial depth of cut; required unless slot")
 
 
 class ChannelsTable(Table):
     """Which column of the files is which component, with its sign."""
 
-    feed: str | None = None
-    across: str | None = None
-    axis: str | None = None
-    on: Literal["work", "cutter"]
+    feed: str | None = Field(None, description='column of the force along the feed, with its sign, as "-Fy"')
+    across: str | None = Field(None, description="column of the force across the feed")
+    axis: str | None = Field(None, description="column of the force along the axis of the cutter")
+    on: Literal["work", "cutter"] = Field(description="body on which the measured force acts")
 
 
 class DynamometerTable(Table):
-    """About where the dynamometer rings; what is not stated is taken as rigid."""
+    """Natural frequencies of the dynamometer; a direction that is not stated is taken as rigid."""
 
-    feed_hz: Positive | None = None
-    across_hz: Positive | None = None
-    axis_hz: Positive | None = None
+    feed_hz: Positive | None = Field(None, description="natural frequency along the feed, about")
+    across_hz: Positive | None = Field(None, description="natural frequency across the feed, about")
+    axis_hz: Positive | None = Field(None, description="natural frequency along the axis of the cutter, about")
 
 
 class MeasurementTable(Table):
     """One file."""
 
-    file: Text
-    use: Literal["fit", "predict"]
-    feed_mm_min: Positive = Field(le=100_000.0)
-    speed_rpm: Positive = Field(le=1_000_000.0)
-    window_s: tuple[Number, Number] | None = None
-    channels: ChannelsTable | None = None
+    file: Text = Field(description="file with the measured forces")
+    use: Literal["fit", "predict"] = Field(description="fit: coefficients are fitted to it; predict: compared only")
+    feed_mm_min: Positive = Field(le=100_000.0, description="feed of the cut")
+    speed_rpm: Positive = Field(le=1_000_000.0, description="spindle speed of the cut")
+    window_s: tuple[Number, Number] | None = Field(None, description="time range that is used; none: all of it")
+    channels: ChannelsTable | None = Field(None, description="channels of this file; none: those of the job")
 
 
 class AxialTable(Table):
     """Axial coefficients from elsewhere, where the axis was not measured."""
 
-    kac_mpa: Number
-    kae_n_mm: Number
-    source: Text
+    kac_mpa: Number = Field(description="axial cutting coefficient")
+    kae_n_mm: Number = Field(description="axial edge coefficient")
+    source: Text = Field(description="where the coefficients come from")
 
 
 class FitLimitsTable(Limits):
@@ -70,14 +70,18 @@ class FitLimitsTable(Limits):
 class FitJobTable(Table):
     """The whole file of a job that identifies force coefficients from measured forces."""
 
-    name: Text = Field(description="of the material that is made")
+    name: Text = Field(description="name of the material that is written")
     source: Text = Field(description="where the measurements come from")
-    workpiece: str = Field("", description="what was cut")
+    workpiece: str = Field("", description="material of the workpiece that was cut")
     conditions: str = Field("", description="cutting conditions, e.g. dry or flood")
-    method: Literal["average", "instantaneous"] = Field(description="from mean forces, or from whole turns")
-    band_hz: Positive | None = Field(None, description="harmonics up to here count; instantaneous needs it")
-    runout: Literal["seek", "given"] = Field("seek", description="fitted too, or that of the cutter")
-    zero: bool = Field(False, description="fit an offset of each channel too")
+    method: Literal["average", "instantaneous"] = Field(
+        description="average: fits mean forces; instantaneous: fits forces over whole turns"
+    )
+    band_hz: Positive | None = Field(
+        None, description="highest frequency of the harmonics that are used; required with instantaneous"
+    )
+    runout: Literal["seek", "given"] = Field("seek", description="seek: fitted too; given: that of the cutter")
+    zero: bool = Field(False, description="true: a constant offset of each channel is fitted too")
     cutter: CutterTable
     engagement: EngagementTable
     channels: ChannelsTable

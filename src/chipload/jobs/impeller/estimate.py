@@ -29,9 +29,9 @@ def estimate(points: int, areas: Sequence[float], scallop: float, corner: float,
     Examples
     --------
     >>> estimate(600, [2000.0, 1000.0], 0.1, 1.5, 4)
-    'estimate: 600 contact points, 4 ways, each with 2.79 m of passes a channel; 1.1 to 6.9 min of processor time'
+    'estimate: 600 contact points, 4 partitions, each with 2.79 m of passes a channel; 1.1 to 6.9 min of processor time'
     >>> estimate(40, [], 0.1, 1.5, 2)
-    'estimate: 40 contact points, 2 ways; 7.2 to 22 s of processor time'
+    'estimate: 40 contact points, 2 partitions; 7.2 to 22 s of processor time'
     """
     step = max(corner_step(corner, scallop), scallop)
     metres = sum(areas) / step / 1e3
@@ -39,6 +39,6 @@ def estimate(points: int, areas: Sequence[float], scallop: float, corner: float,
     unit, name = (60.0, "min") if high > 300.0 else (1.0, "s")
     passes = f", each with {metres:.3g} m of passes a channel" if areas else ""
     return (
-        f"estimate: {points} contact points, {ways} ways{passes}; {low / unit:.2g} to {high / unit:.2g} {name} of "
-        "processor time"
+        f"estimate: {points} contact points, {ways} partitions{passes}; {low / unit:.2g} to {high / unit:.2g} "
+        f"{name} of processor time"
     )

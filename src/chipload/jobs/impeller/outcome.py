@@ -454,7 +454,9 @@ def unmilled(milled: ImpellerResult) -> tuple[str, ...]:
     divided = milled.used.divided
     untold = divided.untold if divided else 0
     return (
-        (f"{untold} ranges of pallet angles had too many arcs to be decided: they count as closed",) if untold else ()
+        (f"{untold} ranges of pallet angles had too many arcs to be decided: they are taken as blocked",)
+        if untold
+        else ()
     )
 
 

@@ -43,7 +43,7 @@ def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         ]
     used = milled.used
     if used is None or used.divided is None:
-        return [*out, '<p class="no">No way mills all that can be reached.</p>']
+        return [*out, '<p class="no">No partition mills all that can be reached.</p>']
     out.append(f"<h3>Patches: {escape(used.name)}</h3>")
     for k, op in enumerate(milled.surfaces):
         out.append(figure(f"patches-{k}", patch_figure(milled, used, op), figures))

@@ -141,7 +141,7 @@ def _path(
 ) -> PlannedPoints | str:  # fmt: skip
     """The shorter one of lines along u and along v; or why there is none."""
     best: PlannedPoints | None = None
-    why = "there is no way off the surface at the ends of its path"
+    why = "the cutter cannot leave the surface at the ends of its path"
     for along in sorted("uv", key=lambda x: field.path(surface, x)):
         try:
             points = point_path(surface, along, box, field, cutter, limits.scallop, paths.chord_mm)

@@ -184,7 +184,7 @@ def _gouge(track: str, checked: Checked | CheckedRough | FiveAxisProgram) -> Lim
     if gouge.bound <= limit or gouge.found > limit:
         state, why = Verdict.HOLDS if gouge.bound <= limit else Verdict.EXCEEDS, ""
     else:
-        state, why = Verdict.UNPROVEN, f"between {gouge.found:.4f} and {gouge.bound:.4f} mm: the limit lies within that"
+        state, why = Verdict.UNPROVEN, f"between {gouge.found:.4f} and {gouge.bound:.4f} mm: the limit lies in between"
     error = 1.0 - gouge.found / gouge.bound if gouge.bound > 0.0 else 0.0
     row = gouge.row if gouge.row >= 0 else None
     place = gouge.place if gouge.row >= 0 else None

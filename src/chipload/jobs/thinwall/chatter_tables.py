@@ -11,16 +11,18 @@ class WallModeTable(Table):
     """A mode of the cutter with holder and spindle, alike in all directions across its axis."""
 
     frequency_hz: Positive = Field(description="natural frequency")
-    damping_ratio: Positive = Field(lt=1.0, description="there is no default")
+    damping_ratio: Positive = Field(lt=1.0, description="damping ratio; there is no default")
     stiffness_n_um: Positive = Field(description="modal stiffness at the tip")
 
 
 class WallDynamicsTable(Table):
     """Vibration of wall and cutter: passes are no deeper than chatter allows, each at a spindle speed of its own."""
 
-    damping_ratio: Positive = Field(lt=1.0, description="of the wall's modes; there is no default")
-    modes: Count = Field(4, le=12, description="modes of the wall, in each state that it is cut in")
-    mode: tuple[WallModeTable, ...] = Field((), description="of the cutter; none: rigid, and the margin is unproven")
+    damping_ratio: Positive = Field(lt=1.0, description="damping ratio of the wall's modes; there is no default")
+    modes: Count = Field(4, le=12, description="number of lowest modes of the wall in each state of removal")
+    mode: tuple[WallModeTable, ...] = Field(
+        (), description="modes of the cutter; none: rigid, and the margin is unproven"
+    )
     margin: Positive = Field(1.0, ge=1.0, description="least stability margin that every pass must have")
     least_rpm: Positive | None = Field(None, description="least spindle speed of a pass; none: speed_rpm")
     most_rpm: Positive | None = Field(None, description="greatest spindle speed of a pass; none: speed_rpm")

@@ -373,7 +373,7 @@ def _wall(job: ThinWallJob, shape: ThinWall, foot: float) -> WallBlank:
     rows = max(1, round(foot * j))
     if rows >= j:
         raise InputError(
-            f"wall.elements = {list(w.elements)}: {j} up the wall: must be above {rows}, those of the foot: state more"
+            f"wall.elements = {list(w.elements)}: {j} up the wall: must be above {rows}, those of the foot: raise it"
         )
     v = np.concatenate([np.linspace(0.0, foot, rows + 1)[:-1], np.linspace(foot, 1.0, j - rows + 1)])
 

@@ -316,5 +316,5 @@ def helps(place: Help) -> str:
     if place.feed_per_tooth_mm is not None:
         return f"a feed of at most {place.feed_per_tooth_mm:.4g} mm a tooth would do"
     if place.diameter_mm is not None:
-        return f"the edge alone is too much; a cutter of at most {place.diameter_mm:.4g} mm would do"
+        return f"the edge force alone exceeds the limit; a cutter of at most {place.diameter_mm:.4g} mm would do"
     return "neither a smaller feed nor a smaller cutter of this shape would do"

@@ -55,7 +55,7 @@ def result_of(walled: ThinWallResult) -> Result:
             *(f"limit {name}: not stated" for name in walled.unchecked),
             *_unchecked_bodies(walled),
             *(() if "dynamics" in walled.settings else ("chatter: not calculated",)),
-            "tangential forces do not bend the wall; a bent wall is not cut less deep",
+            "bending by tangential forces, smaller depth of cut on a bent wall: not calculated",
         ),
         provenance=walled.provenance,
         maps=tuple(_maps(walled)),
@@ -94,7 +94,10 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
     place = (float(one.shape.at[0]), float(one.shape.at[1]), float(one.shape.at[2]))
     state, why = state_of(gouge, tolerance + one.shift)[0], ""
     if one.shift > 0.0 and state is Verdict.HOLDS:
-        state, why = Verdict.UNPROVEN, "the path is moved: it is compared within its greatest shift only"
+        state, why = (
+            Verdict.UNPROVEN,
+            "the path is shifted against the form error: the gouge is known to within the greatest shift only",
+        )
     out.append(LimitCheck("gouge_mm", tolerance + one.shift, gouge, state, one.name, place=place, reason=why))
     out += chatter_limits(walled.settings.get("dynamics"), c, one.name, error_of(walled, one, "force_n"))
     return (*out, *default_limits(walled.checks, walled.planning.machine, c, one.name, one.load_error))

@@ -73,28 +73,33 @@ class WallTable(Table):
     foot_mm: Positive = Field(description="height above the clamp that keeps its stock")
     allowance_mm: tuple[NotNegative, NotNegative] = Field(description="stock on the side towards +y and towards -y")
     elements: tuple[Count, Count] = Field(description="finite elements along the wall and up it, the foot among them")
-    length_mm: Positive | None = Field(None, le=5000.0)
-    height_mm: Positive | None = Field(None, le=5000.0)
-    thickness_mm: Positive | None = Field(None, le=5000.0)
-    chord_root_mm: Positive | None = Field(None, le=5000.0)
-    chord_tip_mm: Positive | None = Field(None, le=5000.0)
-    thickness_root_mm: Positive | None = Field(None, le=5000.0)
-    thickness_tip_mm: Positive | None = Field(None, le=5000.0)
-    edge_share: NotNegative | None = Field(
-        None, description="of a blade: its thickness at the edges; else the part of u left out at each edge"
+    length_mm: Positive | None = Field(None, le=5000.0, description="length of a plate")
+    height_mm: Positive | None = Field(None, le=5000.0, description="height of a plate or blade above the clamp")
+    thickness_mm: Positive | None = Field(None, le=5000.0, description="finished thickness of a plate")
+    chord_root_mm: Positive | None = Field(None, le=5000.0, description="chord of a blade at the clamp")
+    chord_tip_mm: Positive | None = Field(None, le=5000.0, description="chord of a blade at the free edge")
+    thickness_root_mm: Positive | None = Field(
+        None, le=5000.0, description="thickness of a blade in the middle of the chord, at the clamp"
     )
-    camber_deg: Number | None = None
-    stagger_root_deg: Number | None = None
-    stagger_tip_deg: Number | None = None
-    files: tuple[Text, ...] | None = Field(None, description="sections from the clamp to the free edge")
+    thickness_tip_mm: Positive | None = Field(
+        None, le=5000.0, description="thickness of a blade in the middle of the chord, at the free edge"
+    )
+    edge_share: NotNegative | None = Field(
+        None,
+        description="blade: thickness at the edges over that in the middle; else: share of u left out at each edge",
+    )
+    camber_deg: Number | None = Field(None, description="angle by which the camber line of a blade turns")
+    stagger_root_deg: Number | None = Field(None, description="angle of the chord about z at the clamp")
+    stagger_tip_deg: Number | None = Field(None, description="angle of the chord about z at the free edge")
+    files: tuple[Text, ...] | None = Field(None, description="files with the sections, from the clamp to the free edge")
     unit: Unit | None = Field(None, description="unit of the files, which do not state it")
-    columns: Text | None = Field(None, description="of files that do not name them, as X Y Z")
-    span: tuple[NotNegative, NotNegative] | None = Field(None, description="part of the span that is the wall")
+    columns: Text | None = Field(None, description="columns of files that do not name them, as X Y Z")
+    span: tuple[NotNegative, NotNegative] | None = Field(None, description="range of the span that is the wall, 0 to 1")
     file: Text | None = Field(None, description="STEP file; `chipload check FILE` lists its faces")
     front: FaceName | None = Field(None, description="face, by number or point [mm] on it: the side towards +y")
     back: FaceName | None = Field(None, description="the face opposite: the side towards -y")
     clamp: FaceName | None = Field(
-        None, description="what is clamped: a face beside the front, or a point of that edge"
+        None, description="clamped edge of the front: the face beside it, or a point on the edge"
     )
     fit_mm: Positive | None = Field(
         None, le=0.1, description="greatest deviation of a fitted patch from its face; none: 0.001"
@@ -107,7 +112,9 @@ class FacePartTable(Table):
     file: Text = Field(description="STEP file; `chipload check FILE` lists its faces")
     chord_mm: Positive = Field(0.01, le=1.0, description="greatest deviation of facets from the part's faces")
     places: tuple[Count, Count] = Field((8, 6), description="places along a face and up it at which the part is solved")
-    spacing_mm: Positive = Field(1.0, description="of the points of the stock that shank and holder are compared with")
+    spacing_mm: Positive = Field(
+        1.0, description="distance between the points of the stock that shank and holder are checked against"
+    )
 
 
 class FaceWallTable(Table):
@@ -137,23 +144,23 @@ Walls = Annotated[
 class WallWorkpieceTable(Table):
     """Material of the wall, and the clamps of a part."""
 
-    name: Text
+    name: Text = Field(description="name of the material")
     modulus_gpa: Gigapascal = Field(description="Young's modulus")
     poisson: NotNegative = Field(lt=0.5, description="Poisson's ratio")
     density_kg_m3: Density
-    yield_mpa: Megapascal = Field(description="stress up to which the wall springs back")
+    yield_mpa: Megapascal = Field(description="yield strength")
     clamp: tuple[ClampTable, ...] = Field(
-        (), description="of a part with [[wall]]: together they allow no rigid motion"
+        (), description="clamps of a part with [[wall]]; together they must allow no rigid motion"
     )
-    order: Literal[2, 3] | None = Field(None, description="of a part: order of the modes of a cell; none: 2")
-    cell_mm: Positive | None = Field(None, description="of a part: side of its cells; none: by the thinnest wall")
+    order: Literal[2, 3] | None = Field(None, description="polynomial order of the cells of a part; none: 2")
+    cell_mm: Positive | None = Field(None, description="side of the cells of a part; none: by the thinnest wall")
 
 
 class ThresholdTable(Table):
     """Experiments that find the allowable force of a place; without them the threshold is modelled."""
 
     file: Text = Field(description="CSV: u, v, normal_force_n, and deflection_um where that was measured")
-    deviations: NotNegative = Field(description="standard deviations of its scatter that are kept as reserve")
+    deviations: NotNegative = Field(description="reserve, in standard deviations of the scatter of the experiments")
 
 
 class WallOperationTable(Table):
@@ -166,46 +173,51 @@ class WallOperationTable(Table):
         description="finishing program (CL data or NC) whose rows the passes follow, in the coordinates of the wall; "
         "it gives direction, lean and step-over; none: rows are planned",
     )
-    milling: Literal["down", "up"] | None = Field(None, description="needed without rows")
+    milling: Literal["down", "up"] | None = Field(None, description="direction of milling; required without rows")
     contact: Literal["corner", "flank"] = Field(
         "corner",
         description="what touches the surface: the corner radius of a ball or bull nose, or the flank of an end mill "
         "whose axis stands along the wall",
     )
-    axial_depth_mm: Positive | None = Field(None, description="of flank contact: from row to row along the axis")
+    axial_depth_mm: Positive | None = Field(None, description="flank contact: distance between rows along the axis")
     feed_mm_min: Positive = Field(le=1e5, description="feed of the centre of the cutter's corner radius")
-    speed_rpm: Positive = Field(le=1e6)
+    speed_rpm: Positive = Field(le=1e6, description="spindle speed")
     lean_deg: Positive | None = Field(
-        None, lt=89.0, description="of the axis from the surface's normal towards the free edge; needed without rows"
+        None,
+        lt=89.0,
+        description="angle of the axis from the surface's normal towards the free edge; required without rows",
     )
-    lead_deg: Number | None = Field(None, description="of the axis forward along the feed; needed without rows")
-    step_over_mm: Positive | None = Field(None, description="from row to row; or scallop_um")
+    lead_deg: Number | None = Field(None, description="angle of the axis forward along the feed; required without rows")
+    step_over_mm: Positive | None = Field(None, description="distance between rows; or scallop_um")
     scallop_um: Positive | None = Field(None, ge=0.01, description="scallop height between rows; or step_over_mm")
-    depth_min_mm: Positive
-    depth_max_mm: Positive
+    depth_min_mm: Positive = Field(description="smallest depth of cut")
+    depth_max_mm: Positive = Field(description="greatest depth of cut")
     leave_mm: NotNegative = Field(
         0.0, description="stock on every side for the operation after this one; 0 in the last one, which finishes"
     )
     slope: Positive = Field(
         le=1.0,
-        description="greatest change of depth per length along the surface; of a flank from row to row up the wall",
+        description="greatest change of depth per length along the surface; flank contact: from row to row up the wall",
     )
     reserve: NotNegative = Field(
-        lt=1.0, description="share by which the planner keeps below the threshold for what its force model leaves out"
+        lt=1.0, description="share of the threshold that the planner keeps free for what its force model leaves out"
     )
-    clearance_mm: Positive = Field(description="from the surface between two pieces of the path")
-    step_mm: Positive = Field(
-        ge=1e-3, le=10.0, description="from contact point to contact point, a step of the simulation"
-    )
+    clearance_mm: Positive = Field(description="distance of links from the surface")
+    step_mm: Positive = Field(ge=1e-3, le=10.0, description="distance between contact points, a step of the simulation")
     chord_mm: Positive = Field(
         0.005, le=0.1, description="greatest deviation of rows from the surface between contact points"
     )
     least_error: bool = Field(False, description="also plan the least form error within the time of the constant depth")
     compensate_um: Number = Field(
-        0.0, ge=0.0, le=200.0, description="also move the last passes against their form error, by at most this; 0: not"
+        0.0,
+        ge=0.0,
+        le=200.0,
+        description="greatest shift of the last passes against their form error; 0: no plan with shifted passes",
     )
     layer_mm: Positive = Field(le=1.0, description="thickness of the layers of the simulation")
-    tolerance_mm: Positive = Field(0.001, ge=1e-6, le=0.05, description="how far chords may leave the edges of chips")
+    tolerance_mm: Positive = Field(
+        0.001, ge=1e-6, le=0.05, description="greatest deviation of chords from the edges of chips"
+    )
     corner_slices: Count = Field(48, le=400, description="slices of the corner radius in the simulation")
 
 
@@ -214,14 +226,14 @@ class ThinWallLimitsTable(Limits):
 
     deflection_workpiece_um: Positive = Field(description="greatest deflection of the wall normal to its surface")
     form_error_um: Positive | None = Field(None, description="greatest form error of the finished surface")
-    torque_nm: Positive | None = None
+    torque_nm: Positive | None = Field(None, description="greatest torque on the cutter")
 
 
 class ThinWallJobTable(Table):
     """The whole file of a job that cuts a thin wall."""
 
     wall: Walls
-    part: FacePartTable | None = Field(None, description="needed by [[wall]]")
+    part: FacePartTable | None = Field(None, description="required with [[wall]]")
     neighbour: tuple[FixtureTable, ...] = Field(
         (),
         description="what stands beside one [wall], in its coordinates, as the next blades of a blisk: no part of a "
@@ -232,7 +244,9 @@ class ThinWallJobTable(Table):
     material: SourceTable
     threshold: ThresholdTable | None = None
     cutter: tuple[CutterTable, ...] = Field(min_length=1)
-    dynamics: WallDynamicsTable | None = Field(None, description="vibration; none: chatter is not calculated")
+    dynamics: WallDynamicsTable | None = Field(
+        None, description="vibration of wall and cutter; none: chatter is not calculated"
+    )
     operation: tuple[WallOperationTable, ...] = Field(
         min_length=1, max_length=4, description="in the order of cutting; more than one: semi-finishing, then finishing"
     )

@@ -173,7 +173,7 @@ def clear_field(
         if got.min() >= -limits.touch and lean > 0.5 * limits.lean:
             return field
         least = min(least, -float(got.min()))
-    return f"with a smooth axis it comes {least:.3g} mm into a wall"
+    return f"with a smooth axis it cuts {least:.3g} mm into a wall"
 
 
 def axis_field(

@@ -189,7 +189,7 @@ def linked(
     for one in passes:
         begin, end = job.away(one, 0), job.away(one, -1)
         if begin is None or end is None:
-            why = "no way off the surface at its " + ("beginning" if begin is None else "end")
+            why = "the cutter cannot leave the surface at its " + ("beginning" if begin is None else "end")
             refused += [(k, why) for k in one.numbers]
             continue
         first, last = int(one.of[0]), int(one.of[-1])

@@ -349,7 +349,9 @@ class _Run:
             return
         x, y = 0.5 * (low + high)
         self.starts.abandon(np.array([x, y]), 2.0 * self.radius)
-        text = f"{SLOW_PASSES} passes took {took[:, 0].sum():.3g} mm2 here, hardly wider than the cutter: left"
+        text = (
+            f"{SLOW_PASSES} passes took {took[:, 0].sum():.3g} mm2 here, hardly wider than the cutter: the rest is left"
+        )
         self.events.append(Event("pocket-narrow", float(x), float(y), text))
 
     def _linked(self, p: Floats) -> bool:
@@ -396,7 +398,7 @@ class _Run:
             self.lately.append((took, *places[:, 0:2].mean(axis=0).tolist()))
             if reason == _pass.BLOCKED:
                 text = (
-                    f"pass {self.passes} stops: no turn keeps the engagement within "
+                    f"pass {self.passes} stops: no direction keeps the engagement within "
                     f"{math.degrees(self.most_engaged):.4g} deg"
                 )
                 self.events.append(Event("pocket-blocked", float(at[0]), float(at[1]), text))
@@ -455,7 +457,7 @@ class _Run:
         area, contours, places = self._left().parts()
         events = list(self.events)
         for mm2, (x, y) in places:
-            events.append(Event("pocket-leftover", x, y, f"{mm2:.4g} mm2 is left that could be reached"))
+            events.append(Event("pocket-leftover", x, y, f"{mm2:.4g} mm2 that the cutter can reach is left"))
         names = {"entry": ENTRY, "cut": CUT, "link": LINK, "lift": LIFT}
         whole = self.whole
         path = ClearingPath(

@@ -167,7 +167,7 @@ def largest_depths(
     """
     F_th = np.atleast_1d(np.asarray(thresholds, dtype=np.float64))
     if not ((F_th > 0.0) & np.isfinite(F_th)).all():
-        raise InputError("threshold: a place has none above 0 N")
+        raise InputError("threshold: a place of the wall has no threshold above 0 N")
     if limits.greatest > posture.deepest:
         raise InputError(
             f"depth_max_mm = {limits.greatest:g}: must be at most {posture.deepest:.6g}, {posture.deepest_is}"

@@ -200,7 +200,7 @@ def _outermost(x: Floats, allowed: Ints, count: int) -> tuple[list[int], int]:
     try:
         hull = np.sort(allowed[ConvexHull(x[allowed]).vertices])
     except QhullError as error:
-        raise InputError("experiments: all candidates lie on a line: allow one off it") from error
+        raise InputError("experiments: all candidates lie on a line: add a candidate off it") from error
     if len(hull) <= count:
         return [int(i) for i in hull], len(hull)
     hull = hull[:: max(1, len(hull) // 40)]
@@ -260,7 +260,7 @@ def propose_cuts(
         if not len(depth):
             raise InputError(
                 f"experiments: site {i + 1} (u {x[at, 0]:g}, v {x[at, 1]:g}): the smallest depth "
-                f"{law.limits.smallest:g} mm costs {float(law.forces[0]):.4g} N, the greatest force wanted is "
+                f"{law.limits.smallest:g} mm needs {float(law.forces[0]):.4g} N, the greatest force to try is "
                 f"{wanted[-1]:.4g} N: allow a smaller depth or feed, or leave the place out of the candidates"
             )
         force = np.asarray(law.force(depth))

@@ -233,7 +233,7 @@ def calibrated(experiments: Experiments, places: ArrayLike, deviations: float) -
     try:
         triangles = Delaunay(place)
     except QhullError as error:
-        raise InputError("experiments: all places lie on a line: add one off it") from error
+        raise InputError("experiments: all places lie on a line: add a place off it") from error
     s, how = scatter(experiments)
     value = LinearNDInterpolator(triangles, y)(at)
     outside = ~np.isfinite(value)

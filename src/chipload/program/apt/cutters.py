@@ -47,7 +47,7 @@ def read_cutters(text: str, *, units: Literal["mm", "inch"] = "mm") -> tuple[dic
 
     def settle() -> None:
         if pending is not None and out.setdefault(tool, pending[0]) != pending[0]:
-            text = f"{pending[1]}: another cutter for tool {tool}: its first is kept"
+            text = f"{pending[1]}: tool {tool} already has a cutter: the first one is kept"
             findings.append(Finding("apt-cutter", pending[1].line, text))
 
     for record in records(text):

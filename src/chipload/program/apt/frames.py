@@ -77,7 +77,7 @@ class Coordinates:
             return R, np.zeros(3), R @ _Z
         if not self._plain and self.points_in is None:
             raise InputError(
-                f"line {self.line}: CSYS without TRNTYP does not say what points are given in: say whether it is the "
+                f"line {self.line}: CSYS without TRNTYP leaves the frame of the points open: state whether it is the "
                 "work frame or the coordinates of CSYS"
             )
         R, t = (self.A, self.t) if self.points_in == "csys" else (np.eye(3), np.zeros(3))
@@ -117,8 +117,8 @@ class Coordinates:
         near = [abs(math.remainder(said * scale - own, math.tau)) < SAME_AXIS for scale in (1.0, math.pi / 180.0)]
         if sum(near) != 1 or abs(u[k]) > SAME_AXIS:
             raise InputError(
-                f"line {self.line}: ROTABL: an angle of {said:g} must, in rad or else in degrees, bring the tool to "
-                f"TLAXIS {u}"
+                f"line {self.line}: ROTABL: an angle of {said:g} turns the tool to TLAXIS {u} neither in rad nor in "
+                f"degrees: correct the angle or TLAXIS"
             )
         return _rotation(k, own)
 

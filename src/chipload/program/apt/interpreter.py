@@ -107,14 +107,12 @@ class AptInterpreter:
             self.ended = word
         elif REFUSED.fullmatch(word) or (word == "MSYS" and track.at is not None):
             raise record.error(
-                "changes the coordinates or the order in a way that is not read: write plain GOTO instead"
+                "changes the coordinates or the order of the records and is not read: write plain GOTO instead"
             )
         elif LEFT_OUT.fullmatch(word.partition(",")[0]):
-            track.leave_out(
-                "apt-left-out", record.line, f"{record}: moves the tool in a way that is not read: left out"
-            )
+            track.leave_out("apt-left-out", record.line, f"{record}: moves the tool and is not read: left out")
         elif word == "CUTCOM" and record.args != ("OFF",):
-            track.note_once("apt-cutcom", record.line, f"{record}: points are taken as of the tool's own tip")
+            track.note_once("apt-cutcom", record.line, f"{record}: points are taken as positions of the tool tip")
         elif UNUSED.fullmatch(word):
             track.note("apt-unused", record.line, str(record))
         elif word not in _SILENT:
@@ -149,7 +147,7 @@ class AptInterpreter:
     def _from(self, record: AptRecord) -> None:
         p, b = self._point(record)
         if self.track.at is not None and (self.track.at, self.track.axis) != (p, b):
-            self.track.note("apt-from", record.line, f"{record}: a rapid leads there")
+            self.track.note("apt-from", record.line, f"{record}: the tool moves there in a rapid")
         self.track.rapid(p, b, record.line)
         self._programmed = p
 
@@ -168,7 +166,7 @@ class AptInterpreter:
         """The point and the axis of a GOTO in the work frame."""
         v = record.numbers(3, 6)
         if self._changed is not None and not self._loaded and self.track.at is not None:
-            text = f"{self._changed}: another cutter and no tool is loaded: the tool stays {self.track.tool}"
+            text = f"{self._changed}: no LOADTL follows the new cutter: tool {self.track.tool} stays loaded"
             self.track.note("apt-cutter", self._changed.line, text)
         self._changed, self._loaded = None, False
         if not self._units_said:
@@ -203,7 +201,7 @@ class AptInterpreter:
         circle = read_circle(record)
         if isinstance(circle, str):
             self.track.leave_out(
-                "apt-circle", record.line, f"{record}: {circle}: a straight line leads to the next point"
+                "apt-circle", record.line, f"{record}: {circle}: the tool moves to the next point in a straight line"
             )
             self._circle = None
             return
@@ -250,7 +248,7 @@ class AptInterpreter:
         off = np.subtract(p, centre)
         own = float(np.linalg.norm(off - (off @ normal) * np.array(normal)))
         if circle.radius is not None and abs(own - circle.radius * self.mm) > RADIUS_MM:
-            text = f"{circle.record}: the GOTO after it gives the radius {own:.6g} mm"
+            text = f"{circle.record}: its radius to the GOTO after it is {own:.6g} mm"
             self.track.note("apt-arc", circle.record.line, text)
         if circle.sweep is not None and start is not None:
             sweep = sweep_of(start, p, centre, normal)

@@ -72,7 +72,9 @@ def read_apt(
     for record in records(text):
         if reader.ended:
             reader.track.note(
-                "apt-after-end", record.line, f"{record} and all after it is left out: behind {reader.ended}"
+                "apt-after-end",
+                record.line,
+                f"{record} stands after {reader.ended}: it and all that follows is left out",
             )
             break
         reader.read(record)

@@ -135,10 +135,12 @@ class AptRows:
         if value <= 0.0:
             raise InputError(f"line {line}: a cutting motion at feed {value:g}: FEDRAT must be above 0")
         if counts == DEGREES and not stands:
-            raise InputError(f"line {line}: a feed in degrees a minute and the tip moves: give FEDRAT of lengths")
+            raise InputError(
+                f"line {line}: a feed in degrees a minute, but the tip moves: give FEDRAT in lengths a minute"
+            )
         if stands:
             if counts != DEGREES and axis != self.axis:
-                text = "the tool turns and the tip stands: the number of the feed is counted in degrees"
+                text = "the tool turns about its tip: the feed is taken in degrees a minute"
                 self.note_once("apt-turn", line, text)
             return math.radians(value)
         return value

@@ -189,8 +189,8 @@ class Controller:
         if self.tools is not None and self.strict_tools:
             raise InputError(f"{what}{number}: tool {number} is not in the tool table: add it there")
         where = "is not in the tool table" if self.tools is not None else "is used and no tool table is given"
-        counts = "length counts" if number in self.diameters else "length and diameter count"
-        self.once("nc-tool-unknown", f"tool {number} {where}: its {counts} as 0")
+        taken = "length is taken" if number in self.diameters else "length and diameter are taken"
+        self.once("nc-tool-unknown", f"tool {number} {where}: its {taken} as 0")
         return Tool(number)
 
     def compensation_diameter(self, name: str, number: int, stated: float) -> float:
@@ -216,8 +216,8 @@ class Controller:
         if number in (self.tools or {}):
             self.leave_out(
                 "nc-diameter-missing",
-                f"{name} D{number}: the tool table states no D for tool {number}, with it the controller compensates "
-                f"by 0: {taken}: write D{diameter:g} in the table",
+                f"{name} D{number}: the tool table states no D for tool {number}, so the controller compensates by "
+                f"0: {taken}: write D{diameter:g} in the table",
             )
         elif known != number and self.dialect == "linuxcnc":
             self.leave_out("nc-diameter-unknown", f"{name} D{number}: no diameter of tool {number} is known: {taken}")

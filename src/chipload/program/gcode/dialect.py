@@ -127,18 +127,20 @@ def lenient(block: Block, c: Controller, unread: frozenset[int] = UNREAD) -> Blo
     if bad:
         names = ", ".join(shown(code) for code in bad if code != NOTED) or "a motion"
         if bad != [NOTED]:
-            c.leave_out("nc-unknown-word", f"{names}: is not read: its block does not move")
+            c.leave_out("nc-unknown-word", f"{names}: is not read: the motion of its block is left out")
         c.unread = names if has_axes(block) else c.unread
         block.g = [code for code in block.g if code not in bad and GROUP_OF[code] not in ("motion", "once")]
         block.words = {x: value for x, value in block.words.items() if x in KEPT_WORDS}
     elif any(GROUP_OF[code] in ("motion", "none") for code in block.g):
         c.unread = ""
     elif c.unread and has_axes(block) and COVET.isdisjoint(block.g):
-        c.leave_out("nc-unknown-word", f"{c.unread}, which is not read, goes on here: the block does not move")
+        c.leave_out(
+            "nc-unknown-word", f"{c.unread}, which is not read, is still active: the motion of this block is left out"
+        )
         block.words = {x: value for x, value in block.words.items() if x in KEPT_WORDS}
     if c.left_out:
         _without_motion(block, c)
     for m in [m for m in block.m if m not in M_GROUP_OF and m not in USER_M]:
-        c.refused("nc-unknown-word", f"M{m}: is not known and does nothing here")
+        c.refused("nc-unknown-word", f"M{m}: is not known; it is ignored")
         block.m.remove(m)
     return block

@@ -97,7 +97,7 @@ class Fanuc(Dialect):
         text, comments = bare(raw)
         text = _SKIP.sub("/", text).replace("(", "")
         if OUTPUTS.match(text):
-            c.once("nc-output", f"{text[:20].upper()}: writes nothing here")
+            c.once("nc-output", f"{text[:20].upper()}: its output is not written")
             return None
         block = read_block(with_brackets(text), comments, c.parameters)
         for code in block.g:
@@ -205,7 +205,7 @@ class Fanuc(Dialect):
             words["i"], words["j"] = -abs(words.pop("q", 0.0)), 0.0
             c.leave_out(
                 "nc-back-boring",
-                "G87: the shift by Q is taken against X, where the machine has a setting, and the cutter as round",
+                "G87: the shift by Q is taken along -X (a setting of the machine), and the cutter as round",
             )
         if 29 in block.m:
             block.m.remove(29)

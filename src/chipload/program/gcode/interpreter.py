@@ -116,7 +116,7 @@ class BlockInterpreter:
             return
         other = _OTHER.match(text)
         if other is not None:
-            c.note("nc-comment-ignored", f"({text.strip()[:LONGEST]}): opens and writes nothing here")
+            c.note("nc-comment-ignored", f"({text.strip()[:LONGEST]}): is ignored, no log is written")
             return
         plain = "".join(x for x in " ".join(text.split()) if x.isprintable())[:LONGEST]
         if plain:
@@ -158,7 +158,7 @@ class BlockInterpreter:
             state.surface = spindle == 960
             c.changed()
             if state.surface:
-                c.note("nc-surface-speed", "G96: S is a speed of the edge: the spindle speed is not known here")
+                c.note("nc-surface-speed", "G96: S is a surface speed: the spindle speed is not known here")
         feed = codes.get("feed")
         if feed is not None:
             state.feed_mode = feed
@@ -175,7 +175,7 @@ class BlockInterpreter:
                 if units is not None and (units == 200) != (state.scale != 1.0):
                     c.note(
                         "nc-feed-before-units",
-                        f"F{words['f']:g}: is taken before {shown(units)}, in the units before it",
+                        f"F{words['f']:g}: is read in the units before the {shown(units)} of this block",
                     )
         if "s" in words:
             if words["s"] < 0.0:
@@ -217,7 +217,7 @@ class BlockInterpreter:
                 raise InputError("M66: P and E: one input at a time")
             if "e" in words and words.get("l", 0.0) != 0.0:
                 raise InputError("M66: an analogue input is read at once: L must be 0")
-            self.c.leave_out("nc-input", "M66: an input of the machine is not known here: #5399 counts as 0")
+            self.c.leave_out("nc-input", "M66: an input of the machine is not known here: #5399 is taken as 0")
             self.c.parameters.numbered[5399] = 0.0
 
     def _machine(self, block: Block) -> None:
@@ -241,7 +241,7 @@ class BlockInterpreter:
                 code, what = _IGNORED[m]
                 c.once(code, f"M{m}: {what} does not affect the path; it is ignored")
             elif m in USER_M:
-                c.once("nc-user-code", f"M{m}: is the machine builder's own: what it does is not known here")
+                c.once("nc-user-code", f"M{m}: is a code of the machine builder: its effect is not known here")
             elif m in (428, 429, 430):
                 state.tcp, state.tcp_by_length = m == 428, False
                 c.changed()

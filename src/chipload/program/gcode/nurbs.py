@@ -42,8 +42,8 @@ def spline_points(points: Floats, weights: Floats, order: int, tolerance: float 
     n = len(points) - 1
     if not 2 <= order <= min(n + 1, HIGHEST_ORDER):
         raise InputError(
-            f"spline of order {order} with {n + 1} control points: L must be from 2 to that number, at most "
-            f"{HIGHEST_ORDER}"
+            f"G5.2: L{order}: the order of a spline with {n + 1} control points must be from 2 to "
+            f"{min(n + 1, HIGHEST_ORDER)}"
         )
     inner = n - order + 2
     knots = np.concatenate([np.zeros(order), np.arange(1.0, inner), np.full(order, float(inner))])

@@ -53,7 +53,7 @@ def note_unset_offsets(c: Controller) -> None:
     used = {frame.number for frame in c.track.used_frames() if frame.number > 0}
     severity = Severity.UNPROVEN if len(used) > 1 else Severity.NOTE
     for line, name in c.unset_offsets.values():
-        said = "its origin is not known here and counts as the machine's: state it in program.work_offsets"
+        said = "its origin is not known and is taken as the machine's: state it in program.work_offsets"
         c.findings.once("nc-offset-unset", line, f"{name}: {said}", severity)
 
 
@@ -63,8 +63,8 @@ def note_machine_coordinates(c: Controller, name: str) -> None:
     if number > 0 and number not in c.stated_offsets:
         c.once(
             "nc-machine-coordinates",
-            f"{name}: moves in the machine's coordinates, and where {_offset_name(number)} lies in them is not known: "
-            f"it counts as the machine's origin: state it in program.work_offsets",
+            f"{name}: moves in the machine's coordinates, where the origin of {_offset_name(number)} is not known: "
+            f"it is taken as the machine's: state it in program.work_offsets",
             Severity.UNPROVEN,
         )
 
@@ -195,7 +195,7 @@ def _check_length(c: Controller, code: int, number: int) -> None:
     if not known:
         c.once(
             "nc-length-unknown",
-            f"{shown(code)} H{number}: the length of tool {number} is unknown and counts as 0: state Z of tool "
+            f"{shown(code)} H{number}: the length of tool {number} is unknown and is taken as 0: state Z of tool "
             f"{number} in a tool table (program.tools)",
         )
     if code == 430 and number != tool and (known or tool != 0):
@@ -252,14 +252,14 @@ def in_machine_unknown(c: Controller, name: str, axes: Axes) -> bool:
     if set(axes) & {0, 1} and 2 not in axes and c.retracted != here:
         c.once(
             "nc-machine-coordinates",
-            f"{name}: moves in the machine's coordinates, and where {_offset_name(number)} lies in them is not known: "
-            "it is left out: state it in program.work_offsets",
+            f"{name}: moves in the machine's coordinates, where the origin of {_offset_name(number)} is not known: "
+            "the motion is left out: state it in program.work_offsets",
             Severity.UNPROVEN,
         )
     else:
         c.once(
             "nc-machine-retraction",
-            f"{name}: a retraction to where only the machine knows is left out: state "
+            f"{name}: a retraction to a position of the machine is left out: state "
             f"{_offset_name(number)} in program.work_offsets to have it",
         )
     if 2 in axes:

@@ -57,7 +57,7 @@ class Parameters:
             value = self.numbered.get(key)
             if value is None:
                 if self.noted is not None and (key < 5000):
-                    said = f"#{key} is read before it is set and counts as 0: state it in program.parameters"
+                    said = f"#{key} is read before it is set and is taken as 0: state it in program.parameters"
                     self.noted("nc-parameter-unset", said)
                 return 0.0
             return value

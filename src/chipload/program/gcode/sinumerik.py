@@ -171,7 +171,7 @@ class Sinumerik(Dialect):
                 words[letter] = here + value if absolute else value
             else:
                 if way != "AC":
-                    c.once("nc-ignored", f"{way}: the direction of a rotary axis is left to the machine")
+                    c.once("nc-ignored", f"{way}: the direction in which a rotary axis turns is left to the machine")
                 words[letter] = value if absolute else value - here
         if 6 in block.m and c.tools is not None and not {430, 490} & set(block.g):
             block.g.append(430)
@@ -180,7 +180,7 @@ class Sinumerik(Dialect):
         for letter in "dh":
             if letter in words and not (letter == "h" and {430, 490} & set(block.g)):
                 del words[letter]
-                c.once("nc-ignored", f"{letter.upper()}: edges of tools and auxiliary functions are left out")
+                c.once("nc-ignored", f"{letter.upper()}: tool edges (D) and auxiliary functions (H) are ignored")
 
 
 def _without_comment(raw: str) -> tuple[str, str, str]:
@@ -259,10 +259,12 @@ def _code(block: Block, c: Controller, code: int) -> None:
 
 def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple[str, str, float]]) -> None:
     if name in ("A3", "B3", "C3", "A2", "B2", "C2", "A4", "B4", "C4", "A5", "B5", "C5", "LEAD", "TILT"):
-        raise NotReadError(f"{name}: tool directions as vectors or angles to the surface are not read: post with axes")
+        raise NotReadError(
+            f"{name}: tool directions as vectors or angles to the surface are not read: output rotary axes"
+        )
     if name == "T" and text.startswith('"'):
         number = c.named_tools.setdefault(text, FIRST_NAMED + len(c.named_tools))
-        c.once("nc-tool-unknown", f"tool {text}: is not known here; it counts as T{number} without length")
+        c.once("nc-tool-unknown", f"tool {text}: has no number: it is taken as T{number} with length 0")
         _put(block, "t", float(number))
         return
     if name in CURVES:
@@ -299,7 +301,7 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
 
 def _left_out(block: Block, c: Controller, word: str) -> None:
     """A word whose motion is not read: its block does not move."""
-    c.leave_out("nc-unknown-word", f"{word}: is not read: its block does not move")
+    c.leave_out("nc-unknown-word", f"{word}: is not read: the motion of its block is left out")
     if NOTED not in block.g:
         block.g.append(NOTED)
 

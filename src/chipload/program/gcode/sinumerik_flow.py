@@ -157,7 +157,7 @@ def flow_step(flow: Flow, raw: str, value: Value) -> bool:
     try:
         flow.line = _next(flow, some, one, value)
     except NotReadError as error:
-        flow.c.leave_out("nc-jump", f"{error}: {one.word} {one.rest[:40]}: taken as no jump")
+        flow.c.leave_out("nc-jump", f"{error}: {one.word} {one.rest[:40]}: the jump is not taken")
         flow.line = _without(flow.line, some, one)
     return True
 

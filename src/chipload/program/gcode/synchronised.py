@@ -48,7 +48,7 @@ def synchronised(c: Controller, block: Block, code: int) -> None:
         _feed(c, start, pitch)
         state.sense = sense
         c.changed()
-        c.once("nc-tapping", f"{name}: the way past the end, until the spindle has stopped, is left out")
+        c.once("nc-tapping", f"{name}: the overrun past the end, until the spindle has stopped, is left out")
 
 
 def _feed(c: Controller, to: Nine, pitch: float) -> None:

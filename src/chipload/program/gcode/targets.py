@@ -42,7 +42,7 @@ def end(c: Controller, block: Block) -> Nine:
 def polar(c: Controller, block: Block, given: dict[int, float]) -> dict[int, float]:
     """X and Y of a pole; ``given``: the axes that the block gives besides."""
     if 0 in given or 1 in given:
-        raise InputError("@ and ^: stand for X and Y and go with neither")
+        raise InputError("@ and ^: give the end by radius and angle: leave X and Y out")
     state, words = c.state, block.words
     x, y = state.at[0], state.at[1]
     r, angle = math.hypot(x, y), math.degrees(math.atan2(y, x))

@@ -116,9 +116,7 @@ class Cycles:
     def _choose_preset(self, text: str) -> None:
         chosen = self.s.q.values.get(339)
         if self.preset is not None and chosen != self.preset:
-            self.s.unproven(
-                "heidenhain-datum", f"{text[:40]}: another preset, which is not known here, counts as the first"
-            )
+            self.s.unproven("heidenhain-datum", f"{text[:40]}: this preset is not known here: the first one is kept")
         elif self.preset is None:
             self.preset = chosen
 

@@ -77,7 +77,7 @@ class HeidenhainFlow:
             name = f"{value:g}"
         key = name if name.startswith('"') else name.lstrip("0") or "0"
         if key not in self.text.places:
-            raise InputError(f"LBL {name} is not there")
+            raise InputError(f"LBL {name} is missing")
         return self.text.places[key]
 
     def call(self, block: str, at: int) -> int:
@@ -86,7 +86,7 @@ class HeidenhainFlow:
             r'CALL LBL\s*(\d+|"[^"]*"|Q[LR]?\d+)(?:\s+REP\s*(\d{1,9}|Q[LR]?\d+)(?:\s*/\s*\d+)?)?', block
         )
         if found is None:
-            raise InputError(f"{block!r}: CALL LBL must have a number, and REP how many times")
+            raise InputError(f"{block!r}: must be CALL LBL number, or CALL LBL number REP times")
         place = self.place(found[1])
         if found[2] is None:
             self._enter(self.text, at)
@@ -101,7 +101,7 @@ class HeidenhainFlow:
 
     def _enter(self, text: Text, at: int) -> None:
         if len(self.calls) >= NESTED:
-            raise InputError(f"more than {NESTED} calls inside one another")
+            raise InputError(f"calls are nested deeper than {NESTED}")
         self.calls.append((text, at, self.s.scale))
 
     def call_program(self, block: str, at: int) -> int:

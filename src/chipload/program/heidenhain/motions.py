@@ -82,7 +82,7 @@ def _retract(s: ConversationalState, text: str) -> None:
         return
     s.end_contour()
     if found[1] == "MAX" or 2 in s.unknown:
-        s.note("heidenhain-m91", "M140: a retraction to where only the machine knows is left out")
+        s.note("heidenhain-m91", "M140: a retraction to a position of the machine is left out")
         s.unknown.add(2)
     else:
         s.plunge(RAPID, s.at[2] + abs(s.amount(found[1])) * s.scale, 0.0)
@@ -120,7 +120,9 @@ def arc_of_radius(s: ConversationalState, text: str) -> None:
     start, chord = complex(*s.at[:2]), complex(end[0] - s.at[0], end[1] - s.at[1])
     under = radius**2 - 0.25 * abs(chord) ** 2
     if abs(chord) < 1e-9 or under < -ROUNDED * abs(radius):
-        raise InputError(f"CR: the radius {radius:g} mm does not reach from start to end: {abs(chord):.6g} mm apart")
+        raise InputError(
+            f"CR: R = {radius:g} mm: start and end are {abs(chord):.6g} mm apart: must be at least half of that in size"
+        )
     out = math.copysign(math.sqrt(max(under, 0.0)), radius * sense)
     centre = start + 0.5 * chord + 1j * chord / abs(chord) * out
     _arc(s, text, end, (centre.real, centre.imag), sense, codes, fast)

@@ -164,7 +164,7 @@ class _Blocks:
             try:
                 return self.flow.function(block, at)
             except NotKnownError as err:
-                self.s.unproven("heidenhain-jump", f"{err} [taken as no jump: {block[:60]}]")
+                self.s.unproven("heidenhain-jump", f"{err} [jump not taken: {block[:60]}]")
                 return at + 1
         if re.match(r"END PGM\b|END\b", block):
             back = self.flow.end()

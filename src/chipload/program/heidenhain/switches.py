@@ -63,11 +63,11 @@ def after(s: ConversationalState, codes: list[int]) -> None:
         elif m in (2, 30):
             s.ended = True
         elif m in (97, 98):
-            s.unproven("heidenhain-corner", f"M{m}: corners of a compensated contour are carried out as without it")
+            s.unproven("heidenhain-corner", f"M{m}: is ignored at a corner of a compensated contour")
         elif m == 130:
-            s.unproven("heidenhain-m130", "M130: untilted coordinates are taken as the others")
+            s.unproven("heidenhain-m130", "M130: untilted coordinates are read as those in force")
         elif m not in KNOWN and m not in SILENT:
-            s.note("heidenhain-unknown", f"M{m}: what it does is not known here")
+            s.note("heidenhain-unknown", f"M{m}: its effect is not known here")
 
 
 def tip(s: ConversationalState, on: bool, name: str) -> None:
@@ -144,7 +144,7 @@ class Tools:
         more = {name: s.signed(sign, value) * s.scale for name, sign, value in _CHANGE.findall(rest)}
         s.extra_radius = more.get("DR", 0.0)
         if s.tool not in s.lengths:
-            s.note("heidenhain-tool-unknown", f"tool {s.tool} has no TOOL DEF: its length counts as 0")
+            s.note("heidenhain-tool-unknown", f"tool {s.tool} has no TOOL DEF: its length is taken as 0")
         radius = s.radius()
         if radius is not None:
             s.q.set(RADIUS_Q, radius / s.scale)
@@ -157,7 +157,7 @@ class Tools:
             return int(found[2])
         if found[3]:
             number = self.named.setdefault(found[3], FIRST_NAMED + len(self.named))
-            s.note("nc-tool-unknown", f"tool {found[3][:40]}: is not known here; it counts as tool {number}")
+            s.note("nc-tool-unknown", f"tool {found[3][:40]}: has no number: it is taken as tool {number}")
             return number
         if found[4]:
             value = s.amount(found[4])
@@ -178,7 +178,7 @@ class Tools:
 def datum_shift(s: ConversationalState, text: str, body: str) -> None:
     """CYCL DEF 7.k: the shift of one axis."""
     if body.startswith("#"):
-        s.unproven("heidenhain-datum", f"{text[:40]}: the datum table is not known here: it counts as no shift")
+        s.unproven("heidenhain-datum", f"{text[:40]}: the datum table is not known here: its shift is taken as 0")
         return
     hit = _SHIFT.match(body)
     if hit is None:

@@ -205,7 +205,7 @@ def first_edge(impeller: Impeller, tolerance: float, corner: float, around: int)
     if count > _MOST_NODES:
         raise InputError(
             f"a corner radius of {corner:g} mm needs about {count:.2g} points of the walls: must be at most "
-            f"{_MOST_NODES:g}: state more, or leave cutters of so small a corner radius out of the catalogue"
+            f"{_MOST_NODES:g}: raise it, or leave cutters of so small a corner radius out of the catalogue"
         )
     return edge
 
