@@ -58,7 +58,7 @@ class Strip:
 
 
 @dataclass(frozen=True, eq=False)
-class _Run:
+class _Shared:
     """What the tasks of all strips share; ``plan`` is that of the whole stock, ``size`` steps make a block."""
 
     xs: Floats
@@ -226,7 +226,7 @@ class Strips:
         self.stock, self.cutters, self.complete = stock, setting.cutters, True
         self._team, self._beside = team, beside
         own = replace(setting, watch=None, moves=None, workers=1, processes=Workers())
-        team.share(_Run(stock.xs, stock.ys, plan_of(stock), program, own, size))
+        team.share(_Shared(stock.xs, stock.ys, plan_of(stock), program, own, size))
         self._states = [_State(strip, part_of(stock, strip), piece, first) for strip in strips]
         self._total = number_of_steps(program, setting.resolution.step_mm, setting.resolution.tolerance)
         self._blocks = list[tuple[Block, ...]]()
@@ -310,7 +310,7 @@ def part_of(stock: LayeredStock, strip: Strip) -> LayeredStock:
     return out
 
 
-def removed_in_strip(run: _Run, state: _State, blocks: int) -> tuple[list[Block], _State]:
+def removed_in_strip(run: _Shared, state: _State, blocks: int) -> tuple[list[Block], _State]:
     """The next blocks of a strip; this is what a worker executes."""
     # a copy: where the task is done again, it begins as it did
     strip, stock, fine = state.strip, state.stock.copied(), run.setting.resolution

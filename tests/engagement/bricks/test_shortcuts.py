@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.bricks._kernels import WAIT, gap, least, swept
+from chipload.engagement.bricks._kernels import WAIT, estimated_least, least, swept
 from chipload.engagement.bricks.chain._kernels import joined
 from chipload.engagement.bricks.circle._kernels import crossing, swept_at
 from chipload.engagement.bricks.index._kernels import what_is
@@ -62,7 +62,7 @@ def test_what_settles_a_point_agrees_with_the_search_of_the_least_distance(kind:
         found = bool(swept(m, c, *p, wait))
         assert found == (high < 1e-8)
         inside, outside = inside + found, outside + (not found)
-        assert gap(m, c, *p) >= low - 1e-10
+        assert estimated_least(m, c, *p) >= low - 1e-10
     assert inside > 20
     assert outside > 20
 

@@ -253,7 +253,7 @@ def in_cylinder(x, y, w, dx, dy, dw, wide, low, high):
 
 
 @njit(cache=True, nogil=True)
-def beside(m, t, x0, y0, w0):
+def from_axis(m, t, x0, y0, w0):
     """Of a point at a time: the square of its distance from the axis, the rate of that, and its height above the tip;
     (x0, y0, w0) as of :func:`chord`.
     """
@@ -272,15 +272,15 @@ def beside(m, t, x0, y0, w0):
 
 
 @njit(cache=True, nogil=True)
-def beside_flank(m, c, t, x0, y0, w0, dx, dy, off):
+def swept_by_flank(m, c, t, x0, y0, w0, dx, dy, off):
     """1: a point was swept by a cutter's cylinder, 0: it was not, -1: not known.
 
     Newton's step from the time t to the least distance from the axis; its square h has a second derivative of at least
     2 (x'^2 + y'^2 - |y| M), so that h there is above the least one by no more than h'^2 over twice that.
     """
     bend = 8.0 * off
-    t = min(max(t - 0.5 * beside(m, t, x0, y0, w0)[1] / (dx * dx + dy * dy + 1e-300), 0.0), 1.0)
-    h, rate, w = beside(m, t, x0, y0, w0)
+    t = min(max(t - 0.5 * from_axis(m, t, x0, y0, w0)[1] / (dx * dx + dy * dy + 1e-300), 0.0), 1.0)
+    h, rate, w = from_axis(m, t, x0, y0, w0)
     far = (c[WIDE] + EPS) ** 2
     if h < far:
         return 1 if -EPS < w < c[FLUTE] + EPS else -1
@@ -301,7 +301,7 @@ def swept(m, c, x, y, z, wait):
     Where the axis is fixed the point goes along a line in the frame of the cutter; where it turns it is never farther
     than M / 8 from the line between its first and its last place there. What a cylinder as much wider or narrower says
     settles most points; for a flat mill with a fixed axis that is all. For a flank alone a step of Newton settles most
-    others, see :func:`beside_flank`.
+    others, see :func:`swept_by_flank`.
     """
     x0, y0, w0, dx, dy, dw, bow = chord(m, x, y, z)
     t = nearest_time(x0, y0, dx, dy)
@@ -331,18 +331,18 @@ def swept(m, c, x, y, z, wait):
     elif from_profile(c, math.sqrt(far), w)[0] < (-off if m[THETA] > 0.0 else EPS):
         return True
     if c[TB] == 0.0 and least_w > c[Z2] + off:
-        known = beside_flank(m, c, t, x0, y0, w0, dx, dy, bow)
+        known = swept_by_flank(m, c, t, x0, y0, w0, dx, dy, bow)
         if known >= 0:
             return known == 1
     elif c[KIND] == FLAT:
-        h, _, w = beside(m, t, x0, y0, w0)
+        h, _, w = from_axis(m, t, x0, y0, w0)
         if h < (wide + EPS) ** 2 and -EPS < w < tall + EPS:
             return True
     return least_from(m, c, x, y, z, t, EPS, EPS, KNOWN, wait)[1] < EPS
 
 
 @njit(cache=True, nogil=True)
-def gap(m, c, x, y, z):
+def estimated_least(m, c, x, y, z):
     """About the least f of a point over a move, for the search of where it is 0: f near the time at which the point is
     nearest to the axis, and where the corner or the bottom decide after two steps along its rate.
     """
@@ -351,8 +351,8 @@ def gap(m, c, x, y, z):
     if m[THETA] > 0.0:
         size = dx * dx + dy * dy + 1e-300
         for _ in range(2):
-            t = min(max(t - 0.5 * beside(m, t, x0, y0, w0)[1] / size, 0.0), 1.0)
-        h, _, w = beside(m, t, x0, y0, w0)
+            t = min(max(t - 0.5 * from_axis(m, t, x0, y0, w0)[1] / size, 0.0), 1.0)
+        h, _, w = from_axis(m, t, x0, y0, w0)
     else:
         w = w0 + t * dw
         h = (x0 + t * dx) ** 2 + (y0 + t * dy) ** 2

@@ -11,7 +11,7 @@ import math
 
 from numba import njit
 
-from chipload.engagement.bricks._kernels import gap, swept
+from chipload.engagement.bricks._kernels import estimated_least, swept
 from chipload.engagement.bricks.index._kernels import solid, what_is
 from chipload.engagement.moves._kernels import AIR, MATERIAL
 from chipload.engagement.moves.border._kernels import BESIDE, NARROW, TURNS
@@ -42,9 +42,9 @@ def swept_at(ring, c, s, e, index, wait):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def gap_at(ring, c, s, e, index):
+def estimated_least_at(ring, c, s, e, index):
     """About the distance of a direction of the circle out of what the move e swept."""
-    return gap(
+    return estimated_least(
         index[6][e], index[8][index[7][e]], ring[0] + c * ring[3] + s * ring[6], ring[1] + c * ring[4] + s * ring[7],
         ring[2] + c * ring[5] + s * ring[8],
     )  # fmt: skip
@@ -80,8 +80,8 @@ def crossing(ring, cu, su, cs, ss, e, index, wait):
     high = 1.0
     near = 0.5 * BESIDE / math.sqrt((cu - cs) ** 2 + (su - ss) ** 2)
     if e >= 0 and near < 0.25:
-        f0 = gap_at(ring, cu, su, e, index)
-        f1 = gap_at(ring, cs, ss, e, index)
+        f0 = estimated_least_at(ring, cu, su, e, index)
+        f1 = estimated_least_at(ring, cs, ss, e, index)
         if f0 > 0.0 > f1:
             a = 0.0
             b = 1.0
@@ -94,7 +94,7 @@ def crossing(ring, cu, su, cs, ss, e, index, wait):
                     break
                 at = to
                 dc, ds = between(cu, su, cs, ss, at)
-                f = gap_at(ring, dc, ds, e, index)
+                f = estimated_least_at(ring, dc, ds, e, index)
                 if f > 0.0:
                     a = at
                     f0 = f

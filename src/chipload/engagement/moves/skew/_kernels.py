@@ -32,7 +32,7 @@ def alone(piece, first, last, r):
 
 
 @njit(cache=True, nogil=True)
-def front_end(across, rise, sk, ck):
+def leading_end(across, rise, sk, ck):
     """Psi at which the front ends, for a motion in the plan and along the axis."""
     side = sk * across
     lift = ck * rise
@@ -121,14 +121,14 @@ def tooth_rows(entries, start, span, piece, slices, c, lead, hand, across, rise,
                 rows_of[count] = k
                 count += 1
                 continue
-            end = front_end(across[i], rise[i], slices[k, 4], slices[k, 5])
+            end = leading_end(across[i], rise[i], slices[k, 4], slices[k, 5])
             for j in range(parts):
                 t0 = s0 + (s1 - s0) * j / parts
                 t1 = s0 + (s1 - s0) * (j + 1) / parts if j + 1 < parts else s1
                 kappa = alpha + 0.5 * (t0 + t1) / corner
                 sk = math.sin(kappa)
                 ck = math.cos(kappa)
-                own = front_end(across[i], rise[i], sk, ck)
+                own = leading_end(across[i], rise[i], sk, ck)
                 off = (j + 0.5) / parts - 0.5
                 low_psi = max(a + off * skew_a, -own) if a > NEAR - end else -own
                 high_psi = min(b + off * skew_b, own) if b < end - NEAR else own
