@@ -1,4 +1,4 @@
-"""The lower Lipschitz envelope of depths over places: no steeper than L, nowhere above what was given.
+"""Lower Lipschitz envelope of depths over places: nowhere steeper than L, nowhere above the given depths.
 
 Notation: p, q places [mm]; d(q) [mm] what may be cut there; L greatest slope; n places.
 
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 
 def lower_envelope(points: ArrayLike, depth: ArrayLike, slope: float) -> Floats:
-    """d~ at places, the shape of ``depth``.
+    """Envelope d~ at the places, the shape of ``depth``.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""The rows of a finishing program: where its cutter touches the sides of a wall, edge to edge, without a gap.
+"""Rows of a finishing program: the parts in which its cutter touches a side of a wall, from edge to edge.
 
 Notation as in :mod:`chipload.planning.thinwall.contact` and :mod:`chipload.planning.thinwall.finish_rows`. The path is
-looked at in straight pieces; a place of it belongs to a row where the clearance between cutter and side is small.
-Between a place that touches within the side and the next one that does not, the edge is found by halving.
+divided into short straight pieces. A place of it belongs to a row where the clearance between cutter and side is small.
+Between a place that touches within the side and the next one that does not, the edge is found by bisection.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def sides_of_program(
     name: str,
     tool: int | None = None,
 ) -> tuple[tuple[FinishSide, ...], float]:
-    """The rows of a program over each side, and the greatest distance [mm] of neighbouring ones.
+    """The rows of a program over each side, and the greatest distance [mm] of neighbouring rows.
 
     Parameters
     ----------
