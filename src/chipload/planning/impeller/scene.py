@@ -1,4 +1,4 @@
-"""What is milled and what must not be touched: contact points and check points.
+"""Scene of a search: contact points that are milled, and check points that must not be touched.
 
 Notation: S contact point [mm], N its unit normal into the channel, K curvature tensor of its surface (3, 3) [1/mm],
 above 0 where the surface bends towards N; c check point.
@@ -44,7 +44,7 @@ class CheckPoints:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Contact points and check points of one set-up.
+    """Contact points and check points of one setup.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Scene:
     near : check points of the contact's own surface nearer than this [mm] are left out: there the curvature stands for
         them. A deviation of the surface from its second order, over that distance, is not seen.
     covering : of the walls between the check points; None: ranges hold at the check points alone
-    shared : the same check points in another scene, which are not looked at again; None: they are new
+    shared : the same check points in another scene, which are not processed again; None: they are new
 
     Raises
     ------

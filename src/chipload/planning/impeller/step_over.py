@@ -1,4 +1,4 @@
-"""Distance between two passes of a toroidal cutter that leaves a scallop of a given height.
+"""Step-over of a toroidal cutter that leaves a scallop of a given height.
 
 Notation: N surface normal, T cutter axis, s = sin of the angle between them; r corner radius, rho = R - r; d unit
 vector along the path, e = N x d across it; K curvature tensor of the surface, above 0 where it bends towards N; height
@@ -33,7 +33,7 @@ from chipload.planning.impeller.scene import Floats
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """How a cutter's axis and a path lie at contact points; every array of one shape (...,).
+    """Orientation of a cutter's axis and a path at contact points; every array of one shape (...,).
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def contact_of(normal: ArrayLike, axis: ArrayLike, along: ArrayLike, curvature: 
 
 
 def trace_curvature(contact: Contact, rho: float, corner: float) -> Floats:
-    """How much more than the surface the trace of the cutter bends across the path: q.
+    """Curvature q of the cutter's trace across the path, beyond that of the surface.
 
     Parameters
     ----------

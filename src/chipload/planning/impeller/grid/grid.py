@@ -1,4 +1,4 @@
-"""The largest cutter at each pallet angle of a grid: what may go there, before exact ranges say it.
+"""Largest cutter at each pallet angle of a grid, an estimate before the exact ranges are calculated.
 
 Notation: rho = R - r of one corner radius r; c contact point, t table angle, B pallet angle.
 """
