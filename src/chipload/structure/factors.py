@@ -1,4 +1,4 @@
-"""The factors of a symmetric positive definite matrix, and many right-hand sides at once.
+"""Factors of a symmetric positive definite matrix, and solutions for many right-hand sides at once.
 
 Notation: A (f, f) = P^T L D L^T P with P a permutation (minimum degree on A + A^T), L unit lower triangular, D
 diagonal; B right-hand sides (f, q).

@@ -1,4 +1,4 @@
-"""How strained a workpiece is by a force: equivalent stress in its elements.
+"""Equivalent stress in the elements of a workpiece under a force.
 
 Notation: u [mm] displacement of the nodes, g gradients of the shape functions at the points of integration,
 eps = sym(sum of u g^T), sigma = lambda tr(eps) 1 + 2 mu eps [MPa]; von Mises' sqrt(3/2 s : s), s the deviator of sigma.

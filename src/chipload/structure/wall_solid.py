@@ -1,4 +1,4 @@
-"""A thin tube or cone as a solid of hexahedra: the second opinion on :mod:`chipload.structure.shell`.
+"""A thin tube or cone as a solid of hexahedra, to check :mod:`chipload.structure.shell` by another method.
 
 Notation as there. Half the wall, theta from 0 to pi, is meshed; on both cuts the displacement along y is 0, so that
 loads that are even in theta are those of the whole. Elements are short near theta = 0, where the cutter is, and grow

@@ -33,7 +33,7 @@ WORST = 12
 
 @dataclass(frozen=True, eq=False)
 class StepLines:
-    """Where and how hard the steps of a program cut.
+    """Contact lines and forces of the steps of a program.
 
     Parameters
     ----------

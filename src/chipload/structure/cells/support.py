@@ -1,4 +1,4 @@
-"""Where a support would lower the deflection of a place most.
+"""Effect of a support on the deflection of a place: the best of some candidates.
 
 Notation: q the loaded place with the force F, s a candidate with the normal n, k stiffness of the support, C_sq
 displacement at s per force at q. A support is a spring along n, a change of rank one, so that by Sherman and Morrison
@@ -24,7 +24,7 @@ from chipload.structure.cells.workpiece import STATIONS, CellWorkpiece, displace
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """What supports would do, one at a time.
+    """Deflection with each candidate support, one at a time.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Support:
 
     @property
     def best(self) -> int:
-        """The candidate that lowers it most."""
+        """The candidate that lowers the deflection most."""
         return int(np.argmin(self.after))
 
 

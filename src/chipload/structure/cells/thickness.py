@@ -1,4 +1,4 @@
-"""The thinnest wall and the thinnest floor of a layered stock, and cells that resolve them.
+"""The thinnest wall and the thinnest floor of a layered stock, and the cell size that resolves them.
 
 A wall is thinner than t where the section of a layer, made narrower by t / 2 all round and wider again, has lost more
 than :data:`PATCH` t^2: a corner loses less. A floor, or a roof, is thinner than t where the upright runs of material

@@ -1,9 +1,9 @@
-"""A clamped workpiece in one state of its removal, and how far it gives way where it is cut.
+"""A clamped workpiece in one state of removal, and its compliance along contact lines.
 
 Notation: u modes, K (3 u, 3 u) stiffness of material and clamps. A **contact line** is the segment along which a cutter
-touches the surface, from its lowest to its highest point; the force is spread evenly over it, since under a point force
-an elastic body gives way without bound. With the load w = mean over the line of the modes' values, its compliance at a
-**station** of the line with the modes' values v is C = (v x I)^T K^-1 (w x I), (3, 3) [mm/N].
+touches the surface, from its lowest to its highest point. The force is spread evenly over it, since under a point force
+the displacement of an elastic body has no bound. With the load w = mean over the line of the modes' values, its
+compliance at a **station** of the line with the modes' values v is C = (v x I)^T K^-1 (w x I), (3, 3) [mm/N].
 
 K is factored in an order of nested dissection: planes of the lattice cut the workpiece in halves again and again, the
 modes of a plane come after those of both sides. A line touches few of the factors, those from its cells to the last
@@ -47,7 +47,7 @@ ABREAST = 21
 
 @dataclass(frozen=True)
 class Elastic:
-    """What a workpiece is made of.
+    """Elastic constants and density of a workpiece.
 
     Parameters
     ----------
