@@ -1,4 +1,4 @@
-"""A contour semi-finished and finished by several strategies, side by side.
+"""Plan of a contour: semi-finishing and finishing by several strategies.
 
 Notation: R cutter radius, s radial depth of the finish pass, a* = arccos(1 - s/R) its engagement angle along a line,
 f0 the programmed feed; planning frame as in :mod:`.offsets`.
@@ -60,7 +60,7 @@ OVERSHOOT_DEG = 0.05
 
 @dataclass(frozen=True)
 class Finishing:
-    """What the engineer asks of a contour; mm, mm/s, rad/s.
+    """Parameters of a contour; mm, mm/s, rad/s.
 
     Parameters
     ----------

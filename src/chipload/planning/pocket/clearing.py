@@ -1,13 +1,12 @@
-"""A whole pocket cleared at constant engagement: passes of a front that never meets more than a*.
+"""Clearing of a whole pocket at constant engagement: passes whose engagement never exceeds a*.
 
 Notation: O centre of the cutter, T its heading, R radius; material lies on the RIGHT of travel (down milling; up
-milling is the mirror image of it). a* the engagement wanted, 1 - cos a* = s / R. A **pass** turns at every step as far
-towards the material as the exact engagement allows; it slides along the wall where that holds it. Where it ends the
-cutter goes on from the nearest place of the cleared edge that still has material beside it.
+milling is the mirror image of it). a* the required engagement, 1 - cos a* = s / R. A **pass** turns at every step as
+far towards the material as the exact engagement allows; where a wall limits it, it follows the wall. Where a pass ends
+the cutter continues from the nearest place of the cleared edge that still has material beside it.
 
-Reference: [Uddin2007] for the law da/ds = sin b / (R sin(a - b)) - kappa.
-Differs from source: the law only says where the root search begins; what is kept is the engagement itself, along the
-whole of each step.
+Reference: [Uddin2007] for the law da/ds = sin b / (R sin(a - b)) - kappa. Differs from source: the law only gives the
+start of the root search; what is limited is the engagement itself, along the whole of each step.
 """
 
 from __future__ import annotations
@@ -107,7 +106,7 @@ def clear_region(
     entry: Entry = "helix",
     progress: Progress = silent,
 ) -> ClearingPath:
-    """Path that clears ``region`` with a cutter of ``radius`` [mm], never engaged by more than ``engagement`` [rad].
+    """Path that clears ``region`` with a cutter of ``radius`` [mm] with at most ``engagement`` [rad].
 
     Parameters
     ----------
@@ -155,7 +154,7 @@ def clear_region(
 def require_clearing(
     region: Region, radius: float, engagement: float, milling: str, step: float, allowance: float
 ) -> Region:
-    """The region of the cutter's centre, if :func:`clear_region` can clear ``region``.
+    """Region of the cutter's centre, if :func:`clear_region` can clear ``region``.
 
     Raises
     ------

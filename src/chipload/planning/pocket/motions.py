@@ -1,7 +1,7 @@
-"""The path of a pocket as motions of a program, and as rows of a history along them.
+"""Motions of a pocket's program, and rows of a history along them.
 
-Notation: a **run** is what lies between two places where the cutter comes down; a **piece** is a part of a motion, of
-which the history has a row at its end.
+Notation: a **run** is the part of the program between two places where the cutter is lowered; a **piece** is a part of
+a motion, with a row of the history at its end.
 """
 
 from __future__ import annotations
@@ -218,8 +218,8 @@ def runs_of(motions: Motions, samples: MotionSamples) -> list[tuple[int, int]]:
 
 
 def clock(motions: Motions, samples: MotionSamples, time: Floats, programs: list[Program], ends: Floats) -> Floats:
-    """(m,) time at the end of every piece [s] from that at the ends of the program's rows; of a LIFT when the cutter is
-    down again.
+    """Time at the end of every piece [s], (m,), counted like that at the ends of the program's rows; of a LIFT the time
+    when the cutter is down again.
 
     Within a motion each piece takes its time at the feed. What the program takes longer is shared as the planned
     slowing down; a motion that a rounded corner shortens is faster in equal shares. The program of a run ends with its

@@ -1,6 +1,6 @@
-"""A pocket cleared by the front, as a program with what it costs.
+"""Plan of a cleared pocket: its program, its columns and its totals.
 
-Notation: R cutter radius, s radial depth, a* = arccos(1 - s/R) the engagement that is held; phi immersion as in
+Notation: R cutter radius, s radial depth, a* = arccos(1 - s/R) the constant engagement; phi immersion as in
 :mod:`chipload.engagement.contact`.
 """
 

@@ -1,4 +1,4 @@
-"""Where the cutter's centre may be, and what it can reach from there.
+"""Region in which the cutter's centre may be, and the region that the cutter reaches from there.
 
 Notation: R [mm] cutter radius. The **centre region** is the region inset by R plus the allowance; what is reachable is
 the centre region grown by R: the opening of the region by a disc.

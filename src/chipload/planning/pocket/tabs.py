@@ -1,4 +1,4 @@
-"""Tabs: strips of material that stay over the floor of a pocket and hold what it cuts out.
+"""Tabs: strips of material above the floor of a pocket that hold the piece that is cut out.
 
 A tab leads from the wall at a stated place straight across the pocket to the wall opposite. Above its top the pocket is
 cleared as if there were none; below, the strip is no part of the region.

@@ -1,4 +1,4 @@
-"""What a pocket costs and leaves in numbers: the values of its summary, over all stages and for each finish."""
+"""Totals of a pocket for its summary: time, length and material left, over all stages and for each finish."""
 
 from __future__ import annotations
 

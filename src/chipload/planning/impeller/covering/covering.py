@@ -81,8 +81,7 @@ class Covering:
         object.__setattr__(self, "ordered", np.ascontiguousarray(self.points[self.tree.order]))
 
     def depth(self, radius: float) -> float:
-        """Greatest depth of a wall in a part of the tool inside which a ball of this radius rolls [mm]; inf: no bound.
-        """
+        """Greatest depth of a wall in a part of the tool inside which a ball of this radius rolls [mm]; inf: none."""
         return depth_of(radius, self.reach, self.bend, self.sunk)
 
     def proves(self, cutter: CatalogueCutter, clearance: float) -> bool:
