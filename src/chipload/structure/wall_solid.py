@@ -93,7 +93,7 @@ def normal_compliance(wall: WallSolid, s_force: float, s_point: float, length: f
     s = s_force + 0.5 * length * np.repeat(ds[0], SPREAD[1])
     if not (s.min() >= 0.0 and s.max() <= shell.length):
         raise InputError(f"wall_solid: s = {s_force:g} mm with an area of {length:g} mm: must lie on the wall")
-    # the half of the area that is on this half of the wall bears half of the force
+    # the half of the area that is on this half of the wall takes half of the force
     round_ = 0.25 * width * (1.0 + np.tile(dt[0], SPREAD[0]))
     weight = 0.5 * np.outer(ds[1] / ds[1].sum(), dt[1] / dt[1].sum()).ravel()
     top = _place(shell, np.column_stack([round_ / shell.radius_at(s), s, np.full(len(s), 0.5 * shell.thickness)]))

@@ -27,11 +27,11 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 Floats = NDArray[np.float64]
 
-#: engagements that are looked at [deg]: those that the planner takes
+#: range of the engagements [deg]: those that the planner takes
 LEAST_DEG, GREATEST_DEG = 2.0, 150.0
 #: places of the stock on the front half of the rim, from one wall to the other
 PLACES = 25
-#: engagements are looked at so far apart [deg], and the answer is found to the second
+#: spacing of the tested engagements [deg], and the accuracy of the answer
 APART_DEG, CLOSE_DEG = 2.0, 1e-3
 
 

@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 
 #: of the gouge that is allowed: what the plan may use
 _SHARE = 0.8
-#: a cutter that comes deeper into a wall beside the two offset points than this over the gouge is not looked at [mm]
+#: a cutter that comes deeper into a wall beside the two offset points than this over the gouge is not tried [mm]
 _ROUGHLY = 0.5
 #: how often a pass is made longer so that it reaches its ends at all heights
 _LONGER = 3

@@ -29,7 +29,7 @@ from chipload.simulation.channel.gouges import Gouge
 
 Floats = NDArray[np.float64]
 
-#: name of the way of the cutter picked by hand
+#: name of the partition with the hand-picked cutter
 PICKED = "hand-picked"
 #: why a contact point is not reached, in words
 REASONS: Mapping[str, str] = {

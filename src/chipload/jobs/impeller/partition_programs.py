@@ -35,7 +35,7 @@ from chipload.planning.impeller.settings import (
 from chipload.program.read import times_on
 from chipload.progress import Progress
 
-#: how often ways are divided at most
+#: greatest number of divisions of a partition
 _ROUNDS = 2
 #: where the check finds more than asked on a patch or surface, what is left is counted on points so many times closer
 #: together and planned again; not for those where it finds more than this share of what is asked: there no cutter goes

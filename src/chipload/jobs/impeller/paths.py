@@ -42,7 +42,7 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 _LEAD = 1.0
 #: of the gouge that is allowed, how near its depth is found
 _RESOLUTION = 0.2
-#: points of the walls by which their cells are laid out, and where roughing is looked at, along and up
+#: points of the walls by which their cells are laid out, and where roughing is checked, along and up
 _COARSE = (61, 25)
 #: not at the very edges of a blade: there a ray into the metal leaves it again
 EDGE = 0.01

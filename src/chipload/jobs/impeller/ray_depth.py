@@ -16,7 +16,7 @@ from chipload.planning.impeller.impeller import Impeller
 
 Floats = NDArray[np.float64]
 
-#: most that is looked at [mm]
+#: greatest depth of a ray [mm]
 MOST = 0.5
 #: how far from the other side a ray ends, over the gouge that is allowed
 _AWAY = 1.5

@@ -1,4 +1,4 @@
-"""A job that cuts a thin wall: its tables checked against one another, its files found."""
+"""A thin-wall job: checks of its tables against one another, and the paths of its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much more the finished wall may give way than its finite elements say: the error of their mesh, place by place.
+"""Error of the compliance of the finished wall by the mesh of its finite elements, at each place.
 
 Notation: C [mm/N] normal compliance that is used, of a force at a point of the cut face; L [mm/N] that of a force
 spread evenly through the thickness, which settles on finer meshes where C does not: under a point the displacement

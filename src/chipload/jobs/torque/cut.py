@@ -246,7 +246,7 @@ def shell_stock(
 
 
 def resolution_of(job: TorqueJob) -> Resolution:
-    """How fine the chips are looked at."""
+    """Resolution of the chips in the simulation."""
     ask, smallest = job.table.simulation, min(c.radius for c in job.cutters.values())
     return Resolution(ask.step_mm, ask.tolerance_mm, 6, 0.5 * smallest)
 

@@ -29,7 +29,7 @@ FEED_STEP = 0.05
 LONGEST = 0.5 * np.pi
 #: ends of rows and of steps agree within [mm]
 SAME_MM = 1e-6
-#: the machine is looked for so far from its last place, and is off the path beyond [mm]
+#: the machine's place is searched so far from its last place, and is off the path beyond [mm]
 WINDOW_MM, AWAY_MM = 5.0, 0.3
 PATH, TABLE, HAL = "path.csv", "controller.toml", "hal.toml"
 #: files that the controller in use takes beside its program

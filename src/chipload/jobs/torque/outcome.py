@@ -231,7 +231,7 @@ class AllowableTorque:
     ----------
     limit : of torque, from the wall alone
     torque : the limit that is kept [N mm], the least of that and the stated one; 0: not attainable
-    true_torque : what the wall as it really is would bear [N mm]
+    true_torque : allowable torque of the real wall [N mm]
     one_tooth : the limit by the closed formula of one tooth [N mm], to compare; None: of a workpiece there is none
     remedy : what would make a torque allowable, where none is
     path : with what is planned and what is true
@@ -295,7 +295,7 @@ class TorqueResult:
 
     @property
     def attainable(self) -> bool:
-        """Whether there is a torque that the wall bears."""
+        """Whether any torque is allowable."""
         return self.allowable.torque > 0.0
 
     @property

@@ -21,7 +21,7 @@ from chipload.structure.shell import Ritz, Shell, ritz
 MARGIN = 1.2
 #: halvings of a search
 HALVINGS = 8
-#: thicker walls are looked for up to this share of the radius, free lengths down to this share of what is stated
+#: thicker walls are searched up to this share of the radius, free lengths down to this share of the stated one
 THICKEST, SHORTEST = 0.2, 0.1
 
 

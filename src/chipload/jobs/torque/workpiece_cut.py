@@ -61,7 +61,7 @@ from chipload.structure.spindle import Bar, tool_bars
 
 Floats = NDArray[np.float64]
 
-#: between two rotations that are looked at [rad]
+#: angle between two rotations at which forces are calculated [rad]
 ROTATION = math.radians(1.0)
 
 

@@ -231,7 +231,7 @@ def _stock(job: _Job) -> Region:
 
 
 def _behind(job: _Job) -> float:
-    """How far the stock that is looked at goes into the part [mm]."""
+    """Depth of the considered stock inside the part [mm]."""
     return 0.5 * job.radius + (0.0 if job.finish else job.setting.passes * job.setting.radial_depth)
 
 

@@ -73,13 +73,13 @@ ENTRIES, LEAST_ROOM = 50, 0.02
 SLOW_PASSES, SLOW_AREA = 30, 0.02
 #: steps between two calls of ``progress``, and capsules that the stock has room for before them
 CHUNK, ROOM = 2000, 1600
-#: depth / R that is looked into for material beside the path, round after round
+#: depth / R of the search for material beside the path, round after round
 DEPTHS = (0.03, 0.006)
 #: vertices of a pass lie within this part of R, of at most so many mm, from the lines and arcs that are written
 FIT, FIT_UP_TO = 2e-4, 8.0
 #: the steps keep this much [rad] below the engagement that what is written must keep
 MARGIN = 2e-3
-#: what is written is looked at every 0.03 R, and keeps this much [rad] below it there
+#: the written path is checked every 0.03 R, and stays this much [rad] below the limit there
 BETWEEN = 4e-4
 #: what is written may leave the centre region by this part of R, of at most so many mm: the middle of a chord of a
 #: convex wall

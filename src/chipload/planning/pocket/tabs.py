@@ -18,7 +18,7 @@ from chipload.geometry.contour import Contour, Region
 
 Floats = NDArray[np.float64]
 
-#: spacing of places on a wall among which the nearest is looked for [mm]
+#: spacing of places on a wall among which the nearest is searched [mm]
 SPACING_MM = 0.01
 #: chords of the region about the tabs leave its arcs by at most so much [mm], away from the part
 CHORD_MM = 1e-4

@@ -28,7 +28,7 @@ from chipload.stability.modes import Modes
 
 Floats = NDArray[np.float64]
 
-#: depths that are looked at, halvings between the last stable and the first other, and nodes of the chip's profile
+#: depths that are tested, bisections between the last stable and the first other, and nodes of the chip's profile
 LOOKS, HALVINGS, NODES = 8, 4, 4
 #: places by which a speed is chosen, at most: those at which a mode moves most
 WORST = 4
@@ -131,7 +131,7 @@ def stable_depths(
     walls : the same places in several states
     limits : smallest and greatest depth
     speed : of the spindle [rad/s]
-    halvings : between two depths that are looked at
+    halvings : bisections between two tested depths
     """
     count = len(walls[0])
     looks = np.geomspace(limits.smallest, limits.greatest, LOOKS)

@@ -114,7 +114,7 @@ def normal_force(
     measure : ``greatest`` size over the revolution, or the size of the ``mean``
     nodes : as of :func:`chipload.planning.thinwall.plane_stock.engagement_of_depths`; None: 8 of a mean (1e-4 of a
         ball's), 16 of the greatest (1 to 4 % too great: the engagement begins and ends abruptly)
-    step_deg : between the rotations at which the greatest is looked for; None: 1, of a flank 0.25
+    step_deg : between the rotations at which the greatest is searched; None: 1, of a flank 0.25
 
     Examples
     --------

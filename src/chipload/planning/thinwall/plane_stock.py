@@ -39,7 +39,7 @@ from chipload.errors import InputError
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-#: places of phi at which the row before is looked for, before bisection
+#: places of phi at which the row before is searched, before bisection
 LOOKS = 90
 #: halvings of a bracket of phi: 4 deg / 2^36
 HALVINGS = 36

@@ -27,7 +27,7 @@ Ints = NDArray[np.int64]
 
 #: the cutter may be so far from the finished side [mm], or within it
 NEAR = 0.02
-#: a clearance is told up to this [mm]
+#: greatest clearance that is reported [mm]
 NEAR_ENOUGH = 1.0
 #: chords of arcs leave them by at most this [mm]
 CHORD = 0.001

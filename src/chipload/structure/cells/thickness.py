@@ -27,7 +27,7 @@ from chipload.structure.cells.moments import alike, stock_moments
 PATCH = 2.0
 #: sides of cells over the thinnest wall: wanted, and at most
 GOOD, MOST = 1.25, 2.5
-#: sections that are looked at, points across the longest side
+#: sections that are searched, points across the longest side
 SECTIONS, POINTS = 16, 48
 #: thicknesses that are tried: each so many times the one before, then halvings
 GROWTH, HALVINGS = 1.4, 5

@@ -22,7 +22,7 @@ def admitted(
 
     Parameters
     ----------
-    found : of the corner radius, with its table angles; nothing above its bounds and ``slack`` [mm] is told apart
+    found : of the corner radius, with its table angles; values above bounds and ``slack`` [mm] are alike
     cut : height of the cutting part above the corner's centres [mm], as the limits were found with
 
     Returns
