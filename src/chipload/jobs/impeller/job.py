@@ -1,4 +1,4 @@
-"""A job that mills an impeller: its tables checked against one another, its files found."""
+"""An impeller job: checks of its tables against one another, and the paths of its files."""
 
 from __future__ import annotations
 

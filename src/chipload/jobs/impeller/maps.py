@@ -1,4 +1,4 @@
-"""Surface maps of an impeller: the largest cutter and its table angle, and what all programs leave."""
+"""Surface maps of an impeller: the largest cutter, its table angle, and the excess after all programs."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Every way with its programs: divided, planned, timed, divided again by what the programs take, and checked.
+"""Partitions with their programs: divided, planned, timed, divided again by the program times, and checked.
 
-Notation: a way is one set of cutters, as in ``planning/impeller/compare.py``. Contact points predict the time of a
-patch from the step-over alone. What its program takes on the machine, with links and rest passes, over what they
-predict is a factor of its surface, order of strips, cutter and table angle; divided again with these factors, the way
-is chosen by the time that programs take. Of all rounds the quickest is kept.
+Notation: a partition is for one set of cutters, as in ``planning/impeller/compare.py``. Contact points predict the time
+of a patch from the step-over alone. The time of its program on the machine, with links and rest passes, over that
+prediction is a factor of its surface, order of strips, cutter and table angle. Divided again with these factors, the
+partition is chosen by program time. Of all rounds the quickest is kept.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def checked_partitions(
     progress: Progress,
     keep: Keep = anew,
 ) -> tuple[CheckedPartition, ...]:
-    """Each way that mills all, with the programs of its best round.
+    """Each partition that mills all, with the programs of its best round.
 
     Parameters
     ----------

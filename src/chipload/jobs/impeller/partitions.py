@@ -1,4 +1,4 @@
-"""How the surfaces are divided: patches over each surface, and one, two, three cutters side by side."""
+"""Report sections of the partitions: patches over each surface, and one, two, three cutters in comparison."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SHADES = 5
 
 
 def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> list[str]:
-    """The part of the page about all surfaces: which way, its patches."""
+    """Report sections about all surfaces: the partition that is milled, and its patches."""
     out = [
         "<h2>One cutter, two, three</h2>",
         '<p class="note">All channels; path and feed time of the contact points at the stated scallop, with changes of '
@@ -113,7 +113,7 @@ def _programmed(milled: ImpellerResult) -> str:
 
 
 def partitions_figure(milled: ImpellerResult) -> go.Figure:
-    """Time of each way: milling, changes; its least time as a line."""
+    """Time of each partition: milling, changes; its least time as a line."""
     able = [(way, way.divided) for way in milled.partitions if way.divided is not None]
     names = [way.name for way, _ in able]
     out = go.Figure()

@@ -1,4 +1,4 @@
-"""The finishing programs of an impeller: planned patch by patch, then checked by the simulation of the channel."""
+"""Finishing programs of an impeller: planned patch by patch, then checked by the simulation of the channel."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def finish_settings(
     paths: PathsTable, ahead: float, tools: int, workers: int, covering: Covering | None = None,
     forces: ForceTerms | None = None,
 ) -> FinishSettings:  # fmt: skip
-    """What the finishing programs of a job are planned with.
+    """Parameters with which the finishing programs of a job are planned.
 
     ``tools`` : how many tool numbers are taken; ``covering`` : of the walls between check points; ``forces`` : by which
     passes are fed, None: all alike.
@@ -85,7 +85,7 @@ def finish_settings(
 def checked_programs(
     job: FinishSettings, machine: Machine, plan: PlannedSettings, paths: PathsTable, keep: Keep = anew
 ) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:
-    """A program for each setting with what the check finds; what all of them leave on each surface."""
+    """A program for each setting with the result of its check; the excess of all of them on each surface."""
     impeller, asked, settings = job.impeller, job.how.scallop, plan.settings
     millings = [m for s in settings for m in s.millings]
     faces = list(dict.fromkeys((m.patch.body, m.patch.side) for m in millings))
@@ -128,7 +128,7 @@ def left_by(
     job: FinishSettings, walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float,
     keep: Keep = anew,
 ) -> tuple[Remainder, ...]:  # fmt: skip
-    """What a program leaves on each wall."""
+    """Excess that a program leaves on each wall."""
     got = _left_task(walls, program, cutter, depth).of(job, keep)
     return tuple(
         Remainder(w, rest, gouge, row, part, _HEIGHT, depth)
@@ -152,7 +152,7 @@ def gouge_by(
     job: FinishSettings, walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float,
     allowed: float, keep: Keep = anew,
 ) -> Gouge:  # fmt: skip
-    """The deepest gouge of a program."""
+    """Deepest gouge of a program."""
     found: Gouge = _gouge_task(walls, program, cutter, depth, allowed).of(job, keep)
     return found
 
@@ -171,7 +171,7 @@ def _deepest(
 
 
 def in_cut(program: Program) -> NDArray[np.bool_]:
-    """(n,) rows of tracks: neither leads nor links."""
+    """Rows of tracks, (n,) bool: neither leads nor links."""
     return np.array([name == "finish" for name in program.labels])[program.label]
 
 
