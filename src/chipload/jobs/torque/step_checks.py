@@ -30,7 +30,7 @@ LEAST = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class StepChecks:
-    """Steps of the path with what they are cut with; n of them.
+    """Data of n steps of the path for the default checks.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class StepChecks:
 
 
 def step_checks(real: CutSteps, loads: Loads, material: Material, most: float) -> StepChecks:
-    """Steps as they really are.
+    """Data of the real steps.
 
     Parameters
     ----------
