@@ -1,8 +1,8 @@
-"""The greatest engagement within all limits of a job (`engagement_deg = "limit"`).
+"""Greatest engagement within all limits of a job (`engagement_deg = "limit"`).
 
-The greatest engagement at which every stated limit and every default check holds at the feed, the speed and the depth
-of the operation, wherever on the front half of the rim the stock lies: at the wall, in the middle, at the other side.
-So a path that keeps the engagement keeps the limits.
+It is the greatest engagement at which every stated limit and every default check holds at the feed, the speed and the
+depth of the operation, wherever on the front half of the rim the stock lies: at the wall, in the middle, at the other
+side. So a path that keeps the engagement keeps the limits.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def greatest_engagement(
     checks: DefaultChecks,
     rigid: tuple[float, float],
 ) -> EngagementAdvice:
-    """The greatest engagement at which every limit holds.
+    """Greatest engagement at which every limit holds.
 
     Raises
     ------

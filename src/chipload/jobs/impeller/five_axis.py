@@ -35,7 +35,7 @@ from chipload.simulation.channel.gouges import Gouge
 
 Floats = NDArray[np.float64]
 
-#: distance of the points of a surface on which what is left is measured [mm]
+#: distance of the points of a surface on which the excess is measured [mm]
 _SPACING = 0.6
 #: by which axis positions may differ at the end of a channel and at the beginning of the next [mm, rad]
 _SAME = 1e-6

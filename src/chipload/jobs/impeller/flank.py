@@ -30,7 +30,7 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 Floats = NDArray[np.float64]
 
-#: of the gouge that is allowed: what the plan may use
+#: share of the allowed gouge that the plan may use
 _SHARE = 0.8
 #: a cutter that comes deeper into a wall beside the two offset points than this over the gouge is not tried [mm]
 _ROUGHLY = 0.5

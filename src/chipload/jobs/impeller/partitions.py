@@ -17,7 +17,7 @@ from chipload.result.style import FONT, GRID
 
 Ints = NDArray[np.int64]
 
-#: colours of the cutters of a way; lighter for the second table angle, lighter still for the third
+#: colours of the cutters of a partition; lighter for the second table angle, lighter still for the third
 COLOURS = ("#3457a6", "#c9821a", "#0b7a75", "#8a4f9e", "#5b8c2a", "#a8793a")
 #: shades of one cutter, by table angle
 SHADES = 5
@@ -96,7 +96,7 @@ def _compared(milled: ImpellerResult) -> str:
 
 
 def _programmed(milled: ImpellerResult) -> str:
-    """What the programs of each way take."""
+    """Table of the programs of each partition."""
     rows = [
         [
             escape(w.name), ", ".join(f"D {c.diameter:g} r {c.corner_radius:g}" for c in w.cutters), f"{w.path:.0f}",

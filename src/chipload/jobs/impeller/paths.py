@@ -48,7 +48,7 @@ _COARSE = (61, 25)
 EDGE = 0.01
 #: how far the rays go above a surface [mm]
 _HEIGHT = 1.0
-#: distance of points of a whole surface on which what is left is measured [mm]
+#: distance of points of a whole surface on which the excess is measured [mm]
 _SPACING = 0.6
 #: grid lines across the passes of a patch on which the scallop is measured, points between two passes
 _FEW, _BETWEEN = 7, 14
@@ -176,7 +176,7 @@ def in_cut(program: Program) -> NDArray[np.bool_]:
 
 
 def _whole(job: FinishSettings, body: int, side: str, millings: Sequence[Milling]) -> SurfacePoints:
-    """Points of a surface as far as its patches go."""
+    """Points of a surface within its patches."""
     surface = job.surface(body, side)
     boxes = np.array([m.box for m in millings if (m.patch.body, m.patch.side) == (body, side)])
     low, high = boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)

@@ -26,7 +26,7 @@ from chipload.simulation.channel.channel import SurfacePoints
 
 Floats = NDArray[np.float64]
 
-#: what is farther counts as this far [mm]
+#: greatest clearance that is calculated [mm]
 FAR = 20.0
 #: labels of rows that mill a wall, or come to it and leave it along it
 CUT = ("finish", "lead")

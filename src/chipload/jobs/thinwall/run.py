@@ -131,7 +131,7 @@ def _planned_operation(one: WallOperation) -> PlannedOperation:
 
 
 def _thick_enough(inputs: WallInputs) -> None:
-    """Refuse a finished wall that is thinner than what is cut off it at once."""
+    """Refuse a finished wall that is thinner than one depth of cut."""
     greatest = max(o.depths.law.limits.greatest for o in inputs.operations)
     thickness, deepest = inputs.body.shape.size()[2], min(greatest, max(inputs.body.allowance))
     if not thickness >= deepest:

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Speeds:
-    """``programmed`` (n,) what the program says, ``reached`` (n,) what the machine does [mm/s], ``time`` (n,) [s]."""
+    """Speeds of a pass: ``programmed`` (n,) and ``reached`` by the machine (n,) [mm/s], ``time`` (n,) [s]."""
 
     programmed: Floats
     reached: Floats

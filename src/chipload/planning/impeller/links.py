@@ -239,7 +239,7 @@ def _in_order(job: _LinkJob, passes: Sequence[Pass], stages: Sequence[int]) -> l
 
 
 class _Pose(NamedTuple):
-    """A way off the end of a pass: its tips, the last where it ends; the axis; whether it is clear of allowances."""
+    """A lift off the end of a pass: its tips, the last one at its end; the axis; whether it is clear of allowances."""
 
     tips: tuple[Floats, ...]
     axis: Floats
@@ -261,7 +261,7 @@ class _LinkJob:
     top: float
 
     def away(self, track: Pass, k: int) -> _Pose | None:
-        """The way off the end ``k`` of a pass, whose last tip has a clear way up; None: there is none."""
+        """Lift off the end ``k`` of a pass, whose last tip has a clear retract; None: there is none."""
         p, T, N = track.tip[k], track.axis[k], track.normal[k]
         share = np.arange(1, _SMALL + 1)[:, None] / _SMALL
         found: _Pose | None = None
@@ -301,7 +301,7 @@ class _LinkJob:
         return up
 
     def along(self, tip: Floats, axis: Floats, fed: bool) -> Moves:
-        """The way up or down along the axis, ``fed``: not in rapid, for the blank may stand there."""
+        """Retract or approach along the axis, ``fed``: at a feed, because the blank may stand there."""
         motion, feed = (LINE, self.how.feed) if fed else (RAPID, 0.0)
         return Moves.of(motion, tip[None], axis[None], feed, "link")
 

@@ -17,7 +17,7 @@ from chipload.planning.impeller.scene import Floats
 
 _STARTS = 12
 _ROUNDS = 30
-#: ramps of a way over the part [s], and the rate of the pallet on it [rad/s]
+#: ramps of a link over the part [s], and the rate of the pallet on it [rad/s]
 _OVER, _RATE = 0.5, 2.0
 
 

@@ -41,8 +41,8 @@ from chipload.planning.impeller.track import ToolTrack
 from chipload.program.program import LINE
 from chipload.progress import Progress, part_of, silent
 
-#: rest passes take what is left above this share of the scallop: above what is left between two lines, and below
-#: what is asked, for the count is of points
+#: rest passes remove excess above this share of the scallop: above the scallop between two lines, and below the
+#: limit, because only points are checked
 _AIM = 0.985
 
 
@@ -233,7 +233,7 @@ LeftMemory = dict[tuple[int, tuple[int, ...]], tuple[Floats, tuple[ToolTrack, ..
 
 
 def _left(face: SurfaceGrid, settings: Iterable[CutterSetting], memory: LeftMemory) -> Floats:
-    """(a, b) float [mm] what all tracks that are in the moves leave on the grid of a surface."""
+    """Excess (a, b) float [mm] of all tracks that are in the moves, on the grid of a surface."""
     out = np.full((len(face.u), len(face.v)), np.inf)
     for s in settings:
         gone, first = {k for k, _ in s.linked.refused}, 0
@@ -248,7 +248,7 @@ def _left(face: SurfaceGrid, settings: Iterable[CutterSetting], memory: LeftMemo
 
 
 def _faces(job: FinishSettings, millings: Sequence[Milling], fine: float) -> list[SurfaceGrid]:
-    """Every surface that is milled, as far as its patches go."""
+    """Every surface that is milled, within its patches."""
     boxes: dict[tuple[int, str], list[Box]] = {}
     for m in millings:
         boxes.setdefault((m.patch.body, m.patch.side), []).append(m.box)

@@ -42,10 +42,10 @@ from chipload.program.program import Program
 NUMBERS = {(0, "plus"): 0, (1, "minus"): 1, (0, "minus"): 3, (1, "plus"): 4}
 NUMBERS |= {(body, f"{side} fillet"): FILLET + n for (body, side), n in NUMBERS.items()}
 _FLOOR = 2
-#: rest passes take what is left above this share of the scallop: above what is left between two lines, and below
-#: what is asked, for the count is of points
+#: rest passes remove excess above this share of the scallop: above the scallop between two lines, and below the
+#: limit, because only points are checked
 _AIM = 0.985
-#: so many settings are brought into the best order; more of them on and on to the nearest
+#: greatest number of settings that are put into the best order; more of them always to the nearest
 _EXACT = 7
 
 
@@ -240,7 +240,7 @@ def lines_of(patch: Patch) -> tuple[str, Box]:
     return along, box
 
 
-#: what a milling is known by: surface, order of its strips, box, cutter, table angle
+#: key of a milling: surface, order of its strips, box, cutter, table angle
 MillingKey = tuple[object, ...]
 
 

@@ -81,7 +81,7 @@ FIT, FIT_UP_TO = 2e-4, 8.0
 MARGIN = 2e-3
 #: the written path is checked every 0.03 R, and stays this much [rad] below the limit there
 BETWEEN = 4e-4
-#: what is written may leave the centre region by this part of R, of at most so many mm: the middle of a chord of a
+#: the written path may leave the centre region by this part of R, of at most so many mm: the middle of a chord of a
 #: convex wall
 SLACK, SLACK_UP_TO = 1e-4, 4.0
 #: area / R^2 that a pass must take for its start to be used again

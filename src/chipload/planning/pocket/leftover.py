@@ -109,8 +109,8 @@ class PocketRemainder:
             self.rest = shapely.difference(self.rest, swept(points, breaks, self.radius))
 
     def take_from(self, stock: PlanarStock, points: Floats, breaks: NDArray[np.bool_]) -> None:
-        """Take away what is cleared of a stock: the squares of its cleared cells, and what a part of the path sweeps
-        that comes near a cell that is cleared in part. All that was cut before this part was taken so already.
+        """Remove the cleared part of a stock: the squares of its cleared cells, and the area that a part of the path
+        sweeps near a cell that is cleared in part. All earlier cuts must have been removed in the same manner.
         """
         if len(points):
             self.rest = shapely.difference(self.rest, cleared_squares(stock))
@@ -130,8 +130,8 @@ class PocketRemainder:
         return float(self.rest.area), tuple(contours), places
 
     def widest(self, allowed: shapely.Geometry) -> Place:
-        """(x, y, room) [mm]: the middle of the widest place of what is left where the cutter's centre may go
-        (``allowed``), and its distance from where it may not; room 0 where there is none.
+        """Widest place (x, y, room) [mm] of the remaining material where the cutter's centre may go (``allowed``): its
+        middle and its distance from where the centre may not go; room 0 where there is none.
         """
         best = (0.0, 0.0, 0.0)
         for piece in shapely.get_parts(shapely.intersection(self.rest, allowed)):

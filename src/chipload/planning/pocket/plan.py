@@ -95,7 +95,7 @@ def _strategy(
     limits: Mapping[str, float],
     progress: Progress,
 ) -> StrategyResult:
-    """One strategy with its program and what it costs."""
+    """One strategy with its program and its totals."""
     radius = cutter.radius
     sections = sections_of(asked, setting)
     stages = stages_of(sections, setting, radius, name, lambda done, what: progress(0.9 * done, what))
@@ -263,7 +263,7 @@ def misses(
     areas: Sequence[float],
     limit_deg: float,
 ) -> list[Event]:
-    """Where a strategy misses the engagement that was asked for, or leaves parts of the areas [mm^2] within its reach.
+    """Where a strategy misses the required engagement, or leaves parts of the areas [mm^2] within its reach.
 
     An engagement within the limit that the job states is no failure.
     """

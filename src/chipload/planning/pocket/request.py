@@ -160,7 +160,7 @@ class Asked:
 
 
 def laid_out(contours: Sequence[Contour], setting: Clearing, radius: float) -> Asked:
-    """The region, what is free of material, the engagement that is held and the step.
+    """Region, free space, constant engagement and step of a request.
 
     Raises
     ------

@@ -81,7 +81,7 @@ class FinishSide:
         return Rows(contact, normal, feed, depth > NOTHING, axis, count), np.stack([u, v], axis=-1), depth
 
     def _left(self, left: Floats, places: tuple[Floats, Floats], u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Points and unit normals (..., 3) of what a pass leaves."""
+        """Points and unit normals (..., 3) of the surface that a pass leaves."""
 
         def q(a: Floats, b: Floats) -> Floats:
             point, normal = self.at(a, b)

@@ -34,7 +34,7 @@ from chipload.program.program import LINE, RAPID, Program
 Floats = NDArray[np.float64]
 
 
-#: the way out leans by this share of n from the axis: away from the wall
+#: the retract leans by this share of n from the axis: away from the wall
 ASIDE = 0.2
 
 

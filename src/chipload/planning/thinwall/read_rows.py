@@ -197,7 +197,7 @@ def _between(path: _FeedMotions, here: Ints, there: Ints, share: Floats) -> tupl
 
 
 def _split(row: FinishRow, side: SideAt) -> list[FinishRow]:
-    """The pieces of a path over a side along which u goes one way; pieces up or down the side are left out."""
+    """Parts of a path over a side along which u is monotone; parts up or down the side are left out."""
     if len(row.u) < 2:
         return []
     along, up = tangents(side, row.u[:-1], row.v[:-1])
