@@ -332,7 +332,7 @@ def greatest_stress(modes: Ritz, s_force: float, length: float, width: float, an
 
 @dataclass(frozen=True, eq=False)
 class Ovalisation:
-    """What each harmonic adds to the deflection under the force, and the shape of the loaded rim.
+    """Part of each harmonic in the deflection under the force, and the shape of the loaded rim.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ The chain is held at its end and statically determinate, so the joints add to th
     C(a, b) = integral from max(a, b) of (z - a)(z - b) / (E I) dz
               + sum over joints above both of c_ff + c_fm (z_j - a + z_j - b) + c_mm (z_j - a)(z_j - b).
 
-Shear is left out, as in :mod:`chipload.structure.beam`, with which a clamped cutter agrees to the last digits.
+Shear is left out, as in :mod:`chipload.structure.beam`; a clamped cutter agrees with that module to the last digits.
 
 Reference: [Altintas2012] ch. 2 and 4; [Schmitz2009] ch. 9 for the joint between cutter and holder.
 """

@@ -74,7 +74,7 @@ def watch(
 
 
 def alive(state: StructureRemoval, watched: UnitLoads) -> NDArray[np.bool_]:
-    """Which places still are on material, (p,) bool."""
+    """Whether each watched place is still on material, (p,) bool."""
     return _alive(state, watched.F, watched.own.shape[1])
 
 

@@ -1,8 +1,9 @@
 """A thin tube or cone as a solid of hexahedra, to check :mod:`chipload.structure.shell` by another method.
 
-Notation as there. Half the wall, theta from 0 to pi, is meshed; on both cuts the displacement along y is 0, so that
-loads that are even in theta are those of the whole. Elements are short near theta = 0, where the cutter is, and grow
-evenly from there; nothing of the shell's theory is in it: shear through the thickness and the thickness itself are.
+Notation as there. Half the wall, theta from 0 to pi, is meshed. On both cuts the displacement along y is 0, so loads
+that are even in theta are those of the whole. Elements are short near theta = 0, where the cutter is, and grow evenly
+from there. The solid uses nothing of the shell's theory; it includes shear through the thickness and the thickness
+itself.
 """
 
 from __future__ import annotations

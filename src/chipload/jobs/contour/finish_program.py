@@ -182,7 +182,7 @@ def _labelled(path: Path, text: str, labels: Sequence[str]) -> list[tuple[int, i
 
 
 def flat_lengths(p: Program) -> NDArray[Any]:
-    """(n,) chord of every motion in the plane, or the length of a full turn [mm]."""
+    """Chord of every motion in the plane, or the length of a full turn, (n,) [mm]."""
     seg = flat_motions(p)
     chord = np.hypot(seg[:, 2] - seg[:, 0], seg[:, 3] - seg[:, 1])
     turn = np.abs(seg[:, 6]) * np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])

@@ -50,7 +50,7 @@ def track_name(outcome: ContourResult, operation: int, strategy: str) -> str:
 
 
 def history_of(op: Operation, strategy: StrategyResult) -> dict[str, NDArray[Any]]:
-    """(n,) columns of the history of a strategy, as the result keeps them."""
+    """Columns (n,) of the history of a strategy, as the result keeps them."""
     columns = dict(strategy.history)
     if "form_error_signed_um" in columns:
         columns["form_error_um"] = columns["form_error_signed_um"]

@@ -1,7 +1,7 @@
 """Check before the search whether a cutter is long enough for the channel.
 
-Notation: a contact point lies d below the shroud, the least distance in the meridional plane. A cutter that touches it
-has its holder, which begins ``reach`` above its tip, within the shroud where reach < d; and a holder that is wider than
+Notation: a contact point lies d below the shroud, the least distance in the meridional plane. The holder of a cutter
+that touches it begins ``reach`` above its tip, and lies within the shroud where reach < d. A holder that is wider than
 the greatest distance of two blades, 2 r sin(pitch / 2) at the outer radius r, has no room there.
 """
 

@@ -296,7 +296,7 @@ class CheckedPartition:
 
     @property
     def cutters(self) -> tuple[CatalogueCutter, ...]:
-        """Every cutter of the programs once, with those of rest passes."""
+        """All cutters of the programs, each once, with those of rest passes."""
         return tuple(dict.fromkeys(p.setting.cutter for p in self.programs))
 
     @property
@@ -424,12 +424,12 @@ class ImpellerResult:
 
     @property
     def tolerance(self) -> float | None:
-        """How deep a wall may lie in a certified cutter [mm]; None: nothing is certified between check points."""
+        """Greatest depth of a wall in a certified cutter [mm]; None: nothing is certified between check points."""
         return self.surfaces[0].answer.tolerance
 
     @property
     def area(self) -> float:
-        """Of all surfaces [mm^2], one channel."""
+        """Area of all surfaces [mm^2], one channel."""
         return float(sum(op.surface.area.sum() for op in self.surfaces))
 
     def searched(self, patch: Patch) -> Searched:

@@ -44,7 +44,7 @@ _FINER, _NEARLY = (0.5, 0.25), 1.25
 
 @dataclass(frozen=True, eq=False)
 class _Planned:
-    """A way that is planned: its division, what it was chosen by [s], its settings, their time of all channels [s]."""
+    """A planned partition: its division, its predicted time [s], its settings, their time of all channels [s]."""
 
     partition: Partition
     predicted: float
@@ -54,7 +54,7 @@ class _Planned:
 
 @dataclass(eq=False)
 class _Memory:
-    """What ways share: planned millings, row times and checks of the same programs."""
+    """Shared results of all partitions: planned millings, row times and checks of the same programs."""
 
     millings: dict[MillingKey, Milling] = field(default_factory=dict)
     checks: dict[str, tuple[tuple[Checked, ...], tuple[Covered, ...]]] = field(default_factory=dict)

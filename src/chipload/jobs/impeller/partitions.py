@@ -142,7 +142,7 @@ def partitions_figure(milled: ImpellerResult) -> go.Figure:
 
 
 def patch_grid(milled: ImpellerResult, way: Partition, op: Searched) -> Ints:
-    """(a, b) number of the patch of each contact point of a surface; -1: none."""
+    """Number of the patch of each contact point of a surface, (a, b); -1: none."""
     out = np.full(op.surface.shape, -1, dtype=np.int64)
     for n, p in enumerate(way.divided.patches if way.divided is not None else ()):
         if milled.searched(p) is op:

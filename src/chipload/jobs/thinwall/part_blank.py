@@ -102,7 +102,7 @@ class PartBlank:
         return out
 
     def error(self, side: int) -> Floats:
-        """(n, m) relative error of the compliance of a finished side by its cells."""
+        """Relative error (n, m) of the compliance of a finished side by its cells."""
         none = [np.zeros(self.shape) for _ in self.body.each]
         fine, coarse = self.compliance(none, side), self.compliance(none, side, wide=True)
         # what the surface gives beneath a square, which larger cells do not show

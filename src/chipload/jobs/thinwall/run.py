@@ -142,8 +142,8 @@ def _thick_enough(inputs: WallInputs) -> None:
 
 
 def check(job: ThinWallJob) -> tuple[list[str], bool]:
-    """What the job names: the wall, its finite elements, the greatest threshold, and the steps of the first variant,
-    which is laid out but not simulated.
+    """Results of a check of the files of a job: the wall, its finite elements, the greatest threshold, and the steps of
+    the first variant, which is laid out but not simulated.
 
     Raises
     ------

@@ -340,7 +340,7 @@ def feed_rows(removal: Removal) -> slice:
 
 
 def step_points(removal: Removal, program: Program) -> Floats:
-    """(n + 1, 3) ends of the steps from the first feed to the last [mm].
+    """Ends of the steps from the first feed to the last, (n + 1, 3) [mm].
 
     Raises
     ------
@@ -359,7 +359,7 @@ def step_points(removal: Removal, program: Program) -> Floats:
 
 
 def step_feeds(removal: Removal, rapids: float) -> Floats:
-    """(n,) programmed feeds of the same steps [mm/s]; ``rapids`` that of the rapids between two cuts."""
+    """Programmed feeds of the same steps, (n,) [mm/s]; ``rapids`` that of the rapids between two cuts."""
     c, own = removal.columns, feed_rows(removal)
     return np.where(c["rapid"][own], rapids, mm_s_from_mm_min(1.0) * c["feed_mm_min"][own])
 
@@ -404,7 +404,7 @@ def true_loads(loads: Loads, points: Floats, place: Place, surprises: tuple[Surp
 def surprise_factors(
     steps: int, away: Callable[[SurpriseTable], Floats], surprises: tuple[SurpriseTable, ...]
 ) -> tuple[Floats, Floats]:
-    """(n,) factors of the parts of the edge and of the feed.
+    """Factors (n,) of the parts of the edge and of the feed.
 
     ``away`` gives the (n,) distance [mm] of the steps from a hard spot.
     """

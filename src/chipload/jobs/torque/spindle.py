@@ -55,7 +55,7 @@ def deviation_of(job: TorqueJob) -> SpindleDeviation:
 
 
 def estimate_range(job: TorqueJob, spindle: Spindle) -> tuple[float, float]:
-    """(least, greatest) torque that the estimate holds for [N mm], of the file.
+    """Least and greatest torque for which the estimate holds [N mm], of the file.
 
     Else what counts as no longer light, and what the drive's greatest current gives.
     """

@@ -82,7 +82,7 @@ def step_checks(real: CutSteps, loads: Loads, material: Material, most: float) -
 
 
 def feed_ratio(programmed: TorqueProfile, outcome: Outcome, speed: float) -> Floats:
-    """(k,) feed per tooth of the rows of an outcome over the programmed one; ``speed`` that of the free spindle."""
+    """Feed per tooth of the rows of an outcome over the programmed one, (k,); ``speed`` that of the free spindle."""
     return np.asarray(outcome.feed / np.interp(outcome.s, programmed.s, programmed.feed) * (speed / outcome.speed))
 
 

@@ -6,7 +6,7 @@ two surfaces that face each other), W(o) deflection of the workpiece in any dire
 stress of the workpiece per force. All are convex in o, so between 0 and 1 the straight line lies above them.
 
 Compliance is that of the state of removal of each step, which no feed changes. It is known to a share e: the limit is
-made for compliance and stress (1 + e) times as great. The stress is looked at in the steps that bend the workpiece most
+made for compliance and stress (1 + e) times as great. Stress is calculated in the steps that bend the workpiece most
 and in those with most force; the greatest g among them counts everywhere.
 """
 
@@ -203,7 +203,7 @@ def workpiece_cut(
 def deflections(
     removal: Removal, material: Material, known: WorkpieceCompliance, bars: dict[int, tuple[Bar, ...]]
 ) -> tuple[Floats, Floats, Floats]:
-    """(n,) D, the whole deflection, and W of each row of a removal [mm]; 0 where nothing is cut."""
+    """D, the whole deflection, and W of each row of a removal, (n,) [mm]; 0 where nothing is cut."""
     n = len(removal.columns["line"])
     whole, work = np.zeros(n), np.zeros(n)
     for cuts in removal.cuts:

@@ -73,7 +73,7 @@ def constant_force(cut: CutConditions, met: Engagement, feed: float, wanted: flo
 
 
 def within_machine(s: Floats, wanted: Floats, acceleration: float, jerk: float | None) -> Floats:
-    """(n,) feeds at ``s`` [mm], nowhere above ``wanted``, that keep acceleration [mm/s^2] and jerk [mm/s^3].
+    """Feeds (n,) at ``s`` [mm], nowhere above ``wanted``, that keep acceleration [mm/s^2] and jerk [mm/s^3].
 
     >>> s = np.linspace(0.0, 20.0, 401)
     >>> v = within_machine(s, np.where(s < 10.0, 20.0, 10.0), 100.0, None)

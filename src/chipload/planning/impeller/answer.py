@@ -76,7 +76,7 @@ class Answer:
 
     @property
     def diameter(self) -> Floats:
-        """(c,) [mm]; 0: unreachable."""
+        """Diameter of the largest cutter (c,) [mm]; 0: unreachable."""
         sizes = np.array([c.diameter for c in self.catalogue.cutters] + [0.0])
         return sizes[self.cutter]
 

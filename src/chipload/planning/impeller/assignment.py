@@ -178,7 +178,7 @@ def _side(number: int, orders: list[Floats]) -> _Node:
 
 
 def _forward(node: _Node, before: Floats, changes: Changes) -> tuple[Floats, object]:
-    """Least times (cutters, tables) after a node, and what is needed to go back."""
+    """Least times (cutters, tables) after a node, and the data for the steps back."""
     if isinstance(node, _Leaf):
         return _entered(before, changes) + node.cost, before
     records = []
@@ -263,7 +263,7 @@ def _bounds(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64]) -> 
 
 
 def _totals(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64], changes: Changes) -> Floats:
-    """(n,) the least times of many sets, as :func:`_solved` without the way; inf: cells are left."""
+    """Least times (n,) of many sets, as :func:`_solved` without the steps; inf: cells are left."""
     state = np.zeros((*sets.shape, sides[0][0].shape[3]))
     for side in sides:
         ways = []

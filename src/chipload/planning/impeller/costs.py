@@ -64,7 +64,7 @@ class Terms:
             raise InputError(f"repeats = {self.repeats}: must be at least 1")
 
     def feeds(self, cutters: int) -> Floats:
-        """(cutters,) [mm/s]."""
+        """Feed of each cutter (cutters,) [mm/s]."""
         if isinstance(self.feed, tuple) and len(self.feed) != cutters:
             raise InputError(f"feed_mm_s: {len(self.feed)} numbers: must be one or {cutters}, one for each cutter")
         return np.broadcast_to(np.asarray(self.feed, dtype=np.float64), (cutters,))
@@ -104,21 +104,21 @@ class ChannelSide:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """(a, b)."""
+        """Number of contact points (a, b) along u and v."""
         return len(self.u), len(self.v)
 
     def edges(self, order: int) -> Floats:
-        """Where the strips of an order begin and end: half-way between the contact points."""
+        """Edges of the strips of an order: half-way between the contact points."""
         x = self.u if order == 0 else self.v
         return np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
 
     def points(self, order: int) -> NDArray[np.int64]:
-        """(strips, cells) which contact points."""
+        """Contact points of each strip (strips, cells)."""
         grid = np.arange(len(self.scene.contact)).reshape(self.shape)
         return grid if order == 0 else grid.T
 
     def along(self, order: int) -> Floats:
-        """(c, 3) direction of the paths of an order."""
+        """Direction of the paths of an order (c, 3)."""
         grid = self.scene.contact.reshape(*self.shape, 3)
         return np.array(np.gradient(grid, (self.u, self.v)[1 - order], axis=1 - order)).reshape(-1, 3)
 
@@ -176,7 +176,7 @@ class Costs:
         self.known[~reached] = True
 
     def cells(self, order: int) -> Floats:
-        """(strips, cells, k, t) times of an order, as programs take them."""
+        """Times of an order (strips, cells, k, t), as programs take them."""
         out: Floats = self.time[order][self.side.points(order)] * self.factor[order]
         return out
 

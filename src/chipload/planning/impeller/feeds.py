@@ -172,7 +172,7 @@ def loads_of(
 
 
 def allowed_factor(bites: ToothEngagement, places: PassPlaces, cutter: Cutter, terms: ForceTerms) -> Floats:
-    """(n,) greatest f at which deflection and stress of a step are allowed, :data:`LEAST` where none is."""
+    """Greatest f (n,) at which deflection and stress of a step are allowed; :data:`LEAST` where none is."""
     stress = allowed_stress(cutter)
 
     def fits(factor: Floats) -> NDArray[np.bool_]:

@@ -42,15 +42,15 @@ class AxisPath(Protocol):
 
     @property
     def tip(self) -> Floats:
-        """(n, 3) [mm]."""
+        """Tips (n, 3) [mm]."""
 
     @property
     def axis(self) -> Floats:
-        """(n, 3) unit."""
+        """Unit axes (n, 3)."""
 
     @property
     def normal(self) -> Floats:
-        """(n, 3) unit."""
+        """Unit normals of the surface (n, 3)."""
 
     def back(self) -> Self:
         """The same pass from its end to its beginning."""

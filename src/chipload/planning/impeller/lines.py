@@ -103,7 +103,7 @@ class Tracks:
 
     @property
     def length(self) -> float:
-        """Of the paths in the cut [mm]."""
+        """Length of the paths in the cut [mm]."""
         return math.fsum(t.length for t in self.tracks)
 
 

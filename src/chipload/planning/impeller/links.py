@@ -342,7 +342,7 @@ class _LinkJob:
 
 
 def _within_rate(moves: Moves, rate: float) -> Moves:
-    """The moves, fed so that the pallet keeps its rate."""
+    """The moves, with feeds at which the pallet keeps its rate."""
     if math.isinf(rate):
         return moves
     B = np.arctan2(moves.axis[:, 1], moves.axis[:, 0])

@@ -264,7 +264,7 @@ def _faces(job: FinishSettings, millings: Sequence[Milling], fine: float) -> lis
 
 
 def _cells(face: SurfaceGrid) -> Floats:
-    """(a, b) area [mm2] that each grid point stands for."""
+    """Area (a, b) [mm2] of the surface round each grid point."""
     U, V = (x.ravel() for x in np.meshgrid(face.u, face.v, indexing="ij"))
     size = np.linalg.norm(np.cross(face.surface.at(U, V, 1, 0), face.surface.at(U, V, 0, 1)), axis=1)
     out: Floats = size.reshape(len(face.u), len(face.v)) * (face.u[1] - face.u[0]) * (face.v[1] - face.v[0])

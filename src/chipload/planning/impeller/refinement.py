@@ -112,7 +112,7 @@ class Refinement:
         return float(near[np.abs(near - wanted).argmin()])
 
     def furthest(self, inside: Floats, pallet: float, outside: Floats) -> tuple[Floats, float, float] | None:
-        """The last (u, v) on the way from one point to another that is reached with B near that before it.
+        """Last (u, v) between one point and another that is reached with B near that before it.
 
         Returns
         -------

@@ -123,21 +123,21 @@ class Scene:
 
     @property
     def tree(self) -> Tree:
-        """Of the check points."""
+        """Tree of the check points."""
         return self.walls.tree
 
     @property
     def ordered(self) -> Floats:
-        """(m, 3) check points in the order of the tree [mm]."""
+        """Check points in the order of the tree (m, 3) [mm]."""
         return self.walls.ordered
 
     @property
     def own(self) -> Ints:
-        """(m,) surface of each check point, in the order of the tree."""
+        """Surface of each check point (m,), in the order of the tree."""
         return self.walls.own
 
     def at_contacts(self, contact: Floats, normal: Floats, curvature: Floats, surface: int) -> Scene:
-        """The same check points with other contact points, all on one surface."""
+        """Scene with the same check points and other contact points, all on one surface."""
         number = np.full(len(contact), surface, dtype=np.int64)
         return Scene(
             contact, normal, curvature, number, self.check, self.check_surface, self.near, self.tree, self.covering,

@@ -84,7 +84,7 @@ class ContactSurface:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """(a, b)."""
+        """Number of contact points (a, b) along u and v."""
         return len(self.u), len(self.v)
 
 

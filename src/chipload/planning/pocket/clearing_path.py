@@ -91,7 +91,7 @@ class EarlierPath:
 
 
 def segment_lengths(segments: Floats) -> Floats:
-    """(n,) lengths [mm] of lines and arcs (n, 7); 0 is allowed."""
+    """Lengths (n,) [mm] of lines and arcs (n, 7); 0 is allowed."""
     seg = segments
     chord = np.hypot(seg[:, 2] - seg[:, 0], seg[:, 3] - seg[:, 1])
     rho = np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])

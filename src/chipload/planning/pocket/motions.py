@@ -73,7 +73,7 @@ class Motions:
 
     @cached_property
     def lengths(self) -> Floats:
-        """(n,) length in the plane [mm]; 0 of a LIFT."""
+        """Length in the plane (n,) [mm]; 0 of a LIFT."""
         return np.where(self.kind == LIFT, 0.0, segment_lengths(self.segments))
 
     @cached_property
@@ -143,7 +143,7 @@ def samples_of(motions: Motions, step: float) -> MotionSamples:
 
 
 def places(seg: Floats, share: Floats) -> tuple[Floats, Floats]:
-    """(m, 2) points [mm] and unit headings at the shares of segments (m, 7); heading +x where one has no length."""
+    """Points (m, 2) [mm] and unit headings at the shares of segments (m, 7); heading +x of a segment without length."""
     p, q, centre, sweep = seg[:, 0:2], seg[:, 2:4], seg[:, 4:6], seg[:, 6]
     arc = sweep != 0.0
     v = p - centre

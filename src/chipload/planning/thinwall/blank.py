@@ -7,7 +7,7 @@ it. An element keeps (a_m - D_m) / T .. 1 - (a_p - D_p) / T of its thickness, m 
 side k-, p the side k+, D the least of its places and T the mean: the wall is taken a little too soft where D varies.
 
 The compliance is that of a force on the face that the cut leaves. A state that differs from the last one everywhere is
-factored anew: a low-rank correction of every element is no smaller than the stiffness itself.
+factored again: a low-rank correction of every element is no smaller than the stiffness itself.
 
 Reference: [Yan2018] for the thresholds by place; Differs from source: the stiffness is that of the present state.
 """

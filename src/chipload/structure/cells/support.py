@@ -5,7 +5,7 @@ displacement at s per force at q. A support is a spring along n, a change of ran
 
     u_q' = u_q - C_qs n (n . u_s) / (1 / k + n . C_ss n),  with u_s = C_sq F, C_qs = C_sq^T,
 
-with no new factors. It is taken to hold in both directions, as a jack that is pressed on.
+with no new factors. The support is assumed to hold in both directions, as a jack that is pressed on.
 
 Reference: [Hager1989].
 """
