@@ -1,4 +1,4 @@
-"""What gives way under the force: the workpiece while it is cut, the cutter as a beam, holder and spindle."""
+"""Compliance and modes of the workpiece while it is cut, of the cutter as a beam, and of holder and spindle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far the cutter bends: a stepped cantilever, clamped at the holder.
+"""Deflection of the cutter as a stepped cantilever that is clamped at the holder.
 
 Notation: z [mm] height above the tip; l overhang and l_f flute length [mm]; d diameter; E modulus [MPa];
 I = pi D^4 / 64 [mm^4] with D = fluted_factor d (0.8 d unless stated) in the fluted part, the shank's diameter above it.
@@ -20,7 +20,7 @@ from chipload.errors import InputError
 
 
 def flexibilities(cutter: Cutter, fluted_factor: float | None = None) -> tuple[float, float]:
-    """1 / (E I) of the fluted part and of the shank, 1/(N mm^2); a factor of None is the cutter's own.
+    """Flexibility 1 / (E I) of the fluted part and of the shank, 1/(N mm^2); a factor of None is the cutter's own.
 
     Raises
     ------

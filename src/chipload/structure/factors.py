@@ -1,11 +1,11 @@
-"""The factors of a symmetric positive definite matrix, and many right-hand sides at once.
+"""Factors of a symmetric positive definite matrix, and solutions for many right-hand sides at once.
 
 Notation: A (f, f) = P^T L D L^T P with P a permutation (minimum degree on A + A^T), L unit lower triangular, D
 diagonal; B right-hand sides (f, q).
 
-SuperLU factors without pivots. Its own solution takes the columns one after the other through 100 MB of factors;
-:func:`chipload.structure._kernels.triangular` takes 64 abreast, skips rows that are still zero on the way down and rows
-that nobody asked for on the way up: ten times as many a second (benchmarks/structure.py).
+SuperLU factors without pivots. Its own solution processes the columns one after the other through 100 MB of factors.
+:func:`chipload.structure._kernels.triangular` processes 64 together, skips rows that are still zero in forward
+substitution and rows that are not needed in back substitution: ten times as many a second (benchmarks/structure.py).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which nodes and elements a plate or a blade has: hexahedra in rows, columns and layers.
+"""Structured meshes of a plate or a blade: 20-node hexahedra in rows, columns and layers.
 
 Notation: I, J, K elements along i (length), j (height), k (thickness). The half grid has (2 I + 1, 2 J + 1, 2 K + 1)
 places; those with at most one odd index are nodes (20 an element). Element (i, j, k) has the number (i J + j) K + k.

@@ -1,4 +1,4 @@
-"""What one 20-node hexahedron gives: shape functions, stiffness and mass, many elements at once.
+"""Shape functions, stiffness and mass of 20-node hexahedra, many elements at once.
 
 Notation: m elements, 20 nodes each, (xi, eta, zeta) in [-1, 1]^3 the local place, N_i shape functions, J = dx/dxi;
 g_i = dN_i/dx [1/mm]; lambda, mu [MPa] Lame's constants; kept (lo, hi) the part of the thickness that is there, as
@@ -7,9 +7,9 @@ fractions 0 .. 1 along zeta. Degrees of freedom of an element are node by node: 
 Nodes: 0-3 corners at zeta = -1 counter-clockwise from (-1, -1), 4-7 those at zeta = 1, 8-11 and 12-15 the middles of
 the edges after each corner at zeta = -1 and 1, 16-19 those of the edges along zeta: the order of C3D20 in CalculiX.
 
-The space of the element keeps itself under zeta -> a zeta + b. So an element that has lost a slice of its thickness is
-integrated over what is left with the shape functions it had: for a flat plate this is the thinner element exactly, and
-beside an uncut neighbour it is a step, still conforming. No node moves.
+The shape functions of the element span the same space under zeta -> a zeta + b. So an element that has lost a slice of
+its thickness is integrated over the rest with its first shape functions. For a flat plate this is the thinner element
+exactly; beside an uncut neighbour it is a step, still conforming. No node moves.
 
 Reference: [Zienkiewicz2005] ch. 4 to 6; the rule of 14 points is that of [Irons1971].
 """

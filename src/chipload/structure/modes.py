@@ -1,9 +1,9 @@
-"""How a workpiece sings: natural frequencies and shapes.
+"""Natural frequencies and mode shapes of a workpiece.
 
 Notation: K stiffness, M consistent mass over the free degrees of freedom; K x = w^2 M x, w [rad/s]; s shift [1/s^2].
 
-Lanczos on (K + s M)^-1 finds the lowest modes first; with s = 0 it uses the factors that the compliance has already. A
-part that nothing holds has six motions of no frequency, and needs s > 0.
+Lanczos on (K + s M)^-1 finds the lowest modes first; with s = 0 it uses the factors of the compliance. A free part has
+six rigid modes of frequency 0, and needs s > 0.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from chipload.structure.solid import Factored, SolidWorkpiece, assemble, assembl
 
 
 def modes(part: SolidWorkpiece | Factored, count: int, shift: float = 0.0) -> tuple[Array, Array]:
-    """Lowest natural frequencies and their shapes.
+    """Lowest natural frequencies and their mode shapes.
 
     One factorisation (none if ``part`` is factored and ``shift`` is 0), then about 3 ``count`` solutions.
 

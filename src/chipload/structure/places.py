@@ -1,4 +1,4 @@
-"""Where on the workpiece a force acts: a place in an element, found from a point or from a side.
+"""Places at which a force acts on the workpiece: a local place in an element, found from a point or from a side.
 
 Notation: (xi, eta, zeta) in [-1, 1]^3 local place in an element; N shape functions; x the point [mm].
 """
@@ -39,7 +39,7 @@ class MeshPlaces:
 
 
 def on_side(grid: Grid, side: str, u: ArrayLike, v: ArrayLike) -> MeshPlaces:
-    """Places of a side by how far along it they lie.
+    """Places of a side at the shares u, v of its two directions.
 
     Parameters
     ----------
@@ -164,7 +164,9 @@ def normals_of(grid: Grid, places: MeshPlaces, side: str) -> Array:
 
 
 def weights(grid: Grid, places: MeshPlaces) -> csr_array:
-    """Sparse (p, n): how a force at each place goes to the nodes, and how their motion moves the place."""
+    """Shape functions at the places, sparse (p, n): they carry a force at a place to its nodes, and the motion of the
+    nodes to the place.
+    """
     N = shape(places.local)
     rows = np.repeat(np.arange(len(places)), 20)
     out = csr_array((N.ravel(), (rows, grid.elements[places.element].ravel())), shape=(len(places), len(grid.nodes)))

@@ -1,10 +1,10 @@
-"""How far a measured tool tip gives way when the force is slow.
+"""Static compliance of a tool tip from its measured receptance.
 
 Notation: f [Hz]; H(f) complex receptance [mm/N]; w = 2 pi f; C static compliance [mm/N].
 
 Below the first resonance each mode adds c_k / (1 - (f / f_k)^2), so Re H = C + c_2 f^2 + c_4 f^4 + ...; C is the
-constant of that polynomial, fitted over a band. Accelerometers see little there: take the band where the
-coherence is good.
+constant of that polynomial, fitted over a band. Accelerometers measure little at low frequencies: choose a band with
+good coherence.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How far the workpiece gives way while it is cut: the factors of the start, corrected by a small dense system.
+"""Compliance of the workpiece while it is cut: the factors of the first state, corrected by a small dense system.
 
 Notation: f free degrees of freedom; K stiffness at the last factorisation (the base), K' = K + dK the present one.
 Elements that were cut since the base touch the degrees of freedom A, which belong to no other element, and B, which

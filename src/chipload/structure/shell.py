@@ -1,4 +1,4 @@
-"""How far a thin tube or cone gives way under the cutter, and how hard it is strained: a Fourier-Ritz shell.
+"""Deflection and stress of a thin tube or cone under the cutting force, by a Fourier-Ritz shell.
 
 Notation: s [mm] along the meridian from 0 to the length; theta round; r = r0 + s sin f the radius of the middle
 surface, f [rad] the half angle of the cone (f > 0: wider away from s = 0); t thickness; u, v, w displacements along s,
@@ -220,7 +220,7 @@ def compliance(
 
 
 def left_out(modes: Ritz, s: ArrayLike) -> Floats:
-    """What the harmonics and terms that were left out would add to the normal compliance under a point force [mm/N].
+    """Contribution of the omitted harmonics and terms to the normal compliance under a point force [mm/N].
 
     They are short waves, to which the wall is an infinite plate: [s (L - s) / terms^2 + r^2 / n_max^2] / (8 pi D). The
     first part is exact for many terms; near a free edge the second is too small by a factor of 2 to 3. The two
@@ -332,7 +332,7 @@ def greatest_stress(modes: Ritz, s_force: float, length: float, width: float, an
 
 @dataclass(frozen=True, eq=False)
 class Ovalisation:
-    """What each harmonic adds to the deflection under the force, and the shape of the loaded rim.
+    """Part of each harmonic in the deflection under the force, and the shape of the loaded rim.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How far a clamped workpiece gives way: one factorisation, then every force.
+"""Compliance of a clamped workpiece by finite elements: one factorisation for all forces.
 
 Notation: n nodes, K stiffness [N/mm] over the free degrees of freedom (3 node + c), f force [N], u displacement [mm],
 K u = f. N_p shape functions at a place p; compliance C_p = N_p K^-1 N_p^T (3, 3) [mm/N]; C_nn = normal . C_p normal.

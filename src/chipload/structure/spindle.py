@@ -1,14 +1,14 @@
-"""How far the tip gives way when holder and spindle bend too: a chain of bars and joints.
+"""Compliance of the tool tip with holder and spindle: a chain of bars and joints.
 
-Notation: z [mm] height above the tip; E I [N mm^2] of each bar, from the tip upwards; a joint at height z_j gives way
-by c_ff [mm/N] under a force, c_mm [rad/(N mm)] under a moment, c_fm [1/N] each under the other.
+Notation: z [mm] height above the tip; E I [N mm^2] of each bar, from the tip upwards; a joint at height z_j has the
+compliances c_ff [mm/N] under a force, c_mm [rad/(N mm)] under a moment, and c_fm [1/N] of each under the other.
 
 The chain is held at its end and statically determinate, so the joints add to the bending (unit load method):
 
     C(a, b) = integral from max(a, b) of (z - a)(z - b) / (E I) dz
               + sum over joints above both of c_ff + c_fm (z_j - a + z_j - b) + c_mm (z_j - a)(z_j - b).
 
-Shear is left out, as in :mod:`chipload.structure.beam`, with which a clamped cutter agrees to the last digits.
+Shear is left out, as in :mod:`chipload.structure.beam`; a clamped cutter agrees with that module to the last digits.
 
 Reference: [Altintas2012] ch. 2 and 4; [Schmitz2009] ch. 9 for the joint between cutter and holder.
 """
@@ -30,7 +30,7 @@ from chipload.structure.hexa import Array
 
 @dataclass(frozen=True)
 class Joint:
-    """What gives way between two bars: c_ff [mm/N], c_mm [rad/(N mm)], c_fm [1/N]; all 0: rigid.
+    """Compliances of a joint between two bars: c_ff [mm/N], c_mm [rad/(N mm)], c_fm [1/N]; all 0: rigid.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def cutter_bars(cutter: Cutter, joint: Joint = RIGID, fluted_factor: float | Non
 
 
 def tool_bars(cutter: Cutter) -> tuple[Bar, ...]:
-    """The cutter alone, or where its tip was measured with what the machine adds to it there.
+    """Bars of the cutter, and of what the machine adds at the tip where that was measured.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def tool_bars(cutter: Cutter) -> tuple[Bar, ...]:
 
 
 def as_measured(bars: tuple[Bar, ...], compliance: float) -> tuple[Bar, ...]:
-    """The chain with what a measured tip has more than it, e.g. by holder and spindle that it leaves out.
+    """The chain with the compliance that a measured tip has in addition, e.g. by holder and spindle.
 
     The difference goes into the last joint as a translation: right at the tip whatever it comes from; loads higher up
     are given as much of it, rather too much where holder and spindle tilt.

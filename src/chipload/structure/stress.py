@@ -1,10 +1,11 @@
-"""How strained a workpiece is by a force: equivalent stress in its elements.
+"""Equivalent stress in the elements of a workpiece under a force.
 
 Notation: u [mm] displacement of the nodes, g gradients of the shape functions at the points of integration,
 eps = sym(sum of u g^T), sigma = lambda tr(eps) 1 + 2 mu eps [MPa]; von Mises' sqrt(3/2 s : s), s the deviator of sigma.
 
-Points of integration lie inside the elements: in a plate of one layer the outermost at 0.775 of half the thickness, so
-that the stress is drawn out to its faces, by the parabola through the three points of each line through the thickness.
+Points of integration lie inside the elements: in a plate of one layer the outermost at 0.775 of half the thickness. The
+stress is therefore extrapolated to the faces, by the parabola through the three points of each line through the
+thickness.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How far places give way in one state of the removal.
+"""Compliance of places of a workpiece in one state of removal.
 
 Notation: as in :mod:`chipload.structure.removal`: A and B degrees of freedom of cut elements, W columns of K^-1,
 G = W at the rows B, M the correction; F forces, U = K^-1 F; d = 1 or 3 forces a place, p places, q = p d.
@@ -74,7 +74,7 @@ def watch(
 
 
 def alive(state: StructureRemoval, watched: UnitLoads) -> NDArray[np.bool_]:
-    """Which places still are on material, (p,) bool."""
+    """Whether each watched place is still on material, (p,) bool."""
     return _alive(state, watched.F, watched.own.shape[1])
 
 

@@ -1,8 +1,9 @@
-"""A thin tube or cone as a solid of hexahedra: the second opinion on :mod:`chipload.structure.shell`.
+"""A thin tube or cone as a solid of hexahedra, to check :mod:`chipload.structure.shell` by another method.
 
-Notation as there. Half the wall, theta from 0 to pi, is meshed; on both cuts the displacement along y is 0, so that
-loads that are even in theta are those of the whole. Elements are short near theta = 0, where the cutter is, and grow
-evenly from there; nothing of the shell's theory is in it: shear through the thickness and the thickness itself are.
+Notation as there. Half the wall, theta from 0 to pi, is meshed. On both cuts the displacement along y is 0, so loads
+that are even in theta are those of the whole. Elements are short near theta = 0, where the cutter is, and grow evenly
+from there. The solid uses nothing of the shell's theory; it includes shear through the thickness and the thickness
+itself.
 """
 
 from __future__ import annotations
@@ -93,7 +94,7 @@ def normal_compliance(wall: WallSolid, s_force: float, s_point: float, length: f
     s = s_force + 0.5 * length * np.repeat(ds[0], SPREAD[1])
     if not (s.min() >= 0.0 and s.max() <= shell.length):
         raise InputError(f"wall_solid: s = {s_force:g} mm with an area of {length:g} mm: must lie on the wall")
-    # the half of the area that is on this half of the wall bears half of the force
+    # the half of the area that is on this half of the wall takes half of the force
     round_ = 0.25 * width * (1.0 + np.tile(dt[0], SPREAD[0]))
     weight = 0.5 * np.outer(ds[1] / ds[1].sum(), dt[1] / dt[1].sum()).ravel()
     top = _place(shell, np.column_stack([round_ / shell.radius_at(s), s, np.full(len(s), 0.5 * shell.thickness)]))

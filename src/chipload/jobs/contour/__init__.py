@@ -1,4 +1,4 @@
-"""Jobs that plan contours and pockets in the plane, write the programs and check them."""
+"""Contour jobs: they plan contours and pockets in the plane, write the programs and check them."""
 
 from __future__ import annotations
 

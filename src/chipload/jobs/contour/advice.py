@@ -1,8 +1,8 @@
-"""The greatest engagement within all limits of a job (`engagement_deg = "limit"`).
+"""Greatest engagement within all limits of a job (`engagement_deg = "limit"`).
 
-The greatest engagement at which every stated limit and every default check holds at the feed, the speed and the depth
-of the operation, wherever on the front half of the rim the stock lies: at the wall, in the middle, at the other side.
-So a path that keeps the engagement keeps the limits.
+It is the greatest engagement at which every stated limit and every default check holds at the feed, the speed and the
+depth of the operation, wherever on the front half of the rim the stock lies: at the wall, in the middle, at the other
+side. So a path that keeps the engagement keeps the limits.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 Floats = NDArray[np.float64]
 
-#: engagements that are looked at [deg]: those that the planner takes
+#: range of the engagements [deg]: those that the planner takes
 LEAST_DEG, GREATEST_DEG = 2.0, 150.0
 #: places of the stock on the front half of the rim, from one wall to the other
 PLACES = 25
-#: engagements are looked at so far apart [deg], and the answer is found to the second
+#: spacing of the tested engagements [deg], and the accuracy of the answer
 APART_DEG, CLOSE_DEG = 2.0, 1e-3
 
 
@@ -52,7 +52,7 @@ def greatest_engagement(
     checks: DefaultChecks,
     rigid: tuple[float, float],
 ) -> EngagementAdvice:
-    """The greatest engagement at which every limit holds.
+    """Greatest engagement at which every limit holds.
 
     Raises
     ------

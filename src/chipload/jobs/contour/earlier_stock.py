@@ -29,7 +29,7 @@ def read_stock(path: Path) -> LayeredStock:
 
 
 def standing_between(stock: LayeredStock, floor: float, top: float, name: str) -> tuple[Contour, ...]:
-    """Closed contours of all that stands anywhere between two heights [mm].
+    """Closed contours of all material between two heights [mm].
 
     Raises
     ------
@@ -57,5 +57,5 @@ def standing_between(stock: LayeredStock, floor: float, top: float, name: str) -
 
 
 def stock_top(stock: LayeredStock) -> int:
-    """The highest layer that holds material."""
+    """Number of the highest layer that holds material."""
     return max(k for k in range(stock.layers) if stock.area(k) > 0.0)

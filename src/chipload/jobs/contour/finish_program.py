@@ -35,7 +35,7 @@ from chipload.simulation.centre_path import flat_motions
 
 #: motions are level and places are the same within this [mm]
 LEVEL_MM = 1e-6
-#: how far a level may come nearer than R to the wall of one above, the rounding of its text; places looked at [mm]
+#: how far a level may come nearer than R to the wall of one above, the rounding of its text; spacing of checks [mm]
 NEAR_MM, APART_MM = 2e-3, 0.1
 #: modes in which the inserted lines would mean something else
 _MODES = re.compile(r"(?<![A-Za-z_])[gG]\s*0*(20|70|91|90\.1|41|42|41\.1|42\.1|51|68|16)(?![\d.])")
@@ -182,7 +182,7 @@ def _labelled(path: Path, text: str, labels: Sequence[str]) -> list[tuple[int, i
 
 
 def flat_lengths(p: Program) -> NDArray[Any]:
-    """(n,) chord of every motion in the plane, or the length of a full turn [mm]."""
+    """Chord of every motion in the plane, or the length of a full turn, (n,) [mm]."""
     seg = flat_motions(p)
     chord = np.hypot(seg[:, 2] - seg[:, 0], seg[:, 3] - seg[:, 1])
     turn = np.abs(seg[:, 6]) * np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])

@@ -163,12 +163,12 @@ def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int,
 
 
 def left_on_walls(op: OperationTable) -> float:
-    """What a pocket leaves on its walls in the end [mm]."""
+    """Final allowance of a pocket on its walls [mm]."""
     return (op.allowance_mm or 0.0) if op.wall_finish is None else op.wall_finish.allowance_mm
 
 
 def depth_of(op: OperationTable, finished: bool = False) -> float:
-    """Depth that a pocket is cut to [mm], or that of its ``finished`` floor."""
+    """Depth of a pocket [mm], or that of its ``finished`` floor."""
     left = 0.0 if finished or op.floor_finish is not None else op.floor_allowance_mm or 0.0
     return (op.axial_depth_mm if op.depth_mm is None else op.depth_mm) - left
 

@@ -16,7 +16,7 @@ from chipload.result import Provenance, Verdict
 
 @dataclass(frozen=True)
 class PlanVerification:
-    """What the simulation, which knows no planner, finds of one strategy.
+    """Result of the independent simulation of one strategy.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class PlanVerification:
 
 @dataclass(frozen=True, eq=False)
 class Operation:
-    """One operation with what is needed to show it.
+    """One operation with the data that the report shows.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Operation:
 
 @dataclass(frozen=True, eq=False)
 class ContourResult:
-    """A whole run.
+    """Result of a whole run.
 
     Parameters
     ----------

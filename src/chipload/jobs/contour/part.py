@@ -18,7 +18,7 @@ from chipload.machine.machine import Machine
 
 
 def read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Contour, ...], tuple[Finding, ...]]:
-    """Contours of the drawing or of the planar face, those of the stock's outline, and what was noticed.
+    """Contours of the drawing or of the planar face, those of the stock's outline, and findings of the reader.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from chipload.report.programs import ENDINGS, program_name
 
 
 def program_files(outcome: ContourResult) -> dict[str, bytes]:
-    """Every program by file name: each strategy of each operation for the controller and as CL data."""
+    """All programs by file name: each strategy of each operation for the controller and as CL data."""
     out: dict[str, bytes] = {}
     ending = ENDINGS[outcome.machine.dialect]
     for k, op in enumerate(outcome.operations):

@@ -50,7 +50,7 @@ def track_name(outcome: ContourResult, operation: int, strategy: str) -> str:
 
 
 def history_of(op: Operation, strategy: StrategyResult) -> dict[str, NDArray[Any]]:
-    """(n,) columns of the history of a strategy, as the result keeps them."""
+    """Columns (n,) of the history of a strategy, as the result keeps them."""
     columns = dict(strategy.history)
     if "form_error_signed_um" in columns:
         columns["form_error_um"] = columns["form_error_signed_um"]
@@ -63,7 +63,7 @@ def history_of(op: Operation, strategy: StrategyResult) -> dict[str, NDArray[Any
 
 
 def limits_of(machine: Machine, op: Operation, strategy: StrategyResult, track: str) -> tuple[LimitCheck, ...]:
-    """Every limit of the job against a strategy, then those that are checked by default.
+    """Limit checks of a strategy: those of the job, then the default checks.
 
     The engagement counts with its greatest along each step.
     """
@@ -96,7 +96,7 @@ def takes_time(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
 
 
 def findings_of(op: Operation, name: str) -> tuple[Finding, ...]:
-    """What was found in a strategy: events of the planner, the machine, the simulation."""
+    """Findings of a strategy: events of the planner, the machine, the simulation."""
     strategy = op.result.strategies[name]
     out = [_event(e, op.top - op.depth) for e in strategy.events]
     out += op.machine_findings.get(name, ())
@@ -111,7 +111,7 @@ def findings_of(op: Operation, name: str) -> tuple[Finding, ...]:
 
 
 def failures_of(machine: Machine, op: Operation, name: str) -> tuple[str, ...]:
-    """What keeps a strategy from holding: findings and limits that exceed or are unproven, the worst first."""
+    """Reasons why a strategy does not hold: findings and limits that exceed or are unproven, the worst first."""
     checks = limits_of(machine, op, op.result.strategies[name], name)
     found = [(Verdict.of_finding(f), f.text) for f in findings_of(op, name)]
     found += [(c.state, c.text) for c in checks]

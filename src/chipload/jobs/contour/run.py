@@ -1,6 +1,6 @@
 """The run of a contour or pocket job: read the files, plan each operation, check each program by simulation.
 
-Nothing is written here: the outcome is a value, and the report room writes it.
+This module writes no file: the outcome is a value, and the report package writes it.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ VERDICTS = {"proved": Verdict.HOLDS, "failed": Verdict.EXCEEDS, "unproven": Verd
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """What a job names, read: contours and top of the stock [mm], machine, material, and what the readers noticed.
+    """Data of the files that a job names: contours and top of the stock [mm], machine, material, and findings of the
+    readers.
 
     Where the finish path is that of a program the contours are those of each of its levels.
     """
@@ -188,7 +189,7 @@ def run(job: ContourJob, progress: Progress = silent) -> ContourResult:
 
 
 def check(job: ContourJob) -> tuple[list[str], bool]:
-    """What the files of a job hold, and whether each operation can be planned; nothing is simulated.
+    """Contents of the files of a job, and whether each operation can be planned; nothing is simulated.
 
     Raises
     ------
@@ -397,7 +398,7 @@ def _setting(
 def verify(
     strategy: StrategyResult, op: OperationTable, cutter: Cutter, top: float, progress: Progress
 ) -> PlanVerification:
-    """Let the simulation, which knows no planner, hold the program of one strategy against its history.
+    """Compare the history of one strategy with a simulation of its program that is independent of the planner.
 
     The planner says in ``drawn`` what the program starts from (`stock before`, closed contours; a front starts in the
     solid) and the `wall`, whose travel has the part on its right.

@@ -1,4 +1,4 @@
-"""Tooth engagement of some steps of planned passes, from the arcs that the planner found."""
+"""Tooth engagement of some steps of planned passes, from the engaged arcs of the planner."""
 
 from __future__ import annotations
 

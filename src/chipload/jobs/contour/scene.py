@@ -1,4 +1,6 @@
-"""scene.glb: wall, stock, cutter and the paths coloured by engagement. Lengths are mm, Z is up, as the extras say."""
+"""The file scene.glb: wall, stock, cutter, and the paths coloured by engagement. Lengths are mm, Z is up, as the extras
+say.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ Floats = NDArray[np.float64]
 
 
 def scene_bytes(outcome: ContourResult) -> bytes:
-    """scene.glb."""
+    """The file scene.glb."""
     scene = trimesh.Scene()
     for k, op in enumerate(outcome.operations):
         _add(scene, f"{k}-", op)
@@ -28,7 +30,7 @@ def scene_bytes(outcome: ContourResult) -> bytes:
 
 
 def blanks_of(outcome: ContourResult) -> dict[str, Blank]:
-    """What each strategy begins with: the prism over its stock, or, where it begins in the solid, over a box."""
+    """Initial blank of each strategy: the prism over its stock, or, where it begins in the solid, over a box."""
     out = {}
     for k, op in enumerate(outcome.operations):
         for name, strategy in op.result.strategies.items():

@@ -1,7 +1,7 @@
 """Semi-finish passes as lines of a program: NC, conversational (Heidenhain), APT CL data.
 
-The lines begin and end where the old program stands behind its row k, at a safe height; what lasts beyond a line (feed,
-motion mode) is put back. Work offset, tool and spindle speed are those of the old program.
+The lines begin and end where the old program is after its row k, at a safe height; modes that last beyond a line (feed,
+motion mode) are restored. Work offset, tool and spindle speed are those of the old program.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def inserted_lines(dialect: Dialect, planned: Program, rows: Ints, p: Program, k
 
 
 def put_in(dialect: Dialect, old: Sequence[str], line: int, new: Sequence[str]) -> list[str]:
-    """The old lines with the new ones behind the line number ``line``; block numbers of conversational text go on.
+    """The old lines with the new ones after the line number ``line``; block numbers of conversational text continue.
 
     >>> put_in("heidenhain", ["0 BEGIN PGM A MM", "1 L Z+9", "2 END PGM A MM"], 2, ["L X+1"])
     ['0 BEGIN PGM A MM', '1 L Z+9', '2 L X+1', '3 END PGM A MM']

@@ -1,4 +1,4 @@
-"""Jobs that find the largest cutters of an impeller, plan its programs and check them."""
+"""Impeller jobs: they find the largest cutters of an impeller, plan its programs and check them."""
 
 from __future__ import annotations
 

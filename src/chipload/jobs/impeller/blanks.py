@@ -1,4 +1,4 @@
-"""What the programs of an impeller begin with, to be shown: the blank of their channel, the cutters with holders."""
+"""Initial blanks of impeller programs, for display: the blank of their channel, and the cutters with holders."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MODULUS = 2e5
 
 
 def blanks_of(milled: ImpellerResult) -> dict[str, Blank]:
-    """Of every program its cutter; of those of the partition that is milled the stock that those before it leave.
+    """Cutter of every program, and the blank before each program of the partition that is milled.
 
     Stock is shown where the job roughs the channel, and of the channel beside the blade.
     """

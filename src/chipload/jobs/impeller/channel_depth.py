@@ -1,7 +1,7 @@
-"""Whether a cutter is long enough for the channel, before anything is searched.
+"""Check before the search whether a cutter is long enough for the channel.
 
-Notation: a contact point lies d below the shroud, the least distance in the meridional plane. A cutter that touches it
-has its holder, which begins ``reach`` above its tip, within the shroud where reach < d; and a holder that is wider than
+Notation: a contact point lies d below the shroud, the least distance in the meridional plane. The holder of a cutter
+that touches it begins ``reach`` above its tip, and lies within the shroud where reach < d. A holder that is wider than
 the greatest distance of two blades, 2 r sin(pitch / 2) at the outer radius r, has no room there.
 """
 
@@ -23,7 +23,7 @@ POINTS = 1001
 
 
 def channel_depth(impeller: Impeller, contact: Floats) -> float:
-    """The greatest distance of contact points (n, 3) from the shroud [mm]; off by less than a step of its curve."""
+    """Greatest distance of contact points (n, 3) from the shroud [mm]; its error is less than a step of the curve."""
     curve = impeller.shroud.curve(np.linspace(0.0, 1.0, POINTS))
     place = np.column_stack([np.hypot(contact[:, 0], contact[:, 1]), contact[:, 2]])
     least = np.full(len(place), math.inf)
@@ -35,7 +35,7 @@ def channel_depth(impeller: Impeller, contact: Floats) -> float:
 
 
 def too_short(impeller: Impeller, catalogue: Catalogue, depth: float) -> tuple[CatalogueCutter, ...]:
-    """Cutters whose holder would have to be between the blades and is wider than any two are apart."""
+    """Cutters whose holder would have to be between the blades and is wider than the greatest distance of two."""
     radius = max(float(s.meridian[:, 0].max()) for s in (impeller.hub, impeller.shroud))
     gap = 2.0 * radius * math.sin(0.5 * impeller.pitch / (1 if impeller.splitter is None else 2))
     return tuple(

@@ -1,8 +1,8 @@
-"""All channels in one program: the same rows again and again, the pallet turned on by a pitch each time.
+"""One program for all channels: the same rows repeatedly, with the pallet turned by a pitch each time.
 
 Notation: B pallet angle of the part, q position of its axis, B = offset + sense q; pitch = 2 pi / blades. A program
-begins and ends above the safe height, whatever B is, so that the way from channel to channel is clear. As the walls of
-an impeller are the same after a turn by the pitch, the checks of one channel hold for all.
+begins and ends above the safe height at any B, so the motion from channel to channel is clear. As the walls of an
+impeller are the same after a turn by the pitch, the checks of one channel hold for all.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from chipload.program.to_axes import to_axes
 
 
 def channel_repeat(program: Program, machine: Machine, table: IndexTable, blades: int) -> Repeat | None:
-    """The loop over all channels; None: the pallet's axis has ends, and does not turn so far."""
+    """Loop over all channels; None: the pallet's axis has a limited range that is too small."""
     axis = machine.chain.axis(table.pallet)
     if math.isfinite(axis.low) or math.isfinite(axis.high):
         commands, _ = to_axes(program, machine)
@@ -33,7 +33,7 @@ def channel_repeat(program: Program, machine: Machine, table: IndexTable, blades
 
 
 def turned(program: Program, angle: float) -> Program:
-    """The program of a channel that lies further round the part by an angle [rad]."""
+    """Program of a channel that lies further round the part by an angle [rad]."""
     c, s = math.cos(angle), math.sin(angle)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     axis = program.axis @ R.T

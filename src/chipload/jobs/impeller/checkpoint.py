@@ -30,7 +30,7 @@ RECORDS = (
 
 
 class KeptParts(kept_parts.KeptRecords):
-    """Parts of a run by their keys; a :class:`chipload.planning.impeller.kept.Keep`."""
+    """Kept parts of a run by their keys; a :class:`chipload.planning.impeller.kept.Keep`."""
 
     def __init__(self, checkpoint: Checkpoint | None, key: str, team: Team | None = None) -> None:
         super().__init__(checkpoint, key, RECORDS, team)
@@ -42,5 +42,5 @@ def part_bytes(value: object) -> bytes:
 
 
 def read_part(data: bytes) -> Any:
-    """What :func:`part_bytes` wrote."""
+    """The part from the bytes of :func:`part_bytes`."""
     return kept_parts.read_part(data, RECORDS)

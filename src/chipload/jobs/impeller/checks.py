@@ -1,4 +1,4 @@
-"""The programs of an impeller on its page: what the independent check found in each."""
+"""Report sections of an impeller's programs: the results of the independent check of each."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROWS = 20_000
 
 
 def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> list[str]:
-    """The part of the page about programs; none where the job asks for none."""
+    """Report sections about programs; none where the job asks for none."""
     if milled.programs is None:
         return ["<h2>Programs</h2>", "<p>The job asks for none: state [operation.paths].</p>"]
     head = [
@@ -154,7 +154,7 @@ def _five_axis_cells(p: CheckedFlank | CheckedPoints) -> list[str]:
 
 
 def left_figure(covered: Covered) -> go.Figure:
-    """What is left on a surface, unrolled."""
+    """Excess on a surface, unrolled."""
     w = covered.left.wall
     u, v = w.u.reshape(w.shape)[:, 0], w.v.reshape(w.shape)[0]
     over = 2.0 * covered.asked
@@ -174,7 +174,7 @@ def left_figure(covered: Covered) -> go.Figure:
 
 
 def paths_figure(milled: ImpellerResult) -> go.Figure:
-    """The way of the tip in space, a colour a program; rapids in red."""
+    """Path of the tip in space, one colour for each program; rapids in red."""
     out = go.Figure()
     for op in milled.surfaces:
         f, q = grid_faces(*op.surface.shape), op.place.astype(np.float32)

@@ -1,7 +1,8 @@
-"""The largest cutter of single contact points at single table angles: diameter, corner radius, pallet angles.
+"""Tables of the largest cutter of single contact points at single table angles: diameter, corner radius, pallet angles.
 
-As the tables 1 to 3 of [Wu2019], which list contact points at 35, 45 and 55 deg. The diameter is the largest of the
-catalogue at that table angle that has a valid pallet angle at the check points; between them nothing is asked.
+They have the form of tables 1 to 3 of [Wu2019], which list contact points at 35, 45 and 55 deg. The diameter is the
+largest of the catalogue at that table angle that has a valid pallet angle at the check points; between them nothing is
+checked.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an impeller run will need, before it is run.
+"""Estimate of the contact points, passes and processor time of an impeller run.
 
 Measured (docs/design/impeller_paths.md, processor time of all cores): the search and the division of a contact point
 take 0.05 s on a KJ66, 0.06 s on the example, up to 0.4 s on HECC with necks and holders; the programs of one channel

@@ -1,4 +1,4 @@
-"""How the result of an impeller is presented: partitions, programs, and each surface with its map and its proof."""
+"""Presentation of an impeller result: partitions, programs, and each surface with its map and its proof."""
 
 from __future__ import annotations
 

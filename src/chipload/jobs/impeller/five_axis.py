@@ -1,4 +1,4 @@
-"""What flank passes and point milling on five axes share: the machine, the check of a program, all channels.
+"""Common parts of flank passes and point milling on five axes: the machine, the check of a program, all channels.
 
 Notation: q position of the axis that turns the part about the impeller's z, theta = sense q; pitch = 2 pi / blades.
 """
@@ -35,7 +35,7 @@ from chipload.simulation.channel.gouges import Gouge
 
 Floats = NDArray[np.float64]
 
-#: distance of the points of a surface on which what is left is measured [mm]
+#: distance of the points of a surface on which the excess is measured [mm]
 _SPACING = 0.6
 #: by which axis positions may differ at the end of a channel and at the beginning of the next [mm, rad]
 _SAME = 1e-6
@@ -64,7 +64,7 @@ def five_axis_machine(source: str | Path | None, key: str) -> Machine:
 
 @dataclass(frozen=True, eq=False)
 class ProgramCheck:
-    """What the check finds of a program: gouge, what is left, what the machine does not give, time [s]."""
+    """Result of the check of a program: gouge, excess, findings on the machine's limits, time [s]."""
 
     gouge: Gouge
     left: Remainder
@@ -76,7 +76,7 @@ def program_check(
     how: FinishSettings, side: SurfaceTable, machine: Machine, cutter: CatalogueCutter, program: Program,
     paths: PathsTable, points: SurfacePoints | None = None, keep: Keep = anew,
 ) -> ProgramCheck:  # fmt: skip
-    """The check of a program of a surface, as of every program; ``points`` of the surface, None: evenly over it."""
+    """Check of a program of a surface; ``points`` of the surface, None: evenly over it."""
     at = surface_points(how, side) if points is None else points
     depth = ray_depth(how.impeller, EDGE, paths.gouge_mm)
     left = left_by(how, [at], program, cutter, depth, keep)[0]
@@ -121,9 +121,9 @@ def part_axis(machine: Machine) -> tuple[str, int] | None:
 
 
 def all_channels(program: Program, machine: Machine, blades: int) -> AllChannels | str:
-    """The program of one channel for all of them: in a loop, else row by row; a text where neither can be.
+    """Program of all channels from that of one: as a loop, else row by row; a text where neither is possible.
 
-    The program ends above the beginning of the next channel, so that there are no other ways than those of its rows.
+    The program ends above the beginning of the next channel, so it has no other motions than those of its rows.
     """
     commands, _ = to_axes(program, machine)
     q, about = commands.position, part_axis(machine)

@@ -1,4 +1,4 @@
-"""What flank passes and point milling on five axes come to: program, what the check finds, or why there is none."""
+"""Outcome of flank passes and point milling on five axes: the checked program, or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class AllChannels:
 
 @dataclass(frozen=True, eq=False)
 class FiveAxisProgram:
-    """The program of a surface with what the check finds.
+    """Program of a surface with the result of its check.
 
     Parameters
     ----------
@@ -65,12 +65,12 @@ class FiveAxisProgram:
 
     @property
     def excess(self) -> float:
-        """The most that is left on the surface [mm]."""
+        """Greatest excess on the surface [mm]."""
         return float(self.left.rest.max())
 
     @property
     def fails(self) -> tuple[str, ...]:
-        """What does not hold."""
+        """Conditions that do not hold."""
         out = [f"{self.name}: {f}" for f in self.findings]
         if self.gouge.bound > self.allowed:
             out.append(f"{self.name}: {self.gouge.message}: gouge_mm = {self.allowed:g} is allowed")
@@ -80,7 +80,7 @@ class FiveAxisProgram:
 
     @property
     def verified(self) -> bool:
-        """No gouge, nothing beyond the machine, no more left than is allowed."""
+        """Whether there is no gouge, no excess above the allowed one, and no motion beyond the machine."""
         return not self.fails
 
 
@@ -92,12 +92,12 @@ class CheckedFlank(FiveAxisProgram):
 
     @property
     def deviation(self) -> float:
-        """The greatest of all passes [mm]."""
+        """Greatest deviation of all passes [mm]."""
         return max(p.deviation for p in self.passes)
 
     @property
     def length(self) -> float:
-        """Of the path in the cut [mm]."""
+        """Length of the path in the cut [mm]."""
         return math.fsum(p.length for p in self.passes)
 
 
@@ -122,13 +122,13 @@ class CheckedPoints(FiveAxisProgram):
 
     @property
     def length(self) -> float:
-        """Of the path in the cut [mm]."""
+        """Length of the path in the cut [mm]."""
         return self.path.length
 
 
 @dataclass(frozen=True)
 class NoFiveAxisPath:
-    """A surface that no cutter of the catalogue mills so, and why."""
+    """A surface that no cutter of the catalogue mills on five axes, and the reason."""
 
     name: str
     reason: str

@@ -1,7 +1,7 @@
 """Flank passes of the sides of an impeller, on a machine with five simultaneous axes: planned, written, checked.
 
-They stand beside the programs of the index table: the same sides, each in one pass, with the largest cutter of the
-catalogue that is clear of all walls and keeps the deviation.
+They are an addition to the programs of the index table: the same sides, each in one pass, with the largest cutter of
+the catalogue that is clear of all walls and keeps the deviation.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 Floats = NDArray[np.float64]
 
-#: of the gouge that is allowed: what the plan may use
+#: share of the allowed gouge that the plan may use
 _SHARE = 0.8
-#: a cutter that comes deeper into a wall beside the two offset points than this over the gouge is not looked at [mm]
+#: a cutter that comes deeper into a wall beside the two offset points than this over the gouge is not tried [mm]
 _ROUGHLY = 0.5
 #: how often a pass is made longer so that it reaches its ends at all heights
 _LONGER = 3
@@ -45,7 +45,7 @@ SIDES = ("plus", "minus")
 def checked_flanks(
     job: ImpellerJob, how: FinishSettings, catalogue: Catalogue, progress: Progress = silent, keep: Keep = anew
 ) -> tuple[CheckedFlank | NoFiveAxisPath, ...]:
-    """A flank pass for each side that the job names."""
+    """Flank passes of each side that the job names, with their check."""
     op, impeller = job.operation, how.impeller
     table, paths = op.flank, op.paths
     if table is None or paths is None:

@@ -1,4 +1,4 @@
-"""What the finishing feeds of a job are found with: force coefficients, and the cutters as bars with teeth."""
+"""Data for the finishing feeds of a job: force coefficients, and the cutters as bars with teeth."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 
 def force_terms(job: ImpellerJob, catalogue: Catalogue) -> ForceTerms | None:
-    """What feeds are found with; None: the job does not ask for it.
+    """Data from which feeds are calculated; None: the job does not ask for it.
 
     Raises
     ------
@@ -40,6 +40,6 @@ def force_terms(job: ImpellerJob, catalogue: Catalogue) -> ForceTerms | None:
 
 
 def cutter_feeds(job: ImpellerJob, catalogue: Catalogue, terms: ForceTerms | None) -> float | tuple[float, ...]:
-    """Feed of every cutter by which cutters are compared before there are paths [mm/s]."""
+    """Feed of every cutter [mm/s], with which cutters are compared before paths are planned."""
     feed = mm_s_from_mm_min(job.operation.feed_mm_min)
     return feed if terms is None else nominal_feeds(catalogue, terms, job.operation.scallop_mm, feed)

@@ -1,4 +1,4 @@
-"""A job that mills an impeller: its tables checked against one another, its files found."""
+"""An impeller job: checks of its tables against one another, and the paths of its files."""
 
 from __future__ import annotations
 
@@ -108,12 +108,12 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
 
 
 def resume_note(job: ImpellerJob) -> str:
-    """What is not kept while the job runs: nothing that takes long."""
+    """Note on the part of the work that is not kept while the job runs: nothing that takes long."""
     return ""
 
 
 def missing(values: Mapping[str, Any]) -> list[str]:
-    """What a part lacks or has twice; ``values`` are those of the file."""
+    """Keys that a part lacks or has twice; ``values`` are those of the file."""
     part = values.get("impeller")
     if not isinstance(part, Mapping):
         return []

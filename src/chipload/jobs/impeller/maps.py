@@ -1,4 +1,4 @@
-"""Surface maps of an impeller: the largest cutter and its table angle, and what all programs leave."""
+"""Surface maps of an impeller: the largest cutter, its table angle, and the excess after all programs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from chipload.result import SurfaceMap
 
 
 def maps_of(milled: ImpellerResult) -> tuple[SurfaceMap, ...]:
-    """Of each surface its largest diameter and table angle, and, where there are programs, the material left on it."""
+    """Maps of each surface: its largest diameter and table angle, and, where there are programs, the excess."""
     out = []
     for op in milled.surfaces:
         points, faces = surface_mesh(op)

@@ -1,4 +1,4 @@
-"""The surfaces and bodies of an impeller as triangles."""
+"""Triangle meshes of the surfaces and bodies of an impeller."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ def program_name(milled: ImpellerResult, k: int) -> str:
 
 
 def finish_names(milled: ImpellerResult) -> list[tuple[str, Checked]]:
-    """File names of the finishing programs without their endings: of the way that is milled, then of all others."""
+    """File names of the finishing programs without endings: of the partition that is milled, then of all others."""
     used = milled.used_checked
     out = [(program_name(milled, k), p) for k, p in enumerate(milled.programs or (), 1)]
     for way in milled.checked or ():
@@ -54,7 +54,7 @@ def _five_axis_name(kind: str, k: int, p: FiveAxisProgram) -> str:
 
 
 def stem_of(way: CheckedPartition) -> str:
-    """What the file names of a way that is not milled begin with."""
+    """Start of the file names of a partition that is not milled."""
     return f"way-{way.name.replace(' ', '-')}"
 
 

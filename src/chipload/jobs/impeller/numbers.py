@@ -1,4 +1,4 @@
-"""The numbers of an impeller in summary.json: surfaces, partitions, programs, roughing, what is left."""
+"""Numbers of an impeller in summary.json: surfaces, partitions, programs, roughing, excess."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from chipload.units import mm_min_from_mm_s
 
 
 def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
-    """All surfaces together, then each."""
+    """Numbers of all surfaces together, then of each."""
     rows = [surface(op) for op in milled.surfaces]
     used, picked = milled.used, milled.picked
     return {
@@ -48,7 +48,7 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
 
 
 def partition_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
-    """A way to mill all surfaces; path and time are of all channels."""
+    """Numbers of a partition of all surfaces; path and time are of all channels."""
     d = way.divided
     head = {"name": way.name, "reached_share": way.share}
     if d is None:
@@ -68,7 +68,7 @@ def partition_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
 
 
 def checked_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
-    """A way with the numbers of its checked programs; path and times are of all channels, without roughing.
+    """Numbers of a partition with checked programs; path and times are of all channels, without roughing.
 
     Without programs they are those that the contact points predict, and there is no verdict.
     """
@@ -259,7 +259,7 @@ def _one(op: Searched, one: tuple[CatalogueCutter, int] | None) -> dict[str, Any
 
 
 def surface(op: Searched) -> dict[str, Any]:
-    """One surface."""
+    """Numbers of one surface."""
     answer, area = op.answer, op.surface.area
     return {
         "surface": op.surface.name,

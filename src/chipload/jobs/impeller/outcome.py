@@ -1,4 +1,4 @@
-"""What a job that mills an impeller hands to the report, and the verdict over it."""
+"""Outcome of an impeller job, and its verdict."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from chipload.simulation.channel.gouges import Gouge
 
 Floats = NDArray[np.float64]
 
-#: name of the way of the cutter picked by hand
+#: name of the partition with the hand-picked cutter
 PICKED = "hand-picked"
 #: why a contact point is not reached, in words
 REASONS: Mapping[str, str] = {
@@ -61,7 +61,7 @@ class OneCutter:
 
 @dataclass(frozen=True, eq=False)
 class Searched:
-    """One surface with what was found.
+    """One surface with the results of its search.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class Searched:
 
     @cached_property
     def limiting(self) -> tuple[Limiting, ...]:
-        """For each corner radius and table angle what keeps one cutter from being larger."""
+        """For each corner radius and table angle the contact point and cutter that limit one cutter for the surface."""
         out = []
         reached = np.flatnonzero(self.answer.cutter >= 0)
         for f in self.answer.families if len(reached) else ():
@@ -110,7 +110,7 @@ class Searched:
 
 @dataclass(frozen=True)
 class Limiting:
-    """What keeps one cutter for a whole surface from being larger at a table angle.
+    """Limit of one cutter for a whole surface at a table angle, and its cause.
 
     Parameters
     ----------
@@ -136,8 +136,8 @@ class Limiting:
 
 @dataclass(frozen=True)
 class Scallop:
-    """What the check measures on a patch: ``asked``, greatest rest between two passes, mean height of the scallops
-    [mm], how many there are, the share of the patch on which no more than asked is left.
+    """Scallops that the check measures on a patch: ``asked``, greatest excess between two passes, mean height of the
+    scallops [mm], their number, and the share of the patch with no more excess than asked.
     """
 
     asked: float
@@ -148,13 +148,13 @@ class Scallop:
 
     @property
     def holds(self) -> bool:
-        """Whether nothing between two passes is higher than asked."""
+        """Whether no scallop between two passes is higher than asked."""
         return self.greatest <= self.asked
 
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """A program of one setting with what the simulation found.
+    """A program of one setting with the results of its simulation.
 
     Parameters
     ----------
@@ -181,12 +181,12 @@ class Checked:
 
     @property
     def verified(self) -> bool:
-        """No gouge, nothing beyond the machine, no scallop higher than asked, no cutter overloaded."""
+        """Whether there is no gouge, no motion beyond the machine, no scallop above the aim, no overloaded cutter."""
         return not self.fails
 
     @property
     def missed(self) -> float:
-        """Length of lines that are not milled as they were laid out [mm]; rest passes may have done it."""
+        """Length of lines that are not milled as laid out [mm]; rest passes may have milled it."""
         own = math.fsum(x.length for m in self.setting.millings for x in m.tracks.missed)
         return own + math.fsum(self.setting.tracks[k].length for k, _ in self.setting.linked.refused)
 
@@ -198,7 +198,7 @@ class Checked:
 
     @property
     def fails(self) -> tuple[str, ...]:
-        """What does not hold."""
+        """Conditions that do not hold."""
         out = [f"{self.name}: {f}" for f in self.findings]
         if self.gouge.bound > self.allowed:
             out.append(f"{self.name}: {self.gouge.message}: gouge_mm = {self.allowed:g} is allowed")
@@ -217,7 +217,7 @@ class Checked:
 
 @dataclass(frozen=True, eq=False)
 class Covered:
-    """What all programs together leave on a surface, as far as its patches go.
+    """Excess that all programs together leave on a surface, within its patches.
 
     Parameters
     ----------
@@ -242,18 +242,18 @@ class Covered:
 
     @property
     def share(self) -> float:
-        """Of the area, where no more than asked is left."""
+        """Share of the area with no more excess than asked."""
         return 1.0 - self.left.excess(self.asked)
 
     @property
     def greatest(self) -> tuple[float, int]:
-        """Most that is left [mm], at most the height of the rays, and its point."""
+        """Greatest excess [mm], at most the height of the rays, and its point."""
         k = int(self.left.rest.argmax())
         return float(self.left.rest[k]), k
 
     @property
     def fails(self) -> tuple[str, ...]:
-        """What does not hold."""
+        """Conditions that do not hold."""
         most, k = self.greatest
         if most <= self.asked:
             return ()
@@ -270,7 +270,7 @@ class Covered:
 
 @dataclass(frozen=True, eq=False)
 class CheckedPartition:
-    """A way to mill all surfaces with its programs, checked. Times and paths are of all channels, without roughing.
+    """A partition of all surfaces with its checked programs. Times and paths are of all channels, without roughing.
 
     Parameters
     ----------
@@ -296,12 +296,12 @@ class CheckedPartition:
 
     @property
     def cutters(self) -> tuple[CatalogueCutter, ...]:
-        """Every cutter of the programs once, with those of rest passes."""
+        """All cutters of the programs, each once, with those of rest passes."""
         return tuple(dict.fromkeys(p.setting.cutter for p in self.programs))
 
     @property
     def path(self) -> float:
-        """In the cut [mm]."""
+        """Length of the path in the cut [mm]."""
         return self.blades * math.fsum(p.setting.length for p in self.programs)
 
     @property
@@ -317,17 +317,17 @@ class CheckedPartition:
 
     @property
     def seconds(self) -> float:
-        """Time of all [s]."""
+        """Total time [s]."""
         return self.cutting + self.links + self.changes
 
     @property
     def fails(self) -> tuple[str, ...]:
-        """What does not hold."""
+        """Conditions that do not hold."""
         return (*(f for p in self.programs for f in p.fails), *(f for c in self.covered for f in c.fails))
 
     @property
     def verified(self) -> bool:
-        """Every program holds, and together they leave no more than asked."""
+        """Whether every program holds, and together they leave no more excess than asked."""
         return not self.fails
 
     @property
@@ -340,8 +340,8 @@ class CheckedPartition:
 
 @dataclass(frozen=True, eq=False)
 class StatedJob:
-    """What the job states: its title, the keys of its operation, the outer diameter [mm], how far the hub goes on
-    ahead of the blade's leading edge [mm].
+    """Values that the job states: its title, the keys of its operation, the outer diameter [mm], and the length of the
+    hub ahead of the blade's leading edge [mm].
     """
 
     title: str
@@ -352,7 +352,7 @@ class StatedJob:
 
 @dataclass(frozen=True, eq=False)
 class ImpellerResult:
-    """A whole run.
+    """Result of a whole run.
 
     Parameters
     ----------
@@ -387,23 +387,23 @@ class ImpellerResult:
 
     @property
     def not_on_five_axes(self) -> tuple[str, ...]:
-        """Why surfaces are not milled on five axes though the job asks for it."""
+        """Reasons why surfaces are not milled on five axes though the job asks for it."""
         return tuple(p.reason for p in (*(self.flanks or ()), *(self.points or ())) if isinstance(p, NoFiveAxisPath))
 
     @property
     def picked(self) -> Partition | None:
-        """The way of the cutter picked by hand."""
+        """Partition with the hand-picked cutter."""
         return next((way for way in self.partitions if way.name == PICKED), None)
 
     @property
     def used_checked(self) -> CheckedPartition | None:
-        """The way that is milled: of those that hold, or else of all, the one whose programs take the least time."""
+        """Partition that is milled: of those that hold, or else of all, the one with the least program time."""
         able = [w for w in self.checked or () if w.name != PICKED]
         return min(able, key=lambda w: (not w.verified, w.seconds), default=None)
 
     @property
     def used(self) -> Partition | None:
-        """The way that is milled; without programs that with the least predicted time; None: nothing mills all.
+        """Partition that is milled; without programs the one with the least predicted time; None: none mills all.
 
         Of equal ones that with fewer cutters.
         """
@@ -414,22 +414,22 @@ class ImpellerResult:
 
     @property
     def programs(self) -> tuple[Checked, ...] | None:
-        """Finishing programs of the way that is milled; None: the job asks for none."""
+        """Finishing programs of the partition that is milled; None: the job asks for none."""
         return None if self.used_checked is None else self.used_checked.programs
 
     @property
     def covered(self) -> tuple[Covered, ...] | None:
-        """What these programs leave on each surface."""
+        """Excess that these programs leave on each surface."""
         return None if self.used_checked is None else self.used_checked.covered
 
     @property
     def tolerance(self) -> float | None:
-        """How deep a wall may lie in a certified cutter [mm]; None: nothing is certified between check points."""
+        """Greatest depth of a wall in a certified cutter [mm]; None: nothing is certified between check points."""
         return self.surfaces[0].answer.tolerance
 
     @property
     def area(self) -> float:
-        """Of all surfaces [mm^2], one channel."""
+        """Area of all surfaces [mm^2], one channel."""
         return float(sum(op.surface.area.sum() for op in self.surfaces))
 
     def searched(self, patch: Patch) -> Searched:
@@ -448,7 +448,7 @@ def unreached_text(op: Searched, missed: Unreachable) -> str:
 
 
 def unmilled(milled: ImpellerResult) -> tuple[str, ...]:
-    """What the patches leave open."""
+    """Messages: the partition does not mill all that can be reached, or ranges of pallet angles are undecided."""
     if milled.used is None:
         return (f"{milled.partitions[-1].name} of the catalogue do not mill all that can be reached",)
     divided = milled.used.divided

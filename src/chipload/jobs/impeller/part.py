@@ -1,4 +1,4 @@
-"""The impeller of a job: by formula, through sections of points, or from faces of a STEP file.
+"""Part of an impeller job: by formula, through sections of points, or from faces of a STEP file.
 
 Notation: see ``planning/impeller/impeller.py``; z axis of rotation, the flow comes in against it.
 """
@@ -43,7 +43,7 @@ AGAINST_Z |= {key.replace("-", "+"): _OVER @ R for key, R in AGAINST_Z.items()}
 
 @dataclass(frozen=True, eq=False)
 class ImpellerPart:
-    """An impeller, and what its faces became and its fillets take, a line each."""
+    """An impeller, and a line on each face that was read and on each side with fillets."""
 
     impeller: Impeller
     faces: tuple[str, ...] = ()

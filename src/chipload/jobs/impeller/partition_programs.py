@@ -1,9 +1,9 @@
-"""Every way with its programs: divided, planned, timed, divided again by what the programs take, and checked.
+"""Partitions with their programs: divided, planned, timed, divided again by the program times, and checked.
 
-Notation: a way is one set of cutters, as in ``planning/impeller/compare.py``. Contact points predict the time of a
-patch from the step-over alone. What its program takes on the machine, with links and rest passes, over what they
-predict is a factor of its surface, order of strips, cutter and table angle; divided again with these factors, the way
-is chosen by the time that programs take. Of all rounds the quickest is kept.
+Notation: a partition is for one set of cutters, as in ``planning/impeller/compare.py``. Contact points predict the time
+of a patch from the step-over alone. The time of its program on the machine, with links and rest passes, over that
+prediction is a factor of its surface, order of strips, cutter and table angle. Divided again with these factors, the
+partition is chosen by program time. Of all rounds the quickest is kept.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from chipload.planning.impeller.settings import (
 from chipload.program.read import times_on
 from chipload.progress import Progress
 
-#: how often ways are divided at most
+#: greatest number of divisions of a partition
 _ROUNDS = 2
 #: where the check finds more than asked on a patch or surface, what is left is counted on points so many times closer
 #: together and planned again; not for those where it finds more than this share of what is asked: there no cutter goes
@@ -44,7 +44,7 @@ _FINER, _NEARLY = (0.5, 0.25), 1.25
 
 @dataclass(frozen=True, eq=False)
 class _Planned:
-    """A way that is planned: its division, what it was chosen by [s], its settings, their time of all channels [s]."""
+    """A planned partition: its division, its predicted time [s], its settings, their time of all channels [s]."""
 
     partition: Partition
     predicted: float
@@ -54,7 +54,7 @@ class _Planned:
 
 @dataclass(eq=False)
 class _Memory:
-    """What ways share: planned millings, row times and checks of the same programs."""
+    """Shared results of all partitions: planned millings, row times and checks of the same programs."""
 
     millings: dict[MillingKey, Milling] = field(default_factory=dict)
     checks: dict[str, tuple[tuple[Checked, ...], tuple[Covered, ...]]] = field(default_factory=dict)
@@ -69,7 +69,7 @@ def checked_partitions(
     progress: Progress,
     keep: Keep = anew,
 ) -> tuple[CheckedPartition, ...]:
-    """Each way that mills all, with the programs of its best round.
+    """Each partition that mills all, with the programs of its best round.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How the surfaces are divided: patches over each surface, and one, two, three cutters side by side."""
+"""Report sections of the partitions: patches over each surface, and one, two, three cutters in comparison."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from chipload.result.style import FONT, GRID
 
 Ints = NDArray[np.int64]
 
-#: colours of the cutters of a way; lighter for the second table angle, lighter still for the third
+#: colours of the cutters of a partition; lighter for the second table angle, lighter still for the third
 COLOURS = ("#3457a6", "#c9821a", "#0b7a75", "#8a4f9e", "#5b8c2a", "#a8793a")
 #: shades of one cutter, by table angle
 SHADES = 5
 
 
 def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> list[str]:
-    """The part of the page about all surfaces: which way, its patches."""
+    """Report sections about all surfaces: the partition that is milled, and its patches."""
     out = [
         "<h2>One cutter, two, three</h2>",
         '<p class="note">All channels; path and feed time of the contact points at the stated scallop, with changes of '
@@ -96,7 +96,7 @@ def _compared(milled: ImpellerResult) -> str:
 
 
 def _programmed(milled: ImpellerResult) -> str:
-    """What the programs of each way take."""
+    """Table of the programs of each partition."""
     rows = [
         [
             escape(w.name), ", ".join(f"D {c.diameter:g} r {c.corner_radius:g}" for c in w.cutters), f"{w.path:.0f}",
@@ -113,7 +113,7 @@ def _programmed(milled: ImpellerResult) -> str:
 
 
 def partitions_figure(milled: ImpellerResult) -> go.Figure:
-    """Time of each way: milling, changes; its least time as a line."""
+    """Time of each partition: milling, changes; its least time as a line."""
     able = [(way, way.divided) for way in milled.partitions if way.divided is not None]
     names = [way.name for way, _ in able]
     out = go.Figure()
@@ -142,7 +142,7 @@ def partitions_figure(milled: ImpellerResult) -> go.Figure:
 
 
 def patch_grid(milled: ImpellerResult, way: Partition, op: Searched) -> Ints:
-    """(a, b) number of the patch of each contact point of a surface; -1: none."""
+    """Number of the patch of each contact point of a surface, (a, b); -1: none."""
     out = np.full(op.surface.shape, -1, dtype=np.int64)
     for n, p in enumerate(way.divided.patches if way.divided is not None else ()):
         if milled.searched(p) is op:

@@ -1,4 +1,4 @@
-"""The finishing programs of an impeller: planned patch by patch, then checked by the simulation of the channel."""
+"""Finishing programs of an impeller: planned patch by patch, then checked by the simulation of the channel."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 _LEAD = 1.0
 #: of the gouge that is allowed, how near its depth is found
 _RESOLUTION = 0.2
-#: points of the walls by which their cells are laid out, and where roughing is looked at, along and up
+#: points of the walls by which their cells are laid out, and where roughing is checked, along and up
 _COARSE = (61, 25)
 #: not at the very edges of a blade: there a ray into the metal leaves it again
 EDGE = 0.01
 #: how far the rays go above a surface [mm]
 _HEIGHT = 1.0
-#: distance of points of a whole surface on which what is left is measured [mm]
+#: distance of points of a whole surface on which the excess is measured [mm]
 _SPACING = 0.6
 #: grid lines across the passes of a patch on which the scallop is measured, points between two passes
 _FEW, _BETWEEN = 7, 14
@@ -59,7 +59,7 @@ def finish_settings(
     paths: PathsTable, ahead: float, tools: int, workers: int, covering: Covering | None = None,
     forces: ForceTerms | None = None,
 ) -> FinishSettings:  # fmt: skip
-    """What the finishing programs of a job are planned with.
+    """Parameters with which the finishing programs of a job are planned.
 
     ``tools`` : how many tool numbers are taken; ``covering`` : of the walls between check points; ``forces`` : by which
     passes are fed, None: all alike.
@@ -85,7 +85,7 @@ def finish_settings(
 def checked_programs(
     job: FinishSettings, machine: Machine, plan: PlannedSettings, paths: PathsTable, keep: Keep = anew
 ) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:
-    """A program for each setting with what the check finds; what all of them leave on each surface."""
+    """A program for each setting with the result of its check; the excess of all of them on each surface."""
     impeller, asked, settings = job.impeller, job.how.scallop, plan.settings
     millings = [m for s in settings for m in s.millings]
     faces = list(dict.fromkeys((m.patch.body, m.patch.side) for m in millings))
@@ -128,7 +128,7 @@ def left_by(
     job: FinishSettings, walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float,
     keep: Keep = anew,
 ) -> tuple[Remainder, ...]:  # fmt: skip
-    """What a program leaves on each wall."""
+    """Excess that a program leaves on each wall."""
     got = _left_task(walls, program, cutter, depth).of(job, keep)
     return tuple(
         Remainder(w, rest, gouge, row, part, _HEIGHT, depth)
@@ -152,7 +152,7 @@ def gouge_by(
     job: FinishSettings, walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float,
     allowed: float, keep: Keep = anew,
 ) -> Gouge:  # fmt: skip
-    """The deepest gouge of a program."""
+    """Deepest gouge of a program."""
     found: Gouge = _gouge_task(walls, program, cutter, depth, allowed).of(job, keep)
     return found
 
@@ -171,12 +171,12 @@ def _deepest(
 
 
 def in_cut(program: Program) -> NDArray[np.bool_]:
-    """(n,) rows of tracks: neither leads nor links."""
+    """Rows of tracks, (n,) bool: neither leads nor links."""
     return np.array([name == "finish" for name in program.labels])[program.label]
 
 
 def _whole(job: FinishSettings, body: int, side: str, millings: Sequence[Milling]) -> SurfacePoints:
-    """Points of a surface as far as its patches go."""
+    """Points of a surface within its patches."""
     surface = job.surface(body, side)
     boxes = np.array([m.box for m in millings if (m.patch.body, m.patch.side) == (body, side)])
     low, high = boxes[:, :, 0].min(axis=0), boxes[:, :, 1].max(axis=0)

@@ -1,7 +1,7 @@
 """Point milling of the surfaces of an impeller on five simultaneous axes: planned, written, checked.
 
-It stands beside the programs of the index table: the same surfaces, each in one path with a smooth axis, with the
-cutter of the catalogue whose path is the shortest of those that reach all of it.
+It is an addition to the programs of the index table: the same surfaces, each in one path with a smooth axis. The cutter
+is that of the catalogue with the shortest path, of those that reach the whole surface.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _FINE = 0.25
 
 @dataclass(frozen=True, eq=False)
 class PlannedPoints:
-    """The path of a surface: the cutter, `u` or `v` along which its lines run, with its lifts, without."""
+    """Path of a surface: the cutter, `u` or `v` along which its lines run, and the path with and without its lifts."""
 
     cutter: CatalogueCutter
     along: str
@@ -60,7 +60,7 @@ class PlannedPoints:
 def checked_points(
     job: ImpellerJob, how: FinishSettings, catalogue: Catalogue, progress: Progress = silent, keep: Keep = anew
 ) -> tuple[CheckedPoints | NoFiveAxisPath, ...]:
-    """Point milling of each surface that the job names."""
+    """Point milling of each surface that the job names, with its check."""
     op, impeller = job.operation, how.impeller
     table, paths = op.point_milling, op.paths
     if table is None or paths is None:

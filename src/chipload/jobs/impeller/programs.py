@@ -1,4 +1,4 @@
-"""Files of an impeller: the proof, the contact points, and a program for each cutter at each table angle."""
+"""Output files of an impeller: the proof, the contact points, and a program for each cutter at each table angle."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from chipload.report.programs import ENDINGS
 
 
 def program_files(milled: ImpellerResult) -> dict[str, bytes]:
-    """Every further file by name."""
+    """All further files by name."""
     out = {"proof.npz": proof_bytes(milled), "contact_points.parquet": contact_points_bytes(milled)}
     for stem, cutter, table, checked, program, empty in _programs(milled):
         if empty:

@@ -1,4 +1,6 @@
-"""contact_points.parquet and proof.npz: the largest cutter at each contact point, and what proves that bound."""
+"""The files contact_points.parquet and proof.npz: the largest cutter at each contact point, and the proof of that
+bound.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ from chipload.jobs.impeller.outcome import ImpellerResult
 
 
 def contact_points_bytes(milled: ImpellerResult) -> bytes:
-    """contact_points.parquet: a row a contact point."""
+    """The file contact_points.parquet: one row for each contact point."""
     tables = []
     for op in milled.surfaces:
         s, answer = op.surface.scene, op.answer
@@ -47,7 +49,7 @@ def contact_points_bytes(milled: ImpellerResult) -> bytes:
 
 
 def proof_bytes(milled: ImpellerResult) -> bytes:
-    """proof.npz: for each surface k, as `k/...`, what was searched and every bound with what proves it.
+    """The file proof.npz: for each surface k, as `k/...`, the searched catalogue and every bound with its proof.
 
     ``contact``, ``normal`` (c, 3), ``curvature`` (c, 3, 3), ``check`` (m, 3), ``check_surface`` (m,), ``near``,
     ``tables`` (t,) [rad]; of each family f as `k/f/...` ``corner_radius``, ``rho``, ``bound``, ``pallet`` (c, t),

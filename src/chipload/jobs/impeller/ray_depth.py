@@ -1,6 +1,6 @@
-"""How deep below the surfaces of an impeller the check looks: less than its blades are thick.
+"""Depth of the check's rays below the surfaces of an impeller: less than the thickness of its blades.
 
-A ray that comes near the other side of a blade meets the cutter that mills there, by as much as that may gouge: it
+A ray that comes near the other side of a blade meets the cutter that mills there, by as much as that may gouge. It
 would count as a gouge as deep as the ray.
 """
 
@@ -16,7 +16,7 @@ from chipload.planning.impeller.impeller import Impeller
 
 Floats = NDArray[np.float64]
 
-#: most that is looked at [mm]
+#: greatest depth of a ray [mm]
 MOST = 0.5
 #: how far from the other side a ray ends, over the gouge that is allowed
 _AWAY = 1.5
@@ -29,7 +29,7 @@ _LEAST = 1.2
 
 
 def ray_depth(impeller: Impeller, edge: float, gouge: float) -> float:
-    """How deep rays into the metal may go [mm] so that they do not come out on its other side.
+    """Greatest depth [mm] of rays into the metal that do not come out on its other side.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The result of an impeller: a track for the search and one for each program, limits, findings."""
+"""Result of an impeller job: a track for the search and one for each program, limits, findings."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def result_of(milled: ImpellerResult) -> Result:
 
 
 def failures_of(op: Searched) -> tuple[str, ...]:
-    """What keeps the search of a surface from holding."""
+    """Reasons why the search of a surface does not hold."""
     return tuple(f.text for f in _surface_findings(op))
 
 

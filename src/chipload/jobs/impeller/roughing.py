@@ -1,4 +1,4 @@
-"""The roughing programs of an impeller: planned channel by channel, then checked on surfaces and on the blank."""
+"""Roughing programs of an impeller: planned channel by channel, then checked on the surfaces and on the blank."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def checked_roughing(
     op: ImpellerOperationTable, paths: PathsTable, rough: RoughTable, walls: Sequence[SurfacePoints],
     ahead: float, workers: int, progress: Progress, keep: Keep = anew,
 ) -> tuple[CheckedRough, ...]:  # fmt: skip
-    """A roughing program for each channel and table angle, each with what the checks find.
+    """A roughing program for each channel and table angle, with the results of its checks.
 
     Parameters
     ----------
@@ -100,9 +100,11 @@ def checked_roughing(
 def without_touch(
     plan: RoughingSetting, stock: TriDexel, grid: float, touch: float
 ) -> tuple[RoughingSetting, ChannelRemoval, TriDexel]:
-    """The plan less the rows on which what is above the cutting part takes of the blank; what it takes, what is left.
+    """The plan without the rows on which a part above the cutting part removes some of the blank; what is removed, and
+    what is left.
 
-    A row that is left out leaves more for those after it, so that all is simulated again until nothing is taken.
+    A row that is left out leaves more material for those after it, so the simulation repeats until nothing is removed
+    above the cutting part.
     """
     for turn in itertools.count():
         left = copy.deepcopy(stock)

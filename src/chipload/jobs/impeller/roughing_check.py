@@ -1,4 +1,4 @@
-"""Roughing programs of an impeller with what the simulation found: their verdict, their numbers, their table."""
+"""Roughing programs of an impeller with the results of their simulation: verdict, numbers, table."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from chipload.simulation.channel.stock import ChannelRemoval
 
 @dataclass(frozen=True, eq=False)
 class CheckedRough:
-    """A roughing program with what the simulation found.
+    """A roughing program with the results of its simulation.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class CheckedRough:
 
     @property
     def verified(self) -> bool:
-        """No gouge, nothing beyond the machine, nothing taken by rapids or above the cutting part."""
+        """Whether there is no gouge, no motion beyond the machine, and no cut by rapids or above the cutting part."""
         return not self.fails
 
     @property
@@ -71,12 +71,12 @@ class CheckedRough:
 
     @property
     def length(self) -> float:
-        """Of the rows [mm]."""
+        """Length of the rows [mm]."""
         return sum(t.length for t in self.rough.machined)
 
     @property
     def fails(self) -> tuple[str, ...]:
-        """What does not hold."""
+        """Conditions that do not hold."""
         out = [f"{self.name}: {f}" for f in self.findings]
         if self.gouge.bound > self.allowed:
             out.append(f"{self.name}: {self.gouge.message}: gouge_mm = {self.allowed:g} is allowed")
@@ -86,7 +86,7 @@ class CheckedRough:
         return tuple(out)
 
     def values(self) -> dict[str, Any]:
-        """For summary.json; volumes are those of one channel in a blank with uncut neighbours."""
+        """Numbers for summary.json; volumes are those of one channel in a blank with uncut neighbours."""
         c, rough = self.rough.cutter, self.rough
         worst = int(self.taken.above.argmax())
         return {
@@ -115,7 +115,7 @@ class CheckedRough:
 
 
 def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) -> list[str]:
-    """The part of the page about roughing; none where the job asks for none."""
+    """Report sections about roughing; none where the job asks for none."""
     if roughs is None:
         return []
     head = ["program", "layers", "rows", "path [mm]", "time [min]", "taken [cm3]", "left [mm]"]

@@ -1,4 +1,4 @@
-"""A job that mills an impeller: read, its surfaces searched for the largest cutters."""
+"""Run of an impeller job: search for the largest cutters of its surfaces, planning and check of its programs."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ WORKERS = len(os.sched_getaffinity(0))
 def run(
     job: ImpellerJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: Workers | None = None
 ) -> ImpellerResult:
-    """The largest cutters of every surface that the job names.
+    """Search the largest cutters of every surface that the job names; plan and check the programs.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def _named(job: ImpellerJob) -> list[tuple[str, str | Path]]:
 
 
 def check(job: ImpellerJob) -> tuple[list[str], bool]:
-    """What the files of a job hold; nothing is searched."""
+    """Contents of the files of a job; nothing is searched."""
     machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
     impeller = part.impeller
     _picked(job, catalogue)
@@ -221,7 +221,7 @@ def _stages(op: ImpellerOperationTable, progress: Progress) -> list[Progress]:
 
 
 def part_of(progress: Progress, k: int, n: int) -> Progress:
-    """Progress of the k-th of n like parts."""
+    """Progress of the k-th of n similar parts."""
     return lambda done, what: progress((k + done) / n, what)
 
 

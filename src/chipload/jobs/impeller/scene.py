@@ -1,4 +1,5 @@
-"""scene.glb of an impeller: the surfaces coloured by their largest diameter, the other blades and the hub beside them.
+"""The file scene.glb of an impeller: the surfaces coloured by their largest diameter, with the other blades and the
+hub.
 
 Lengths are mm, Z is up, as the extras say.
 """
@@ -24,7 +25,7 @@ MISSED = (179, 38, 30, 255)
 
 
 def scene_bytes(milled: ImpellerResult) -> bytes:
-    """scene.glb."""
+    """The file scene.glb."""
     scene = trimesh.Scene()
     for name, (points, faces), colour in body_meshes(milled.impeller):
         _add(scene, name, points, faces, np.tile(np.array(colour, dtype=np.uint8), (len(points), 1)))

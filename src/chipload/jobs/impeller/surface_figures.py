@@ -1,4 +1,4 @@
-"""The figures of an impeller as plotly values: the largest diameter over a surface and by table angle, pallet angles.
+"""Figures of an impeller's surfaces in plotly: the largest diameter over a surface and by table angle, pallet angles.
 
 Notation: alpha table angle, B pallet angle [deg]; u along, v up the surface as in ``planning/impeller/surfaces.py``.
 """
@@ -29,7 +29,7 @@ SHOWN = 6000
 
 
 def map_figure(op: Searched) -> go.Figure:
-    """The largest diameter over the surface, unrolled: a cell a contact point."""
+    """Largest diameter over the surface, unrolled: one cell for each contact point."""
     a, b = op.surface.shape
     answer, s = op.answer, op.surface
     d = answer.diameter.reshape(a, b).T
@@ -177,7 +177,9 @@ def space_figure(op: Searched) -> go.Figure:
 
 
 def tightest(op: Searched) -> tuple[int, CatalogueCutter, int, float, tuple[int, ...]] | None:
-    """Contact point where the one cutter has least room, it, its table angle, its pallet angle, what stops a larger."""
+    """Contact point where the one cutter has least room, the cutter, its table angle, its pallet angle, and the limit
+    of a larger one.
+    """
     one = op.one
     if one is None:
         return None
@@ -235,7 +237,7 @@ def _ijk(f: NDArray[np.int64]) -> dict[str, Any]:
 
 
 def styled(figure: go.Figure, height: int) -> None:
-    """White paper, thin grid."""
+    """Give a figure a white background and a thin grid."""
     figure.update_layout(
         template="none", height=height, margin={"l": 70, "r": 20, "t": 14, "b": 54}, font=FONT, paper_bgcolor="white",
         plot_bgcolor="white",

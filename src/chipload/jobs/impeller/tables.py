@@ -1,4 +1,4 @@
-"""A job that mills an impeller in sections: its blades, the cutters there are, the machine with its index table."""
+"""Job tables of an impeller job: its blades, the cutters, the machine with its index table, the operation."""
 
 from __future__ import annotations
 

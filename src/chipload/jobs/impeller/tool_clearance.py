@@ -26,7 +26,7 @@ from chipload.simulation.channel.channel import SurfacePoints
 
 Floats = NDArray[np.float64]
 
-#: what is farther counts as this far [mm]
+#: greatest clearance that is calculated [mm]
 FAR = 20.0
 #: labels of rows that mill a wall, or come to it and leave it along it
 CUT = ("finish", "lead")
@@ -35,7 +35,7 @@ CUT = ("finish", "lead")
 def clearance_blocks(
     program: Program, machine: Machine, cutter: CatalogueCutter, walls: Callable[[], Sequence[SurfacePoints]]
 ) -> Callable[[], Iterator[Columns]]:
-    """The history of a program with its clearance, calculated once, when it is first asked for."""
+    """History of a program with its clearance, calculated once, at its first use."""
 
     @cache
     def columns() -> Columns:
@@ -56,7 +56,7 @@ def clearance_blocks(
 def tool_clearance(
     walls: Sequence[SurfacePoints], cutter: CatalogueCutter, tip: Floats, axis: Floats, cuts: NDArray[np.bool_]
 ) -> Floats:
-    """(n,) distance [mm] of the nearest wall from the whole tool, at least 0 and at most :data:`FAR`.
+    """Distance [mm] of the nearest wall from the whole tool, (n,), at least 0 and at most :data:`FAR`.
 
     Parameters
     ----------

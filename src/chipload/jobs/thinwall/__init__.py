@@ -1,4 +1,4 @@
-"""Jobs that plan the depth of cut of a thin wall, and simulate and compare its variants."""
+"""Thin-wall jobs: they plan the depths of cut of a thin wall, and simulate and compare the variants."""
 
 from __future__ import annotations
 

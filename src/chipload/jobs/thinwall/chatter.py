@@ -1,8 +1,9 @@
-"""Chatter of a thin wall's passes: the depth that it allows beside the deflection, a speed for each pass, the margin.
+"""Chatter of a thin wall's passes: stable depths beside the deflection limit, a speed for each pass, the stability
+margin.
 
-A pass is looked at in two states: with the stock that it leaves, and with what was there before, the greatest depth
-thicker at most. The modes are those of the finite elements that the compliance comes from. The simulated passes are
-then asked for their margins with the chips that they cut, in both states.
+A pass is checked in two states: with the stock that it leaves, and with the stock before it, thicker by at most the
+greatest depth. The modes are those of the finite elements that the compliance comes from. The margins of the simulated
+passes are then calculated with their own chips, in both states.
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ Floats = NDArray[np.float64]
 
 #: column that the history does not keep: the margin with the modes that the wall has before its first pass
 FIRST_STATE = "first_margin"
-#: speeds that are looked at for a pass
+#: speeds that are tested for a pass
 SPEEDS = 9
-#: places of the elements at which depths are looked for, along and up at most
+#: greatest number of places of the elements at which depths are searched, along and up
 ALONG, UP = 7, 6
 #: relative error of a margin by the map
 MARGIN_ERROR = 0.01
@@ -49,7 +50,7 @@ PER_UM = 1000.0
 
 @dataclass(frozen=True, eq=False)
 class WallChatter:
-    """The vibration of a wall's job.
+    """Chatter calculation of a thin-wall job: modes of wall and cutter, stable depths, margins.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ class WallChatter:
     _depths: dict[tuple[bytes, int], tuple[Floats, float]] = field(default_factory=dict)
 
     def motion(self, left: Sequence[Floats], side: int) -> WallMotion:
-        """Motion at all places of the elements of a side; ``left`` at these places, on all sides."""
+        """Modes at all places of the elements of a side; ``left`` at these places, on all sides."""
         states = self.inputs.both(left)
         key = (b"".join(D.tobytes() for D in states), side)
         if key not in self._motions:
@@ -91,7 +92,7 @@ class WallChatter:
     def depths(self, left: Sequence[Floats], side: int) -> tuple[Floats, float]:
         """Stable depths at all places of the elements of a side [mm], and the speed of the pass [rad/s].
 
-        Between places that are looked at the least of those around counts.
+        Between these places the least of those around counts.
         """
         key = (b"".join(np.asarray(D).tobytes() for D in left), side)
         if key not in self._depths:
@@ -111,7 +112,7 @@ class WallChatter:
         return self._depths[key]
 
     def limited(self, places: Places, threshold_of: ThresholdOf) -> ThresholdOf:
-        """Thresholds that also say which depth is stable and at which speed."""
+        """Thresholds with the stable depth and its spindle speed."""
 
         def both(left: Sequence[Floats], side: int) -> Threshold:
             depth, speed = self.depths(places.coarse(left), side)
@@ -177,7 +178,7 @@ def _least_around(values: Floats, at: tuple[NDArray[np.int64], NDArray[np.int64]
 
 
 def chatter_of(inputs: WallInputs) -> WallChatter | None:
-    """The vibration that a job states; None: it states none."""
+    """Chatter calculation that a job states; None: it states none."""
     table = inputs.job.table.dynamics
     if table is None:
         return None
@@ -243,5 +244,5 @@ def chatter_numbers(one: Variant, dynamics: Mapping[str, Any] | None) -> dict[st
 
 
 def governed(m: PassMap) -> float:
-    """Share of the places of a pass whose depth is the one that chatter allows."""
+    """Share of the places of a pass whose depth is the stable depth."""
     return float((m.depth >= (1.0 - 1e-6) * m.stable).mean()) if m.stable is not None else 0.0

@@ -1,4 +1,4 @@
-"""The table of a thin wall's job about vibration."""
+"""Job tables of vibration in a thin-wall job."""
 
 from __future__ import annotations
 

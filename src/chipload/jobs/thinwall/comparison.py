@@ -1,13 +1,14 @@
-"""What a plan is compared with, where the job asks for it: the least form error in the same time, a moved path.
+"""Further variants that a job can ask for: the least form error in the same time, and a compensated path.
 
-The variable plan takes less time at one deflection. Its dual has the time of the constant plan and spends it on less
-form error, which is that of the last pass of each side: that pass is held to ever smaller shares of the limit, until
-the time is spent. Places that bear not even that get the smallest depth, whose edge force rules.
+The variable plan takes less time at one deflection. The least-error plan takes the time of the constant plan and has
+less form error, which is that of the last pass of each side: that pass keeps ever smaller shares of the limit, until
+the time is used. Places where even the smallest depth exceeds such a share get the smallest depth, where the edge force
+governs.
 
-Compensation moves the last pass of each side by the form error that is predicted for it, to the other side (mirrored),
-by no more than is stated; it is simulated, and moved again by what was found. What remains is the error less the way
-that the path was moved. The cut is that much deeper than planned, so that force and deflection are found too great
-rather than too small: a real wall yields, and is cut less deep.
+Compensation moves the last pass of each side by its predicted form error to the other side (mirrored), by at most the
+stated distance. The moved pass is simulated, and moved again by the error found. The remaining error is the form error
+less the distance by which the path was moved. The cut is deeper than planned by that distance, so force and deflection
+are found too great rather than too small: a real wall deflects, and is cut less deep.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def least_error(
     time_of: Callable[[PlannedVariant], float],
     prove: Callable[[PlannedVariant], Variant],
 ) -> Variant:
-    """Variable depths with the least form error in a time.
+    """Variable depths with the least form error in a given time.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def least_error(
 def compensated(
     places: Places, planned: PlannedVariant, before: Variant, most: float, prove: Callable[[PlannedVariant], Variant]
 ) -> Variant:
-    """A plan whose last passes are moved against their form error.
+    """Plan whose last passes are moved against their predicted form error.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How the result of a thin wall is presented: sections of the report, scene, programs."""
+"""Presentation of a thin-wall result: sections of the report, scene, programs."""
 
 from __future__ import annotations
 

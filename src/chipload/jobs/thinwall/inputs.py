@@ -1,6 +1,6 @@
-"""What a thin wall's job comes to: its shape with stock, finite elements, operations and thresholds.
+"""Inputs of a thin-wall job: its shape with stock, finite elements, operations and thresholds.
 
-Notation: u, v parameters of a side; i, j elements along the wall and up it; delta [mm] deflection that is allowed.
+Notation: u, v parameters of a side; i, j elements along the wall and up it; delta [mm] allowed deflection.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ Floats = NDArray[np.float64]
 FACETS = (96, 64)
 #: the finished wall may be cut into by the chord of its rows and by so much [mm], for those of chips and facets
 GOUGE = 0.003
-#: part of the contact line of a tooth that its force is spread over
+#: share of the contact line of a tooth over which its force is spread
 BEARS = 0.5
 #: share of a step-over that rows may be farther apart: a height of whole step-overs, with rounded digits, stays so
 SLACK = 1e-4
@@ -54,7 +54,7 @@ SLACK = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class WallBody:
-    """The wall and its stock, or a part with several, in mm.
+    """The wall with its stock, or a part with several walls, in mm.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class WallBody:
 
 @dataclass(frozen=True, eq=False)
 class WallInputs:
-    """Everything that planning and proof need.
+    """Inputs of planning and simulation.
 
     Attributes
     ----------
@@ -123,19 +123,19 @@ class WallInputs:
 
     @property
     def cut(self) -> WallCut:
-        """How the last operation cuts, which makes the finished surface."""
+        """Cutting data of the last operation, which makes the finished surface."""
         return self.operations[-1].cut
 
     @property
     def depths(self) -> DepthRules:
-        """From what the depths of the last operation follow."""
+        """Depth rules of the last operation."""
         return self.operations[-1].depths
 
     @property
     def line(self) -> ContactLine | None:
-        """Where the flank bears on the wall, from the lower end of a contact line: at its upper end, where the wall
-        gives way most, over half the length that one tooth bears on with the smallest depth: its force is not even
-        along that. None: the corner radius cuts.
+        """Contact line of the flank on the wall, measured from its lower end. The deflection is taken at its upper end,
+        where it is greatest. The force acts over half the length along which one tooth cuts with the smallest depth,
+        because it is not even along that length. None: the corner radius cuts.
         """
         pose = self.cut.posture
         if not isinstance(pose, FlankPose):
@@ -145,7 +145,7 @@ class WallInputs:
 
     @property
     def surface_line(self) -> ContactLine | None:
-        """Where the flank bears while it makes a point of the surface: from there up. None: the corner radius cuts."""
+        """Contact line of the flank for a point of the surface: from there up. None: the corner radius cuts."""
         return None if self.line is None else ContactLine(self.line.length, self.line.length)
 
     @property
@@ -161,7 +161,7 @@ class WallInputs:
 
     @property
     def gouge_tolerance(self) -> float:
-        """How deep the finished wall may be cut into [mm]."""
+        """Allowed depth of a gouge in the finished wall [mm]."""
         return self.job.operation.chord_mm + GOUGE
 
     @property
@@ -222,7 +222,7 @@ class WallInputs:
         )
 
     def threshold(self, deflection: float) -> ThresholdOf:
-        """Thresholds of the sides with stock under a deflection that is allowed [mm]."""
+        """Thresholds of the sides with stock for an allowed deflection [mm]."""
 
         def limited(left: Sequence[Floats], side: int) -> Threshold:
             C = self.body.compliance(self.both(left), self.body.side_numbers[side], self.line)
@@ -237,7 +237,7 @@ class WallInputs:
         return limited if self.depths.experiments is None else measured
 
     def finished_threshold(self) -> Threshold:
-        """Thresholds of the first side with stock when the wall is finished."""
+        """Thresholds of the first side with stock in the finished state."""
         return self.threshold(self.depths.deflection)(
             [np.zeros(self.body.elastic.shape) for _ in self.body.side_numbers], 0
         )
@@ -263,7 +263,7 @@ class WallInputs:
 
 
 def read_wall(job: ThinWallJob) -> WallInputs:
-    """Read what a job names and make the finite elements and the force law.
+    """Read the files of a job and make the finite elements and the force laws.
 
     Raises
     ------

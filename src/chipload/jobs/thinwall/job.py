@@ -1,4 +1,4 @@
-"""A job that cuts a thin wall: its tables checked against one another, its files found."""
+"""A thin-wall job: checks of its tables against one another, and the paths of its files."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def load(path: Path, table: ThinWallJobTable, overrides: Sequence[str]) -> ThinW
 
 
 def resume_note(job: ThinWallJob) -> str:
-    """What is not kept while the job runs: the plan that is being simulated."""
+    """Note on the part of the work that is not kept while the job runs: the plan that is being simulated."""
     return "plans that were simulated are kept; the simulation of a plan does not resume: stopped, it begins again"
 
 

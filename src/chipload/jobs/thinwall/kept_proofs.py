@@ -1,7 +1,8 @@
-"""Simulated passes of a thin wall in the checkpoint of its run: a plan that was proved is not simulated again.
+"""Simulated passes of a thin wall in the checkpoint of a run: a resumed run does not simulate a plan again.
 
 A plan depends on the job and on the plans before it; its key is that of its passes. The error of its loads, which is
-asked for after the simulation, is a part of its own: where only that is missing, the plan is simulated once more.
+calculated after the simulation, is kept as a part of its own: where only the error is missing, the plan is simulated
+again.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ RECORDS = (Collision, Finish, Shape)
 
 
 def kept_of(job: ThinWallJob, checkpoint: Checkpoint | None, provenance: Provenance) -> KeptRecords:
-    """What is kept of a job."""
+    """Parts of a job that its checkpoint keeps."""
     key = digest(job.table.model_dump_json(), provenance.inputs, versions(), sources())
     return KeptRecords(checkpoint, key, RECORDS)
 
 
 def kept_proof(keep: KeptRecords, plan: Plan, prove: Callable[[], Proof]) -> Proof:
-    """The proof of a plan, kept or made; ``prove`` simulates it."""
+    """Simulation result of a plan, from the checkpoint or by ``prove``."""
     passes = tuple((p.operation, p.side, p.low, p.high, p.threshold.speed, p.correction) for p in plan.passes)
     key, made = (plan.name, passes), list[Proof]()
 

@@ -1,10 +1,10 @@
-"""How far the loads on a thin wall may be from those of a finer simulation: layers, slices, steps and rotations.
+"""Error of the loads on a thin wall against a finer simulation: layers, slices, steps and rotations.
 
-Every pass that holds the greatest load of some column is looked at as :mod:`chipload.simulation.accuracy` says: a few
-of its steps are computed once more in a finer stock. With e_p the error of a pass relative to its own worst value w_p,
-and w the worst of all passes, the error of the whole is the greatest e_p w_p / w.
+Every pass that has the greatest load of some column is checked as in :mod:`chipload.simulation.accuracy`: a few of its
+steps are calculated again in a finer stock. With e_p the error of a pass relative to its own worst value w_p, and w the
+worst of all passes, the error of the whole is the greatest e_p w_p / w.
 
-What bends the wall goes with the force along its normal, what bends the cutter with the whole force.
+The deflection of the wall is proportional to the force along its normal, that of the cutter to the whole force.
 """
 
 from __future__ import annotations

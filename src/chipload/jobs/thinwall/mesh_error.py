@@ -1,4 +1,4 @@
-"""How much more the finished wall may give way than its finite elements say: the error of their mesh, place by place.
+"""Error of the compliance of the finished wall by the mesh of its finite elements, at each place.
 
 Notation: C [mm/N] normal compliance that is used, of a force at a point of the cut face; L [mm/N] that of a force
 spread evenly through the thickness, which settles on finer meshes where C does not: under a point the displacement
@@ -40,7 +40,7 @@ ABOVE = 1e-9
 
 
 def mesh_error(inputs: WallInputs, used: Floats, side: int) -> Floats:
-    """(n, m) relative error of the compliance ``used`` (n, m) of the finished wall at the places of its elements.
+    """Relative error (n, m) of the compliance ``used`` (n, m) of the finished wall at the places of its elements.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def _heights(inputs: WallInputs, v: Floats) -> tuple[Floats, Floats]:
 
 
 def error_at(places: tuple[Floats, Floats], error: Floats, u: Floats, v: Floats) -> Floats:
-    """(k,) errors at parameters, between places in proportion."""
+    """Errors (k,) at parameters, linear between places."""
     low, high = places[1][0], places[1][-1]
     return np.asarray(
         RegularGridInterpolator(places, error)(np.column_stack([np.clip(u, 0.0, 1.0), np.clip(v, low, high)]))
@@ -133,7 +133,7 @@ def finished_wall(
 
 
 def spread_compliance(solid: SolidWorkpiece, a: Floats, b: Floats, side: int, line: Sequence[Floats] = ()) -> Floats:
-    """(k,) compliance [mm/N] along the normal of a side under a force that is spread through the thickness.
+    """Compliance (k,) [mm/N] along the normal of a side under a force that is spread through the thickness.
 
     Parameters
     ----------

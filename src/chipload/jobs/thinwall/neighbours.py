@@ -1,6 +1,6 @@
-"""Whether a tool runs into what stands beside a wall: the part, or the neighbours of one wall; links are among it.
+"""Collisions of a tool with the part, or with the neighbours of one wall, on all motions including links.
 
-What the cutting part runs into is found by the chips: a rapid that cuts, a gouge in the section of any layer.
+The chips show what the cutting part collides with: a rapid that cuts, or a gouge in the section of any layer.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SPACING = 1.0
 
 
 def wall_collisions(inputs: WallInputs, legs: Sequence[PassProgram]) -> tuple[Collision, ...]:
-    """Where shank and holder come into one finished wall, and they or the cutting part into its neighbours.
+    """Collisions of shank and holder with one finished wall, and of the whole tool with its neighbours.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def wall_collisions(inputs: WallInputs, legs: Sequence[PassProgram]) -> tuple[Co
 
 
 def part_collisions(inputs: WallInputs, uncut: LayeredStock, legs: Sequence[PassProgram]) -> tuple[Collision, ...]:
-    """Where shank and holder come into the finished part, or into what is still there of its stock.
+    """Collisions of shank and holder with the finished part, or with its remaining stock.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""What cutting a thin wall gave: three variants of its passes, each planned, written and simulated.
+"""Outcome of a thin-wall job: three variants of its passes, each planned, written and simulated.
 
-Notation: F_n [N] greatest force along the normal of the surface that a pass leaves, over a revolution; F_th [N] what
-the place bears, limit over normal compliance in the state of that pass; u, v parameters of a side.
+Notation: F_n [N] greatest force along the normal of the surface that a pass leaves, over a revolution; F_th [N]
+threshold of the place: the limit over the normal compliance in the state of that pass; u, v parameters of a side.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class PassMap:
     u, v : (n,), (m,) their parameters
     depth : (n, m) float [mm]
     threshold : (n, m) float [N], limit over compliance, or calibrated
-    stable : (n, m) float [mm], depth that chatter allows; None: it is not calculated
+    stable : (n, m) float [mm], stable depth; None: it is not calculated
     speed : of the spindle [rad/s]; None: that of the operation
     operation : number of the operation
     """
@@ -67,7 +67,7 @@ class Finish:
     ----------
     points : (n, m, 3) float [mm]
     error : (n, m) float [mm], by deflection, positive where material is left
-    rigid : (n, m) float [mm], what a rigid cutter leaves: cusps
+    rigid : (n, m) float [mm], what a rigid cutter leaves: scallops
     made : (n, m) bool, whether a step of the simulation comes to the point
     unsure : (n, m) float, relative error of the compliance by its mesh
     parameters : (n,), (m,) float, u and v of the points
@@ -84,14 +84,14 @@ class Finish:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What the simulated stock is beside the finished wall.
+    """Shape of the simulated stock beside the finished wall.
 
     Attributes
     ----------
     gouge : greatest depth into the wall [mm]; 0: none
     left : greatest height over it [mm]
     at : (3,) float [mm], where the gouge is
-    points : how many were looked at
+    points : number of points that were checked
     nearest : least distance of the cutter to the finished wall along the path [mm]; below 0: it gouges
     collisions : of the tool with a part, or with one wall and its neighbours
     """
@@ -106,7 +106,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Help:
-    """A place that bears not even the smallest depth, and what would make it feasible."""
+    """A place where even the smallest depth exceeds the threshold, and the changes that would make it feasible."""
 
     side: int
     at: tuple[float, float, float]
@@ -127,7 +127,7 @@ class VariantPlan:
     limit : deflection [mm] that it was planned under; infinite: none
     maps : a pass each, in the order of cutting
     force, deflection : greatest [N], [mm]; None: compliance not known
-    infeasible : places that bear nothing
+    infeasible : places where even the smallest depth is too great
     """
 
     order: str
@@ -141,7 +141,7 @@ class VariantPlan:
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """One variant.
+    """One variant: its plan, program, loads and form error.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ class Variant:
 
     @property
     def deflection(self) -> float:
-        """Greatest of the wall [mm]."""
+        """Greatest deflection of the wall [mm]."""
         return 1e-3 * float(self.columns["deflection_workpiece_um"].max(initial=0.0))
 
     @property
@@ -237,7 +237,7 @@ class WallGeometry:
 
 @dataclass(frozen=True, eq=False)
 class PlannedOperation:
-    """An operation that was planned.
+    """An operation of the plan.
 
     Attributes
     ----------
@@ -259,7 +259,7 @@ class PlannedOperation:
 
 @dataclass(frozen=True, eq=False)
 class WallPlanning:
-    """What the plans were made from.
+    """Data that the plans were made from.
 
     Attributes
     ----------
@@ -280,13 +280,13 @@ class WallPlanning:
 
     @property
     def cutters(self) -> dict[int, Cutter]:
-        """By number."""
+        """Cutters by number."""
         return {one.cutter.number: one.cutter for one in self.operations}
 
 
 @dataclass(frozen=True, eq=False)
 class ThinWallResult:
-    """A thin wall, cut.
+    """Result of a thin-wall job.
 
     Attributes
     ----------
@@ -312,7 +312,7 @@ class ThinWallResult:
 
 
 def helps(place: Help) -> str:
-    """What would make a place feasible."""
+    """Changes that would make a place feasible, in words."""
     if place.feed_per_tooth_mm is not None:
         return f"a feed of at most {place.feed_per_tooth_mm:.4g} mm a tooth would do"
     if place.diameter_mm is not None:

@@ -1,12 +1,12 @@
-"""A clamped part with stock on the sides of its walls, in finite cells: what its places bear in each state of removal.
+"""A clamped part with stock on its walls, in finite cells: compliance of its places in each state of removal.
 
 Notation: C_nn [mm/N] normal compliance of a place, of a force that is spread over a square of the side; at an edge the
 square lies within the side. Under a line C_nn would grow without bound with smaller cells. D [mm] stock left on a side,
 (n, m) at the places.
 
-The cells are those of a workpiece under any program (:mod:`chipload.structure.cells`): the whole part in its clamps
-gives way, floor and neighbours too. The error is :data:`CORNER` times the difference to cells of :data:`COARSER`
-times the side in the finished state, :data:`FLOOR`, and all that a half space gives beneath the square (Johnson,
+The cells are those of a workpiece under any program (:mod:`chipload.structure.cells`): the whole part in its clamps is
+elastic, floor and neighbours too. The error is :data:`CORNER` times the difference to cells of :data:`COARSER` times
+the side in the finished state, :data:`FLOOR`, and the whole compliance of a half space beneath the square (Johnson,
 Contact Mechanics, 1985, section 3.4). In the example `part/walls.toml` it is 11 to 41 %, where cells of 1.5 mm of order
 3 find 8 to 30 %.
 """
@@ -49,7 +49,7 @@ TOGETHER = 64
 
 @dataclass(frozen=True, eq=False)
 class PartBlank:
-    """The part in its clamps.
+    """The part with its stock, in its clamps.
 
     Attributes
     ----------
@@ -77,11 +77,11 @@ class PartBlank:
 
     @property
     def unknowns(self) -> int:
-        """Of the last state that was solved."""
+        """Number of unknowns of the last state that was solved."""
         return 3 * len(self._last["fine"][1].modes)
 
     def state(self, left: Sequence[Floats], wide: bool = False) -> CellWorkpiece:
-        """The part with stock ``left`` on its sides, factored; ``wide``: in the wide cells."""
+        """Factored part with stock ``left`` on its sides; ``wide``: in the wide cells."""
         key, which = b"".join(np.ascontiguousarray(D).tobytes() for D in left), "wide" if wide else "fine"
         if key != self._last.get(which, (b"", None))[0]:
             grid = self.wide if wide else self.grid
@@ -102,7 +102,7 @@ class PartBlank:
         return out
 
     def error(self, side: int) -> Floats:
-        """(n, m) relative error of the compliance of a finished side by its cells."""
+        """Relative error (n, m) of the compliance of a finished side by its cells."""
         none = [np.zeros(self.shape) for _ in self.body.each]
         fine, coarse = self.compliance(none, side), self.compliance(none, side, wide=True)
         # what the surface gives beneath a square, which larger cells do not show

@@ -1,4 +1,4 @@
-"""Walls of a part by faces of its model: the sides that are cut, and the part with the stock that is left on them.
+"""Walls of a part, named by faces of its model: the sides that are cut, and the part with the stock left on them.
 
 Notation: u in 0..1 along a side, v in 0..1 from the top of its foot to its free edge; w in 0..1 from its lower edge, so
 that the foot ends at w = f; N the normal out of the metal, D [mm] stock that is left. The frame is that of the model, z

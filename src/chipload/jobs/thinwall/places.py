@@ -1,9 +1,9 @@
-"""The places that a wall is planned at: those of its elements along it, every row of the cutter up it.
+"""Places at which a wall is planned: those of its elements along it, and every row of the cutter up it.
 
 Notation: u, v parameters of a side; C_nn [mm/N] normal compliance; D [mm] stock left on a side, (n, m) at the places.
 
-Finite elements know their own places only; the compliance between them is that of cubics of its logarithm, as the
-simulation takes it. A state of the wall is solved for once, whoever asks.
+Finite elements have compliances at their own places only. Between them the logarithm of the compliance is interpolated
+by cubics, as in the simulation. A state of the wall is solved once, for all who use it.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class Places:
         return len(self.u), len(self.v)
 
     def coarse(self, left: Sequence[Floats]) -> list[Floats]:
-        """Stock at the places of the elements, of stock at these."""
+        """Stock at the places of the elements, from the stock at these places."""
         v = self.inputs.body.places[1]
         return [np.array([np.interp(v, self.v, row) for row in D]) for D in left]
 
@@ -128,7 +128,7 @@ class Places:
         return self._errors[side]
 
     def threshold(self, deflection: float, factor: float, spare: bool = True) -> ThresholdOf:
-        """Thresholds at these places under a deflection that is allowed [mm]; ``factor`` of them is used.
+        """Thresholds at these places for an allowed deflection [mm]; ``factor`` of them is used.
 
         Parameters
         ----------

@@ -1,8 +1,8 @@
-"""The rows of an operation from the user's own finishing program: its file, and how the cutter stands along them.
+"""Rows of an operation from the user's own finishing program: its file, and the poses of the cutter along them.
 
-Notation: lead, tilt and step-over b with its sign as in :mod:`chipload.planning.thinwall.plane_stock`. Rows that run to
-and fro have the row before on their right and on their left in turn: each sense has poses of its own. Where the lean
-changes along the rows, the pose of least, middle and greatest lean stand for all.
+Notation: lead, tilt and step-over b with its sign as in :mod:`chipload.planning.thinwall.plane_stock`. Rows in both
+directions have the row before on their right and on their left in turn: each direction has poses of its own. Where the
+lean changes along the rows, the poses of least, middle and greatest lean represent all.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class ProgramRows:
     stands: tuple[tuple[int, float, float], ...]
 
     def poses(self, cutter: Cutter, feed_per_tooth: float) -> tuple[CutterPose, ...]:
-        """How the cutter stands along the rows."""
+        """Poses of the cutter along the rows."""
         return tuple(
             CutterPose(cutter, feed_per_tooth, (sign or 1) * self.step_over, lead, tilt)
             for sign, lead, tilt in self.stands

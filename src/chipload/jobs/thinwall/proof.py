@@ -1,4 +1,4 @@
-"""One variant of the passes over a thin wall, run through the stock: forces, deflections, form error, gouges.
+"""Simulation of one variant of the passes over a thin wall: forces, deflections, form error, gouges.
 
 Notation: F_n [N] greatest force along the normal of the surface that a pass leaves; C_nn [mm/N] normal compliance of
 the wall in the state of that pass, by finite elements; F_th [N] threshold. C_nn between places by cubics of its
@@ -46,7 +46,7 @@ Floats = NDArray[np.float64]
 UP = np.array([0.0, 0.0, 1.0])
 #: places of a step at which the wall is judged: its beginning, middle and end
 JUDGED, MIDDLE = (0.0, 0.5, 1.0), 1
-#: rotations of a flank between which greatest forces are looked for [rad]: its bites begin and end all at once
+#: rotations of a flank between which greatest forces are searched [rad]: its engagement begins and ends abruptly
 FLANK_TURN = math.radians(0.25)
 #: variants whose stock is even
 EVEN = ("constant", "unconstrained")
@@ -58,7 +58,7 @@ CLOUD = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """What the simulation found.
+    """Result of the simulation of a variant.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Proof:
 
 
 def resolution_of(inputs: WallInputs, legs: Sequence[PassProgram], operation: int = -1) -> Resolution:
-    """How fine the simulation of an operation looks: a row of the passes is a step."""
+    """Resolution of the simulation of an operation: one row of the passes is one step."""
     own = inputs.operations[operation]
     op = own.table
     longest = max(float(np.linalg.norm(np.diff(leg.program.p_work, axis=0), axis=1).max()) for leg in legs)
@@ -86,7 +86,7 @@ def resolution_of(inputs: WallInputs, legs: Sequence[PassProgram], operation: in
 
 
 def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats, progress: Progress) -> Proof:
-    """Run the passes of a plan at these places through the stock.
+    """Simulate the passes of a plan at these places in the stock.
 
     Parameters
     ----------

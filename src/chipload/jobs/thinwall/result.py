@@ -1,4 +1,4 @@
-"""The result of a thin wall: a track for each variant, limits, findings, maps over the wall."""
+"""Result of a thin-wall job: a track for each variant, limits, findings, maps over the wall."""
 
 from __future__ import annotations
 
@@ -75,8 +75,8 @@ def _unchecked_bodies(walled: ThinWallResult) -> tuple[str, ...]:
 
 
 def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
-    """Every limit of a variant: those of the job, the force at each contact point, the yield stress, the gouge, and
-    those that are checked by default.
+    """Limit checks of a variant: those of the job, the force at each contact point, the yield stress, the gouge, and
+    the default checks.
     """
     c, out = one.columns, []
     for name, limit in walled.limits.items():
@@ -110,7 +110,8 @@ def error_of(walled: ThinWallResult, one: Variant, name: str) -> float:
 
 
 def mesh_error_of(walled: ThinWallResult, name: str, columns: Mapping[str, NDArray[Any]]) -> float:
-    """By how much the greatest value of a column may grow by the error of the mesh, relative; 0: not of the compliance.
+    """Relative increase of the greatest value of a column by the error of the mesh; 0: it does not depend on the
+    compliance.
 
     Thresholds that experiments gave have none of it.
     """
@@ -127,7 +128,7 @@ def _growth(values: Floats, error: Floats) -> float:
 
 
 def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
-    """What was found in a variant beside its limits."""
+    """Findings of a variant in addition to its limit checks."""
     out = list(one.beyond)
     if one.plan.infeasible:
         worst = min(one.plan.infeasible, key=lambda h: h.force_allowable_n)
@@ -150,7 +151,7 @@ def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
 
 
 def failures_of(walled: ThinWallResult, one: Variant) -> tuple[str, ...]:
-    """What keeps a variant from holding, the worst first."""
+    """Reasons why a variant does not hold, the worst first."""
     found = [(Verdict.of_finding(f), f.text) for f in findings_of(walled, one)]
     found += [(c.state, c.text) for c in limits_of(walled, one)]
     return tuple(text for state in (Verdict.EXCEEDS, Verdict.UNPROVEN) for s, text in found if s is state)

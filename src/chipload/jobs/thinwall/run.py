@@ -1,4 +1,4 @@
-"""A job that cuts a thin wall: three variants are planned, written for the machine, and simulated one after another."""
+"""Run of a thin-wall job: three variants are planned, written for the machine, and simulated one after another."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def _planned_operation(one: WallOperation) -> PlannedOperation:
 
 
 def _thick_enough(inputs: WallInputs) -> None:
-    """Refuse a finished wall that is thinner than what is cut off it at once."""
+    """Refuse a finished wall that is thinner than one depth of cut."""
     greatest = max(o.depths.law.limits.greatest for o in inputs.operations)
     thickness, deepest = inputs.body.shape.size()[2], min(greatest, max(inputs.body.allowance))
     if not thickness >= deepest:
@@ -142,8 +142,8 @@ def _thick_enough(inputs: WallInputs) -> None:
 
 
 def check(job: ThinWallJob) -> tuple[list[str], bool]:
-    """What the job names: the wall, its finite elements, the greatest threshold, and the steps of the first variant,
-    which is laid out but not simulated.
+    """Results of a check of the files of a job: the wall, its finite elements, the greatest threshold, and the steps of
+    the first variant, which is laid out but not simulated.
 
     Raises
     ------
@@ -196,7 +196,8 @@ def _first_side(inputs: WallInputs) -> str:
 def propose(
     job: ThinWallJob, sites: int, scatter: float, bracket: float, steps: int, repeats: int, progress: Progress = silent
 ) -> Proposal:
-    """Calibration cuts that pin best what the finished wall bears: where and how deep, around the modelled threshold.
+    """Calibration cuts that determine the threshold of the finished wall best: places and depths, around the modelled
+    threshold.
 
     Parameters
     ----------
@@ -205,7 +206,7 @@ def propose(
     Raises
     ------
     InputError
-        A file cannot be read, values do not go together, or a site bears not even the smallest depth.
+        A file cannot be read, values do not go together, or a site does not allow even the smallest depth.
     """
     if job.walls:
         raise InputError("wall: calibration cuts are proposed for one [wall] of a shape only")

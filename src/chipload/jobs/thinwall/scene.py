@@ -1,5 +1,5 @@
-"""scene.glb of a thin wall: finished wall, workpiece before, the cutter, contact points of each variant coloured by
-depth. Lengths are mm, Z is up, as the extras say.
+"""The file scene.glb of a thin wall: finished wall, workpiece before, the cutter, and the contact points of each
+variant coloured by depth. Lengths are mm, Z is up, as the extras say.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 
 def scene_bytes(walled: ThinWallResult) -> bytes:
-    """scene.glb."""
+    """The file scene.glb."""
     scene = trimesh.Scene()
     for (vertices, faces), name, colour in (
         (walled.geometry.finished, "wall", WALL),

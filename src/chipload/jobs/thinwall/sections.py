@@ -1,4 +1,4 @@
-"""Sections of the report on a thin wall: the variants side by side, maps, what happens along the path."""
+"""Report sections of a thin wall: comparison of the variants, maps, and loads along the path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A job that cuts a thin wall: a plate or a blade with stock on its sides, as deep at each place as the wall allows."""
+"""Job tables of a thin-wall job: a plate, a blade or a part with stock on its walls."""
 
 from __future__ import annotations
 

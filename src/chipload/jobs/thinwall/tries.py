@@ -46,7 +46,7 @@ CONSTANTS = 3
 
 
 class Tried:
-    """Plans that are simulated one after another; how far that is, is told on the way."""
+    """Plans that are simulated one after another, with their progress."""
 
     def __init__(self, places: Places, progress: Progress, keep: KeptRecords | None = None) -> None:
         self.places, self.progress = places, progress
@@ -58,7 +58,7 @@ class Tried:
         self.share = 1.0
 
     def prove(self, planned: Planned, share: float) -> Variant:
-        """Write and simulate a plan, which takes this share of what is left to do."""
+        """Write and simulate a plan, which takes this share of the remaining progress."""
         name, low = planned.plan.name, self.done
         width = share * (1.0 - low)
         self.variable += name == "variable"
@@ -77,7 +77,7 @@ class Tried:
 
 
 def unlimited_plan(places: Places) -> Planned:
-    """Passes of the greatest depth, whatever the wall allows."""
+    """Passes of the greatest depth, without the limit of the wall."""
     operations = [
         DepthOperation(places.threshold(o.depths.deflection, o.depths.factor), o.depths.even_law, o.leave)
         for o in places.inputs.operations
@@ -129,8 +129,8 @@ def _over(one: Variant, modelled: bool, assumed: float) -> tuple[float, bool]:
 
 
 def constant_within(tried: Tried, free: Variant) -> tuple[Variant, Corrections]:
-    """The constant depth that the simulation of the greatest one lets expect, corrected until it holds; and the
-    corrections of the force in even stock that the greatest one gave.
+    """Constant depth from the forces of the simulated greatest depth, corrected until it holds; and the corrections of
+    the force in even stock from that simulation.
     """
     places = tried.places
     inputs = places.inputs
@@ -156,8 +156,8 @@ def _smallest(places: Places, planned: Planned) -> bool:
 
 
 def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Variant:
-    """Variable depths within the limit: planned, simulated, corrected by what was found. Of the plans that hold the
-    fastest one; where none does, the one that exceeds least.
+    """Variable depths within the limit: planned, simulated, and corrected by the simulation. The result is the fastest
+    plan that holds; where none holds, the one that exceeds least.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def _variant(places: Places, planned: Planned, program: Program, run: OnMachine,
 
 
 def _infeasible(places: Places, plan: Plan, held: float) -> tuple[Help, ...]:
-    """Places that bear not even the smallest depth in some pass under the limit itself, with what would help there."""
+    """Places where even the smallest depth of some pass exceeds the limit itself, with changes that would help."""
     out: list[Help] = []
     for number in range(len(places.inputs.operations)):
         out += _infeasible_in(places, [p for p in plan.passes if p.operation == number], plan.infeasible, held)

@@ -92,8 +92,8 @@ def maps(
 
 
 def along(walled: ThinWallResult) -> go.Figure:
-    """Deflection of the wall, its force over the threshold and its force, along the time at a feed, the variants in
-    rows of one figure.
+    """Deflection of the wall, its force over the threshold, and its force, over the time at a feed, with the variants
+    in rows of one figure.
     """
     rows = (
         ("deflection_workpiece_um", 1.0, "workpiece deflection [µm]", walled.limits["deflection_workpiece_um"]),

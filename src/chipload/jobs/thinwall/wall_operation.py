@@ -1,6 +1,6 @@
-"""How each operation of a thin wall's job cuts: cutter, feed and rows, and what its depths of cut follow from.
+"""Operations of a thin-wall job: cutter, feed, rows and depth rules of each.
 
-Operations follow one another: each but the last leaves stock all over every side, which the next one takes with its own
+Operations follow one another. Each but the last leaves stock on every side, which the next one removes with its own
 cutter. Notation: r the reserve of an operation: its planner uses the share 1 - r of a threshold.
 """
 
@@ -28,7 +28,9 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 @dataclass(frozen=True, eq=False)
 class WallCut:
-    """How the wall is cut, in mm, s, rad, N; rows leave cusps of ``scallop``, ``measure`` of the force counts."""
+    """Cutting data of an operation, in mm, s, rad, N; rows leave scallops of height ``scallop``, and ``measure`` of the
+    force counts.
+    """
 
     cutter: Cutter
     material: Material
@@ -42,13 +44,13 @@ class WallCut:
 
 @dataclass(frozen=True, eq=False)
 class DepthRules:
-    """From what the depths of cut follow.
+    """Depth rules of an operation: force laws, slope, allowed deflection and reserve.
 
     Attributes
     ----------
-    law, even_law : F_n of depths on stock with the slope, and on even stock, both with cusps
+    law, even_law : F_n of depths on stock with the slope, and on even stock, both with scallops
     slope : greatest change of depth along the surface
-    deflection : that is allowed [mm]
+    deflection : allowed deflection [mm]
     factor : of the thresholds, at most 1
     experiments : None: thresholds are modelled
     """
@@ -63,7 +65,7 @@ class DepthRules:
 
 @dataclass(frozen=True, eq=False)
 class WallOperation:
-    """An operation: its keys, how it cuts, from what its depths follow, the rows of its program if it names one."""
+    """An operation: its keys, cutting data, depth rules, and the rows of its program if it names one."""
 
     table: WallOperationTable
     cut: WallCut

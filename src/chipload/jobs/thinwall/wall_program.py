@@ -1,4 +1,4 @@
-"""The passes of a plan as a program on the machine: linked, with the time of each row."""
+"""Program of the passes of a plan on the machine, with links and the time of each row."""
 
 from __future__ import annotations
 
@@ -33,7 +33,9 @@ BEYOND = 1.0
 
 @dataclass(frozen=True, eq=False)
 class OnMachine:
-    """A program on the machine: the axes, the time of each row of the tip [s], what the machine does not give."""
+    """A program on the machine: axis positions, the time of each row of the tip [s], and findings where it exceeds the
+    machine.
+    """
 
     commands: Commands
     times: Floats
@@ -41,7 +43,7 @@ class OnMachine:
 
 
 def on_machine(inputs: WallInputs, program: Program) -> OnMachine:
-    """What the axes do for a program."""
+    """Axis positions of a program."""
     machine: Machine = inputs.cut.machine
     lengths = {o.cut.cutter.number: o.cut.cutter.overhang for o in inputs.operations}
     commands, _ = to_axes(program, machine, tool_lengths=lengths)
@@ -52,7 +54,7 @@ def on_machine(inputs: WallInputs, program: Program) -> OnMachine:
 
 
 def linked(inputs: WallInputs, plan: Plan, places: tuple[Floats, Floats] | None = None) -> tuple[PassProgram, ...]:
-    """The way of a plan at these places, u and v; None: those of the elements."""
+    """Linked passes of a plan at these places, u and v; None: those of the elements."""
     motions = [_motion(inputs, k) for k in range(len(inputs.operations))]
     return link_passes(plan.passes, motions, places or inputs.body.places)
 

@@ -42,7 +42,7 @@ NEAR = 2
 
 @dataclass(frozen=True, eq=False)
 class Allowable:
-    """What is planned, what is true, and what the wall allows.
+    """Planned cut, real cut, and the allowable torque of the wall.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Allowable:
 def allowable(
     job: TorqueJob, program: Program, material: Material, machine: Machine, progress: Progress = silent
 ) -> Allowable:
-    """Cut the stock as planned and as it is, and find the limit.
+    """Simulate the cut in the planned and in the real stock, and find the torque limit.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def wall_of(job: TorqueJob) -> Shell:
 
 
 def thinnest(job: TorqueJob) -> Shell:
-    """The wall that the limit is made for: as thin as its tolerance lets it be."""
+    """Wall for which the limit is calculated: as thin as its tolerance allows."""
     shell = wall_of(job)
     return replace(shell, thickness=shell.thickness - job.shell.wall_tolerance_mm)
 
@@ -129,7 +129,7 @@ def limit_of(job: TorqueJob, planned: Cut) -> tuple[Ritz, PathLimit]:
 
 
 def allowed(job: TorqueJob) -> tuple[float, float]:
-    """Deflection [mm] and stress [MPa] that are allowed."""
+    """Allowed deflection [mm] and stress [MPa]."""
     ask = job.table.limits
     return 1e-3 * ask.form_error_um, ask.strength_share * job.shell.strength_mpa
 
@@ -142,7 +142,7 @@ def feed_at(planned: CutSteps, limit: PathLimit, k: int) -> float:
 
 
 def relief_of(limit: PathLimit, torque: float) -> Floats:
-    """(n + 1,) allowable torque at the ends of the steps over the limit, the least of the steps near."""
+    """Allowable torque at the ends of the steps over the limit, (n + 1,): the least of the steps near."""
     if torque <= 0.0:
         return np.ones(len(limit.each) + 1)
     # a stated limit holds everywhere
@@ -152,7 +152,7 @@ def relief_of(limit: PathLimit, torque: float) -> Floats:
 
 
 def path_of(planned: CutSteps, true: Loads, relief: Floats) -> ToolPath:
-    """The path of the controllers, with what is planned and what is true."""
+    """Path of the controllers, with the planned and the real cut."""
     believed = np.column_stack([row_means(planned.loads.torque_edge), row_means(planned.loads.torque_cut)])
     real = np.column_stack([row_means(true.torque_edge), row_means(true.torque_cut)])
     return tool_path(planned.points, np.append(planned.feed, planned.feed[-1]), believed, real, relief)

@@ -1,8 +1,9 @@
 """The controllers that are compared on one path: constant, model, PI, fuzzy, fuzzy with the model.
 
-All of them meet the same truth: the real cut, and the real spindle, which differ from the plan by what the job states.
-`constant` and `model` are as fast as they can be with hindsight: the greatest constant override, and the schedule of
-the model with the greatest torque, at which the limit is kept in truth. The PI controller is tuned by a rule.
+All of them run in the same real process: the real cut, and the real spindle, which differ from the plan by what the job
+states. `constant` and `model` are as fast as they can be with hindsight: the greatest constant override, and the
+schedule of the model with the greatest torque, at which the real process keeps the limit. A rule tunes the PI
+controller.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ Play = Callable[[Override, bool], ControllerRun]
 
 
 def controller_of(job: TorqueJob, torque: float) -> Override:
-    """The rules of the job for a limit of torque [N mm]; its PI gains are 0 where a rule is to find them."""
+    """Controller of the job for a torque limit [N mm]; its PI gains are 0 where a rule is to find them."""
     t: dict[str, Any] = job.table.torque_control.override.model_dump()
     hold = t.pop("hold")
     overload = 1e3 * t["overload_nm"]
@@ -64,7 +65,7 @@ def cases_of(
     job: TorqueJob, path: ToolPath, controller: Override, table: FuzzyTable, spindle: Spindle, torque: float,
     walls: tuple[WallPath, ...], acceleration: float, progress: Progress,
 ) -> tuple[ControllerCase, ...]:  # fmt: skip
-    """Every controller without latency, and with what the job states."""
+    """Every controller, first without latency and then with the latency that the job states."""
     ask = job.table.loop
     period = 1e-3 * ask.period_ms
     out = []
@@ -81,7 +82,7 @@ def player(
     path: ToolPath, table: FuzzyTable, spindle: Spindle, deviation: SpindleDeviation, loop: Loop, torque: float,
     walls: tuple[WallPath, ...],
 ) -> Play:  # fmt: skip
-    """What runs one controller, with or without the model, against the truth."""
+    """Function that runs one controller in the real process, with or without the model."""
 
     def play(override: Override, modelled: bool) -> ControllerRun:
         model = path.model if modelled else None
@@ -98,7 +99,7 @@ def player(
 
 
 def compared(path: ToolPath, config: Override, play: Play, torque: float) -> dict[str, ControllerRun]:
-    """Every controller by its name."""
+    """Runs of every controller by its name."""
     runs: dict[str, ControllerRun] = {}
     for name, (override, modelled) in comparison(_constant(path, config, torque, play), config).items():
         runs[name] = play(override, modelled)

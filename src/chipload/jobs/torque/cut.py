@@ -52,7 +52,7 @@ COARSE = 8.0
 
 @dataclass(frozen=True)
 class Place:
-    """Where the finished wall is."""
+    """Position of the finished wall."""
 
     table: ShellTable
 
@@ -62,7 +62,7 @@ class Place:
 
     @property
     def angle(self) -> float:
-        """F [rad]."""
+        """Half angle f [rad]."""
         return math.radians(self.table.angle_deg)
 
     @property
@@ -72,7 +72,7 @@ class Place:
         return min(self.table.clamp_z_mm, other), max(self.table.clamp_z_mm, other)
 
     def along(self, z: Floats) -> Floats:
-        """S of heights [mm]; outside 0 .. length beside the wall."""
+        """Distance s along the wall of heights [mm]; outside 0 .. length beside the wall."""
         return np.asarray(self._up * (z - self.table.clamp_z_mm) / math.cos(self.angle))
 
     def outer(self, z: Floats) -> Floats:
@@ -89,7 +89,7 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class CutSteps:
-    """What the steps of a program cut; steps from the first feed to the last.
+    """Cutting data of the steps of a program, from the first feed to the last.
 
     Parameters
     ----------
@@ -108,14 +108,14 @@ class CutSteps:
 
     @property
     def rows(self) -> slice:
-        """Rows of the removal that the steps are."""
+        """Rows of the removal of the steps."""
         first = int(np.flatnonzero(~self.removal.columns["rapid"])[0])
         return slice(first, first + len(self.feed))
 
 
 @dataclass(frozen=True, eq=False)
 class Cut(CutSteps):
-    """What the steps of a program cut from the stock of a thin wall.
+    """Removal and cutting data of the steps of a program in the stock of a thin wall.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class Cut(CutSteps):
 
 
 def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) -> Program:
-    """The program that is named, or made.
+    """Program of the job: the stated file, or the generated one.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
 
 
 def round_program(ask: RoundTable, place: Place, cutter: Cutter) -> Program:
-    """Straight to the wall, down it in a helix, once round at the bottom, straight away."""
+    """Straight to the wall, down it in a helix, one full turn at the bottom, straight away."""
     spindle, tool = rad_s_from_rpm(ask.speed_rpm), cutter.number
     feed = mm_s_from_mm_min(ask.feed_mm_min)
     # down milling has the wall on the right of travel: clockwise round it
@@ -246,13 +246,13 @@ def shell_stock(
 
 
 def resolution_of(job: TorqueJob) -> Resolution:
-    """How fine the chips are looked at."""
+    """Resolution of the chips in the simulation."""
     ask, smallest = job.table.simulation, min(c.radius for c in job.cutters.values())
     return Resolution(ask.step_mm, ask.tolerance_mm, 6, 0.5 * smallest)
 
 
 def require_linear(material: Material) -> None:
-    """Refuse a material whose torque has no part that goes with the feed and one of the edge.
+    """Refuse a material whose torque cannot be split into a part of the edge and a part in proportion to the feed.
 
     Raises
     ------
@@ -278,7 +278,7 @@ def cut(
     *,
     keep: bool = False,
 ) -> Cut:
-    """Run the program through the stock, which changes.
+    """Simulate the program in the stock, which changes.
 
     Parameters
     ----------
@@ -326,7 +326,7 @@ def cut(
 
 
 def edge_material(material: Material) -> Material:
-    """The same with little more than its edge coefficients."""
+    """The material with little more than its edge coefficients."""
     little = LITTLE_MPA / material.Ktc
     return replace(
         material, Ktc=LITTLE_MPA, Krc=little * material.Krc, Kac=little * material.Kac, spread=None, covariance=None
@@ -340,7 +340,7 @@ def feed_rows(removal: Removal) -> slice:
 
 
 def step_points(removal: Removal, program: Program) -> Floats:
-    """(n + 1, 3) ends of the steps from the first feed to the last [mm].
+    """Ends of the steps from the first feed to the last, (n + 1, 3) [mm].
 
     Raises
     ------
@@ -359,7 +359,7 @@ def step_points(removal: Removal, program: Program) -> Floats:
 
 
 def step_feeds(removal: Removal, rapids: float) -> Floats:
-    """(n,) programmed feeds of the same steps [mm/s]; ``rapids`` that of the rapids between two cuts."""
+    """Programmed feeds of the same steps, (n,) [mm/s]; ``rapids`` that of the rapids between two cuts."""
     c, own = removal.columns, feed_rows(removal)
     return np.where(c["rapid"][own], rapids, mm_s_from_mm_min(1.0) * c["feed_mm_min"][own])
 
@@ -388,7 +388,7 @@ def _on_the_wall(
 
 
 def true_loads(loads: Loads, points: Floats, place: Place, surprises: tuple[SurpriseTable, ...]) -> Loads:
-    """The loads with a worn cutter and hard spots; thicker sides and thinner walls are in what was cut."""
+    """Loads with a worn cutter and hard spots; thicker sides and thinner walls are in the real cut."""
     middle = 0.5 * (points[1:] + points[:-1])
     around = place.outer(middle[:, 2])
 
@@ -404,7 +404,7 @@ def true_loads(loads: Loads, points: Floats, place: Place, surprises: tuple[Surp
 def surprise_factors(
     steps: int, away: Callable[[SurpriseTable], Floats], surprises: tuple[SurpriseTable, ...]
 ) -> tuple[Floats, Floats]:
-    """(n,) factors of the parts of the edge and of the feed.
+    """Factors (n,) of the parts of the edge and of the feed.
 
     ``away`` gives the (n,) distance [mm] of the steps from a hard spot.
     """
@@ -422,7 +422,7 @@ def surprise_factors(
 
 
 def off_centre(stock_mm: float, surprises: tuple[SurpriseTable, ...]) -> tuple[float, float]:
-    """Where the centre of the stock's outer edge really is [mm]."""
+    """Real centre of the stock's outer edge [mm]."""
     x = y = 0.0
     for one in surprises:
         if one.kind == "thicker-side":
@@ -438,7 +438,7 @@ def thinner_share(surprises: tuple[SurpriseTable, ...]) -> float:
 
 
 def contact_width(stock_mm: float, cutters: Mapping[int, Cutter]) -> float:
-    """How wide the contact is round the wall, as on a flat one: sqrt(a (2 R - a)) with the smallest cutter [mm]."""
+    """Width of the contact round the wall, as on a flat one: sqrt(a (2 R - a)) with the smallest cutter [mm]."""
     radius = min(c.radius for c in cutters.values())
     a = min(stock_mm, radius)
     return math.sqrt(a * (2.0 * radius - a))

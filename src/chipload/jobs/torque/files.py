@@ -1,7 +1,7 @@
 """The files of a torque job for the machine: path and controller for `chipload hal`, and two programs.
 
-`0-override.ngc` has the programmed feeds and takes the override; `0-feedforward.ngc` has the feeds that the model
-allows written into it, for a machine without a controller: nothing is measured there.
+`0-override.ngc` has the programmed feeds and takes the override. `0-feedforward.ngc` has the feeds that the model
+allows written into it, for a machine without a controller, where nothing is measured.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ FEED_STEP = 0.05
 LONGEST = 0.5 * np.pi
 #: ends of rows and of steps agree within [mm]
 SAME_MM = 1e-6
-#: the machine is looked for so far from its last place, and is off the path beyond [mm]
+#: the machine's place is searched so far from its last place, and is off the path beyond [mm]
 WINDOW_MM, AWAY_MM = 5.0, 0.3
 PATH, TABLE, HAL = "path.csv", "controller.toml", "hal.toml"
 #: files that the controller in use takes beside its program
@@ -63,7 +63,7 @@ def program_files(outcome: TorqueResult) -> dict[str, bytes]:
 
 
 def planned_override(outcome: TorqueResult, config: Override) -> Floats:
-    """(n,) override of each step that the model alone allows, in whole steps, rounded down but not below the floor."""
+    """Override of each step that the model alone allows, (n,): in whole steps, rounded down but not below the floor."""
     told = outcome.allowable.path.over_relief
     with np.errstate(divide="ignore", invalid="ignore"):
         rows = np.where(told.cut > 0.0, (config.torque_ref - told.edge) / told.cut, np.inf)
@@ -74,7 +74,7 @@ def planned_override(outcome: TorqueResult, config: Override) -> Floats:
 
 
 def feed_forward(outcome: TorqueResult, config: Override) -> Program:
-    """The program with its cutting rows in pieces of one feed each; arcs stay arcs."""
+    """Program with its cutting rows split into parts of one feed each; arcs stay arcs."""
     p, override = outcome.job.program, planned_override(outcome, config)
     arc, points, at = is_arc(p), outcome.allowable.path.points, 0
     row_of, end, feed = [], [], []

@@ -68,7 +68,7 @@ class TorqueJob:
 
     @property
     def workpiece(self) -> WorkpieceTable | None:
-        """What limits the torque; None: the shell does."""
+        """Workpiece that limits the torque; None: the shell does."""
         return self.table.workpiece
 
 

@@ -1,9 +1,9 @@
 """The outcome of a torque job: the limit of wall or workpiece, and each controller with and without latency.
 
-Torques are held against what the wall bears at their place: `torque_nm_max` is the torque over its relief, so that it
-compares with the one limit, that of the place where the wall bears least; `torque_raw_nm_max` is the torque itself.
-The verdict is over the fuzzy controller with the model of the cut, with the latency of the job; the others are there
-to compare.
+Torques are compared with the allowable torque at their place: `torque_nm_max` is the torque over its relief, so it
+compares with the one limit, that of the place with the least allowable torque; `torque_raw_nm_max` is the torque
+itself. The verdict is that of the fuzzy controller with the model of the cut, with the latency of the job; the other
+controllers are for comparison.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class ControllerRun:
     workpiece: Floats | None = None
 
     def numbers(self) -> dict[str, Any]:
-        """In summary.json."""
+        """Numbers in summary.json."""
         return {
             "time_s": self.outcome.time,
             "torque_nm_max": 1e-3 * self.outcome.load_max,
@@ -103,7 +103,7 @@ class ComplianceComparison:
 
 @dataclass(frozen=True, eq=False)
 class SolidComparison:
-    """The second opinion: compared places, numbers of elements (half round, along, through) and of nodes."""
+    """Check of the shell by a solid: compared places, numbers of elements (half round, along, through) and of nodes."""
 
     places: tuple[ComplianceComparison, ...]
     counts: tuple[int, int, int]
@@ -117,7 +117,7 @@ class SolidComparison:
 
 @dataclass(frozen=True)
 class SpindleEstimate:
-    """How far the torque that is estimated from the spindle is to be trusted.
+    """Accuracy of the torque that is estimated from the spindle.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class SpindleEstimate:
 
 @dataclass(frozen=True, eq=False)
 class TorqueInputs:
-    """What the job states, and what it was read from.
+    """Values of the job and its program for the result.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ class TorqueInputs:
 
 @dataclass(frozen=True, eq=False)
 class ShellWall:
-    """The wall.
+    """The wall of a tube or cone.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ class AllowableTorque:
     ----------
     limit : of torque, from the wall alone
     torque : the limit that is kept [N mm], the least of that and the stated one; 0: not attainable
-    true_torque : what the wall as it really is would bear [N mm]
+    true_torque : allowable torque of the real wall [N mm]
     one_tooth : the limit by the closed formula of one tooth [N mm], to compare; None: of a workpiece there is none
     remedy : what would make a torque allowable, where none is
     path : with what is planned and what is true
@@ -247,7 +247,7 @@ class AllowableTorque:
 
 @dataclass(frozen=True, eq=False)
 class ControlComparison:
-    """The controllers, and what they were compared with.
+    """Runs of the controllers, and the references of their comparison.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ class ControlComparison:
 
 @dataclass(frozen=True, eq=False)
 class TorqueResult:
-    """The whole result.
+    """Result of a torque job.
 
     Parameters
     ----------
@@ -295,12 +295,12 @@ class TorqueResult:
 
     @property
     def attainable(self) -> bool:
-        """Whether there is a torque that the wall bears."""
+        """Whether any torque is allowable."""
         return self.allowable.torque > 0.0
 
     @property
     def source(self) -> str:
-        """Where the limit comes from: `deflection`, `strength`, `workpiece deflection` or `stated`."""
+        """Source of the limit: `deflection`, `strength`, `workpiece deflection` or `stated`."""
         return "stated" if self.allowable.torque < self.allowable.limit.torque else self.allowable.limit.by
 
     def compared(self, case: ControllerCase) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Remedies if the edge force alone is too great for the wall: each change that would make a torque allowable.
+"""Remedies if the edge force alone exceeds the allowable force: each change that would make a torque allowable.
 
 Notation: F_e edge force at a step, in proportion to its depth of cut; F_lim = min(d / (C_w + C_t), S / g) as in
 :mod:`chipload.control.wall`, for another depth of cut, wall, free length or overhang. A change would do where F_lim
@@ -21,13 +21,13 @@ from chipload.structure.shell import Ritz, Shell, ritz
 MARGIN = 1.2
 #: halvings of a search
 HALVINGS = 8
-#: thicker walls are looked for up to this share of the radius, free lengths down to this share of what is stated
+#: thicker walls are searched up to this share of the radius, free lengths down to this share of the stated one
 THICKEST, SHORTEST = 0.2, 0.1
 
 
 @dataclass(frozen=True)
 class HardestPlace:
-    """A step whose edge force is too much: ends of its depth of cut along the wall [mm], C_t [mm/N], F_e [N]."""
+    """Step whose edge force is too great: ends of its depth of cut along the wall [mm], C_t [mm/N], F_e [N]."""
 
     near: float
     far: float
@@ -36,7 +36,7 @@ class HardestPlace:
 
 
 def remedies(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) -> list[str]:
-    """Changes of which each by itself would do; ``shell``: the wall that the limit is made for."""
+    """Changes each of which alone would do; ``shell``: the wall for which the limit is calculated."""
     places = _hardest(planned, limit)
     k = limit.step
     depth, tolerance, modes = float(planned.far[k] - planned.near[k]), job.shell.wall_tolerance_mm, ritz(shell)
@@ -90,7 +90,7 @@ def _hardest(planned: Cut, limit: PathLimit) -> list[HardestPlace]:
 
 
 def remedy_text(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) -> str:
-    """What would do, in a sentence."""
+    """Remedies in a sentence."""
     found = remedies(job, shell, planned, limit)
     if not found:
         return (

@@ -1,6 +1,6 @@
 """The result of a torque job: a track for each controller and latency, limits, findings.
 
-The verdict stands on the fuzzy controller with the model of the cut and the latency that the job states.
+The verdict is that of the fuzzy controller with the model of the cut and the latency that the job states.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def track_name(case: ControllerCase, controller: str) -> str:
 
 
 def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
-    """Every limit of the job against a controller, then those that are checked by default.
+    """Limit checks of a controller: those of the job, then the default checks.
 
     Their ``resolution_error`` is that of the simulation of the truth: of the mean torque for torques and powers, of the
     force for what the part and the cutter do, there with that of the compliance of a clamped workpiece.

@@ -53,7 +53,7 @@ from chipload.stock.layers import LayeredStock
 
 
 def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
-    """Cut the stock as planned and as it is, find the limit, run every controller.
+    """Simulate the cut in the planned and in the real stock, find the torque limit, and run every controller.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def _real_stock(job: TorqueJob, program: Program) -> LayeredStock:
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """What the controllers and the checks follow: what is cut as planned and in truth, its loads, and its responses."""
+    """Data of the path for the controllers and the checks: planned and real cut, loads, and responses."""
 
     planned: CutSteps
     real: CutSteps
@@ -141,7 +141,7 @@ def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Materi
 
 
 def check(job: TorqueJob) -> tuple[list[str], bool]:
-    """Read all that the job names, say what of it does not go together, and find the limit of torque coarsely.
+    """Read the files that the job names, report values that do not go together, and find the torque limit coarsely.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
 
 
 def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spindle]:
-    """What the job names, if its values go together.
+    """Machine, material, fuzzy table, program and spindle of a job, checked against one another.
 
     Raises
     ------

@@ -1,4 +1,6 @@
-"""scene.glb of a torque-controlled program: the stock that is left, and the path coloured by torque over allowable."""
+"""The file scene.glb of a torque-controlled program: the remaining stock, and the path coloured by torque over
+allowable.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ SCENE_ROWS = 4000
 
 
 def scene_bytes(outcome: TorqueResult) -> bytes:
-    """scene.glb: what is left of the stock, and the path coloured by the torque over the allowable one."""
+    """The file scene.glb: the remaining stock, and the path coloured by the torque over the allowable torque."""
     scene = trimesh.Scene()
     stock = outcome.wall.stock.mesh()
     stock.visual.face_colors = (168, 122, 58, 255)

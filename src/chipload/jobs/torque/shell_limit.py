@@ -1,4 +1,4 @@
-"""The torque that a thin wall allows, for the result and, coarsely, for a check."""
+"""Allowable torque of a thin wall, for the result and, coarsely, for a check."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ MOST_PREVIEWED = 3000
 
 
 def shell_wall(job: TorqueJob, a: Allowable) -> ShellWall:
-    """The wall in the result."""
+    """Data of the wall in the result."""
     place = Place(job.shell)
     low, high = _finished(place, a.real)
     return ShellWall(
@@ -54,7 +54,7 @@ def shell_wall(job: TorqueJob, a: Allowable) -> ShellWall:
 
 
 def shell_torque(job: TorqueJob, a: Allowable, material: Material) -> AllowableTorque:
-    """The torque that the wall allows, in the result."""
+    """Allowable torque of the wall, in the result."""
     return AllowableTorque(
         limit=a.limit,
         torque=a.torque,
@@ -66,14 +66,14 @@ def shell_torque(job: TorqueJob, a: Allowable, material: Material) -> AllowableT
 
 
 def real_shell_stock(job: TorqueJob, program: Program) -> LayeredStock:
-    """The stock as it really is, before the program; that of the plan is made too, so that it is known to be right."""
+    """The real stock before the program. The planned one is made too, to check that it is valid."""
     shell_stock(job, program)
     surprises = job.table.surprise
     return shell_stock(job, program, off_centre(job.shell.stock_mm, surprises), thinner_share(surprises))
 
 
 def preview_of_shell(job: TorqueJob, program: Program, material: Material, machine: Machine) -> tuple[str, bool]:
-    """The limit of torque by a coarse simulation of the plan, in a sentence, and whether there is one."""
+    """Torque limit by a coarse simulation of the plan, in a sentence, and whether there is one."""
     rough = coarser(job)
     if counted(program, job.cutters, resolution_of(rough)) > MOST_PREVIEWED:
         return "the run finds the torque limit", True

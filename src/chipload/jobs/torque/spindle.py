@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 def spindle_of(job: TorqueJob, speeds: Floats) -> Spindle:
-    """What the controller believes of the spindle; ``speeds`` those of the program [rad/s].
+    """The controller's model of the spindle; ``speeds`` those of the program [rad/s].
 
     Raises
     ------
@@ -44,18 +44,18 @@ def spindle_of(job: TorqueJob, speeds: Floats) -> Spindle:
 
 
 def identified_from(job: TorqueJob, spindle: Spindle) -> Literal["current", "power"]:
-    """What the spindle was identified from."""
+    """Whether the spindle was identified from its current or from its power."""
     power = job.spindle_file is not None and read_spindle(job.spindle_file, spindle.speed).source == "power"
     return "power" if power else "current"
 
 
 def deviation_of(job: TorqueJob) -> SpindleDeviation:
-    """How the real spindle differs."""
+    """Deviation of the real spindle from its model."""
     return SpindleDeviation(**job.table.spindle.deviation.model_dump())
 
 
 def estimate_range(job: TorqueJob, spindle: Spindle) -> tuple[float, float]:
-    """(least, greatest) torque that the estimate holds for [N mm], of the file.
+    """Least and greatest torque for which the estimate holds [N mm], of the file.
 
     Else what counts as no longer light, and what the drive's greatest current gives.
     """
@@ -69,8 +69,8 @@ def estimate_range(job: TorqueJob, spindle: Spindle) -> tuple[float, float]:
 
 
 def require_resolved(job: TorqueJob, spindle: Spindle, torque: float) -> None:
-    """Refuse a limit of torque [N mm] that the spindle cannot hold, that counts as light, or that it was not identified
-    for.
+    """Refuse a torque limit [N mm] that the spindle cannot hold, that counts as light, or for which it was not
+    identified.
     """
     override = job.table.torque_control.override
     excess = 1e-2 * job.table.limits.torque_over_percent
@@ -91,7 +91,7 @@ def require_resolved(job: TorqueJob, spindle: Spindle, torque: float) -> None:
 
 
 def wrong_side(key: str, value: float, held: float) -> InputError:
-    """A torque of the override [N mm] on the wrong side of the one that is held."""
+    """Error for a torque of the override [N mm] on the wrong side of the torque limit."""
     side = "below" if key == "light_nm" else "above"
     return InputError(
         f"torque_control.override.{key} = {1e-3 * value:g}: must be {side} the torque that is held, "

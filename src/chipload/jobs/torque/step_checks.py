@@ -30,7 +30,7 @@ LEAST = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class StepChecks:
-    """Steps of the path with what they are cut with; n of them.
+    """Data of n steps of the path for the default checks.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class StepChecks:
 
 
 def step_checks(real: CutSteps, loads: Loads, material: Material, most: float) -> StepChecks:
-    """Steps as they really are.
+    """Data of the real steps.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def step_checks(real: CutSteps, loads: Loads, material: Material, most: float) -
 
 
 def feed_ratio(programmed: TorqueProfile, outcome: Outcome, speed: float) -> Floats:
-    """(k,) feed per tooth of the rows of an outcome over the programmed one; ``speed`` that of the free spindle."""
+    """Feed per tooth of the rows of an outcome over the programmed one, (k,); ``speed`` that of the free spindle."""
     return np.asarray(outcome.feed / np.interp(outcome.s, programmed.s, programmed.feed) * (speed / outcome.speed))
 
 

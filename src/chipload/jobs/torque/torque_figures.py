@@ -98,7 +98,7 @@ def allowable(outcome: TorqueResult) -> go.Figure:
 
 
 def ovalised(wall: ShellWall) -> go.Figure:
-    """The rim under the cutter's force, and what each harmonic adds, against a beam."""
+    """Rim under the cutter's force, and the part of each harmonic, compared with a beam."""
     oval, shell = wall.oval, wall.shell
     figure = make_subplots(
         rows=1, cols=2, specs=[[{"type": "polar"}, {"type": "xy"}]], column_widths=[0.45, 0.55],
@@ -134,7 +134,7 @@ def ovalised(wall: ShellWall) -> go.Figure:
 
 
 def answers(table: FuzzyTable) -> go.Figure:
-    """The fuzzy surface."""
+    """Output of the fuzzy rules over the error and its change."""
     e, d, f = surface(table)
     figure = go.Figure(go.Surface(x=d, y=e, z=f, colorscale=SCALE, colorbar={"thickness": 12, "title": "answer"}))
     axes = {"xaxis": {"title": "change"}, "yaxis": {"title": "error"}, "zaxis": {"title": "answer"}}
@@ -143,7 +143,7 @@ def answers(table: FuzzyTable) -> go.Figure:
 
 
 def measured(outcome: TorqueResult) -> go.Figure:
-    """Measured against true torque of the controller of the verdict, and what is not trusted."""
+    """Measured and true torque of the controller of the verdict, and the measurements that it does not trust."""
     run_of = outcome.control.cases[-1].runs[HELD]
     run = run_of.outcome
     keep = np.unique(np.linspace(0, len(run.t) - 1, min(len(run.t), 3000)).astype(np.int64))

@@ -53,7 +53,7 @@ def unrolled(outcome: TorqueResult) -> go.Figure:
 
 
 def torques(outcome: TorqueResult) -> dict[str, Floats]:
-    """(n,) torques at the points of the path [N m]: allowable, planned and true at the programmed feed, and held."""
+    """Torques at the points of the path, (n,) [N m]: allowable, planned and true at the programmed feed, and held."""
     path = outcome.allowable.path
     out = {
         "allowable": 1e-3 * outcome.allowable.torque * path.relief,

@@ -6,7 +6,7 @@ two surfaces that face each other), W(o) deflection of the workpiece in any dire
 stress of the workpiece per force. All are convex in o, so between 0 and 1 the straight line lies above them.
 
 Compliance is that of the state of removal of each step, which no feed changes. It is known to a share e: the limit is
-made for compliance and stress (1 + e) times as great. The stress is looked at in the steps that bend the workpiece most
+made for compliance and stress (1 + e) times as great. Stress is calculated in the steps that bend the workpiece most
 and in those with most force; the greatest g among them counts everywhere.
 """
 
@@ -61,25 +61,25 @@ from chipload.structure.spindle import Bar, tool_bars
 
 Floats = NDArray[np.float64]
 
-#: between two rotations that are looked at [rad]
+#: angle between two rotations at which forces are calculated [rad]
 ROTATION = math.radians(1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class TwoParts:
-    """Something of n steps by the edge and by what goes with the feed: (n,) float each."""
+    """A quantity of n steps in two parts, by the edge and in proportion to the feed: (n,) float each."""
 
     edge: Floats
     cut: Floats
 
     def times(self, edge: Floats, cut: Floats) -> TwoParts:
-        """With other factors of both, (n,) each."""
+        """The quantity with other factors of both parts, (n,) each."""
         return TwoParts(self.edge * edge, self.cut * cut)
 
 
 @dataclass(frozen=True, eq=False)
 class WorkpieceCut(CutSteps):
-    """What the steps of a program cut from a workpiece; the force of its loads is the greatest of each step.
+    """Cutting data of the steps of a program in a workpiece; the force of its loads is the greatest of each step.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class WorkpieceCut(CutSteps):
 
 @dataclass(frozen=True, eq=False)
 class AllowableWorkpiece:
-    """What is planned, what is true, and which torque the workpiece allows.
+    """Planned cut, real cut, and the allowable torque of the workpiece.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class AllowableWorkpiece:
 
 
 def simulation_of(job: TorqueJob, solid: SolidTable) -> ProgramJob:
-    """The job of a simulation of the same program, through a stock of it."""
+    """Simulation job of the same program in the stock of the workpiece."""
     t = job.table
     fine = SimulateTable.model_validate(
         {"kind": "simulate", "step_mm": t.simulation.step_mm, "tolerance_mm": t.simulation.tolerance_mm}
@@ -158,7 +158,7 @@ def workpiece_cut(
     rapids: float,
     progress: Progress = silent,
 ) -> WorkpieceCut:
-    """Run the program through a stock of the workpiece, with the material and with its edge alone.
+    """Simulate the program in the stock of the workpiece, with the material and with its edge alone.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def workpiece_cut(
 def deflections(
     removal: Removal, material: Material, known: WorkpieceCompliance, bars: dict[int, tuple[Bar, ...]]
 ) -> tuple[Floats, Floats, Floats]:
-    """(n,) D, the whole deflection, and W of each row of a removal [mm]; 0 where nothing is cut."""
+    """D, the whole deflection, and W of each row of a removal, (n,) [mm]; 0 where nothing is cut."""
     n = len(removal.columns["line"])
     whole, work = np.zeros(n), np.zeros(n)
     for cuts in removal.cuts:
@@ -223,7 +223,7 @@ def deflections(
 def responses_of(
     job: TorqueJob, cut: WorkpieceCut, factors: tuple[Floats, Floats] | None = None, margin: float = 0.0
 ) -> list[LimitedResponse]:
-    """What the limits of the job say of a cut.
+    """Limited responses of a cut by the limits of the job.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def responses_of(
 
 
 def limit_on_workpiece(loads: Loads, responses: list[LimitedResponse]) -> PathLimit:
-    """The torque that a workpiece allows along a program.
+    """Allowable torque of a workpiece along a program.
 
     Raises
     ------
@@ -262,7 +262,7 @@ def limit_on_workpiece(loads: Loads, responses: list[LimitedResponse]) -> PathLi
 def allowable_on_workpiece(
     job: TorqueJob, program: Program, material: Material, machine: Machine, progress: Progress = silent
 ) -> AllowableWorkpiece:
-    """Cut the stock as planned and as it is, and find the limit.
+    """Simulate the cut in the planned and in the real stock, and find the torque limit.
 
     Raises
     ------
@@ -289,7 +289,7 @@ def allowable_on_workpiece(
 
 
 def real_stock_body(job: TorqueJob, program: Program) -> LayeredStock:
-    """The stock as it really is, before the program."""
+    """The real stock before the program."""
     return stock_body(simulation_of(job, job.table.real_stock or stated(job.table.stock, "stock")), program)
 
 

@@ -1,9 +1,9 @@
-"""The torque that a clamped workpiece allows, for the result and, coarsely, for a check; and remedies.
+"""Allowable torque of a clamped workpiece, for the result and, coarsely, for a check; and remedies.
 
-Notation as in :mod:`chipload.jobs.torque.workpiece_cut`. Where D_e or W_e alone reaches its limit d no feed would do.
-Each change by itself would where the response of the edge is then at most d / :data:`MARGIN`: a depth of cut in
-proportion, an overhang by its cube, a support by what it takes off at the step that bends the workpiece most, clamps or
-walls by their stiffness.
+Notation as in :mod:`chipload.jobs.torque.workpiece_cut`. Where D_e or W_e alone reaches its limit d no feed is
+allowable. A change alone is a remedy where the response of the edge is then at most d / :data:`MARGIN`: a depth of cut
+in proportion, an overhang by its cube, a support by the deflection that it removes at the step that bends the workpiece
+most, clamps or walls by their stiffness.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ MOST_PREVIEWED, STATES = 1500, 2
 
 
 def clamped_workpiece(job: TorqueJob, a: AllowableWorkpiece) -> ClampedWorkpiece:
-    """The workpiece in the result."""
+    """Data of the workpiece in the result."""
     strength = stated(stated(job.workpiece, "workpiece").yield_mpa, "workpiece.yield_mpa")
     planned, real = a.planned.compliance, a.real.compliance
     return ClampedWorkpiece(planned, real, (a.planned.strained, a.real.strained), strength, a.real.stock)
 
 
 def allowable_torque(job: TorqueJob, a: AllowableWorkpiece) -> AllowableTorque:
-    """The torque that the workpiece allows, in the result."""
+    """Allowable torque of the workpiece, in the result."""
     return AllowableTorque(
         limit=a.limit,
         torque=a.torque,
@@ -56,7 +56,7 @@ def allowable_torque(job: TorqueJob, a: AllowableWorkpiece) -> AllowableTorque:
 
 
 def preview_on_workpiece(job: TorqueJob, program: Program, material: Material, machine: Machine) -> tuple[str, bool]:
-    """The limit of torque by a coarse simulation of the plan, in a sentence, and whether there is one."""
+    """Torque limit by a coarse simulation of the plan, in a sentence, and whether there is one."""
     rough = coarser(job)
     few = stated(rough.workpiece, "workpiece").model_copy(update={"states": STATES})
     rough = replace(rough, table=rough.table.model_copy(update={"workpiece": few}))
@@ -74,7 +74,7 @@ def preview_on_workpiece(job: TorqueJob, program: Program, material: Material, m
 
 
 def remedy_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit) -> str:
-    """What would do where no torque is allowable, in a sentence."""
+    """Remedies where no torque is allowable, in a sentence."""
     found = remedies_on_workpiece(job, planned, limit)
     if not found:
         return (
@@ -85,7 +85,7 @@ def remedy_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit)
 
 
 def remedies_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit) -> list[str]:
-    """Changes of which each by itself would do."""
+    """Changes each of which alone would do."""
     k, margin = limit.step, planned.compliance.error
     response = next(r for r in responses_of(job, planned, margin=margin) if r.by == limit.by)
     edge, allowed = float(response.edge[k]), response.most / MARGIN

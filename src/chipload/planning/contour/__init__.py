@@ -1,4 +1,4 @@
-"""Contours finished at constant engagement: the walls, the passes and their times."""
+"""Planning of contours that are finished at constant engagement: the walls, the passes and their times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The backward method: the semi-finish pass is reshaped so that the finish pass sees one engagement angle.
+"""Backward method: it reshapes the semi-finish pass so that the finish pass has a constant engagement angle.
 
 Notation: O centre path of the finish pass (material on the RIGHT of travel), T tangent, n = Rot(+90 deg) T, kappa its
 curvature (positive away from the material), R cutter radius, a* wanted engagement.
@@ -8,7 +8,7 @@ the material is the centre path of that pass.
 Reference: [Uddin2007].
 Differs from source: where P* turns away from the material by delta (a line that runs into a concave corner) a cutter of
 radius R cannot reach the kink; O* is trimmed there and leaves a fillet, so the engagement overshoots. The source calls
-it computational error; it is geometry, is reported, and vanishes with eased joints (:mod:`.ease`).
+it computational error; it is geometry, is reported, and vanishes with eased joints (:mod:`.blend`).
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Strategies of a contour at equal greatest force, and at equal time of the finish pass.
+"""Comparison of the strategies of a contour at equal greatest force, and at equal time of the finish pass.
 
-A strategy that lowers the force at one feed may as well go faster at the old force. So each is run through the same
-finish pass at the feed f0 at which its greatest force is that of a reference, and at the f0 at which its finish pass
-takes as long as that of the reference; the path stays. Force and time come from the force model and from the speed that
-the machine reaches, as in the plan itself.
+A strategy with a lower force at one feed can be faster at the first force. So each is calculated for the same path at
+the feed f0 at which its greatest force is that of a reference, and at the f0 at which its finish pass takes as long as
+that of the reference. Force and time come from the force model and from the speed that the machine reaches, as in the
+plan.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 
-#: f0 is looked for between these multiples of the feed of the job, to this share of it
+#: f0 is searched between these multiples of the feed of the job, to this share of it
 LOW, HIGH, CLOSE = 0.02, 10.0, 1e-3
-#: steps of a finish pass that the force model is asked for in a comparison
+#: steps of a finish pass at which a comparison calculates the force
 ASKED = 300
 
 
@@ -43,7 +43,7 @@ class FinishPasses:
 def programmed_feeds(
     steps: SampledPass, cut: CutConditions, feed: float, machine: Machine, wanted: float | None
 ) -> Floats:
-    """(n,) programmed feed of the steps of a pass [mm/s]: f0, or its schedule where ``wanted`` is stated."""
+    """Programmed feed of the steps of a pass [mm/s], (n,): f0, or its schedule where ``wanted`` is stated."""
     if wanted is None:
         return np.full(len(steps.s), feed)
     ideal = constant_force(cut, steps.engagement, feed, wanted)
@@ -53,9 +53,11 @@ def programmed_feeds(
 def compared(
     finish: Mapping[str, FinishPasses], use: str, cut: CutConditions, feed: float, machine: Machine
 ) -> dict[str, dict[str, object]]:
-    """By strategy, `at_equal_force` and `at_equal_time` beside the strategy ``use`` at ``feed`` [mm/s].
+    """Values `at_equal_force` and `at_equal_time` of each strategy, relative to the strategy ``use`` at ``feed``
+    [mm/s].
 
-    None where no feed from ``LOW`` to ``HIGH`` times that of the job does it: the edge force knows no feed.
+    None where no feed from ``LOW`` to ``HIGH`` times that of the job does so: the edge force does not depend on the
+    feed.
     """
     force, time = _force(finish[use], cut, machine, feed), _time(finish[use], cut, machine, feed)
     out: dict[str, dict[str, object]] = {}

@@ -1,4 +1,4 @@
-"""The forward method of Stori and Wright: a pass that holds the engagement angle by bending into the material.
+"""Forward method of Stori and Wright: a pass that keeps the engagement angle constant by bending into the material.
 
 Notation: P(i) points of the old surface, material on the RIGHT of travel; Q(i) points of the new surface, T(i) unit
 feed, O(i) = Q(i) + R Rot(+90 deg) T(i) the cutter's centre, L = |P(i) - Q(i)| = 2 R sin(a*/2).

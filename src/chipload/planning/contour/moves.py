@@ -1,4 +1,4 @@
-"""How fast a pass runs, and its program.
+"""Speed that the machine reaches along a pass, and the program of a pass.
 
 Notation: v speed that the machine reaches. It keeps the machine's acceleration along the path and across it,
 v^2 |kappa| <= a_max, and passes a kink as the machine's corner tolerance allows. The programmed feeds are those of
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Speeds:
-    """``programmed`` (n,) what the program says, ``reached`` (n,) what the machine does [mm/s], ``time`` (n,) [s]."""
+    """Speeds of a pass: ``programmed`` (n,) and ``reached`` by the machine (n,) [mm/s], ``time`` (n,) [s]."""
 
     programmed: Floats
     reached: Floats

@@ -1,4 +1,4 @@
-"""Where the cutter runs: drawn chains become walls with the material on the right of travel, and their centre paths.
+"""Walls from drawn chains, with the material on the right of travel, and the centre paths of the cutter.
 
 Notation: the planning frame has the material on the RIGHT (down milling). For up milling everything is mirrored in y,
 planned, and mirrored back: :func:`mirrored` is its own inverse. R cutter radius, Q the wall, O the centre path.
@@ -90,7 +90,7 @@ def _turned_to_area(chain: Contour) -> Contour:
 
 
 def run_on(chain: Contour, length: float) -> Contour:
-    """An open chain run on along its end tangents by ``length`` mm at both ends; a closed contour as it is."""
+    """An open chain, extended along its end tangents by ``length`` mm at both ends; a closed contour is unchanged."""
     if chain.closed:
         return chain
     p, t, _ = chain.at([0.0, chain.length])

@@ -1,4 +1,4 @@
-"""The passes of a contour: centre path, the stock each one meets, and the ways in and out.
+"""Passes of a contour: centre path, the stock that each one meets, lead-in and lead-out.
 
 Notation: planning frame, material on the right; R cutter radius, s radial depth of the finish pass, s1 that of the
 semi-finish pass; W the walls, O the finish centre path.
@@ -26,8 +26,8 @@ from chipload.planning.result import Event
 class ContourPass:
     """One pass round one wall.
 
-    ``path`` the centre path that makes the wall, ``lead_in`` and ``lead_out`` its ways in and out (None where there is
-    no room), ``stock`` what it meets, ``stopped`` why it ends before it should.
+    ``path`` the centre path that makes the wall, ``lead_in`` and ``lead_out`` (None where there is no room),
+    ``stock`` the stock that it meets, ``stopped`` the reason why it ends too early.
     """
 
     name: str
@@ -39,7 +39,7 @@ class ContourPass:
 
 
 def surface(paths: Sequence[Contour], radius: float) -> tuple[Contour, ...]:
-    """What a pass leaves standing on its right: the parallel of its centre paths at R."""
+    """Surface that a pass leaves on its right: the parallel of its centre paths at R."""
     return offset(paths, -radius)
 
 
@@ -141,7 +141,7 @@ def with_leads(
     later: int = 0,
     ahead: float = 0.0,
 ) -> ContourPass:
-    """A pass with its ways in and out: quarter circles tangent to the path on the free side.
+    """A pass with lead-in and lead-out: quarter circles tangent to the path on the free side.
 
     The path of an open chain is that over the extended one; between its quarter circles and the chain it runs on
     along the end tangents by ``lead`` mm, and by 2 R more for each of the ``later`` passes that follow, so that no

@@ -1,4 +1,4 @@
-"""A contour semi-finished and finished by several strategies, side by side.
+"""Plan of a contour: semi-finishing and finishing by several strategies.
 
 Notation: R cutter radius, s radial depth of the finish pass, a* = arccos(1 - s/R) its engagement angle along a line,
 f0 the programmed feed; planning frame as in :mod:`.offsets`.
@@ -60,7 +60,7 @@ OVERSHOOT_DEG = 0.05
 
 @dataclass(frozen=True)
 class Finishing:
-    """What the engineer asks of a contour; mm, mm/s, rad/s.
+    """Parameters of a contour; mm, mm/s, rad/s.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def _stock(job: _Job) -> Region:
 
 
 def _behind(job: _Job) -> float:
-    """How far the stock that is looked at goes into the part [mm]."""
+    """Depth of the considered stock inside the part [mm]."""
     return 0.5 * job.radius + (0.0 if job.finish else job.setting.passes * job.setting.radial_depth)
 
 

@@ -1,4 +1,4 @@
-"""A pass in steps: where the cutter is, and its exact engagement there.
+"""A pass in steps: places of the cutter, and its exact engagement there.
 
 Notation: s [mm] length along lead-in, path and lead-out; O centre, T unit feed; a engagement angle, phi immersion.
 All in the work frame.

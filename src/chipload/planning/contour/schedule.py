@@ -1,13 +1,13 @@
-"""The feed schedule of strategy `feed`: the feed at which the force stays what it is on a straight wall.
+"""Feed schedule of the strategy `feed`: the feed at which the force equals that on a straight wall.
 
 Notation: f0 programmed feed, F0 the greatest force over a revolution at f0 on a straight wall (engagement a*), F(a, f)
 that of the force model at an engagement. The schedule is the greatest f <= f0 with F(a, f) <= F0; by the force model,
 not by the chip thickness alone: the arc grows with a, and the edge force does not know the feed.
 
-A machine cannot follow a jump of it. So the schedule slows down early enough to keep the acceleration of the machine
-and, where its file states one, its jerk; it is nowhere above F(a, f) <= F0. The jerk is kept by the least of the
-schedule within a window of +-h, and then its mean over +-h: what is averaged at a place is nowhere above the schedule
-there, and the change of acceleration takes at least 2 h.
+A machine cannot follow a jump of this feed. So the schedule slows down early enough to keep the acceleration of the
+machine and, where its file states one, its jerk; it nowhere exceeds the feed with F(a, f) <= F0. The jerk is limited by
+the least of the schedule within a window of +-h, and then its mean over +-h: the mean at a place is nowhere above the
+schedule there, and a change of acceleration takes at least 2 h.
 
 Reference: [Uddin2007], strategy 3.
 """
@@ -45,7 +45,7 @@ def straight_force(cut: CutConditions, wanted: float, feed: float) -> float:
 
 
 def constant_force(cut: CutConditions, met: Engagement, feed: float, wanted: float) -> Floats:
-    """(n,) greatest feed [mm/s], at most ``feed``, at which the force is at most that on a straight wall.
+    """Greatest feed [mm/s], (n,), at most ``feed``, at which the force is at most that on a straight wall.
 
     Where it is above that even at ``LEAST_SHARE`` of f0, mostly by the edge force, the feed is that.
     """
@@ -73,7 +73,7 @@ def constant_force(cut: CutConditions, met: Engagement, feed: float, wanted: flo
 
 
 def within_machine(s: Floats, wanted: Floats, acceleration: float, jerk: float | None) -> Floats:
-    """(n,) feeds at ``s`` [mm], nowhere above ``wanted``, that keep acceleration [mm/s^2] and jerk [mm/s^3].
+    """Feeds (n,) at ``s`` [mm], nowhere above ``wanted``, that keep acceleration [mm/s^2] and jerk [mm/s^3].
 
     >>> s = np.linspace(0.0, 20.0, 401)
     >>> v = within_machine(s, np.where(s < 10.0, 20.0, 10.0), 100.0, None)

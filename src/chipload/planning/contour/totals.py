@@ -1,4 +1,4 @@
-"""What the passes of a contour take in time, and how much of the stock on the walls they clear."""
+"""Totals of the passes of a contour: their time, and the share of the stock on the walls that they clear."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def cleared_percent(
 
 
 def counts(passes: int, history: Columns) -> dict[str, object]:
-    """What the time [s] is spent on, passes in all, and how often the cutter goes up between them."""
+    """Time [s] by kind of motion, number of passes, and number of retracts between them."""
     linked = elapsed(history, history["pass"] == "link")
     return {
         "cutting_s": float(history["t_s"][-1]) - linked,
@@ -55,5 +55,5 @@ def counts(passes: int, history: Columns) -> dict[str, object]:
 
 
 def elapsed(history: Columns, where: NDArray[np.bool_]) -> float:
-    """Time spent in the steps that end in a row ``where`` [s]."""
+    """Time of the steps that end in a row ``where`` [s]."""
     return float(np.diff(history["t_s"], prepend=0.0)[where].sum())

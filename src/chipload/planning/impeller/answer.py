@@ -1,4 +1,4 @@
-"""The largest cutter of a catalogue at every contact point, and the largest for all of them.
+"""Largest cutter of a catalogue at every contact point, and the largest single cutter for all contact points.
 
 Notation: R cutter radius, r corner radius, rho = R - r; a family is the cutters of one r. rho* of a family
 (``search.py``) is a proved bound, tested with the cutting part alone; the cutters below it are tried from the largest
@@ -46,7 +46,7 @@ class Unreachable:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Largest cutter at each contact point.
+    """Largest cutter at each contact point, with its table angle and pallet angles.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Answer:
 
     @property
     def diameter(self) -> Floats:
-        """(c,) [mm]; 0: unreachable."""
+        """Diameter of the largest cutter (c,) [mm]; 0: unreachable."""
         sizes = np.array([c.diameter for c in self.catalogue.cutters] + [0.0])
         return sizes[self.cutter]
 
@@ -152,7 +152,7 @@ def _proves(scene: Scene, cutter: CatalogueCutter, clearance: float) -> bool:
 def one_cutter(
     scene: Scene, answer: Answer, clearance: float, pallets: ArrayLike = FULL, workers: int = 1
 ) -> tuple[int, int, tuple[Floats, ...]] | None:
-    """The largest cutter that mills every reachable contact point at one table angle.
+    """Largest cutter that mills every reachable contact point at one table angle.
 
     Returns
     -------
@@ -166,7 +166,7 @@ def one_cutter(
 def one_cutter_of(
     parts: Sequence[tuple[Scene, Answer]], clearance: float, pallets: ArrayLike = FULL, workers: int = 1
 ) -> tuple[int, int, tuple[tuple[Floats, ...], ...]] | None:
-    """The largest cutter for several surfaces at one table angle, all searched with the same catalogue and tables.
+    """Largest cutter for several surfaces at one table angle; all were searched with the same catalogue and tables.
 
     Returns
     -------

@@ -1,13 +1,13 @@
-"""Which cutter at which table angle for which strips, so that the time of all is least.
+"""Assignment of cutters and table angles to strips in the least total time.
 
-Notation: a side is a grid of cells, one a contact point; its strips follow each other across u or across v, forwards or
-backwards. State: (cutter, table angle). Between two strips the state may change, at the cost of a cutter change, of a
-re-indexing of the table, or of both.
+Notation: a side is a grid of cells, one for each contact point; its strips follow each other across u or across v,
+forwards or backwards. State: (cutter, table angle). Between two strips the state may change, at the cost of a cutter
+change, of a re-indexing of the table, or of both.
 
-Method: dynamic programming over the states, strip after strip, side after side; of the four ways through a side the
-cheapest for every state behind it. A strip of which no state of the cutters at hand mills all cells is gone through
-cell by cell. With at most m cutters every set of m is bounded from below by its strips without changes, and the sets
-are solved in the order of their bounds until a bound is not below the best time: exact.
+Method: dynamic programming over the states, strip after strip, side after side; of the four directions through a side
+the cheapest for every state behind it. A strip of which no state of the available cutters mills all cells is milled
+cell by cell. With at most m cutters the time of every set of m has a lower bound from its strips without changes. The
+sets are solved in the order of their bounds until a bound is not below the best time: exact.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.planning.impeller.scene import Floats
 
-#: most sets of cutters that are looked at
+#: greatest number of sets of cutters
 SETS = 300_000
-_BATCH = 512  # sets that are looked at together
+_BATCH = 512  # sets that are solved together
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,14 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class Assignment:
-    """The cheapest way: its time with changes [s], and its steps."""
+    """The assignment in the least time: its time with changes [s], and its steps."""
 
     total: float
     steps: tuple[Step, ...]
 
 
 def assigned(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int | None = None) -> Assignment | None:
-    """The least time over all sides in their order, with at most so many different cutters.
+    """Assignment in the least time over all sides in their order, with at most ``most`` different cutters.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def _side(number: int, orders: list[Floats]) -> _Node:
 
 
 def _forward(node: _Node, before: Floats, changes: Changes) -> tuple[Floats, object]:
-    """Least times (cutters, tables) after a node, and what is needed to go back."""
+    """Least times (cutters, tables) after a node, and the data for the steps back."""
     if isinstance(node, _Leaf):
         return _entered(before, changes) + node.cost, before
     records = []
@@ -263,7 +263,7 @@ def _bounds(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64]) -> 
 
 
 def _totals(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64], changes: Changes) -> Floats:
-    """(n,) the least times of many sets, as :func:`_solved` without the way; inf: cells are left."""
+    """Least times (n,) of many sets, as :func:`_solved` without the steps; inf: cells are left."""
     state = np.zeros((*sets.shape, sides[0][0].shape[3]))
     for side in sides:
         ways = []

@@ -1,15 +1,15 @@
-"""A smooth field of cutter axes over a surface, clear of all walls: for point milling on five simultaneous axes.
+"""Smooth field of cutter axes over a surface, clear of all walls, for point milling on five simultaneous axes.
 
-Notation: S(u, v) the surface with its normal N, T(u, v) the axis of the cutter there, n = N.T. The field is known at
-nodes, a grid of u and v, and goes between them by cubic splines of its components.
+Notation: S(u, v) the surface with its normal N, T(u, v) the axis of the cutter there, n = N.T. The field is stored at
+nodes, a grid of u and v, and interpolated between them by cubic splines of its components.
 
-At every node the directions of a fixed set are looked at: those that the machine reaches away from its pole, that lean
-by ``lean`` from the normal at least, and at which the whole cutter is clear of all check points. The depth of a
-direction is its angle to the nearest one of the set that is not. A direction costs (1 - depth / wanted)^2 where it is
-not deep, and how much longer the path is there than with the widest step-over of the node; two neighbouring nodes cost
-the square of the angle between them. Line after line of nodes is solved by dynamic programming, its neighbouring lines
-held as they are, again and again until nothing changes. At last the axes are drawn towards the mean of their
-neighbours, as far as they stay clear and deep.
+At every node a fixed set of directions is tested. Allowed are those that the machine reaches away from its pole, that
+lean by ``lean`` from the normal at least, and at which the whole cutter is clear of all check points. The depth of a
+direction is its angle to the nearest one of the set that is not allowed. The cost of a direction is (1 - depth /
+wanted)^2 where it is less deep than wanted, and how much longer the path is there than with the widest step-over of the
+node. The cost of two neighbouring nodes is the square of the angle between them. Lines of nodes are solved one after
+another by dynamic programming with their neighbouring lines fixed, until nothing changes. Finally the axes are moved
+towards the mean of their neighbours, as far as they stay clear and deep.
 
 Reference: [Jun2003] for the set of directions and the smooth choice among them. Differs from source: whole surface, not
 line by line, and the step-over counts.
@@ -40,19 +40,19 @@ _DIRECTIONS = 900
 _POLE = math.radians(6.0)
 #: depth of a direction that costs nothing [rad]; what an angle of one radian between two nodes costs, squared
 _WANTED, _SMOOTH = math.radians(15.0), 40.0
-#: how strongly a wide step-over draws
+#: weight of a wide step-over
 _WIDE = 1.0
 #: sweeps over the lines of nodes, rounds of drawing towards the mean
 _SWEEPS, _ROUNDS = 4, 40
-#: of the depth that a drawn axis keeps
+#: share of the depth that a smoothed axis keeps
 _KEEP = 0.7
-#: nodes that are tried; places between two of them at which the field is looked at
+#: numbers of nodes that are tried; places between two of them at which the field is checked
 _COUNTS, _FINER = ((9, 5), (17, 9), (33, 17)), 3
 
 
 @dataclass(frozen=True)
 class AxisLimits:
-    """What the axis of a cutter keeps.
+    """Limits of the axis of a cutter.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class AxisLimits:
 
 @dataclass(frozen=True, eq=False)
 class AxisField:
-    """The field over a box of a surface.
+    """Axis field over a box of a surface.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class AxisField:
         return out
 
     def path(self, surface: BSplinePatch, along: str) -> float:
-        """About how long the path over the box is [mm]: area over step-over."""
+        """Estimated length of the path over the box [mm]: area over step-over."""
         U, V = (x.ravel() for x in np.meshgrid(self.u, self.v, indexing="ij"))
         size = np.linalg.norm(np.cross(surface.at(U, V, 1, 0), surface.at(U, V, 0, 1)), axis=1)
         w = self.width[0 if along == "u" else 1].ravel()
@@ -149,7 +149,7 @@ def clear_field(
     reachable: tuple[Floats, Flags],
     limits: AxisLimits,
 ) -> AxisField | str:
-    """The field with as few nodes as it is clear with between them too; or why there is none.
+    """Axis field with the fewest nodes with which it is also clear between them; or the reason why there is none.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def axis_field(
     reachable: tuple[Floats, Flags],
     limits: AxisLimits,
 ) -> AxisField | float:
-    """The field over a box (low, high) of u, of v; or the share of the nodes that the cutter reaches where not all.
+    """Axis field over a box (low, high) of u, of v; or the share of the nodes that the cutter reaches if not all.
 
     Parameters
     ----------

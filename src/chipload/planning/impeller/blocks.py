@@ -1,4 +1,4 @@
-"""A long loop over contact points, on threads, block by block, the same result with any number of them."""
+"""A loop over contact points in blocks, on threads; the result does not depend on their number."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ BLOCK = 32
 
 
 def in_blocks(block: Callable[[int], None], total: int, workers: int, progress: Progress, what: str) -> None:
-    """Runs ``block(first)`` for the first of every :data:`BLOCK` in 0..``total``, and tells how far it is.
+    """Run ``block(first)`` for the first of every :data:`BLOCK` in 0..``total``, and report the progress.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The largest cutter that one check point admits, in closed form.
+"""Largest cutter that one check point admits, in closed form.
 
 Notation: S contact point, N its outward normal, T cutter axis, n = N.T, V = (N - n T) / sqrt(1 - n^2); R cutter radius,
 r corner radius, rho = R - r; c check point, y = c - S - r N, h = y.T its height above the centres of the corner,

@@ -1,7 +1,7 @@
-"""The same sides with a cutter picked by hand and with one, two, three cutters; and the gouge test of the source.
+"""Comparison of cutter sets: a hand-picked cutter, and one, two or three cutters; and the gouge test of the source.
 
-Notation: B pallet angle. The test of the source takes one contact point, cutter, table angle and B, and looks at
-every check point: it shares nothing with the search but the frame.
+Notation: B pallet angle. The test of the source takes one contact point, cutter, table angle and B, and checks every
+check point. It shares only the frame with the search.
 
 Reference: [Wu2019].
 """
@@ -29,7 +29,7 @@ from chipload.progress import Progress, silent
 
 @dataclass(frozen=True, eq=False)
 class Partition:
-    """One way to mill the sides.
+    """One partition of the sides among cutters and table angles.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Partition:
 
 @dataclass(frozen=True, eq=False)
 class CutterChoice:
-    """One way to mill the sides, not yet divided.
+    """One set of cutters for the sides, not yet divided into patches.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class CutterChoice:
     took: float = 0.0
 
     def partition(self, workers: int = 1, progress: Progress = silent, keep: Keep = anew) -> Partition:
-        """The way in the least time by its costs as they stand."""
+        """The partition in the least time by the present costs."""
         sides = [c.side for c in self.costs]
         found = divided(self.costs, self.most, workers, progress, keep)
         return Partition(self.name, found, sides[0].answer.catalogue, _share(sides), *_proved(sides), self.took)
@@ -97,7 +97,8 @@ def cutter_choices(
     progress: Progress = silent,
     keep: Keep = anew,
 ) -> tuple[CutterChoice, ...]:
-    """The hand-picked cutter (an index in the catalogue) at any table angle, then so many cutters, which share costs.
+    """The hand-picked cutter (an index in the catalogue) at any table angle, then one cutter and more, with shared
+    costs.
 
     Raises
     ------

@@ -1,13 +1,14 @@
-"""What a cutter at a table angle takes for each contact point of a side, bounded first, proved when it is asked for.
+"""Time of each contact point of a side by cutter and table angle: first a lower bound, then the proved value on
+request.
 
 Notation: c contact point, k cutter, t table angle, B pallet angle; w step-over (``step_over.py``); the strips of a side
 follow each other across u (order 0, the paths run along v) or across v (order 1).
 
 The path of a contact point is its area / w, with the widest w of the B in its valid ranges, of a grid of ``STEP`` over
-all that the machine allows; where no B of the grid is valid, w at the middle of the widest range, but not above the
-bound. Before the ranges are asked for, the widest w of the B of the grid at which the cutting part is clear (at
-none: of all) gives the bound: a cutter that the bounds of the search do not exclude takes at least that long. Ranges
-are computed once, for what is asked.
+all B that the machine allows; where no B of the grid is valid, w at the middle of the widest range, but not above the
+bound. Before the ranges are calculated, the widest w of the B of the grid at which the cutting part is clear (if there
+is none: of all B) gives the bound: a cutter that the bounds of the search do not exclude takes at least that long.
+Ranges are calculated once, and only for what is requested.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from chipload.planning.impeller.ranges.ranges import FULL, Ranges, valid_ranges
 from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.step_over import Contact, contact_of, width
 
-#: of the pallet angles that a step-over is looked for at [rad]
+#: spacing of the pallet angles at which the step-over is calculated [rad]
 STEP = math.radians(5.0)
 _TOUCH = 1e-9  # [mm] the bounds are so much on the safe side
 _ALONG = 1e-9  # n within this of 1: the axis stands along the normal, there is no trace
@@ -37,7 +38,7 @@ _ALONG = 1e-9  # n within this of 1: the axis stands along the normal, there is 
 
 @dataclass(frozen=True)
 class Terms:
-    """What a path is paid with.
+    """Data from which the time of a path is calculated.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ class Terms:
             raise InputError(f"repeats = {self.repeats}: must be at least 1")
 
     def feeds(self, cutters: int) -> Floats:
-        """(cutters,) [mm/s]."""
+        """Feed of each cutter (cutters,) [mm/s]."""
         if isinstance(self.feed, tuple) and len(self.feed) != cutters:
             raise InputError(f"feed_mm_s: {len(self.feed)} numbers: must be one or {cutters}, one for each cutter")
         return np.broadcast_to(np.asarray(self.feed, dtype=np.float64), (cutters,))
@@ -103,27 +104,27 @@ class ChannelSide:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """(a, b)."""
+        """Number of contact points (a, b) along u and v."""
         return len(self.u), len(self.v)
 
     def edges(self, order: int) -> Floats:
-        """Where the strips of an order begin and end: half-way between the contact points."""
+        """Edges of the strips of an order: half-way between the contact points."""
         x = self.u if order == 0 else self.v
         return np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
 
     def points(self, order: int) -> NDArray[np.int64]:
-        """(strips, cells) which contact points."""
+        """Contact points of each strip (strips, cells)."""
         grid = np.arange(len(self.scene.contact)).reshape(self.shape)
         return grid if order == 0 else grid.T
 
     def along(self, order: int) -> Floats:
-        """(c, 3) direction of the paths of an order."""
+        """Direction of the paths of an order (c, 3)."""
         grid = self.scene.contact.reshape(*self.shape, 3)
         return np.array(np.gradient(grid, (self.u, self.v)[1 - order], axis=1 - order)).reshape(-1, 3)
 
 
 class MeasuredCost(NamedTuple):
-    """What a patch takes in a program [s] beside what its contact points predict; order, cutter, table of its side."""
+    """Time of a patch [s] in a program and as its contact points predict it; order, cutter, table of its side."""
 
     order: int
     cutter: int
@@ -133,7 +134,7 @@ class MeasuredCost(NamedTuple):
 
 
 class Costs:
-    """The times of one side, known or bounded; a memo that grows by :meth:`prove`.
+    """Times of one side, proved or bounded; :meth:`prove` adds proved ones.
 
     Attributes
     ----------
@@ -175,12 +176,12 @@ class Costs:
         self.known[~reached] = True
 
     def cells(self, order: int) -> Floats:
-        """(strips, cells, k, t) times of an order, as programs take them."""
+        """Times of an order (strips, cells, k, t), as programs take them."""
         out: Floats = self.time[order][self.side.points(order)] * self.factor[order]
         return out
 
     def measured(self, rows: Sequence[MeasuredCost]) -> None:
-        """Takes the factors from programs; what no program has yet is taken for the mean of its order, or of all.
+        """Take the factors from programs; a patch that is in no program takes the mean of its order, or of all.
 
         A patch of which no contact point is reached predicts no time: its program says nothing of the others.
         """
@@ -199,7 +200,7 @@ class Costs:
                 self.factor[order, key[0], key[1]] = ratio([r for r in own if (r.cutter, r.table) == key])
 
     def prove(self, asked: Sequence[tuple[int, int, int]], workers: int = 1, keep: Keep = anew) -> None:
-        """Make (c, k, t) known."""
+        """Prove the times (c, k, t)."""
         groups: dict[int, list[tuple[int, int]]] = {}
         for point, cutter, table in sorted(set(asked)):
             if not self.known[point, cutter, table]:

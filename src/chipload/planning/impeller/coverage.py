@@ -1,4 +1,4 @@
-"""Which points of a surface lie between two passes.
+"""Points of a surface that lie between two passes.
 
 Notation: a track runs along p, lines follow each other across q; at a place p it lies at q(p).
 """
@@ -15,19 +15,19 @@ from chipload.planning.impeller.scene import Floats
 
 
 class LinePlaces(Protocol):
-    """A piece of a line: its places (n, 2), u and v, and its number."""
+    """A part of a line: its places (n, 2), u and v, and its number."""
 
     @property
     def at(self) -> Floats:
-        """Places."""
+        """Places (u, v)."""
 
     @property
     def line(self) -> int:
-        """Number."""
+        """Number of the line."""
 
 
 def between_lines(tracks: Sequence[LinePlaces], along: str, at: Floats) -> NDArray[np.bool_]:
-    """Whether points (n, 2), u and v, lie between two lines that follow each other, both of which are milled there.
+    """Whether points (n, 2), u and v, lie between two neighbouring lines that are both milled there.
 
     Parameters
     ----------

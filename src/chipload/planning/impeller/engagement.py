@@ -1,4 +1,4 @@
-"""What a finishing pass takes: the tooth engagement of a cutter at places of its path, from the poses before it.
+"""Tooth engagement of a cutter at places of a finishing pass, from the earlier poses of the cutter.
 
 Notation: S contact point, N normal, K curvature tensor of the surface; p tip, A axis, d direction of the feed; a
 allowance that stands on the surface; slices, rho, kappa, phi, T, n as in :mod:`chipload.engagement.tooth_engagement`.
@@ -39,7 +39,7 @@ _BOTTOM, _CORNER, _FLANK = 4, 16, 0.5
 
 @dataclass(frozen=True, eq=False)
 class EarlierPoses:
-    """Poses of passes that were milled before: tips, axes (m, 3), rho and corner radius (m, 2) [mm] of their cutters.
+    """Poses of earlier passes: tips, axes (m, 3), rho and corner radius (m, 2) [mm] of their cutters.
 
     >>> EarlierPoses.of(np.array([[0, 0, 0], [0, 0, 1.0]]), np.eye(3)[[0, 0]], 4.0, 1.0).tip[:, 2].round(3).tolist()
     [0.0, 0.333, 0.667, 1.0]
@@ -51,12 +51,12 @@ class EarlierPoses:
 
     @staticmethod
     def none() -> EarlierPoses:
-        """No pass was milled before."""
+        """No earlier poses."""
         return EarlierPoses(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2)))
 
     @staticmethod
     def of(tip: Floats, axis: Floats, rho: float, corner: float) -> EarlierPoses:
-        """Poses of one pass, more of them put in so that they stand at most :data:`SPACING` apart."""
+        """Poses of one pass, with more of them inserted so that they stand at most :data:`SPACING` apart."""
         length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
         at = np.linspace(0.0, length[-1], max(math.ceil(length[-1] / SPACING), 1) + 1)
         tips, axes = (np.column_stack([np.interp(at, length, x[:, j]) for j in range(3)]) for x in (tip, axis))
@@ -64,7 +64,7 @@ class EarlierPoses:
         return EarlierPoses(tips, axes, np.tile([rho, corner], (len(at), 1)))
 
     def with_more(self, other: EarlierPoses) -> EarlierPoses:
-        """Both."""
+        """The poses of both."""
         return EarlierPoses(
             np.vstack([self.tip, other.tip]), np.vstack([self.axis, other.axis]), np.vstack([self.shape, other.shape])
         )
@@ -72,7 +72,7 @@ class EarlierPoses:
 
 @dataclass(frozen=True, eq=False)
 class PassPlaces:
-    """Places of passes at which the chip is looked at.
+    """Places of passes at which the chip is calculated.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def engagement_at(
     places: PassPlaces, cutter: Cutter, feed_per_tooth: float, allowance: float, earlier: EarlierPoses,
     first: ArrayLike | None = None,
 ) -> ToothEngagement:  # fmt: skip
-    """Tooth engagement of a cutter at places of its passes, a step each; every tooth alike.
+    """Tooth engagement of a cutter at places of its passes, one step for each place; all teeth are alike.
 
     Parameters
     ----------

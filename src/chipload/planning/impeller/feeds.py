@@ -1,15 +1,15 @@
-"""Feeds of finishing passes that the strength and the deflection of each cutter allow.
+"""Feeds of finishing passes within the strength and the deflection of each cutter.
 
 Notation: f feed over the greatest one, from :data:`LEAST` to 1; delta [mm] greatest lateral deflection of the cutter at
 its contact, sigma [MPa] its greatest equivalent stress over a revolution. Both rise with f.
 
-The chip of a pass is simulated at places along it (``engagement.py``), from the allowance that stands on the surface
-and from all passes before it in the order of the programs; force, stress and deflection are those of the one force
-model. A pass is fed as fast as delta and sigma allow at each of its places, less :data:`ERROR` for the samples of the
-chip and less the spread of the coefficients. Where even the least feed is too much for a limit the pass keeps that, and
-its loads show it.
+The chip of a pass is simulated at places along it (``engagement.py``), from the allowance on the surface and from all
+passes before it in the order of the programs; force, stress and deflection are those of the common force model. The
+feed of a pass is the greatest at which delta and sigma are allowed at each of its places, reduced by :data:`ERROR` for
+the samples of the chip and by the spread of the coefficients. Where even the least feed exceeds a limit the pass keeps
+that feed, and its loads show it.
 
-Left out: the teeth's entry, chatter, deflection of the workpiece.
+Not included: entry of the teeth, chatter, deflection of the workpiece.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _LEAN = 0.2
 
 @dataclass(frozen=True)
 class ForceTerms:
-    """What finishing feeds are found with.
+    """Data for the calculation of finishing feeds.
 
     Parameters
     ----------
@@ -83,7 +83,8 @@ class ForceTerms:
         return ERROR + (self.material.spread or 0.0)
 
     def cutter(self, size: CatalogueCutter) -> Cutter:
-        """A cutter of the catalogue as a bar with teeth: above its cutting part it is as thick as its thinnest part.
+        """A cutter of the catalogue as a bar with teeth; above its cutting part it has the diameter of its thinnest
+        part.
 
         Raises
         ------
@@ -111,7 +112,7 @@ class ForceTerms:
 
 @dataclass(frozen=True, eq=False)
 class PassLoads:
-    """Loads of the passes of a setting, each at the feed that it has.
+    """Loads of the passes of a setting, each at its own feed.
 
     Parameters
     ----------
@@ -136,7 +137,7 @@ class PassLoads:
 
     @property
     def columns(self) -> tuple[tuple[str, Floats, float, str], ...]:
-        """Name, values (n,), limit and unit of what is limited."""
+        """Name, values (n,), limit and unit of each limited quantity."""
         return (
             ("deflection of the cutter", 1000.0 * self.deflection, 1000.0 * self.most, "µm"),
             ("stress of the cutter", self.stress, self.allowed, "MPa"),
@@ -146,7 +147,8 @@ class PassLoads:
 def loads_of(
     bites: ToothEngagement, places: PassPlaces, cutter: Cutter, material: Material, factor: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Force [N], deflection [mm] and stress [MPa] (n,) of steps whose feed is ``factor`` (n,) times that of the bites.
+    """Force [N], deflection [mm] and stress [MPa] (n,) of steps whose feed is ``factor`` (n,) times that of the tooth
+    engagement.
 
     The deflection is that of a bar under the force at the mean height of the teeth's contact with material.
     """
@@ -170,7 +172,7 @@ def loads_of(
 
 
 def allowed_factor(bites: ToothEngagement, places: PassPlaces, cutter: Cutter, terms: ForceTerms) -> Floats:
-    """(n,) greatest f at which deflection and stress of a step are allowed, :data:`LEAST` where none is."""
+    """Greatest f (n,) at which deflection and stress of a step are allowed; :data:`LEAST` where none is."""
     stress = allowed_stress(cutter)
 
     def fits(factor: Floats) -> NDArray[np.bool_]:
@@ -195,7 +197,7 @@ def places_of(
 
 
 def nominal_feeds(catalogue: Catalogue, terms: ForceTerms, scallop: float, feed: float) -> tuple[float, ...]:
-    """Feed [mm/s] of each cutter on a plane wall with the step-over of the scallop, along which it leans by 78 deg.
+    """Feed [mm/s] of each cutter on a plane wall with the step-over of the scallop, at a lean of 78 deg along it.
 
     The comparison before there are paths; the feeds of programs come from their own chips.
     """

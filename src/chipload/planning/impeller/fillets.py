@@ -24,7 +24,7 @@ _PLACES = 201
 
 
 def with_fillets(impeller: Impeller, radius: float) -> tuple[Impeller, tuple[str, ...]]:
-    """An impeller whose sides meet the hub without fillets, with fillets; what they take, a line for each side.
+    """An impeller with fillets between its sides and its hub, and a line for each side that states what they take.
 
     Raises
     ------

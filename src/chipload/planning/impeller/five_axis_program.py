@@ -1,12 +1,12 @@
-"""The program of passes on five simultaneous axes: from above the part to the surface, along it, and up again.
+"""Program of passes on five simultaneous axes: approach from above the part, the passes, and retract.
 
 Notation: p tip [mm], A axis, N normal of the surface; H(A) the height along A above which no point of the impeller
 lies: of its outline, the corners of the convex body round all channels. The cutter comes down along A beside the end of
-the pass, a lift off the surface, goes to it at the feed of the cut, along it, and leaves it the same way. A row whose
-rotary axes would turn faster than they can is fed more slowly.
+the pass, a lift off the surface, moves to it at the feed of the cut, along it, and leaves it in the same manner. In a
+row whose rotary axes would exceed their greatest speed the feed is reduced.
 
-At its end the cutter goes on above the part to where it begins in the next channel. So a program that is carried out
-again and again, the part turned on by a pitch each time, has no other ways than those of its rows.
+At its end the cutter moves above the part to the start of the next channel. So a program that is repeated, with the
+part turned by a pitch each time, has no other motions than those of its rows.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from chipload.program.to_axes import to_axes
 
 #: of the lift that are tried
 _LIFTS = (1.0, 0.5, 0.25)
-#: places of a lift that are looked at
+#: places of a lift that are checked
 _SMALL = 12
 #: of the axis in one row above the part [rad]
 _TURN = math.radians(3.0)
@@ -42,18 +42,18 @@ class AxisPath(Protocol):
 
     @property
     def tip(self) -> Floats:
-        """(n, 3) [mm]."""
+        """Tips (n, 3) [mm]."""
 
     @property
     def axis(self) -> Floats:
-        """(n, 3) unit."""
+        """Unit axes (n, 3)."""
 
     @property
     def normal(self) -> Floats:
-        """(n, 3) unit."""
+        """Unit normals of the surface (n, 3)."""
 
     def back(self) -> Self:
-        """The same from its end to its beginning."""
+        """The same pass from its end to its beginning."""
 
 
 def outline_of(scene: Scene, blades: int) -> Floats:
@@ -77,7 +77,7 @@ def outline_of(scene: Scene, blades: int) -> Floats:
 def lifted(
     path: AxisPath, end: int, scene: Scene, outline: Floats, cutter: CatalogueCutter, how: Link, above: float
 ) -> Floats | None:
-    """The tip beside an end (0, -1) of a pass, from which the way up along the axis is free; None: there is none.
+    """Tip beside an end (0, -1) of a pass, from which the retract along the axis is free; None: there is none.
 
     ``above`` : clearance of neck, shank and holder [mm].
     """
@@ -99,7 +99,7 @@ def lifted(
 
 
 def top_of(outline: Floats, axis: Floats, how: Link) -> float:
-    """The height along the axis at which the tip is above the part."""
+    """Height along the axis at which the tip is above the part."""
     return float((outline @ axis).max()) + how.above
 
 
@@ -112,7 +112,7 @@ class LinkedPath:
     end: Floats
 
     def back(self) -> LinkedPath:
-        """The same from its end to its beginning."""
+        """The same pass from its end to its beginning."""
         return LinkedPath(self.path.back(), self.end, self.begin)
 
 
@@ -120,7 +120,7 @@ def five_axis_program(
     passes: Sequence[LinkedPath], outline: Floats, how: Link, feed: float, spindle: float, tool: int, machine: Machine,
     pitch: float,
 ) -> Program:  # fmt: skip
-    """The program of passes in their order, every second one from its end, in the frame of the impeller.
+    """Program of the passes in their order, every second one from its end, in the frame of the impeller.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def _round(outline: Floats, a: tuple[Floats, Floats], b: tuple[Floats, Floats], 
 
 
 def rotary_share(program: Program, machine: Machine) -> Floats:
-    """(n,) rate of the fastest rotary axis in each row over its greatest; 0 for rapids."""
+    """Rate of the fastest rotary axis in each row over its greatest rate, (n,); 0 for rapids."""
     commands, _ = to_axes(replace(program, line=np.arange(len(program))), machine)
     step = np.abs(np.diff(commands.position, axis=0, prepend=commands.position[:1]))
     out = np.zeros(len(program))

@@ -1,16 +1,17 @@
-"""Flank passes (swarf milling) of a blade's side: one pass with the side of the cutter, on five simultaneous axes.
+"""Flank passes (swarf milling) of a blade's side, one pass with the flank of the cutter on five simultaneous axes.
 
 Notation: S(u, v) the side with its normal N out of the metal, u along it, v up it from v0 to v1; R radius of the
 cutter. At a place u the cutter's axis goes through a0 = S(u, v0) + (R + x0) N and a1 = S(u, v1) + (R + x1) N + x2 D,
 with D the direction along the side at v1. d(v) [mm] the least distance of S(u', v) from the axis over the u' near u,
-less R: what the cutter leaves at the height v, below 0 how deep it gouges. Deviation: the greatest size of d over v.
+less R: the excess that the cutter leaves at the height v, below 0 a gouge. Deviation: the greatest size of d over v.
 
 The three numbers x of every place are those of the least deviation. A change of x moves the axis by delta(v) and d by
-N.delta(v), to first order, so that the best change within a step is a linear program; programs are solved one after the
-other until none finds less. The value of the last one is a lower bound of what any small change reaches. A surface that
-can be unrolled has the deviation 0; one that is twisted does not, and a thinner cutter has less of it.
+N.delta(v), to first order, so the best change within a step is a linear program. Programs are solved one after another
+until none finds less. The value of the last one is a lower bound for any small change. A developable surface has the
+deviation 0; a twisted one does not, and its deviation is less with a thinner cutter.
 
-Between two places tip and axis go evenly; places are added until the deviation in the middle is that of the places.
+Between two places tip and axis are interpolated evenly; places are added until the deviation in the middle is that of
+the places.
 
 Reference: [Liu1995] for the two offset points to begin with. Differs from source: they are only the first guess.
 """
@@ -40,7 +41,7 @@ _APART, _FINER = 3.0, 4
 
 @dataclass(frozen=True, eq=False)
 class FlankPass:
-    """A pass along a side.
+    """A flank pass along a side.
 
     Parameters
     ----------
@@ -63,28 +64,28 @@ class FlankPass:
 
     @property
     def deviation(self) -> float:
-        """The greatest of all places [mm]."""
+        """Greatest deviation of all places [mm]."""
         return float(np.maximum(self.left, -self.gouge).max())
 
     @property
     def unimproved(self) -> float:
-        """By how much the deviation of a place may at most be above that of the best axis nearby [mm]."""
+        """Upper bound of the deviation of a place above that of the best axis nearby [mm]."""
         return float((np.maximum(self.left, -self.gouge) - self.least).max())
 
     @property
     def length(self) -> float:
-        """Of the tip's path [mm]."""
+        """Length of the tip's path [mm]."""
         return float(np.linalg.norm(np.diff(self.tip, axis=0), axis=1).sum())
 
     def back(self) -> FlankPass:
-        """The same from its end to its beginning."""
+        """The same pass from its end to its beginning."""
         return FlankPass(**{f.name: getattr(self, f.name)[::-1] for f in fields(self)})
 
 
 def flank_pass(
     surface: BSplinePatch, along: tuple[float, float], up: tuple[float, float], cutter: CatalogueCutter, chord: float
 ) -> FlankPass:
-    """The pass of a cutter along a side with the least deviation at each place.
+    """Flank pass of a cutter along a side with the least deviation at each place.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Surfaces that are milled as patches with parameters: sides as they are, the floor and layers above it by fitting.
+"""Surfaces with parameters for patches: the sides, and the floor and the layers above it by fitting.
 
 Notation: u along the hub from inlet to outlet, v across a channel from the plus side of a body to the next body round,
 both 0..1, as the contact points of ``surfaces.py``. A layer lies at the share w of the way from the hub, less an
@@ -22,7 +22,7 @@ Flags = NDArray[np.bool_]
 
 
 def patch_of(impeller: Impeller, body: str, side: str, ahead: float = 0.0) -> BSplinePatch:
-    """The surface of :func:`surface_of` with the same u and v.
+    """The surface of :func:`surface_of` as a patch with the same u and v.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def layer_of(
 
 
 def meridian(impeller: Impeller, s: Floats, share: float, allowance: float, where: tuple[float, float]) -> Floats:
-    """(k, 2) r and z of a layer at places s of the hub, which goes from ``where`` to where."""
+    """Points (k, 2), r and z, of a layer at places s of the hub between both ends of ``where``."""
     n = impeller.hub.normal(s, np.zeros(len(s)))
     low = impeller.hub.curve(s) + allowance * n[:, [0, 2]]
     tip = impeller.blade.plus.at([0.0, 1.0], 1.0)

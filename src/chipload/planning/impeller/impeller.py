@@ -1,4 +1,4 @@
-"""An impeller: blades and splitters round a hub, and the points of one channel.
+"""An impeller: hub, blades and splitters, and the points of one channel.
 
 Notation: z axis of rotation, inlet above; theta angle about it, pitch = 2 pi / blades. Sides of a blade as in
 ``geometry/sections.py``: `plus` faces a growing theta. The channel of `plus` of a blade is bounded by `minus` of the
@@ -32,7 +32,7 @@ ARC = 9
 
 @dataclass(frozen=True, eq=False)
 class Impeller:
-    """An impeller.
+    """An impeller: hub, shroud, blades and splitters, with their fillets.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Impeller:
         return self.blade, self.splitter.turned(turn)
 
     def body(self, index: int) -> Blade:
-        """Bodies counted round, 0 the blade, on and on in both directions."""
+        """A body by its number round the impeller, 0 the blade, in both directions without end."""
         bodies = self.bodies
         return bodies[index % len(bodies)].turned(self.pitch * (index // len(bodies)))
 
@@ -77,7 +77,7 @@ class Impeller:
         return self.fillets[index % len(self.fillets)].turned(self.pitch * (index // len(self.fillets)))
 
     def foot(self, index: int, sign: int) -> BSplinePatch:
-        """What of a side of a body, ``sign`` 1 plus, -1 minus, stands on the hub at v = 0."""
+        """The edge of a side of a body, ``sign`` 1 plus, -1 minus, on the hub at v = 0."""
         return _side(self.fillet(index) if self.fillets else self.body(index), sign)
 
     def scene(
@@ -91,7 +91,7 @@ class Impeller:
         hub_points: tuple[int, int] = (40, 25),
         hub_range: tuple[float, float] = (0.0, 1.0),
     ) -> Scene:
-        """Contact points of one side, check points of its channel and of the bodies round it.
+        """Contact points of one side, with check points of its channel and of the bodies round it.
 
         Parameters
         ----------

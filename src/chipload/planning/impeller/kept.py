@@ -1,6 +1,7 @@
-"""How a long plan remembers its finished parts, so that a run that was stopped does not plan them again.
+"""Finished parts of a long plan, kept so that a resumed run does not plan them again.
 
-Parts that do not need one another are told ahead: where there are other processes, they are made side by side.
+Parts that do not depend on one another are announced in advance. Where there are other processes, they are planned in
+parallel.
 """
 
 from __future__ import annotations
@@ -30,12 +31,12 @@ class PlanTask:
     arguments: tuple[Any, ...]
 
     def of(self, shared: Any, keep: Keep) -> Any:
-        """The part, kept or made with what all processes share."""
+        """The part, from the kept ones or planned with the data that all processes share."""
         return keep(self.key, lambda: self.make(shared, *self.arguments))
 
 
 class Keep(Protocol):
-    """What gives a part of a plan: the kept one, or the one that ``make`` makes.
+    """Source of the parts of a plan: a kept part, or the one that ``make`` plans.
 
     ``key``: numbers, texts, arrays and dataclasses of them that say which part of the run it is and what it depends on.
     """
@@ -44,22 +45,24 @@ class Keep(Protocol):
         """The part."""
 
     def ahead(self, parts: Sequence[PlanTask], progress: Progress = silent) -> None:
-        """Parts that are asked for next: made side by side where there are other processes, else when asked for."""
+        """Announce the parts that are needed next: planned in parallel where there are other processes, else on
+        request.
+        """
 
 
 class Anew:
-    """Nothing is kept: the default of every ``keep=`` argument.
+    """A :class:`Keep` that keeps nothing: the default of every ``keep=`` argument.
 
     >>> anew(("sum",), lambda: 1 + 1)
     2
     """
 
     def __call__(self, key: tuple[object, ...], make: Callable[[], T]) -> T:
-        """What ``make`` makes."""
+        """The part that ``make`` plans."""
         return make()
 
     def ahead(self, parts: Sequence[PlanTask], progress: Progress = silent) -> None:
-        """Each is made when it is asked for."""
+        """Nothing: each part is planned on request."""
 
 
 anew = Anew()

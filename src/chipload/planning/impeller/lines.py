@@ -1,9 +1,9 @@
-"""Lines on a surface: where they lie, the pallet angles that are valid there, the tracks on them, what is missed.
+"""Lines on a surface: their places, the valid pallet angles on them, their tracks, and the spans that are not reached.
 
 Notation: a line runs along one parameter p of the surface, at fixed stations, at q(p) of the other. The pallet angles
-come from the exact ranges at its stations (``pallet.py``), looked for near those of the line before first. Where a
-line comes to a point that is not reached, its end is found by halving; points between are added where a straight row
-would leave the path (``mend.py``).
+come from the exact ranges at its stations (``pallet.py``), searched near those of the line before first. Where a line
+comes to a point that is not reached, its end is found by bisection. Points are added where a straight row would leave
+the path (``refinement.py``).
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.step_over import contact_of, width
 from chipload.planning.impeller.track import ToolTrack, posed, written
 
-#: points of a line whose pallet angles are looked for together, and how far from those of the line before [rad]
+#: points of a line whose pallet angles are searched together, and greatest distance from those of the line before [rad]
 _GROUP, _WINDOW = 6, math.radians(10.0)
 #: how far about an angle that meets a wall ranges are taken exactly, and the narrowest range [rad]
 _EXACT, _LEAST = math.radians(12.0), 1e-9
-#: stations and halvings by which the first line that is reached is looked for
+#: stations and bisections in the search for the first line that is reached
 _KNOTS, _BISECT = 17, 4
 #: n within this of 1: the axis stands along the normal, there is no step-over
 _FLAT = 1e-9
@@ -43,7 +43,7 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class LineMotion:
-    """What a line is milled with.
+    """Motion data of lines: feed, tolerances and clearance.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class UnreachedSpan:
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """What one cutter mills on one surface at one table angle.
+    """Tracks of one cutter on one surface at one table angle.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class Tracks:
 
     @property
     def length(self) -> float:
-        """Of the paths in the cut [mm]."""
+        """Length of the paths in the cut [mm]."""
         return math.fsum(t.length for t in self.tracks)
 
 
@@ -144,13 +144,13 @@ class Lines:
 
     @property
     def mender(self) -> Refinement:
-        """Puts points between those of a track."""
+        """Refinement of the tracks: it adds points between those of a track."""
         return Refinement(
             self.surface, self.scene, self.number, self.cutter, self.table, self.how.chord, self.how.clearance
         )
 
     def line(self, q: Floats, before: Floats) -> Line:
-        """The line at q, its pallet angles near those of the line ``before`` where there are any."""
+        """The line at q, with pallet angles near those of the line ``before`` if there are any."""
         S, N, K, d, at = self.on(q)
         scene = self.scene.at_contacts(S, N, K, self.number)
         step = np.linalg.norm(np.diff(S, axis=0), axis=1)
@@ -171,7 +171,7 @@ class Lines:
         """Pieces of a line with their pallet angles, near those ``before``: of ranges at the check points.
 
         Where the cutter, as it then stands, meets a wall between them, the ranges about that angle are taken exactly;
-        where nothing is left of them, they are looked for at all angles.
+        where nothing is left of them, they are searched at all angles.
         """
         most = self.how.rate * step / self.how.feed
         plain = replace(scene, covering=None, known=scene.tree)
@@ -207,7 +207,8 @@ class Lines:
         return out
 
     def border(self, Q: tuple[float, float], need: Flags | None = None) -> Floats:
-        """Q at every station from Q[0] towards Q[1] where the cutter first reaches the surface, evened out.
+        """Places q of a line from Q[0] towards Q[1] where the cutter first reaches the surface at each station,
+        smoothed.
 
         Looked at are the stations that are in ``need``.
         """
@@ -235,7 +236,7 @@ class Lines:
         return out
 
     def strip(self, q: Floats, border: float) -> UnreachedSpan:
-        """What lies between the border and the first line."""
+        """The strip between the border and the first line."""
         k, edge = int(q.argmax()), (self.on(np.full(len(q), border)))
         length = float(np.linalg.norm(np.diff(edge[0], axis=0), axis=1).sum())
         (a, b), (c, d) = edge[4][0].tolist(), self.on(q)[4][k].tolist()
@@ -251,7 +252,8 @@ class Lines:
     def tracks(
         self, line: Line, use: Flags, number: int, need: Flags | None = None
     ) -> tuple[list[ToolTrack], list[UnreachedSpan]]:
-        """Tracks of the pieces of a line where it is in ``use``, and what is missed of what they ``need`` to mill.
+        """Tracks of the parts of a line where it is in ``use``, and the spans that are missed of what they ``need`` to
+        mill.
 
         A piece that ends between two stations goes on from the last as far as the cutter does; where the next piece
         begins so far back that they meet, nothing is missed.
@@ -384,7 +386,7 @@ class Lines:
 def stations(
     surface: BSplinePatch, along: str, P: tuple[float, float], Q: tuple[float, float], chord: float, apart: float
 ) -> int:
-    """Points of a line, so that its chords are within a half of ``chord`` of the surface, at most ``apart`` [mm]."""
+    """Number of points of a line with chords within half of ``chord`` of the surface, at most ``apart`` [mm]."""
     lines = np.linspace(*Q, 5)
     p = np.linspace(*P, 33)
     longest = max(
@@ -407,7 +409,7 @@ def stations(
 def stretched(
     surface: BSplinePatch, along: str, P: tuple[float, float], Q: tuple[float, float], count: int, overrun: float
 ) -> Floats:
-    """Stations from P[0] to P[1], evenly, and beyond them by ``overrun`` [mm] where the surface goes so far."""
+    """Stations from P[0] to P[1], even, and beyond them by ``overrun`` [mm] where the surface extends so far."""
     p = np.linspace(*P, count)
     lines = np.linspace(*Q, 5)
     size = np.linalg.norm(
@@ -423,7 +425,7 @@ def stretched(
 
 
 def windowed(ranges: Floats, angle: float, width: float) -> tuple[Floats, Floats]:
-    """What of ranges (k, 2) lies within a width of an angle, whole turns from it too, and what does not.
+    """Parts of ranges (k, 2) within a width of an angle, whole turns from it too, and the other parts.
 
     >>> inside, outside = windowed(np.array([[0.0, 2.0], [3.0, 4.0]]), 1.0 + math.tau, 0.5)
     >>> inside.round(9).tolist(), outside.round(9).tolist()

@@ -1,18 +1,19 @@
-"""How the cutter comes to a track, from one to the next, and away: moves that are proved to be clear.
+"""Links: proved clear moves to a track, from one track to the next, and away.
 
 Notation: p tip [mm], T axis, N normal at the contact; alpha table angle, H(alpha) the height along T above which
 nothing of the part lies, whatever the pallet angle: the part is within a body of revolution, H = max of r sin(alpha) +
 z cos(alpha). With its tip above H the cutter is clear wherever it stands.
 
-Tracks that end and begin close together are one pass: the cutter stays down between them (``passes.py``). Passes are
-milled in the order that takes little time over their ends (``pass_order.py``).
+Tracks that end and begin close together are one pass: the cutter stays down between them (``passes.py``). The order of
+passes keeps the time between their ends short (``pass_order.py``).
 
-The cutter leaves a pass along N + T, T or N by the lift, and comes to one the same way back: on these it touches, so
-that they are looked at in small steps, and may be as deep as ``touch``. The first ``lead`` of a lift is at the feed of
-the cut. Where a channel is too narrow for a lift it goes up along T to H at once, and may be as deep as ``touch`` all
-the way, which is proved. From a lift it goes straight to the lifted beginning of the next pass where that is near and
-proved clear (``clearance/``), else up along T to H, round, and down. The way up and down is along the spindle: it is
-rapid where it is proved clear of what roughing leaves on the walls as well, else at the feed of links.
+The cutter leaves a pass along N + T, T or N by the lift, and approaches one on the same line. It touches the surface
+there, so these moves are checked in small steps, and may be as deep as ``touch``. The first ``lead`` of a lift is at
+the feed of the cut. Where a channel is too narrow for a lift the cutter retracts along T to H at once, and may be as
+deep as ``touch`` over the whole retract, which is proved. From a lift it moves straight to the lifted beginning of the
+next pass where that is near and proved clear (``clearance/``), else along T to H, round above the part, and down. The
+retract and the approach are along the spindle. They are rapid where they are proved clear of the allowance on the walls
+too, else at the feed of links.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.track import ToolTrack, pallet_of, written
 from chipload.program.program import LINE, RAPID
 
-_SMALL = 24  # places at which a lift is looked at
+_SMALL = 24  # places at which a lift is checked
 _TURN = math.radians(3.0)  # of the pallet in one row above the part
 _LIFTS = (1.0, 0.5, 0.25)  # of the lift that are tried
 _OVER = 0.5  # [s] of ramps and turns of the pallet on a way over the part, when ways are compared
@@ -43,7 +44,7 @@ _OVER = 0.5  # [s] of ramps and turns of the pallet on a way over the part, when
 
 @dataclass(frozen=True)
 class Link:
-    """How tracks are linked.
+    """Parameters of links between tracks.
 
     Parameters
     ----------
@@ -151,7 +152,7 @@ def linked(
     joint: Joint | None = None,
     stages: Sequence[int] = (),
 ) -> Linked:
-    """Every track with what is between: in the order given where ``one_way``, else in that of a tour.
+    """All tracks with their links: in the given order where ``one_way``, else in the order of :mod:`.pass_order`.
 
     Parameters
     ----------
@@ -238,7 +239,7 @@ def _in_order(job: _LinkJob, passes: Sequence[Pass], stages: Sequence[int]) -> l
 
 
 class _Pose(NamedTuple):
-    """A way off the end of a pass: its tips, the last where it ends; the axis; whether it is clear of allowances."""
+    """A lift off the end of a pass: its tips, the last one at its end; the axis; whether it is clear of allowances."""
 
     tips: tuple[Floats, ...]
     axis: Floats
@@ -260,7 +261,7 @@ class _LinkJob:
     top: float
 
     def away(self, track: Pass, k: int) -> _Pose | None:
-        """The way off the end ``k`` of a pass, whose last tip has a clear way up; None: there is none."""
+        """Lift off the end ``k`` of a pass, whose last tip has a clear retract; None: there is none."""
         p, T, N = track.tip[k], track.axis[k], track.normal[k]
         share = np.arange(1, _SMALL + 1)[:, None] / _SMALL
         found: _Pose | None = None
@@ -300,7 +301,7 @@ class _LinkJob:
         return up
 
     def along(self, tip: Floats, axis: Floats, fed: bool) -> Moves:
-        """The way up or down along the axis, ``fed``: not in rapid, for the blank may stand there."""
+        """Retract or approach along the axis, ``fed``: at a feed, because the blank may stand there."""
         motion, feed = (LINE, self.how.feed) if fed else (RAPID, 0.0)
         return Moves.of(motion, tip[None], axis[None], feed, "link")
 
@@ -341,7 +342,7 @@ class _LinkJob:
 
 
 def _within_rate(moves: Moves, rate: float) -> Moves:
-    """The moves, fed so that the pallet keeps its rate."""
+    """The moves, with feeds at which the pallet keeps its rate."""
     if math.isinf(rate):
         return moves
     B = np.arctan2(moves.axis[:, 1], moves.axis[:, 0])

@@ -1,13 +1,13 @@
-"""The pallet angle along a line, continuous through the valid ranges.
+"""Continuous pallet angle along a line, within the valid ranges.
 
 Notation: B [rad] pallet angle, ranges (k, 2) of B at each point of a line, exact (``ranges/``); l [mm] length along the
-line. A range is cut into states; a step from state to state is possible where the two ranges overlap, so that all
-between is valid at one of the two ends, and where the pallet can go that far in the time of the step. The states with
-the least cost are found by dynamic programming, O(n K^2), and then drawn smooth within their ranges.
+line. A range is divided into states. A step from state to state is possible where the two ranges overlap, so that every
+angle between is valid at one of the two ends, and where the pallet can turn that far in the time of the step. The
+states with the least cost are found by dynamic programming, O(n K^2), and then smoothed within their ranges.
 
-The cost of a point is (1 - depth / wanted)^2 of a state nearer than ``wanted`` to an end of its range, a share of the
-angle from the state that is preferred, how much longer the path is than with the widest step-over at that point, and
-the square of the turn over the length of the step.
+The cost of a point has three terms: (1 - depth / wanted)^2 of a state nearer than ``wanted`` to an end of its range, a
+share of the angle from the preferred state, and how much longer the path is than with the widest step-over at that
+point. The cost of a step is the square of the turn over the length of the step.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ _INSET = 0.02  # of its width: a range is not used nearer to its ends
 
 @dataclass(frozen=True, eq=False)
 class Turned:
-    """Points ``first`` .. ``last`` - 1 of a line in one go, with their pallet angles B [rad], without jumps of 2 pi."""
+    """Points ``first`` .. ``last`` - 1 of a line without interruption, with their pallet angles B [rad], without jumps
+    of 2 pi.
+    """
 
     first: int
     last: int
@@ -47,7 +49,7 @@ def pallet_angles(
     preferred: Floats | None = None,
     widths: Callable[[Ints, Floats], Floats] | None = None,
 ) -> tuple[Turned, ...]:
-    """Pieces of a line with a continuous pallet angle in each.
+    """Parts of a line with a continuous pallet angle in each.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ from chipload.planning.impeller.impeller import Impeller
 
 @dataclass(frozen=True)
 class ImpellerShape:
-    """Dimensions of an impeller by formula [mm, rad]; the defaults are those of the source, ``wrap`` on are ours."""
+    """Dimensions of an impeller by formula [mm, rad]; defaults are those of the source, from ``wrap`` on our own."""
 
     blades: int = 11
     channel: float = 24.185
@@ -48,7 +48,7 @@ class ImpellerShape:
 
     @property
     def thickness(self) -> float:
-        """T [mm], what the channel leaves.
+        """Thickness t of the blades round the axis [mm]: what the channel leaves of the pitch.
 
         >>> round(ImpellerShape().thickness, 3)
         2.022
@@ -57,7 +57,7 @@ class ImpellerShape:
 
 
 def impeller_of(shape: ImpellerShape, along: int = 41, up: int = 9) -> Impeller:
-    """The impeller of a shape; its blades go through ``along`` x ``up`` points of the formula."""
+    """The impeller of a shape; its blades pass through ``along`` x ``up`` points of the formula."""
     share = np.linspace(0.0, 1.0, along)
     phi = 0.5 * math.pi * share
     Ro = shape.outer_radius

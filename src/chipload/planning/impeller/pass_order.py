@@ -1,9 +1,9 @@
-"""The order in which passes are milled, and from which end, so that the ways between them take little time.
+"""Order and direction of passes with short times between them.
 
-Notation: a pass has two ends, 0 its beginning and 1 its end. The time from an end to another is that of the quicker of
-two ways: straight at the feed of links where they are near, or over the part in rapid. The tour is begun at every pass
-in turn (at most :data:`_STARTS` of them), each time on to the nearest end, and then parts of it are turned round while
-that makes it shorter (2-opt); the shortest is taken.
+Notation: a pass has two ends, 0 its beginning and 1 its end. The time from one end to another is that of the quicker of
+two links: straight at the feed of links where they are near, or over the part in rapid. A sequence starts at every pass
+in turn (at most :data:`_STARTS` of them) and continues each time to the nearest end. Parts of it are then reversed
+while that makes it shorter (2-opt). The shortest sequence is taken.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from chipload.planning.impeller.scene import Floats
 
 _STARTS = 12
 _ROUNDS = 30
-#: ramps of a way over the part [s], and the rate of the pallet on it [rad/s]
+#: ramps of a link over the part [s], and the rate of the pallet on it [rad/s]
 _OVER, _RATE = 0.5, 2.0
 
 
@@ -85,7 +85,7 @@ def _times_between(tips: Floats, axes: Floats, top: float, near: float, feed: fl
 
 
 def _nearest(cost: Floats, begin: int, n: int) -> list[int]:
-    """Begun at an end, on and on to the nearest one; the ends at which passes are begun."""
+    """Sequence from one end on, always to the nearest next one; the ends at which passes begin."""
     order, open_ = [begin], np.ones(2 * n, dtype=np.bool_)
     open_[[begin, begin ^ 1]] = False
     while open_.any():
@@ -96,7 +96,7 @@ def _nearest(cost: Floats, begin: int, n: int) -> list[int]:
 
 
 def _turned(cost: Floats, first: Floats, order: Sequence[int]) -> tuple[float, list[int]]:
-    """The tour with parts of it turned round while that saves time, and its time."""
+    """The sequence with parts of it reversed while that saves time, and its time."""
     at = np.array(order)
     n = len(at)
     for _ in range(_ROUNDS):

@@ -1,9 +1,9 @@
-"""Passes: tracks that are milled in one go, because the cutter stays down on the surface from one to the next.
+"""Passes: tracks that are milled without a lift, because the cutter stays on the surface from one to the next.
 
 Notation: S contact point, N normal, T axis, p tip of the cutter. Between the end of one track and the nearer end of the
-next the contact goes straight in u and v of their surface, and the pallet turns evenly. The way between is made as a
-track is (``refinement.py``): points are put in until every row keeps to the surface and touches nothing; where that
-does not go the cutter lifts.
+next the contact moves straight in u and v of their surface, and the pallet turns evenly. The link is refined like a
+track (``refinement.py``): points are added until every row stays on the surface and touches nothing. Where that is not
+possible the cutter lifts.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _TURN = math.radians(30.0)
 
 @dataclass(frozen=True, eq=False)
 class Pass:
-    """Tracks in one go.
+    """A pass: tracks that follow one another without a lift.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Pass:
     label: str
 
     def back(self) -> Pass:
-        """The same from its end to its beginning."""
+        """The same pass from its end to its beginning."""
         kinds = np.concatenate([[0], self.labels[:0:-1]])
         return Pass(
             self.numbers[::-1], self.tip[::-1], self.axis[::-1], self.normal[::-1], self.of[::-1], kinds, self.label
@@ -61,7 +61,7 @@ class Pass:
 
 
 def single(number: int, track: ToolTrack, label: str) -> Pass:
-    """A track by itself."""
+    """A pass of one track."""
     n = len(track.tip)
     zero = np.zeros(n, dtype=np.int64)
     return Pass((number,), track.tip, track.axis, track.normal, zero + number, zero, label)
@@ -102,12 +102,12 @@ def joined(tracks: Sequence[ToolTrack], joint: Joint, longest: float, label: str
 
 
 def stayed_at(one: Pass) -> bool:
-    """Whether a pass has a link that stays down."""
+    """Whether a pass has a link that stays on the surface."""
     return bool(one.labels.any())
 
 
 def surface_joint(menders: Sequence[Refinement | None]) -> Joint:
-    """What joins tracks of one surface; ``menders`` of each track, the same object for those of one surface."""
+    """Function that joins tracks of one surface; ``menders`` of each track, the same object for one surface."""
 
     def joint(number: int, before: ToolTrack, after: ToolTrack) -> ToolTrack | None:
         mender = menders[number]

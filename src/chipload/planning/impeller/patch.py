@@ -1,4 +1,4 @@
-"""A patch: what one cutter mills at one table angle on one side of the channel.
+"""A patch: the part of one side of the channel that one cutter mills at one table angle.
 
 Notation: u along a side from the leading edge, v from hub to shroud; alpha table angle, B pallet angle. The strips of a
 side follow each other across one of u and v; the paths of a patch run along the other one.
@@ -26,7 +26,7 @@ class Patch:
     at : (k, 2) u and v of its contact points
     ranges : for each contact point (m, 2) valid pallet angles [rad]; m = 0: unreachable with every cutter
     path : predicted from the step-over at its contact points, of one such side [mm]
-    time : predicted, of one such side, with links where programs have told what they take [s]
+    time : predicted, of one such side, with links where programs have shown their time [s]
     area : that is milled [mm2]
     part : range of the other parameter; not 0..1 where no cutter at one table angle mills a whole strip
     """

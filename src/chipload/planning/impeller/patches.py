@@ -1,12 +1,12 @@
-"""Contiguous patches of the sides of a channel, each milled with one cutter at one table angle, in the least time.
+"""Division of the sides of a channel into patches, each for one cutter and table angle, in the least time.
 
 Notation: a strip is a row of contact points of a side; its strips follow each other across u or across v. Time: path
 over feed, the path of a contact point its area over the step-over there (``costs.py``), cutter changes, settings of the
 index table. A strip takes a cutter at a table angle only where every contact point of it that any cutter reaches has
 a valid range of the pallet angle, neck, shank and holder included.
 
-Method: the least time (``assignment.py``) of bounds; what of it is not proved yet is proved; again, until all of it is.
-As no bound is above what is proved, the last one is the least of all.
+Method: the least time (``assignment.py``) is calculated with bounds; what it uses and is not yet proved is proved; this
+repeats until all of it is proved. As no bound is above the proved value, the last time is the least of all.
 
 Reference: [Wu2019]. Differs from source: it divides one side by eye, in two, after its diameters.
 """
@@ -30,7 +30,7 @@ from chipload.progress import Progress, silent
 
 @dataclass(frozen=True, eq=False)
 class PatchDivision:
-    """Sides in patches.
+    """Sides divided into patches.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class PatchDivision:
     bound : below it is no time of the same strips in any sequence, with as many cutters [s]
     bound_any_shape : nor, below this, of patches of any shape on the same contact points [s]
     unreachable : for each side the contact points that no cutter of the catalogue mills
-    untold : ranges that took too many arcs to tell, and count as closed
+    untold : ranges with too many arcs to decide, which count as closed
     """
 
     patches: tuple[Patch, ...]
@@ -59,12 +59,12 @@ class PatchDivision:
 
     @property
     def above_bound(self) -> float:
-        """By what share the time is above the bound."""
+        """Share by which the time is above the bound."""
         return self.total / self.bound - 1.0 if self.bound > 0.0 else 0.0
 
 
 def costs_of(sides: Sequence[ChannelSide], terms: Terms, workers: int = 1) -> tuple[Costs, ...]:
-    """The times of sides, to be shared by calls of :func:`divided`; the sides have one catalogue."""
+    """Times of the sides, shared by calls of :func:`divided`; the sides have one catalogue."""
     if not sides:
         raise InputError("sides: none: must be at least one")
     catalogue = sides[0].answer.catalogue
@@ -81,7 +81,7 @@ def divided(
     progress: Progress = silent,
     keep: Keep = anew,
 ) -> PatchDivision | None:
-    """The patches of sides milled one after the other with at most so many different cutters.
+    """Patches of sides that are milled one after another with at most ``most`` different cutters.
 
     Parameters
     ----------

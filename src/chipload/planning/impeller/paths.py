@@ -1,14 +1,15 @@
-"""Finishing paths of a patch: lines that leave a scallop of the same height between them.
+"""Finishing paths of a patch: lines with scallops of the same height between them.
 
-Notation: a line runs along one parameter p of the surface at q(p) of the other; d its direction, N normal, e = N x d;
-h height of the scallop. The next line lies at the step w across e, q + w / (S_q.e) with the derivative half-way; w is
-how far the pass reaches below h on this side and how far the next one does on its own (``cusp.py``), then refined until
-the scallop between the poses of both (``scallop.py``) is as high as aimed. The next line's pallet angles are not known
-before it lies: they are first taken for those of this line.
+Notation: a line runs along one parameter p of the surface at q(p) of the other; d its direction, N normal, e = N x d; h
+height of the scallop. The next line lies at the step w across e, q + w / (S_q.e) with the derivative half-way. w is the
+distance over which the pass stays below h on this side, plus that of the next pass on its own side
+(``scallop_width.py``). It is then refined until the scallop between the poses of both (``scallop_height.py``) is as
+high as required. The pallet angles of the next line are not known in advance: they are first taken to be those of this
+line.
 
 The pallet angles of a line come from the exact ranges at its points (``pallet.py``). Points without a range are left
-out and told; the line is split there. A line that reaches the border of the patch ends there; a part of a line along
-the border is the last.
+out and reported; the line is split there. A line that reaches the border of the patch ends there; a part of a line
+along the border is the last.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ _GROWTH = 0.2
 
 @dataclass(frozen=True)
 class PatchFinish:
-    """How a patch is finished.
+    """Parameters of the finishing path of a patch.
 
     Parameters
     ----------
@@ -83,13 +84,13 @@ def finishing(
     workers: int = 1,
     progress: Progress = silent,
 ) -> Tracks:
-    """Tracks over a part of a surface at constant scallop.
+    """Tracks over a part of a surface at constant scallop height.
 
     Parameters
     ----------
     along : `u` or `v`, the parameter that the lines run along
     box : (low, high) of u, (low, high) of v, within 0..1
-    scene : its check points; its contact points are not looked at
+    scene : its check points; its contact points are not used
     number : of the surface among those of the check points
     table : alpha [rad]
     pallets : (k, 2) [rad] where B may be

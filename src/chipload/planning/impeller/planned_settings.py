@@ -1,8 +1,8 @@
 """Settings of patches with their rest passes, in the order in which they are milled.
 
-What the passes of all patches together leave too high is milled by rest passes (``rest_machining.py``), in the program
-of the cutter at the table angle that reaches it, or in one of its own. What other processes can make meanwhile (paths
-of patches, links, rest passes) is told ahead, round by round.
+Rest passes (``rest_machining.py``) mill what the passes of all patches together leave too high, in the program of the
+cutter at the table angle that reaches it, or in a program of their own. Parts that other processes can plan meanwhile
+(paths of patches, links, rest passes) are announced in advance, round by round.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ from chipload.planning.impeller.track import ToolTrack
 from chipload.program.program import LINE
 from chipload.progress import Progress, part_of, silent
 
-#: rest passes take what is left above this share of the scallop: above what is left between two lines, and below
-#: what is asked, for the count is of points
+#: rest passes remove excess above this share of the scallop: above the scallop between two lines, and below the
+#: limit, because only points are checked
 _AIM = 0.985
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedSettings:
-    """All settings, and what by the planner's own count is still left higher than asked.
+    """All settings, and the places that by the planner's own check are still higher than required.
 
     ``left`` [mm2] of each surface by body and side, ``unreached`` [mm2] of it where no cutter and table angle that was
     tried has a valid pallet angle.
@@ -69,12 +69,12 @@ def planned(
     keep: Keep = anew,
     fine: float = 1.0,
 ) -> PlannedSettings:
-    """The settings of patches with their rest passes, in the order in which changes take least.
+    """The settings of patches with their rest passes, in the order with the shortest changes.
 
     Parameters
     ----------
     changes : what a change of cutter and a setting of the table take
-    rounds : most times that what is left is looked at and milled with rest passes
+    rounds : greatest number of rounds of rest passes
     known : millings that are planned already; those that are planned here are added
     keep : gives what an earlier run has finished of them
     fine : distance of the points at which what is left is counted, over the usual one
@@ -129,7 +129,7 @@ def tell_millings(
     ways: Sequence[tuple[FinishSettings, Sequence[Patch]]], known: Mapping[MillingKey, Milling], keep: Keep,
     progress: Progress = silent,
 ) -> None:  # fmt: skip
-    """Tell ahead the paths of the patches of several ways that are not ``known``."""
+    """Announce the paths of the patches of several partitions that are not ``known``."""
     parts = {
         key: job.milling_task(patch)
         for job, patches in ways
@@ -191,7 +191,7 @@ def _with_rests(
 
 
 def settings_with_feeds(job: FinishSettings, settings: tuple[CutterSetting, ...]) -> tuple[CutterSetting, ...]:
-    """The settings, in the order in which they are milled, with the feeds that forces allow."""
+    """The settings, in the order in which they are milled, with the feeds that the forces allow."""
     if job.forces is None:
         return settings
     most = job.how.motion.feed
@@ -233,7 +233,7 @@ LeftMemory = dict[tuple[int, tuple[int, ...]], tuple[Floats, tuple[ToolTrack, ..
 
 
 def _left(face: SurfaceGrid, settings: Iterable[CutterSetting], memory: LeftMemory) -> Floats:
-    """(a, b) float [mm] what all tracks that are in the moves leave on the grid of a surface."""
+    """Excess (a, b) float [mm] of all tracks that are in the moves, on the grid of a surface."""
     out = np.full((len(face.u), len(face.v)), np.inf)
     for s in settings:
         gone, first = {k for k, _ in s.linked.refused}, 0
@@ -248,7 +248,7 @@ def _left(face: SurfaceGrid, settings: Iterable[CutterSetting], memory: LeftMemo
 
 
 def _faces(job: FinishSettings, millings: Sequence[Milling], fine: float) -> list[SurfaceGrid]:
-    """Every surface that is milled, as far as its patches go."""
+    """Every surface that is milled, within its patches."""
     boxes: dict[tuple[int, str], list[Box]] = {}
     for m in millings:
         boxes.setdefault((m.patch.body, m.patch.side), []).append(m.box)
@@ -264,7 +264,7 @@ def _faces(job: FinishSettings, millings: Sequence[Milling], fine: float) -> lis
 
 
 def _cells(face: SurfaceGrid) -> Floats:
-    """(a, b) area [mm2] that each grid point stands for."""
+    """Area (a, b) [mm2] of the surface round each grid point."""
     U, V = (x.ravel() for x in np.meshgrid(face.u, face.v, indexing="ij"))
     size = np.linalg.norm(np.cross(face.surface.at(U, V, 1, 0), face.surface.at(U, V, 0, 1)), axis=1)
     out: Floats = size.reshape(len(face.u), len(face.v)) * (face.u[1] - face.u[0]) * (face.v[1] - face.v[0])

@@ -1,15 +1,15 @@
-"""Point milling of a surface on five simultaneous axes: lines there and back, with a scallop of one height between.
+"""Point milling of a surface on five simultaneous axes: zigzag lines with a constant scallop height.
 
 Notation: lines run along one parameter p of the surface at q(p) of the other; T(u, v) the axis (``axis_field.py``),
-which is known all over the surface before a line lies on it. h height of the scallop, w step-over across a line.
+which is known over the whole surface before the lines are laid out. h height of the scallop, w step-over across a line.
 
-A station p needs N(p) steps from border to border, the integral of 1 / w across the lines; all stations get the same
-number M, the greatest of them, each with its own share 1 / (w N) of them at every place. So lines begin and end
-together, and never become skew. Where N differs much the surface is divided into bands of stations, each with an M of
-its own, so that the path is shortest. The widths w are first those of two passes side by side (``scallop_width.py``),
-then those that the scallop between the poses of every two lines shows (``scallop_height.py``): the distance of the
-lines times sqrt(h / scallop), again and again. M grows until no scallop is above h. The first and the last line lie
-inside the border, as far as their pass stays below h there.
+A station p needs N(p) steps from border to border, the integral of 1 / w across the lines. All stations get the same
+number M, the greatest N, each with its own share 1 / (w N) of them at every place. So lines begin and end together, and
+never become skew. Where N differs much the surface is divided into bands of stations, each with an M of its own, so
+that the path is shortest. The widths w are first those of two neighbouring passes (``scallop_width.py``). Then they are
+corrected by the scallop between the poses of every two lines (``scallop_height.py``): the distance of the lines times
+sqrt(h / scallop), repeatedly. M grows until no scallop is above h. The first and the last line lie inside the border,
+as far as their pass stays below h there.
 
 From line to line the cutter stays on the surface. Between two rows the tip goes straight and the axis turns evenly;
 rows are added until the tip of the middle is within the chord.
@@ -76,7 +76,7 @@ class PointPath:
 
     @property
     def lines(self) -> int:
-        """How many."""
+        """Number of lines."""
         return len(np.unique(self.line[self.line >= 0]))
 
     @property
@@ -86,19 +86,19 @@ class PointPath:
 
     @property
     def length(self) -> float:
-        """Of the tip's path [mm]."""
+        """Length of the tip's path [mm]."""
         return float(np.linalg.norm(np.diff(self.tip, axis=0), axis=1).sum())
 
     @property
     def turn(self) -> float:
-        """Greatest turn of the axis over a millimetre of the contact's path [rad/mm]."""
+        """Greatest turn of the axis per millimetre of the contact's path [rad/mm]."""
         angle = np.arccos(np.clip((self.axis[1:] * self.axis[:-1]).sum(axis=1), -1.0, 1.0))
         size = np.linalg.norm(np.diff(self.tip, axis=0), axis=1)
         far = size > 1e-3
         return float((angle[far] / size[far]).max()) if far.any() else 0.0
 
     def back(self) -> PointPath:
-        """The same from its end to its beginning."""
+        """The same path from its end to its beginning."""
         return PointPath(**{f.name: getattr(self, f.name)[::-1] for f in fields(self)})
 
 
@@ -111,7 +111,7 @@ def point_path(
     scallop: float,
     chord: float,
 ) -> PointPath:
-    """The path over a part of a surface.
+    """Point-milling path over a part of a surface.
 
     Parameters
     ----------

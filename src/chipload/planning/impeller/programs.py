@@ -1,4 +1,4 @@
-"""The program of one cutter at one setting of the table, in the work frame.
+"""Program of one cutter at one table angle, in the work frame.
 
 Notation: alpha table angle, set before the first motion and kept in all of the program; B pallet angle. On the machine
 the table stands at the position that brings the tool's axis to alpha from the pallet's (``tables.py``).
@@ -21,7 +21,7 @@ _STILL = 1e-9  # [rad] the table angle of a row may differ by so much
 
 
 def program_of(moves: Moves, spindle: float, tool: int) -> Program:
-    """The program of the moves; ``spindle`` [rad/s], ``tool`` number."""
+    """Program of the moves; ``spindle`` [rad/s], ``tool`` number."""
     labels = tuple(dict.fromkeys(moves.label))
     n = len(moves.tip)
     up = np.tile([0.0, 0.0, 1.0], (n, 1))
@@ -34,7 +34,7 @@ def program_of(moves: Moves, spindle: float, tool: int) -> Program:
 
 
 def pallet_rate(machine: Machine) -> float:
-    """Greatest rate of the turning pallet [rad/s]."""
+    """Greatest rate of the pallet [rad/s]."""
     return next(x.rate for x in machine.chain.rotary if not x.indexed)
 
 
@@ -44,7 +44,7 @@ def table_stands(program: Program) -> bool:
 
 
 def pallet_speed(program: Program) -> Floats:
-    """(n,) rate of the pallet [rad/s] in each row at its feed; 0 for rapids."""
+    """Rate of the pallet [rad/s] in each row at its feed, (n,); 0 for rapids."""
     B = np.unwrap(np.arctan2(program.axis[:, 1], program.axis[:, 0]))
     turn = np.abs(np.diff(B, prepend=B[:1]))
     cut = (program.motion != RAPID) & (program.motion != DWELL)
@@ -54,7 +54,7 @@ def pallet_speed(program: Program) -> Floats:
 
 
 def too_fast(program: Program, machine: Machine) -> tuple[Finding, ...]:
-    """A finding where the pallet is asked for more than its rate."""
+    """Finding where the pallet would exceed its greatest rate."""
     speed, most = pallet_speed(program), pallet_rate(machine)
     if not len(speed) or speed.max() <= most * (1.0 + 1e-9):
         return ()

@@ -1,9 +1,10 @@
-"""Tracks refined between their points: more points where a straight row would leave the path or touch the part.
+"""Refinement of tracks: points are added where a straight row would leave the path or touch the part.
 
-Notation: between two poses the tip goes straight and the axis turns evenly. Half-way the cutter should touch the
-surface at the middle of u, v and B: how far the straight row is off along the normal there is its chord error. A check
-point, or a node of the scene's covering, that lies deeper than the chord in the cutter at a quarter, a half or three
-quarters is a gouge. Either is refined by a point between, whose pallet angle is the nearest valid one to the middle.
+Notation: between two poses the tip moves straight and the axis turns evenly. Half-way the cutter should touch the
+surface at the middle of u, v and B; the distance of the straight row from that along the normal is its chord error. A
+check point, or a node of the scene's covering, that lies deeper than the chord in the cutter at a quarter, a half or
+three quarters is a gouge. Both are removed by a point between, whose pallet angle is the nearest valid one to the
+middle.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ _WINDOW = np.radians(6.0)
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """One cutter on one surface at one table angle.
+    """Refinement of the tracks of one cutter on one surface at one table angle.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ class Refinement:
     clearance: float
 
     def refined(self, track: ToolTrack) -> tuple[tuple[ToolTrack, ...], Ints]:
-        """The track with more points; in parts, where a row could not be refined, and how many rows that are."""
+        """The track with more points, split where a row cannot be refined, and the number of such rows."""
         for _ in range(_ROUNDS):
             bad = self.bad(track)
             if not len(bad):
@@ -80,7 +81,7 @@ class Refinement:
         return out
 
     def split(self, track: ToolTrack, rows: Ints) -> ToolTrack | None:
-        """A point in the middle of each of the rows where there is a valid one; None: there is none at all."""
+        """The track with a point in the middle of each of the rows that has a valid one; None: none has."""
         at = 0.5 * (track.at[rows] + track.at[rows + 1])
         B = 0.5 * (track.pallet[rows] + track.pallet[rows + 1])
         got = [self.pallet(a, b) for a, b in zip(at, B, strict=True)]
@@ -111,7 +112,7 @@ class Refinement:
         return float(near[np.abs(near - wanted).argmin()])
 
     def furthest(self, inside: Floats, pallet: float, outside: Floats) -> tuple[Floats, float, float] | None:
-        """The last (u, v) on the way from one point to another that is reached with B near that before it.
+        """Last (u, v) between one point and another that is reached with B near that before it.
 
         Returns
         -------

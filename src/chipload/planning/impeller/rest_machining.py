@@ -1,11 +1,11 @@
-"""What all passes together leave standing too high, and the rest passes that take it.
+"""Rest machining: places that all passes together leave too high, and the rest passes for them.
 
-Notation: p, q the parameters along a rest pass and across; h height of the scallop. A surface is looked at on a grid
-finer than the narrowest step of a corner; what is left at a point is its distance from the poses of every track that
-touch near it, along the normal by one step of the secant (``scallop_height.py``). Points that belong together are a
-region. A region is milled with the cutter and table angle that have valid pallet angles at most of its points: one that
-is in use first, then the cutters in use at any angle, then smaller ones. What is milled is looked at again; what was
-tried with a cutter at an angle is not tried so again.
+Notation: p, q the parameters along a rest pass and across; h height of the scallop. A surface has a grid finer than the
+narrowest step of a corner. The excess at a grid point is its distance from the poses of every track that touch near it,
+along the normal by one step of the secant (``scallop_height.py``). Connected points are a region. A region is milled
+with the cutter and table angle that have valid pallet angles at most of its points: first one in use, then the cutters
+in use at any angle, then smaller ones. The grid is checked again after each round; a cutter that was tried in a region
+at an angle is not tried there again.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from chipload.planning.impeller.track import ToolTrack
 
 #: points of a region that are tried
 _SAMPLE = 10
-#: width of the cells in which poses are looked for, as a share of the cutter's radius, and the least [mm]
+#: width of the cells in which poses are searched, as a share of the cutter's radius, and the least [mm]
 _CELL, _LEAST_CELL = 0.5, 2.0
 #: distance of grid points, and of rest passes, as a share of the step of a corner on a plane
 _GRID, _STEP = 0.45, 0.85
@@ -46,7 +46,7 @@ Pair = tuple[int, float]  # index of a cutter, table angle [rad]
 
 @dataclass(frozen=True, eq=False)
 class SurfaceGrid:
-    """A surface that is milled: its grid of points.
+    """Grid of points over a surface that is milled.
 
     Parameters
     ----------
@@ -89,8 +89,8 @@ def face_of(
     body: int, side: str, surface: BSplinePatch, number: int, box: tuple[tuple[float, float], tuple[float, float]],
     scallop: float, corner: float, fine: float = 1.0,
 ) -> SurfaceGrid:  # fmt: skip
-    """The grid of a surface, fine enough for what a corner [mm] leaves at a scallop [mm]; its points are so many times
-    closer together as ``fine`` is below 1.
+    """The grid of a surface, fine enough for what a corner [mm] leaves at a scallop [mm]. Its points are closer
+    together as ``fine`` falls below 1.
     """
     spacing = fine * _GRID * corner_step(corner, scallop)
     t = [np.linspace(low, high, 33) for low, high in box]
@@ -107,7 +107,7 @@ def face_of(
 
 
 def corner_step(corner: float, scallop: float) -> float:
-    """Step [mm] at which a corner leaves the scallop on a plane; the least of any toroid.
+    """Step-over [mm] at which a corner leaves the scallop on a plane; the least of any toroid.
 
     >>> round(corner_step(2.0, 0.1), 4)
     1.249
@@ -117,7 +117,7 @@ def corner_step(corner: float, scallop: float) -> float:
 
 
 def left_over(face: SurfaceGrid, passes: Sequence[tuple[CatalogueCutter, Sequence[ToolTrack]]]) -> Floats:
-    """(a, b) float [mm] what the tracks of every cutter leave on the grid; inf where none comes near."""
+    """Excess that the tracks of every cutter leave on the grid, (a, b) float [mm]; inf where none comes near."""
     points = np.ascontiguousarray(face.points.reshape(-1, 3))
     normals = np.ascontiguousarray(face.normals.reshape(-1, 3))
     out = np.full(len(points), np.inf)
@@ -153,7 +153,7 @@ def _poses(tracks: Sequence[ToolTrack], fine: float) -> tuple[Floats, Floats, Fl
 
 
 def regions(left: Floats, scallop: float, hopeless: Flags) -> list[Flags]:
-    """Where more than the scallop is left: points (a, b) that belong together, the largest first."""
+    """Connected points (a, b) where the excess is more than the scallop, the largest region first."""
     over = (left > scallop) & ~hopeless
     joined, count = label(binary_dilation(over), structure=np.ones((3, 3)))
     out = [over & (joined == k) for k in range(1, count + 1)]
@@ -162,7 +162,7 @@ def regions(left: Floats, scallop: float, hopeless: Flags) -> list[Flags]:
 
 @dataclass(frozen=True, eq=False)
 class RestSettings:
-    """What rest passes are planned with.
+    """Parameters with which rest passes are planned.
 
     Parameters
     ----------
@@ -183,16 +183,16 @@ class RestSettings:
     keep: Keep = anew
 
     def chosen(self, face: SurfaceGrid, region: Flags) -> Pair | None:
-        """The cutter and table angle for a region; None: none that was not tried reaches any of its points."""
+        """The cutter and table angle for a region; None: no untried one reaches any of its points."""
         return self.keep(self.pair_key(face, region), lambda: self._chosen(face, region))
 
     def pair_key(self, face: SurfaceGrid, region: Flags) -> tuple[object, ...]:
-        """What the cutter and table angle of a region depend on; other regions do not overlap it."""
+        """Key of the cutter and table angle of a region: everything that they depend on."""
         tried = tuple((k, a, x & region) for (k, a), x in face.tried.items() if (x & region).any())
         return ("rest pair", *self._place(face, region), self.catalogue, self.used, tried)
 
     def passes_key(self, face: SurfaceGrid, region: Flags, pair: Pair) -> tuple[object, ...]:
-        """What the passes of a region depend on."""
+        """Key of the passes of a region."""
         return ("rest passes", *self._place(face, region), self.catalogue.cutters[pair[0]], pair[1])
 
     def _place(self, face: SurfaceGrid, region: Flags) -> tuple[object, ...]:

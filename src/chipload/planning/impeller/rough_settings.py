@@ -1,9 +1,9 @@
-"""Roughing of every channel: which cutter, at which table angle, and its programs.
+"""Roughing of every channel: its cutters, their table angles, and the programs.
 
-Notation: alpha table angle, D diameter. A channel is looked at on points of its layers (``floor.py``) beside walls
-thicker by their allowances. The largest cutter that fits is the largest that, by the proved search point by point, goes
-at a stated share of them; its table angle is the one at which it goes at most of them. What it does not reach there is
-roughed at a second angle where that adds enough, and so on; rows there go only where those before did not.
+Notation: alpha table angle, D diameter. A channel is searched at points of its layers (``floor.py``) beside walls
+thicker by their allowances. The roughing cutter is the largest that, by the proved search, fits at a stated share of
+these points; its table angle is the one at which it fits at most of them. Points that it does not reach are roughed at
+a second angle where that adds enough, and so on; rows there are only where those before did not reach.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from chipload.planning.impeller.track import ToolTrack
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 
-#: shares along and across a layer of the points at which a channel is looked at; most layers of them
+#: shares along and across a layer of the points at which a channel is searched; greatest number of layers
 _ALONG, _ACROSS, _LAYERS = np.linspace(0.06, 0.94, 9), (0.25, 0.5, 0.75), 4
 #: least share of the points that a further table angle must add
 _WORTH = 0.1
@@ -70,7 +70,7 @@ class RoughingSetting:
     tool: int
 
     def without(self, numbers: Sequence[int]) -> RoughingSetting:
-        """The same without some of its rows, linked anew."""
+        """The setting without some of its rows, with new links."""
         gone = set(numbers)
         keep = tuple(t for k, t in enumerate(self.tracks.tracks) if k not in gone)
         out = tuple(t for k, t in enumerate(self.tracks.tracks) if k in gone)
@@ -80,7 +80,7 @@ class RoughingSetting:
         return replace(self, tracks=tracks, linked=way, program=program, stopped=(*self.stopped, *out))
 
     def numbered(self, tool: int) -> RoughingSetting:
-        """The same with another tool number."""
+        """The setting with another tool number."""
         return replace(self, tool=tool, program=program_of(self.linked.moves, self.spindle, tool))
 
     @property
@@ -96,7 +96,7 @@ def roughed(
     table: IndexTable, share: float, ahead: float = 0.0, workers: int = 1, progress: Progress = silent,
     keep: Keep = anew,
 ) -> tuple[RoughingSetting, ...]:  # fmt: skip
-    """The roughing programs of all channels.
+    """Roughing programs of all channels.
 
     Parameters
     ----------

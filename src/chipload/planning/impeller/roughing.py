@@ -1,9 +1,9 @@
-"""Roughing of a channel between two bodies: layers from the shroud down to the hub, rows in each.
+"""Roughing paths of a channel between two bodies: layers from the shroud down to the hub, with rows in each.
 
-Notation: a layer lies at the share w between the hub, with its allowance, and the shroud (``floor.py``); w falls from
-layer to layer so that none is thicker than the depth. In a layer the rows run along u, as far across as the cutter
-goes beside walls thicker by their allowance, no further apart than the step. Each begins beyond the outlet, in the air,
-and goes to the inlet: the cutter comes to a row from outside, never from above into the full.
+Notation: a layer lies at the share w between the hub, with its allowance, and the shroud (``floor.py``); w decreases
+from layer to layer so that none is thicker than the depth. In a layer the rows run along u, as far across as the cutter
+fits beside walls thicker by their allowance, at most the step apart. Each row begins beyond the outlet, in the air, and
+runs to the inlet: the cutter enters a row from outside, and never plunges into solid material.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _FEWEST, _INSET = 17, 0.02
 
 @dataclass(frozen=True)
 class RoughingSettings:
-    """How a channel is roughed.
+    """Parameters of the roughing of a channel.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class RoughingSettings:
 
 
 def layers(impeller: Impeller, depth: float, allowance: float, ahead: float = 0.0) -> Floats:
-    """Shares w of the layers, falling to 0, none thicker than ``depth`` [mm]."""
+    """Shares w of the layers, decreasing to 0, none thicker than ``depth`` [mm]."""
     where = hub_range(impeller, ahead)
     s = np.linspace(*where, 101)
     low, high = (meridian(impeller, s, w, allowance, where) for w in (0.0, 1.0))
@@ -88,7 +88,7 @@ def roughing(
     progress: Progress = silent,
     before: Sequence[ToolTrack] = (),
 ) -> Tracks:
-    """Tracks of the channel on the plus side of a body, clear of its walls as :func:`thickened` gives them.
+    """Roughing tracks of the channel on the plus side of a body, clear of its walls as :func:`thickened` gives them.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def _places(track: ToolTrack) -> Floats:
 def guarded(
     impeller: Impeller, index: int, milled: int, spacing: float, corner: float, around: int = 1, ahead: float = 0.0
 ) -> Scene:
-    """Check points for finishing one wall of the channel on the plus side of a body; between them nothing is cut.
+    """Check points for finishing one wall of the channel on the plus side of a body; nothing is cut between them.
 
     The others are moved out by spacing^2 / (8 corner), as deep as a corner can come between them.
 

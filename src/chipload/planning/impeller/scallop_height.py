@@ -1,9 +1,9 @@
-"""How high the scallop between two lines stands: from the cutter's poses on both, not to second order.
+"""Height of the scallop between two lines, from the cutter's poses on both lines.
 
-Notation: at each station i two lines lie at q and q'; points of the surface between them at shares of the way; D
+Notation: at each station i two lines lie at q and q'; points of the surface between them at shares of the distance; D
 distance of a point from the cutting part, at the poses of both lines from station to station nearby. The least D over
-the poses, between them by a parabola, is what is left there, along the normal by one step of the secant; the greatest
-of a station's points is its crest.
+the poses, between them by a parabola, is the excess there, along the normal by one step of the secant; the greatest of
+a station's points is its scallop height.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from chipload.planning.impeller import _scallop
 from chipload.planning.impeller.scene import Floats
 
 _SHARES = (np.arange(15) + 0.5) / 15
-#: steps of thirds by which the crest is looked for between two shares
+#: steps of the ternary search for the top of the scallop between two shares
 _STEPS = 5
 _NEAR = 4.0  # [mm] along the line: poses that are farther do not count
-#: distance of poses between which a scallop is looked for [mm]; of a small corner its share of the radius, and what is
+#: distance of poses between which a scallop is searched [mm]; of a small corner its share of the radius, and what is
 #: small [mm]: with 1.5 mm a D 12 r 2 came out a third too high, with 0.5 mm a D 12 r 1 took 1.7 times as long
 _FINE, _SHARE, _SMALL = 0.5, 0.15, 1.0
 
@@ -27,7 +27,7 @@ _FINE, _SHARE, _SMALL = 0.5, 0.15, 1.0
 def scallop_heights(
     points: Floats, normals: Floats, tips: tuple[Floats, Floats], axes: tuple[Floats, Floats], rho: float, corner: float
 ) -> Floats:
-    """(n,) float [mm] crest at each place; nan where either line has no pose.
+    """Scallop height at each place, (n,) float [mm]; nan where either line has no pose.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def distance(points: Floats, tips: Floats, axes: Floats, rho: float, corner: flo
 
 
 def pose_distance(corner: float) -> float:
-    """Distance [mm] of poses along a line between which a scallop is looked for; a small corner needs them closer.
+    """Distance [mm] of poses along a line for the search of a scallop; a small corner needs a smaller one.
 
     >>> pose_distance(1.0), pose_distance(2.0)
     (0.15, 0.5)
@@ -78,5 +78,5 @@ def pose_distance(corner: float) -> float:
 
 
 def shares() -> Floats:
-    """Shares of the way from line to line at which the surface is looked at."""
+    """Shares of the distance from line to line at which the surface is evaluated."""
     return _SHARES

@@ -1,4 +1,4 @@
-"""How far from its path a pass stays below a scallop, on either side, with corner and flank.
+"""Distance from its path, on either side, over which a pass of corner and flank stays below a scallop height.
 
 Notation: S contact point, N normal, T cutter axis, n = N.T, V unit across T towards N; d along the path, e = N x d
 across it; r corner radius, rho = R - r; K curvature tensor of the surface; h height of the scallop.

@@ -1,4 +1,4 @@
-"""What is milled and what must not be touched: contact points and check points.
+"""Scene of a search: contact points that are milled, and check points that must not be touched.
 
 Notation: S contact point [mm], N its unit normal into the channel, K curvature tensor of its surface (3, 3) [1/mm],
 above 0 where the surface bends towards N; c check point.
@@ -44,7 +44,7 @@ class CheckPoints:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Contact points and check points of one set-up.
+    """Contact points and check points of one setup.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Scene:
     near : check points of the contact's own surface nearer than this [mm] are left out: there the curvature stands for
         them. A deviation of the surface from its second order, over that distance, is not seen.
     covering : of the walls between the check points; None: ranges hold at the check points alone
-    shared : the same check points in another scene, which are not looked at again; None: they are new
+    shared : the same check points in another scene, which are not processed again; None: they are new
 
     Raises
     ------
@@ -123,21 +123,21 @@ class Scene:
 
     @property
     def tree(self) -> Tree:
-        """Of the check points."""
+        """Tree of the check points."""
         return self.walls.tree
 
     @property
     def ordered(self) -> Floats:
-        """(m, 3) check points in the order of the tree [mm]."""
+        """Check points in the order of the tree (m, 3) [mm]."""
         return self.walls.ordered
 
     @property
     def own(self) -> Ints:
-        """(m,) surface of each check point, in the order of the tree."""
+        """Surface of each check point (m,), in the order of the tree."""
         return self.walls.own
 
     def at_contacts(self, contact: Floats, normal: Floats, curvature: Floats, surface: int) -> Scene:
-        """The same check points with other contact points, all on one surface."""
+        """Scene with the same check points and other contact points, all on one surface."""
         number = np.full(len(contact), surface, dtype=np.int64)
         return Scene(
             contact, normal, curvature, number, self.check, self.check_surface, self.near, self.tree, self.covering,

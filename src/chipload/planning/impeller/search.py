@@ -1,13 +1,14 @@
-"""The largest cutter at every contact point and table angle, proved.
+"""Largest cutter of a corner radius at every contact point and table angle, with a proof.
 
 Notation: R cutter radius, r corner radius, rho = R - r; alpha table angle, B pallet angle [rad]. For each contact point
-and table angle rho* = max over B of min over the check points of their limit (``closed.py``).
+and table angle rho* = max over B of min over the check points of their limit (``closed_form.py``).
 
-Method: a coarse grid of B, a climb to the best beside it; then the arcs of B that the limiting check points (blockers)
-forbid to rho* + eps, exactly, are united. No gap: proved, the blockers are the proof. A gap: its middle has a larger
-cutter, or a new blocker. Gaps narrower than ``least`` are not counted: no machine holds B to that.
+Method: a coarse grid of B, then a local search from the best B of the grid. Then the exact arcs of B that the limiting
+check points (blockers) forbid to rho* + eps are united. If they cover all B, the blockers prove the bound. If they
+leave a range, its middle has a larger cutter or a new blocker. Ranges narrower than ``least`` are not counted: no
+machine holds B to that.
 
-Reference: [Wu2019]. Differs from source: no grid of B decides, every radius at once.
+Reference: [Wu2019]. Differs from source: the result does not depend on a grid of B; every radius at once.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ CURVATURE = -2
 
 @dataclass(frozen=True)
 class Sampling:
-    """How finely the pallet angle is searched.
+    """Resolution of the search over the pallet angle.
 
     Parameters
     ----------

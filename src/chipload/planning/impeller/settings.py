@@ -1,7 +1,7 @@
-"""A cutter at a table angle with its patches: their paths, its rest passes, its moves, one program.
+"""Settings: a cutter at a table angle with its patches, their paths, its rest passes, its moves, one program.
 
-Notation: a setting is a cutter at a table angle with the patches that are milled so; alpha table angle [rad]. In the
-scene of a channel the surfaces are numbered as :meth:`Impeller.scene` does for the plus side of the blade.
+Notation: a setting is a cutter at a table angle with the patches that it mills; alpha table angle [rad]. In the scene
+of a channel the surfaces are numbered as :meth:`Impeller.scene` does for the plus side of the blade.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ from chipload.program.program import Program
 NUMBERS = {(0, "plus"): 0, (1, "minus"): 1, (0, "minus"): 3, (1, "plus"): 4}
 NUMBERS |= {(body, f"{side} fillet"): FILLET + n for (body, side), n in NUMBERS.items()}
 _FLOOR = 2
-#: rest passes take what is left above this share of the scallop: above what is left between two lines, and below
-#: what is asked, for the count is of points
+#: rest passes remove excess above this share of the scallop: above the scallop between two lines, and below the
+#: limit, because only points are checked
 _AIM = 0.985
-#: so many settings are brought into the best order; more of them on and on to the nearest
+#: greatest number of settings that are put into the best order; more of them always to the nearest
 _EXACT = 7
 
 
@@ -73,7 +73,7 @@ class Milling:
 
 @dataclass(frozen=True, eq=False)
 class CutterSetting:
-    """A cutter at a table angle.
+    """A cutter at a table angle with its patches and programs.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class CutterSetting:
 
     @property
     def tracks(self) -> tuple[ToolTrack, ...]:
-        """Of all patches, then of the rest passes."""
+        """Tracks of all patches, then of the rest passes."""
         return (*(t for m in self.millings for t in m.tracks.tracks), *(t for r in self.rests for t in r.tracks))
 
     @property
@@ -106,16 +106,16 @@ class CutterSetting:
 
     @property
     def length(self) -> float:
-        """Of the path in the cut [mm]."""
+        """Length of the path in the cut [mm]."""
         return math.fsum(t.length for t in self.machined)
 
     def numbered(self, tool: int) -> CutterSetting:
-        """The same with another tool number."""
+        """The setting with another tool number."""
         return replace(self, program=replace(self.program, tool=np.full(len(self.program), tool)))
 
 
 def channel_scene(impeller: Impeller, how: ContactSampling) -> Scene:
-    """Check points of the channels beside the blade, as fine as ``how`` says."""
+    """Check points of the channels beside the blade, at the spacing of ``how``."""
     check, hub = counts(impeller, how)
     return impeller.scene(
         0, "plus", ([0.5], [0.5]), check, how.near, max(how.around, 1), hub, hub_range(impeller, how.ahead)
@@ -124,7 +124,7 @@ def channel_scene(impeller: Impeller, how: ContactSampling) -> Scene:
 
 @dataclass(frozen=True, eq=False)
 class FinishSettings:
-    """What finishing programs are planned with.
+    """Parameters with which finishing programs are planned.
 
     Parameters
     ----------
@@ -149,15 +149,15 @@ class FinishSettings:
 
     @property
     def spans(self) -> tuple[tuple[float, float], ...]:
-        """Where the pallet may stand [rad]."""
+        """Allowed pallet angles [rad]."""
         return tuple((float(a), float(b)) for a, b in self.table.spans)
 
     def with_catalogue(self, catalogue: Catalogue) -> FinishSettings:
-        """The same with the cutters of another catalogue."""
+        """The same parameters with the cutters of another catalogue."""
         return replace(self, catalogue=catalogue)
 
     def milling(self, patch: Patch, keep: Keep = anew) -> Milling:
-        """The finishing path of a patch."""
+        """Finishing path of a patch."""
         along, box = lines_of(patch)
         tracks: Tracks = self.milling_task(patch).of(self, keep)
         return Milling(patch, along, box, tracks)
@@ -221,7 +221,7 @@ class FinishSettings:
         )  # fmt: skip
 
     def rest_settings(self, used: tuple[Pair, ...], keep: Keep = anew) -> RestSettings:
-        """What rest passes are planned with beside the cutters at table angles in use."""
+        """Parameters of rest passes, with the cutters and table angles in use."""
         how = self.how
         return RestSettings(
             self.scene, self.catalogue, how.motion, how.scallop, how.overrun, used, self.table.angle, self.spans,
@@ -240,12 +240,12 @@ def lines_of(patch: Patch) -> tuple[str, Box]:
     return along, box
 
 
-#: what a milling is known by: surface, order of its strips, box, cutter, table angle
+#: key of a milling: surface, order of its strips, box, cutter, table angle
 MillingKey = tuple[object, ...]
 
 
 def milling_key(catalogue: Catalogue, patch: Patch) -> MillingKey:
-    """What the tracks of a patch are known by."""
+    """Key of the tracks of a patch."""
     c = catalogue.cutters[patch.cutter]
     at = patch.at[:, 1 if patch.order == "u" else 0]
     ends = (float(at.min()), float(at.max()))
@@ -253,7 +253,8 @@ def milling_key(catalogue: Catalogue, patch: Patch) -> MillingKey:
 
 
 def setting_order(pairs: Sequence[Pair], changes: Changes) -> list[Pair]:
-    """Cutters at table angles in the order in which changes take least: exact for up to seven, else on to the nearest.
+    """Cutters at table angles in the order with the shortest changes: exact for up to seven, else always to the
+    nearest.
 
     >>> setting_order([(0, 1.0), (1, 0.5), (0, 0.5)], Changes(60.0, 300.0))
     [(0, 1.0), (0, 0.5), (1, 0.5)]
@@ -269,7 +270,7 @@ def setting_order(pairs: Sequence[Pair], changes: Changes) -> list[Pair]:
 
 
 def change_time(pairs: Iterable[Pair], changes: Changes) -> float:
-    """What the changes from each to the next take [s].
+    """Time of the changes from each setting to the next [s].
 
     >>> change_time([(0, 1.0), (1, 0.5), (0, 0.5)], Changes(60.0, 300.0))
     420.0

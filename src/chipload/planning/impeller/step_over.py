@@ -1,14 +1,14 @@
-"""Distance between two passes of a toroidal cutter that leaves a scallop of a given height.
+"""Step-over of a toroidal cutter that leaves a scallop of a given height.
 
 Notation: N surface normal, T cutter axis, s = sin of the angle between them; r corner radius, rho = R - r; d unit
 vector along the path, e = N x d across it; K curvature tensor of the surface, above 0 where it bends towards N; height
 h of the scallop along the normal, w step-over along the surface.
 
-The cutter touches with the tensor C of principal curvatures 1/r, in the plane of N and T, and 1/(r + rho/s). What it
-sweeps along d is tangent to the surface along the path and to the cutter along the line where it leaves its trace, so
-to second order it bends away from the surface by q = det(C - K) / d.(C - K)d across the path. On a plane 1/q =
-r cos^2 + (r + rho/s) sin^2 of the angle from the plane of N and T to e: the radii are mixed, not the curvatures, as
-the trace is the outline of the cutter seen along d.
+The cutter touches with the tensor C of principal curvatures 1/r, in the plane of N and T, and 1/(r + rho/s). Its swept
+surface along d is tangent to the surface along the path, and to the cutter along the line where it leaves its trace. So
+to second order it bends away from the surface by q = det(C - K) / d.(C - K)d across the path. On a plane 1/q = r cos^2
++ (r + rho/s) sin^2 of the angle from the plane of N and T to e: the radii are mixed, not the curvatures, as the trace
+is the outline of the cutter seen along d.
 
 With k = e.K e the surface and with k + q the pass are arcs across the path; two passes meet at the height h where
 
@@ -33,7 +33,7 @@ from chipload.planning.impeller.scene import Floats
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """How a cutter's axis and a path lie at contact points; every array of one shape (...,).
+    """Orientation of a cutter's axis and a path at contact points; every array of one shape (...,).
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def contact_of(normal: ArrayLike, axis: ArrayLike, along: ArrayLike, curvature: 
 
 
 def trace_curvature(contact: Contact, rho: float, corner: float) -> Floats:
-    """How much more than the surface the trace of the cutter bends across the path: q.
+    """Curvature q of the cutter's trace across the path, beyond that of the surface.
 
     Parameters
     ----------

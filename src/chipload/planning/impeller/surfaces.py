@@ -1,4 +1,4 @@
-"""The surfaces of an impeller that are milled, each as a grid of contact points with its check points.
+"""Surfaces of an impeller that are milled, each as a grid of contact points with its check points.
 
 Notation: a surface is named by a body and a side: `blade` or `splitter`, `plus` or `minus` as in ``sections.py`` of the
 geometry, `plus fillet` or `minus fillet` between it and the hub, or `floor`, the hub between the plus side of the body
@@ -25,7 +25,7 @@ _FINE = 201  # points of a curve whose length is measured
 
 @dataclass(frozen=True)
 class ContactSampling:
-    """Where contact points and check points lie.
+    """Spacing of contact points and check points.
 
     Parameters
     ----------
@@ -84,14 +84,14 @@ class ContactSurface:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """(a, b)."""
+        """Number of contact points (a, b) along u and v."""
         return len(self.u), len(self.v)
 
 
 def surface_of(
     impeller: Impeller, body: str, side: str, how: ContactSampling, covering: Covering | None = None
 ) -> ContactSurface:
-    """A surface of an impeller; its ranges hold between the check points where a ``covering`` of the walls is given.
+    """A surface of an impeller. With a ``covering`` of the walls its ranges also hold between the check points.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def surface_of(
 
 
 def hub_range(impeller: Impeller, ahead: float) -> tuple[float, float]:
-    """From where to where the hub counts: ``ahead`` [mm] of the blade's leading edge to its trailing edge."""
+    """Range of the hub that counts: from ``ahead`` [mm] of the blade's leading edge to its trailing edge."""
     s = np.linspace(0.0, 1.0, 20 * _FINE)
     length = np.concatenate([[0.0], np.linalg.norm(np.diff(impeller.hub.curve(s), axis=0), axis=1).cumsum()])
     foot = np.concatenate([impeller.foot(0, w).at([0.0, 1.0], 0.0) for w in (1, -1)])
@@ -130,7 +130,7 @@ def hub_range(impeller: Impeller, ahead: float) -> tuple[float, float]:
 
 
 def counts(impeller: Impeller, how: ContactSampling) -> tuple[tuple[int, int], tuple[int, int]]:
-    """How many check points along and up a side, along and across a channel's floor."""
+    """Number of check points along and up a side, and along and across a channel's floor."""
     t = np.linspace(0.0, 1.0, _FINE)
     sides = [p for body in impeller.bodies for p in (body.plus, body.minus)]
     along = max(_length(p.at(t, v)) for p in sides for v in (0.0, 0.5, 1.0))

@@ -1,4 +1,4 @@
-"""What a machine with a pallet on an index table gives: table angles and pallet angles.
+"""Table angles and pallet angles of a machine with a pallet on an index table.
 
 Notation: alpha table angle between the pallet's axis and the tool [rad]; B pallet angle [rad] in
 T(B) = (sin alpha cos B, sin alpha sin B, cos alpha) in the frame of the impeller (work frame), z along the pallet's
@@ -28,7 +28,7 @@ _STATED = 1e-6  # a stated angle may miss a position of the table by so much [ra
 
 @dataclass(frozen=True, eq=False)
 class IndexTable:
-    """The angles of a machine, by table angle.
+    """Allowed pallet angles of a machine, by table angle.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class IndexTable:
     sense: int
 
     def at(self, angles: ArrayLike) -> IndexTable:
-        """The same with some of its table angles [rad].
+        """The index table with some of its table angles [rad] only.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""A track: where the cutter touches, and how it stands there, point after point in one go.
+"""A track: contact points and poses of the cutter along a line without interruption.
 
 Notation: S contact point, N normal, T(B) cutter axis at the table angle alpha and the pallet angle B; n = N.T,
 V = (N - n T) / sqrt(1 - n^2); R, r, rho = R - r of the cutter. Tip p = S + r N + rho V - r T.
@@ -43,17 +43,17 @@ class ToolTrack:
 
     @property
     def length(self) -> float:
-        """Of the tip's path [mm]."""
+        """Length of the tip's path [mm]."""
         return float(np.linalg.norm(np.diff(self.tip, axis=0), axis=1).sum())
 
     def back(self) -> ToolTrack:
-        """The same from its end to its beginning."""
+        """The same track from its end to its beginning."""
         columns = {f.name: getattr(self, f.name)[::-1] for f in fields(self) if f.name != "line"}
         return ToolTrack(**columns, line=self.line)
 
 
 def written(pallet: ArrayLike) -> Floats:
-    """Pallet angles [rad] as the program will state them.
+    """Pallet angles [rad] as they are written in the program.
 
     >>> float(np.degrees(written(np.radians(12.3456789))).round(9))
     12.345679
@@ -65,7 +65,7 @@ def written(pallet: ArrayLike) -> Floats:
 def posed(
     contact: Floats, normal: Floats, table: float, pallet: Floats, cutter: CatalogueCutter
 ) -> tuple[Floats, Floats]:
-    """Tips (n, 3) [mm] and axes (n, 3) of the cutter that touches at the contact points.
+    """Tips (n, 3) [mm] and axes (n, 3) of the cutter at the contact points.
 
     >>> tip, axis = posed(np.zeros((1, 3)), np.array([[1.0, 0, 0]]), 0.0, np.zeros(1), CatalogueCutter(20.0, 2.0))
     >>> tip.tolist(), axis.tolist()
@@ -81,13 +81,13 @@ def posed(
 def track_of(
     at: Floats, contact: Floats, normal: Floats, table: float, pallet: Floats, cutter: CatalogueCutter, line: int
 ) -> ToolTrack:
-    """The track of a cutter through contact points at pallet angles, which are rounded as they are written."""
+    """Track of a cutter through contact points at pallet angles, which are rounded as in the program."""
     B = written(pallet)
     tip, axis = posed(contact, normal, table, B, cutter)
     return ToolTrack(at, contact, normal, B, tip, axis, line)
 
 
 def pallet_of(table: float, axis: ArrayLike) -> float:
-    """B [rad] of an axis at the table angle."""
+    """Pallet angle B [rad] of an axis at the table angle."""
     a = np.asarray(axis, dtype=np.float64)
     return math.atan2(a[1], a[0]) if math.sin(table) else 0.0

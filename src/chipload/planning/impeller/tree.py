@@ -1,4 +1,4 @@
-"""A tree of balls over the check points.
+"""Tree of balls over the check points.
 
 Notation: node k has the children 2 k + 1 and 2 k + 2; nodes from ``leaves`` on hold points. A ball is a row
 ``x, y, z, radius`` [mm]; a negative radius is empty.

@@ -1,6 +1,6 @@
-"""Which cutter would reach a contact point that none of a catalogue reaches.
+"""Largest diameter that would reach a contact point that no cutter of a catalogue reaches.
 
-Notation: as in ``search.py``; the search of a catalogue ends at its smallest cutter, here it goes on down to rho = 0.
+Notation: as in ``search.py``; the search of a catalogue ends at its smallest cutter, this one continues to rho = 0.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def with_fits(
 
     Parameters
     ----------
-    most : so many points are looked at; the others keep the diameter that the search has come by
+    most : greatest number of points that are searched; the others keep the diameter of the first search
     """
     rows = [k for k, u in enumerate(answer.unreachable) if u.reason == "cutting part"][:most]
     if not rows:

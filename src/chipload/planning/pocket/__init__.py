@@ -1,4 +1,4 @@
-"""Pockets cleared at constant engagement."""
+"""Planning of pockets that are cleared at constant engagement."""
 
 from __future__ import annotations
 

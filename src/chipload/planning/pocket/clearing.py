@@ -1,13 +1,12 @@
-"""A whole pocket cleared at constant engagement: passes of a front that never meets more than a*.
+"""Clearing of a whole pocket at constant engagement: passes whose engagement never exceeds a*.
 
 Notation: O centre of the cutter, T its heading, R radius; material lies on the RIGHT of travel (down milling; up
-milling is the mirror image of it). a* the engagement wanted, 1 - cos a* = s / R. A **pass** turns at every step as far
-towards the material as the exact engagement allows; it slides along the wall where that holds it. Where it ends the
-cutter goes on from the nearest place of the cleared edge that still has material beside it.
+milling is the mirror image of it). a* the required engagement, 1 - cos a* = s / R. A **pass** turns at every step as
+far towards the material as the exact engagement allows; where a wall limits it, it follows the wall. Where a pass ends
+the cutter continues from the nearest place of the cleared edge that still has material beside it.
 
-Reference: [Uddin2007] for the law da/ds = sin b / (R sin(a - b)) - kappa.
-Differs from source: the law only says where the root search begins; what is kept is the engagement itself, along the
-whole of each step.
+Reference: [Uddin2007] for the law da/ds = sin b / (R sin(a - b)) - kappa. Differs from source: the law only gives the
+start of the root search; what is limited is the engagement itself, along the whole of each step.
 """
 
 from __future__ import annotations
@@ -74,15 +73,15 @@ ENTRIES, LEAST_ROOM = 50, 0.02
 SLOW_PASSES, SLOW_AREA = 30, 0.02
 #: steps between two calls of ``progress``, and capsules that the stock has room for before them
 CHUNK, ROOM = 2000, 1600
-#: depth / R that is looked into for material beside the path, round after round
+#: depth / R of the search for material beside the path, round after round
 DEPTHS = (0.03, 0.006)
 #: vertices of a pass lie within this part of R, of at most so many mm, from the lines and arcs that are written
 FIT, FIT_UP_TO = 2e-4, 8.0
 #: the steps keep this much [rad] below the engagement that what is written must keep
 MARGIN = 2e-3
-#: what is written is looked at every 0.03 R, and keeps this much [rad] below it there
+#: the written path is checked every 0.03 R, and stays this much [rad] below the limit there
 BETWEEN = 4e-4
-#: what is written may leave the centre region by this part of R, of at most so many mm: the middle of a chord of a
+#: the written path may leave the centre region by this part of R, of at most so many mm: the middle of a chord of a
 #: convex wall
 SLACK, SLACK_UP_TO = 1e-4, 4.0
 #: area / R^2 that a pass must take for its start to be used again
@@ -107,7 +106,7 @@ def clear_region(
     entry: Entry = "helix",
     progress: Progress = silent,
 ) -> ClearingPath:
-    """Path that clears ``region`` with a cutter of ``radius`` [mm], never engaged by more than ``engagement`` [rad].
+    """Path that clears ``region`` with a cutter of ``radius`` [mm] with at most ``engagement`` [rad].
 
     Parameters
     ----------
@@ -155,7 +154,7 @@ def clear_region(
 def require_clearing(
     region: Region, radius: float, engagement: float, milling: str, step: float, allowance: float
 ) -> Region:
-    """The region of the cutter's centre, if :func:`clear_region` can clear ``region``.
+    """Region of the cutter's centre, if :func:`clear_region` can clear ``region``.
 
     Raises
     ------

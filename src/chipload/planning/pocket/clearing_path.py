@@ -1,4 +1,4 @@
-"""The path of a cleared pocket: rows of lines and arcs, what they are, and their mirror image.
+"""The path of a cleared pocket: rows of lines and arcs with their kinds, and the mirror image of a path.
 
 Notation: R [mm] cutter radius; a row goes from the place of the row before it to its own.
 """
@@ -24,7 +24,8 @@ ENTRY, CUT, LINK, LIFT = 0, 1, 2, 3
 
 @dataclass(frozen=True, eq=False)
 class ClearingPath:
-    """The way of the cutter's centre, and what it left. Row k goes along a line or an arc from row k - 1 to row k.
+    """Path of the cutter's centre, and the material that it left. Row k goes along a line or an arc from row k - 1 to
+    row k.
 
     Parameters
     ----------
@@ -61,13 +62,13 @@ class ClearingPath:
 
     @cached_property
     def segments(self) -> Floats:
-        """(n, 7) the rows as those of a contour; row 0 has no length."""
+        """Rows as segments of a contour, (n, 7); row 0 has no length."""
         p = np.column_stack([self.x, self.y])
         return np.column_stack([np.vstack([p[:1], p[:-1]]), p, self.centre, self.sweep])
 
     @cached_property
     def lengths(self) -> Floats:
-        """(n,) length of each row [mm]."""
+        """Length of each row [mm], (n,)."""
         return segment_lengths(self.segments)
 
     @property
@@ -78,19 +79,19 @@ class ClearingPath:
 
 @dataclass(frozen=True, eq=False)
 class EarlierPath:
-    """What the same cutter cut in the same plane before: segments (n, 7) [mm, rad], and the region of its centre."""
+    """Earlier cuts of the same cutter in the same plane: segments (n, 7) [mm, rad], and the region of its centre."""
 
     segments: Floats
     centres: Region
 
     @staticmethod
     def of(path: ClearingPath, centres: Region) -> EarlierPath:
-        """All of a path that lies on the floor."""
+        """The rows of a path on the floor."""
         return EarlierPath(path.segments[path.kind != LIFT], centres)
 
 
 def segment_lengths(segments: Floats) -> Floats:
-    """(n,) lengths [mm] of lines and arcs (n, 7); 0 is allowed."""
+    """Lengths (n,) [mm] of lines and arcs (n, 7); 0 is allowed."""
     seg = segments
     chord = np.hypot(seg[:, 2] - seg[:, 0], seg[:, 3] - seg[:, 1])
     rho = np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])
@@ -154,7 +155,7 @@ def _image(contour: Contour, flip: Floats) -> Contour:
 
 
 def mirrored_earlier(earlier: EarlierPath) -> EarlierPath:
-    """The mirror image of what was cut before."""
+    """Mirror image of earlier cuts in the y axis."""
     flip = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
     return EarlierPath(earlier.segments * flip, mirrored_region(earlier.centres))
 

@@ -1,9 +1,9 @@
-"""Space that is free of material before the cutter begins: outside of the stock, pre-drilled holes, what a larger
-cutter cleared, what does not stand in the stock of an earlier result.
+"""Free space: regions without material before the cutter begins. They are the outside of the stock, pre-drilled holes,
+the region that a larger cutter cleared, and places without material in the stock of an earlier result.
 
-Notation: R [mm] cutter radius. A free region is swept by the cutter itself: along its parallels at R, 2 R, 3 R ... from
-its boundary, which together reach every place of it that a disc of radius R can. A place that none can (an inner corner
-of the stock's outline) would stay material for the planner, and not for the machine: it is refused.
+Notation: R [mm] cutter radius. The cutter sweeps a free region along its parallels at R, 2 R, 3 R ... from its
+boundary, which together reach every place of it that a disc of radius R can. A place that no disc reaches (an inner
+corner of the stock's outline) would remain material for the planner, but not for the machine: it is refused.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def parallels(region: Region, radius: float) -> list[tuple[Contour, ...]]:
 
 
 def take_free(stock: PlanarStock, regions: Sequence[Region], radius: float) -> None:
-    """Take the free regions out of the stock."""
+    """Remove the free regions from the stock."""
     for region in regions:
         for contours in parallels(region, radius):
             for contour in contours:
@@ -65,7 +65,7 @@ def places_along(contour: Contour, step: float) -> tuple[Floats, Floats]:
 
 
 def outside_of(stock: Region, radius: float) -> Region:
-    """The band ``BAND`` R wide around the outline of the stock."""
+    """Band, ``BAND`` R wide, around the outline of the stock."""
     outer = offset_region(stock, -BAND * radius)
     return _reached(
         Region.of([*outer.contours, *stock.contours]), radius, "part.stock_layers: the outline of the stock"
@@ -73,7 +73,7 @@ def outside_of(stock: Region, radius: float) -> Region:
 
 
 def hole(x: float, y: float, diameter: float, radius: float) -> Region:
-    """A pre-drilled hole.
+    """Region of a pre-drilled hole.
 
     Raises
     ------
@@ -89,12 +89,12 @@ def hole(x: float, y: float, diameter: float, radius: float) -> Region:
 
 
 def cleared_by(region: Region, radius: float, allowance: float) -> Region:
-    """What a cutter of ``radius`` can clear of a region: its opening, ``allowance`` off the walls [mm]."""
+    """Region that a cutter of ``radius`` can clear: its opening, ``allowance`` off the walls [mm]."""
     return offset_region(offset_region(region, radius + allowance), -radius)
 
 
 def without_stock(region: Region, standing: Sequence[Contour], radius: float, allowance: float) -> Region:
-    """What of a region, ``allowance`` off its walls [mm], holds no material before, where a disc of R reaches it.
+    """Part of a region, ``allowance`` off its walls [mm], without earlier material, where a disc of R reaches it.
 
     ``standing`` are closed contours of the material. The region is exact at the walls, where only films stand.
     """
@@ -110,7 +110,7 @@ def without_stock(region: Region, standing: Sequence[Contour], radius: float, al
 
 
 def without_leftover(region: Region, left: Sequence[Contour], radius: float, kept: float = KEPT) -> Region:
-    """What of a free region a disc of R can be in without meeting what was ``left`` in it (closed contours).
+    """Part of a free region in which a disc of R does not meet the material ``left`` in it (closed contours).
 
     The places of the disc's centre are a polygon, ``kept`` R clear of what was left; grown by R they make the region,
     so that the disc reaches all of it.

@@ -1,9 +1,9 @@
-"""What is left of the reachable region after a path: area, contours and places.
+"""Material that a path leaves of the reachable region: area, contours and places.
 
 Notation: R [mm] cutter radius. The swept area is the union of the path's buffers (shapely); its arcs are polygons whose
-corners lie on the circle, so that it is less than the truth by at most 2e-5 R. While a pocket is planned the cells that
-the stock knows to be wholly cleared are taken away as squares, and buffers only of the path near the others;
-:func:`leftover` asks no stock.
+corners lie on the circle, so it is less than the true area by at most 2e-5 R. While a pocket is planned, the cells that
+the stock knows to be wholly cleared are removed as squares, and buffers only of the path near the other cells;
+:func:`leftover` does not use a stock.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def near_partly_cleared(
 
 
 class PocketRemainder:
-    """What is left of a region, less and less of it as a path goes on; each part of the path is taken away once."""
+    """Remaining material of a region, reduced as a path goes on; each part of the path is removed once."""
 
     def __init__(self, reachable: Region, radius: float, free: Sequence[Region] = ()) -> None:
         self.radius = radius
@@ -104,13 +104,13 @@ class PocketRemainder:
             self.rest = shapely.difference(self.rest, region.flatten(1e-5 * radius))
 
     def take(self, points: Floats, breaks: NDArray[np.bool_]) -> None:
-        """Take away what the discs along a part of the path sweep, as in :func:`swept`."""
+        """Remove the area that the discs along a part of the path sweep, as in :func:`swept`."""
         if len(points):
             self.rest = shapely.difference(self.rest, swept(points, breaks, self.radius))
 
     def take_from(self, stock: PlanarStock, points: Floats, breaks: NDArray[np.bool_]) -> None:
-        """Take away what is cleared of a stock: the squares of its cleared cells, and what a part of the path sweeps
-        that comes near a cell that is cleared in part. All that was cut before this part was taken so already.
+        """Remove the cleared part of a stock: the squares of its cleared cells, and the area that a part of the path
+        sweeps near a cell that is cleared in part. All earlier cuts must have been removed in the same manner.
         """
         if len(points):
             self.rest = shapely.difference(self.rest, cleared_squares(stock))
@@ -130,8 +130,8 @@ class PocketRemainder:
         return float(self.rest.area), tuple(contours), places
 
     def widest(self, allowed: shapely.Geometry) -> Place:
-        """(x, y, room) [mm]: the middle of the widest place of what is left where the cutter's centre may go
-        (``allowed``), and its distance from where it may not; room 0 where there is none.
+        """Widest place (x, y, room) [mm] of the remaining material where the cutter's centre may go (``allowed``): its
+        middle and its distance from where the centre may not go; room 0 where there is none.
         """
         best = (0.0, 0.0, 0.0)
         for piece in shapely.get_parts(shapely.intersection(self.rest, allowed)):
@@ -147,7 +147,7 @@ class PocketRemainder:
 def leftover(
     reachable: Region, points: Floats, breaks: NDArray[np.bool_], radius: float
 ) -> tuple[float, tuple[Contour, ...], list[tuple[float, tuple[float, float]]]]:
-    """:meth:`Remainder.parts` of a whole path at once."""
+    """Remaining material after a whole path: :meth:`PocketRemainder.parts`."""
     rest = PocketRemainder(reachable, radius)
     rest.take(points, breaks)
     return rest.parts()

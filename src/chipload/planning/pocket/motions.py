@@ -1,7 +1,7 @@
-"""The path of a pocket as motions of a program, and as rows of a history along them.
+"""Motions of a pocket's program, and rows of a history along them.
 
-Notation: a **run** is what lies between two places where the cutter comes down; a **piece** is a part of a motion, of
-which the history has a row at its end.
+Notation: a **run** is the part of the program between two places where the cutter is lowered; a **piece** is a part of
+a motion, with a row of the history at its end.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Motions:
 
     @cached_property
     def lengths(self) -> Floats:
-        """(n,) length in the plane [mm]; 0 of a LIFT."""
+        """Length in the plane (n,) [mm]; 0 of a LIFT."""
         return np.where(self.kind == LIFT, 0.0, segment_lengths(self.segments))
 
     @cached_property
@@ -143,7 +143,7 @@ def samples_of(motions: Motions, step: float) -> MotionSamples:
 
 
 def places(seg: Floats, share: Floats) -> tuple[Floats, Floats]:
-    """(m, 2) points [mm] and unit headings at the shares of segments (m, 7); heading +x where one has no length."""
+    """Points (m, 2) [mm] and unit headings at the shares of segments (m, 7); heading +x of a segment without length."""
     p, q, centre, sweep = seg[:, 0:2], seg[:, 2:4], seg[:, 4:6], seg[:, 6]
     arc = sweep != 0.0
     v = p - centre
@@ -218,8 +218,8 @@ def runs_of(motions: Motions, samples: MotionSamples) -> list[tuple[int, int]]:
 
 
 def clock(motions: Motions, samples: MotionSamples, time: Floats, programs: list[Program], ends: Floats) -> Floats:
-    """(m,) time at the end of every piece [s] from that at the ends of the program's rows; of a LIFT when the cutter is
-    down again.
+    """Time at the end of every piece [s], (m,), counted like that at the ends of the program's rows; of a LIFT the time
+    when the cutter is down again.
 
     Within a motion each piece takes its time at the feed. What the program takes longer is shared as the planned
     slowing down; a motion that a rounded corner shortens is faster in equal shares. The program of a run ends with its

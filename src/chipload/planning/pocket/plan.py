@@ -1,6 +1,6 @@
-"""A pocket cleared by the front, as a program with what it costs.
+"""Plan of a cleared pocket: its program, its columns and its totals.
 
-Notation: R cutter radius, s radial depth, a* = arccos(1 - s/R) the engagement that is held; phi immersion as in
+Notation: R cutter radius, s radial depth, a* = arccos(1 - s/R) the constant engagement; phi immersion as in
 :mod:`chipload.engagement.contact`.
 """
 
@@ -95,7 +95,7 @@ def _strategy(
     limits: Mapping[str, float],
     progress: Progress,
 ) -> StrategyResult:
-    """One strategy with its program and what it costs."""
+    """One strategy with its program and its totals."""
     radius = cutter.radius
     sections = sections_of(asked, setting)
     stages = stages_of(sections, setting, radius, name, lambda done, what: progress(0.9 * done, what))
@@ -263,7 +263,7 @@ def misses(
     areas: Sequence[float],
     limit_deg: float,
 ) -> list[Event]:
-    """Where a strategy misses the engagement that was asked for, or leaves parts of the areas [mm^2] within its reach.
+    """Where a strategy misses the required engagement, or leaves parts of the areas [mm^2] within its reach.
 
     An engagement within the limit that the job states is no failure.
     """

@@ -1,4 +1,4 @@
-"""Where the cutter's centre may be, and what it can reach from there.
+"""Region in which the cutter's centre may be, and the region that the cutter reaches from there.
 
 Notation: R [mm] cutter radius. The **centre region** is the region inset by R plus the allowance; what is reachable is
 the centre region grown by R: the opening of the region by a disc.
@@ -45,7 +45,7 @@ class Reach:
         return bool(_kernels.allowed(x, y, grid, *self.arguments()))
 
     def arguments(self) -> tuple[NDArray[Any], ...]:
-        """What the kernels take."""
+        """Arguments of the kernels."""
         return self.flag, self.edges, self.rows, self.row_edges
 
 
@@ -55,8 +55,8 @@ def centre_region(region: Region, distance: float) -> Region:
 
 
 def inner_points(contour: Contour, chord: float) -> Floats:
-    """(m, 2) vertices [mm] of a polygon inside a closed contour of the centre region: chords where the arc bends
-    around the inside, tangents where the inside bends around the arc; at most ``chord`` [mm] off.
+    """Vertices (m, 2) [mm] of a polygon inside a closed contour of the centre region: chords where the arc bends around
+    the inside, tangents where the inside bends around the arc; at most ``chord`` [mm] off.
     """
     out = []
     for (x0, y0, _, _, xc, yc, sweep), r in zip(contour.segments, contour.radii, strict=True):
@@ -93,8 +93,8 @@ def reach_of(centres: Region, grid: Floats, chord: float) -> Reach:
 
 
 def widest_places(centres: Region, chord: float) -> list[tuple[float, float, float]]:
-    """(x, y, radius) [mm] of the largest circle in each separate part of the centre region, the parts in the order of a
-    short way between them.
+    """Largest circles (x, y, radius) [mm], one in each separate part of the centre region, in the order of a short path
+    between them.
     """
     rings = [shapely.make_valid(shapely.polygons(inner_points(c, chord))) for c in centres.contours]
     outer = [g for g, c in zip(rings, centres.contours, strict=True) if c.area > 0.0]
@@ -113,8 +113,8 @@ def widest_places(centres: Region, chord: float) -> list[tuple[float, float, flo
 
 
 def shortest_order(points: Floats) -> list[int]:
-    """Order in which an open way visits all points (n, 2): the nearest next, from every first one, each improved by
-    turning stretches of it round (2-opt) as long as that shortens it; the shortest, of equal ones the first.
+    """Order in which a short open path visits all points (n, 2): the nearest next, from every first point, each
+    improved by reversing parts of it (2-opt) as long as that shortens it; the shortest, of equal ones the first.
 
     >>> shortest_order(np.array([[0.0, 0.0], [3.0, 0.0], [1.0, 0.0], [2.0, 0.0]]))
     [0, 2, 3, 1]
@@ -148,8 +148,8 @@ def shortest_order(points: Floats) -> list[int]:
 
 
 def longest_line(centres: shapely.Geometry, middle: Floats, half: float) -> Floats:
-    """Ends (2, 2) [mm] of the longest straight line through ``middle`` that stays in the region of the centre, at most
-    ``half`` to either side, of ``DIRECTIONS`` even directions.
+    """Ends (2, 2) [mm] of the longest straight line through ``middle`` inside the centre region, at most ``half`` to
+    either side, of ``DIRECTIONS`` even directions.
 
     >>> longest_line(shapely.box(0.0, 0.0, 9.0, 0.2), np.array([4.0, 0.1]), 3.0).round(6).tolist()
     [[1.06, 0.1], [6.94, 0.1]]

@@ -1,6 +1,6 @@
-"""What is asked of a pocket: depths, feeds, walls, finish passes, where there is no material before the cutter begins.
+"""Request for a pocket: depths, feeds, walls, finish passes, and free space.
 
-Notation: R cutter radius, s radial depth, a* = arccos(1 - s/R) the engagement that is held.
+Notation: R cutter radius, s radial depth, a* = arccos(1 - s/R) the constant engagement.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ AROUND = 1.05
 @dataclass(frozen=True)
 class LargerCutter:
     """A cutter that cleared the same contours before: radius and allowance on the walls [mm], and closed contours of
-    what else it left, as far as that is known.
+    other material that it left, as far as it is known.
     """
 
     radius: float
@@ -39,7 +39,9 @@ class LargerCutter:
 
 @dataclass(frozen=True)
 class FloorFinish:
-    """The last level of a pocket, which takes what is left on the floor: feed [mm/s], spindle speed [rad/s]."""
+    """Floor finish: the last level of a pocket, which removes the allowance on the floor; feed [mm/s], spindle speed
+    [rad/s].
+    """
 
     feed: float
     spindle_speed: float
@@ -47,7 +49,7 @@ class FloorFinish:
 
 @dataclass(frozen=True)
 class WallFinish:
-    """The passes that take what clearing left on the walls; mm, mm/s, rad/s.
+    """Wall finish: passes that remove the allowance of clearing on the walls; mm, mm/s, rad/s.
 
     Parameters
     ----------
@@ -63,7 +65,7 @@ class WallFinish:
 
 @dataclass(frozen=True)
 class Clearing:
-    """What the engineer asks of a pocket; mm, mm/s, rad/s, as in :class:`chipload.planning.contour.plan.Finishing`.
+    """Parameters of a pocket; mm, mm/s, rad/s, as in :class:`chipload.planning.contour.plan.Finishing`.
 
     Parameters
     ----------
@@ -158,7 +160,7 @@ class Asked:
 
 
 def laid_out(contours: Sequence[Contour], setting: Clearing, radius: float) -> Asked:
-    """The region, what is free of material, the engagement that is held and the step.
+    """Region, free space, constant engagement and step of a request.
 
     Raises
     ------

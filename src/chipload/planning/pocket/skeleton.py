@@ -1,7 +1,8 @@
-"""The middle lines of a region: places with two or more nearest places of the walls, and the branches between them.
+"""Middle lines of a region: places with two or more nearest places of the walls, and the branches between them.
 
 Notation: **clearance** [mm] the distance of a place from the walls. The lines are edges of the Voronoi diagram of
-places on the walls: near the true middle within the spacing of these, so that their clearance is always asked for anew.
+places on the walls. They lie near the true middle, within the spacing of these places, so their clearance is always
+calculated again.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The stages of a pocket: clearing in levels, the finish of the floor, the finish of the walls.
+"""Stages of a pocket: clearing in levels, floor finish, wall finish.
 
 Each stage runs one path of the centre at one or more heights. The path of the walls is planned in the stock that the
 clearing path left, with the same greatest engagement; that of the floor is the clearing path once more.

@@ -1,4 +1,4 @@
-"""Places on the edge of the cleared space from which a pass can go on.
+"""Starts of passes: places on the edge of the cleared space from which a pass can continue.
 
 Notation: a **place** is a point of the path with a normal N to where material may lie; its heading has N on the right.
 Places of one pass follow one another; a run of open places starts at its first one, so that the next pass follows
@@ -33,9 +33,9 @@ TRIES = 12
 
 
 class Starts:
-    """All places of the path so far, and those that may still be open.
+    """All places of the path so far, and the live ones, which may still be open.
 
-    ``live`` are the indices of these, rising; ``fresh`` whether each was not looked at since the stock near it changed.
+    ``live`` are the indices of these, ascending; ``fresh``: the stock near it has changed since its last check.
     After :meth:`search` all of them are open. The arrays of all places are views of buffers that double when they are
     full: a pass costs the time of its own places, and of those that are live.
     """
@@ -59,7 +59,7 @@ class Starts:
         self.p, self.normal, self.rank, self.first = used["p"], used["normal"], used["rank"], used["first"]
 
     def add(self, points: Floats, headings: Floats) -> None:
-        """Places of a pass: right side in its order, left side in the other, and ahead of where it ended."""
+        """Add the places of a pass: its right side in order, its left side in reverse, and those ahead of its end."""
         right = np.column_stack([np.sin(headings), -np.cos(headings)])
         fan = headings[-1] + np.radians([-45.0, 0.0, 45.0])
         n = len(points)
@@ -86,7 +86,7 @@ class Starts:
         self.fresh = np.concatenate([self.fresh | near, np.ones(self.count - before, dtype=bool)])
 
     def revive(self) -> None:
-        """Let every place be looked at again."""
+        """Make every place live again."""
         self.live, self.fresh = np.arange(self.count), np.ones(self.count, dtype=bool)
 
     def search(self, stock: PlanarStock, reach: Reach, depth: float) -> None:
@@ -126,7 +126,7 @@ class Starts:
         return int(order[0])
 
     def drop(self, k: int) -> None:
-        """A start from which nothing could be cut: it and its near followers are not tried again."""
+        """Remove a start from which nothing could be cut: it and its near followers are not tried again."""
         n = max(1, round(0.2 * self.radius / self.step))
         at = int(np.searchsorted(self.live, k))
         end = at + 1
@@ -135,14 +135,14 @@ class Starts:
         self._forget(np.arange(at, end))
 
     def abandon(self, centre: Floats, far: float) -> None:
-        """Places within ``far`` of a centre are not tried again until :meth:`revive`."""
+        """Exclude places within ``far`` of a centre until :meth:`revive`."""
         self._forget(np.flatnonzero(np.hypot(*(self.p[self.live] - centre).T) <= far))
 
     def _forget(self, which: NDArray[np.int64]) -> None:
         self.live, self.fresh = np.delete(self.live, which), np.delete(self.fresh, which)
 
     def candidates(self, k: int) -> Iterator[tuple[float, float, float]]:
-        """(x, y, heading) to begin with for the start k: a little before it on its own path, then at it."""
+        """Poses (x, y, heading) to begin with for the start k: a little before it on its own path, then at it."""
         back = round(BACK * self.radius / self.step)
         i = k
         while i > 0 and k - i < back and not self.first[i]:

@@ -1,4 +1,4 @@
-"""Tabs: strips of material that stay over the floor of a pocket and hold what it cuts out.
+"""Tabs: strips of material above the floor of a pocket that hold the piece that is cut out.
 
 A tab leads from the wall at a stated place straight across the pocket to the wall opposite. Above its top the pocket is
 cleared as if there were none; below, the strip is no part of the region.
@@ -18,7 +18,7 @@ from chipload.geometry.contour import Contour, Region
 
 Floats = NDArray[np.float64]
 
-#: spacing of places on a wall among which the nearest is looked for [mm]
+#: spacing of places on a wall among which the nearest is searched [mm]
 SPACING_MM = 0.01
 #: chords of the region about the tabs leave its arcs by at most so much [mm], away from the part
 CHORD_MM = 1e-4

@@ -1,4 +1,4 @@
-"""What a pocket costs and leaves in numbers: the values of its summary, over all stages and for each finish."""
+"""Totals of a pocket for its summary: time, length and material left, over all stages and for each finish."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _span(values: Floats) -> dict[str, float]:
 
 
 def _times(stages: Sequence[PocketStage], history: Columns, motions: int, whole: float) -> dict[str, object]:
-    """Time [s] by what the cutter does, and the number of motions. What is no cut and no entry is a link."""
+    """Time [s] by kind of motion, and the number of motions. Motions that are neither cut nor entry are links."""
     took = np.diff(history["t_s"], prepend=0.0)
     cutting = float(took[np.isin(history["pass"], [stage.name for stage in stages])].sum())
     entry = float(took[history["pass"] == "entry"].sum())

@@ -97,7 +97,7 @@ class Trochoid:
             self.stock.remove_segments(arcs)
 
     def room(self, place: Floats) -> float:
-        """How far the centre may go from a place in any direction [mm]."""
+        """Distance [mm] that the centre can move from a place in any direction."""
         return max(0.0, float(distance(self.walls, place)[0]) - self.off)
 
     def _places(self, line: Floats) -> tuple[Floats, Floats, Floats]:

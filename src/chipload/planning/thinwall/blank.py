@@ -1,4 +1,4 @@
-"""A wall with stock on one side or both: its finish surfaces as grids of places, and what they bear in a state.
+"""A wall with stock on one side or both: finish surfaces as grids of places, compliance and thresholds in a state.
 
 Notation: i, j, k, zeta as in :mod:`chipload.structure.grid`; the mesh is the workpiece with all of its stock, a [mm]
 the allowance of a side, D [mm] what is left of it, T [mm] the thickness of the mesh at a place. A place is numbered
@@ -7,7 +7,7 @@ it. An element keeps (a_m - D_m) / T .. 1 - (a_p - D_p) / T of its thickness, m 
 side k-, p the side k+, D the least of its places and T the mean: the wall is taken a little too soft where D varies.
 
 The compliance is that of a force on the face that the cut leaves. A state that differs from the last one everywhere is
-factored anew: a low-rank correction of every element is no smaller than the stiffness itself.
+factored again: a low-rank correction of every element is no smaller than the stiffness itself.
 
 Reference: [Yan2018] for the thresholds by place; Differs from source: the stiffness is that of the present state.
 """
@@ -76,7 +76,7 @@ class FinishSurface:
 
 @dataclass(frozen=True)
 class ContactLine:
-    """The part of a contact line up a wall that bears at once, from a place on the line's lower end.
+    """Part of a contact line up a wall over which the force acts at one instant, from a place on its lower end.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class ContactLine:
 
 @dataclass(frozen=True, eq=False)
 class WallBlank:
-    """A wall and its stock.
+    """A wall with its stock.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ class WallBlank:
         )
 
     def state(self, left: Sequence[Floats]) -> SolidWorkpiece:
-        """The workpiece with stock ``left`` D, (n, m) float [mm] on k- and on k+."""
+        """The workpiece while stock ``left`` D, (n, m) float [mm], is on k- and on k+."""
         T = self._blocks(self._thickness()).mean(axis=1)
         D = [
             np.clip(self._blocks(np.asarray(x)).min(axis=1), 0.0, a) for x, a in zip(left, self.allowance, strict=True)
@@ -231,7 +231,7 @@ class WallBlank:
         return C
 
     def _line_compliance(self, solid: SolidWorkpiece, side: Side, line: ContactLine) -> Floats:
-        """Displacement of the upper end of a line under a force spread over it: by Betti's theorem the mean
+        """Displacement of the upper end of a line under a force spread over the line. By Betti's theorem it is the mean
         displacement of the line under the same force at its upper end.
         """
         j = solid.grid.counts[1]
@@ -266,7 +266,9 @@ class WallBlank:
         return frequency, np.stack([at @ shape for shape in shapes], axis=2)
 
     def _clamped(self, places: MeshPlaces) -> NDArray[np.bool_]:
-        """Places on the clamp itself: they do not give way; the stiffest place stands for them."""
+        """Whether each place lies on the clamp itself, (p,) bool. Such places do not move and take the compliance of
+        the stiffest place.
+        """
         held = np.zeros(len(self.solid.grid.nodes), dtype=np.bool_)
         held[self.solid.grid.side("j-")] = self.solid.constrained[self.solid.grid.side("j-")].all(axis=1)
         foot = places.local[:, 1] <= -1.0 + 1e-12

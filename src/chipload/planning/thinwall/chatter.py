@@ -1,12 +1,12 @@
-"""Depths of cut that chatter allows at places of a wall, at a spindle speed and in a state of the wall.
+"""Stable depths of cut at places of a wall, at a spindle speed and in a state of removal.
 
-Notation: Phi (p, 3, m) [1/sqrt(t)] mode shapes of the wall at its places, as vectors in the frame of the wall; the
-cutter has modes of its own, alike in every direction across its axis; all of them and the wall part cutter and work
-together. A depth is stable where the greatest multiplier of the cut, its force times the wanted margin, is below 1. The
-chip is that of :mod:`chipload.planning.thinwall.plane_stock`; cutter and wall move in three directions.
+Notation: Phi (p, 3, m) [1/sqrt(t)] mode shapes of the wall at its places, as vectors in the frame of the wall. The
+cutter has modes of its own, the same in every direction across its axis. All modes count for the distance between
+cutter and wall. A depth is stable where the greatest multiplier of the cut, with its force times the required margin,
+is below 1. The chip is that of :mod:`chipload.planning.thinwall.plane_stock`; cutter and wall move in three directions.
 
-The greatest depth is looked for upward: the limit is not monotone in the depth, and a pass cuts every depth below its
-own somewhere, so that the first depth that chatters ends it.
+The search for the stable depth goes from small to large depths. Stability is not monotone in the depth, and a pass cuts
+every depth below its own somewhere, so the first depth that chatters ends the search.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from chipload.stability.modes import Modes
 
 Floats = NDArray[np.float64]
 
-#: depths that are looked at, halvings between the last stable and the first other, and nodes of the chip's profile
+#: depths that are tested, bisections between the last stable and the first other, and nodes of the chip's profile
 LOOKS, HALVINGS, NODES = 8, 4, 4
 #: places by which a speed is chosen, at most: those at which a mode moves most
 WORST = 4
@@ -36,7 +36,7 @@ WORST = 4
 
 @dataclass(frozen=True, eq=False)
 class WallMotion:
-    """How the wall moves at some places in one state.
+    """Modes of the wall at some places in one state.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ class WallMotion:
 
     @property
     def worst(self) -> NDArray[np.int64]:
-        """Numbers of the places at which the first modes move most along the normal."""
+        """Numbers of the places at which the first modes have the greatest normal displacement."""
         size = np.abs(np.einsum("pj,pjm->pm", self.frames[:, 2], self.shapes))
         return np.unique(size.argmax(axis=0)[:WORST])
 
 
 @dataclass(frozen=True, eq=False)
 class WallCutting:
-    """What cuts the wall.
+    """Cutter, material and damping of the cut of a wall, and the required stability margin.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class WallCutting:
     material : whose coefficients count
     cutter_modes : each counts in both directions across the axis; None: the cutter is rigid
     damping : damping ratio of the wall's modes
-    margin : factor on the cutting force that must be stable
+    margin : factor on the cutting force with which the cut must be stable
     """
 
     posture: CutterPose
@@ -89,7 +89,7 @@ class WallCutting:
             raise InputError(f"dynamics.margin = {self.margin:g}: must be at least 1")
 
     def vibrating(self, cuts: DynamicCuts, wall: WallMotion, frames: Floats) -> DynamicCuts:
-        """Cuts (p,) with the modes of cutter and wall at as many places; ``frames`` (p, 3, 3) rows T, n, A."""
+        """Cuts (p,) with the modes of cutter and wall, one for each place; ``frames`` (p, 3, 3) rows T, n, A."""
         damping, omega, U = [], [], []
         if self.cutter_modes is not None:
             own = self.cutter_modes
@@ -113,7 +113,7 @@ class WallCutting:
         return dynamic_cuts(met, pose.cutter, self.material, None, speed, T, n, A=A, directions=3)
 
     def stable(self, cuts: DynamicCuts, wall: WallMotion) -> NDArray[np.bool_]:
-        """(p,) whether cuts at as many places are stable at the wanted margin."""
+        """Whether the cut at each place is stable at the required margin, (p,) bool."""
         frames = np.einsum("ab,pbj->paj", self.posture.frame, wall.frames)
         some = self.vibrating(cuts, wall, frames)
         most = 2 * len(some.damping) + SPARE
@@ -124,14 +124,14 @@ class WallCutting:
 def stable_depths(
     cutting: WallCutting, walls: Sequence[WallMotion], limits: DepthRange, speed: float, halvings: int = HALVINGS
 ) -> Floats:
-    """Greatest depth (p,) [mm] up to which each place is stable in all of some states; 0: not at the smallest one.
+    """Greatest depth (p,) [mm] up to which each place is stable in all states; 0 where the smallest depth chatters.
 
     Parameters
     ----------
     walls : the same places in several states
     limits : smallest and greatest depth
     speed : of the spindle [rad/s]
-    halvings : between two depths that are looked at
+    halvings : bisections between two tested depths
     """
     count = len(walls[0])
     looks = np.geomspace(limits.smallest, limits.greatest, LOOKS)
@@ -167,8 +167,8 @@ def _stable_in_all(
 def quietest_speed(
     cutting: WallCutting, walls: Sequence[WallMotion], limits: DepthRange, speeds: Floats, present: float
 ) -> float:
-    """The speed [rad/s] at which the least stable depth is greatest, of those that are as good the nearest to the
-    present one; the places are those at which a mode of the wall moves most.
+    """Spindle speed [rad/s] at which the least stable depth is greatest. Of equally good speeds it is the nearest to
+    the present one. The places are those at which a mode of the wall moves most.
     """
     at = np.unique(np.concatenate([wall.worst for wall in walls]))
     some = [wall.chosen(at) for wall in walls]

@@ -1,4 +1,4 @@
-"""Where a ball or bull nose touches a side of a wall.
+"""Contact points of a ball or bull-nose cutter on a side of a wall.
 
 Notation: S(u, v) a point of the side, N its normal out of the wall; tip p, axis A, corner radius r, e the radius of
 the circle that the corner's centres lie on, C its middle. The centre of the corner that is nearest to the side is
@@ -36,7 +36,7 @@ ALONG = 0.02
 
 @dataclass(frozen=True, eq=False)
 class SideContacts:
-    """Where the cutter is nearest to a side, at each of n places of its path.
+    """Nearest point of a side and clearance, at each of n places of the cutter's path.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class SideContacts:
 
 
 class ContactFinder:
-    """Finds contacts on a side above its foot, a share of v, whose grid of points is made once."""
+    """Search for contact points on a side above its foot, a share of v, with a grid of points that is made once."""
 
     def __init__(self, side: SideAt, cutter: Cutter, foot: float = 0.0) -> None:
         self.side, self.cutter, self.foot = side, cutter, foot
@@ -64,7 +64,7 @@ class ContactFinder:
         self.mesh = max(float(np.linalg.norm(np.diff(own, axis=k), axis=-1).max()) for k in (0, 1))
 
     def contacts(self, tip: Floats, axis: Floats, far: float) -> SideContacts:
-        """Where the cutter is nearest to the side.
+        """Nearest points and clearances of the cutter on the side.
 
         Parameters
         ----------

@@ -1,11 +1,11 @@
-"""What a simulation found at contact points over what the law says there, place by place: corrections of the next plan.
+"""Corrections of the force law for the next plan: simulated force over force by the law, at each place.
 
 Notation: u, v parameters of a side; c as in :mod:`chipload.planning.thinwall.passes`.
 
-A place takes the greatest of the points around it, up to its neighbours along u and half way to them along v, where the
-places are the rows of the cutter: no point that its depth has a part in is left out. The law is right to some percent
-in even stock; what it does not know is that the row at the free edge finds half of it, and how steep the stock really
-is within the cutter's reach.
+A place takes the greatest ratio of the contact points around it: up to its neighbours along u, and half way to them
+along v, where the places are the rows of the cutter. So every point that the depth of the place affects is counted. The
+law is accurate to a few percent in even stock. It does not know that the row at the free edge finds half of the stock,
+nor how steep the stock is within the cutter's reach.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ROW = 0.75
 
 
 def found(places: tuple[Floats, Floats], u: ArrayLike, v: ArrayLike, ratio: ArrayLike) -> Floats:
-    """Greatest ratio around places, (n, m) float; not a number where no point is near.
+    """Greatest ratio of the contact points around each place, (n, m) float; NaN where no point is near.
 
     Parameters
     ----------

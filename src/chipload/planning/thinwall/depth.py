@@ -1,13 +1,12 @@
-"""Largest depth of cut whose force normal to the surface stays at or below a threshold.
+"""Largest depth of cut whose force normal to the surface is at most a threshold.
 
-Notation: d [mm] depth of cut; F_n [N] force along the surface normal over a revolution of the spindle, by the one force
-model on the bites of :mod:`chipload.planning.thinwall.plane_stock`: its greatest size, or the size of its mean; F_th
-[N]
-threshold; f_z [mm] feed per tooth.
+Notation: d [mm] depth of cut; F_n [N] force along the surface normal over a revolution of the spindle, by the force
+model with the tooth engagement of :mod:`chipload.planning.thinwall.plane_stock`: its greatest size, or the size of its
+mean; F_th [N] threshold; f_z [mm] feed per tooth.
 
-F_n(d) is looked at from d_min to d_max; the depth is the greatest d up to which F_n <= F_th everywhere, found to
+F_n(d) is calculated from d_min to d_max. The result is the greatest d up to which F_n <= F_th everywhere, found to
 ``tolerance`` by bracketing and false position (Illinois), from below. A place where F_n(d_min) > F_th is infeasible. If
-the edge alone, f_z -> 0, stays below F_th there, a smaller feed makes it feasible; else a smaller cutter may.
+the edge force alone, f_z -> 0, is below F_th there, a smaller feed makes the place feasible; else a smaller cutter may.
 
 Reference: [Yan2018] for the idea; the closed form of a ball upright in a slot, radial terms, is the test.
 """
@@ -34,13 +33,13 @@ Measure = Literal["greatest", "mean"]
 
 #: what limits a depth: values of ``Depths.status``
 THRESHOLD, DEEPEST, INFEASIBLE = 0, 1, 2
-#: depths at which the force is looked at before it is solved for
+#: depths at which the force is calculated before the equation is solved
 LOOKS = 49
-#: share of the feed that stands for the edge alone
+#: share of the feed at which the force is the edge force alone
 NO_FEED = 1e-6
-#: rotations between which the greatest force is looked for; bites of a flank begin and end all at once
+#: rotations between which the greatest force is searched; the engagement of a flank begins and ends abruptly
 STEP_DEG, FLANK_STEP_DEG = 1.0, 0.25
-#: depths whose bites are held at once
+#: depths whose tooth engagement is in memory at once
 BLOCK = 256
 
 
@@ -63,7 +62,7 @@ class DepthRange:
 
 @dataclass(frozen=True)
 class Infeasible:
-    """A place that bears not even the smallest depth.
+    """A place whose threshold is exceeded even at the smallest depth.
 
     Attributes
     ----------
@@ -83,7 +82,7 @@ class Infeasible:
 
 @dataclass(frozen=True, eq=False)
 class Depths:
-    """Depth of cut at places.
+    """Depths of cut at places, their forces, and what limits them.
 
     Attributes
     ----------
@@ -108,14 +107,14 @@ def normal_force(
     nodes: int | None = None,
     step_deg: float | None = None,
 ) -> Floats:
-    """F_n of depths (n,) [mm], (n,) float [N].
+    """Normal force F_n of depths (n,) [mm], (n,) float [N].
 
     Parameters
     ----------
     measure : ``greatest`` size over the revolution, or the size of the ``mean``
     nodes : as of :func:`chipload.planning.thinwall.plane_stock.engagement_of_depths`; None: 8 of a mean (1e-4 of a
-        ball's), 16 of the greatest (1 to 4 %: bites come and go at once, which makes it rather too great)
-    step_deg : between the rotations at which the greatest is looked for; None: 1, of a flank 0.25
+        ball's), 16 of the greatest (1 to 4 % too great: the engagement begins and ends abruptly)
+    step_deg : between the rotations at which the greatest is searched; None: 1, of a flank 0.25
 
     Examples
     --------
@@ -158,7 +157,7 @@ def largest_depths(
     measure: Measure,
     progress: Progress = silent,
 ) -> Depths:
-    """Largest depth at places with thresholds (p,) [N].
+    """Largest depths of cut at places with thresholds (p,) [N].
 
     Raises
     ------

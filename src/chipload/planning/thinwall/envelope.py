@@ -1,11 +1,11 @@
-"""The lower Lipschitz envelope of depths over places: no steeper than L, nowhere above what was given.
+"""Lower Lipschitz envelope of depths over places: nowhere steeper than L, nowhere above the given depths.
 
-Notation: p, q places [mm]; d(q) [mm] what may be cut there; L greatest slope; n places.
+Notation: p, q places [mm]; d(q) [mm] allowable depth of cut there; L greatest slope; n places.
 
     d~(p) = min over q of d(q) + L |p - q|
 
 is the greatest function at or below d whose slope is at most L in any direction. An average would lie above d where d
-is least, and break the threshold there. |p - q| is the straight distance, at most that along the surface: d~ is never
+is least, and exceed the threshold there. |p - q| is the straight distance, at most that along the surface: d~ is never
 too deep.
 
 Places are gathered in boxes of about sqrt(n); for those of one box the others are taken in the order of min d +
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 
 def lower_envelope(points: ArrayLike, depth: ArrayLike, slope: float) -> Floats:
-    """d~ at places, the shape of ``depth``.
+    """Envelope d~ at the places, the shape of ``depth``.
 
     Parameters
     ----------

@@ -1,21 +1,21 @@
-"""Which calibration cuts pin the threshold of a wall best: where, and how deep.
+"""Calibration cuts that determine the threshold of a wall best: their places and depths.
 
 Notation: u, v parameters of the surface; y = log F_th, F_th [N] the threshold as modelled at p places; S the m sites of
 the cuts; w_i(p) weight of site i at a place in the interpolation of :mod:`chipload.planning.thinwall.threshold`
 (Delaunay's triangles, linear; beyond all sites the least of them); s standard deviation of y in one experiment.
 
-Sites are the set of m candidates with the least mean square of what the interpolation is expected to miss (an I-optimal
-design with the bias of the interpolation in it; the model knows the shape of y, though not its level):
+The sites are the set of m candidates with the least mean square of the expected error of the interpolation. This is an
+I-optimal design that includes the bias of the interpolation: the model knows the shape of y, but not its level.
 
     J(S) = mean over p of (sum_i w_i y_i - y_p)^2 + s^2 sum_i w_i^2,
 
-and (min y_i - y_p)^2 + s^2 beyond them. Beyond all sites the wall may bear less than any of them, so the outermost
-candidates (the corners) are sites whatever J says, where m is enough for them; else the three that span the greatest
-triangle begin (D-optimal for a plane). The rest is greedy, then exchanged one for another while that helps. All subsets
-would be C(c, m); on small cases the test holds the result against them.
+and (min y_i - y_p)^2 + s^2 beyond all sites. There the threshold may be below that of every site, so the outermost
+candidates (the corners) are always sites where m is large enough for them; else the three that span the greatest
+triangle are the first (D-optimal for a plane). The other sites are chosen greedily and then exchanged one for another
+while that lowers J. All subsets would be C(c, m); a test compares small cases with them.
 
-At each site a series of depths, such that the normal force is F_th b^k, k = -n .. n: it brackets a threshold that is
-off by a factor b^n. The table in which they are noted is that of :mod:`chipload.planning.thinwall.table`.
+Each site has a series of depths with the normal forces F_th b^k, k = -n .. n. The series brackets a threshold that is
+wrong by a factor of up to b^n. The table of the cuts is that of :mod:`chipload.planning.thinwall.table`.
 
 Reference: [Yan2018] for the calibration; [Atkinson2007] ch. 12 for exchange.
 """
@@ -46,7 +46,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """Calibration cuts.
+    """Proposed calibration cuts.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Proposal:
 
 
 def expected_misses(sites: ArrayLike, places: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
-    """What the interpolation from some sites misses of y, and how the scatter of one experiment comes in.
+    """Expected error of the interpolation of y from some sites, and the part of the scatter of one experiment in it.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def propose_sites(
     candidates: ArrayLike | None = None,
     progress: Progress = silent,
 ) -> Ints:
-    """Sites whose experiments pin the threshold of the places best; (count,) int, rows of ``places``, rising.
+    """Sites whose experiments determine the threshold of the places best; (count,) int, rows of ``places``, ascending.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def propose_cuts(
     candidates: ArrayLike | None = None,
     progress: Progress = silent,
 ) -> Proposal:
-    """Propose calibration cuts: where, and how deep.
+    """Propose calibration cuts: places and depths.
 
     Parameters
     ----------

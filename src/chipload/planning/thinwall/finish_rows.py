@@ -1,8 +1,8 @@
-"""Rows of the user's own finishing program as those that a wall's passes are offset from.
+"""Rows of the user's own finishing program, from which the passes of a wall are offset.
 
 Notation: u, v place on a side, S its point and N its normal; D [mm] stock that a pass leaves; q = S + D N its contact
-points, n the normal of the surface q(u, v); A the axis of the cutter, which stays that of the program; t the feed, l to
-its left. A row is a piece of the program along which the cutter touches the side and u goes one way.
+points, n the normal of the surface q(u, v); A the axis of the cutter, the same as in the program; t the feed, l to its
+left. A row is a part of the program along which the cutter touches the side and u is monotone.
 
 The surface q has the tangents S_u + D_u N + D N_u and S_v + D_v N + D N_v, by differences; D between places by monotone
 cubics, as in :mod:`chipload.planning.thinwall.linking`.
@@ -32,7 +32,7 @@ STEP = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class FinishRow:
-    """A row of a program over a side.
+    """One row of a program over a side.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class FinishRow:
 
 @dataclass(frozen=True, eq=False)
 class FinishSide:
-    """The rows of a program over a side.
+    """The rows of a program over one side.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class FinishSide:
         return Rows(contact, normal, feed, depth > NOTHING, axis, count), np.stack([u, v], axis=-1), depth
 
     def _left(self, left: Floats, places: tuple[Floats, Floats], u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Points and unit normals (..., 3) of what a pass leaves."""
+        """Points and unit normals (..., 3) of the surface that a pass leaves."""
 
         def q(a: Floats, b: Floats) -> Floats:
             point, normal = self.at(a, b)
@@ -99,7 +99,7 @@ class FinishSide:
 
 
 def depth_at(values: Floats, places: tuple[Floats, Floats], u: Floats, v: Floats) -> Floats:
-    """Depths (n, m) of places at parameters (k,): monotone cubics along u, then along v.
+    """Depths (n, m) of places, interpolated at parameters (k,): monotone cubics along u, then along v.
 
     Examples
     --------
@@ -127,7 +127,7 @@ def _feeds(contact: Floats, normal: Floats, count: NDArray[np.int64]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class RowFrames:
-    """How the cutter stands along the rows of a side, at the finished surface.
+    """Lead and tilt of the cutter along the rows of a side, at the finished surface.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ class RowFrames:
 
 
 def row_frames(side: FinishSide) -> tuple[RowFrames, ...]:
-    """Leads and tilts of the rows of a side, those with the row before on their right and on their left apart."""
+    """Leads and tilts of the rows of a side, in two groups: the row before lies on the right, or on the left."""
     found: dict[int, list[tuple[Floats, Floats]]] = {}
     middles = np.array([0.5 * (float(row.v.min()) + float(row.v.max())) for row in side.rows])
     for k, row in enumerate(side.rows):
@@ -173,7 +173,7 @@ def _sign(side: FinishSide, middles: Floats, k: int, point: Floats, left: Floats
 
 
 def heights_of(rows: Sequence[FinishRow], u: Floats) -> Floats:
-    """(r, k) v of rows at parameters u (k,); beyond the ends of a row that of its end."""
+    """Parameter v (r, k) of rows at parameters u (k,); beyond the ends of a row the value at its end."""
     out = []
     for row in rows:
         order = np.argsort(row.u)

@@ -1,12 +1,11 @@
-"""Rows over a wall that are cut with the flank: an axial depth apart, the cutter's axis along the wall.
+"""Rows over a wall that the flank of the cutter cuts: one axial depth apart, with the cutter's axis along the wall.
 
 Notation: p finish surface, N its normal; D [mm] stock that a pass leaves, (n, m) at the places; b axial depth;
 q = p + D N the lower end of the contact line of a row, which reaches b up the wall; t direction of the feed, A the
 axis, n the normal of q across both.
 
-Row k leaves D(v_k) from v_k to v_(k+1): a pass leaves steps. The flank reaches on over the rows before, above it, so
-that D does not grow with v. Along a row D is one: where it ran out to nothing, the deflection would be greater than
-the depth.
+Row k leaves D(v_k) from v_k to v_(k+1), so a pass leaves steps. The flank reaches up over the rows before, so D does
+not grow with v. D is constant along a row: where it decreased to 0, the deflection would exceed the depth.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class FlankSide:
-    """One side, an axial depth from place to place up it.
+    """One side, with places one axial depth apart up the wall.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the flank of an end mill or bull nose cuts of plane stock in front of it, below the row that was cut before.
+"""Tooth engagement of the flank of an end mill or bull-nose cutter in plane stock, below the row that was cut before.
 
 Notation: the surface that the row leaves is the plane z = 0 with its normal N = +z; d [mm] depth of the stock above it,
 which is the radial depth of cut; x the direction of the feed; the axis A = (0, +-1, 0) lies along the plane, so that
@@ -32,13 +32,13 @@ from chipload.planning.thinwall.plane_stock import CutterPose
 
 Floats = NDArray[np.float64]
 
-#: shortest bite that is kept [rad]
+#: shortest range of engagement that is kept [rad]
 SHORT = 1e-9
 
 
 @dataclass(frozen=True)
 class FlankPose:
-    """How a cutter stands with its flank along the surface, and what lies beside it.
+    """Position of a cutter whose flank lies along the surface, and the row before.
 
     Parameters
     ----------
@@ -107,26 +107,26 @@ class FlankPose:
 
     @property
     def deepest(self) -> float:
-        """R [mm]: beyond it the teeth come in behind the axis."""
+        """Radius R [mm]: at greater depths the teeth enter behind the axis."""
         return self.cutter.radius
 
     @property
     def deepest_is(self) -> str:
-        """What ``deepest`` is, in a message."""
+        """Text for messages: the meaning of ``deepest``."""
         return "the radius of the cutter"
 
     @property
     def meets(self) -> float:
-        """Radius [mm] of the circle that the cutter meets the stock with, in the plane of feed and normal."""
+        """Radius [mm] of the circle with which the cutter meets the stock, in the plane of feed and normal."""
         return self.cutter.radius
 
     @property
     def centre(self) -> Floats:
-        """Middle of the corner circle's centres, (3,) float [mm], seen from the lower end of the contact line."""
+        """Middle of the circle of the corner's centres, (3,) float [mm], from the lower end of the contact line."""
         return np.array([0.0, 0.0, self.cutter.radius])
 
     def tooth_line(self, depth: float) -> float:
-        """Length [mm] of the contact line that one tooth bears on at once, at most the axial depth.
+        """Length [mm] of the contact line along which one tooth cuts at one instant, at most the axial depth.
 
         R psi / tan(helix), cos(psi) = 1 - d / R: so much of its helix lies within the stock of depth d.
 
@@ -138,7 +138,7 @@ class FlankPose:
         return abs(self.step) if lag == 0.0 else min(abs(self.step), psi / lag)
 
     def engagement(self, depths: ArrayLike, nodes: int = 8) -> ToothEngagement:
-        """Tooth engagement on stock of given depths, a step each.
+        """Tooth engagement in stock of given depths, one step for each depth.
 
         Parameters
         ----------

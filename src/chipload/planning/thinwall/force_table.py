@@ -1,4 +1,4 @@
-"""Force and depth of cut in a table, for the many places of a wall that one posture of the cutter passes.
+"""Table of normal force over depth of cut, for the many places of a wall that one pose of the cutter passes.
 
 Notation: d [mm] depth, F_n [N] force normal to the surface, as in :mod:`chipload.planning.thinwall.depth`.
 """
@@ -25,7 +25,7 @@ A_DECADE = 128
 
 @dataclass(frozen=True, eq=False)
 class ForceTable:
-    """F_n(d) in a table, for the many places of a wall: straight between depths in a geometric row.
+    """Normal force F_n(d) in a table over geometrically spaced depths, linear between them.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class ForceTable:
     forces: Floats
 
     def force(self, depth: ArrayLike) -> Floats:
-        """F_n (...) [N]; below the smallest depth straight to 0 (rather too small)."""
+        """Normal force F_n (...) [N]; below the smallest depth linear to 0, which is rather too small."""
         d = np.concatenate([[0.0], self.depths])
         return np.asarray(np.interp(np.asarray(depth, dtype=np.float64), d, np.concatenate([[0.0], self.forces])))
 
@@ -52,7 +52,7 @@ class ForceTable:
 def law_of(
     posture: Pose, material: Material, limits: DepthRange, *, measure: Measure, looks: int | None = None
 ) -> ForceTable:
-    """Table of F_n; 128 depths a decade: between them it is right to 1e-4 of what :func:`normal_force` says."""
+    """Table of F_n with 128 depths a decade; between them it is within 1e-4 of :func:`normal_force`."""
     if limits.greatest > posture.deepest:
         raise InputError(
             f"depth_max_mm = {limits.greatest:g}: must be at most {posture.deepest:.6g}, {posture.deepest_is}"
@@ -65,11 +65,10 @@ def law_of(
 def law_on_stock(
     posture: Pose, material: Material, limits: DepthRange, *, slope: float, scallop: float, measure: Measure
 ) -> ForceTable:
-    """Table of F_n on stock that is not plane: deeper below the contact point, with scallops of the pass before on it.
+    """Table of F_n on uneven stock: deeper beside the contact point, with scallops of the pass before.
 
-    Within the reach sqrt(2 r (d + c)) of the cutter stock whose depth changes with a slope of at most L, and that has
-    cusps of at most c, is nowhere deeper than d + c + L sqrt(2 r (d + c)). The force is taken there, so that it is
-    rather too great.
+    Stock whose slope is at most L and whose scallops are at most c high is nowhere deeper than d + c + L sqrt(2 r (d +
+    c)) within the reach sqrt(2 r (d + c)) of the cutter. The force is that of this depth, which is rather too great.
 
     Parameters
     ----------
@@ -105,7 +104,8 @@ def greatest_law(
     scallop: float,
     measure: Measure,
 ) -> tuple[ForceTable, int]:
-    """Table of the greatest F_n of several poses, and the number of the pose that has most at the greatest depth.
+    """Table of the greatest F_n of several poses, and the number of the pose with the greatest force at the greatest
+    depth.
 
     Parameters
     ----------

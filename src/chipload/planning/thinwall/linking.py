@@ -1,15 +1,15 @@
-"""The whole way of a cutter over a wall: every pass row by row, the links between rows and between sides.
+"""Programs of all passes of a wall: every pass row by row, the links between rows and between sides.
 
-Notation: rows, q, n and t as in :mod:`chipload.planning.thinwall.paths`; C [mm] the middle of the corner circle's
-centres; c [mm] clearance along n; A the cutter's axis. A row runs on beyond both edges of the wall by o [mm], so that
-the cutter comes to its depth in the air. Between two pieces it lifts by c along n and goes back along the next row at
-that distance; between two passes it goes out along A, a little away from the wall, until its tip is as high as the
-safe height, over the wall, and in along the next axis.
+Notation: rows, q, n and t as in :mod:`chipload.planning.thinwall.paths`; C [mm] the middle of the circle of the
+corner's centres; c [mm] clearance along n; A the cutter's axis. A row extends beyond both edges of the wall by o [mm],
+so that the cutter reaches its depth in the air. Between two rows the cutter lifts by c along n and returns along the
+next row at that distance. Between two passes it retracts along A, a little away from the wall, until its tip is at the
+safe height above the wall, and approaches along the next axis.
 
-The feed is that of C, which is what a chip's thickness comes from, not that of the tip, which is nearer to the surface.
+The feed is that of C, which determines the chip thickness, and not that of the tip, which is nearer to the surface.
 
-Every row of the program has its own line number, its place on the side (u along it, v up it) and the depth that is
-planned there, so that a checker can say at which contact point something was found.
+Every row of the program has its own line number, its place on the side (u along it, v up it) and the planned depth
+there, so a check can name the contact point of what it finds.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from chipload.program.program import LINE, RAPID, Program
 Floats = NDArray[np.float64]
 
 
-#: the way out leans by this share of n from the axis: away from the wall
+#: the retract leans by this share of n from the axis: away from the wall
 ASIDE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class FineSide:
-    """One side, finely.
+    """One side, sampled finely.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class FineSide:
     v: Floats
 
     def laid(self, p: WallPass, places: tuple[Floats, Floats], posture: Pose) -> tuple[Rows, Floats, Floats]:
-        """Rows of a pass, and the parameters (r, s, 2) and the planned depth (r, s) [mm] of their contact points."""
+        """Rows of a pass, with the parameters (r, s, 2) and the planned depth (r, s) [mm] of their contact points."""
         low, high = (refined(d, places, (self.u, self.v)) for d in (p.low, p.high))
         rows = rows_of(self.surface, low, high, posture)
         return (rows, *_known(rows, self, high - low))
@@ -61,7 +61,7 @@ class FineSide:
 
 @dataclass(frozen=True, eq=False)
 class PassProgram:
-    """One pass as a program, and what is known at its rows.
+    """One pass as a program, with the side, contact point and planned depth of its rows.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class PassProgram:
 
 @dataclass(frozen=True, eq=False)
 class OperationMotion:
-    """How an operation goes over the sides.
+    """Path data of an operation: sides, pass motion and margins.
 
     Attributes
     ----------
@@ -102,8 +102,8 @@ class OperationMotion:
 
 @dataclass(frozen=True)
 class Margins:
-    """Distances [mm] of a tour: beyond the edges of the wall, the safe height of the tip, and how far links may leave
-    their distance to the surface.
+    """Distances [mm] of links: beyond the edges of the wall, the safe height of the tip, and the tolerance of a link's
+    distance to the surface.
     """
 
     beyond: float
@@ -117,7 +117,7 @@ class Margins:
 
 
 def refined(values: Floats, at: tuple[Floats, Floats], to: tuple[Floats, Floats]) -> Floats:
-    """Depths (n, m) of places at parameters ``at`` between them, at parameters ``to``; no value beyond its neighbours.
+    """Depths (n, m) interpolated from parameters ``at`` to parameters ``to``; no value lies beyond its neighbours.
 
     Monotone cubics along u, then along v.
     """
@@ -126,7 +126,7 @@ def refined(values: Floats, at: tuple[Floats, Floats], to: tuple[Floats, Floats]
 
 
 def beyond_edges(rows: Rows, distance: float) -> Rows:
-    """Rows with a point more at both ends, ``distance`` [mm] on along the feed, where nothing is cut."""
+    """Rows with one more point at both ends, ``distance`` [mm] on along the feed, where nothing is cut."""
     length = rows.contact.shape[1]
     count = np.full(len(rows.contact), length) if rows.count is None else rows.count
     at = np.clip(np.arange(length + 2) - 1, 0, count[:, None] - 1)
@@ -151,7 +151,7 @@ def beyond_edges(rows: Rows, distance: float) -> Rows:
 def link_passes(
     passes: Sequence[WallPass], operations: Sequence[OperationMotion], places: tuple[Floats, Floats]
 ) -> tuple[PassProgram, ...]:
-    """A leg a pass, in order.
+    """Programs of the passes with their links, one for each pass, in order.
 
     Parameters
     ----------

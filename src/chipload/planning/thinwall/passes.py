@@ -1,25 +1,27 @@
-"""Passes over a thin wall: variable depths that it bears, from the finish surface outwards, and constant ones.
+"""Passes over a thin wall: variable depths within the allowable force, from the finish surface outwards; constant
+depths.
 
-Notation: D_k [mm] stock that is left on a side before its pass k, D_0 = 0 the finish surface; d [mm] depth that a place
-bears; d~ its lower Lipschitz envelope of slope L; a allowance. Passes are numbered from the finish outwards, the order
-of planning; they are cut the other way round, the sides of a wall alternately: ... A_2 B_2 A_1 B_1. Of several walls
-the first one is cut first, whole.
+Notation: D_k [mm] stock that is left on a side before its pass k, D_0 = 0 the finish surface; d [mm] greatest depth of
+a place within its threshold; d~ its lower Lipschitz envelope of slope L; a allowance. Passes are numbered from the
+finish outwards, the order of planning. They are cut in the opposite order, the sides of a wall alternately: ... A_2 B_2
+A_1 B_1. Of several walls the first one is cut first, whole.
 
     D_k = min(D_(k-1) + d~_k, a)      until D_k = a everywhere,
 
 but at most a - d_min where a is not reached, so that the pass before has more than a film to cut.
 
-The depth of pass k is that which the wall bears with D_(k-1) left on its side everywhere, as if the whole pass were cut
-already: the softest state in which the pass is cut. The other side still has what its own later passes take.
+The depth of pass k is the allowable one with D_(k-1) left on its side everywhere, as if the whole pass were already
+cut: the most compliant state in which the pass is cut. The other side still has the stock of its own later passes.
 
-Constant depths: the least d of the first passes, in the fewest equal passes; unlimited: what the cutter takes.
+Constant depths: the least d of the last passes, in the fewest equal passes. Unconstrained: the greatest depth of the
+cutter.
 
-Operations with cutters of their own follow one another: each but the last leaves even stock on every side, which the
-next one takes. Each is planned by its own law, from the stock that it leaves to the stock that it finds. All walls are
-cut by one operation before the next one comes.
+Operations with cutters of their own follow one another. Each but the last leaves even stock on every side, which the
+next one removes. Each is planned with its own force law, from the stock that it leaves to the stock that it finds. One
+operation cuts all walls before the next one begins.
 
-The force that a place is planned with is c F_n(d): c of a side, 1 where nothing is known, is what a simulation of an
-earlier plan found there over what the law says of the same depth.
+The planned force at a place is c F_n(d). The correction c of a side is the force that a simulation of an earlier plan
+found there over the force of the law at the same depth; it is 1 where nothing is known.
 
 Reference: [Yan2018]. Differs from source: thresholds of each pass by the stiffness in its own state.
 """
@@ -42,7 +44,7 @@ from chipload.planning.thinwall.threshold import Threshold
 from chipload.progress import Progress, silent
 
 Floats = NDArray[np.float64]
-#: what the places of a side bear, ``(left on each side, side) -> threshold``
+#: threshold of the places of a side, ``(left on each side, side) -> threshold``
 ThresholdOf = Callable[[Sequence[Floats], int], Threshold]
 
 #: plan of an operation, ``(number, surfaces with the stock that it finds, stock that it leaves) -> plan``
@@ -57,15 +59,15 @@ NOTHING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class WallPass:
-    """One pass over one side.
+    """One pass over one side: stock before and after it, its force and its threshold.
 
     Attributes
     ----------
     side : number of the side
     low, high : (n, m) float [mm], stock after and before it
-    threshold : what the places bear in the state after it
+    threshold : of the places in the state after it
     force : (n, m) float [N], c F_n of its depth; 0 where nothing is cut
-    exceeds : (n, m) bool, where that is above the threshold, or the pass is deeper than chatter allows
+    exceeds : (n, m) bool, where the force is above the threshold, or the pass is deeper than the stable depth
     correction : (n, m) float, c that it was planned with
     operation : number of the operation that cuts it
     """
@@ -99,7 +101,7 @@ class Plan:
     ----------
     name : ``variable``, ``constant`` or ``unconstrained``
     passes : in order
-    infeasible : (side, i, j) of places that bear not even the smallest depth in some pass
+    infeasible : (side, i, j) of places where even the smallest depth is too great in some pass
     """
 
     name: str
@@ -135,7 +137,7 @@ def _ones(surfaces: Sequence[FinishSurface], corrections: Sequence[Floats] | Non
 
 
 def planned_pass(side: int, low: Floats, high: Floats, threshold: Threshold, law: ForceTable, c: Floats) -> WallPass:
-    """A pass from the stock before it to that after it, with the force that is planned there."""
+    """A pass from the stock before it to the stock after it, with its planned force."""
     depth = high - low
     force = np.where(depth > NOTHING, c * law.force(np.maximum(depth, NOTHING)), 0.0)
     exceeds = force > threshold.force.reshape(low.shape) * (1.0 + 1e-9)
@@ -143,7 +145,7 @@ def planned_pass(side: int, low: Floats, high: Floats, threshold: Threshold, law
 
 
 def in_operations(surfaces: Sequence[FinishSurface], leaves: Sequence[float], planned: PlanOf) -> Plan:
-    """The passes of operations that follow one another.
+    """Passes of all operations, one operation after another.
 
     Parameters
     ----------
@@ -170,8 +172,8 @@ def in_operations(surfaces: Sequence[FinishSurface], leaves: Sequence[float], pl
 
 
 def in_steps(values: Floats) -> Floats:
-    """Stock (n, m) lowered so that it is one along each row and does not grow up the wall; on the free edge that of the
-    row which reaches there.
+    """Stock (n, m), lowered so that it is constant along each row and does not grow up the wall. The free edge takes
+    the stock of the row that reaches it.
 
     >>> in_steps(np.array([[0.3, 0.2, 0.25, 0.1], [0.4, 0.3, 0.3, 0.2]])).tolist()
     [[0.3, 0.2, 0.2, 0.2], [0.3, 0.2, 0.2, 0.2]]
@@ -200,7 +202,7 @@ def variable(
     most: int = 200,
     progress: Progress = silent,
 ) -> Plan:
-    """Variable depths.
+    """Passes of variable depth within the thresholds.
 
     Parameters
     ----------
@@ -260,8 +262,8 @@ def least_first_depth(
     corrections: Sequence[Floats] | None = None,
     leave: float = 0.0,
 ) -> float:
-    """Least depth [mm] that all places of all sides bear in the last passes, which ``leave`` stock [mm]; 0: one bears
-    none.
+    """Least over all places and sides of the greatest allowable depth [mm] in the last passes, which ``leave`` stock
+    [mm]; 0 where a place allows none.
     """
     D = [np.full(s.points.shape[:2], leave) for s in surfaces]
     c = _ones(surfaces, corrections)
@@ -279,7 +281,7 @@ def constant(
     corrections: Sequence[Floats] | None = None,
     leave: float = 0.0,
 ) -> Plan:
-    """Equal passes of at most ``depth``, the fewest; ``corrections`` and ``leave`` as of :func:`variable`.
+    """The fewest equal passes of at most ``depth``; ``corrections`` and ``leave`` as of :func:`variable`.
 
     Raises
     ------

@@ -1,13 +1,13 @@
-"""Five-axis rows over a wall on the surface that a pass leaves.
+"""Five-axis rows of a wall's passes, on the surface that a pass leaves.
 
 Notation: p finish surface, N its normal, D [mm] stock that the pass leaves; q = p + D N; n = N - grad D (normed) the
-normal of q, here of the sampled surface itself, so that curvature counts too; t direction of the feed along i,
-l = n x t to its left. The cutter touches q at a point of a row, its axis leans by lead and tilt in (t, l, n) as
-:mod:`chipload.planning.thinwall.plane_stock` says; its tip is where that puts it.
+normal of q, here of the sampled surface itself, so that curvature counts too; t direction of the feed along i, l = n x
+t to its left. The cutter touches q at a point of a row. Its axis leans by lead and tilt in (t, l, n) as in
+:mod:`chipload.planning.thinwall.plane_stock`; this determines its tip.
 
-Rows run along i, from the free edge towards the clamp, so that the wall below still carries stock; all in one sense,
-that which has the row before on the side that the posture says. A row is cut where the pass finds stock; between pieces
-the cutter lifts by a clearance along n and moves at the rapid rate.
+Rows run along i, from the free edge towards the clamp, so that the wall below still carries stock. All rows have the
+same direction, with the row before on the side that the pose states. A row is cut where the pass finds stock; between
+its parts the cutter lifts by a clearance along n and moves at the rapid rate.
 
 Reference: [Yan2018] for the offset of the finish path by the depths.
 """
@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PassMotion:
-    """How the rows are gone along.
+    """Cutter pose, feed and clearance of the rows.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class PassMotion:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Contact points of rows.
+    """Contact points of rows with their normals and directions of feed.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ def offset_normals(points: Floats, normals: Floats) -> Floats:
 
 
 def rows_of(surface: FinishSurface, low: Floats, high: Floats, posture: Pose) -> Rows:
-    """Rows over the surface that is left at ``low``, stock before at ``high`` (n, m) [mm].
+    """Rows over the surface that is left at ``low``, with the stock before at ``high`` (n, m) [mm].
 
     Between the places of the surface points and normals are interpolated straight.
 
@@ -127,7 +127,9 @@ def rows_of(surface: FinishSurface, low: Floats, high: Floats, posture: Pose) ->
 
 
 def placed(rows: Rows, posture: Pose) -> tuple[Floats, Floats, Floats]:
-    """Tip [mm], axis and middle C of the corner circle's centres [mm] at the contact points, (r, s, 3) float each."""
+    """Tip [mm], axis and middle C of the circle of the corner's centres [mm] at the contact points, (r, s, 3) float
+    each.
+    """
     if rows.axis is not None:
         r, e, height = posture.cutter.apt[1:4]
         C = rows.contact + r * rows.normal + e * across(rows.normal, rows.axis)
@@ -139,7 +141,7 @@ def placed(rows: Rows, posture: Pose) -> tuple[Floats, Floats, Floats]:
 
 
 def program_of(rows: Rows, pass_motion: PassMotion, label: str) -> Program:
-    """Motions of the rows; the first is a rapid.
+    """Program of the rows; its first motion is a rapid.
 
     Raises
     ------
@@ -181,7 +183,7 @@ def program_of(rows: Rows, pass_motion: PassMotion, label: str) -> Program:
 
 
 def seconds(program: Program, rapid: float) -> float:
-    """Length over feed, and over the rapid rate [mm/s]: no acceleration, no turning of axes."""
+    """Time [s]: length over feed, and over the rapid rate [mm/s]; acceleration and rotary axes are left out."""
     length = np.linalg.norm(np.diff(program.p_work, axis=0), axis=1)
     cuts = program.motion[1:] == LINE
     return float((length[cuts] / program.feed[1:][cuts]).sum() + length[~cuts].sum() / rapid)
@@ -190,7 +192,7 @@ def seconds(program: Program, rapid: float) -> float:
 def pass_programs(
     passes: Sequence[WallPass], surfaces: Sequence[FinishSurface], pass_motion: PassMotion
 ) -> tuple[Program, ...]:
-    """A program a pass, in order."""
+    """Programs of the passes, one for each pass, in order."""
     return tuple(
         program_of(
             rows_of(surfaces[p.side], p.low, p.high, pass_motion.posture),
@@ -202,7 +204,7 @@ def pass_programs(
 
 
 def gouges(rows: Rows, surface: FinishSurface, low: Floats, posture: Pose, tolerance: float) -> NDArray[np.int64]:
-    """Contact points (g, 2), row and number, where the corner of the cutter is too great for a concave surface.
+    """Contact points (g, 2), row and number, where the cutter's corner is too large for a concave surface.
 
     A point of the surface that lies nearer to the disk of the corner circle's centres than r - ``tolerance`` [mm].
     """

@@ -1,4 +1,4 @@
-"""What a ball or bull-nose cutter bites off a plane stock of given depth beside the row that was cut before.
+"""Tooth engagement of a ball or bull-nose cutter in plane stock of given depth, beside the row that was cut before.
 
 Notation: the surface that the row leaves is the plane z = 0 with its normal N = +z; d [mm] depth of the stock above it;
 x the direction of the feed, f_z [mm] feed per tooth; the row before lies at y = -b, b the step-over with its sign
@@ -11,9 +11,10 @@ A convex cutter that moves straight on along x meets uncut material wherever its
 a point of it cuts where h > 0, z < d and z < g(y + b): g is the lower outline of the cutter seen along x, which the row
 before has left. The first two are sinusoids of phi; the roots of the third are bracketed and bisected.
 
-Over kappa the ends of bites run into one another like square roots, where a circle just touches z = d. Nodes are those
-of Gauss in t, kappa = m - w cos(t), which makes that smooth; the length of a bite along the profile is its weight.
-Accuracy: docs/design/thinwall.md. The stock is plane: right where d is small against the surface's radii of curvature.
+As functions of kappa the ends of the engagement meet like square roots, where a circle just touches z = d. The nodes
+are those of Gauss in t, kappa = m - w cos(t), in which the ends are smooth; the weight of a node is its length along
+the profile. Accuracy: docs/design/thinwall.md. The stock is plane: accurate where d is small against the surface's
+radii of curvature.
 
 Reference: [Engin2001] for kappa and s. Differs from source: depth and step-over normal to the surface.
 """
@@ -38,19 +39,19 @@ from chipload.errors import InputError
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-#: places of phi at which the row before is looked for, before bisection
+#: places of phi at which the row before is searched, before bisection
 LOOKS = 90
 #: halvings of a bracket of phi: 4 deg / 2^36
 HALVINGS = 36
 #: points of the lower outline of a bull nose
 OUTLINE = 4001
-#: shortest bite that is kept [rad]
+#: shortest range of engagement that is kept [rad]
 SHORT = 1e-9
 
 
 @dataclass(frozen=True)
 class CutterPose:
-    """How a cutter stands on the surface and what lies beside it.
+    """Position of a cutter on the surface, and the row before.
 
     Parameters
     ----------
@@ -111,7 +112,7 @@ class CutterPose:
 
     @property
     def deepest(self) -> float:
-        """Depth r (1 - sin(beta)) [mm]: beyond it the flank cuts too.
+        """Depth r (1 - sin(beta)) [mm]: at greater depths the flank cuts too.
 
         >>> ball = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
         >>> round(CutterPose(ball, 0.05, None, lead=math.radians(30.0)).deepest, 9)
@@ -121,12 +122,12 @@ class CutterPose:
 
     @property
     def deepest_is(self) -> str:
-        """What ``deepest`` is, in a message."""
+        """Text for messages: the meaning of ``deepest``."""
         return "where the flank begins to cut"
 
     @property
     def meets(self) -> float:
-        """Radius [mm] of the circle that the cutter meets the stock with, in the plane of feed and normal."""
+        """Radius [mm] of the circle with which the cutter meets the stock, in the plane of feed and normal."""
         return self.cutter.corner_radius
 
     def engagement(self, depths: ArrayLike, nodes: int = 8) -> ToothEngagement:
@@ -135,14 +136,14 @@ class CutterPose:
 
     @property
     def centre(self) -> Floats:
-        """C, (3,) float [mm], seen from the point where the cutter touches z = 0."""
+        """C, (3,) float [mm], from the point where the cutter touches z = 0."""
         r, e = self.cutter.apt[1:3]
         s = math.sin(self.beta)
         up = np.array([0.0, 0.0, 1.0])
         return r * up if s < 1e-12 else r * up - e * (math.cos(self.beta) * self.axis - up) / s
 
     def outline(self, y: Floats) -> Floats:
-        """g: height of the cutter's lower outline, seen along the feed, at y [mm]; infinite beside it."""
+        """Height g of the cutter's lower outline, seen along the feed, at y [mm]; infinite beside it."""
         r, e = self.cutter.apt[1:3]
         C = self.centre
         if e == 0.0:
@@ -165,7 +166,7 @@ def _nodes(low: Floats, high: Floats, number: int) -> tuple[Floats, Floats]:
 
 
 def _breaks(posture: CutterPose, d: Floats) -> Floats:
-    """Kappa on the corner between which the ends of bites are smooth, (n, m) increasing [rad].
+    """Values of kappa on the corner between which the ends of the engagement are smooth, (n, m) increasing [rad].
 
     Where the circle of z = d is touched, and where two of the three borders (z = d, h = 0, the row before) meet; of a
     ball also where the border of the row before is touched. With C as origin h = 0 is x = 0 on a ball.
@@ -222,13 +223,13 @@ def _profile(posture: CutterPose, d: Floats, number: int) -> tuple[Floats, Float
 
 
 def engagement_of_depths(posture: CutterPose, depths: ArrayLike, nodes: int = 8) -> ToothEngagement:
-    """Tooth engagement on stock of given depths, a step each.
+    """Tooth engagement in stock of given depths, one step for each depth.
 
     Parameters
     ----------
     posture : cutter, feed, step-over, lead and tilt
     depths : (n,) float [mm], above 0, at most ``posture.deepest``
-    nodes : of the profile, between each two kappa where the bites change their form
+    nodes : of the profile, between each two kappa where the engagement changes its form
 
     Returns
     -------
@@ -242,7 +243,7 @@ def engagement_of_depths(posture: CutterPose, depths: ArrayLike, nodes: int = 8)
 
     Examples
     --------
-    A ball that stands upright in a slot bites from 0 to pi.
+    A ball that stands upright in a slot is engaged from 0 to pi.
 
     >>> ball = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
     >>> rows = engagement_of_depths(CutterPose(ball, 0.05, None), [0.5]).rows

@@ -1,8 +1,8 @@
-"""The rows of a finishing program: where its cutter touches the sides of a wall, edge to edge, without a gap.
+"""Rows of a finishing program: the parts in which its cutter touches a side of a wall, from edge to edge.
 
 Notation as in :mod:`chipload.planning.thinwall.contact` and :mod:`chipload.planning.thinwall.finish_rows`. The path is
-looked at in straight pieces; a place of it belongs to a row where the clearance between cutter and side is small.
-Between a place that touches within the side and the next one that does not, the edge is found by halving.
+divided into short straight pieces. A place of it belongs to a row where the clearance between cutter and side is small.
+Between a place that touches within the side and the next one that does not, the edge is found by bisection.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Ints = NDArray[np.int64]
 
 #: the cutter may be so far from the finished side [mm], or within it
 NEAR = 0.02
-#: a clearance is told up to this [mm]
+#: greatest clearance that is reported [mm]
 NEAR_ENOUGH = 1.0
 #: chords of arcs leave them by at most this [mm]
 CHORD = 0.001
@@ -73,7 +73,7 @@ def sides_of_program(
     name: str,
     tool: int | None = None,
 ) -> tuple[tuple[FinishSide, ...], float]:
-    """The rows of a program over each side, and the greatest distance [mm] of neighbouring ones.
+    """The rows of a program over each side, and the greatest distance [mm] of neighbouring rows.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def _between(path: _FeedMotions, here: Ints, there: Ints, share: Floats) -> tupl
 
 
 def _split(row: FinishRow, side: SideAt) -> list[FinishRow]:
-    """The pieces of a path over a side along which u goes one way; pieces up or down the side are left out."""
+    """Parts of a path over a side along which u is monotone; parts up or down the side are left out."""
     if len(row.u) < 2:
         return []
     along, up = tangents(side, row.u[:-1], row.v[:-1])

@@ -1,10 +1,10 @@
-"""The table of calibration cuts: proposed, filled in at the machine, read back.
+"""Table of calibration cuts: proposed by the planner, filled in at the machine, and read back.
 
-Notation: F [N] normal force and w [mm] deflection of a cut, delta [mm] the deflection that is allowed; a series is what
-was cut at one place, depth by depth.
+Notation: F [N] normal force and w [mm] deflection of a cut, delta [mm] allowed deflection; a series is the cuts at one
+place, depth by depth.
 
-A cut that reports a deflection gives the threshold F delta / w. A series that reports only which cut was too much gives
-the greatest force that was borne below the least that was not: the width of the bracket is reserve.
+A cut with a reported deflection gives the threshold F delta / w. A series that only reports which cuts were too much
+gives the greatest acceptable force below the least unacceptable one; the width of this bracket is a reserve.
 
 Reference: [Yan2018] for the calibration.
 """
@@ -49,7 +49,7 @@ def cuts_bytes(proposal: Proposal) -> bytes:
 
 
 def write_cuts(path: str | Path, proposal: Proposal) -> None:
-    """Write the table to be filled in at the machine."""
+    """Write the table of proposed cuts, to be filled in at the machine."""
     write_whole(path, cuts_bytes(proposal))
 
 
@@ -65,7 +65,7 @@ class _Row:
 
 
 def read_cuts(path: str | Path, deflection: float) -> tuple[Experiments, tuple[Finding, ...]]:
-    """Read a table that was filled in.
+    """Read a table that was filled in at the machine.
 
     A row counts where ``deflection_um`` or ``too_much`` (yes, no) is filled in; ``normal_force_n`` may be left empty,
     then the expected one stands, which is said. Columns may be in any order, more may be added; commas, or semicolons
@@ -115,7 +115,7 @@ def read_cuts(path: str | Path, deflection: float) -> tuple[Experiments, tuple[F
 
 
 def _allowable_force(cuts: list[_Row], label: str, findings: list[Finding]) -> float:
-    """Greatest force of a series that was borne below the least one that was too much."""
+    """Greatest acceptable force of a series, below the least one that was too much."""
     failed = [c.force for c in cuts if c.too_much]
     least = min(failed, default=math.inf)
     below = [c.force for c in cuts if not c.too_much and c.force < least]

@@ -1,8 +1,8 @@
-"""The force normal to its surface that a place of the wall bears, and where that is known from.
+"""Allowable normal force of places of a wall: modelled from the compliance, or calibrated by experiments.
 
-Notation: F_th [N] threshold; delta [mm] deflection that is allowed; C_nn [mm/N] normal compliance of a place; u, v
-parameters of the surface; F_i [N] forces borne in m experiments, y = log F; s standard deviation of y, k how many of
-them are kept as reserve.
+Notation: F_th [N] threshold, the allowable force; delta [mm] allowed deflection; C_nn [mm/N] normal compliance of a
+place; u, v parameters of the surface; F_i [N] allowable forces found in m experiments, y = log F; s standard deviation
+of y; k number of standard deviations that are kept as reserve.
 
 Modelled: F_th = delta / C_nn, with C_nn of the clamped workpiece in its present state of removal.
 
@@ -11,8 +11,8 @@ Calibrated: y is interpolated linearly between the experiments (Delaunay's trian
     F_th = exp(y - k s).
 
 s is the pooled deviation of repeats, or what it is when each experiment is predicted from the others without it, the
-greater of the two where both are known. Beyond the experiments the wall may bear less than any of them did: such places
-are named in ``outside`` and take the least of all, with the reserve.
+greater of the two where both are known. Beyond the experiments the allowable force may be less than in any of them.
+Such places are listed in ``outside`` and take the least force of all, with the reserve.
 
 Reference: [Yan2018] for thresholds by place, calibrated; Differs from source: may be modelled, and says which.
 """
@@ -39,7 +39,7 @@ Source = Literal["modelled", "calibrated"]
 
 @dataclass(frozen=True, eq=False)
 class Threshold:
-    """Normal force that places bear.
+    """Allowable normal force of places.
 
     Attributes
     ----------
@@ -48,8 +48,8 @@ class Threshold:
     factor : safety factor that is in ``force`` already, at most 1
     outside : (p,) bool, beyond the experiments; False where modelled
     compliance : (p,) float [mm/N], C_nn; None: calibrated
-    text : a sentence that says where the force is known from
-    depth : (p,) float [mm], greatest depth that chatter allows, 0: none; None: not asked
+    text : a sentence that states the source of the force
+    depth : (p,) float [mm], stable depth, 0: none is stable; None: not calculated
     speed : of the spindle [rad/s] that this holds for; None: that of the operation
     """
 
@@ -63,12 +63,12 @@ class Threshold:
     speed: float | None = None
 
     def within(self, depth: Floats) -> Floats:
-        """Depths [mm] of the places, no deeper than chatter allows."""
+        """Depths [mm] of the places, at most the stable depth."""
         return depth if self.depth is None else np.minimum(depth, self.depth.reshape(depth.shape))
 
 
 def modelled(C_nn: ArrayLike, deflection: float, factor: float = 1.0) -> Threshold:
-    """Threshold from compliance.
+    """Threshold modelled from the compliance: delta / C_nn, times the factor.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def modelled(C_nn: ArrayLike, deflection: float, factor: float = 1.0) -> Thresho
 
 
 def of_state(state: StructureRemoval, watched: UnitLoads, deflection: float, factor: float = 1.0) -> Threshold:
-    """Threshold of watched places in one state of the removal; see :func:`chipload.structure.unit_loads.watch`.
+    """Threshold of watched places in one state of removal; see :func:`chipload.structure.unit_loads.watch`.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def of_state(state: StructureRemoval, watched: UnitLoads, deflection: float, fac
 
 @dataclass(frozen=True, eq=False)
 class Experiments:
-    """Forces that places of the wall bore.
+    """Allowable forces that experiments found at places of the wall.
 
     Parameters
     ----------
@@ -146,7 +146,8 @@ class Experiments:
 
 
 def from_deflections(place: ArrayLike, force: ArrayLike, measured: ArrayLike, deflection: float) -> Experiments:
-    """Experiments that report how far the wall gave way: force borne = force times delta over the measured deflection.
+    """Experiments in which the deflection was measured: the allowable force is force times delta over measured
+    deflection.
 
     Parameters
     ----------
@@ -166,7 +167,7 @@ def from_deflections(place: ArrayLike, force: ArrayLike, measured: ArrayLike, de
 
 
 def scatter(experiments: Experiments) -> tuple[float, str]:
-    """Standard deviation of log F, and what it was found from.
+    """Standard deviation of log F, and the source of this number.
 
     Raises
     ------
@@ -205,7 +206,7 @@ def _means(experiments: Experiments) -> tuple[Floats, Floats, list[Floats]]:
 
 
 def calibrated(experiments: Experiments, places: ArrayLike, deviations: float) -> Threshold:
-    """Threshold of places between experiments.
+    """Threshold of places, interpolated between experiments.
 
     Parameters
     ----------

@@ -1,11 +1,12 @@
 """Three plans for one wall: variable depths, a constant depth under the same limit, a constant depth without it.
 
-The constant one is the least depth that the last passes bear, in the fewest equal passes; those need less than it, so
-that the wall gives way less than it may. Variable depths are then held to what the constant ones reach, so that both
-are compared at one deflection. Without the limit the depth is the greatest that is allowed.
+All plans with the limit have the same allowed deflection. The constant depth is the least that the last passes allow,
+in the fewest equal passes; these are usually less deep than that, so their deflection is below the limit. Variable
+depths keep the limit itself at every place, not the deflection of the constant ones. Without the limit the depth is the
+greatest of the force law.
 
-The sides are cut alternately or one after the other, whichever leaves fewer passes; at as many, whichever needs the
-least normal force: each choice is planned, and named.
+The sides are cut alternately or one after the other, whichever gives fewer passes; if both give as many, whichever
+needs the lesser normal force. Both orders are planned, and the plan names its order.
 
 Reference: [Yan2018] for the comparison.
 """
@@ -39,7 +40,7 @@ NAMES = ("variable", "constant", "unconstrained")
 
 @dataclass(frozen=True, eq=False)
 class DepthOperation:
-    """An operation with a cutter of its own, and what it may do.
+    """Depth planning data of an operation: thresholds, force law and limits of its cutter.
 
     Attributes
     ----------
@@ -61,7 +62,7 @@ class DepthOperation:
 
 @dataclass(frozen=True, eq=False)
 class PlannedVariant:
-    """A plan and what it was planned under.
+    """A plan with its allowed deflection and the order of its sides.
 
     Attributes
     ----------
@@ -78,7 +79,7 @@ class PlannedVariant:
 
 
 def unlimited(surfaces: Sequence[FinishSurface], operations: Sequence[DepthOperation]) -> PlannedVariant:
-    """Passes of the greatest depth of the law of each operation, whatever the wall bears."""
+    """Passes of the greatest depth of each operation's force law, without the limit of the wall."""
 
     def of_order(order: Order) -> PlanOf:
         def planned(k: int, found: Sequence[FinishSurface], leave: float) -> Plan:
@@ -92,8 +93,8 @@ def unlimited(surfaces: Sequence[FinishSurface], operations: Sequence[DepthOpera
 
 
 def even(surfaces: Sequence[FinishSurface], operations: Sequence[DepthOperation], deflection: float) -> PlannedVariant:
-    """Equal passes of the depth that every place bears in the last ones of an operation, at least the smallest of its
-    law.
+    """Equal passes of the depth that every place allows in the last passes of an operation, at least the smallest of
+    its law.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ def even(surfaces: Sequence[FinishSurface], operations: Sequence[DepthOperation]
 def limited_to(
     surfaces: Sequence[FinishSurface], operations: Sequence[DepthOperation], deflection: float
 ) -> PlannedVariant:
-    """Variable depths under thresholds that allow ``deflection`` [mm]."""
+    """Passes of variable depth within thresholds for an allowed ``deflection`` [mm]."""
 
     def of_order(order: Order) -> PlanOf:
         def planned(k: int, found: Sequence[FinishSurface], leave: float) -> Plan:

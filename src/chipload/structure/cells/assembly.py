@@ -38,7 +38,7 @@ MOST_MODES = 150_000
 
 @dataclass(frozen=True, eq=False)
 class CellModes:
-    """Which modes a workpiece has.
+    """Numbering of the modes of a workpiece.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class CellModes:
 
 
 def shares(moments: Array) -> Array:
-    """(nx, ny, nz) share of each cell that is material."""
+    """Share of material of each cell, (nx, ny, nz)."""
     return np.asarray(moments[..., 0, 0, 0] / 8.0)
 
 

@@ -1,4 +1,4 @@
-"""Clamps of a workpiece: material in a region that is held, stiffly or by springs.
+"""Clamps of a workpiece: regions in which its material is held, rigidly or by springs.
 
 Notation: a clamp holds the material of the stock within an upright prism, in some of the directions x, y, z. Springs
 are spread over that material: k_v = k / V [N/mm per mm^3], with the stiffness k of the whole clamp in each direction
@@ -35,7 +35,7 @@ MOTIONS = tuple(f"{kind} {axis}" for kind in ("motion along", "rotation about") 
 
 @dataclass(frozen=True, eq=False)
 class Clamp:
-    """A part of the stock that is held.
+    """Region of the stock that is held.
 
     Parameters
     ----------

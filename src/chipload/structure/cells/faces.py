@@ -1,7 +1,8 @@
-"""A grid whose planes lie on the flat faces of a part that are square to it.
+"""A grid of cells with planes on the flat faces of a part that are square to the axes.
 
-A cell that holds the corner between a wall and its floor is too stiff by 2 to 6 %, however fine it is
-(docs/design/workpiece.md). The largest flat faces are taken first, as long as they do not make many more cells.
+A cell that contains the corner between a wall and its floor is too stiff, so the position of the planes matters more
+than the size of the cells (docs/design/workpiece.md: 13 % too stiff in equal cells of 2.5 times the thickness of the
+wall). The largest flat faces are taken first, as long as they do not add many cells.
 
 Faces along x and y are straight edges of the sections of a layered stock, with the height of their layers; faces along
 z the difference of area from section to section.

@@ -1,10 +1,10 @@
 """Modes of a workpiece, followed through its removal: frequencies and shapes in the state of each step.
 
-A wall that is thinned from its free edge down sounds higher at first, for mass goes where it moves most, and lower in
-the end. Modes are solved in some states of removal and interpolated between them by the volume removed, frequencies by
-their logarithm. Modes of neighbouring states belong together by |x_a^T M_b x_b|, never by their number, since they may
-cross. The interval in which a frequency changes most is halved until none changes by more than the tolerance or there
-are enough states.
+A wall that is thinned from its free edge down has a higher natural frequency at first, because mass is removed where it
+moves most, and a lower one in the end. Modes are solved in some states of removal and interpolated between them by the
+volume removed, frequencies by their logarithm. Modes of neighbouring states belong together by |x_a^T M_b x_b|, never
+by their number, since they may cross. The interval in which a frequency changes most is halved until none changes by
+more than the tolerance or there are enough states.
 """
 
 from __future__ import annotations

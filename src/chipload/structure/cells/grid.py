@@ -89,7 +89,7 @@ class CellGrid:
 
     @cached_property
     def volumes(self) -> Array:
-        """(nx, ny, nz) volumes of the cells [mm^3]."""
+        """Volumes of the cells (nx, ny, nz) [mm^3]."""
         x, y, z = (np.diff(v) for v in self.planes)
         return np.asarray(x[:, None, None] * y[:, None] * z)
 
@@ -100,11 +100,11 @@ class CellGrid:
         return a, b, c
 
     def sides(self, cells: Indices) -> Array:
-        """(n, 3) sides [mm] of cells (n, 3)."""
+        """Sides (n, 3) [mm] of cells (n, 3)."""
         return np.stack([np.diff(v)[cells[:, d]] for d, v in enumerate(self.planes)], axis=1)
 
     def points(self, cells: Indices, local: Array) -> Array:
-        """(n, 3) places [mm] of local coordinates (n, 3) of cells (n, 3)."""
+        """Places (n, 3) [mm] of local coordinates (n, 3) of cells (n, 3)."""
         low = np.stack([v[cells[:, d]] for d, v in enumerate(self.planes)], axis=1)
         return np.asarray(low + 0.5 * (local + 1.0) * self.sides(cells))
 
@@ -113,7 +113,7 @@ class CellGrid:
         return np.stack([np.interp(points[..., d], v, np.arange(len(v))) for d, v in enumerate(self.planes)], axis=-1)
 
     def cell_of(self, points: Array) -> tuple[Indices, Array]:
-        """(n, 3) int cell of each point, and (n, 3) float its local coordinates; points outside take the nearest."""
+        """Cell of each point, (n, 3) int, and its local coordinates, (n, 3); points outside take the nearest cell."""
         cell = np.stack(
             [
                 np.clip(np.searchsorted(v, points[:, d], side="right") - 1, 0, len(v) - 2)
@@ -125,7 +125,7 @@ class CellGrid:
         return cell, 2.0 * (points - low) / self.sides(cell) - 1.0
 
     def modes_of(self, cells: Indices) -> Indices:
-        """(n, (p + 1)^3) int lattice numbers of the modes of cells (n, 3)."""
+        """Lattice numbers of the modes of cells (n, 3): (n, (p + 1)^3) int."""
         q = np.arange(self.order + 1)
         local = np.stack(np.meshgrid(q, q, q, indexing="ij"), axis=-1).reshape(-1, 3)
         at = cells[:, None, :] * self.order + local
@@ -177,7 +177,7 @@ def grid_between(faces: Planes, cell_mm: float, order: int = 2) -> CellGrid:
 
 
 def cells_between(planes: Array, cell_mm: float) -> Indices:
-    """(m - 1,) int the fewest equal cells between planes (m,) whose sides are at most ``cell_mm``."""
+    """Fewest equal cells between planes (m,) whose sides are at most ``cell_mm``, (m - 1,) int."""
     return np.maximum(np.ceil(np.diff(planes) / cell_mm * (1.0 - 1e-9)), 1.0).astype(np.int64)
 
 
@@ -201,20 +201,20 @@ def _modes(order: int) -> tuple[Array, ...]:
 
 
 def mode_values(order: int, xi: Array) -> tuple[Array, Array]:
-    """(n, p + 1) values and derivatives of the modes of one direction at local coordinates (n,)."""
+    """Values and derivatives of the modes of one direction at local coordinates (n,), (n, p + 1) each."""
     values = np.stack([legendre.legval(xi, c) for c in _modes(order)], axis=-1)
     slopes = np.stack([legendre.legval(xi, legendre.legder(c)) + 0.0 * xi for c in _modes(order)], axis=-1)
     return np.asarray(values, dtype=np.float64), np.asarray(slopes, dtype=np.float64)
 
 
 def shape_values(grid: CellGrid, local: Array) -> Array:
-    """(n, (p + 1)^3) values of the modes of a cell at local coordinates (n, 3)."""
+    """Values of the modes of a cell at local coordinates (n, 3), (n, (p + 1)^3)."""
     x, y, z = (mode_values(grid.order, local[:, d])[0] for d in range(3))
     return np.asarray(np.einsum("ni,nj,nk->nijk", x, y, z).reshape(len(local), -1))
 
 
 def shape_gradients(grid: CellGrid, local: Array) -> Array:
-    """(n, (p + 1)^3, 3) slopes of the modes of a cell in its local coordinates: times 2 / h they are per mm."""
+    """Slopes of the modes of a cell in its local coordinates (n, 3), (n, (p + 1)^3, 3): times 2 / h they are per mm."""
     both = [mode_values(grid.order, local[:, d]) for d in range(3)]
     out = []
     for d in range(3):

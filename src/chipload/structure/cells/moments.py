@@ -54,7 +54,7 @@ def alike(stock: LayeredStock, layer: int) -> bool:
 
 
 def section_moments(shapes: NDArray[np.object_], grid: CellGrid) -> Array:
-    """(nx, ny, n, n) float moments M_kl of the union of polygons that do not overlap, n = 2 p + 1.
+    """Moments M_kl of the union of polygons that do not overlap, (nx, ny, n, n) float, n = 2 p + 1.
 
     >>> from chipload.structure.cells.grid import grid_over
     >>> m = section_moments(np.array([shapely.box(1, 0, 4, 2)], dtype=object), grid_over((0, 0, 0), (4, 2, 2), 2.0))
@@ -98,7 +98,7 @@ def height_moments(grid: CellGrid, low: float, high: float) -> tuple[range, Arra
 
 
 def stock_moments(stock: LayeredStock, grid: CellGrid, region: StockRegion | None = None) -> Array:
-    """(nx, ny, nz, n, n, n) float moments M_klm of a stock in cells that hold it.
+    """Moments M_klm of a stock in the cells that hold it, (nx, ny, nz, n, n, n) float.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ class StockSections:
                 self.shapes.append(shape)
 
     def nearest(self, points: Array) -> Array:
-        """(n, 3) float [mm], the nearest point of the material to each of (n, 3); a point in it is its own.
+        """Nearest point of the material to each of (n, 3), (n, 3) float [mm]; a point in the material is its own.
 
         >>> stock = LayeredStock.block((0, 0, 0), (4, 4, 2), 1.0, 4.0)
         >>> StockSections(stock).nearest(np.array([[1.0, 2.0, 1.5], [5.0, 2.0, 3.0]])).tolist()

@@ -33,7 +33,7 @@ WORST = 12
 
 @dataclass(frozen=True, eq=False)
 class StepLines:
-    """Where and how hard the steps of a program cut.
+    """Contact lines and forces of the steps of a program.
 
     Parameters
     ----------
@@ -93,11 +93,11 @@ class StepCompliances:
     loose: float
 
     def at(self, steps: Indices) -> Array:
-        """(n, s, 3, 3) compliance of steps; of a step that is not known, that of the last known one before it."""
+        """Compliance of steps (n, s, 3, 3); a step that is not known takes that of the last known one before it."""
         return np.asarray(self.compliance[self._rows(steps)])
 
     def at_points(self, steps: Indices, points: Array) -> Array:
-        """(n, 3, 3) compliance of steps at points (n, 3) [mm] beside their contact: by a parabola along its line."""
+        """Compliance of steps at points (n, 3) [mm] beside their contact, (n, 3, 3): by a parabola along its line."""
         rows = self._rows(steps)
         low, along = self.lines[rows, 0], self.lines[rows, 1] - self.lines[rows, 0]
         length = np.einsum("ni,ni->n", along, along)

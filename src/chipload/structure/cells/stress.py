@@ -3,8 +3,8 @@
 Notation: eps = sym(grad u), sigma = lambda tr(eps) 1 + 2 mu eps; von Mises' sqrt(3/2 s : s), s the deviator. Stress is
 taken at 2 x 2 x 2 points of each cell, where they lie in material.
 
-Beside the contact the chip is formed, and the metal yields anyway: what is nearer to the contact line than a distance
-that is stated does not count.
+Near the contact the chip is formed and the metal yields anyway: points nearer to the contact line than a stated
+distance do not count.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class GreatestStress:
 
 
 def greatest_stress(work: CellWorkpiece, elastic: Elastic, line: Array, force: Array, away: float) -> GreatestStress:
-    """Where and how much a force strains a workpiece most.
+    """Greatest equivalent stress of a workpiece under a force, and its place.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
-"""Where a support would lower the deflection of a place most.
+"""Effect of a support on the deflection of a place: the best of some candidates.
 
 Notation: q the loaded place with the force F, s a candidate with the normal n, k stiffness of the support, C_sq
 displacement at s per force at q. A support is a spring along n, a change of rank one, so that by Sherman and Morrison
 
     u_q' = u_q - C_qs n (n . u_s) / (1 / k + n . C_ss n),  with u_s = C_sq F, C_qs = C_sq^T,
 
-with no new factors. It is taken to hold in both directions, as a jack that is pressed on.
+with no new factors. The support is assumed to hold in both directions, as a jack that is pressed on.
 
 Reference: [Hager1989].
 """
@@ -24,7 +24,7 @@ from chipload.structure.cells.workpiece import STATIONS, CellWorkpiece, displace
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """What supports would do, one at a time.
+    """Deflection with each candidate support, one at a time.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Support:
 
     @property
     def best(self) -> int:
-        """The candidate that lowers it most."""
+        """The candidate that lowers the deflection most."""
         return int(np.argmin(self.after))
 
 

@@ -1,4 +1,4 @@
-"""The thinnest wall and the thinnest floor of a layered stock, and cells that resolve them.
+"""The thinnest wall and the thinnest floor of a layered stock, and the cell size that resolves them.
 
 A wall is thinner than t where the section of a layer, made narrower by t / 2 all round and wider again, has lost more
 than :data:`PATCH` t^2: a corner loses less. A floor, or a roof, is thinner than t where the upright runs of material
@@ -27,7 +27,7 @@ from chipload.structure.cells.moments import alike, stock_moments
 PATCH = 2.0
 #: sides of cells over the thinnest wall: wanted, and at most
 GOOD, MOST = 1.25, 2.5
-#: sections that are looked at, points across the longest side
+#: sections that are searched, points across the longest side
 SECTIONS, POINTS = 16, 48
 #: thicknesses that are tried: each so many times the one before, then halvings
 GROWTH, HALVINGS = 1.4, 5

@@ -76,7 +76,7 @@ def vibration_modes(work: CellWorkpiece, count: int) -> VibrationModes:
 
 
 def shapes_along(work: CellWorkpiece, found: VibrationModes, lines: Array) -> Array:
-    """(c, 3, m) float [1/sqrt(t)] mean of mode shapes along contact lines (c, 2, 3) [mm], as a force is spread."""
+    """Mean of mode shapes along contact lines (c, 2, 3) [mm], as a force is spread: (c, 3, m) float [1/sqrt(t)]."""
     if not len(lines):
         return np.zeros((0, 3, len(found.frequency)))
     mean = line_means(work, lines)
@@ -84,6 +84,8 @@ def shapes_along(work: CellWorkpiece, found: VibrationModes, lines: Array) -> Ar
 
 
 def overlap(a: VibrationModes, b: VibrationModes) -> Array:
-    """(m, m) float, x_a^T M_b x_b: how far modes of state a are those of a state b of the same cells, with sign."""
+    """Products x_a^T M_b x_b, (m, m) float: agreement of the modes of state a with those of state b of the same cells,
+    with sign.
+    """
     _, p, q = np.intersect1d(a.lattice, b.lattice, assume_unique=True, return_indices=True)
     return np.asarray(np.einsum("udi,udj->ij", a.shapes[p], b.momenta[q]))

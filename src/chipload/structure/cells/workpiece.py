@@ -1,9 +1,9 @@
-"""A clamped workpiece in one state of its removal, and how far it gives way where it is cut.
+"""A clamped workpiece in one state of removal, and its compliance along contact lines.
 
 Notation: u modes, K (3 u, 3 u) stiffness of material and clamps. A **contact line** is the segment along which a cutter
-touches the surface, from its lowest to its highest point; the force is spread evenly over it, since under a point force
-an elastic body gives way without bound. With the load w = mean over the line of the modes' values, its compliance at a
-**station** of the line with the modes' values v is C = (v x I)^T K^-1 (w x I), (3, 3) [mm/N].
+touches the surface, from its lowest to its highest point. The force is spread evenly over it, since under a point force
+the displacement of an elastic body has no bound. With the load w = mean over the line of the modes' values, its
+compliance at a **station** of the line with the modes' values v is C = (v x I)^T K^-1 (w x I), (3, 3) [mm/N].
 
 K is factored in an order of nested dissection: planes of the lattice cut the workpiece in halves again and again, the
 modes of a plane come after those of both sides. A line touches few of the factors, those from its cells to the last
@@ -47,7 +47,7 @@ ABREAST = 21
 
 @dataclass(frozen=True)
 class Elastic:
-    """What a workpiece is made of.
+    """Elastic constants and density of a workpiece.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def cell_workpiece(
 
 
 def dissected(lattice: Indices, p: int) -> Indices:
-    """(u,) int order of modes by nested dissection; ``lattice`` (u, 3) int their places, ``p`` the order of cells."""
+    """Order of modes by nested dissection, (u,) int; ``lattice`` (u, 3) int their places, ``p`` the order of cells."""
     out: list[Indices] = []
     waiting: list[tuple[Indices, bool]] = [(np.arange(len(lattice)), False)]
     while waiting:
@@ -182,7 +182,7 @@ def _separator(at: Indices, p: int) -> tuple[int, int] | None:
 
 
 def mode_weights(work: CellWorkpiece, points: Array) -> csr_array:
-    """(n, u) sparse values of the modes at points (n, 3), or at the nearest material to them."""
+    """Values of the modes at points (n, 3), or at the nearest material to them: (n, u) sparse."""
     at = work.sections.nearest(points)
     cell, local = work.grid.cell_of(at)
     empty = work.share[tuple(cell.T)] <= LEAST_SHARE
@@ -237,7 +237,7 @@ def line_compliances(work: CellWorkpiece, lines: ArrayLike) -> Array:
 
 
 def line_means(work: CellWorkpiece, lines: Array) -> csr_array:
-    """(c, u) sparse mean of the modes along contact lines (c, 2, 3) [mm]: a force of 1 that is spread evenly."""
+    """Mean of the modes along contact lines (c, 2, 3) [mm]: (c, u) sparse, a force of 1 that is spread evenly."""
     t = _spread(work, lines)
     c, count = len(lines), len(t)
     mean = csr_array((np.full(c * count, 1.0 / count), np.arange(c * count), np.arange(c + 1) * count))
@@ -245,7 +245,7 @@ def line_means(work: CellWorkpiece, lines: Array) -> csr_array:
 
 
 def displacements(work: CellWorkpiece, line: ArrayLike, points: ArrayLike) -> Array:
-    """(n, 3, 3) float [mm/N] displacement of points (n, 3) per force that is spread over a contact line (2, 3)."""
+    """Displacement of points (n, 3) per force that is spread over a contact line (2, 3): (n, 3, 3) float [mm/N]."""
     ends = np.asarray(line, dtype=np.float64).reshape(1, 2, 3)
     w = _along(work, ends, _spread(work, ends)).mean(axis=0)
     right = np.zeros((len(work.modes), 3, 3))

@@ -1,4 +1,4 @@
-"""Whether a pose, or all of a move, of the whole cutter is clear of the check points.
+"""Clearance of the whole cutter from the check points, at a pose or over a whole move.
 
 Notation: p [mm] tip, T unit axis; D distance of the nearest check point from the cutter, below 0 where one is in it. On
 a move the tip goes straight and the axis turns evenly from T0 to T1. No point of the cutter within L of the tip goes
@@ -43,7 +43,9 @@ def clearance(
 def nearest(
     ordered: Floats, tree: Tree, cutter: CatalogueCutter, stages: Floats, tips: ArrayLike, axes: ArrayLike, cap: float
 ) -> tuple[Floats, Ints]:
-    """As :func:`clearance` of points ``ordered`` (m, 3) by their tree; the point's place in that order."""
+    """The clearance as of :func:`clearance`, of points ``ordered`` (m, 3) by their tree, and the nearest point's place
+    in that order.
+    """
     p = np.ascontiguousarray(tips, dtype=np.float64).reshape(-1, 3)
     a = np.ascontiguousarray(axes, dtype=np.float64).reshape(-1, 3)
     out, which = np.empty(len(p)), np.empty(len(p), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""The walls of an impeller covered by points, so that a cutter that is clear of them is clear of the walls.
+"""Covering of the walls of an impeller: points so close that a cutter clear of them is clear of the walls.
 
 Notation: r corner radius; tolerance [mm]; nodes q of the walls as in ``nodes.py``, with reach t and bend e; sunk [mm]
 how deep in the metal a node is put, c its place.
@@ -57,7 +57,7 @@ _MOST = 32
 
 @dataclass(frozen=True, eq=False)
 class Covering:
-    """Nodes of all walls round a channel.
+    """Covering of all walls round a channel.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Covering:
         object.__setattr__(self, "ordered", np.ascontiguousarray(self.points[self.tree.order]))
 
     def depth(self, radius: float) -> float:
-        """How deep a wall may lie in what a ball of this radius rolls round [mm]; inf: nothing is known."""
+        """Greatest depth of a wall in a part of the tool inside which a ball of this radius rolls [mm]; inf: none."""
         return depth_of(radius, self.reach, self.bend, self.sunk)
 
     def proves(self, cutter: CatalogueCutter, clearance: float) -> bool:
@@ -100,7 +100,7 @@ class Covering:
         return out
 
     def met(self, cutter: CatalogueCutter, tips: Floats, axes: Floats, clearance: float) -> Floats:
-        """How deep a node lies in a cutter at each pose (n,) [mm]; 0: none does."""
+        """Depth of the deepest node in a cutter at each pose (n,) [mm]; 0: no node is in it."""
         away, _ = nearest(self.ordered, self.tree, cutter, self.stages(cutter, clearance), tips, axes, 0.0)
         return -away
 
@@ -108,7 +108,7 @@ class Covering:
         self, scene: Scene, cutter: CatalogueCutter, tables: Floats, clearance: float, points: NDArray[np.int64],
         ranges: tuple[Floats, ...], least: float, workers: int = 1,
     ) -> tuple[tuple[Floats, ...], NDArray[np.bool_]]:  # fmt: skip
-        """What of ranges of B holds for the nodes too; False where there were too many arcs to tell.
+        """Parts of the ranges of B that hold for the nodes too; False where there were too many arcs to decide.
 
         Parameters
         ----------
@@ -149,7 +149,7 @@ def depth_of(radius: float, reach: float, bend: float, sunk: float) -> float:
 def covering_of(
     impeller: Impeller, tolerance: float, corner: float, around: int, hub_range: tuple[float, float]
 ) -> Covering:
-    """The walls of the channels beside the bodies of an impeller covered.
+    """Covering of the walls of the channels beside the bodies of an impeller.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Points that cover a surface: no point of it is farther from one of them than a stated bound.
+"""Nodes that cover a surface: every point of it is within a stated bound of one of them.
 
 Notation: X(u, v) [mm] a surface, q = X(u_i, v_j) a node, p = X(u_i + a, v_j + b) a point of it nearer to q than to its
 neighbours, |a| <= A, |b| <= B. With bounds M of the second derivatives between them p - q = t + e, t = X_u(p) a +

@@ -1,4 +1,4 @@
-"""The largest cutter at each of given pallet angles."""
+"""Largest cutter at each of given pallet angles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The largest cutter at each pallet angle of a grid: what may go there, before exact ranges say it.
+"""Largest cutter at each pallet angle of a grid, an estimate before the exact ranges are calculated.
 
 Notation: rho = R - r of one corner radius r; c contact point, t table angle, B pallet angle.
 """
@@ -22,7 +22,7 @@ def admitted(
 
     Parameters
     ----------
-    found : of the corner radius, with its table angles; nothing above its bounds and ``slack`` [mm] is told apart
+    found : of the corner radius, with its table angles; values above bounds and ``slack`` [mm] are alike
     cut : height of the cutting part above the corner's centres [mm], as the limits were found with
 
     Returns

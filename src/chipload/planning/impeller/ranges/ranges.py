@@ -1,4 +1,4 @@
-"""The pallet angles at which one cutter is clear, neck, shank and holder too.
+"""Exact ranges of the pallet angle in which one cutter is clear, with neck, shank and holder.
 
 Notation: as in ``search.py``. A range is a row (from, to) [rad] of pallet angles; at its ends the cutter touches.
 Parts narrower than ``FLAT`` where the cutter's axis stands along the normal are left out: there V has no direction.
@@ -29,7 +29,7 @@ _MOST = 32  # ranges of one contact point, points of one proof
 
 @dataclass(frozen=True, eq=False)
 class Ranges:
-    """Where one cutter may go.
+    """Valid pallet angles of one cutter.
 
     Parameters
     ----------
