@@ -47,7 +47,7 @@ FACETS = (96, 64)
 #: the finished wall may be cut into by the chord of its rows and by so much [mm], for those of chips and facets
 GOUGE = 0.003
 #: share of the contact line of a tooth over which its force is spread
-LOADED_PART = 0.5
+LOADED = 0.5
 #: share of a step-over that rows may be farther apart: a height of whole step-overs, with rounded digits, stays so
 SLACK = 1e-4
 
@@ -141,7 +141,7 @@ class WallInputs:
         if not isinstance(pose, FlankPose):
             return None
         height = self.body.shape.size()[1] * (1.0 - self.body.foot)
-        return ContactLine(abs(pose.step) / height, LOADED_PART * pose.tooth_line(self.depths.law.limits.smallest) / height)
+        return ContactLine(abs(pose.step) / height, LOADED * pose.tooth_line(self.depths.law.limits.smallest) / height)
 
     @property
     def surface_line(self) -> ContactLine | None:
