@@ -143,7 +143,7 @@ class Material:
 
     @property
     def variances(self) -> NDArray[np.float64]:
-        """Return the covariance (6, 6) of the coefficients: the fitted one, or from the spread with independent errors.
+        """Covariance (6, 6) of the coefficients: the fitted one, or from the spread with independent errors.
 
         Raises
         ------

@@ -283,7 +283,7 @@ def _spacing(t: Floats, stated: float | None, label: str) -> float:
 
 
 def _findings(measured: Measured, window: tuple[float, float] | None, end: float) -> Iterator[Finding]:
-    """Return findings: a window that the file does not fill, clipped samples, channels that drift."""
+    """Yield findings: a window that the file does not fill, clipped samples, channels that drift."""
     step = 1.0 / measured.rate
     if window is not None and (measured.start - window[0] > step or window[1] - end > step):
         text = f"the window {window[0]:g} to {window[1]:g} s is filled from {measured.start:g} to {end:g} s alone"

@@ -118,7 +118,7 @@ class ToothEngagement:
 
     @property
     def frames(self) -> Floats:
-        """Return ``frame``.
+        """The array ``frame``; refused if it is None.
 
         Raises
         ------

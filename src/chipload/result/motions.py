@@ -55,6 +55,6 @@ def motion_columns(program: Program, seconds: NDArray[np.float64]) -> Columns:
 
 
 def motion_blocks(program: Program, machine: Machine) -> Iterator[Columns]:
-    """Return the history of a program on a machine in one block; no block if the program has no motion."""
+    """Yield the history of a program on a machine in one block; no block if the program has no motion."""
     if len(program):
         yield motion_columns(program, times_on(program, machine))
