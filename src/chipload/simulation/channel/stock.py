@@ -1,4 +1,4 @@
-"""What a program takes out of a blank, row after row: rapids and the parts above the cutting part must take nothing.
+"""Removal of a channel program from its blank, row by row; rapids and parts above the cutting part must remove nothing.
 
 Notation: the blank is the part of a body of revolution between two meridional curves, inner and outer, and two angles
 theta, as triangles. It is kept as dexels, a route of its own to the removed volume.
@@ -27,7 +27,7 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class ChannelRemoval:
-    """What a program takes from a blank.
+    """Material that a program removes from a blank.
 
     Parameters
     ----------
