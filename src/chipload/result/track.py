@@ -30,7 +30,7 @@ Blocks = Callable[[], Iterator[Columns]]
 
 
 class TrackKind(enum.StrEnum):
-    """Kind of the tracks of a result: what they compare."""
+    """What the tracks of a result compare."""
 
     STRATEGY = "strategy"
     VARIANT = "variant"

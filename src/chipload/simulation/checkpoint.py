@@ -1,12 +1,12 @@
 """The checkpoint folder of a run: finished chunks and state, from which a stopped run continues.
 
-Notation: a piece is the columns of steps that follow one another, in one Parquet file; the state is all that goes on
-from one step to the next, after the last step of the last piece, in some files. ``last.json`` names the pieces and the
-state that belong together and is replaced at one moment: whatever else lies there is of a piece that was not finished,
-and is written again. Passes beside the removal keep one file each (:mod:`chipload.simulation.kept_pass`).
+Notation: a chunk is the columns of consecutive steps in one Parquet file. The state is all data that continue from one
+step to the next, after the last step of the last chunk, in several files. ``last.json`` names the chunks and the state
+that belong together and is replaced atomically: other files belong to a chunk that was not finished, and are written
+again. Each pass beside the removal has one file (:mod:`chipload.simulation.kept_pass`).
 
-The key stands for all that the result depends on. What was kept under another key is of another run: it is thrown away.
-What cannot be read is set aside in a folder beside it, never removed.
+The key is a hash of all inputs of the result. Data with another key belong to another run and are deleted. Data that
+cannot be read are moved to a folder beside it and never deleted.
 """
 
 from __future__ import annotations
@@ -282,7 +282,7 @@ class Checkpoint:
             self._clear()
 
     def columns(self) -> Stored:
-        """What the pieces hold."""
+        """Return the columns of the chunks."""
         return Stored(self.folder, self.parts)
 
     def close(self) -> None:
@@ -334,7 +334,7 @@ class Checkpoint:
 
 
 def _of_run(file: Path) -> bool:
-    """Whether a file of the folder belongs to the state of the removal: it is no lock and of no pass."""
+    """Return whether a file of the folder belongs to the state of the removal, not to the lock or a pass."""
     return file.name != LOCK and not file.name.startswith(PASS)
 
 

@@ -1,9 +1,9 @@
 """Simulation of a Program in chunks: memory does not grow with the program, and a stopped run continues.
 
-Notation: a piece as in :mod:`chipload.simulation.checkpoint`. Steps are simulated in blocks; after a block, when some
-seconds have passed, the columns since the last time become a piece, the stock and the sums a state. A block needs the
-stock and the sums before it and nothing else, both come back from a file bit for bit, and blocks do not depend on when
-states were written: so the result has the same bytes however often the run was stopped.
+Notation: a chunk as in :mod:`chipload.simulation.checkpoint`. Steps are simulated in blocks. After a block, when some
+seconds have passed, the columns since the last state become a chunk, and stock and sums become a state. A block depends
+only on the stock and the sums before it, which a file restores bit for bit, and not on when states were written.
+Therefore the result has the same bytes however often the run was stopped.
 """
 
 from __future__ import annotations

@@ -24,9 +24,9 @@ would take again after a deflection is not known.
 Without helix a tooth leaves all of its bite at once: the moment just before counts, as in
 :mod:`chipload.cutting.wall_error`.
 
-The load is that of the rigid model in the middle of the step: bending does not thin the chip. The work gives way at q
-under the whole force as if it acted there. The cutter is stiff along its axis, and q is that of the feed's envelope:
-marks of single teeth along the feed are not seen.
+The load is that of the rigid model in the middle of the step: deflection does not reduce the chip thickness. The work
+deflects at q under the whole force as if it acted there. The cutter is stiff along its axis, and q lies on the envelope
+of the feed: marks of single teeth along the feed are not calculated.
 
 Reference: [Uddin2007] and [Altintas2012] ch. 2 for the wall of an end mill, which this repeats for any cutter and
 surface.

@@ -98,7 +98,7 @@ def _clear(
 
 
 def met(tiles: Tiles, stock: LayeredStock, layer: Ints, low: Floats, high: Floats) -> NDArray[np.bool_]:
-    """Whether boxes (n, 2), (n, 2), each in its layer, meet what is left there.
+    """Return whether boxes (n, 2), (n, 2), each in its layer, meet the remaining stock there.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Passes over the steps of a program beside the removal (gouge, collisions) that continue after a stop.
 
-Notation: a pass goes through the steps block after block and keeps arrays; what it has found so far is one file
-``pass-<name>.npz`` in the folder of the run's checkpoint, written whole or not at all. Blocks do not depend on when
-that was, and arrays come back bit for bit: a pass that was stopped finds what one that was not stopped finds. A pass
-that was finished is not gone through again.
+Notation: a pass processes the steps block after block and stores arrays. Its results so far are one file
+``pass-<name>.npz`` in the checkpoint folder of the run, written completely or not at all. Blocks do not depend on when
+the file was written, and arrays are restored bit for bit: a stopped pass has the same result as one that was not
+stopped. A finished pass is not repeated.
 """
 
 from __future__ import annotations

@@ -86,7 +86,7 @@ def _support(steps: Steps, k: Ints, height: Floats, cutter: Cutter) -> Floats:
 
 
 def _touched(support: Floats, layer: Ints, stock: LayeredStock) -> NDArray[np.bool_]:
-    """Whether the polygons of these supports touch what is left of their layers."""
+    """Return whether the polygons of these supports touch the remaining stock of their layers."""
     after, u = np.roll(support, -1, axis=1), np.roll(_U, -1, axis=0)
     cross = math.sin(math.tau / DIRECTIONS)
     x = (support * u[:, 1] - after * _U[:, 1]) / cross

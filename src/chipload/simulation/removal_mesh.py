@@ -1,7 +1,7 @@
 """The removal mesh: the surface of the stock over the rows of a history as quads, each with its visible frames.
 
 Notation: a **frame** stands for a run of rows; frame 0 is the stock before row 0, frame i + 1 that after row
-``rows[i]``. The stock is kept as dexels (:mod:`chipload.stock.dexel`), a route of its own to the removed volume: it
+``rows[i]``. The stock is kept as dexels (:mod:`chipload.stock.dexel`), independent of the removed volume: it
 knows the tip, the axis and the cutter of each row, nothing of chips. Its cells are so wide that the work stays within
 :data:`WORK`; what is thinner than a cell may be missing in the picture.
 """

@@ -3,7 +3,7 @@
 Notation: C [mm] the middle of the corner circle's centres, at r_c along the axis from the tip; e radius of that circle,
 r corner radius; (h, rho) height over C along the axis and distance from it.
 
-Two routes, neither of which knows how the path was made:
+Two methods, both independent of the planning of the path:
 
 * **path**: at both ends and in the middle of every motion, rapids too, the least distance of the body's points to the
   corner (a torus, a sphere where e = 0) and to the flank and shank above it. Points of a grid of spacing s miss the

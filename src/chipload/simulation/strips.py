@@ -238,7 +238,7 @@ class Strips:
         return [done[k] for k in range(len(done))]
 
     def next(self, steps: Steps, piece: ChipAreas | None) -> TakenByLayers:
-        """What the next block of steps takes; ``piece``: the chip of most pieces before them."""
+        """Return the removal of the next block of steps; ``piece`` is the chip of most pieces before them."""
         if not self._blocks:
             done = self._coming.result()
             self._states = [state for _, state in done]

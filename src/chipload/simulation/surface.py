@@ -4,7 +4,7 @@ Notation: steps as in :mod:`chipload.simulation.steps`; the distance of a point 
 the program, is below 0 where the part is cut into (gouge) and above 0 where material stands over it (excess).
 
 The part, fixtures and what a stock fills are points: corners of triangles whose sides are at most ``spacing`` long, and
-a grid of that pitch. What lies between them is not looked at: a rod thinner than the spacing may pass.
+a grid of that pitch. The space between points is not examined: a rod thinner than the spacing may be missed.
 """
 
 from __future__ import annotations

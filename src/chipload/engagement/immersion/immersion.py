@@ -13,7 +13,7 @@ a sinusoid of phi, f_z sin(phi) for a flank that moves across its axis, the feed
 tooth cuts where h > 0 (by more than rounding: 1e-9 of its way) and the point is in the material that the move before it
 has left.
 
-The material is known in layers, each by its section at half its height. A point is held against the section of its
+The material is known in layers, each by its section at half its height. A point is compared with the section of its
 layer at the place where the cutter's surface, uphill or downhill of the point, has the height of that section: on a
 convex cutter both lie on the same front, so that what the cutter left half a step behind is not taken for air, and the
 end of a stock at a bound of layers is met exactly. Where the surface has no such place (flat bottom, tip of a ball), or

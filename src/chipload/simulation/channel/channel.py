@@ -254,7 +254,7 @@ def frames_of(normals: Floats) -> Floats:
 
 
 def scallop_numbers(crests: Floats, asked: float) -> dict[str, float]:
-    """Greatest and mean height of the scallops [mm], and the mean as a share of what is asked; 0 where there is none.
+    """Return greatest and mean scallop height [mm], and the mean over the required height; 0 if there are none.
 
     >>> scallop_numbers(np.array([0.25, 0.5]), 0.5)
     {'greatest_mm': 0.5, 'mean_mm': 0.375, 'mean_share': 0.75, 'count': 2.0}

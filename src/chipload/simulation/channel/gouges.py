@@ -198,7 +198,7 @@ def deepest_gouge(
 
 
 def _height(bend: Floats, grown: float) -> float:
-    """How far above a wall is looked [mm]: a tool that stays higher than a cell may bend (n,) does not gouge there."""
+    """Return the search height [mm] above a wall: a tool higher than the bend (n,) of a cell does not gouge there."""
     most = max(1.0, grown)
     known = bend[np.isfinite(bend)]
     return min(most, max(float(known.max()) + _DIP, _LOW)) if len(known) == len(bend) else most
@@ -230,7 +230,7 @@ def _bounds(low: Floats, t: Floats, w: Floats, r: float, grown: float, depth: fl
 
 
 def _sag(r: float, t: Floats, w: Floats) -> Floats:
-    """How much a ball of radius r that is lowest on a cell is met higher from its nearest corner (n,) [mm]."""
+    """Return the height (n,) [mm] by which a ball of radius r, lowest on a cell, is higher at the nearest corner."""
     wide = t + r * w
     out: Floats = np.where(wide < r, r - np.sqrt(np.maximum(r * r - wide * wide, 0.0)) + 1.5 * t * w, np.inf)
     return out
