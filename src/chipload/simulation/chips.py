@@ -206,7 +206,7 @@ def by_layers(engine: Engine, setting: RunSettings, found: HandOver) -> tuple[Ru
 
 
 def with_accuracy(removal: Removal, program: Program, before: LayeredStock | None, setting: RunSettings) -> Removal:
-    """Return a removal with energy balance and resolution error; ``before`` is the stock before it, None: unchanged."""
+    """Add energy balance and resolution error to a removal; ``before`` is the stock before it, None: add nothing."""
     if before is None:
         return removal
     return replace(
