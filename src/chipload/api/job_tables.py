@@ -30,7 +30,7 @@ SEVERAL = ("operation", "surface", "surprise", "fixture", "measurement")
 def run_tables(
     capability: str, folder: str | Path, progress: Progress, kinds: tuple[str, ...] = (), /, **given: Any
 ) -> FinishedJob:
-    """Run the job of these tables; None: the table is left out. Its operations must be of one of ``kinds``."""
+    """Run the job of these tables; a table that is None is left out. Operations must be of one of ``kinds``."""
     from chipload import jobs
 
     tables = {key: _shaped(key, value) for key, value in given.items() if value is not None}
@@ -42,7 +42,7 @@ def run_tables(
 
 
 def _shaped(key: str, given: Any) -> Any:
-    """The table or tables that a value of this key stands for."""
+    """Return the table or tables that a value stands for under this key."""
     if key in FILES:
         return _file(key, given)
     if key in SOURCES:
@@ -51,7 +51,7 @@ def _shaped(key: str, given: Any) -> Any:
 
 
 def tables_of(key: str, given: Tables) -> list[Values]:
-    """One table or several, as a list."""
+    """Return one table or several as a list."""
     several = [given] if isinstance(given, Mapping) else list(given)
     for k, one in enumerate(several):
         if not isinstance(one, Mapping):
@@ -60,12 +60,12 @@ def tables_of(key: str, given: Tables) -> list[Values]:
 
 
 def cutters_of(given: Any) -> list[Any]:
-    """One cutter or several, as a list."""
+    """Return one cutter or several as a list."""
     return list(given) if isinstance(given, (list, tuple)) else [given]
 
 
 def _source(key: str, given: Source) -> Values:
-    """The table of a shipped thing or of a file."""
+    """Return the table that names a shipped entry or a file."""
     table = _file(key, given)
     if isinstance(given, Mapping) or is_file(given):
         return table
@@ -73,7 +73,7 @@ def _source(key: str, given: Source) -> Values:
 
 
 def _file(key: str, given: Source) -> Values:
-    """The table of a file."""
+    """Return the table that names a file."""
     if isinstance(given, Mapping):
         return given
     if not isinstance(given, (str, Path)):
@@ -82,5 +82,5 @@ def _file(key: str, given: Source) -> Values:
 
 
 def is_file(name: str | Path) -> bool:
-    """Whether a name is that of a file: a path, or a text that ends in .toml or .ini."""
+    """Return whether a name is a file name: a path, or a text that ends in .toml or .ini."""
     return isinstance(name, Path) or Path(name).suffix.lower() in (".toml", ".ini")

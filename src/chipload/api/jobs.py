@@ -1,4 +1,4 @@
-"""Run and check jobs, write results and read them back."""
+"""Functions that run and check a job, write its result folder and load it again."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def run_job(
     folder: str | Path = ".",
     progress: Progress = silent,
 ) -> FinishedJob:
-    """Run a job of any kind; nothing is written.
+    """Run a job of any capability and return its result; no file is written.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def run_job(
 def check_job(
     job: str | Path | Values, overrides: Sequence[str] = (), *, folder: str | Path = "."
 ) -> tuple[list[str], bool]:
-    """Read all that a job names without running it: a line for each thing that was found, and whether it holds.
+    """Read every file that a job names, without running it; return a line for each, and whether the job can run.
 
     Parameters and errors are those of :func:`run_job`.
     """
@@ -54,12 +54,12 @@ def check_job(
 
 
 def write_result(job: FinishedJob, out: str | Path) -> Path:
-    """Write the folder that ``chipload run`` writes, whole or not at all; errors are those of ``FinishedJob.save``."""
+    """Write the result folder of ``chipload run``, completely or not at all; errors as ``FinishedJob.save``."""
     return job.save(out)
 
 
 def load_result(folder: str | Path) -> Result:
-    """Read a result folder back; histories are read when they are asked for.
+    """Load a result folder. The history of a track is read on first use.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Control the torque, change feeds and fit force coefficients from values."""
+"""Functions that simulate torque control, optimise feeds and fit force coefficients."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def optimise_feeds(
     folder: str | Path = ".",
     progress: Progress = silent,
 ) -> FinishedJob:
-    """Give the lines of a program the greatest feeds that its limits of loads allow; the path stays.
+    """Change the feed of each line of a program to the greatest that the load limits allow; the path does not change.
 
     Result, errors and parameters that are not named here are those of :func:`plan_contour`.
 
@@ -79,7 +79,7 @@ def optimise_feeds(
     ----------
     program : the program's file, or keys of ``[program]``
     operation : keys of the ``[[operation]]`` of kind ``simulate``, with its table ``feeds``
-    limits : keys of ``[limits]``; at least one of a load
+    limits : keys of ``[limits]``; at least one limits a load
     part, fixture, machine_table, stiffness, workpiece, dynamics : keys of the table of this name; None: it is left out
     """
     for k, op in enumerate(tables_of("operation", operation)):
@@ -107,7 +107,7 @@ def fit_coefficients(
     progress: Progress = silent,
     **settings: Any,
 ) -> FinishedJob:
-    """Identify force coefficients from measured forces, and predict the measurements that are kept back.
+    """Identify force coefficients from measured forces, and predict the measurements that are not used for the fit.
 
     ``result.operations[0]`` holds the coefficients with their intervals, ``outcome.material`` the
     :class:`chipload.Material`; ``save(out)`` writes material.toml and the report. Errors are those of

@@ -1,4 +1,4 @@
-"""Plan contours, pockets, impellers and thin walls from values."""
+"""Functions that plan and verify contours, pockets, impellers and thin walls."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Read a machine, a material or a program."""
+"""Functions that read a machine, a material or a program."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def read_machine(name: str | Path) -> Machine:
-    """Read a machine: a shipped one by its name, a TOML file or a LinuxCNC configuration (.ini).
+    """Read a machine by its shipped name, or from a TOML file or a LinuxCNC configuration (.ini).
 
     Raises
     ------
@@ -38,7 +38,7 @@ def read_machine(name: str | Path) -> Machine:
 
 
 def read_material(name: str | Path) -> Material:
-    """Read force coefficients: a shipped material by its name, or a TOML file. Errors are those of read_machine.
+    """Read force coefficients by the name of a shipped material, or from a TOML file; errors as :func:`read_machine`.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def read_program(
     setup: Setup | None = None,
     progress: Progress = silent,
 ) -> ProgramReading:
-    """Read NC text or CL data as the controller of a machine does.
+    """Read NC text or CL data as the controller of a machine interprets it.
 
     Parameters
     ----------

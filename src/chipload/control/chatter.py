@@ -8,7 +8,7 @@ has a frequency of its own beside the harmonics. Harmonics above f_s / 2 fold ba
 stated are left out there too, and a frequency above f_s / 2 is told folded; the signal should have a filter before it
 is sampled.
 
-A window in which the speed moves is not judged. Chatter is said after several windows, one behind the other, in which
+A window in which the speed changes is not judged. Chatter is reported after several consecutive windows in which
 ``level`` and ``share`` are above what is stated. The answer is another speed: that of a quiet window of the program's
 simulation (``stability.windows`` of its summary) which the override reaches, nearest to the present one, but none in
 which chatter was heard; where there is none, or after so many changes, a stop. Nothing is judged on the way to it; a
@@ -44,7 +44,7 @@ EDGE = 0.1
 
 
 class Heard(StrEnum):
-    """What a window of samples was."""
+    """Judgement of a window of samples."""
 
     QUIET = "quiet"
     CHATTER = "chatter"
@@ -52,7 +52,7 @@ class Heard(StrEnum):
 
 
 class ChatterAnswer(StrEnum):
-    """What is done."""
+    """Action after a window of samples."""
 
     KEEP = "keep"
     SPEED = "speed"
@@ -61,7 +61,7 @@ class ChatterAnswer(StrEnum):
 
 @dataclass(frozen=True)
 class ListeningRules:
-    """When a signal is chatter, and what may be done.
+    """Thresholds for chatter in a signal, and the permitted actions.
 
     Parameters
     ----------
@@ -102,13 +102,13 @@ class ListeningRules:
 
     @property
     def samples(self) -> int:
-        """N of a window."""
+        """Number of samples N of a window."""
         return round(self.window * self.rate)
 
 
 @dataclass(frozen=True)
 class HeardWindow:
-    """What a window of the signal has beside the harmonics of the speed.
+    """Content of a window of the signal beside the harmonics of the spindle speed.
 
     ``level`` is in units of the signal, ``hertz`` the frequency of its greatest line [Hz].
     """
@@ -120,7 +120,7 @@ class HeardWindow:
 
 
 def listen(signal: ArrayLike, speed: ArrayLike, rules: ListeningRules) -> HeardWindow:
-    """One window of a signal.
+    """Analyse one window of a signal.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def listen(signal: ArrayLike, speed: ArrayLike, rules: ListeningRules) -> HeardW
 
 @dataclass(frozen=True)
 class SpeedAnswer:
-    """What is done after a window: ``override`` of the programmed speed, 0 of a stop, and why."""
+    """Action after a window: the ``override`` of the programmed speed, 0 for a stop, and the reason."""
 
     kind: ChatterAnswer
     override: float
@@ -181,7 +181,7 @@ class SpeedAnswer:
 
 @dataclass(eq=False)
 class ChatterGuard:
-    """Hears chatter window by window and answers with another speed, or a stop.
+    """Detector of chatter, window by window, that answers with another speed or a stop.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ class ChatterGuard:
             raise InputError("chatter: a quiet window must rise from above 0")
 
     def hear(self, signal: ArrayLike, speed: ArrayLike) -> SpeedAnswer:
-        """The answer to one window of samples; parameters as of :func:`listen`."""
+        """Return the answer to one window of samples; parameters as for :func:`listen`."""
         heard = listen(signal, speed, self.rules)
         wanted = self.override * self.programmed
         if self._changes and abs(float(np.mean(np.asarray(speed))) - wanted) > REACHED * wanted:
@@ -236,7 +236,7 @@ class ChatterGuard:
         return SpeedAnswer(ChatterAnswer.SPEED, self.override, heard, f"{said}: {60.0 * found:.0f} rpm")
 
     def _quiet(self) -> float | None:
-        """The quiet speed that is taken [rev/s]; None: there is none."""
+        """Return the quiet speed to take [rev/s]; None if there is none."""
         low, high = self.rules.least * self.programmed, self.rules.most * self.programmed
         now = self._bad[-1]
         found = []

@@ -56,7 +56,7 @@ def answers(
     windows: Sequence[tuple[float, float]],
     halui: bool = False,
 ) -> Iterator[str]:
-    """What is answered to a stream of lines ``signal speed``, windows half over one another; empty lines, and others
+    """Yield the answers to a stream of lines ``signal speed``, windows half over one another; empty lines, and others
     than two numbers, as halsampler writes where samples were lost, begin a window anew.
 
     Parameters

@@ -40,7 +40,7 @@ _ENDS = ("half", "whole")
 
 @dataclass(frozen=True, eq=False)
 class FuzzyTable:
-    """Sets and rules.
+    """A fuzzy table: sets of error, change and output, and rules.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class FuzzyTable:
 
 
 def read_fuzzy(path: str | Path) -> FuzzyTable:
-    """A table from a TOML file: ``name``, ``error``, ``change``, ``output``, ``rules``, ``ends`` (`half`, `whole`).
+    """Read a table from TOML: ``name``, ``error``, ``change``, ``output``, ``rules``, ``ends`` (`half`, `whole`).
 
     Centres are numbers or texts of fractions (`"2/3"`).
 
@@ -126,7 +126,7 @@ def read_fuzzy(path: str | Path) -> FuzzyTable:
 
 
 def standard() -> FuzzyTable:
-    """The table that comes with chipload: 7 x 7 sets, rule clip(i + j).
+    """Return the shipped table: 7 x 7 sets, rule clip(i + j).
 
     >>> standard().rules[3].tolist()
     [0, 1, 2, 3, 4, 5, 6]
@@ -135,7 +135,7 @@ def standard() -> FuzzyTable:
 
 
 def write_fuzzy(table: FuzzyTable) -> str:
-    """The TOML of a table; :func:`read_fuzzy` gives the same one back.
+    """Return the TOML text of a table, from which :func:`read_fuzzy` reads the same table.
 
     >>> write_fuzzy(additive(3)).splitlines()[-2]
     '    [2, 3, 4],'
@@ -165,7 +165,7 @@ def additive(sets: int = 7) -> FuzzyTable:
 
 
 def mamdani(table: FuzzyTable, error: ArrayLike, change: ArrayLike) -> Floats:
-    """Answers of min, max and centroid.
+    """Return the Mamdani output: minimum, maximum and centroid.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def mamdani(table: FuzzyTable, error: ArrayLike, change: ArrayLike) -> Floats:
 
 
 def sampled(table: FuzzyTable, error: float, change: float, points: int) -> float:
-    """The same by sampling the output at ``points`` places: the formula as it is written, to be trusted and slow."""
+    """Return the Mamdani output by sampling at ``points`` places: the formula as written, slow, as a reference."""
     a, b = _memberships(table.error, error), _memberships(table.change, change)
     first, last = table.output[0], table.output[-1]
     low = first - (table.output[1] - first) if table.whole_ends else first
@@ -212,7 +212,7 @@ def sampled(table: FuzzyTable, error: float, change: float, points: int) -> floa
 
 
 def product_sum(table: FuzzyTable, error: ArrayLike, change: ArrayLike) -> Floats:
-    """Answers of product and sum: the output centres, interpolated over the rules; shapes as :func:`mamdani`."""
+    """Return the output of product and sum: output centres interpolated over the rules; shapes as :func:`mamdani`."""
     e, d = _inputs(error, change)
     out = np.empty(e.size)
     for k, (x, y) in enumerate(zip(e.ravel(), d.ravel(), strict=True)):

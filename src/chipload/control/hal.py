@@ -8,8 +8,9 @@ pin `beat` changes with every step; HAL watches it and takes the feed away from 
 (examples/tube/linuxcnc). The time is that of the machine's pins, so a step that comes late is a long step, and one
 longer than `timeout_s` is a start: spindle and controller begin anew.
 
-The torque of the model is predicted in every case, with feed-forward or without, and readings are held against it. A
-controller that has stopped goes on sending 0, and beats, until it is asked to end: its end is the reason of the stop.
+The torque of the model is always predicted, with feed-forward or without, and readings are compared with it. A
+controller that has stopped continues to send 0 and to beat until it is told to end; it then returns the reason of the
+stop.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ COLUMNS = (
 
 @dataclass(frozen=True, eq=False)
 class HalJob:
-    """A controller and the machine that it controls.
+    """A controller, and the machine that it controls.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ class HalJob:
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What happened.
+    """Record of a run of the controller.
 
     Parameters
     ----------
@@ -119,13 +120,13 @@ class Record:
     torque_max: float
 
     def column(self, name: str) -> Floats:
-        """(n,) float, one of ``COLUMNS``."""
+        """Return a column (n,), one of ``COLUMNS``."""
         return np.asarray(self.rows[:, COLUMNS.index(name)])
 
 
 @dataclass(eq=False)
 class _Cut:
-    """The spindle, simulated and as it is estimated, and where it was at the last step.
+    """The simulated spindle, its estimate, and its position at the last step.
 
     Parameters
     ----------
@@ -173,7 +174,7 @@ class _Cut:
         return seconds
 
     def _measure(self, seen: PinValues, real: Spindle, noise: float, seconds: float) -> None:
-        """The torque from current and speed, those of the pins or the simulated ones."""
+        """Update current and estimate by a measurement of current and speed, from pins or simulated."""
         if self.source in MEASURED:
             speed = math.tau * abs(seen.speed)
             # a power over the speed is a torque [N m]
@@ -188,7 +189,7 @@ class _Cut:
             self.state = estimated(self.believed, self.state, self.current, seconds)
 
     def torque(self, seen: PinValues) -> float:
-        """The torque that the controller is told [N mm]; not a number: there is none."""
+        """Return the torque for the controller [N mm]; NaN if there is none."""
         if self.source == "pin":
             return 1e3 * seen.torque
         lost = self.source in MEASURED and not (math.isfinite(seen.current) and math.isfinite(seen.speed))
@@ -208,7 +209,7 @@ def control(
     seed: int = 0,
     notice: Callable[[Status, float], None] = lambda status, s: None,
 ) -> Record:
-    """Control a machine until its path ends, it is gone, or it is asked to stop.
+    """Control a machine until its path ends, the connection is lost, or a stop is requested.
 
     Parameters
     ----------
@@ -284,13 +285,13 @@ def control(
 
 
 def _wrong(seen: PinValues, cut: _Cut) -> bool:
-    """Whether time, place or velocity is not a number, or the time runs backwards."""
+    """Return whether time, place or velocity is not a number, or the time runs backwards."""
     numbers = (seen.time, seen.x, seen.y, seen.z, seen.velocity)
     return not all(map(math.isfinite, numbers)) or (cut.last is not None and seen.time < cut.last[0])
 
 
 def table_of(record: Record) -> str:
-    """The record as CSV."""
+    """Return the record as CSV."""
     lines = [",".join(COLUMNS)]
     lines += [",".join(f"{x:.9g}" for x in row) for row in record.rows]
     return "\n".join(lines) + "\n"

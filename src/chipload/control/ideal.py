@@ -1,8 +1,8 @@
 """References for the comparison of controllers: the shortest possible time, and a PI controller with tuned gains.
 
 Notation: F programmed feed, o(s) = min(cap, (T r - edge) / cut) the override at which the true torque is the limit T
-times the relief r; v <= o F, and the axes accelerate by a at most: v_i+1^2 <= v_i^2 + 2 a ds, both ways. Nobody who
-measures can be faster: it knows the true torque before it is cut.
+times the relief r; v <= o F, and the axes accelerate by a at most: v_i+1^2 <= v_i^2 + 2 a ds, both ways. No controller
+can be faster, because this reference knows the true torque before the cut.
 
 PI: of a plant with gain k (torque over T_ref for an override), lag t and delay d the rule SIMC with a closed loop as
 slow as the delay takes K = t / (2 k d) and T_I = min(t, 8 d). Reference: [Skogestad2003].
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 
 def ideal_time(truth: TorqueProfile, limit: float, relief: ArrayLike, cap: float, acceleration: float) -> float:
-    """Shortest time in which a path can be cut with the torque within its limit [s]; inf where no feed is slow enough.
+    """Return the shortest time [s] of a path with the torque within its limit; inf if no feed is slow enough.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def ideal_time(truth: TorqueProfile, limit: float, relief: ArrayLike, cap: float
 
 
 def pi_tuning(gain: float, lag: float, delay: float) -> tuple[float, float]:
-    """K and K / T_I [1/s] of a PI controller by the rule in the head of this file.
+    """Return K and K / T_I [1/s] of a PI controller by the rule SIMC, see the module.
 
     Parameters
     ----------

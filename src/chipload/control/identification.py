@@ -40,7 +40,7 @@ BLOCKS = 4
 
 @dataclass(frozen=True)
 class LogPrediction:
-    """A log that was predicted from the others.
+    """Prediction of a log from the others, and its error.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class LogPrediction:
 
 @dataclass(frozen=True, eq=False)
 class SensorReading:
-    """How the sensor of a spindle shows what it measures.
+    """Lag, noise and step of the sensor of a spindle.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class SensorReading:
 
 @dataclass(frozen=True, eq=False)
 class IdleDrift:
-    """How the idle current changes over the logs.
+    """Drift of the idle current over the logs.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class IdleDrift:
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedSpindle:
-    """What the logs tell of a spindle.
+    """A spindle as identified from logs.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ class IdentifiedSpindle:
 
 
 def run_of(log: Log, label: str, source: str, air: bool = False) -> Run:
-    """The rows of a log in which the spindle turns.
+    """Return the rows of a log in which the spindle turns.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def identify_spindle(
 
 
 def bandwidth(lag: float, smoothing: float) -> float:
-    """Frequency [Hz] at which lag and filter [s] leave half of the power; inf without both.
+    """Return the frequency [Hz] at which lag and filter [s] leave half of the power; inf without both.
 
     One lag of 1 / (2 pi) s has half at 1 Hz:
 
@@ -239,7 +239,7 @@ def bandwidth(lag: float, smoothing: float) -> float:
 
 
 def aliased(frequency: float, rate: float) -> float:
-    """The frequency [Hz] as which readings at a rate [Hz] show another one.
+    """Return the frequency [Hz] to which readings at a rate [Hz] fold another frequency.
 
     >>> aliased(300.0, 100.0), aliased(130.0, 100.0), aliased(30.0, 100.0)
     (0.0, 30.0, 30.0)
@@ -261,7 +261,7 @@ def _identified(
 
 
 def _lag(runs: Sequence[Run], constant: float | None, changes: bool) -> tuple[float, tuple[float, float]]:
-    """The lag with the least residual, and the interval of those that fit nearly as well."""
+    """Return the lag with the least residual, and the interval of the lags that fit nearly as well."""
     longest = 0.05 * max(float(run.time[-1] - run.time[0]) for run in runs)
     period = min(float(np.median(np.diff(run.time))) for run in runs)
     tried = [lag for lag in LAGS if lag <= longest and (lag == 0.0 or lag >= 0.1 * period)]
@@ -287,7 +287,7 @@ def _lag(runs: Sequence[Run], constant: float | None, changes: bool) -> tuple[fl
 
 
 def _edge(misfit: Callable[[float], float], inside: float, outside: float, allowed: float) -> float:
-    """Where the misfit passes what is allowed, between a lag that fits and an end that may not."""
+    """Return the lag at which the misfit passes the allowed one, between a lag that fits and an end that may not."""
     if misfit(outside) <= allowed:
         return outside
     for _ in range(12):
@@ -307,7 +307,7 @@ def _spread(runs: Sequence[Run], found: SpindleMap) -> float:
 
 
 def _step(values: Floats) -> float:
-    """Step of the readings between their quartiles; 0: none is seen."""
+    """Return the step of the readings between their quartiles; 0 if there is none."""
     low, high = np.quantile(values, (0.25, 0.75))
     some, count = np.unique(values[(values >= low) & (values <= high)], return_counts=True)
     if len(some) < 3 or len(some) > 0.5 * count.sum():
@@ -347,7 +347,7 @@ def _predict_each(
     runs: Sequence[Run], names: Sequence[str], lag: float, stated: float | None, constant: float | None, level: float,
     smoothing: float,
 ) -> tuple[LogPrediction, ...]:  # fmt: skip
-    """Each log predicted from the others; a single one in blocks."""
+    """Predict each log from the others; a single log in blocks."""
     parts = list(zip(names, runs, strict=True)) if len(runs) > 1 else _blocks(names[0], runs[0])
     out = []
     for k, (name, run) in enumerate(parts):
@@ -373,7 +373,7 @@ def _blocks(name: str, run: Run) -> list[tuple[str, Run]]:
 
 
 def _predicted(name: str, run: Run, found: SpindleMap, smoothing: float) -> LogPrediction | None:
-    """Error of the torque of a log by a map that was made without it."""
+    """Return the torque error of a log by a map that was identified without it."""
     if len(run.time) < 3:
         return None
     period = float(np.median(np.diff(run.time)))
@@ -402,7 +402,7 @@ def _predicted(name: str, run: Run, found: SpindleMap, smoothing: float) -> LogP
 
 
 def _separation(low: Floats, high: Floats) -> float:
-    """Share of pairs in which the second is greater, ties half."""
+    """Return the share of pairs in which the second is greater; ties count half."""
     order = np.sort(low)
     below = np.searchsorted(order, high, "left") + np.searchsorted(order, high, "right")
     return float(below.mean() / (2.0 * len(low)))

@@ -1,4 +1,4 @@
-"""The torque that a thin wall allows.
+"""Allowable force and torque on a thin wall.
 
 Notation: s [mm] place along the wall; C_w, C_t [mm/N] compliances of the wall and of the cutter along the wall's
 normal; d [mm] deflection that is allowed, S [MPa] stress that is; F_r, F_t [N] radial and tangential force on the
@@ -7,8 +7,8 @@ cutter; R its radius; A [mm^2] area of the chip, b [mm] depth of cut.
     F_r <= min(d / (C_t + C_w), S / stress of the wall under 1 N),
     F_r = Krc A + Kre b,  F_t = Ktc A + Kte b,   T = R F_t with A from F_r at its limit.
 
-T is the torque of the moment. The controller holds the mean over a revolution, which is less by the ratio of mean and
-peak of the cut; that ratio must be given.
+T is the instantaneous torque. The controller holds the mean over a revolution, which is less by the ratio of mean to
+peak of the cut; that ratio must be stated.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class WallLimit:
-    """The force that a wall allows at places along it.
+    """Allowable force at places along a wall.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class WallLimit:
 
     @property
     def force(self) -> Floats:
-        """(k,) float [N], the allowable radial force."""
+        """The allowable radial force (k,) [N]."""
         return np.minimum(self.by_deflection, self.by_strength)
 
 
@@ -58,7 +58,7 @@ def wall_limit(
     length: float,
     width: float,
 ) -> WallLimit:
-    """Allowable radial force on the wall with the cutter at ``s``.
+    """Return the allowable radial force on the wall with the cutter at ``s``.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def wall_limit(
 
 @dataclass(frozen=True, eq=False)
 class TorqueLimit:
-    """Torque at which a radial force is reached.
+    """Torque limit from a radial force.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class TorqueLimit:
 def torque_limit(
     force: ArrayLike, radius: float, depth: float, material: Material, mean_over_peak: float
 ) -> TorqueLimit:
-    """Torque T_ref at which the radial force reaches ``force``.
+    """Return the torque T_ref at which the radial force reaches ``force``.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Logs of a cut: columns of a CSV file, by name and unit.
+"""Reading of logs of a cut: columns of a CSV file, by name and unit.
 
 Notation: t time [s], w spindle speed [rad/s], I spindle current [A], T torque [N mm], f feed [mm/s].
 
@@ -60,7 +60,7 @@ KNOWN = {
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """Columns of a log; what it does not hold is None.
+    """Columns of a log; a column that it lacks is None.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class _Columns:
 
 
 def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = None) -> tuple[Log, list[Finding]]:
-    """Read a log.
+    """Read a log from a CSV file.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = Non
 
 
 def _table(text: str, head: bool) -> tuple[list[str], Any]:
-    """Names of the columns, and the rows; without a head the names are numbers, the separators spaces."""
+    """Return column names and rows; without a head the names are numbers and the separators spaces."""
     if head:
         rows = csv.reader(io.StringIO(text, newline=""))
         return [name.strip() for name in next(rows, [])], rows
@@ -162,7 +162,7 @@ def _table(text: str, head: bool) -> tuple[list[str], Any]:
 
 
 def _by_name(label: str, names: list[str]) -> _Columns:
-    """The columns that are known by their names."""
+    """Return the columns that are known by their names."""
     wanted: dict[str, tuple[str, str]] = {}
     for name in names:
         quantity, unit = KNOWN.get(name, ("", ""))
@@ -177,7 +177,7 @@ def _by_name(label: str, names: list[str]) -> _Columns:
 
 
 def _kept(rows: Any, places: dict[str, int]) -> tuple[list[list[float | str]], list[int], list[int]]:
-    """Values of whole rows, lines of the others, and the number of each whole row."""
+    """Return the values of complete rows, the lines of the others, and the number of each complete row."""
     kept: list[list[float | str]] = []
     bad, number = [], []
     for k, row in enumerate(rows):
@@ -205,7 +205,7 @@ def _kept(rows: Any, places: dict[str, int]) -> tuple[list[list[float | str]], l
 
 
 def _stated(columns: dict[str, Any] | str | Path) -> _Columns:
-    """The table of columns, checked."""
+    """Return the table of columns after a check."""
     label, table = ("log columns", columns) if isinstance(columns, dict) else read_table("log columns", columns)
     out: dict[str, tuple[str, str]] = {}
     sample, cutting, head = None, (), True

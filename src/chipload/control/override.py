@@ -53,7 +53,7 @@ FALL_OVER_RISE = 3.0
 
 
 class Status(StrEnum):
-    """What a step of the controller was about, in the order of their codes; from OVERLOAD on it has stopped."""
+    """Status of the controller after a step, in the order of the codes; from OVERLOAD on it has stopped."""
 
     RUN = "run"
     SETTLING = "settling"
@@ -74,7 +74,7 @@ STOPS = frozenset(STATUS[_override.OVERLOAD :])
 
 @dataclass(frozen=True)
 class Override:
-    """A controller and its rules.
+    """A feed controller with its rules and parameters.
 
     Parameters
     ----------
@@ -191,14 +191,14 @@ class Override:
 
     @property
     def numbers(self) -> Rules:
-        """The values as the compiled step takes them."""
+        """Values for the compiled step."""
         values = {name: float(getattr(self, name)) for name in Rules._fields if name != "kind"}
         return Rules(kind=KINDS.index(self.kind), **values)
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What a step is told.
+    """Inputs of a step of the controller.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ class Reading:
 
 
 def begin(config: Override, modelled: bool = False) -> Floats:
-    """The state before the first step, and after every stop."""
+    """Return the state before the first step, and after every stop."""
     state = np.zeros(_override.STATE)
     state[_override.OVERRIDE] = state[_override.WANTED] = state[_override.SENT] = config.start
     state[_override.TRIM] = 1.0 if modelled else config.start
@@ -229,7 +229,7 @@ def begin(config: Override, modelled: bool = False) -> Floats:
 
 
 def stopped(state: Floats, reason: Status) -> Floats:
-    """The state after a stop for a reason that is not in the readings.
+    """Return the state after a stop for a reason that is not in the readings.
 
     Raises
     ------
@@ -245,7 +245,7 @@ def stopped(state: Floats, reason: Status) -> Floats:
 
 
 def trim(state: Floats) -> float:
-    """Trim q of a state: with a model the share of torque_ref that may be planned with."""
+    """Return the trim q of a state: with a model the share of torque_ref that the model may plan with."""
     return float(state[_override.TRIM])
 
 
@@ -259,7 +259,7 @@ def allowed(
     acceleration: float,
     first: int = 0,
 ) -> tuple[float, int]:
-    """Override that the model allows, for ``Reading.model``: early enough for what lies ahead, no earlier.
+    """Return the override that the model allows, for ``Reading.model``: reduced as late as the path ahead permits.
 
     Parameters
     ----------
@@ -293,12 +293,12 @@ def allowed(
 
 
 def sets_of(table: FuzzyTable) -> Sets:
-    """The arrays of a table as the compiled step takes them, with room for its sums."""
+    """Return the arrays of a table for the compiled step, with space for its sums."""
     return Sets(table.error, table.change, table.output, table.rules, table.whole_ends, np.empty(len(table.output)))
 
 
 def step(config: Override, table: FuzzyTable, state: Floats, reading: Reading) -> tuple[float, Status, Floats]:
-    """One step.
+    """Do one step of the controller.
 
     Parameters
     ----------

@@ -9,14 +9,15 @@ K_T [N mm/A], I current [A].
     I = K_P (w_0 - w) + K_I integral of (w_0 - w), within the drive's current,
     I_read = lag of I + noise, in whole steps,   T_measured: chipload.control._estimator, from I_read and w.
 
-The plant turns the real spindle (:class:`SpindleDeviation`), the estimator believes its data: K_T, I_idle, J and the
-lag of the two may differ, and the real I_idle may drift.
+The plant simulates the real spindle (:class:`SpindleDeviation`); the estimator uses the data of the spindle. K_T,
+I_idle, J and the lag of the two may differ, and the real I_idle may drift.
 
-Where the wall allows more than what is held, the controller is told the torque over its relief (T and T_model alike):
-it holds the same share of what is allowed everywhere.
+Where the wall allows more than the held torque, the controller receives the torque over its relief (T and T_model
+alike): it holds the same share of the allowable torque everywhere.
 
-What the controller believes (the model) and what is true (its columns with surprises) are two sets of columns. The axes
-accelerate within their limit; the override acts after its latency. Teeth are below the bandwidth and are not in it.
+The model of the controller and the true torque (its columns with surprises) are two sets of columns. The axes
+accelerate within their limit; the override acts after its latency. The tooth frequency is above the bandwidth and is
+not simulated.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ STALL = 0.5
 
 
 class Ended(StrEnum):
-    """How a run ends: at the end of the path, or why not."""
+    """End of a run: at the end of the path, or the reason why not."""
 
     PATH = "path"
     GONE = "gone"
@@ -97,11 +98,11 @@ class TorqueProfile:
             raise InputError(f"profile.s[{row}] = {self.s[row]:g}: must be above {self.s[row - 1]:g} before it")
 
     def torque(self, override: ArrayLike) -> Floats:
-        """Torque [N mm] in each row at an override (a number or (n,))."""
+        """Return the torque [N mm] in each row at an override (a number or (n,))."""
         return np.asarray(self.edge + self.cut * np.asarray(override, dtype=np.float64))
 
     def constant_override(self, torque: float) -> float:
-        """Greatest constant override at which no row exceeds ``torque`` [N mm]; 0: none does."""
+        """Return the greatest constant override at which no row exceeds ``torque`` [N mm]; 0 if there is none."""
         cutting = self.cut > 0.0
         if (self.edge > torque).any():
             return 0.0
@@ -110,7 +111,7 @@ class TorqueProfile:
 
 @dataclass(frozen=True)
 class Surprise:
-    """Something true that the model does not know, from ``begin`` to ``end`` [mm] along the path.
+    """A true change of the torque that the model does not know, from ``begin`` to ``end`` [mm] along the path.
 
     Parameters
     ----------
@@ -136,7 +137,7 @@ class Surprise:
 
 
 def surprised(profile: TorqueProfile, surprises: tuple[Surprise, ...], spacing: float | None = None) -> TorqueProfile:
-    """The true columns: the profile with surprises, sampled every ``spacing`` [mm] (None: the rows that are there)."""
+    """Return the true columns: the profile with surprises, sampled every ``spacing`` [mm] (None: the present rows)."""
     s = profile.s
     if spacing is not None:
         if not spacing > 0.0:
@@ -153,7 +154,7 @@ def surprised(profile: TorqueProfile, surprises: tuple[Surprise, ...], spacing: 
 
 @dataclass(frozen=True)
 class Loop:
-    """Times of the loop and the limit of the axes.
+    """Times of the control loop and the limit of the axes.
 
     Parameters
     ----------
@@ -184,7 +185,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Fault:
-    """What happens to the sensor from ``begin`` to ``end`` [s].
+    """A fault of the sensor from ``begin`` to ``end`` [s].
 
     ``nan``; ``stuck``: its last reading; ``value``: always ``value`` [N mm]; ``scaled``: ``value`` times what it was.
     """
@@ -201,7 +202,7 @@ class Fault:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a run gave.
+    """Result of a run.
 
     Parameters
     ----------
@@ -246,7 +247,7 @@ def run(
     monitor: TorqueProfile | None = None,
     deviation: SpindleDeviation = AS_STATED,
 ) -> Outcome:
-    """Run a controller along a path.
+    """Simulate a controller along a path.
 
     Parameters
     ----------
@@ -322,7 +323,7 @@ def run(
 
 
 def belief_of(spindle: Spindle) -> Belief:
-    """What the estimator takes a spindle for."""
+    """Return the data of a spindle that the estimator uses."""
     return Belief(
         torque_constant=float(spindle.torque_constant),
         idle_constant=float(spindle.idle[0]),
@@ -350,7 +351,7 @@ def _drive(real: Spindle, drift: float) -> _plant.SpindleDrive:
 
 
 def comparison(constant: float, controller: Override) -> dict[str, tuple[Override, bool]]:
-    """The controllers that are compared, with whether each has the model: constant, pi, fuzzy, fuzzy_feedforward.
+    """Return the compared controllers, and whether each has the model: constant, pi, fuzzy, fuzzy_feedforward.
 
     ``constant``: override of the constant one. The others are ``controller`` with another kind.
     """
@@ -364,6 +365,6 @@ def comparison(constant: float, controller: Override) -> dict[str, tuple[Overrid
 
 
 def _on_rows(profile: TorqueProfile, s: Floats) -> TorqueProfile:
-    """The profile with rows also at ``s``."""
+    """Return the profile with additional rows at ``s``."""
     rows = np.union1d(profile.s, s)
     return TorqueProfile(rows, *(np.interp(rows, profile.s, x) for x in (profile.feed, profile.edge, profile.cut)))

@@ -2,13 +2,13 @@
 
 Notation: K_T torque constant [N mm/A]; n [A] standard deviation of a reading of the current, q [A] its step; p time
 between two readings [s], t time constant of the filter [s], g = min(p / t, 1) its gain; I_0 [A] current of the free
-spindle at its speed, c the share by which it may differ from its map. The error that an estimate must be granted is
+spindle at its speed, c the share by which it may differ from its map. The error of an estimate is
 
     R = K_T (2 n sqrt(g / (2 - g)) + q / 2 + c I_0),
 
-two standard deviations of the noise behind the filter, half a step and the error of the idle map. A reading below R is
-not distinguished from air. With a share k by which the torque constant may be wrong, a torque h T that is held may in
-truth be (1 + k) h T + R, so a limit T of which an excess of x is granted needs R <= (1 + x - (1 + k) h) T.
+two standard deviations of the noise behind the filter, half a step and the error of the idle map. A reading below R
+cannot be distinguished from air. With a relative error k of the torque constant, a held torque h T may in fact be
+(1 + k) h T + R, so a limit T with a permitted excess of x requires R <= (1 + x - (1 + k) h) T.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ DEVIATIONS = 2.0
 
 @dataclass(frozen=True)
 class TorqueResolution:
-    """The parts of R [N mm]: noise, quantisation, idle map."""
+    """Torque resolution: the parts of R [N mm] from noise, quantisation and idle map."""
 
     noise: float
     quantisation: float
@@ -44,7 +44,7 @@ class TorqueResolution:
 
 
 def torque_resolution(spindle: Spindle, period: float) -> TorqueResolution:
-    """R of a spindle whose current is read every ``period`` [s].
+    """Return R of a spindle whose current is read every ``period`` [s].
 
     Examples
     --------

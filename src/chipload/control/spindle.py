@@ -9,8 +9,8 @@ which is linear in i_k, 1 / K_T and J / K_T: they come from cuts of known torque
 first order lags by tau [s]; speed and torque pass the same lag before they are compared with it. Residuals of a log
 follow each other; their first autocorrelation rho widens the intervals by sqrt((1 + rho) / (1 - rho)).
 
-Not to be trusted: torques below ``light`` (friction, slip and noise: the share of the error is above what was asked),
-speeds outside those that were identified. Bandwidth: revolutions, not teeth.
+Not valid: torques below ``light`` (by friction, slip and noise the relative error is above the required one), and
+speeds outside the identified range. Bandwidth: revolutions, not teeth.
 
 Reference: [Altintas1992] (cutting force from the current of drives).
 """
@@ -62,12 +62,12 @@ class SpindleMap:
     sensor_lag: float
 
     def idle_current(self, speed: ArrayLike) -> Floats:
-        """I_idle(w) [A], the shape of ``speed`` [rad/s]."""
+        """Return I_idle(w) [A] in the shape of ``speed`` [rad/s]."""
         return np.asarray(np.polynomial.polynomial.polyval(np.asarray(speed, dtype=np.float64), self.idle))
 
 
 def first_order(values: ArrayLike, time: Floats, lag: float) -> Floats:
-    """What a sensor of first order makes of a series, from rest at its first value.
+    """Return the response of a first-order sensor to a series, from rest at its first value.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def first_order(values: ArrayLike, time: Floats, lag: float) -> Floats:
 
 
 def lagged_rate(speed: Floats, time: Floats, lag: float) -> Floats:
-    """dw/dt as a sensor of first order shows it, (w - lagged w) / tau; without a lag by central differences."""
+    """Return dw/dt behind a first-order sensor, (w - lagged w) / tau; without a lag by central differences."""
     if lag == 0.0:
         return np.asarray(np.gradient(speed, time))
     return (speed - first_order(speed, time, lag)) / lag
@@ -215,7 +215,7 @@ def identify_runs(
 
 
 def _scales(runs: Sequence[Run], idle_terms: int, torque_constant: float | None) -> tuple[float, float]:
-    """Greatest speed [rad/s] and torque [N mm] of logs from which a spindle can be identified."""
+    """Return the greatest speed [rad/s] and torque [N mm] of logs; refuse logs that do not identify a spindle."""
     if not 1 <= idle_terms <= 4:
         raise InputError(f"spindle.idle_terms = {idle_terms}: must be from 1 to 4")
     count = sum(len(run.time) for run in runs)
@@ -265,7 +265,7 @@ def _regression(design: Floats, target: Floats, free: list[int]) -> _Regression:
 def _rows(
     run: Run, lag: float, settled: float, idle_terms: int, scale_w: float, scale_t: float
 ) -> tuple[Floats, Floats]:
-    """Columns torque, acceleration and powers of the speed behind the lag, and the current, of the rows that count."""
+    """Return torque, acceleration and powers of the speed behind the lag, and the current, for the valid rows."""
     usable = known_rows(run, settled)
     columns = [first_order(np.nan_to_num(run.torque) / scale_t, run.time, lag), lagged_rate(run.speed, run.time, lag)]
     columns += [first_order((run.speed / scale_w) ** k, run.time, lag) for k in range(idle_terms)]
@@ -316,7 +316,7 @@ def idle_map(
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Torque from a log.
+    """Estimate of the torque from a log.
 
     Parameters
     ----------
@@ -332,12 +332,12 @@ class Estimate:
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """(n,) bool: neither light nor off speed."""
+        """Mask (n,) of valid rows: neither light nor outside the speed range."""
         return ~(self.light | self.off_speed)
 
 
 def estimate(spindle: SpindleMap, time: Floats, speed: Floats, current: Floats, average: int = 1) -> Estimate:
-    """Torque of cutting from speed and current.
+    """Estimate the cutting torque from speed and current.
 
     Parameters
     ----------

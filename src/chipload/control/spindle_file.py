@@ -29,7 +29,7 @@ _OTHER = ("input", "range", "interval", "predictions", "logs")
 
 @dataclass(frozen=True)
 class SpindleData:
-    """What a file of a spindle gives.
+    """Data of a spindle file.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class SpindleData:
 
 
 def write_spindle(found: IdentifiedSpindle, logs: dict[str, str]) -> str:
-    """The TOML of an identified spindle; ``logs``: name -> hash. What is not known is left out, and said."""
+    """Return the TOML of an identified spindle; ``logs``: name -> hash. Unknown values are left out, with a comment."""
     f = found.found
     power = found.source == "power"
     # power over speed in N mm
@@ -96,7 +96,7 @@ def write_spindle(found: IdentifiedSpindle, logs: dict[str, str]) -> str:
 
 
 def read_spindle(path: str | Path, speed: float) -> SpindleData:
-    """The spindle of a file for a speed [rad/s].
+    """Read the spindle of a file for a speed [rad/s].
 
     Raises
     ------
@@ -137,7 +137,7 @@ def read_spindle(path: str | Path, speed: float) -> SpindleData:
 
 
 def _pair(label: str, table: Any, name: str) -> tuple[float, float]:
-    """Least and greatest; of torque the second may be missing: no cut of known torque says how far it holds."""
+    """Return least and greatest value; the greatest torque may be missing if no cut of known torque determined it."""
     value: Any = table.get(name) if isinstance(table, dict) else None
     numbers = [float(x) for x in value if isinstance(x, int | float)] if isinstance(value, list) else []
     if len(numbers) == 1 and name == "torque_nm":

@@ -1,7 +1,6 @@
 """The model of a spindle, and the deviation of the real spindle from it.
 
-The controller believes the first; the simulated machine turns the second. Both are the same where no deviation is
-stated.
+The controller uses the model; the simulated machine has the real spindle. Both are equal if no deviation is stated.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ _LEAST = {
 
 @dataclass(frozen=True)
 class Spindle:
-    """A spindle with its drive and current sensor, as its data say.
+    """A spindle with its drive and current sensor, as its data state it.
 
     Parameters
     ----------
@@ -71,7 +70,7 @@ class Spindle:
 
 @dataclass(frozen=True)
 class SpindleDeviation:
-    """How the real spindle differs from its data.
+    """Deviation of the real spindle from its data.
 
     Parameters
     ----------
@@ -106,7 +105,7 @@ class SpindleDeviation:
                 raise InputError(f"spindle.deviation.{name} = {value:g}: must be from {least:g} to 1000")
 
     def applied(self, data: Spindle) -> Spindle:
-        """The real spindle, at the start."""
+        """Return the real spindle at the start."""
         more = 1.0 + 1e-2 * self.idle_percent
         return replace(
             data,
@@ -117,7 +116,7 @@ class SpindleDeviation:
         )
 
     def drift(self, data: Spindle) -> float:
-        """What the idle current gains each second [A/s], at the speed of ``data``."""
+        """Return the increase of the idle current per second [A/s] at the speed of ``data``."""
         return 1e-2 * self.idle_drift_percent_per_min / 60.0 * (data.idle[0] + data.idle[1] * data.speed)
 
 

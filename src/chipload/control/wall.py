@@ -37,7 +37,7 @@ SAME_MM = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """Both loads of n steps in their two parts, at the programmed feed.
+    """Torque and force of n steps, each as an edge part and a cutting part, at the programmed feed.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Loads:
 
 
 def two_parts(torque: Floats, force: Floats, little_torque: Floats, little_force: Floats, little: float) -> Loads:
-    """Loads from those of the material and of one whose cutting coefficients are ``little`` times as great.
+    """Return loads from those of the material and of one whose cutting coefficients are ``little`` times as great.
 
     A load is E + C with the material and E + little C with the other one, so C is their difference over 1 - little.
 
@@ -82,7 +82,7 @@ def edge_and_cut(whole: Floats, less: Floats, little: float) -> tuple[Floats, Fl
 
 @dataclass(frozen=True, eq=False)
 class UnitResponse:
-    """Deflection and stress of a wall under a unit force at n steps; steps beside the wall have 0.
+    """Deflection and stress of a wall under a unit force at n steps; 0 for steps beside the wall.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class UnitResponse:
 
 
 def unit_response(modes: Ritz, near: Floats, far: Floats, width: float, tool: Floats) -> UnitResponse:
-    """Compliance and stress for depths of cut along a wall.
+    """Return compliance and stress for depths of cut along a wall.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def unit_response(modes: Ritz, near: Floats, far: Floats, width: float, tool: Fl
 
 @dataclass(frozen=True, eq=False)
 class LimitedResponse:
-    """Something that a workpiece must not exceed in n steps, by the edge and by what goes with the feed.
+    """A limited response of a workpiece in n steps, as an edge part and a part proportional to the feed.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ class PathLimit:
 
 
 def path_limit(loads: Loads, wall: UnitResponse, deflection: float, stress: float) -> PathLimit:
-    """The limit of torque; see the head of this file.
+    """Return the torque limit along a path; see the module.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def path_limit(loads: Loads, wall: UnitResponse, deflection: float, stress: floa
 
 
 def limit_by_responses(loads: Loads, responses: Sequence[LimitedResponse]) -> PathLimit | None:
-    """The limit of torque at which the first of some responses reaches its own; None: none of them ever rises.
+    """Return the torque limit at which the first of some responses reaches its limit; None if no response rises.
 
     Parameters
     ----------
@@ -223,14 +223,14 @@ def limit_by_responses(loads: Loads, responses: Sequence[LimitedResponse]) -> Pa
 
 
 def row_means(steps: Floats) -> Floats:
-    """(n + 1,) values at the ends of n steps: the mean of both sides."""
+    """Return values (n + 1,) at the ends of n steps: the mean of both sides."""
     padded = np.concatenate([steps[:1], steps, steps[-1:]])
     return np.asarray(0.5 * (padded[1:] + padded[:-1]))
 
 
 @dataclass(frozen=True, eq=False)
 class WallPath:
-    """What is needed of the wall along a path.
+    """Data of a wall along a path.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ class WallPath:
 
 
 def wall_error(path: WallPath, programmed: TorqueProfile, outcome: Outcome, speed: float) -> Floats:
-    """Deflection of wall and cutter, together, at each row of an outcome.
+    """Return the total deflection of wall and cutter at each row of an outcome.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Cutters: their shape, and the files that describe them."""
+"""Cutters: their shape, their material, and the files that describe them."""
 
 from __future__ import annotations
 

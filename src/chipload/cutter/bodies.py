@@ -1,4 +1,4 @@
-"""Profiles of tools that are held against part, stock and fixtures as bodies: their chips are not simulated.
+"""Profiles of tools that are checked as bodies against part, stock and fixtures; their chips are not simulated.
 
 Notation: a profile is ``((rho, z), ...)`` [mm], distance from the axis and height above the tip, from z = 0 upwards.
 APT: (d, r, e, f, alpha, beta, h) as in :mod:`chipload.cutter.cutter`.
@@ -22,7 +22,7 @@ MINOR = 1.25 * math.sqrt(3.0) / 2.0
 
 
 def cylinder(diameter: float, height: float) -> Profile:
-    """A flat-ended cylinder, as of a reamer.
+    """Return the profile of a flat-ended cylinder, such as a reamer.
 
     >>> cylinder(6.0, 20.0)
     ((3.0, 0.0), (3.0, 20.0))
@@ -31,7 +31,7 @@ def cylinder(diameter: float, height: float) -> Profile:
 
 
 def tap_core(diameter: float, pitch: float, height: float) -> Profile:
-    """A tap within its thread: the cylinder of the minor diameter D - 1.0825 P, that of the hole.
+    """Return the core of a tap: the cylinder of the minor diameter D - 1.0825 P, that of the hole.
 
     >>> round(2.0 * tap_core(6.0, 1.0, 20.0)[0][0], 3)
     4.917
@@ -40,7 +40,7 @@ def tap_core(diameter: float, pitch: float, height: float) -> Profile:
 
 
 def one_thread(diameter: float, neck: float, crest: float, angle: float, height: float) -> Profile:
-    """A thread mill with one row of teeth, and its neck up to ``height``.
+    """Return a thread mill with one row of teeth, and its neck up to ``height``.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def one_thread(diameter: float, neck: float, crest: float, angle: float, height:
 
 
 def dovetail(diameter: float, neck: float, cone: float, angle: float, height: float) -> Profile:
-    """A dovetail mill: widest at its tip, narrower up to the height ``cone``, its neck up to ``height``.
+    """Return a dovetail mill: widest at its tip, narrower up to the height ``cone``, its neck up to ``height``.
 
     ``angle`` [rad] of the flank is stated by some with the axis and by others with the bottom: the wider body counts.
 
@@ -70,7 +70,7 @@ def dovetail(diameter: float, neck: float, cone: float, angle: float, height: fl
 
 
 def saw(diameter: float, blade: float, cap: tuple[float, float]) -> Profile:
-    """A slitting saw on its screw; ``cap`` is diameter and height of the screw's head below the blade.
+    """Return a slitting saw on its screw; ``cap`` is diameter and height of the screw's head below the blade.
 
     >>> saw(60.0, 2.0, (8.0, 3.0))
     ((4.0, 0.0), (4.0, 3.0), (30.0, 3.0), (30.0, 5.0))
@@ -109,7 +109,7 @@ def apt_body(shape: tuple[float, float, float, float, float, float, float]) -> P
 
 
 def check_body(points: Profile, height: float) -> float:
-    """The greatest radius of a profile [mm].
+    """Check a profile and return its greatest radius [mm].
 
     Raises
     ------

@@ -20,7 +20,7 @@ _UNITS = {"metric": "mm", "imperial": "inch", "mm": "mm", "inch": "inch"}
 
 
 def read_project(path: str | Path) -> dict[str, Any]:
-    """The project as the file holds it.
+    """Read a project file.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def read_project(path: str | Path) -> dict[str, Any]:
 
 
 def project_tools(project: dict[str, Any], label: str) -> dict[int, dict[str, Any]]:
-    """The tools of a project by number, under the keys of a job's ``[[cutter]]``.
+    """Return the tools of a project by number, as keys of a job's ``[[cutter]]``.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def _tool(tool: dict[str, Any], units: str, label: str) -> dict[str, Any]:
 
 
 def read_camotics_tool(path: str | Path, tool: int) -> dict[str, Any]:
-    """One tool of a project, under the keys of a job's ``[[cutter]]``.
+    """Read one tool of a project as keys of a job's ``[[cutter]]``.
 
     Raises
     ------

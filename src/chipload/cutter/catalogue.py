@@ -24,7 +24,7 @@ from chipload.tables import Labelled, nearest, read_table, shipped_table
 
 @dataclass(frozen=True)
 class CatalogueCutter:
-    """One size.
+    """One cutter of a catalogue.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class Catalogue:
         return tuple(sorted({c.corner_radius for c in self.cutters}))
 
     def family(self, corner_radius: float) -> tuple[CatalogueCutter, ...]:
-        """The cutters of one corner radius, by diameter."""
+        """Return the cutters of one corner radius, by diameter."""
         return tuple(c for c in self.cutters if c.corner_radius == corner_radius)
 
 
@@ -158,7 +158,7 @@ class _Cutter(BaseModel):
 
 
 def read_catalogue(path: str | Path) -> Catalogue:
-    """The catalogue of a TOML file.
+    """Read a catalogue from a TOML file.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def read_catalogue(path: str | Path) -> Catalogue:
 
 
 def catalogue_named(name: str) -> Catalogue:
-    """A catalogue that comes with chipload.
+    """Return a shipped catalogue.
 
     >>> len(catalogue_named("wu2019").family(2.0))
     36

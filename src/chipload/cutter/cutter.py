@@ -192,12 +192,12 @@ class Cutter:
 
     @property
     def teeth_alike(self) -> bool:
-        """Whether every tooth cuts as the others do: no runout, and one pitch."""
+        """Whether all teeth cut equally: no runout, and one pitch."""
         return self.flutes == 1 or (self.runout[0] == 0.0 and not self.pitch)
 
     @property
     def tooth_angles(self) -> NDArray[np.float64]:
-        """Angle of each tooth behind tooth 0, (N,) float [rad].
+        """Angle (N,) [rad] of each tooth behind tooth 0.
 
         >>> mill = Cutter(10.0, 3, 0.5, 20.0, 30.0, 6e5, pitch=tuple(np.radians([130.0, 110.0, 120.0])))
         >>> np.degrees(mill.tooth_angles).round(9).tolist()
@@ -213,7 +213,7 @@ class Cutter:
 
     @property
     def resolved_diameter(self) -> float:
-        """Diameter by which lengths of a simulation go [mm]: d, of a pointed cutter a tenth of its widest.
+        """Reference diameter [mm] for lengths in a simulation: d, or a tenth of the widest of a pointed cutter.
 
         >>> engraver = Cutter(0.01, 1, 0.0, 3.0, 30.0, 6e5, taper=math.radians(45.0))
         >>> round(engraver.resolved_diameter, 9)  # 6.01 mm wide at its top
@@ -242,7 +242,7 @@ class Cutter:
         return (self.diameter, r, e, f, self.bottom, self.taper, self.flute_length)
 
     def radius_at(self, z: ArrayLike) -> NDArray[np.float64]:
-        """Radius rho of the envelope at the heights z above the tip; at z = 0 that of the flat bottom.
+        """Return the radius rho of the envelope at heights z above the tip; at z = 0 that of the flat bottom.
 
         Bottom line up to z = f - r cos(alpha), corner circle e + sqrt(r^2 - (f - z)^2) up to z = f - r sin(beta), flank
         line above, on beyond the flutes.
@@ -280,7 +280,7 @@ class Cutter:
         return np.asarray(np.where(z < low, bottom, np.where(z < high, circle, flank)))
 
     def profile(self, chord_mm: float) -> NDArray[np.float64]:
-        """(m, 2) (rho, z) [mm] of the envelope from the tip to h, its corner by chords within ``chord_mm``.
+        """Return the envelope (m, 2) as (rho, z) [mm] from the tip to h, its corner by chords within ``chord_mm``.
 
         >>> Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5).profile(0.01).tolist()
         [[0.0, 0.0], [5.0, 0.0], [5.0, 20.0]]

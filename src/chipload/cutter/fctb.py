@@ -26,7 +26,7 @@ _LONGEST = 60
 
 
 def read_fctb(path: str | Path) -> dict[str, Any]:
-    """What the file says, under the keys of a job's ``[[cutter]]``; what it does not say is not there.
+    """Read a tool bit as keys of a job's ``[[cutter]]``; values that the file does not state are left out.
 
     Diameter, flutes, cutting edge height, shank diameter, the add-on's stick-out as overhang, the name; by shape corner
     radius, point, taper or body. Not in such a file: number, helix, modulus.

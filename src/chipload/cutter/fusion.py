@@ -40,7 +40,7 @@ _MOST_TOOLS = 100_000
 
 
 def read_fusion_tool(path: str | Path, tool: int | None) -> dict[str, Any]:
-    """One tool of a library, under the keys of a job's ``[[cutter]]``; what it does not state is not there.
+    """Read one tool of a library as keys of a job's ``[[cutter]]``; values that it does not state are left out.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def _cutter(tool: dict[str, Any], number: int | None, label: str) -> dict[str, A
 
 
 def _tip(shape: str, geometry: dict[str, Any], out: dict[str, Any], mm: float, label: str) -> dict[str, Any]:
-    """Corner, taper, point, neck or body; a body whose profile is not stated is the cylinder around it."""
+    """Return corner, taper, point, neck or body; a body without a stated profile is the cylinder around it."""
     d = out.get("diameter_mm")
     if shape == "ball" and d is not None:
         return {"corner_radius_mm": 0.5 * d}

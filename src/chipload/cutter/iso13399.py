@@ -1,4 +1,4 @@
-"""Tool data of ISO 13399 as exchange files of ISO 10303-21 (`.p21`): the few properties that a cutter has.
+"""Reading of ISO 13399 tool data from exchange files of ISO 10303-21 (`.p21`): the properties that a cutter needs.
 
 Read are values that carry their symbol, ``NUMERICAL_VALUE('DC', ...)``, as tool makers write them; values that are
 known by the code of a dictionary alone are left out. Lengths are mm unless the unit of the value says inch.
@@ -26,7 +26,7 @@ _NAMED = re.compile(r"STRING_VALUE\s*\(\s*'([A-Z0-9_]{1,20})'\s*,\s*(?:\$\s*,\s*
 
 
 def read_iso13399(path: str | Path) -> dict[str, Any]:
-    """What the file states, under the keys of a job's ``[[cutter]]``; what it does not state is not there.
+    """Read a file as keys of a job's ``[[cutter]]``; values that it does not state are left out.
 
     Raises
     ------

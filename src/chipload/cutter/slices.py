@@ -34,7 +34,7 @@ Part = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
 
 @dataclass(frozen=True, eq=False)
 class Slices:
-    """Pieces of a cutter's profile that follow one another, (k,) float each.
+    """Consecutive pieces of a cutter's profile, (k,) float each.
 
     Parameters
     ----------
@@ -87,12 +87,12 @@ class Slices:
 
     @property
     def columns(self) -> Floats:
-        """(k, 7) float: s_from, rho, z, sin(kappa), cos(kappa), lag, rate; what a bite and the force need."""
+        """Columns (k, 7) for tooth engagement and force: s_from, rho, z, sin(kappa), cos(kappa), lag, rate."""
         return np.column_stack([self.s_from, self.rho, self.z, self.sin_kappa, self.cos_kappa, self.lag, self.rate])
 
 
 def edge_lag(cutter: Cutter) -> float:
-    """tan(helix) / R [rad/mm]: how far the edge lags behind its tip for each mm of height."""
+    """Return tan(helix) / R [rad/mm]: the lag of the edge behind its tip for each mm of height."""
     return math.tan(cutter.helix) / cutter.radius
 
 
@@ -104,7 +104,7 @@ def slices(
     flank_mm: float | None = None,
     grading: float = 1.0,
 ) -> Slices:
-    """The profile from the axis to the end of the flutes in slices.
+    """Return the profile from the axis to the end of the flutes in slices.
 
     Parameters
     ----------

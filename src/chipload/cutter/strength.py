@@ -1,11 +1,12 @@
 """The strength of a cutter's material: the allowable stress of its sections.
 
-Carbide is brittle: its greatest tensile stress is held against the transverse rupture strength (ISO 3327, a bar without
-notch in bending). High-speed steel yields first: its equivalent stress by von Mises is held against the yield strength.
+Carbide is brittle: its greatest tensile stress is compared with the transverse rupture strength (ISO 3327, a bar
+without notch in bending). High-speed steel yields first: its von Mises equivalent stress is compared with the yield
+strength.
 
 The shipped strengths are those of ordinary grades; a data sheet of the cutter's own grade is better. The default safety
-factor of 2 covers what the check leaves out: peaks of the force above the linear model (measured ones were up to 1.7
-times as high), the scatter of rupture strengths, the repeated load.
+factor of 2 covers effects that the check does not include: peaks of the force above the linear model (measured ones
+were up to 1.7 times as high), the scatter of rupture strengths, and repeated load.
 
 Reference: [HumphryBaker2019] for WC-Co, about 3 GPa at best for fine grain; [M2DataSheet] for high-speed steel M2.
 """
@@ -23,7 +24,7 @@ STEEL_BELOW = 3.5e5
 
 
 class ToolMaterial(StrEnum):
-    """What the cutter is made of."""
+    """Material of a cutter."""
 
     CARBIDE = "carbide"
     HSS = "hss"
@@ -41,7 +42,7 @@ STATED = "as stated in the job"
 
 @dataclass(frozen=True)
 class ToolStrength:
-    """What is stated of a cutter's strength.
+    """Stated strength of a cutter.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ class ToolStrength:
                 raise InputError(f"cutter.{key} = {value:g}: must be from 1 to 100")
 
     def material_at(self, modulus: float) -> ToolMaterial:
-        """The stated material, or that which has the modulus [MPa].
+        """Return the stated material, or the one with this modulus [MPa].
 
         >>> ToolStrength().material_at(5.8e5).value
         'carbide'
@@ -80,7 +81,7 @@ class ToolStrength:
         return ToolMaterial.HSS if modulus < STEEL_BELOW else ToolMaterial.CARBIDE
 
     def allowed(self, modulus: float) -> float:
-        """Stress that is allowed [MPa].
+        """Return the allowed stress [MPa].
 
         >>> ToolStrength(mpa=3600.0, safety_factor=1.5).allowed(5.8e5)
         2400.0
@@ -89,7 +90,7 @@ class ToolStrength:
         return own / self.safety_factor
 
     def source(self, modulus: float) -> str:
-        """Where the strength comes from."""
+        """Return the source of the strength."""
         return SOURCES[self.material_at(modulus)] if self.mpa is None else STATED
 
 

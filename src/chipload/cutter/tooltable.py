@@ -1,6 +1,6 @@
 """LinuxCNC tool tables (`.tbl`): a line a tool, `T1 P1 Z+0.511 D10.0 ;10 mm end mill`.
 
-Lengths are in the machine's unit, which the file does not say: it is asked for.
+Lengths are in the machine's unit, which the file does not state: the caller states it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _LARGEST_NUMBER = 1e9
 
 
 def read_tool_table(path: str | Path, tool: int, unit: str) -> dict[str, Any]:
-    """Number, diameter and name of one tool, under the keys of a job's ``[[cutter]]``; what is not there is left out.
+    """Read number, diameter and name of one tool as keys of a job's ``[[cutter]]``; missing values are left out.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a cut costs: material coefficients, force, torque, power, and the wall it leaves."""
+"""Cutting: force coefficients, force, torque and power, cutter stress, and the form error of a wall."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""How sure a force is: the standard deviation that the coefficients' own errors give it.
+"""Standard deviation of force and torque that results from the errors of the force coefficients.
 
 Notation: K = (Ktc, Krc, Kac, Kte, Kre, Kae) with the covariance C (6, 6); a load L (force along T, n, the axis, and
 torque) is linear in K: L = B K, B (4, 6) the loads of unit coefficients, so that cov(L) = B C B', exactly.
 
-A fitted material has its C. One of which only a spread is known, sigma / K the same for all, is taken to have
-coefficients that err each by itself: C = diag(spread^2 K^2). Real errors hang together, and then the band is wider or
-narrower. Exponents of a size effect, runout and the engagement are taken as sure.
+A fitted material has its own C. If only a spread sigma / K is known, the same for all coefficients, their errors are
+taken as independent: C = diag(spread^2 K^2). Real errors are correlated, which makes the band wider or narrower. The
+exponents of a size effect, runout and engagement are taken as exact.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 def mean_band(
     bites: ToothEngagement, cutter: Cutter, material: Material, frame: ArrayLike | None = None
 ) -> tuple[Floats, Floats]:
-    """Standard deviation of the mean force and torque.
+    """Return the standard deviation of the mean force and torque.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def mean_band(
 
 
 def mean_basis(bites: ToothEngagement, cutter: Cutter, material: Material, frame: ArrayLike | None = None) -> Floats:
-    """B of the mean loads, (n, 4, 6): force and torque for 1 of each coefficient; for the band of a sum add B first."""
+    """Return B (n, 4, 6) of the mean loads: loads for 1 of each coefficient; B of a sum of loads is the sum of B."""
     basis = np.zeros((len(bites), 4, 6))
     rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
     if not any(material.exponents):
@@ -73,7 +73,7 @@ def mean_basis(bites: ToothEngagement, cutter: Cutter, material: Material, frame
 
 
 def deviations(basis: Floats, material: Material) -> Floats:
-    """Roots of the diagonal of B C B' for B (..., 4, 6): standard deviations (..., 4)."""
+    """Return standard deviations (..., 4): the roots of the diagonal of B C B' for B (..., 4, 6)."""
     variance = np.einsum("...ik,kl,...il->...i", basis, material.variances, basis)
     return np.asarray(np.sqrt(np.clip(variance, 0.0, None)))
 
@@ -81,7 +81,7 @@ def deviations(basis: Floats, material: Material) -> Floats:
 def band_over_turn(
     bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike, frame: ArrayLike | None = None
 ) -> tuple[Floats, Floats]:
-    """Standard deviation of force and torque at given rotations.
+    """Return the standard deviation of force and torque at given rotations.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def band_over_turn(
 def peak_band(
     bites: ToothEngagement, cutter: Cutter, material: Material, at_force: ArrayLike, at_torque: ArrayLike
 ) -> tuple[Floats, Floats]:
-    """Standard deviation of the size of the force, and of the torque, at a rotation of each step.
+    """Return the standard deviation of the size of the force, and of the torque, at one rotation of each step.
 
     With F = B K at the rotation and e = F / |F|, that of |F| is sqrt(b C b') with b = e B: of first order in the errors
     of K, exact where they keep the direction of F.
@@ -144,7 +144,7 @@ def peak_band(
 
 
 def _bases_at(bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
-    """B of every step at a rotation of its own, (n, 4, 6)."""
+    """Return B (n, 4, 6) of every step at a rotation of its own."""
     out = np.zeros((len(bites), 4, 6))
     angles = np.ascontiguousarray(theta, dtype=np.float64)
     rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
@@ -156,12 +156,12 @@ def _bases_at(bites: ToothEngagement, cutter: Cutter, material: Material, theta:
 
 
 def _unit_laws(material: Material) -> Floats:
-    """Laws of one coefficient at a time, 1 each, with the material's exponents: (6, 9)."""
+    """Return six force laws (6, 9), each with one coefficient of 1, the others 0, and the material's exponents."""
     return np.column_stack([np.eye(6), np.broadcast_to(material.exponents, (6, 3))])
 
 
 def turned_basis(basis: Floats, frame: ArrayLike) -> Floats:
-    """B (n, ..., 4, 6) with its forces turned into ``frame`` (n, 3, 3), rows T, n and A."""
+    """Return B (n, ..., 4, 6) with its forces in the frame of the work; ``frame`` (n, 3, 3) has rows T, n, A."""
     frames = np.asarray(frame, dtype=np.float64)
     across = np.swapaxes(frames, 1, 2).reshape(len(frames), *[1] * (basis.ndim - 3), 3, 3)
     return np.concatenate([across @ basis[..., :3, :], basis[..., 3:, :]], axis=-2)

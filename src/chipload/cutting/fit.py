@@ -1,4 +1,4 @@
-"""Force coefficients from measured forces: what a fit is, the average method, and what a fit says of another cut.
+"""Identification of force coefficients from measured forces by the average method, and prediction of other cuts.
 
 Notation: x = (Ktc, Krc, Kac, Kte, Kre, Kae) [MPa, N/mm] as in :mod:`chipload.cutting.material`; force on the cutter
 along T, n and the axis as in :mod:`chipload.cutting.force`; theta [rad] rotation of tooth 0; e, lambda runout; Omega
@@ -6,12 +6,12 @@ along T, n and the axis as in :mod:`chipload.cutting.force`; theta [rad] rotatio
 six forces that belong to unit coefficients; w0 [rad/s], zeta resonance of the dynamometer.
 
 Force is linear in x. The mean force over whole turns is B_0 x: a linear regression over the cuts, whose B_0 is the
-closed form of the one force model, for any arc. Every sample over the turn: :mod:`chipload.cutting.fit_turns`.
+closed form of the force model for any arc. :mod:`chipload.cutting.fit_turns` fits every sample over the turn.
 
 The dynamometer shows D(w) = 1 / (1 - (w / w0)^2 + 2 i zeta w / w0) times the force, 1 where it is taken as rigid.
 
-Intervals are 95 %, Student's t; here from the scatter about the line. With two feeds no scatter is left, and that from
-turn to turn is taken. What no channel determines is not a number.
+Intervals are 95 %, Student's t; here from the scatter about the line. With two feeds no scatter is left; the scatter
+from turn to turn is then used. A coefficient that no channel determines is NaN.
 
 Reference: [Altintas2012] ch. 2, mean forces; [Kline1983], runout.
 """
@@ -51,7 +51,7 @@ _MORE = tuple(replace(_PLAIN, **{name: getattr(_PLAIN, name) + step}) for name, 
 
 @dataclass(frozen=True, eq=False)
 class FittedCoefficients:
-    """Coefficients x with what is known of them.
+    """Identified coefficients x with their covariance and intervals.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class FittedCoefficients:
 
 @dataclass(frozen=True, eq=False)
 class FittedChannels:
-    """What the three channels of the dynamometer showed.
+    """Results of a fit for each of the three channels of the dynamometer.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class FittedChannels:
 
 @dataclass(frozen=True, eq=False)
 class FitSearch:
-    """How the coefficients were found.
+    """Parameters, covariance and convergence of the search of a fit.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class FitSearch:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Force coefficients that were identified.
+    """Result of the identification of force coefficients.
 
     Parameters
     ----------
@@ -129,19 +129,19 @@ class Fit:
 
     @property
     def identified(self) -> NDArray[np.bool_]:
-        """(6,) which coefficients the measurement determines."""
+        """Mask (6,) of the coefficients that the measurement determines."""
         return np.asarray(np.isfinite(self.coefficients.values))
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """(3,) the channels whose force the identified coefficients give."""
+        """Mask (3,) of the channels whose force follows from the identified coefficients."""
         plane, axis = self.identified[list(PLANE)].all(), self.identified[list(AXIS)].all()
         return np.array([plane, plane, axis])
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """What the coefficients say of a cut: (3,) float [N] along T, n and the axis; NaN where they do not say it.
+    """Predicted forces of a cut, (3,) float [N] along T, n and the axis; NaN where coefficients are missing.
 
     ``mean``; ``high`` and ``low`` greatest and least over the turn as the dynamometer shows them; ``band_high`` and
     ``band_low`` of the harmonics that were fitted alone; ``half`` (5, 3) the half widths of their 95 % bands, in this
@@ -159,25 +159,25 @@ class Prediction:
 
 # -- the model --------------------------------------------------------------------------------------------------
 def unit_forces(cut: MeasuredCut, cutter: Cutter, theta: Floats) -> Floats:
-    """Forces on the cutter that belong to unit coefficients, (m, 3, 6) float: force = unit_forces @ x."""
+    """Return the forces on the cutter for unit coefficients, (m, 3, 6) float: force = unit_forces @ x."""
     bites = engagement_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
     return _columns(lambda material: forces_over_turn(bites, cutter, material, theta)[0][0])
 
 
 def unit_means(cut: MeasuredCut, cutter: Cutter) -> Floats:
-    """As :func:`unit_forces`, averaged over the turn in closed form: (3, 6) float."""
+    """Return :func:`unit_forces` averaged over the turn in closed form, (3, 6) float."""
     bites = engagement_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
     return _columns(lambda material: mean_forces(bites, cutter, material)[0][0])
 
 
 def _columns(force: Callable[[Material], Floats]) -> Floats:
-    """The force of each unit coefficient, as a difference of the forces of two materials."""
+    """Return the force of each unit coefficient as the difference of the forces of two materials."""
     plain = force(_PLAIN)
     return np.stack([(force(more) - plain) / step for more, step in zip(_MORE, _STEPS, strict=True)], axis=-1)
 
 
 def unit_harmonics(cut: MeasuredCut, cutter: Cutter, harmonics: int) -> Complexes:
-    """B_k, (H + 1, 3, 6) complex; the zeroth is the closed form."""
+    """Return the harmonics B_k, (H + 1, 3, 6) complex; B_0 is the closed form."""
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
     out = np.fft.rfft(unit_forces(cut, cutter, theta), axis=0)[: harmonics + 1] / TURN
     out[0] = unit_means(cut, cutter)
@@ -185,7 +185,7 @@ def unit_harmonics(cut: MeasuredCut, cutter: Cutter, harmonics: int) -> Complexe
 
 
 def dynamometer(resonance: Floats, w: Floats) -> Complexes:
-    """D of each channel at the frequencies w (m,) [rad/s]: (m, 3) complex."""
+    """Return the transfer function D of each channel at the frequencies w (m,) [rad/s], (m, 3) complex."""
     out = np.ones((len(w), 3), dtype=np.complex128)
     for c in np.flatnonzero(np.isfinite(resonance[:, 0])):
         r = w / resonance[c, 0]
@@ -194,14 +194,14 @@ def dynamometer(resonance: Floats, w: Floats) -> Complexes:
 
 
 def as_real(amplitude: Complexes) -> Floats:
-    """Amplitudes as real numbers whose squares sum to the mean square of the signal: (2 H + 1, ...)."""
+    """Return amplitudes as real numbers (2 H + 1, ...) whose squares sum to the mean square of the signal."""
     root = math.sqrt(2.0)
     return np.concatenate([amplitude[:1].real, root * amplitude[1:].real, root * amplitude[1:].imag])
 
 
 # -- the average method -----------------------------------------------------------------------------------------
 def fit_average(cuts: Sequence[MeasuredCut], cutter: Cutter) -> Fit:
-    """Coefficients from mean forces over whole turns.
+    """Identify force coefficients from mean forces over whole turns by linear regression.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def fit_average(cuts: Sequence[MeasuredCut], cutter: Cutter) -> Fit:
 
 
 def solved(a: Floats, y: Floats) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Least squares with scaled columns; which columns are there at all, and which are determined."""
+    """Solve least squares with scaled columns; return also which columns are not zero and which are determined."""
     size = np.linalg.norm(a, axis=0)
     there = size > 0.0
     scale = np.where(there, size, 1.0)
@@ -274,13 +274,13 @@ def _turns(cuts: Sequence[MeasuredCut], harmonics: int) -> tuple[Turns, ...]:
 
 
 def runout_of(cutter: Cutter) -> Floats:
-    """(e cos(lambda), e sin(lambda)) [mm]."""
+    """Return the runout as (e cos(lambda), e sin(lambda)) [mm]."""
     size, direction = cutter.runout
     return size * np.array([math.cos(direction), math.sin(direction)])
 
 
 def padded(spread: Floats, more: int) -> Floats:
-    """A covariance with ``more`` exact numbers before it."""
+    """Return a covariance preceded by ``more`` exact numbers, whose rows and columns are 0."""
     out = np.zeros((len(spread) + more, len(spread) + more))
     out[more:, more:] = spread
     return out
@@ -297,7 +297,7 @@ def concluded(
     search: FitSearch,
     notes: list[str],
 ) -> Fit:
-    """A fit with its intervals; what is not identified becomes NaN."""
+    """Return a fit with its intervals; coefficients that are not identified are NaN."""
     if search.freedom < 1:
         notes.append("as many coefficients as observations: no interval can be stated")
     values = np.where(identified, linear, np.nan)
@@ -312,7 +312,7 @@ def concluded(
 
 
 def _student(freedom: int) -> float:
-    """How many standard deviations hold 95 % on both sides."""
+    """Return the half width of a two-sided 95 % interval in standard deviations."""
     return float(stdtrit(freedom, 0.975)) if freedom > 0 else math.nan
 
 
@@ -326,7 +326,7 @@ def predicted(fit: Fit, cut: MeasuredCut, theta: Floats, resonance: Floats | Non
 
 
 def _turned(fit: Fit, cut: MeasuredCut, p: Floats, theta: Floats, harmonics: int | None, resonance: Floats) -> Floats:
-    """As :func:`predicted` for any runout and coefficients p, of the first harmonics or of all."""
+    """Return :func:`predicted` for any runout and coefficients p, from the first harmonics or from all."""
     cutter = replace(fit.cutter, runout=(math.hypot(p[0], p[1]), math.atan2(p[1], p[0])))
     rings = np.isfinite(resonance[:, 0])
     force = np.full((len(theta), 3), np.nan)
@@ -342,7 +342,7 @@ def _turned(fit: Fit, cut: MeasuredCut, p: Floats, theta: Floats, harmonics: int
 
 
 def predicted_mean(fit: Fit, cut: MeasuredCut) -> tuple[Floats, Floats]:
-    """Mean force over the turn and the half width of its band, (3,) float [N] each: as in :func:`predict`, alone."""
+    """Return the mean force over the turn and the half width of its band, (3,) [N] each, as :func:`predict`."""
     return _banded(fit, lambda p: _mean(fit, cut, p))
 
 
@@ -352,7 +352,7 @@ def _mean(fit: Fit, cut: MeasuredCut, p: Floats) -> Floats:
 
 
 def _banded(fit: Fit, numbers: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
-    """What ``numbers`` gives at the fitted parameters, and the half width of its 95 % band, by differences."""
+    """Return ``numbers`` at the fitted parameters, and the half width of its 95 % band by differences."""
     p = fit.search.parameters
     values = numbers(p)
     slopes = np.zeros((*values.shape, len(p)))
@@ -366,7 +366,7 @@ def _banded(fit: Fit, numbers: Callable[[Floats], Floats]) -> tuple[Floats, Floa
 
 
 def predict(fit: Fit, cut: MeasuredCut) -> Prediction:
-    """Mean and extremes of a cut that was not fitted, with their bands from the covariance of runout and x."""
+    """Predict mean and extremes of a cut that was not fitted, with bands from the covariance of runout and x."""
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
 
     def numbers(p: Floats) -> Floats:
@@ -382,7 +382,7 @@ def predict(fit: Fit, cut: MeasuredCut) -> Prediction:
 
 
 def aligned(fit: Fit, cut: MeasuredCut, turns: Turns, parts: int = 720) -> float:
-    """theta_0 of a cut at which its harmonics lie nearest to those that the fit says, of ``parts`` tried [rad]."""
+    """Return theta_0 [rad] of a cut at which its harmonics are nearest to the predicted ones, of ``parts`` tried."""
     k = np.arange(len(turns.amplitude), dtype=np.float64)
     said = (unit_harmonics(cut, fit.cutter, len(k) - 1) @ fit.coefficients.linear) * dynamometer(
         fit.channels.resonance, k * cut.speed

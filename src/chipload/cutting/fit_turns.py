@@ -1,4 +1,4 @@
-"""Force coefficients from every sample over the turn, with the runout and the spindle's phase, which nobody measured.
+"""Identification of force coefficients, runout and spindle phase from every force sample over the turn.
 
 Notation: as in :mod:`chipload.cutting.fit`; theta_0 [rad] rotation of tooth 0 at the first sample; f cuts, H harmonics.
 
@@ -7,12 +7,12 @@ amplitudes:
 
     c_k = D(k Omega) B_k(e, lambda) x exp(i k theta_0) + zero (k = 0).
 
-x and the zeros are linear and solved inside (variable projection); theta_0 of each cut and the runout outside. Omega is
-found before, where the harmonics hold most. Harmonics up to a stated band count, and each channel of each cut counts
-by its own size. Where the dynamometer rings, w0 and zeta come from all harmonics in turn with the rest; intervals take
-them as known.
+x and the zeros are linear: an inner least-squares problem solves them (variable projection). An outer search finds
+theta_0 of each cut and the runout. Omega is found first, as the speed whose harmonics contain most of the power.
+Harmonics up to a stated band are used, and each channel of each cut is weighted by its own size. Where the dynamometer
+rings, w0 and zeta are found from all harmonics, alternating with the rest; intervals take them as known.
 
-Intervals: covariance (J'J)^-1 J' diag(r^2 / (1 - l)^2) J (J'J)^-1 with residuals r and leverages l, which holds too
+Intervals: covariance (J'J)^-1 J' diag(r^2 / (1 - l)^2) J (J'J)^-1 with residuals r and leverages l, which is also valid
 where the model fits some harmonics worse than others.
 
 Reference: [Kline1983], runout.
@@ -59,7 +59,7 @@ SIZES = (0.2, 0.45, 0.7)
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """Amplitudes, what they weigh, and what is sought. q = theta_0 of each cut, then the runout (u, v) or u or none."""
+    """Amplitudes, weights and unknowns of the search. q = theta_0 of each cut, then the runout (u, v), u or nothing."""
 
     cuts: tuple[MeasuredCut, ...]
     turns: tuple[Turns, ...]
@@ -72,18 +72,18 @@ class _Problem:
 
     @property
     def unknowns(self) -> int:
-        """Numbers of the runout: with two teeth only its size acts, with one nothing."""
+        """Number of unknowns of the runout: with two teeth only its size has an effect, with one tooth it has none."""
         return min(self.cutter.flutes - 1, 2) if self.seek_runout else 0
 
     def cutter_at(self, runout: Floats) -> Cutter:
-        """The cutter with the runout of the unknowns."""
+        """Return the cutter with the runout of the unknowns."""
         if not len(runout):
             return self.cutter
         u, v = float(runout[0]), float(runout[1]) if len(runout) > 1 else 0.0
         return replace(self.cutter, runout=(math.hypot(u, v), math.atan2(v, u)))
 
     def units(self, runout: Floats) -> list[Complexes]:
-        """B_k of each cut."""
+        """Return B_k of each cut."""
         key = tuple(runout.tolist())
         if key not in self.kept:
             if len(self.kept) > 16:
@@ -92,7 +92,7 @@ class _Problem:
         return self.kept[key]
 
     def rows(self, q: Floats, only: int | None = None) -> tuple[Floats, Floats]:
-        """Weighted design (m, 6 + zeros) and observations (m,), of every cut or of one."""
+        """Return the weighted design matrix (m, 6 + zeros) and observations (m,) of every cut or of one."""
         f = len(self.cuts)
         k = np.arange(self.harmonics + 1, dtype=np.float64)
         design, seen = [], []
@@ -112,12 +112,12 @@ class _Problem:
         return np.concatenate(design), np.concatenate(seen)
 
     def left(self, q: Floats) -> Floats:
-        """Residuals at the best linear coefficients."""
+        """Return the residuals at the best linear coefficients."""
         a, y = self.rows(q)
         return np.asarray(y - a @ solved(a, y)[0])
 
     def start(self, runout: Floats) -> Floats:
-        """theta_0 of each cut by search, at one runout; the linear coefficients are free in each cut.
+        """Return theta_0 of each cut by search at one runout; the linear coefficients are free in each cut.
 
         Turning the phase turns all columns alike: the normal matrix stays, and only its right side changes.
         """
@@ -148,7 +148,7 @@ def fit_instantaneous(
     zero: bool = False,
     ringing: Sequence[float | None] = (None, None, None),
 ) -> Fit:
-    """Coefficients from every sample over the turn.
+    """Identify force coefficients from every force sample over the turn.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def fit_instantaneous(
 
 
 def turns_in_band(cuts: Sequence[MeasuredCut], band: float) -> tuple[int, tuple[Turns, ...]]:
-    """The harmonics of the fastest spindle in the band [rad/s], and the turns of all cuts with at least as many.
+    """Return the number of harmonics in the band [rad/s] at the fastest spindle, and the turns of all cuts.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def turns_in_band(cuts: Sequence[MeasuredCut], band: float) -> tuple[int, tuple[
 
 
 def _searched(problem: _Problem) -> tuple[Floats, bool]:
-    """The best of several starts."""
+    """Return the best result of several starts."""
     f, m = len(problem.cuts), problem.unknowns
     flutes = problem.cutter.flutes
     starts = [np.zeros(0)]
@@ -222,7 +222,7 @@ def _searched(problem: _Problem) -> tuple[Floats, bool]:
 
 
 def _refined(problem: _Problem, q: Floats) -> tuple[Floats, bool]:
-    """Least squares from one start."""
+    """Refine the unknowns by least squares from one start."""
     least = min(cut.feed_per_tooth(problem.cutter.flutes) for cut in problem.cuts)
     scale = np.concatenate([np.full(len(problem.cuts), 0.1), np.full(problem.unknowns, 0.2 * least)])
     done = least_squares(problem.left, q, x_scale=scale, xtol=1e-10, ftol=1e-12, max_nfev=200)
@@ -230,7 +230,7 @@ def _refined(problem: _Problem, q: Floats) -> tuple[Floats, bool]:
 
 
 def _rung(problem: _Problem, q: Floats) -> Floats:
-    """w0 and zeta of each channel that rings, from all harmonics, the rest as it is."""
+    """Return w0 and zeta of each channel that rings, from all harmonics, with the other unknowns fixed."""
     f = len(problem.cuts)
     a, y = problem.rows(q)
     x = solved(a, y)[0][:6]
@@ -252,7 +252,7 @@ def _rung(problem: _Problem, q: Floats) -> Floats:
 
 
 def _ringing_left(p: Floats, parts: list[tuple[Floats, Complexes, Complexes]]) -> Floats:
-    """What one channel leaves at p = (ln w0, ln zeta), each cut by its own size."""
+    """Return the residuals of one channel at p = (ln w0, ln zeta), each cut weighted by its own size."""
     one = np.full((3, 2), np.nan)
     one[0] = np.exp(p)
     e = [(dynamometer(one, w)[:, 0] * forced - seen) / np.linalg.norm(seen) for w, forced, seen in parts]
@@ -260,7 +260,7 @@ def _ringing_left(p: Floats, parts: list[tuple[Floats, Complexes, Complexes]]) -
 
 
 def _concluded(problem: _Problem, q: Floats, converged: bool) -> Fit:
-    """Values, covariance and quality at the end of the search."""
+    """Return values, covariance and quality at the end of the search."""
     f, m = len(problem.cuts), problem.unknowns
     a, y = problem.rows(q)
     x, there, determined = solved(a, y)
@@ -301,7 +301,7 @@ def _concluded(problem: _Problem, q: Floats, converged: bool) -> Fit:
 
 
 def _quality(problem: _Problem, q: Floats, x: Floats) -> tuple[Floats, Floats]:
-    """Standard deviation of what the model leaves in the band [N], and R^2, of each channel."""
+    """Return the standard deviation of the residuals in the band [N], and R^2, of each channel."""
     left, total = np.full((2, 3), np.nan)
     for c in range(3):
         mine = [i for i, cut in enumerate(problem.cuts) if cut.measured[c]]

@@ -1,4 +1,4 @@
-"""Force, torque and power of what the teeth cut: the one force model of chipload.
+"""The force model: force, torque and power from tooth engagement and force coefficients.
 
 Notation: A the axis from the tip to the holder, T the direction that immersion is counted from less pi/2 (that of the
 feed where the feed is normal to A), n = Rot(+90 deg about A) T; phi immersion, h chip thickness, s length along the
@@ -16,10 +16,11 @@ right-hand cut out of the holder:
     dF = -dFt t - dFr nu - dFa e,  dFt = (Ktc h + Kte) ds, likewise r and a;  torque rho dFt.
 
 On a straight flank nu = u and e = A; on a flat bottom the radial force is the thrust, along A. With a counter-clockwise
-spindle (M4, left-hand cutter) n is mirrored and the rest stands.
+spindle (M4, left-hand cutter) n is mirrored and everything else is unchanged.
 
-Between the bounds of a bite h is a sinusoid, and the integral over s is a closed form: no slices of a straight flank.
-Where the material has a size effect, h^(1 - m) in place of h, it is a quadrature, right to 1e-7 or better.
+Between the bounds of a bite h is a sinusoid, and the integral over s has a closed form: a straight flank needs no
+slices. If the material has a size effect, h^(1 - m) in place of h, the integral is a quadrature with an error of 1e-7
+or less.
 
 Reference: [Altintas2012] ch. 2, analytic forces of a helical end mill; [Engin2001] for kappa and the sign of the axial
 force; [Kienzle1952] for the size effect.
@@ -51,7 +52,7 @@ EXACT_ROWS = 24
 
 
 def _arrays(bites: ToothEngagement, cutter: Cutter) -> tuple[Any, ...]:
-    """Tooth engagement as the kernels take them, after a check that the cutter has their teeth."""
+    """Return tooth engagement as arrays for the kernels, after a check that the cutter has its teeth."""
     top = int(bites.tooth.max(initial=-1))
     if top >= cutter.flutes:
         raise InputError(f"tooth engagement: tooth {top}: must be below cutter.flutes = {cutter.flutes}")
@@ -61,7 +62,7 @@ def _arrays(bites: ToothEngagement, cutter: Cutter) -> tuple[Any, ...]:
 def forces_over_turn(
     bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike
 ) -> tuple[Floats, Floats]:
-    """Force on the cutter and torque at given rotations.
+    """Return the force on the cutter and the torque at given rotations.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def forces_over_turn(
 
 
 def mean_forces(bites: ToothEngagement, cutter: Cutter, material: Material) -> tuple[Floats, Floats]:
-    """Force on the cutter and torque averaged over a revolution; the lag of the edge does not enter.
+    """Return force on the cutter and torque averaged over a revolution; they do not depend on the lag of the edge.
 
     Returns
     -------
@@ -114,12 +115,12 @@ def greatest_forces(
     sample_step: float = SAMPLE_STEP,
     exact_rows: int | None = EXACT_ROWS,
 ) -> Mapping[str, Floats]:
-    """Where the load is greatest over a revolution.
+    """Return the greatest in-plane force, torque and axial force over a revolution.
 
     The rotations where a bite begins or ends are found exactly; between them the load is smooth, is sampled at most
     ``sample_step`` apart and refined by golden section. Jumps (zero helix) count with their one-sided limits.
 
-    In a step of more than ``exact_rows`` bites (None: no such limit) the ends are not looked up, for their number
+    In a step of more than ``exact_rows`` bites (None: no such limit) the ends are not searched, because their number
     times the number of bites grows too fast: the revolution, or the pitch where all teeth are alike, is sampled
     ``sample_step`` apart and the best sample refined between its neighbours. A peak narrower than that may be missed.
 
@@ -138,7 +139,7 @@ def greatest_forces(
 
 
 def in_work(force: ArrayLike, frame: ArrayLike) -> Floats:
-    """Forces along T, n and the axis in the frame of the work: F_T T + F_n n + F_A A.
+    """Return forces along T, n and the axis in the frame of the work: F_T T + F_n n + F_A A.
 
     Parameters
     ----------
@@ -178,7 +179,7 @@ def forces_along(
     count: ArrayLike | None = None,
     sample_step: float = SAMPLE_STEP,
 ) -> dict[str, NDArray[Any]]:
-    """Force, torque and power of every step of a pass.
+    """Return force, torque, power and chip thickness of every step of a pass with a straight flank.
 
     Parameters
     ----------
@@ -191,7 +192,7 @@ def forces_along(
     axial_depth : [mm], at most the flute length
     spindle_speed : () or (n,) float [rad/s], for the power
     spindle : ``cw`` (M3) or ``ccw`` (M4, a left-hand cutter)
-    count : (n,) int, arcs that hold; None: all k
+    count : (n,) int, number of valid arcs; None: all k
     sample_step : [rad], of the search over the revolution
 
     Returns

@@ -1,8 +1,9 @@
-"""What a material asks of the edge: cutting and edge coefficients, where they were measured and how sure they are.
+"""Materials: cutting and edge coefficients, their source, range and uncertainty, and the files that contain them.
 
-Notation: per mm of depth a tooth meets Ft = Ktc h + Kte (tangential), Fr = Krc h + Kre (radial), Fa = Kac h + Kae
-(axial), h [mm] the chip thickness; Kc [MPa], Ke [N/mm]. With a size effect of exponent m, which each direction has its
-own of, Kc h becomes Kc (h / 1 mm)^(-m) h, Kc that at a thickness of 1 mm: thin chips ask for more.
+Notation: per mm of depth a tooth has the forces Ft = Ktc h + Kte (tangential), Fr = Krc h + Kre (radial) and
+Fa = Kac h + Kae (axial), h [mm] the chip thickness; Kc [MPa], Ke [N/mm]. With a size effect Kc h becomes
+Kc (h / 1 mm)^(-m) h, where Kc is the coefficient at a thickness of 1 mm and each direction has its own exponent m:
+thin chips need a greater force per area.
 
 Reference: [Altintas2012] ch. 2; [Kienzle1952] for the exponent; [Zhang2021] table 5 for the shipped numbers.
 """
@@ -127,7 +128,7 @@ class Material:
             raise InputError("material: tangential with radial or axial coefficients: leave them at 0")
 
     def _check_covariance(self) -> None:
-        """Refuse what is no covariance; keep it as a tuple of rows."""
+        """Refuse a matrix that is not a covariance; keep it as a tuple of rows."""
         if self.spread is not None:
             raise InputError("material.spread and material.covariance: give one of them: both state the same")
         c = np.asarray(self.covariance, dtype=np.float64)
@@ -142,8 +143,7 @@ class Material:
 
     @property
     def variances(self) -> NDArray[np.float64]:
-        """Covariance of the six coefficients, (6, 6) float: the fitted one, or from the spread as if each coefficient
-        erred by itself.
+        """Covariance (6, 6) of the coefficients: the fitted one, or from the spread with independent errors.
 
         Raises
         ------
@@ -161,12 +161,12 @@ class Material:
 
     @property
     def has_band(self) -> bool:
-        """Whether it says how sure its coefficients are."""
+        """Whether the uncertainty of the coefficients is known, as a spread or a covariance."""
         return self.spread is not None or self.covariance is not None
 
     @property
     def law(self) -> tuple[float, ...]:
-        """Coefficients and exponents, (Ktc, Krc, Kac, Kte, Kre, Kae, m_t, m_r, m_a), as the kernels take them."""
+        """Coefficients and exponents (Ktc, Krc, Kac, Kte, Kre, Kae, m_t, m_r, m_a), in the order of the kernels."""
         return (*self.coefficients, *self.exponents)
 
     @property
@@ -176,14 +176,14 @@ class Material:
 
 
 def _number(label: str, key: str, value: Any) -> float:
-    """A number of the file, not a truth value and not a text."""
+    """Return a number of the file; refuse a Boolean or a text."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(f"{label}: {key} = {value!r}: must be a number")
     return float(value)
 
 
 def _range(label: str, table: dict[str, Any], low: str, high: str) -> tuple[float, float] | None:
-    """Two numbers that are given together or not at all."""
+    """Return two numbers of the file that are stated together or not at all."""
     if low not in table and high not in table:
         return None
     for key in (low, high):
@@ -193,14 +193,14 @@ def _range(label: str, table: dict[str, Any], low: str, high: str) -> tuple[floa
 
 
 def _matrix(label: str, value: Any) -> list[list[float]]:
-    """Rows of numbers; their count is checked by the material."""
+    """Return rows of numbers of the file; the material checks their count."""
     if not isinstance(value, list) or not all(isinstance(row, list) and len(row) == len(value) for row in value):
         raise InputError(f"{label}: covariance: must be 6 rows of 6 numbers")
     return [[_number(label, "covariance", x) for x in row] for row in value]
 
 
 def _from_table(label: str, table: dict[str, Any]) -> Material:
-    """A material from the values of its file; ``label`` names it in messages."""
+    """Return the material of the values of its file; ``label`` names it in messages."""
     for key in table:
         if key not in _KEYS:
             near = nearest(key, list(_KEYS))
@@ -246,7 +246,7 @@ def read_material(path: str | Path) -> Material:
 
 
 def material_text(material: Material) -> str:
-    """A material as :func:`read_material` reads it; numbers to the last digit."""
+    """Return the TOML text of a material for :func:`read_material`, with numbers to the last digit."""
     values: dict[str, Any] = {key: getattr(material, key) for key in _TEXTS if getattr(material, key)}
     for key, (name, _, _) in _NUMBERS.items():
         if not (material.tangential and key in _DIRECTIONS):
@@ -266,13 +266,13 @@ def material_text(material: Material) -> str:
 
 
 def beyond(material: Material, chip_max_mm: float, speed_mm_s: float) -> tuple[str, ...]:
-    """What a cut asks of the coefficients outside the range they were measured in, as texts; none: nothing, or unknown.
+    """Return a text for each measured range that a cut leaves; none if it leaves none or no range is known.
 
     Parameters
     ----------
     material : with its ranges
-    chip_max_mm : thickest chip [mm] of a step: every chip ends thin, but where the thickest is below the range all of
-        it is
+    chip_max_mm : thickest chip [mm] of a step. Every chip has a thin end; a step is below the range only if its
+        thickest chip is
     speed_mm_s : cutting speed at the rim [mm/s]
 
     Examples
@@ -292,7 +292,7 @@ def beyond(material: Material, chip_max_mm: float, speed_mm_s: float) -> tuple[s
 
 
 def need_directions(material: Material, what: str) -> None:
-    """Refuse a material of which only the tangential force is known where ``what`` needs its direction too.
+    """Refuse a material with the tangential force alone where ``what`` also needs the direction of the force.
 
     Raises
     ------
@@ -307,7 +307,7 @@ def need_directions(material: Material, what: str) -> None:
 
 
 def material_names() -> tuple[str, ...]:
-    """Names of the materials that come with chipload, sorted.
+    """Return the names of the shipped materials, sorted.
 
     >>> material_names()[:5]
     ('al6082-t6', 'al7075-carbide', 'al7075-hss', 'al7075-t6', 'group-13-stainless')
@@ -316,7 +316,7 @@ def material_names() -> tuple[str, ...]:
 
 
 def material_named(name: str) -> Material:
-    """The shipped material of that name.
+    """Return the shipped material with this name.
 
     Raises
     ------

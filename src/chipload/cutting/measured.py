@@ -1,4 +1,4 @@
-"""Files of measured forces: with a header as DynoWare writes it, or with a line of names alone.
+"""Reading of files of measured forces, with a DynoWare header or with a line of column names only.
 
 Notation: F force [N], t time [s].
 
@@ -68,7 +68,7 @@ class Measured:
         object.__setattr__(self, "force", force)
 
     def column(self, name: str) -> Floats:
-        """The forces of a column, (n,) float [N].
+        """Return the forces (n,) [N] of a column.
 
         Raises
         ------
@@ -97,8 +97,8 @@ def read_forces(path: str | Path, window: tuple[float, float] | None = None) -> 
     Raises
     ------
     InputError
-        The file cannot be read, names no columns or units, holds something that is no number, misses samples within the
-        window, or holds more than can be kept; with the line and what to do.
+        The file cannot be read, names no columns or units, contains a value that is not a number, misses samples within
+        the window, or is too large; the message states the line and the remedy.
     """
     label = f"forces {Path(path).name}"
     lines = _lines(Path(path), label)
@@ -144,7 +144,7 @@ def read_forces(path: str | Path, window: tuple[float, float] | None = None) -> 
 
 
 def _lines(path: Path, label: str) -> Iterator[tuple[int, str]]:
-    """Numbered lines without their ends; latin-1 where the text is not UTF-8."""
+    """Yield numbered lines without line ends; as latin-1 if the text is not UTF-8."""
     with open_regular(path, label, LARGEST_FILE, "cut it into parts") as file:
         for number, raw in enumerate(_raw_lines(file), 1):
             if len(raw) > LINE:
@@ -159,7 +159,7 @@ def _lines(path: Path, label: str) -> Iterator[tuple[int, str]]:
 
 
 def _raw_lines(file: IO[bytes]) -> Iterator[bytes]:
-    """Lines without their ends, LF, CR LF or CR; of one that is too long the first ``LINE + 1`` bytes."""
+    """Yield lines without their ends (LF, CR LF or CR); of a line that is too long the first ``LINE + 1`` bytes."""
     rest = b""
     while block := file.read(BLOCK):
         rest += block
@@ -201,7 +201,7 @@ def _is_number(text: str) -> bool:
 def _head(
     lines: Iterator[tuple[int, str]], label: str
 ) -> tuple[dict[str, str], list[str], list[str] | None, int, tuple[int, list[str]] | None]:
-    """Header, names, units (None: in the names), line of the names, the first line of numbers."""
+    """Return header, names, units (None: in the names), line of the names, and the first line of numbers."""
     before: list[tuple[int, list[str]]] = []
     for number, text in lines:
         if not text.strip():
@@ -231,7 +231,7 @@ def _head(
 def _columns(
     names: list[str], units: list[str] | None, at: int, label: str
 ) -> tuple[tuple[int, float] | None, list[tuple[int, float]]]:
-    """Column and scale of the time, and of each force."""
+    """Return column and scale of the time and of each force."""
     time, forces = None, []
     for k, name in enumerate(names):
         unit = units[k] if units is not None else name.lower().rsplit("_", 1)[-1]
@@ -253,7 +253,7 @@ def _columns(
 
 
 def _rate(header: Mapping[str, str], label: str) -> float | None:
-    """The header's sampling rate [Hz]."""
+    """Return the sampling rate [Hz] of the header."""
     for key, value in header.items():
         if key.lower().startswith(_RATE):
             unit = 1000.0 if "khz" in key.lower() else 1.0
@@ -264,7 +264,7 @@ def _rate(header: Mapping[str, str], label: str) -> float | None:
 
 
 def _spacing(t: Floats, stated: float | None, label: str) -> float:
-    """The sampling rate of the time stamps; gaps are refused, and a rate that the header states otherwise."""
+    """Return the sampling rate of the time stamps; refuse gaps, and a header with another rate."""
     step = float(np.median(np.diff(t)))
     if not step > 0.0:
         raise InputError(f"{label}: time does not rise at {t[0]:g} s: must be equally spaced")
@@ -283,7 +283,7 @@ def _spacing(t: Floats, stated: float | None, label: str) -> float:
 
 
 def _findings(measured: Measured, window: tuple[float, float] | None, end: float) -> Iterator[Finding]:
-    """A window that the file does not fill, samples that are clipped, channels that drift."""
+    """Yield findings: a window that the file does not fill, clipped samples, channels that drift."""
     step = 1.0 / measured.rate
     if window is not None and (measured.start - window[0] > step or window[1] - end > step):
         text = f"the window {window[0]:g} to {window[1]:g} s is filled from {measured.start:g} to {end:g} s alone"

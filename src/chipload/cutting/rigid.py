@@ -1,17 +1,17 @@
-"""Whether the rigid model still holds: the deflection against what the teeth take.
+"""Check of the rigid model: the deflection compared with the feed per tooth and the radial depth of cut.
 
-The loads are those of a cutter and a work that do not give way. Notation: delta [mm] deflection, f_z feed per tooth,
-a_e radial depth, mu = delta / f_z.
+The loads are those of a rigid cutter and a rigid workpiece. Notation: delta [mm] deflection, f_z feed per tooth, a_e
+radial depth of cut, mu = delta / f_z.
 
-Where the engagement changes, tooth j deflects by x_j and takes h_j = f_z - x_j + x_(j-1), the force being linear in h:
+Where the engagement changes, tooth j deflects by x_j and cuts h_j = f_z - x_j + x_(j-1), the force being linear in h:
 x_j = mu h_j, so that x_j = (f_z + x_(j-1)) mu / (1 + mu). The chip settles to f_z by the factor mu / (1 + mu) a tooth,
-however soft the cutter; the first tooth takes f_z / (1 + mu). With mu = 2 it is within 30 % after three teeth and
+however soft the cutter; the first tooth cuts f_z / (1 + mu). With mu = 2 it is within 30 % after three teeth and
 20 % after four, about a revolution: less than the usual spread of the coefficients. In a steady cut the deflection
-makes the radial depth another one, by delta / a_e at most, and so the force.
+changes the radial depth of cut, and so the force, by delta / a_e at most.
 
     share = max(delta / (of_feed f_z), delta / (of_depth a_e)),   of_feed = 2, of_depth = 0.25,
 
-above 1 the rigid model is not held to be right: the loads are not proved. Static: chatter is another question.
+above 1 the rigid model is not valid, and the loads are not proved. The check is static; chatter is checked separately.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ OF_FEED, OF_DEPTH = 2.0, 0.25
 def deflection_share(
     bites: ToothEngagement, deflection_um: ArrayLike, of_feed: float = OF_FEED, of_depth: float = OF_DEPTH
 ) -> Floats:
-    """Column ``deflection_share``: the deflection over the greatest with which the rigid model holds, (n,).
+    """Return the column ``deflection_share`` (n,): deflection over the greatest for which the rigid model is valid.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether the cutter breaks: stress in its fluted part and its shank under what its teeth cut.
+"""Stress in the fluted part and the shank of the cutter under the cutting force.
 
 Notation: z [mm] height above the tip; a section at z carries what cuts below it: dF_l the lateral force and dF_a the
 axial one (along A, into the holder) of a piece of edge at the height z' and the radius rho, u its radial direction,
@@ -15,8 +15,8 @@ sigma / 2 + sqrt(sigma^2 / 4 + tau^2); of high-speed steel von Mises sqrt(sigma^
 both times K_t. It is the greatest over a revolution, and over the sections: the end of the flutes, the clamp in the
 holder, and where the cutter is tapered :data:`TAPER_SECTIONS` of its flank.
 
-Left out: the corner and the edge themselves (they chip, they are no beam), impact when a tooth enters, chatter, and a
-neck thinner than the shank.
+Not included: chipping of the corner and the edge (they are not a beam), impact when a tooth enters, chatter, and a neck
+thinner than the shank.
 
 Reference: [Kops1990] for the equivalent diameter, [Altintas2012] ch. 2 for the forces; bending and torsion of a round
 bar in closed form.
@@ -63,7 +63,7 @@ class Sections:
 
 
 def sections_of(cutter: Cutter) -> Sections:
-    """Sections in which the cutter may break.
+    """Return the sections of a cutter at which the stress is calculated.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def sections_of(cutter: Cutter) -> Sections:
 def section_loads(
     bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike, height: ArrayLike
 ) -> Floats:
-    """What sections carry at given rotations.
+    """Return bending moment, axial force and torque of sections at given rotations.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def section_loads(
 
 
 def normal_stress(loads: ArrayLike, diameter: ArrayLike) -> Floats:
-    """Greatest normal stress [MPa] of sections (h,) [mm] under loads (..., h, 4), as :func:`section_loads` gives them.
+    """Return the greatest normal stress [MPa] of sections (h,) [mm] under loads (..., h, 4) of :func:`section_loads`.
 
     >>> float(normal_stress([[1000.0, 0.0, 0.0, 0.0]], [10.0])[0].round(6))
     10.185916
@@ -132,7 +132,7 @@ def normal_stress(loads: ArrayLike, diameter: ArrayLike) -> Floats:
 
 
 def von_mises_stress(loads: ArrayLike, diameter: ArrayLike) -> Floats:
-    """Greatest equivalent stress by von Mises [MPa]; arguments as :func:`normal_stress`.
+    """Return the greatest von Mises equivalent stress [MPa]; parameters as :func:`normal_stress`.
 
     >>> float(von_mises_stress([[0.0, 0.0, 0.0, 1000.0]], [10.0])[0].round(6))
     8.821262
@@ -142,11 +142,11 @@ def von_mises_stress(loads: ArrayLike, diameter: ArrayLike) -> Floats:
 
 
 def cutter_stress(bites: ToothEngagement, cutter: Cutter, material: Material, rotation: float = ROTATION) -> Floats:
-    """Column ``cutter_stress_mpa``: greatest equivalent stress of each step over a revolution, (n,) [MPa].
+    """Return the column ``cutter_stress_mpa``: greatest equivalent stress of each step over a revolution, (n,) [MPa].
 
     Parameters
     ----------
-    rotation : between two rotations that are looked at [rad]
+    rotation : angle between two calculated rotations [rad]
 
     Raises
     ------
@@ -172,7 +172,7 @@ def cutter_stress(bites: ToothEngagement, cutter: Cutter, material: Material, ro
 
 
 def allowed_stress(cutter: Cutter) -> float:
-    """Limit of the column [MPa]: the strength over the safety factor.
+    """Return the limit of the column [MPa]: the strength over the safety factor.
 
     >>> allowed_stress(Cutter(10.0, 4, 0.5, 20.0, 35.0, 5.8e5))
     1500.0
@@ -181,7 +181,7 @@ def allowed_stress(cutter: Cutter) -> float:
 
 
 def _stresses(loads: ArrayLike, diameter: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Bending stress (at least 0), axial stress (pressure above 0) and shear stress."""
+    """Return bending stress (at least 0), axial stress (pressure above 0) and shear stress."""
     load, d = np.asarray(loads, dtype=np.float64), np.asarray(diameter, dtype=np.float64)
     bending = 32.0 * np.hypot(load[..., 0], load[..., 1]) / (math.pi * d**3)
     return bending, 4.0 * load[..., 2] / (math.pi * d**2), 16.0 * load[..., 3] / (math.pi * d**3)

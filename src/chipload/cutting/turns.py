@@ -1,4 +1,4 @@
-"""Steady cuts that were measured, and what their whole turns hold.
+"""Measured steady cuts, and the spindle speed, harmonics and extremes of their whole turns.
 
 Notation: T unit feed direction, n across it, as in :mod:`chipload.cutting.force`; Omega [rad/s] spindle speed; k
 harmonic of the spindle; c_k complex amplitude: F(t) = c_0 + 2 Re(sum over k of c_k exp(i k Omega t)), t from the first
@@ -72,11 +72,11 @@ class MeasuredCut:
 
     @property
     def measured(self) -> NDArray[np.bool_]:
-        """(3,) which of T, n and the axis were measured."""
+        """Mask (3,) of the components along T, n and the axis that were measured."""
         return np.asarray(~np.isnan(self.force[0]))
 
     def feed_per_tooth(self, flutes: int) -> float:
-        """f_z [mm] = feed / (Omega / (2 pi) N).
+        """Feed per tooth f_z [mm] = feed / (Omega / (2 pi) N).
 
         >>> cut = MeasuredCut("c", 100.0, np.zeros((200, 3)), 10.0, math.tau * 5.0, (0.0, math.pi), 1.0)
         >>> cut.feed_per_tooth(2)
@@ -87,7 +87,7 @@ class MeasuredCut:
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """What whole turns of a cut hold.
+    """Speed, harmonics and extremes of the whole turns of a cut.
 
     ``speed`` [rad/s] that was found; ``amplitude`` (H + 1, 3) complex [N], c_k; ``mean``, ``high`` and ``low`` (r, 3)
     [N] of each turn; ``plane`` (r,) [N] greatest in-plane force of each turn; ``scatter`` (3,) [N] standard deviation
@@ -104,18 +104,18 @@ class Turns:
 
 
 def turns_of(cut: MeasuredCut, harmonics: int, search: float = 0.01, seek: int = 8) -> Turns:
-    """Spindle speed, harmonics and extremes of the whole turns of a cut.
+    """Return spindle speed, harmonics and extremes of the whole turns of a cut.
 
     Parameters
     ----------
     harmonics : H, at least 1 and below half the samples of a turn
     search : part of the nominal speed within which the speed is sought; 0: the nominal speed is exact
-    seek : the speed is where the harmonics up to this hold most
+    seek : the speed is that at which the harmonics up to this one contain the most power
 
     Raises
     ------
     InputError
-        There are more harmonics than samples can tell.
+        The samples cannot resolve so many harmonics.
     """
     given = np.flatnonzero(cut.measured)
     force = cut.force[:, given] - cut.force[:, given].mean(axis=0)
@@ -148,7 +148,7 @@ def turns_of(cut: MeasuredCut, harmonics: int, search: float = 0.01, seek: int =
 
 
 def _speed(force: Floats, rate: float, nominal: float, search: float, top: int) -> float:
-    """Where the harmonics 1 .. top hold most: on the bins of a padded transform, then between them."""
+    """Return the speed at which harmonics 1 .. top have most power: on bins of a padded transform, then between."""
     n = len(force)
     size = 8 * 2 ** math.ceil(math.log2(n))
     power = np.sum(np.abs(np.fft.rfft(force, size, axis=0)) ** 2, axis=1)

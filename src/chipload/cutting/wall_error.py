@@ -1,4 +1,4 @@
-"""What the bending cutter leaves on the wall, or takes too much of.
+"""Form error of a wall that the deflection of the cutter causes.
 
 Notation: phi immersion, theta rotation, bites as in :mod:`chipload.engagement.tooth_engagement`; z [mm] height above
 the tip;
@@ -47,14 +47,14 @@ REACH = 1e-3
 
 
 def _wall_immersion(milling: Milling) -> float:
-    """Immersion where the wall is made [rad], counted in the sense of the spindle."""
+    """Return the immersion [rad] at which the wall is made, in the sense of the spindle."""
     if milling not in ("up", "down"):
         raise InputError(f"milling = {milling!r}: must be up or down")
     return 0.0 if milling == "up" else math.pi
 
 
 def _makes_wall(bites: ToothEngagement, phi_wall: float, reach: float) -> NDArray[np.bool_]:
-    """Whether a bite of the step comes within ``reach`` of the wall, (n,) bool."""
+    """Return for each step whether a bite comes within ``reach`` of the wall, (n,) bool."""
     made = np.zeros(len(bites), dtype=np.bool_)
     near = np.abs(bites.rows[:, 0 if phi_wall == 0.0 else 1] - phi_wall) <= reach
     np.logical_or.at(made, np.repeat(np.arange(len(bites)), np.diff(bites.start)), near)
@@ -62,7 +62,7 @@ def _makes_wall(bites: ToothEngagement, phi_wall: float, reach: float) -> NDArra
 
 
 def _straight(bites: ToothEngagement, cutter: Cutter) -> Floats:
-    """Rows with heights in place of lengths along the profile, (b, 7); other bites than a straight flank's refused."""
+    """Return rows (b, 7) with heights in place of lengths along the profile; refuse all but a straight flank."""
     own = bites.slices[bites.slice]
     bad = np.flatnonzero(~((np.abs(own[:, 3] - 1.0) <= 1e-12) & (np.abs(own[:, 1] - cutter.radius) <= 1e-9)))
     if len(bad):
@@ -76,7 +76,7 @@ def _straight(bites: ToothEngagement, cutter: Cutter) -> Floats:
 
 
 def _beam(cutter: Cutter, fluted_factor: float | None) -> Floats:
-    """Overhang, flute length and the two flexibilities, as the kernels take them."""
+    """Return overhang, flute length and the two flexibilities for the kernels."""
     return np.array([cutter.overhang, cutter.flute_length, *flexibilities(cutter, fluted_factor)])
 
 
@@ -101,7 +101,7 @@ def wall_profile(
     fluted_factor: float | None = None,
     reach: float = REACH,
 ) -> Floats:
-    """Error of the wall over its height, for every step.
+    """Return the form error of the wall over its height for every step.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def wall_error_along(
     fluted_factor: float | None = None,
     reach: float = REACH,
 ) -> dict[str, NDArray[Any]]:
-    """Error of the wall of greatest size over the depth, for every step of a pass.
+    """Return the form error of greatest size over the depth for every step of a pass.
 
     Parameters
     ----------

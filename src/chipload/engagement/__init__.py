@@ -1,4 +1,4 @@
-"""What the cutter touches: contact arcs of the rim."""
+"""Engagement of the cutter with the stock: contact arcs, tooth engagement and chips."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The exact engagement of a cutter circle with stock bounded by lines and arcs.
+"""Exact engagement of a cutter circle with stock that lines and arcs bound.
 
 Notation: O cutter centre, T unit feed direction, R cutter radius, a engagement angle [rad]: the part of the front half
 of the rim (u . T > 0) that lies in material. Immersion phi [rad] is counted from n = Rot(+90 deg) T clockwise:
@@ -26,7 +26,7 @@ PIECES = 4
 
 @dataclass(frozen=True, eq=False)
 class StockBoundary:
-    """Where stock ends: segments (n, 7) of lines and arcs with the MATERIAL ON THE LEFT of each.
+    """Boundary of the stock: segments (n, 7) of lines and arcs with the MATERIAL ON THE LEFT of each.
 
     Closed contours, or open chains so long that the cutter never reaches past their ends.
     """
@@ -43,7 +43,7 @@ class StockBoundary:
 
 @dataclass(frozen=True, eq=False)
 class Engagement:
-    """What the rim meets, a row a query.
+    """Engagement of the rim, a row for each query.
 
     ``angle`` (m,) [rad] sum of the engaged pieces; ``count`` (m,) their number, -1 where the boundary is broken there
     (its crossings do not alternate); ``phi`` (m, PIECES, 2) [rad] their ends in immersion, 0 where there is none.
@@ -57,7 +57,7 @@ class Engagement:
 def engagement(
     stock: StockBoundary, centres: ArrayLike, headings: ArrayLike, radius: float, workers: int = 1
 ) -> Engagement:
-    """Exact engaged pieces of the rim for every centre and heading.
+    """Return the exact engaged arcs of the rim for every centre and heading.
 
     Parameters
     ----------

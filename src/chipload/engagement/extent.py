@@ -1,9 +1,9 @@
-"""How far a step engages: height of the contact, feed per tooth, radial depth, from what the teeth cut.
+"""Contact height, feed per tooth and radial depth of cut of a step, from its tooth engagement.
 
 Notation as in :mod:`chipload.engagement.tooth_engagement`: a bite from phi p to q, s a to b, with the chip thickness
 h = along sin(phi) + across cos(phi) + offset; kappa the angle of the profile. The feed per tooth has the parts
 hypot(along, across) / sin(kappa) across the axis and offset / cos(kappa) along it. Where the feed is not normal to a
-surface of the cutter, that surface says nothing of it; the greatest over the bites is taken.
+surface of the cutter, that surface does not determine the feed per tooth; the greatest over the bites is taken.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ FLAT = 1e-3
 
 
 def contact_height(bites: ToothEngagement) -> Floats:
-    """Height of the highest point of the edge that cuts above the tip, (n,) [mm]; 0 where nothing is cut."""
+    """Return the height (n,) [mm] above the tip of the highest point of the edge that cuts; 0 where nothing is cut."""
     s0, _, z0, sine = bites.slices[bites.slice, :4].T
     return _greatest(bites, z0 + sine * (bites.rows[:, 3] - s0))
 
 
 def tooth_feed(bites: ToothEngagement) -> Floats:
-    """Feed per tooth, (n,) [mm], of bites without runout; 0 where nothing is cut.
+    """Return the feed per tooth (n,) [mm] of bites without runout; 0 where nothing is cut.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def tooth_feed(bites: ToothEngagement) -> Floats:
 
 
 def radial_depth(bites: ToothEngagement) -> Floats:
-    """Width of the contact across the feed, (n,) [mm]: of all bites, seen along T; 0 where nothing is cut."""
+    """Return the radial depth of cut (n,) [mm]: width of all bites seen along T; 0 where nothing is cut."""
     p, q = bites.rows[:, :2].T
     rho = bites.slices[bites.slice, 1]
     # across = rho cos(phi): its ends, and its extremes at 0 (or 2 pi) and pi where the arc holds them

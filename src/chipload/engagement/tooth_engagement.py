@@ -1,4 +1,6 @@
-"""What each tooth cuts, from where to where, how thick: the one interface between engagement and force.
+"""Tooth engagement: the immersion, the part of the edge and the chip thickness of each cut of a tooth.
+
+It is the interface between engagement and force.
 
 Notation: A the cutter's axis from the tip to the holder; T unit direction normal to A, that of the feed where the feed
 is normal to the axis; n = Rot(+90 deg about A) T, mirrored where the spindle runs counter-clockwise; phi [rad]
@@ -14,11 +16,11 @@ motion f a tooth of the point on the edge gives along = sin(kappa) f.T, across =
 offset = -cos(kappa) f.A: a plunge is an offset on the bottom.
 
 Reference: [Altintas2012] ch. 2 for h = f_z sin(phi); [Kline1983] for runout: a tooth cuts what the N teeth before it
-left over, h_j = min over m = 1 .. N of m h + (r_j - r_(j-m)) sin(kappa), where positive; else it does not touch. With
-unlike pitches m is the angle of the m pitches before tooth j over 2 pi / N, and the tooth is later by its angle behind
-an even one, which is kept as a lag of its slices.
-Differs from source: the phase of the offset does not lag with the helix, a tooth has one radius over its depth.
-The volume a revolution removes does not depend on runout: sum over j of h_j = N h.
+left, h_j = min over m = 1 .. N of m h + (r_j - r_(j-m)) sin(kappa), where positive; else it does not touch. With
+uneven pitches m is the angle of the m pitches before tooth j over 2 pi / N, and the angle of the tooth behind an evenly
+spaced one is added to the lag of its slices.
+Differs from source: the phase of the offset does not lag with the helix; a tooth has one radius over its depth.
+The volume that a revolution removes does not depend on runout: sum over j of h_j = N h.
 """
 
 from __future__ import annotations
@@ -54,7 +56,7 @@ class ToothEngagement:
     slice : (b,) int; the row of ``slices`` in which the bite's s lies
     slices : (k, 7) float: s from [mm], rho [mm], z at s from [mm], sin(kappa), cos(kappa), lag at s from [rad], rate of
         the lag [rad/mm]; ``Slices.columns``
-    frame : (n, 3, 3) float: rows T, n, A in the frame of the work; None: nobody asks
+    frame : (n, 3, 3) float: rows T, n, A in the frame of the work; None: not needed
     """
 
     start: Ints
@@ -116,7 +118,7 @@ class ToothEngagement:
 
     @property
     def frames(self) -> Floats:
-        """``frame`` where it is needed.
+        """The array ``frame``; refused if it is None.
 
         Raises
         ------
@@ -128,7 +130,7 @@ class ToothEngagement:
         return self.frame
 
     def chip_max(self) -> Floats:
-        """Greatest chip thickness of each step, (n,) float [mm]; 0 where nothing is cut."""
+        """Return the greatest chip thickness (n,) [mm] of each step; 0 where nothing is cut."""
         low, high, _, _, along, offset, across = self.rows.T
         crest = np.arctan2(along, across)
         crest = crest + math.tau * np.ceil((low - crest) / math.tau)
@@ -140,7 +142,7 @@ class ToothEngagement:
 
 
 def tooth_radii(cutter: Cutter) -> Floats:
-    """r_j - R = e cos(lambda - 2 pi j / N), (N,) float [mm].
+    """Return the radius of each tooth less R: r_j - R = e cos(lambda - 2 pi j / N), (N,) float [mm].
 
     >>> tooth_radii(Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5, runout=(0.01, 0.0))).round(6).tolist()
     [0.01, -0.01]
@@ -150,7 +152,7 @@ def tooth_radii(cutter: Cutter) -> Floats:
 
 
 def with_runout(bites: ToothEngagement, cutter: Cutter) -> ToothEngagement:
-    """The bites of every tooth by itself, as the cutter's runout makes them; those of one tooth stay.
+    """Return the tooth engagement of every tooth by itself with the cutter's runout; rows of a single tooth stay.
 
     Each bite of every tooth, with the thickness h that it would have without runout, becomes for tooth j the ranges of
     immersion in which one of the lines m h + (r_j - r_(j-m)) sin(kappa) is the lowest, and positive. Teeth that are not
@@ -191,7 +193,7 @@ def with_runout(bites: ToothEngagement, cutter: Cutter) -> ToothEngagement:
 
 
 def thickest_of_teeth(plain: ArrayLike, cutter: Cutter, sine: ArrayLike = 1.0) -> Floats:
-    """Thickest chip that any tooth cuts where all would cut ``plain`` without runout, as an array [mm].
+    """Return the thickest chip [mm] of any tooth with runout, where each tooth cuts ``plain`` without runout.
 
     max_j min_m (m h + (r_j - r_(j-m)) sin(kappa)), see :func:`with_runout`. It grows with h, is at least h, and O(N^2).
 
@@ -215,7 +217,7 @@ def thickest_of_teeth(plain: ArrayLike, cutter: Cutter, sine: ArrayLike = 1.0) -
 
 
 def turns_before(cutter: Cutter) -> Floats:
-    """(N, N) float: of tooth j and m = 1 .. N, the angle of the m pitches before it over 2 pi / N."""
+    """Return (N, N) float: for tooth j and m = 1 .. N the angle of the m pitches before it over 2 pi / N."""
     N = cutter.flutes
     pitch = np.array(cutter.pitch) * N / math.tau if cutter.pitch else np.ones(N)
     return np.array([[pitch[(j - np.arange(m)) % N].sum() for m in range(1, N + 1)] for j in range(N)])
@@ -231,7 +233,7 @@ def engagement_of_arcs(
     count: ArrayLike | None = None,
     clockwise: bool = True,
 ) -> ToothEngagement:
-    """Tooth engagement of a straight flank whose engaged arcs are the same over the whole depth.
+    """Return the tooth engagement of a straight flank with the same engaged arcs over the whole depth.
 
     Parameters
     ----------
@@ -240,7 +242,7 @@ def engagement_of_arcs(
     feed_per_tooth : () or (n,) float [mm], >= 0; at 0 nothing is cut
     cutter : a straight flank: no corner radius, no taper, a flat bottom
     axial_depth : [mm], above 0, at most the flute length
-    count : (n,) int, how many of the k arcs of each step hold; None: all k (an arc of no length cuts nothing)
+    count : (n,) int, number of valid arcs of each step; None: all k (an arc of no length cuts nothing)
     clockwise : sense of the spindle seen from above (M3); False mirrors: phi is then counted the other way
 
     Returns
@@ -293,7 +295,7 @@ def engagement_of_arcs(
 
 
 def _check_cutter(cutter: Cutter, axial_depth: float) -> None:
-    """Refuse what a straight flank does not cover."""
+    """Refuse a cutter whose flank is not straight."""
     for key, value in (("corner_radius_mm", cutter.corner_radius), ("taper", cutter.taper), ("bottom", cutter.bottom)):
         if value != 0.0:
             raise InputError(

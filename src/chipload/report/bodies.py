@@ -1,5 +1,5 @@
-"""The bodies of a scene.glb for the 3D view. A body of very many triangles is drawn with fewer, and by how much that
-moves its surface is stated; none is left out.
+"""The bodies of a scene.glb for the 3D view. A body of very many triangles is drawn with fewer, and the displacement of
+its surface is stated; no body is left out.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def _plain(name: str) -> str:
 
 
 def _own(name: str) -> bool:
-    """Whether the view draws a node itself.
+    """Return whether the view draws a node itself.
 
     >>> [_own(n) for n in ("0-path-plain", "rapids", "0-wall", "stock", "1-cutter")]
     [True, True, False, False, True]

@@ -39,7 +39,7 @@ SUFFIXES = (".ngc", ".nc", ".apt", ".npz", ".parquet", ".csv", ".toml")
 
 
 def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, what: str = "result") -> Path:
-    """The absolute target folder, if a result may be put there; asked before the work begins.
+    """Return the absolute target folder if a result may be written there; called before the work begins.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
 
 
 def checkpoint_folder(out: str | Path) -> Path:
-    """Where a run keeps what it has finished until its result is written: beside it.
+    """Return the checkpoint folder of a run, beside the folder of its result.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def checkpoint_folder(out: str | Path) -> Path:
 
 
 def write_finished(result: Result, presentation: Presentation, out: str | Path, progress: Progress = silent) -> Path:
-    """As :func:`write_result` at the end of a run, whose work is kept whatever has come into the folder meanwhile.
+    """Write the result of a run as :func:`write_result`; if the folder was filled meanwhile, the run's work is kept.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def write_files(
     what: str = "result",
     progress: Progress = silent,
 ) -> Path:
-    """Write a folder of files, whole or not at all, and return it.
+    """Write a folder of files, completely or not at all, and return it.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def write_files(
 
 
 def _ours(folder: Path) -> bool:
-    """Whether a folder holds a result of chipload and nothing that it would not write."""
+    """Return whether a folder contains a result of chipload and no other files."""
     try:
         holds = json.loads(read_regular(folder / SUMMARY, SUMMARY, LARGEST_SUMMARY))
         return (

@@ -56,7 +56,7 @@ class Power:
 
 @dataclass(frozen=True)
 class LoadSection:
-    """What a tool cuts between two rapids.
+    """A section: the cut of a tool between two rapids.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ def _collision(result: Result, track: Track, f: Finding, k: int, place: NDArray[
 
 
 def _share(c: LimitCheck) -> float:
-    """How far beyond its limit a value is."""
+    """Return the relative amount by which a value exceeds its limit."""
     value = abs(c.worst or 0.0)
     if c.column.least:
         return c.limit / value if value > 0.0 else np.inf

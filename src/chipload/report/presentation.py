@@ -20,7 +20,7 @@ Content = bytes | Callable[[IO[bytes]], None]
 
 @dataclass(frozen=True, eq=False)
 class Blank:
-    """What a track begins with, and is cut with.
+    """The blank with which a track begins, and its cutters.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Blank:
 
 @dataclass(frozen=True, eq=False)
 class Presentation:
-    """What a result folder holds beside the common files.
+    """Contents of a result folder beside the common files.
 
     Parameters
     ----------

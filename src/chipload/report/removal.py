@@ -82,7 +82,7 @@ def shapes_of(blank: Blank) -> dict[int, Sequence[tuple[str, Floats]]]:
 
 
 def tool_path(track: Track, blank: Blank) -> ToolPoses | None:
-    """Where the tool of a track stands at each row; None: it has no history, or no place."""
+    """Return the tool's place at each row of a track; None if it has no history, or no place."""
     parts: dict[str, list[NDArray[Any]]] = {}
     for block in track.blocks():
         for name in (*PLACE, *AXIS, "s_mm", "tool"):

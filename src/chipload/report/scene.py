@@ -21,7 +21,7 @@ ROWS = 40_000
 def legend(
     title: str, stops: Sequence[tuple[float, Sequence[int]]], words: Sequence[tuple[str, Sequence[int]]] = ()
 ) -> dict[str, Any]:
-    """What the colours of a painted body mean, for the metadata of its mesh: ``mesh.metadata["legend"]``.
+    """Return the legend of a coloured body for the metadata of its mesh: ``mesh.metadata["legend"]``.
 
     Parameters
     ----------

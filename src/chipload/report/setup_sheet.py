@@ -71,7 +71,7 @@ def setup_pdf(result: Result) -> bytes:
 
 
 def _blocks(result: Result, limits: int, room: int) -> list[Block]:
-    """What the page holds, the worst limits first."""
+    """Return the contents of the page, the worst limits first."""
     tracks = _tracks(result)
     programs = [
         (t.name, ", ".join(t.programs), "" if t.time_s is None else f"{t.time_s / 60.0:.2f}", t.verdict.value)

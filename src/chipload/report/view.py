@@ -347,6 +347,6 @@ def _engagement(samples: EngagementSamples, bounds: Mapping[str, float], out: Bu
 
 
 def _breaks(apart: Bools, rows: Ints) -> Bools:
-    """Whether a gap lies between each of the chosen rows and the one before it."""
+    """Return whether a gap lies between each of the chosen rows and the one before it."""
     count = np.cumsum(apart)[rows]
     return np.asarray(np.diff(count, prepend=count[:1]) > 0)

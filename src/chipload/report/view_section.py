@@ -95,7 +95,7 @@ def _scene(
     blanks: Mapping[str, Blank],
     samples: Mapping[str, EngagementSamples],
 ) -> ViewScene:
-    """What is shown of a track."""
+    """Return the scene of a track."""
     path, blank = _path(columns), blanks.get(track.name)
     if removal is not None:
         bodies = tuple(b for b in bodies if b.kind != "stock")

@@ -14,7 +14,7 @@ from chipload.errors import InputError
 
 @dataclass(frozen=True)
 class Column:
-    """A quantity.
+    """A quantity in results: its name, unit, label and meaning.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ UNITS: Mapping[str, str] = {
 
 
 def unit_of(name: str) -> str:
-    """The unit that the ending of a column's name states; empty where it states none.
+    """Return the unit that the ending of a column's name states; empty if it states none.
 
     >>> unit_of("feed_mm_min"), unit_of("torque_nm"), unit_of("tool")
     ('mm/min', 'N m', '')
@@ -179,7 +179,7 @@ def unit_of(name: str) -> str:
 
 
 def _by_name(columns: Iterable[Column]) -> Mapping[str, Column]:
-    """Columns by name; one name stands once."""
+    """Return the columns by name; each name is unique."""
     table: dict[str, Column] = {}
     for column in columns:
         if column.name in table:
@@ -201,7 +201,7 @@ BOUNDED: Mapping[str, tuple[str, str]] = {
 
 
 def column_of(limit: str) -> Column:
-    """The column that a limit bounds, labelled as the limit.
+    """Return the column that a limit bounds, with the label of the limit.
 
     >>> column_of("spindle_power_w").title, column_of("spindle_power_w").name
     ('spindle power [W]', 'power_w')

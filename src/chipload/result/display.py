@@ -19,13 +19,13 @@ FINDINGS = 8
 
 
 def message_html(verdict: Verdict, message: str) -> str:
-    """The message in the colour of its verdict."""
+    """Return the message as HTML in the colour of its verdict."""
     colour = COLOURS[verdict]
     return f"<div style='border-left:5px solid {colour};padding:4px 12px;color:{colour}'>{escape(message)}</div>"
 
 
 def table_html(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table; numbers to the right. No rows: nothing."""
+    """Return an HTML table with numbers aligned right; empty without rows."""
     lines = [
         "<tr>" + "".join(f"<td{_side(cell)}>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
     ]  # fmt: skip
@@ -34,7 +34,7 @@ def table_html(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def result_html(result: Result) -> str:
-    """Message, a row for each limit of the tracks in use, a row for each track, and the first findings."""
+    """Return HTML: the message, tables of the limits of the tracks in use and of all tracks, and the first findings."""
     limits = table_html(
         ("limit", "worst", "allowed", "unit", "state", "track", "where"),
         (

@@ -1,7 +1,8 @@
-"""history.parquet: the histories of all tracks, a row a step of a program, and the arrays of maps.npz.
+"""Writing of history.parquet (the histories of all tracks) and of the arrays of maps.npz.
 
-The first columns are ``operation`` and ``track``; a column that a track lacks is null there. Every field carries unit,
-label and meaning as metadata. Blocks are written one after another: memory does not grow with the program.
+A row is a step of a program. The first columns are ``operation`` and ``track``; a column that a track lacks is null
+there. Every field has its unit, label and meaning as metadata. Blocks are written one after another, so that memory
+does not grow with the program.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from chipload.result.track import Track
 
 
 def write_history(result: Result, file: IO[bytes]) -> dict[str, int]:
-    """Write history.parquet; rows by track.
+    """Write history.parquet and return the number of rows of each track.
 
     Raises
     ------
@@ -48,7 +49,7 @@ def write_history(result: Result, file: IO[bytes]) -> dict[str, int]:
 
 
 def maps_bytes(result: Result) -> bytes:
-    """maps.npz: ``points``, ``values``, ``faces`` and ``displacement``, if any, of each map by its number."""
+    """Return maps.npz: ``points``, ``values``, ``faces`` and ``displacement`` (if any) of each map, by its number."""
     sink = io.BytesIO()
     names = ("points", "values", "faces", "displacement")
     arrays = {

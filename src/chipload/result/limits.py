@@ -2,7 +2,7 @@
 
 Notation: e relative error of a column, from the resolution of the calculation and from the spread of coefficients; a
 value v stands for v - e |v| .. v + e |v|. A limit that lies above this band holds, one below it is exceeded, one inside
-it is unproven. Where a limit is the least value that is allowed (:attr:`Column.least`), all of this is turned round.
+it is unproven. Where a limit is the least allowed value (:attr:`Column.least`), the comparison is reversed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Columns = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class LimitCheck:
-    """A limit and the worst value of the column that it bounds.
+    """Comparison of a limit with the worst value of the column that it bounds.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class LimitCheck:
     reason: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse what is not finite, and a worst value that is missing without a reason."""
+        """Refuse numbers that are not finite, and a missing worst value without a reason."""
         numbers = [self.limit, self.resolution_error, *(self.place or ())]
         numbers += [x for x in (self.worst, self.t_s) if x is not None]
         if not all(map(math.isfinite, numbers)):
@@ -74,7 +74,7 @@ class LimitCheck:
 
     @property
     def place_text(self) -> str:
-        """The place in mm, to 0.1 um; empty: not known.
+        """The place in mm, to 0.1 um; empty if it is not known.
 
         >>> LimitCheck("force_n", 500.0, 812.0, Verdict.EXCEEDS, place=(5.7e-17, 2.25, -33.33333)).place_text
         '0, 2.25, -33.33'
@@ -93,7 +93,7 @@ class LimitCheck:
 
     @property
     def text(self) -> str:
-        """The check in words.
+        """The check as a sentence.
 
         >>> LimitCheck("force_n", 500.0, 812.0, Verdict.EXCEEDS, line=12).text
         'force 812 N exceeds 500 N in line 12'
@@ -117,7 +117,7 @@ class LimitCheck:
 def state_of(
     worst: float, limit: float, error: float = 0.0, reason: str = "", *, least: bool = False
 ) -> tuple[Verdict, str]:
-    """State of a value against its limit, and why it is unproven.
+    """Return the state of a value against its limit, and the reason if it is unproven.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def check_limit(
     error: float = 0.0,
     reason: str = "",
 ) -> LimitCheck:
-    """Check a limit against the greatest value of its column, or the least where the limit is a least value.
+    """Compare a limit with the greatest value of its column, or with the least if the limit is a least allowed value.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Reading of a result folder."""
+"""Reading of result folders: the summary, and the result with its histories."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROWS = 65_536
 
 
 def read_summary(folder: str | Path) -> Summary:
-    """The summary of a result folder.
+    """Read the summary of a result folder.
 
     Raises
     ------
@@ -47,9 +47,9 @@ def read_summary(folder: str | Path) -> Summary:
 
 
 def load_result(folder: str | Path) -> Result:
-    """Read the result folder that ``chipload run`` wrote.
+    """Load a result folder that ``chipload run`` wrote.
 
-    Histories are read from history.parquet when they are asked for.
+    The history of a track is read from history.parquet on first use.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def _track(folder: Path, model: TrackModel, first: int) -> Track:
 
 
 def _blocks(path: Path, first: int, count: int) -> Iterator[Columns]:
-    """Rows ``first`` to ``first + count`` of history.parquet, some at a time, without the columns that are null."""
+    """Yield rows ``first`` to ``first + count`` of history.parquet in blocks, without the columns that are null."""
     if count == 0:
         return
     at = 0

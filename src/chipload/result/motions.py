@@ -1,4 +1,4 @@
-"""Rows of a history for a program that was not simulated: a row a motion of the tip, arcs as chords."""
+"""History of a program that is not simulated: a row for each motion of the tip, or for each chord of an arc."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ CHORD_MM = 0.01
 
 
 def chords_of(program: Program) -> Program:
-    """The program with chords for arcs, for pictures."""
+    """Return the program with chords in place of arcs, for pictures."""
     r = radii(program)
     turn = 2.0 * np.arccos(1.0 - np.minimum(CHORD_MM / np.where(r > 0.0, r, np.inf), 1.0))
     return straightened(program, np.where(is_arc(program) & (r > 0.0), np.maximum(turn, 0.02), np.inf))
 
 
 def motion_columns(program: Program, seconds: NDArray[np.float64]) -> Columns:
-    """Columns of a program, a row a motion of the tip or a chord of an arc.
+    """Return the columns of a program, with a row for each motion of the tip or each chord of an arc.
 
     Parameters
     ----------
@@ -55,6 +55,6 @@ def motion_columns(program: Program, seconds: NDArray[np.float64]) -> Columns:
 
 
 def motion_blocks(program: Program, machine: Machine) -> Iterator[Columns]:
-    """The history of a program on a machine in one block; none if it has no motion."""
+    """Yield the history of a program on a machine in one block; no block if the program has no motion."""
     if len(program):
         yield motion_columns(program, times_on(program, machine))

@@ -1,4 +1,4 @@
-"""Plots of any columns of a history, one below the other, against time or path."""
+"""Plots of columns of a history, one below the other, against time or path."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def columns_figure(
     names: Sequence[str] = USUAL,
     x: Literal["t_s", "s_mm"] = "t_s",
 ) -> go.Figure:
-    """A row a column; limits are dashed, what exceeds one is marked.
+    """Plot each column in a row of its own; limits are dashed lines, and values that exceed them are marked.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ MOST_ROWS = 5
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where the numbers of a result come from; nothing of this computer, no time of day.
+    """Record of the inputs and versions that determine a result, without the computer's name or the time of day.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class SurfaceMap:
     displacement: Floats | None = None
 
     def __post_init__(self) -> None:
-        """Refuse arrays that do not belong together."""
+        """Refuse arrays whose shapes do not match."""
         n = len(self.points)
         if self.points.shape != (n, 3) or self.values.shape != (n,) or self.faces.shape[1:] != (3,):
             raise ValueError(f"map {self.name}: shapes {self.points.shape}, {self.values.shape}, {self.faces.shape}")
@@ -84,7 +84,7 @@ class SurfaceMap:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """The result of a job.
+    """The result of a job: its tracks with their limits and histories, findings, surface maps and provenance.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class Result:
     note: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse two tracks of one name, and one in use behind one of its operation that is not."""
+        """Refuse two tracks of one name, and a track in use that follows one of its operation that is not in use."""
         names = [track.name for track in self.tracks]
         if len(set(names)) < len(names):
             raise ValueError(f"tracks: names {names} must differ")
@@ -123,25 +123,25 @@ class Result:
 
     @property
     def in_use(self) -> tuple[Track, ...]:
-        """The tracks that the verdict stands on."""
+        """The tracks that determine the verdict."""
         return tuple(track for track in self.tracks if track.in_use)
 
     @property
     def limits(self) -> tuple[LimitCheck, ...]:
-        """Every limit of the tracks in use."""
+        """All limit checks of the tracks in use."""
         return tuple(check for track in self.in_use for check in track.limits)
 
     @cached_property
     def verdict(self) -> Verdict:
-        """The worst of the tracks in use and of the findings; unproven if no limit was checked."""
+        """The worst verdict of the tracks in use and of the findings; unproven if no limit was checked."""
         states = [track.verdict for track in self.in_use] + [Verdict.of_finding(f) for f in self.findings]
         return Verdict.worst(states + ([] if self.limits else [Verdict.UNPROVEN]))
 
     @cached_property
     def message(self) -> str:
-        """The verdict in a sentence or two, with the numbers of the limits.
+        """The verdict in one or two sentences, with the numbers of the limits.
 
-        What exceeds comes first, then what is unproven; where everything holds, every limit is named.
+        Limits that are exceeded come first, then those that are unproven. If all limits hold, each is named.
         """
         texts: dict[Verdict, list[str]] = {state: [] for state in Verdict}
         for f in self.findings:
@@ -165,17 +165,17 @@ class Result:
 
     @property
     def _accepted(self) -> str:
-        """How many guesses of a drafted job were accepted, where that is all that is said of them."""
+        """A sentence with the number of accepted guesses of a draft; empty if there are none."""
         guesses = sum(f.code == "job-guess" and f.severity is Severity.NOTE for f in self.findings)
         many = f"{guesses} guesses of the job were" if guesses > 1 else "1 guess of the job was"
         return f"{many} accepted." if guesses else ""
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the message, and tables of limits, tracks and findings."""
+        """HTML for notebooks: the message, and tables of limits, tracks and findings."""
         return result_html(self)
 
     def plot(self, *columns: str, track: str = "", x: Literal["t_s", "s_mm"] = "t_s") -> go.Figure:
-        """Columns of a track one below the other, with their limits, against time or path.
+        """Plot columns of a track one below the other, with their limits, against time or path.
 
         Parameters
         ----------
@@ -196,17 +196,17 @@ class Result:
         return columns_figure(history, {check.name: check.limit for check in chosen.limits}, names, x)
 
     def to_pandas(self, track: str = "") -> pandas.DataFrame:
-        """The history of a track as a table of pandas; no name: the first in use. Needs ``chipload[notebook]``.
+        """Return the history of a track as a pandas DataFrame; without a name that of the first track in use.
 
         Raises
         ------
         InputError
-            There is no track of that name, it has no history, or pandas is not installed.
+            There is no track of that name, it has no history, or pandas is not installed (``chipload[notebook]``).
         """
         return pandas_of(self._history(track))
 
     def to_xarray(self, track: str = "") -> xarray.Dataset:
-        """The history of a track as a dataset of xarray, with units; no name: the first in use.
+        """Return the history of a track as an xarray Dataset with units; without a name that of the first track in use.
 
         Raises
         ------
@@ -216,7 +216,7 @@ class Result:
         return xarray_of(self._history(track))
 
     def track(self, name: str) -> Track:
-        """The track of a name.
+        """Return the track with this name.
 
         Raises
         ------

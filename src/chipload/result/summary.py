@@ -1,4 +1,4 @@
-"""summary.json: one schema for every capability, with a version; docs/summary.schema.json is made from it."""
+"""The schema of summary.json, with a version and the same for every capability; source of docs/summary.schema.json."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class Summary(_SummaryPart):
 
 
 def summary_of(result: Result, rows: Mapping[str, int]) -> Summary:
-    """The summary of a result.
+    """Return the summary of a result.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def summary_of(result: Result, rows: Mapping[str, int]) -> Summary:
 
 
 def summary_bytes(result: Result, rows: Mapping[str, int]) -> bytes:
-    """summary.json; equal results give equal bytes.
+    """Return the bytes of summary.json; equal results give equal bytes.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def summary_bytes(result: Result, rows: Mapping[str, int]) -> bytes:
 
 
 def plain(value: Any) -> Any:
-    """NumPy scalars and arrays, tuples and enums as what JSON knows."""
+    """Convert NumPy scalars and arrays, tuples and enums to JSON values."""
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
@@ -173,7 +173,7 @@ def plain(value: Any) -> Any:
 
 
 def limit_from(model: LimitModel) -> LimitCheck:
-    """The check that a summary holds.
+    """Return the limit check that a summary contains.
 
     Raises
     ------
@@ -187,13 +187,13 @@ def limit_from(model: LimitModel) -> LimitCheck:
 
 
 def finding_from(model: FindingModel) -> Finding:
-    """The finding that a summary holds."""
+    """Return the finding that a summary contains."""
     severity = Severity[model.severity.upper()]
     return Finding(model.code, model.line, model.text, severity, model.place, model.row)
 
 
 def provenance_from(model: ProvenanceModel) -> Provenance:
-    """The provenance that a summary holds."""
+    """Return the provenance that a summary contains."""
     return Provenance(**model.model_dump())
 
 

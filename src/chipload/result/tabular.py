@@ -1,4 +1,4 @@
-"""A history as a table of pandas or a dataset of xarray; both libraries come with ``chipload[notebook]``."""
+"""Conversion of a history to a pandas DataFrame or an xarray Dataset (both come with ``chipload[notebook]``)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ COORDINATES = ("t_s", "s_mm", "line", "pass")
 
 
 def pandas_of(columns: Columns) -> pandas.DataFrame:
-    """A table with a row for each step and the columns of a history.
+    """Return a DataFrame with a row for each step and the columns of a history.
 
     Raises
     ------
@@ -33,10 +33,10 @@ def pandas_of(columns: Columns) -> pandas.DataFrame:
 
 
 def xarray_of(columns: Columns) -> xarray.Dataset:
-    """A dataset with one dimension, ``step``.
+    """Return a Dataset with one dimension, ``step``.
 
     Time, path, line and pass are coordinates. Each variable has the attributes ``units``, ``long_name`` and
-    ``description``, which plots of xarray show and NetCDF files keep.
+    ``description``; xarray shows them in plots and stores them in NetCDF files.
 
     Raises
     ------

@@ -12,9 +12,9 @@ Ints = NDArray[np.int64]
 
 
 def thinned(values: Floats, most: int) -> Ints:
-    """(m,) rows of a column to draw: at most about ``most``, each bucket's least and greatest, first and last kept.
+    """Return the (m,) rows of a column to draw, at most about ``most``: extremes of each bucket, first and last row.
 
-    Rows that are not a number separate pieces and are kept.
+    Rows with NaN separate pieces of the curve and are kept.
 
     >>> thinned(np.array([0.0, 1.0, 9.0, 1.0, 0.0, -5.0, 0.0, 2.0]), 4).tolist()
     [0, 2, 5, 7]

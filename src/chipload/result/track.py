@@ -72,7 +72,7 @@ class Track:
     energy_balance: Mapping[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse a time that is no number."""
+        """Refuse a time that is not a number."""
         if self.time_s is not None and not (math.isfinite(self.time_s) and self.time_s >= 0.0):
             raise ValueError(f"track {self.name}: time_s = {self.time_s}: must be a finite number from 0")
         if all(finding.code != UNBALANCED for finding in self.findings):
@@ -92,17 +92,17 @@ class Track:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of its limits and findings."""
+        """The worst state of the track's limits and findings."""
         states = [check.state for check in self.limits] + [Verdict.of_finding(f) for f in self.findings]
         return Verdict.worst(states)
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """(n,) columns of the whole history by name; empty if there is none."""
+        """Columns (n,) of the whole history by name; empty if the track has no history."""
         blocks = list(self.blocks())
         return {name: np.concatenate([b[name] for b in blocks]) for name in (blocks[0] if blocks else ())}
 
 
 def in_memory(columns: Columns) -> Blocks:
-    """Blocks of a history that is in memory."""
+    """Return the blocks of a history that is in memory."""
     return lambda: iter((columns,))

@@ -24,18 +24,18 @@ class Verdict(enum.StrEnum):
 
     @property
     def exit_code(self) -> int:
-        """Exit code of a command that ends with this verdict: 0, or 3 where anything does not hold."""
+        """Exit code of a command that ends with this verdict: 0 if everything holds, else 3."""
         return 0 if self is Verdict.HOLDS else 3
 
     @staticmethod
     def worst(states: Iterable[Verdict]) -> Verdict:
-        """The worst of some states; ``HOLDS`` without any."""
+        """Return the worst of several states; ``HOLDS`` if there are none."""
         order = list(Verdict)
         return order[max((order.index(s) for s in states), default=0)]
 
     @staticmethod
     def of_finding(finding: Finding) -> Verdict:
-        """What a finding does to the verdict."""
+        """Return the verdict that a finding causes."""
         return list(Verdict)[finding.severity.value]
 
 

@@ -1,4 +1,4 @@
-"""What a Program does, found without knowing how it was planned."""
+"""Simulation and verification of a Program, independent of the planner."""
 
 from __future__ import annotations
 

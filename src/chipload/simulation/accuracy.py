@@ -1,6 +1,6 @@
-"""How far the loads of a simulation may be from those of a finer one, and whether their work is that of the volume.
+"""Accuracy of a simulation: the energy balance and the resolution error of its loads.
 
-Two numbers are found from a run and stated beside it.
+Both are calculated from a run and stated with its result.
 
 **Energy balance**, a cutter: W = sum of T omega dt over its steps, T the mean torque without the edge coefficients,
 against sum of K V, V [mm^3] the volume that the sections of the stock have lost in a step and K [MPa] its specific
@@ -110,7 +110,7 @@ BALANCED = ("tool", "rapid", "chip_volume_mm3", "engaged_volume_mm3", "cutting_w
 
 
 def energy_balance(columns: Columns, ktc: float) -> dict[int, float]:
-    """Work over sum of K V, less 1, of each tool number that cuts: see the module.
+    """Return the energy balance, work over sum of K V less 1, by number of the tools that cut: see the module.
 
     Parameters
     ----------
@@ -162,12 +162,12 @@ class Window:
 
     @property
     def factor(self) -> float:
-        """On the difference of the two resolutions."""
+        """Factor on the difference of the two resolutions."""
         return FACTOR if self.upright else LEANING
 
     @property
     def cost(self) -> int:
-        """How many earlier steps there are."""
+        """Number of earlier steps."""
         return sum(len(s) for s in self.earlier)
 
 
@@ -179,7 +179,7 @@ def resolution_error(
     again: Again,
     names: Sequence[str] = COMPARED,
 ) -> dict[str, float]:
-    """Relative error of the worst value of each column of loads: see the module.
+    """Return the relative resolution error of the worst value of each column of loads: see the module.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def resolution_error(
 
 
 def _used(windows: Mapping[int, Window], setting: RunSettings) -> list[Cutter]:
-    """Cutters of the steps that are computed once more; of a run by moves those that made a move."""
+    """Return the cutters of the steps that are computed once more; of a run by moves those that made a move."""
     some = {int(w.own.tool[0]) for w in windows.values()}
     if setting.moves is not None:
         some |= set(setting.moves.stock.table)
@@ -243,7 +243,7 @@ def _used(windows: Mapping[int, Window], setting: RunSettings) -> list[Cutter]:
 
 
 def _asked(columns: Columns, before: LayeredStock, names: Sequence[str]) -> tuple[list[int], int]:
-    """Steps to compute once more, the most telling first, and how many the run has."""
+    """Return the steps to compute once more, the most significant first, and the number of steps of the run."""
     rapid, volume = np.asarray(columns["rapid"]), np.asarray(columns["chip_volume_mm3"])
     force = np.asarray(columns["force_n"])
     worst = [_among_worst(np.asarray(columns[name])) for name in names if len(force)]
@@ -263,7 +263,7 @@ def _asked(columns: Columns, before: LayeredStock, names: Sequence[str]) -> tupl
 
 
 def _missed(columns: Columns) -> list[int]:
-    """Steps that lose most of what their middle does not engage, as where a mill meets a wall at the end of a step."""
+    """Return the steps that lose most volume that their middle does not engage, as where a mill meets a wall."""
     volume = np.where(np.asarray(columns["rapid"]), 0.0, np.asarray(columns["chip_volume_mm3"]))
     more = volume - np.asarray(columns["engaged_volume_mm3"])
     more = np.where((more > UNLIKE * volume) & (np.asarray(columns["chip_areas"]) > 0), more, 0.0)
@@ -272,20 +272,20 @@ def _missed(columns: Columns) -> list[int]:
 
 
 def _among_worst(values: Floats) -> int:
-    """The middle one of the steps whose load is within 1 % of the worst: the first of many alike is often an entry."""
+    """Return the middle one of the steps within 1 % of the worst load; the first of them is often an entry."""
     alike = np.flatnonzero(values >= 0.99 * values.max())
     return int(alike[len(alike) // 2])
 
 
 def _films(columns: Columns) -> float:
-    """Share of the volume that was lost, not by rapids, in steps without loads."""
+    """Return the share of the volume that steps without loads removed, rapids excluded."""
     volume = np.where(columns["rapid"], 0.0, columns["chip_volume_mm3"])
     whole = float(np.abs(volume).sum())
     return float(np.abs(volume[np.asarray(columns["chip_areas"]) == 0]).sum()) / whole if whole > 0.0 else 0.0
 
 
 def _windows(blocks: Iterable[Steps], asked: list[int], setting: RunSettings) -> list[Window]:
-    """Windows about steps, from one pass for the steps and one for what came before them."""
+    """Return the windows of steps, from one pass for the steps and one for the earlier steps."""
     own: dict[int, tuple[Steps, Floats, Floats]] = {}
     earlier: dict[int, list[Steps]] = {k: [] for k in asked}
     last = max(asked, default=-1)
@@ -312,7 +312,7 @@ def _rows(steps: Steps, rows: Ints) -> Steps:
 
 
 def layers_again(before: LayeredStock, setting: RunSettings, remove: Remove) -> Again:
-    """Steps in a finer stock of layers; ``remove`` gives the columns of some steps."""
+    """Compute steps again in a finer stock of layers; ``remove`` returns the columns of some steps."""
 
     def again(window: Window) -> tuple[Mapping[str, float], Mapping[str, float]]:
         fine = _finer_layers(window, before, setting, remove)
@@ -350,7 +350,7 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
 
 
 def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, remove: Remove) -> dict[str, float]:
-    """The greatest loads in the parts of a step, in a finer stock."""
+    """Return the greatest loads in the parts of a step, in a finer stock."""
     tool = int(window.own.tool[0])
     cutter = setting.cutters[tool]
     stock = before.cropped(window.low[:2], window.high[:2])
@@ -395,7 +395,7 @@ def _span(stock: LayeredStock, low: float, high: float) -> tuple[int, int]:
 
 
 def _parts(step: Steps, count: int) -> Steps:
-    """One step as so many of equal length and time; the axis turns evenly enough between its two directions."""
+    """Return a step divided into steps of equal length and time, with the axis interpolated between its directions."""
     t = np.linspace(0.0, 1.0, count + 1)[:, None]
     p, a = step.p0 + t * (step.p1 - step.p0), step.a0 + t * (step.a1 - step.a0)
     p[-1], a = step.p1[0], a / np.linalg.norm(a, axis=1)[:, None]

@@ -1,10 +1,10 @@
-"""The path of the cutter's centre, and what of the rim meets uncut stock: engagement without any boundary.
+"""Engagement of the rim with uncut stock from the path of the cutter's centre, without a boundary of the stock.
 
 Notation: R cutter radius, O centre, T unit feed direction, n = Rot(+90 deg) T; a moment is a motion and the share
 (0..1) of it that has been travelled; immersion phi [rad] counts from n clockwise, 0..pi the front half of the rim.
 
 A point has been cut before a moment if it lay outside the initial stock or if a centre before that moment came
-nearer to it than R. Nothing here knows how the stock's present boundary looks: the rim is asked point by point.
+nearer to it than R. The present boundary of the stock is not used: the rim is examined point by point.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ CELLS = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class CentrePath:
-    """The path of the centre in the plane, motion after motion, and the stock that it runs through.
+    """The centre path in the plane, motion after motion, and the initial stock.
 
     Parameters
     ----------
@@ -108,12 +108,12 @@ class CentrePath:
 
     @cached_property
     def motions(self) -> Floats:
-        """(n, 9) the rows of :mod:`chipload.simulation._kernels`."""
+        """Motions (n, 9) as rows of :mod:`chipload.simulation._kernels`."""
         return motion_rows(self.segments)
 
     @cached_property
     def lengths(self) -> Floats:
-        """(n,) length of each motion [mm]."""
+        """Length (n,) of each motion [mm]."""
         seg, rho = self.segments, self.motions[:, 7]
         return np.where(seg[:, 6] == 0.0, np.hypot(*(seg[:, 2:4] - seg[:, 0:2]).T), rho * np.abs(seg[:, 6]))
 
@@ -148,14 +148,14 @@ class CentrePath:
         return strips(self.stock, gy, gy + ny * h)
 
     def places(self, motion: ArrayLike, share: ArrayLike) -> tuple[Floats, Floats]:
-        """Centres (m, 2) [mm] and unit headings (m, 2) at the moments; heading 0, 0 where a motion has no length."""
+        """Return centres (m, 2) [mm] and unit headings (m, 2) at moments; heading 0, 0 if a motion has no length."""
         k, w = self._moments(motion, share)
         centre, heading = np.empty((len(k), 2)), np.empty((len(k), 2))
         _kernels.places(self.motions, k, w, centre, heading)
         return centre, heading
 
     def uncut(self, points: ArrayLike, motion: ArrayLike, share: ArrayLike) -> Bools:
-        """(m,) whether each of ``points`` (m, 2) [mm] is still stock at its moment.
+        """Return a mask (m,) of the ``points`` (m, 2) [mm] that are still stock at their moments.
 
         A point at R of the path, within ``TOUCH_MM``, is uncut.
         """
@@ -191,7 +191,7 @@ LEVEL_MM = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Rim:
-    """What the rim meets, a row a moment.
+    """Engagement of the rim, a row for each moment.
 
     ``angle`` (m,) [rad] sum of the engaged pieces of the front half; ``count`` (m,) their number; ``phi``
     (m, PIECES, 2) [rad] their ends in immersion, 0 where there is none.
@@ -203,8 +203,9 @@ class Rim:
 
 
 def samples(step: float) -> Floats:
-    """Immersions [rad] at which the rim is asked: every ``step`` from 0 to pi, and closer and closer (down to a 128th
-    of it) towards both ends, where thin engagement lies.
+    """Return the immersions [rad] at which the rim is examined: every ``step`` from 0 to pi, and denser at both ends.
+
+    There, where thin engagement lies, the spacing decreases to a 128th of ``step``.
     """
     n = max(2, math.ceil(math.pi / step))
     inner = np.linspace(0.0, math.pi, n + 1)
@@ -222,7 +223,7 @@ def rim_engagement(
     workers: int = 1,
     displacement_mm: float = 0.0,
 ) -> Rim:
-    """The engaged pieces of the rim at moments of the path.
+    """Return the engaged arcs of the rim at moments of the path.
 
     Parameters
     ----------
@@ -266,7 +267,7 @@ def rim_engagement(
 
 
 def motion_rows(segments: Floats) -> Floats:
-    """(n, 9) segments with their radius and start angle, as the kernels take them."""
+    """Return segments (n, 9) with their radius and start angle for the kernels."""
     seg = np.asarray(segments, dtype=np.float64)
     v = seg[:, 0:2] - seg[:, 4:6]
     arc = seg[:, 6] != 0.0
@@ -275,7 +276,7 @@ def motion_rows(segments: Floats) -> Floats:
 
 
 def flat_motions(program: Program) -> Floats:
-    """(n, 7) the motions of a program in the plane; row 0 and dwells have no length.
+    """Return the motions (n, 7) of a program in the plane; row 0 and dwells have no length.
 
     Raises
     ------

@@ -1,12 +1,12 @@
-"""The folder in which a run keeps what it has finished, so that the same run goes on there after it was stopped.
+"""The checkpoint folder of a run: finished chunks and state, from which a stopped run continues.
 
-Notation: a piece is the columns of steps that follow one another, in one Parquet file; the state is all that goes on
-from one step to the next, after the last step of the last piece, in some files. ``last.json`` names the pieces and the
-state that belong together and is replaced at one moment: whatever else lies there is of a piece that was not finished,
-and is written again. Passes beside the removal keep one file each (:mod:`chipload.simulation.kept_pass`).
+Notation: a chunk is the columns of consecutive steps in one Parquet file. The state is all data that continue from one
+step to the next, after the last step of the last chunk, in several files. ``last.json`` names the chunks and the state
+that belong together and is replaced atomically: other files belong to a chunk that was not finished, and are written
+again. Each pass beside the removal has one file (:mod:`chipload.simulation.kept_pass`).
 
-The key stands for all that the result depends on. What was kept under another key is of another run: it is thrown away.
-What cannot be read is set aside in a folder beside it, never removed.
+The key is a hash of all inputs of the result. Data with another key belong to another run and are deleted. Data that
+cannot be read are moved to a folder beside it and never deleted.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ Arrays = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class StoredChunk:
-    """A finished piece: its file, its number of steps, the hash of the file."""
+    """A finished chunk: its file, its number of steps, the hash of the file."""
 
     file: str
     steps: int
@@ -56,11 +56,11 @@ class StoredChunk:
 
 
 class _Damaged(Exception):
-    """A file that was kept is not the one that was written; its name."""
+    """Error: a stored file differs from the one that was written; its message is the file name."""
 
 
 class Stored(Mapping[str, NDArray[Any]]):
-    """Columns in files: a column is read when it is asked for; the last :data:`KEPT` stay in memory.
+    """Columns in files: a column is read on first use; the last :data:`KEPT` stay in memory.
 
     A column that a piece lacks is 0 there.
     """
@@ -120,7 +120,7 @@ def in_rows(columns: Arrays, size: int, names: Sequence[str] | None = None) -> I
 
 
 class Checkpoint:
-    """The folder of a run, held by that run alone; a context that lets it go.
+    """The checkpoint folder of a run, locked by that run; a context manager that unlocks it.
 
     What is in the folder stays when the context is left, unless :meth:`begin` was called and the input was then
     refused: :meth:`discard` removes it.
@@ -167,7 +167,7 @@ class Checkpoint:
         self.close()
 
     def begin(self, key: str) -> dict[str, Path] | None:
-        """The files of the state from which the run of this key goes on; None: it begins at its beginning.
+        """Return the files of the state from which the run with this key continues; None if it begins from the start.
 
         ``safe`` is the number of steps that were kept.
         """
@@ -214,13 +214,13 @@ class Checkpoint:
         return file if file.exists() else None
 
     def keep_pass(self, name: str, data: bytes, steps: int) -> None:
-        """Write what a pass has found in so many steps."""
+        """Write the results of a pass after a number of steps."""
         self._make()
         write_whole(self.folder / f"{PASS}{name}.npz", data)
         self.passes[name] = steps
 
     def what_is_kept(self) -> str:
-        """What the run goes on from, as it is told to the user; empty: nothing.
+        """Return a message on the state from which the run continues; empty if there is none.
 
         The folder says it: an interrupt may come between the file of a state and what this object knows of it.
         """
@@ -254,7 +254,7 @@ class Checkpoint:
         self.notice(f"begins again: {what} cannot be read: what was kept is set aside in {aside}")
 
     def add(self, columns: Arrays) -> None:
-        """Write a piece; it counts from the next :meth:`commit` on."""
+        """Write a chunk; it is valid from the next :meth:`commit` on."""
         self._make()
         name = f"{self.number:06d}.parquet"
         table = pa.table({k: pa.array(np.ascontiguousarray(v)) for k, v in columns.items()})
@@ -264,7 +264,7 @@ class Checkpoint:
         self.number += 1
 
     def commit(self, state: Mapping[str, bytes]) -> None:
-        """Make the pieces so far and the state that belongs to them, files by name, the ones that count."""
+        """Make the chunks so far and their state (files by name) the valid ones."""
         self._make()
         made = {name: self._write(f"{name}-{self.number:06d}.npz", data, 0) for name, data in state.items()}
         parts = {"parts": [asdict(p) for p in self.parts], "state": {name: asdict(p) for name, p in made.items()}}
@@ -275,18 +275,18 @@ class Checkpoint:
         self.safe = sum(part.steps for part in self.parts)
 
     def again(self, why: str) -> None:
-        """Throw away what was kept: the run of this key begins at its beginning; ``why`` is told."""
+        """Delete the stored data, so that the run with this key begins from the start; ``why`` is reported."""
         self.notice(why)
         self.parts, self.number, self.safe = [], 0, 0
         if self._lock is not None:
             self._clear()
 
     def columns(self) -> Stored:
-        """What the pieces hold."""
+        """Return the columns of the chunks."""
         return Stored(self.folder, self.parts)
 
     def close(self) -> None:
-        """Let another run have the folder."""
+        """Unlock the folder for other runs."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
@@ -334,12 +334,12 @@ class Checkpoint:
 
 
 def _of_run(file: Path) -> bool:
-    """Whether a file of the folder belongs to the state of the removal: it is no lock and of no pass."""
+    """Return whether a file of the folder belongs to the state of the removal, not to the lock or a pass."""
     return file.name != LOCK and not file.name.startswith(PASS)
 
 
 def is_ours(folder: Path) -> bool:
-    """Whether a folder holds nothing but what a run that was stopped may leave."""
+    """Return whether a folder contains only files of a checkpoint."""
     try:
         return (
             not folder.is_symlink()
@@ -372,7 +372,7 @@ def require_ours(folder: Path) -> None:
 
 
 def digest(*values: Any) -> str:
-    """A hash of values: numbers, texts, arrays, geometries, dataclasses, and tuples, lists and mappings of them."""
+    """Return a hash of values: numbers, texts, arrays, geometries, dataclasses, and tuples, lists, mappings of them."""
     out = hashlib.sha256()
     for value in values:
         _feed(out, value)

@@ -1,10 +1,10 @@
-"""Whether the chips of a tooth find room before its flute: loose volume against the gullet.
+"""Check of the chip space: the loose volume of the chips of a tooth compared with its gullet.
 
 Notation: a tooth cuts V = sum over its bites of rho (b - a) integral of h dphi in a revolution; its chips lie loosely
 and fill q V (``chip_ratio``); between two teeth there is an area A across the axis (``gullet``), over the height H of
 the edge that cuts. The share that is filled is q V / (A H).
 
-A cut of a flat bottom alone has no height: how chips come up from a plunge is not judged, its share is 0.
+A cut of a flat bottom alone has no height; its share is 0, because the chip flow of a plunge is not calculated.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 def flute_fill(cuts: Cuts) -> Floats:
-    """Share of the gullet that a tooth's chips of one revolution fill, (c,), of the fullest tooth in each step.
+    """Return the share of the gullet (c,) that the chips of one revolution fill, for the fullest tooth of each step.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def flute_fill(cuts: Cuts) -> Floats:
 
 
 def _height(own: NDArray[np.int64], piece: NDArray[np.int64], a: Floats, b: Floats, sine: Floats, n: int) -> Floats:
-    """(n,) height of the edge that cuts: of each slice the part from its lowest bite to its highest."""
+    """Return the height (n,) of the edge that cuts: of each slice the part from its lowest bite to its highest."""
     key, back = np.unique(np.column_stack([own, piece]), axis=0, return_inverse=True)
     low, high = np.full(len(key), np.inf), np.full(len(key), -np.inf)
     np.minimum.at(low, back.ravel(), a)

@@ -1,4 +1,4 @@
-"""Run a Program through a layered workpiece: what every step removes, and what that costs.
+"""Simulation of a Program in a layered workpiece: the removal and the loads of every step.
 
 Notation: a step as in :mod:`chipload.simulation.steps`; t in 0..1 within it. Its chip is, layer by layer, what the
 cutter covers during the step and what is still there; its volume the sum of area times thickness. Where the stock's
@@ -82,22 +82,22 @@ def remove(
     engine: Engine = "layers",
     progress: Progress = silent,
 ) -> Removal:
-    """Take what the program cuts from ``stock``, which changes, and say what it costs.
+    """Remove the cuts of a program from ``stock``, which changes, and calculate the loads of every step.
 
-    All columns are kept in memory; :func:`chipload.simulation.chunks.remove_in_chunks` keeps them in files and goes on
-    where it was stopped.
+    All columns stay in memory; :func:`chipload.simulation.chunks.remove_in_chunks` stores them in files and continues a
+    stopped run.
 
     Parameters
     ----------
     program : in the work frame of the stock
     cutters : by tool number
     interpolation : of the axis within a step: along a great circle (slerp) or normalised straight line (lerp)
-    keep : keep what the teeth cut in every step, for :mod:`chipload.simulation.deflection`; some kB a step
+    keep : keep the tooth engagement of every step, for :mod:`chipload.simulation.deflection`; some kB a step
     watch : called with what one cutter cut in some hundred steps; gives more columns, a value for each of them; they
         are 0 in steps that do not cut
     times : (n,) float [s], time of each row of the program on the machine (:mod:`chipload.program.time`), for ``t_s``
         and ``duration_s``; None: at the commanded feed, rapids take none
-    accuracy : find ``energy_balance`` and ``resolution_error``, which costs some steps once more
+    accuracy : calculate ``energy_balance`` and ``resolution_error``, for which some steps are computed once more
     workers : threads that find areas ahead of the removal
     processes : of layers, each with a strip of the stock (:mod:`chipload.simulation.strips`), as a number or as
         :class:`chipload.workers.Workers`, also of a cluster; the result does not depend on threads and processes
@@ -155,7 +155,7 @@ def remove(
 def _blocks_removed(
     program: Program, stock: LayeredStock, sums: RunningSums, setting: RunSettings, times: Floats | None
 ) -> Iterator[tuple[RunningSums, Columns, list[Cuts]]]:
-    """What :func:`remove_block` gives of one block of steps after another."""
+    """Yield the result of :func:`remove_block` for one block of steps after another."""
     fine, size = setting.resolution, block_of(setting)
     blocks = steps_in_blocks(program, fine.step_mm, fine.tolerance, size=size, times=times)
     with strips_for(program, stock, setting, size) as strips:
@@ -173,7 +173,7 @@ def block_of(setting: RunSettings) -> int:
 def with_engine(
     engine: Engine, setting: RunSettings, program: Program, stock: LayeredStock
 ) -> tuple[RunSettings, tuple[int, str] | None]:
-    """The setting with its engine, and why the program was handed over to the layers.
+    """Return the settings with the engine, and why the program was handed over to the layers.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def with_engine(
 
 
 def by_layers(engine: Engine, setting: RunSettings, found: HandOver) -> tuple[RunSettings, tuple[int, str]]:
-    """The setting of the run from its beginning by layers."""
+    """Return the settings of the run from its start by layers."""
     if engine == "moves":
         place = f"line {found.line}" if found.line else "stock"
         raise InputError(f'{place}: {found.why}: state engine = "layers" or "auto"')
@@ -206,7 +206,7 @@ def by_layers(engine: Engine, setting: RunSettings, found: HandOver) -> tuple[Ru
 
 
 def with_accuracy(removal: Removal, program: Program, before: LayeredStock | None, setting: RunSettings) -> Removal:
-    """A removal with its energy balance and resolution error; ``before`` the stock before it, None: as it is."""
+    """Add energy balance and resolution error to a removal; ``before`` is the stock before it, None: add nothing."""
     if before is None:
         return removal
     return replace(
@@ -223,7 +223,7 @@ def resolution_error_of(
     setting: RunSettings,
     names: Sequence[str] = COMPARED,
 ) -> dict[str, float]:
-    """Relative error of the worst value of some columns of a removal (:mod:`chipload.simulation.accuracy`)."""
+    """Return the relative error of the worst value of columns of a removal (:mod:`chipload.simulation.accuracy`)."""
     blocks = StepBlocks(program, setting.resolution.step_mm, setting.resolution.tolerance)
     if setting.moves is None:
         again = layers_again(
@@ -243,14 +243,14 @@ def setting_of(
     workers: int,
     processes: int | Workers = 1,
 ) -> RunSettings:
-    """What a run keeps to."""
+    """Return the settings of a run."""
     profiles = {n: profile_of(c, resolution) for n, c in cutters.items()}
     shared = processes if isinstance(processes, Workers) else Workers(processes)
     return RunSettings(cutters, profiles, material, resolution, interpolation, watch, workers, None, shared)
 
 
 def profile_of(cutter: Cutter, resolution: Resolution) -> Slices:
-    """The slices of a cutter at a resolution."""
+    """Return the slices of a cutter at a resolution."""
     return slices(
         cutter,
         bottom_slices=resolution.bottom_slices,
@@ -261,7 +261,7 @@ def profile_of(cutter: Cutter, resolution: Resolution) -> Slices:
 
 
 def require_steps(program: Program, step_mm: float) -> float:
-    """The least number of steps of a program, if that many can be simulated.
+    """Return the least number of steps of a program; refuse more than can be simulated.
 
     Raises
     ------
@@ -278,7 +278,7 @@ def require_steps(program: Program, step_mm: float) -> float:
 
 
 def counted(program: Program, cutters: Mapping[int, Cutter], resolution: Resolution) -> int:
-    """The number of steps of a program of which every tool has a cutter.
+    """Return the number of steps of a program; refuse it if a tool has no cutter.
 
     Raises
     ------
@@ -306,8 +306,9 @@ def remove_block(
     contact: Engaged | None = None,
     found: TakenByLayers | None = None,
 ) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
-    """Take what some steps cut from the stock: the sums after them, their columns, what the teeth cut in them;
-    ``contact``: what they engage by moves, ``found``: what they take by layers, where that is known.
+    """Remove the cuts of some steps from the stock; return the sums after them, their columns and tooth engagement.
+
+    ``contact`` is their engagement by moves and ``found`` their removal by layers, if that is known.
     """
     if setting.moves is not None:
         return _moved_block(steps, setting.moves, sums, setting, contact)
@@ -358,7 +359,7 @@ def _after(
     basis: Floats,
     piece: ChipAreas | None,
 ) -> RunningSums:
-    """The sums after some steps."""
+    """Return the sums after some steps."""
     cuts = (removed[:, 0] > 0.0) & ~steps.rapid
     lines = steps.line[steps.rapid & (removed[:, 1] > 0.0)].tolist()
     return replace(
@@ -381,7 +382,7 @@ def removal_of(
     columns: Columns,
     cuts: tuple[Cuts, ...] = (),
 ) -> Removal:
-    """What was removed when all steps are done."""
+    """Return the removal after all steps."""
     band = None
     if material.has_band:
         sd = deviations(sums.basis / sums.cut_s, material) if sums.cut_s > 0.0 else np.zeros(4)
@@ -395,7 +396,7 @@ def removal_of(
 
 
 def stacked(blocks: Sequence[Columns]) -> dict[str, NDArray[Any]]:
-    """Columns of blocks one below the other; a column that a block lacks is 0 there."""
+    """Return the columns of blocks one below the other; a column that a block lacks is 0 there."""
     count = [len(b["line"]) for b in blocks]
     return {
         name: np.concatenate([b[name] if name in b else np.zeros(n) for b, n in zip(blocks, count, strict=True)])

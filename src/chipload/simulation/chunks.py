@@ -1,9 +1,9 @@
-"""Run a Program through a stock piece by piece: memory does not grow with it, and a run that was stopped goes on.
+"""Simulation of a Program in chunks: memory does not grow with the program, and a stopped run continues.
 
-Notation: a piece as in :mod:`chipload.simulation.checkpoint`. Steps are simulated in blocks; after a block, when some
-seconds have passed, the columns since the last time become a piece, the stock and the sums a state. A block needs the
-stock and the sums before it and nothing else, both come back from a file bit for bit, and blocks do not depend on when
-states were written: so the result has the same bytes however often the run was stopped.
+Notation: a chunk as in :mod:`chipload.simulation.checkpoint`. Steps are simulated in blocks. After a block, when some
+seconds have passed, the columns since the last state become a chunk, and stock and sums become a state. A block depends
+only on the stock and the sums before it, which a file restores bit for bit, and not on when states were written.
+Therefore the result has the same bytes however often the run was stopped.
 """
 
 from __future__ import annotations
@@ -58,16 +58,16 @@ ARRAYS = {"handed": 1, "numbers": 1, "basis": 2, "rapids": 1, "of": 1, "height":
 
 
 class WatchState(Protocol):
-    """What a watch keeps from one step to the next; it belongs to the state of the run."""
+    """State of a watch between steps, which belongs to the state of the run."""
 
     def to_bytes(self) -> bytes:
-        """All that it keeps, as the bytes of an ``.npz`` file."""
+        """Return the state as the bytes of an ``.npz`` file."""
 
     def restore(self, path: Path) -> None:
-        """Keep what :meth:`to_bytes` wrote, in place of what it keeps; InputError: the file is not such a one."""
+        """Replace the state by that of a file from :meth:`to_bytes`; InputError if it is another file."""
 
     def clear(self) -> None:
-        """Keep nothing: the run begins again."""
+        """Clear the state: the run begins from the start."""
 
 
 def remove_in_chunks(
@@ -88,12 +88,12 @@ def remove_in_chunks(
     engine: Engine = "layers",
     progress: Progress = silent,
 ) -> Removal:
-    """What :func:`chipload.simulation.chips.remove` does, with its columns in files and from where it was stopped.
+    """Do what :func:`chipload.simulation.chips.remove` does, with columns in files; continue a stopped run.
 
     Parameters
     ----------
     unfinished : the folder of the run; it holds the columns of the result, and stays until it is discarded
-    keeps : of ``watch``, what it keeps beside its columns, by names of files
+    keeps : states of ``watch`` beside its columns, by names of files
     times, processes, engine : as of :func:`chipload.simulation.chips.remove`
     also : values of any kind on which the result depends beside the arguments: versions, what ``watch`` uses
 
@@ -163,7 +163,7 @@ def _removed(
     keeps: Mapping[str, WatchState],
     progress: Progress,
 ) -> tuple[RunningSums, list[Columns]]:
-    """The sums after all steps, and the columns that did not go into files."""
+    """Return the sums after all steps, and the columns that are not in files."""
     resolution, cutters = setting.resolution, setting.cutters
 
     def state() -> dict[str, bytes]:

@@ -1,4 +1,4 @@
-"""Which contact point a step of the simulation cuts at, and the force there: the steps of rows with known contacts.
+"""Contact points at which the steps of a simulation cut, with their force, for rows with known contact points.
 
 Notation: row k of a program goes from the contact point q_(k-1) to q_k with the normals n; a place of a step lies a
 share t in it. The contact there is taken between them in proportion, e.g. at the beginning, the middle or the end of
@@ -26,7 +26,7 @@ def touched(
     values: Floats,
     within: float = 0.5,
 ) -> tuple[Contacts, Floats]:
-    """Contacts of the steps that cut at contact points, and other values there.
+    """Return the contacts of the steps that cut at contact points, and other values there.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def touched(
 
 
 def _shares(line: Ints, within: float) -> Floats:
-    """Share of its row at which the place ``within`` each step lies; the steps of a row are equal."""
+    """Return the share of its row at which the place ``within`` each step lies; the steps of a row are equal."""
     start = np.flatnonzero(np.r_[True, line[1:] != line[:-1]])
     count = np.diff(np.append(start, len(line)))
     k = np.arange(len(line)) - np.repeat(start, count)

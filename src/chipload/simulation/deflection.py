@@ -1,4 +1,4 @@
-"""What gives way while a program cuts: the deflection of every step, and the form error of the surface that is left.
+"""Deflection of tool and work in every step, and the form error of the surface that results.
 
 Notation: q point of the wanted surface, n its unit normal out of the part; p, A tip and axis of the cutter, T, n_c, A
 its frame; s length along its profile, phi immersion, theta rotation of tooth 0, lag(s) of its edge, bites as in
@@ -24,9 +24,9 @@ would take again after a deflection is not known.
 Without helix a tooth leaves all of its bite at once: the moment just before counts, as in
 :mod:`chipload.cutting.wall_error`.
 
-The load is that of the rigid model in the middle of the step: bending does not thin the chip. The work gives way at q
-under the whole force as if it acted there. The cutter is stiff along its axis, and q is that of the feed's envelope:
-marks of single teeth along the feed are not seen.
+The load is that of the rigid model in the middle of the step: deflection does not reduce the chip thickness. The work
+deflects at q under the whole force as if it acted there. The cutter is stiff along its axis, and q lies on the envelope
+of the feed: marks of single teeth along the feed are not calculated.
 
 Reference: [Uddin2007] and [Altintas2012] ch. 2 for the wall of an end mill, which this repeats for any cutter and
 surface.
@@ -70,7 +70,7 @@ CHUNK = 4096
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """Where the steps leave a surface, one a step that cuts.
+    """Contact of each cutting step with the surface that it leaves.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Contacts:
 
 @dataclass(frozen=True, eq=False)
 class FormError:
-    """What is left on a surface by a cutter and a workpiece that give way.
+    """Form error of the points of a surface by deflection of cutter and workpiece.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class FormError:
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """What one cutter cut, and how it is judged."""
+    """The cuts of one cutter, with the parameters of the form error."""
 
     cuts: Cuts
     material: Material
@@ -133,7 +133,7 @@ class _Model:
 
 
 def contacts(removal: Removal) -> Contacts:
-    """Where each step that cut leaves a surface.
+    """Return the contact of each cutting step with the surface that it leaves.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def step_deflections(
     bars: Mapping[int, tuple[Bar, ...]] | None,
     rotation: float = math.radians(2.0),
 ) -> dict[str, NDArray[Any]]:
-    """How far work and cutter give way in every step, at most over a revolution.
+    """Return the greatest deflection of work and cutter over a revolution for every step.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def tip_deflections(
     work: float | Floats | None = None,
     rotation: float = math.radians(2.0),
 ) -> dict[str, Floats]:
-    """How far the tip of one cutter and the work part in some steps, at most over a revolution.
+    """Return the greatest relative displacement of cutter tip and work over a revolution for some steps.
 
     With u the lateral motion of the tip under what all teeth cut and F the force on the cutter, the work with a
     compliance c in every direction goes -c F, and they part by u + c F.
@@ -301,7 +301,7 @@ def form_error(
     reach: float = REACH,
     progress: Progress = silent,
 ) -> FormError:
-    """Form error of the points of a surface.
+    """Return the form error of the points of a surface.
 
     Parameters
     ----------
@@ -360,7 +360,7 @@ def form_error(
 def _made_by(
     model: _Model, q: Floats, n: Floats, stiff: Floats, most: Floats, number: Ints, best: Floats, out: FormError
 ) -> float:
-    """Let the steps of one cutter make points where they leave less than ``best``; the greatest deflection seen."""
+    """Assign points to the steps of one cutter that leave less than ``best``; return the greatest deflection."""
     cuts = model.cuts
     shape = _shape(cuts.cutter)
     room = 16 * len(q) + 64
@@ -422,7 +422,7 @@ def _kept(removal: Removal) -> tuple[Cuts, ...]:
 
 
 def _work(work: ArrayLike | None, n: Floats, name: str) -> Floats:
-    """Compliance (p, 3, 3) of the work at places with normals n: (p,) along the normal is C_nn n n^T."""
+    """Return the compliance (p, 3, 3) of the work at places with normals n: (p,) along the normal is C_nn n n^T."""
     if work is None:
         return np.zeros((len(n), 3, 3))
     C = np.asarray(work, dtype=np.float64)
@@ -437,7 +437,7 @@ def _work(work: ArrayLike | None, n: Floats, name: str) -> Floats:
 
 
 def _shape(cutter: Cutter) -> Floats:
-    """The cutter as the kernels take it."""
+    """Return the shape of the cutter for the kernels."""
     _, r, e, f, alpha, beta, h = cutter.apt
     return np.array([r, e, f, alpha, beta, h, e + r * math.sin(alpha)])
 

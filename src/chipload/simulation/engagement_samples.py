@@ -1,4 +1,4 @@
-"""Tooth engagement and loads over a revolution of some steps of a run, kept to be shown.
+"""Engagement samples: tooth engagement and loads over a revolution of some steps of a run, for display.
 
 Notation: frame T, n, A, immersion phi, chip thickness h = along sin(phi) + across cos(phi) + offset and angle kappa as
 in :mod:`chipload.engagement.tooth_engagement`; rho distance from the axis, z height over the tip.
@@ -42,7 +42,7 @@ ARRAYS = ("row", "tool", "flutes", "periods", "frame", "start", "ranges", "turn"
 
 @dataclass(frozen=True, eq=False)
 class EngagementSamples:
-    """Steps in cut, by rising row.
+    """Samples of cutting steps, by rising row.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class EngagementSamples:
         return self.chosen(np.flatnonzero(self.row % stride == 0), stride)
 
     def chosen(self, k: Ints, stride: int) -> EngagementSamples:
-        """Some of the samples."""
+        """Return some of the samples."""
         ranges, start = _rows_of(self.start, k)
         return EngagementSamples(
             stride, self.row[k], self.tool[k], self.flutes[k], self.periods[k], self.frame[k], start,
@@ -98,14 +98,14 @@ class EngagementSamples:
         )  # fmt: skip
 
     def at_most(self, steps: int) -> EngagementSamples:
-        """So many samples at most."""
+        """Return at most ``steps`` samples."""
         out = self
         while len(out) > steps:
             out = out.every(2)
         return out
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        """What a file keeps of it, in single precision."""
+        """Return the arrays for a file, in single precision."""
         kept = {name: getattr(self, name) for name in ARRAYS}
         single = {k: v.astype(np.float32 if v.dtype.kind == "f" else np.int32) for k, v in kept.items()}
         return {**single, "stride": np.array(self.stride, dtype=np.int32)}
@@ -168,7 +168,7 @@ def engagement_samples(
 
 @dataclass(eq=False)
 class EngagementRecorder:
-    """A watch that adds no column and keeps samples.
+    """A watch that stores samples and adds no column.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ class EngagementRecorder:
     parts: list[EngagementSamples] = field(default_factory=list)
 
     def __call__(self, cuts: Cuts) -> dict[str, Floats]:
-        """Keep some of the steps of one cutter."""
+        """Store samples of some of the steps of one cutter."""
         # films that are thinner than the tolerance engage no edge
         engaged = np.diff(cuts.engagement.start) > 0
         chosen = np.flatnonzero((np.asarray(cuts.step) % self.stride == 0) & engaged)
@@ -198,18 +198,18 @@ class EngagementRecorder:
         return {}
 
     def samples(self) -> EngagementSamples | None:
-        """What was kept; None: no step cut."""
+        """Return the samples; None if no step cuts."""
         return _joined([p.every(self.stride // p.stride) for p in self.parts]) if self.parts else None
 
     def to_bytes(self) -> bytes:
-        """What was kept so far, for the state of a run: to the bit."""
+        """Return the samples so far for the state of a run, bit for bit."""
         sink, own = io.BytesIO(), self.samples()
         arrays = {} if own is None else {name: getattr(own, name) for name in ARRAYS}
         np.savez(sink, stride=np.array(self.stride), **arrays)
         return sink.getvalue()
 
     def restore(self, path: Path) -> None:
-        """Keep what an earlier run kept."""
+        """Load the samples of an earlier run."""
         try:
             with np.load(path, allow_pickle=False) as held:
                 arrays = {name: held[name] for name in held.files}
@@ -221,7 +221,7 @@ class EngagementRecorder:
         self.parts = [samples_from(arrays)] if "row" in arrays else []
 
     def clear(self) -> None:
-        """Keep nothing."""
+        """Delete all samples."""
         self.stride, self.parts = 1, []
 
 

@@ -1,4 +1,4 @@
-"""What a simulation will need, before it is run.
+"""Estimate of the steps, memory and processor time of a simulation before it runs.
 
 Measured on programs of 10,000 to 100,000 motions (docs/design/streaming.md): the libraries and an ordinary stock take
 350 MB, a motion that is read 1.6 kB, the columns of a step 0.5 kB while they are joined.
@@ -28,7 +28,7 @@ FLAT, ROUND, TAPERED = 4e-3, 10e-3, 28e-3
 
 
 def estimate(steps: int, motions: int, quick: float = QUICK, slow: float = SLOW, coarse: bool = True) -> str:
-    """Steps, memory and processor time of a simulation, in a sentence; ``quick`` and ``slow`` are times of a step [s].
+    """Return steps, memory and time of a simulation as a sentence; ``quick`` and ``slow`` are times of a step [s].
 
     Where that is long, ``coarse`` says how a first answer is had.
 
@@ -48,7 +48,7 @@ def estimate(steps: int, motions: int, quick: float = QUICK, slow: float = SLOW,
 
 
 def slowest_step(cutter: Cutter) -> float:
-    """Greatest processor time [s] of a step by moves with an upright cutter.
+    """Return the greatest processor time [s] of a step by moves with an upright cutter.
 
     >>> slowest_step(Cutter(10.0, 4, 0.5, 20.0, 35.0, 5.8e5)) == FLAT
     True

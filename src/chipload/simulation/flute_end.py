@@ -1,4 +1,4 @@
-"""Steps in which the end of the flutes is in the air: a cutter with longer flutes takes the same, at less cost.
+"""Replacement of a cutter by one with longer flutes in steps whose flute end is in air: equal removal, less time.
 
 Where the axis leans, a layer cuts through the end of the flutes, a plane, and the edge of the section has corners; what
 the step covers is then bounded by more than two grazing curves and costs ten times as much
@@ -98,7 +98,7 @@ def _clear(
 
 
 def met(tiles: Tiles, stock: LayeredStock, layer: Ints, low: Floats, high: Floats) -> NDArray[np.bool_]:
-    """Whether boxes (n, 2), (n, 2), each in its layer, meet what is left there.
+    """Return whether boxes (n, 2), (n, 2), each in its layer, meet the remaining stock there.
 
     Parameters
     ----------

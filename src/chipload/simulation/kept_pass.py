@@ -1,9 +1,9 @@
-"""Passes over the steps of a program beside the removal - gouge, collisions - that go on after the run was stopped.
+"""Passes over the steps of a program beside the removal (gouge, collisions) that continue after a stop.
 
-Notation: a pass goes through the steps block after block and keeps arrays; what it has found so far is one file
-``pass-<name>.npz`` in the folder of the run's checkpoint, written whole or not at all. Blocks do not depend on when
-that was, and arrays come back bit for bit: a pass that was stopped finds what one that was not stopped finds. A pass
-that was finished is not gone through again.
+Notation: a pass processes the steps block after block and stores arrays. Its results so far are one file
+``pass-<name>.npz`` in the checkpoint folder of the run, written completely or not at all. Blocks do not depend on when
+the file was written, and arrays are restored bit for bit: a stopped pass has the same result as one that was not
+stopped. A finished pass is not repeated.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ SHARE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class KeptPasses:
-    """Where the passes of a run keep what they found.
+    """Store of the results of the passes of a run.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class KeptPasses:
         state: Callable[[], Arrays],
         restore: Callable[[Arrays], None],
     ) -> Iterator[Steps]:
-        """The blocks of steps that the pass has not taken yet.
+        """Yield the blocks of steps that the pass has not processed yet.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class KeptPasses:
     def _restored(
         kept: Checkpoint, name: str, key: NDArray[np.uint8], fresh: Arrays, restore: Callable[[Arrays], None]
     ) -> int:
-        """How many steps the pass has taken already."""
+        """Return the number of steps that the pass has already processed."""
         file = kept.kept_pass(name)
         if file is None:
             return 0

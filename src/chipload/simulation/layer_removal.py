@@ -1,4 +1,4 @@
-"""What each step takes from the layers, and what the teeth cut in its middle.
+"""Removal of each step from the layers, and its tooth engagement in the middle of the step.
 
 Notation: as in :mod:`chipload.simulation.chips`.
 """
@@ -36,7 +36,7 @@ def removed_by_layers(
     own: NDArray[np.bool_] | None = None,
     plan: Plan | None = None,
 ) -> TakenByLayers:
-    """Take some steps from the stock.
+    """Remove some steps from the stock.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def removed_by_layers(
 
 
 def rank_of(whole: Sequence[Polygon]) -> tuple[int, float]:
-    """By how many pieces a chip stands out, and by how alike they are."""
+    """Return the rank of a chip: the number of its pieces, then how equal they are."""
     areas = [p.area for p in whole]
     return len(areas), min(areas) / sum(areas) if areas else 0.0
 

@@ -1,4 +1,4 @@
-"""What the teeth cut in the middle of a step, and the loads that this costs over a revolution.
+"""Tooth engagement in the middle of a step, and the loads over a revolution.
 
 Notation: t in 0..1 within a step; T, n, A the frame of the cutter, nu the outward normal of its surface, phi immersion
 as in :mod:`chipload.engagement.tooth_engagement`.
@@ -59,7 +59,7 @@ ONE_SIDE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class StepEngagement:
-    """Rows of one step."""
+    """Tooth engagement of one step."""
 
     step: int
     frame: Floats
@@ -69,7 +69,7 @@ class StepEngagement:
 
 @dataclass(frozen=True, eq=False)
 class Cuts:
-    """What the teeth of one cutter cut, step by step.
+    """Tooth engagement of one cutter, step by step.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Cuts:
 
 
 def joined(cuts: list[Cuts]) -> Cuts:
-    """Cuts of one cutter that follow one another as one."""
+    """Return consecutive cuts of one cutter joined to one."""
     columns = (np.concatenate([getattr(c, name) for c in cuts]) for name in ("step", "ends", "spindle"))
     step, ends, spindle = columns
     engagement = _joined([c.engagement for c in cuts])
@@ -116,8 +116,10 @@ def _joined(parts: list[ToothEngagement]) -> ToothEngagement:
 
 
 def at_feeds(cuts: Cuts, factor: Floats) -> Cuts:
-    """What the teeth cut at other feeds: where they cut does not depend on the feed, how thick is proportional to it;
-    what runout adds is not.
+    """Return the tooth engagement at other feeds.
+
+    The place of a cut does not depend on the feed. The chip thickness without runout is proportional to it; the part
+    that runout adds does not depend on it.
 
     Parameters
     ----------
@@ -133,7 +135,7 @@ def at_feeds(cuts: Cuts, factor: Floats) -> Cuts:
 def engagement_of_step(
     steps: Steps, k: int, move: Move, cutter: Cutter, profile: Slices, section: Section, tolerance: float
 ) -> StepEngagement:
-    """What the teeth cut at the middle of a step.
+    """Return the tooth engagement at the middle of a step.
 
     The front that the step before it left is half a step behind, and its edges are known to ``tolerance`` [mm] only.
     Where half a step is less than :data:`AHEAD` of those, contact is judged for the cutter moved on along its feed by
@@ -156,7 +158,7 @@ def engagement_of_step(
 
 
 def engagement_of_steps(cuts: list[StepEngagement], profile: Slices) -> ToothEngagement:
-    """The engagement of some steps of one cutter, without its runout."""
+    """Return the tooth engagement of some steps of one cutter, without its runout."""
     start = np.cumsum([0, *(len(c.rows) for c in cuts)])
     rows, owner = np.concatenate([c.rows for c in cuts]), np.concatenate([c.owner for c in cuts])
     frame = np.array([c.frame for c in cuts])
@@ -165,7 +167,7 @@ def engagement_of_steps(cuts: list[StepEngagement], profile: Slices) -> ToothEng
 
 
 def _with_parts(rows: Floats, owner: Ints, profile: Slices) -> tuple[Ints, Floats]:
-    """Slices of the engaged edge, and the columns of the profile followed by those of parts of its arcs.
+    """Return slices of the engaged edge, and the columns of the profile followed by those of parts of its arcs.
 
     A bite that ends within a slice of an arc has the radius and the normal of its own middle, not of the slice's: in a
     shallow cut by a ball nose the uppermost slice holds much of the torque.
@@ -190,8 +192,9 @@ def _with_parts(rows: Floats, owner: Ints, profile: Slices) -> tuple[Ints, Float
 
 
 def greatest_loads(cuts: Cuts, material: Material, rotation: float, bands: bool = False) -> dict[str, Floats]:
-    """Columns (c,) of :data:`LOADS` that limits hold: greatest force [N], greatest and mean torque [N m], mean power
-    [W], thickest chip [mm]; with ``bands`` those of :data:`BANDS` too.
+    """Return the columns (c,) of :data:`LOADS` that limits bound; with ``bands`` those of :data:`BANDS` too.
+
+    They are greatest force [N], greatest and mean torque [N m], mean power [W] and thickest chip [mm].
     """
     turn = over_turn(cuts.engagement, cuts.cutter, material, rotation)
     force, torque, _ = turn
@@ -224,7 +227,7 @@ def bands_of_steps(
 
 
 def over_turn(engagement: ToothEngagement, cutter: Cutter, material: Material, rotation: float) -> OverTurn:
-    """Force and torque at rotations at most ``rotation`` apart, and these rotations [rad]."""
+    """Return force and torque at rotations at most ``rotation`` apart, and these rotations [rad]."""
     pitch = math.tau / cutter.flutes if cutter.teeth_alike else math.tau
     count = max(math.ceil(pitch / rotation), 8)
     theta = np.asarray(np.arange(count) * (pitch / count), dtype=np.float64)
@@ -240,7 +243,7 @@ def loads_of_steps(
     spindle: Floats,
     seconds: Floats,
 ) -> Floats:
-    """(c, len(LOADS)) loads of steps that take ``seconds`` (c,), from :func:`over_turn` of them."""
+    """Return loads (c, len(LOADS)) of steps that take ``seconds`` (c,), from :func:`over_turn`."""
     force, torque, _ = turn
     mean, torque_mean = mean_forces(engagement, cutter, material)
     turned = in_work(force, engagement.frames)

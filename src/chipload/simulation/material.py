@@ -1,4 +1,4 @@
-"""The stock as it was before the first motion: which points of the plane are in it.
+"""The initial stock in the plane, before the first motion: its region and its boundary in strips.
 
 Notation: a boundary is a set of contours with the MATERIAL ON THE LEFT of travel.
 """
@@ -19,7 +19,7 @@ Ints = NDArray[np.int64]
 
 
 def material_left_of(boundary: Sequence[Contour], reach_mm: float) -> Region:
-    """The material on the left of a boundary, as far as a circle of radius ``reach_mm``, as a region.
+    """Return the region of the material on the left of a boundary, within a circle of radius ``reach_mm``.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def material_left_of(boundary: Sequence[Contour], reach_mm: float) -> Region:
 
 
 def _to_circle(p: Floats, direction: Floats, centre: Floats, radius: float) -> Floats:
-    """Where the ray from ``p`` meets the circle."""
+    """Return the point where the ray from ``p`` meets the circle."""
     v = p - centre
     along = float(v @ direction)
     hit: Floats = p + direction * (math.sqrt(along**2 + radius**2 - float(v @ v)) - along)
@@ -76,7 +76,7 @@ def _to_circle(p: Floats, direction: Floats, centre: Floats, radius: float) -> F
 
 
 def strips(stock: Region | None, low: float, high: float) -> tuple[float, float, int, Ints, Ints, Floats]:
-    """The boundary of ``stock`` in pieces monotone in y, by strips of y between ``low`` and ``high`` [mm].
+    """Return the boundary of ``stock`` in pieces monotone in y, by strips of y between ``low`` and ``high`` [mm].
 
     The form is that of ``rows`` in :mod:`chipload.simulation._kernels`. Ends of neighbours are made one, so that no
     ray slips between them.

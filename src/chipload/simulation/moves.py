@@ -1,12 +1,11 @@
-"""Steps of a cutter run through the stock as moves: what each removes and what that costs.
+"""The engine ``moves``: removal and loads of the steps of a cutter from the volume that earlier moves swept.
 
-Notation: as in :mod:`chipload.engagement.moves`, and where the axis leans or turns in
-:mod:`chipload.engagement.bricks`. A step is looked at at its middle, and where it is long at more instants, the middles
-of equal parts of it. Its volume and its mean loads are the means over the instants, its greatest loads the greatest of
-any; what a ``watch`` gets is the tooth engagement at the instant of the greatest force, where several are alike at the
-one nearest to the middle.
+Notation: as in :mod:`chipload.engagement.moves`, and in :mod:`chipload.engagement.bricks` where the axis leans or
+turns. A step is calculated at its middle, and a long step at more instants, the middles of equal parts of it. Its
+volume and mean loads are the means over the instants, its greatest loads the greatest of any. A ``watch`` receives the
+tooth engagement at the instant of the greatest force; of several equal ones, that nearest to the middle.
 
-What this engine cannot do is handed over: :class:`HandOver` names the line and the reason.
+A program that this engine cannot simulate is handed over: :class:`HandOver` names the line and the reason.
 """
 
 from __future__ import annotations
@@ -60,7 +59,7 @@ FILM = 4.0
 
 
 class HandOver(Exception):
-    """What the moves cannot simulate: the line of the program and the reason."""
+    """Error: the engine ``moves`` cannot simulate the program; with its line and the reason."""
 
     def __init__(self, line: int, why: str) -> None:
         super().__init__(why)
@@ -69,15 +68,15 @@ class HandOver(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """What some steps removed.
+    """Removal and loads of some steps.
 
     Parameters
     ----------
     removed : (n, 4) volume [mm^3], pieces and layers of each chip, contact of the shank: 0, for that is handed over
     loads : (n, len(LOADS))
     bands : (n,) each, columns of :data:`chipload.simulation.loads.BANDS`; none where the material has no band
-    basis : (4, 6) integral over the time in cut of what the coefficients are multiplied with
-    cuts : what the teeth cut, one a cutter
+    basis : (4, 6) integral over the time in cut of the factors of the coefficients
+    cuts : tooth engagement, one for each cutter
     """
 
     removed: Floats
@@ -89,7 +88,7 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class MoveRun:
-    """A run by moves: its stock, the layers that it ends in, and how finely the edge is looked at.
+    """A run by moves: its stock, the layers of the final stock, and the resolution of the edge.
 
     Parameters
     ----------
@@ -107,11 +106,11 @@ class MoveRun:
 
     @property
     def upright(self) -> bool:
-        """Whether the axis stands upright all along."""
+        """Whether the axis is upright in the whole program."""
         return isinstance(self.stock, MoveStock)
 
     def skip(self, program: Program, step_mm: float, count: int) -> None:
-        """Make the first ``count`` steps of a program without looking at them: a run that goes on."""
+        """Make the first ``count`` steps of a program without calculating them, to continue a run."""
         for steps in steps_in_blocks(program, step_mm, self.tolerance, size=ROWS):
             if count <= 0:
                 return
@@ -119,7 +118,7 @@ class MoveRun:
             count -= len(steps)
 
     def make(self, steps: Steps, count: int) -> None:
-        """Make the first ``count`` of some steps without looking at them."""
+        """Make the first ``count`` of some steps without calculating them."""
         p0, p1, tool = steps.p0[:count], steps.p1[:count], steps.tool[:count]
         if isinstance(self.stock, BrickStock):
             self.stock.skip(p0, p1, steps.a0[:count], steps.a1[:count], tool)
@@ -127,7 +126,7 @@ class MoveRun:
             self.stock.skip(p0, p1, tool)
 
     def contact(self, steps: Steps) -> Engaged:
-        """Make some steps: what they engage."""
+        """Make some steps and return their engagement."""
         pieces, flank = self.corner_slices, self.flank_mm
         if isinstance(self.stock, BrickStock):
             way = (steps.p0, steps.p1, steps.a0, steps.a1)
@@ -135,7 +134,7 @@ class MoveRun:
         return self.stock.take(steps.p0, steps.p1, steps.tool, corner_slices=pieces, flank_mm=flank)
 
     def finish(self, stock: LayeredStock, workers: int) -> None:
-        """Take from the layers what the moves swept of their sections; found in so many threads."""
+        """Remove the swept volume of the moves from the layers, with a number of threads."""
         low = self.stock.lowest()
         at = [i for i, z in enumerate(stock.heights.tolist()) if z > low]
         with ThreadPoolExecutor(workers) as pool:
@@ -153,7 +152,7 @@ def run_by_moves(
     flank_mm: float,
     interpolation: Interpolation = "slerp",
 ) -> MoveRun:
-    """The run of a program by moves: by heights over the plan where the axis stands upright all along, else by bricks.
+    """Return the run of a program by moves: by heights over the plan if the axis is always upright, else by bricks.
 
     Raises
     ------
@@ -178,19 +177,19 @@ def run_by_moves(
 
 
 def leans(program: Program) -> NDArray[np.bool_]:
-    """Rows of a program whose axis is not upright."""
+    """Return a mask of the rows of a program whose axis is not upright."""
     return np.asarray(np.abs(np.asarray(program.axis) - (0.0, 0.0, 1.0)).max(axis=1) > UPRIGHT)
 
 
 def _is_block(stock: LayeredStock) -> bool:
-    """Whether the layers fill their box."""
+    """Return whether the layers fill their box."""
     x, y, z = stock.xs, stock.ys, stock.bounds
     whole = (x[-1] - x[0]) * (y[-1] - y[0]) * (z[-1] - z[0])
     return bool(abs(stock.volume() - whole) <= 1e-9 * whole)
 
 
 def with_contact(blocks: Iterable[Steps], run: MoveRun | None, workers: int) -> Iterator[tuple[Steps, Engaged | None]]:
-    """Blocks of steps and what they engage; with more than one worker that of the next is found in a thread beside.
+    """Yield blocks of steps with their engagement; with several workers a thread calculates the next block ahead.
 
     None: without moves, or with one worker, which finds it when it is its turn.
     """
@@ -218,7 +217,7 @@ def moved(
     rotation: float,
     found: Engaged | None = None,
 ) -> Moved:
-    """What some steps remove; ``first`` is the number of the first, ``found`` what they engage where that is known.
+    """Return the removal of some steps; ``first`` is the number of the first, ``found`` their engagement if known.
 
     Raises
     ------
@@ -320,7 +319,7 @@ def _bands(
 
 
 def engagement_of(found: Engaged, entries: Ints, steps: Steps, cutter: Cutter) -> ToothEngagement:
-    """The tooth engagement of some entries of one cutter, without its runout.
+    """Return the tooth engagement of some entries of one cutter, without its runout.
 
     Raises
     ------
@@ -381,14 +380,14 @@ def _spans(found: Engaged, entries: Ints) -> tuple[Ints, Ints, Floats, Ints]:
 
 
 def _slices(slices: Floats, cutter: Cutter) -> Floats:
-    """(k, 7) as a bite needs them."""
+    """Return the slices (k, 7) in the form of :class:`ToothEngagement`."""
     s0, _, rho, z, sk, ck = slices[:, :6].T
     lead = edge_lag(cutter)
     return np.column_stack([s0, rho, z, sk, ck, lead * z, lead * sk])
 
 
 def _left(found: Engaged, entries: Ints) -> Floats:
-    """(m, 3) unit normal of the surface that is left; 0 where none or two that face each other are left."""
+    """Return unit normals (m, 3) of the surface that is left; 0 where none or two that face each other are left."""
     total, whole = found.left[entries], found.left_mm[entries]
     size = np.linalg.norm(total, axis=1)
     one = (size > ONE_SIDE * whole) & (whole > 0.0)
@@ -396,7 +395,7 @@ def _left(found: Engaged, entries: Ints) -> Floats:
 
 
 def _together(loads: Floats, step: Ints, each: Floats, weight: Floats) -> None:
-    """Loads of instants as those of their steps: means, greatest, least."""
+    """Replace the loads of instants by those of their steps: means, greatest, least."""
     fresh = np.unique(step)
     loads[np.ix_(fresh, LEAST)] = math.inf
     greatest = np.setdiff1d(np.arange(each.shape[1]), [*MEANS, *LEAST])

@@ -1,7 +1,7 @@
-"""Whether a stock is probably misplaced: the likely cause of loads that no cutter bears.
+"""Detection of a probably misplaced stock, the usual cause of loads far beyond what a cutter can carry.
 
 Notation: t time at feed, of which t_air removes nothing; h greatest height of the stock's box above the tip, along the
-tool's axis, where the first chip is cut; l flute length. Three signs are looked at:
+tool's axis, where the first chip is cut; l flute length. Three signs are examined:
 
 * air: t_air / t is at least ``AIR_SHARE``;
 * depth: h > l, so that the first cut can be deeper than the flutes are long;
@@ -32,7 +32,7 @@ CODE = "stock-misplaced"
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """How the motions at feed of a simulated program lie to its stock.
+    """Position of the motions at feed of a simulated program relative to its stock.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Placement:
 def placement_of(
     columns: Mapping[str, NDArray[Any]], bounds: tuple[Floats, Floats], cutters: Mapping[int, Cutter]
 ) -> Placement:
-    """How the motions at feed lie to the stock; O(n).
+    """Return the position of the motions at feed relative to the stock; O(n).
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def placement_of(
 def stock_placement(
     columns: Mapping[str, NDArray[Any]], bounds: tuple[Floats, Floats], cutters: Mapping[int, Cutter]
 ) -> Finding | None:
-    """The finding that the stock is probably misplaced; None: nothing suggests it.
+    """Return the finding that the stock is probably misplaced; None if nothing suggests it.
 
     It is no verdict of its own: it says the likely cause of a limit that is exceeded. Parameters and errors as those of
     :func:`placement_of`.

@@ -1,4 +1,4 @@
-"""Which layers of a stock a step may take anything from: those where its cutter comes near what is left.
+"""Selection of the layers of a stock from which a step may remove material.
 
 Notation: p tip, A unit axis, s distance along it from the tip, R greatest radius; a step as in
 :mod:`chipload.simulation.steps`; h height of a layer's section; u a direction in the layer. Without what the axis turns
@@ -44,7 +44,7 @@ _U = np.column_stack([np.cos(_ANGLE), np.sin(_ANGLE)])
 def reached(
     steps: Steps, some: Sequence[int], layers: Sequence[Ints], cutter: Cutter, stock: LayeredStock
 ) -> list[Ints]:
-    """Of each of ``some`` steps those of its ``layers`` (numbers) that it may take anything from."""
+    """Return for each of ``some`` steps those of its ``layers`` (numbers) from which it may remove material."""
     if not len(some):
         return []
     k = np.repeat(np.asarray(some), [len(rows) for rows in layers])
@@ -86,7 +86,7 @@ def _support(steps: Steps, k: Ints, height: Floats, cutter: Cutter) -> Floats:
 
 
 def _touched(support: Floats, layer: Ints, stock: LayeredStock) -> NDArray[np.bool_]:
-    """Whether the polygons of these supports touch what is left of their layers."""
+    """Return whether the polygons of these supports touch the remaining stock of their layers."""
     after, u = np.roll(support, -1, axis=1), np.roll(_U, -1, axis=0)
     cross = math.sin(math.tau / DIRECTIONS)
     x = (support * u[:, 1] - after * _U[:, 1]) / cross

@@ -1,4 +1,4 @@
-"""What a program removes from its stock: resolution, settings and sums of a run, and what it gives."""
+"""Data of a removal: the resolution, settings and running sums of a simulation, and its result."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ BANDED = {
 
 @dataclass(frozen=True)
 class Resolution:
-    """How fine the simulation looks.
+    """Resolution of a simulation.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Resolution:
     tolerance : how far chords leave the edges of chips [mm]
     corner_slices : slices of a corner radius
     flank_mm : length of a slice along the flank [mm]
-    rotation : between two rotations at which the force is looked at [rad]
+    rotation : angle between two rotations at which the force is calculated [rad]
     grading : of the slices of a corner, see :func:`chipload.cutter.slices.slices`
     bottom_slices : slices of the bottom line
     """
@@ -88,7 +88,7 @@ class ChipAreas:
 
 @dataclass(frozen=True, eq=False)
 class TakenByLayers:
-    """What some steps took from the layers.
+    """Removal of some steps from the layers.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class TakenByLayers:
 
 @dataclass(frozen=True, eq=False)
 class Removal:
-    """What a program removed.
+    """The removal of a program: its columns, volumes, accuracy and findings.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class Removal:
     piece : the chip with most pieces that are most alike; None where nothing was cut
     findings : rapids that cut, and whether the run was handed over to the layers
     labels : of the program, `label` of the columns counts in them
-    cuts : what the teeth cut, one a cutter that cut; empty unless it was asked for
+    cuts : tooth engagement, one for each cutter that cuts; empty unless requested
     energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty where nothing
         was cut or it was not asked for
     resolution_error : relative error of the worst value of a column, by its name; empty unless it was asked for; both
@@ -173,14 +173,14 @@ class RunSettings:
 
 @dataclass(frozen=True, eq=False)
 class RunningSums:
-    """What is known after some steps and goes on in the next.
+    """Running sums after some steps, which continue in the next.
 
     Parameters
     ----------
     before : volume of the stock before the first step [mm^3]
     steps : how many they are
     s_mm, t_s, cut_s : their length [mm], their time and the time in cut [s]
-    basis : (4, 6) integral over the time in cut of what the coefficients are multiplied with
+    basis : (4, 6) integral over the time in cut of the factors of the coefficients
     rapids : lines with rapids that cut
     piece : as in :class:`Removal`
     handed : line and reason for which the run was handed over from moves to layers

@@ -1,7 +1,7 @@
-"""The stock over the rows of a history: quads, each with the frames in which it is seen, to be shown at any row.
+"""The removal mesh: the surface of the stock over the rows of a history as quads, each with its visible frames.
 
 Notation: a **frame** stands for a run of rows; frame 0 is the stock before row 0, frame i + 1 that after row
-``rows[i]``. The stock is kept as dexels (:mod:`chipload.stock.dexel`), a route of its own to the removed volume: it
+``rows[i]``. The stock is kept as dexels (:mod:`chipload.stock.dexel`), independent of the removed volume: it
 knows the tip, the axis and the cutter of each row, nothing of chips. Its cells are so wide that the work stays within
 :data:`WORK`; what is thinner than a cell may be missing in the picture.
 """
@@ -56,7 +56,7 @@ class RemovalMesh:
     cell: Floats
 
     def frame_of(self, row: int) -> int:
-        """Frame that is shown at a row: the last that stands after no later row."""
+        """Return the frame that is shown at a row: the last one that represents the stock after no later row."""
         return int(np.searchsorted(self.rows, row, side="right"))
 
     def volume(self, frame: int) -> float:
@@ -69,7 +69,7 @@ class RemovalMesh:
 
 @dataclass(frozen=True, eq=False)
 class ToolPoses:
-    """Where the tool stands at each row.
+    """Position, axis and cutter of the tool at each row.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def removal_mesh(
     before: Sequence[ToolPoses] = (),
     wider: float = 1.0,
 ) -> RemovalMesh:
-    """Run the tool along the rows through the blank.
+    """Return the removal mesh of a tool that moves along the rows through the blank.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
-"""Whether a cutter leaves a finished body whole: its path against points of the body, its stock against its sections.
+"""Check of a finished body for gouges: the cutter's path against its points, the stock against its sections.
 
 Notation: C [mm] the middle of the corner circle's centres, at r_c along the axis from the tip; e radius of that circle,
 r corner radius; (h, rho) height over C along the axis and distance from it.
 
-Two routes, neither of which knows how the path was made:
+Two methods, both independent of the planning of the path:
 
 * **path**: at both ends and in the middle of every motion, rapids too, the least distance of the body's points to the
   corner (a torus, a sphere where e = 0) and to the flank and shank above it. Points of a grid of spacing s miss the
@@ -55,7 +55,7 @@ class SectionDeviation:
 
 
 def nearest(program: Program, cutter: Cutter, points: ArrayLike) -> WallClearance:
-    """Least distance of a cutter to a body along a program.
+    """Return the least distance of a cutter to a body along a program.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def nearest(program: Program, cutter: Cutter, points: ArrayLike) -> WallClearanc
 
 
 def section_deviation(stock: LayeredStock, body: trimesh.Trimesh, low: float) -> SectionDeviation:
-    """What is left of a stock beside the finished body.
+    """Return the greatest deviation of a stock from the finished body over its sections.
 
     Parameters
     ----------

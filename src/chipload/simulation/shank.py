@@ -1,4 +1,4 @@
-"""Whether the shank stands in material: an axial depth that the flutes do not reach.
+"""Check of the shank for contact with material: an axial depth greater than the flute length.
 
 The flutes end at ``flute_length``; the shank above them does not cut, it rubs and breaks. The stock is asked when a
 step ends: rings of points of the shank, inside its radius by a margin, upwards from the end of the flutes layer by
@@ -24,7 +24,7 @@ AROUND = 32
 
 
 def axial_overrun(stock: LayeredStock, cutter: Cutter, tip: Floats, axis: Floats, margin: float) -> float:
-    """Length of the shank that stands in material, from the end of the flutes upwards [mm]; 0: none.
+    """Return the length of the shank in material, from the end of the flutes upwards [mm]; 0 if none.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def axial_overrun(stock: LayeredStock, cutter: Cutter, tip: Floats, axis: Floats
 
 
 def _holds(stock: LayeredStock, points: Floats) -> bool:
-    """Whether one of some points (n, 3) [mm] lies in the stock."""
+    """Return whether one of some points (n, 3) [mm] lies in the stock."""
     layer = np.searchsorted(stock.bounds, points[:, 2], "right") - 1
     i = np.searchsorted(stock.xs, points[:, 0], "right") - 1
     j = np.searchsorted(stock.ys, points[:, 1], "right") - 1

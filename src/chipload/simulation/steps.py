@@ -1,4 +1,4 @@
-"""A Program in short steps: where the tip and the axis go in each, and how long it takes.
+"""Division of a Program into short steps, with tip, axis and time of each.
 
 Notation: a step is a straight piece of the tip's path on which the axis turns evenly; p [mm] tip, A unit axis. Arcs
 become chords first. Row 0 of a program is where it begins and gives no step, a dwell gives none.
@@ -65,7 +65,7 @@ class Steps:
 def steps_of(
     program: Program, step_mm: float, chord_mm: float, turn: float = TURN, times: Floats | None = None
 ) -> Steps:
-    """Cut a program into steps; O(n).
+    """Divide a program into steps; O(n).
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def steps_in_blocks(
     first: int = 0,
     times: Floats | None = None,
 ) -> Iterator[Steps]:
-    """The steps of :func:`steps_of` from step ``first`` on, ``size`` at a time and the rest.
+    """Yield the steps of :func:`steps_of` from step ``first`` on in blocks of ``size``.
 
     Each block is made when it is asked for: memory does not grow with the program, nor with the length of its rows.
     """
@@ -121,7 +121,7 @@ def steps_in_blocks(
 
 
 def number_of_steps(program: Program, step_mm: float, chord_mm: float, turn: float = TURN) -> int:
-    """How many steps :func:`steps_of` gives, without making them: O(rows)."""
+    """Return the number of steps of :func:`steps_of` without making them; O(rows)."""
     return sum(
         int(_moves(_rows(program, row - 1, row + ROWS), step_mm, chord_mm, turn, None).parts.sum())
         for row in range(1, len(program), ROWS)
@@ -130,7 +130,7 @@ def number_of_steps(program: Program, step_mm: float, chord_mm: float, turn: flo
 
 @dataclass(frozen=True, eq=False)
 class StepBlocks:
-    """The steps of a program, block after block, as often as they are gone through: see :func:`steps_in_blocks`."""
+    """The steps of a program in blocks, which can be iterated several times: see :func:`steps_in_blocks`."""
 
     program: Program
     step_mm: float
@@ -149,7 +149,7 @@ def blocks_of(steps: Steps | Iterable[Steps]) -> Iterable[Steps]:
 
 @dataclass(frozen=True, eq=False)
 class _Moves:
-    """Chords of a program and into how many steps each is cut.
+    """Chords of a program and the number of steps of each.
 
     Parameters
     ----------
@@ -189,14 +189,14 @@ def _on_moves(program: Program, times: Floats) -> Floats:
 
 
 def moving_rows(program: Program) -> NDArray[np.bool_]:
-    """(n,) whether each row of a program gives steps."""
+    """Return a mask (n,) of the rows of a program that have steps."""
     moving = (program.motion != DWELL) & ((lengths(program) > 0.0) | (_angles(program) > 0.0))
     moving[:1] = False
     return np.asarray(moving)
 
 
 def _angles(program: Program) -> Floats:
-    """(n,) angle that the axis turns by in each row [rad]."""
+    """Return the angle (n,) by which the axis turns in each row [rad]."""
     angle = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(np.diff(program.axis, axis=0), axis=1), 1.0))
     return np.concatenate([np.zeros(min(len(program), 1)), angle])
 
@@ -277,7 +277,7 @@ def _line(begin: Floats, end: Floats, u: Floats) -> Floats:
 
 
 def _turned(begin: Floats, end: Floats, angle: Floats, u: Floats) -> Floats:
-    """(n, 3) axes along great circles."""
+    """Return axes (n, 3) along great circles."""
     if not angle.any():
         return np.asarray(end / np.linalg.norm(end, axis=1)[:, None])
     small = angle < 1e-12

@@ -1,4 +1,4 @@
-"""Strips of a layered stock as tasks of other processes or of a cluster: each removes what reaches into its strip.
+"""Division of a layered stock into strips, whose removal runs as tasks in other processes or on a cluster.
 
 Notation: a strip is a range of neighbouring columns (or rows) of the tiles of the stock; it **owns** the steps whose
 box has its middle in them. Its **halo** is the further columns that its own steps reach into. A tile depends on nothing
@@ -59,7 +59,7 @@ class Strip:
 
 @dataclass(frozen=True, eq=False)
 class _Shared:
-    """What the tasks of all strips share; ``plan`` is that of the whole stock, ``size`` steps make a block."""
+    """Data that the tasks of all strips share; ``plan`` is that of the whole stock, ``size`` steps make a block."""
 
     xs: Floats
     ys: Floats
@@ -97,7 +97,7 @@ Block = _Found | ChiploadError
 def strips_of(
     program: Program, stock: LayeredStock, cutters: Mapping[int, Cutter], step_mm: float, tolerance: float, count: int
 ) -> list[Strip]:
-    """``count`` strips of a stock for a program; none where they would gain nothing.
+    """Return ``count`` strips of a stock for a program; none if they would save no time.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def _cost(strips: list[Strip], low: Ints, middle: Ints, high: Ints, near: NDArra
 
 
 class Strips:
-    """Some strips of a stock, of which a team removes a program.
+    """Strips of a stock from which a team of workers removes a program.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ class Strips:
         return [done[k] for k in range(len(done))]
 
     def next(self, steps: Steps, piece: ChipAreas | None) -> TakenByLayers:
-        """What the next block of steps takes; ``piece``: the chip of most pieces before them."""
+        """Return the removal of the next block of steps; ``piece`` is the chip of most pieces before them."""
         if not self._blocks:
             done = self._coming.result()
             self._states = [state for _, state in done]
@@ -311,7 +311,7 @@ def part_of(stock: LayeredStock, strip: Strip) -> LayeredStock:
 
 
 def removed_in_strip(run: _Shared, state: _State, blocks: int) -> tuple[list[Block], _State]:
-    """The next blocks of a strip; this is what a worker executes."""
+    """Remove the next blocks of a strip; a worker executes this function."""
     # a copy: where the task is done again, it begins as it did
     strip, stock, fine = state.strip, state.stock.copied(), run.setting.resolution
     borders = (run.xs, run.ys)[strip.axis]

@@ -1,10 +1,10 @@
-"""What a program leaves on the part, and what its tools run into.
+"""Differences of the part after a program (gouge, excess), and collisions of its tools.
 
 Notation: steps as in :mod:`chipload.simulation.steps`; the distance of a point of the part from the tool, least over
 the program, is below 0 where the part is cut into (gouge) and above 0 where material stands over it (excess).
 
 The part, fixtures and what a stock fills are points: corners of triangles whose sides are at most ``spacing`` long, and
-a grid of that pitch. What lies between them is not looked at: a rod thinner than the spacing may pass.
+a grid of that pitch. The space between points is not examined: a rod thinner than the spacing may be missed.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ MOST_POINTS = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """The part as points, and what the program leaves at each.
+    """The part as points, and the gouge or excess of the program at each.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Collision:
-    """Something that touches what it must not: what, with what, how deep, at which step and line, where."""
+    """A collision: the bodies that touch, the depth, the step, the line and the place."""
 
     what: str
     into: str
@@ -89,7 +89,7 @@ def require_points(mesh: trimesh.Trimesh, spacing: float, name: str) -> None:
 
 
 def fine(mesh: trimesh.Trimesh, spacing: float, name: str) -> tuple[Floats, Ints]:
-    """Points (p, 3) and triangles (f, 3) of a mesh whose sides are at most ``spacing`` [mm].
+    """Return points (p, 3) and triangles (f, 3) of a mesh with sides of at most ``spacing`` [mm].
 
     Raises
     ------
@@ -113,7 +113,7 @@ def difference(
     progress: Callable[[int], None] = lambda done: None,
     kept: KeptPasses = ALONE,
 ) -> Difference:
-    """What the program leaves on the part; O(places of the tool x points around it).
+    """Return the difference of the part after a program; O(places of the tool x points around it).
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def collisions(
     progress: Callable[[int], None] = lambda done: None,
     kept: KeptPasses = ALONE,
 ) -> tuple[Collision, ...]:
-    """Where shank and holder, and the cutting part too, come into solids; one entry for each line, tool part and solid.
+    """Return the collisions of shank, holder and cutting part with solids, one for each line, tool part and solid.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def in_stock(
     progress: Callable[[int], None] = lambda done: None,
     kept: KeptPasses = ALONE,
 ) -> tuple[Collision, ...]:
-    """Where shank and holder come into what is still there of the stock.
+    """Return the collisions of shank and holder with the remaining stock.
 
     A point of the stock is gone from the first step whose cutting part goes round it; a shank or holder round it
     before that, or where it is never cut, has run into it.

@@ -1,4 +1,4 @@
-"""What each step covers of each layer: found ahead of the removal, for it does not depend on the stock.
+"""Area of each layer that each step covers, calculated ahead of the removal: it does not depend on the stock.
 
 Notation: a step as in :mod:`chipload.simulation.steps`; a layer is known by its section at half its height.
 """
@@ -40,7 +40,7 @@ TOGETHER = 16
 
 @dataclass(frozen=True, eq=False)
 class Swept:
-    """What a step covers: the box that it does not leave, the layers in it, those met with their areas."""
+    """Area that a step covers: its bounding box, the layers in it, and the layers that it meets with their areas."""
 
     move: Move
     low: Floats
@@ -125,7 +125,7 @@ def require_upright(
 
 
 def plan_of(stock: LayeredStock) -> Plan:
-    """x0, y0, x1, y1 of a stock [mm]."""
+    """Return x0, y0, x1, y1 of a stock [mm]."""
     return float(stock.xs[0]), float(stock.ys[0]), float(stock.xs[-1]), float(stock.ys[-1])
 
 
@@ -192,7 +192,7 @@ def _profiles(
 def _covered(
     steps: Steps, own: Mapping[int, Met], cutter: Cutter, K: Floats, stock: LayeredStock, tolerance: float
 ) -> list[list[tuple[int, Polygon | MultiPolygon]]]:
-    """What steps cover of each layer that they meet; layers that an upright flank crosses share one polygon."""
+    """Return the area that steps cover of each layer; layers that an upright flank crosses share a polygon."""
     heights = stock.heights
     asked: list[Floats] = []
     of: list[Ints] = []

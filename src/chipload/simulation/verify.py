@@ -1,4 +1,4 @@
-"""Proves or refutes a plan in the plane by the path of the cutter's centre alone.
+"""Verification of a plan in the plane from the path of the cutter's centre alone.
 
 Notation: R cutter radius. Compared are the planned engagement against that of the rim with the uncut stock, the
 finished wall against the path (gouge, excess), and rapids below the stock's top against what still stands there.
@@ -92,7 +92,7 @@ def verify_contour(
     workers: int = 1,
     progress: Progress = silent,
 ) -> Verification:
-    """Hold a planned program against the path of its own motions.
+    """Compare a planned program with the path of its own motions.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a centre path did to the part's wall: where it gouged, and what it left standing.
+"""Greatest gouge and excess of a centre path on the wall of the part.
 
 Notation: R cutter radius; d the distance from the cutter's centre to the wall, negative on the side of the material.
 The gouge is R - d along the path, the excess the distance from the wall to the path less R.
@@ -37,7 +37,7 @@ class GreatestDistance:
 
 
 def gouge(trail: CentrePath, wall: Sequence[Contour], material: str, step_mm: float = 0.05) -> GreatestDistance:
-    """The greatest depth R - d to which the cutter enters the part, 0 where it does not, and the wall's point there.
+    """Return the greatest depth R - d of the cutter in the part (0 if it does not enter), and the wall's point there.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def gouge(trail: CentrePath, wall: Sequence[Contour], material: str, step_mm: fl
 
 
 def excess(trail: CentrePath, wall: Sequence[Contour], step_mm: float = 0.05) -> GreatestDistance:
-    """The greatest stock left on the wall, max(0, distance from the wall's point to the path - R), and that point.
+    """Return the greatest excess on the wall, max(0, distance from the wall's point to the path - R), and that point.
 
     The wall is sampled at most every ``step_mm`` [mm] and at its joints; each distance is exact.
 

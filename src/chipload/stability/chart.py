@@ -4,8 +4,8 @@ Notation: growth = log |mu|; above 0 the cut chatters. The chart is evaluated on
 whose corners differ in sign, or whose least |growth| is small against the spread of the corners, are halved; the rest
 is interpolated.
 
-The axial depth changes by the upper end of the edge that cuts. A cut whose engagement differs along the edge has no one
-depth: there the force is scaled in its place.
+The axial depth changes by the upper end of the edge that cuts. A cut whose engagement differs along the edge has no
+single depth; the force is then scaled instead.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ LOOKS, CLOSING = 48, 40
 
 @dataclass(frozen=True, eq=False)
 class StabilityChart:
-    """Growth over speed and depth.
+    """Stability chart: growth over spindle speed and axial depth.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class StabilityChart:
 
     @property
     def limit(self) -> Floats:
-        """(s,) least depth at which the cut chatters; the greatest of the chart where none does.
+        """Least depth (s,) at which the cut chatters; the greatest depth of the chart where none does.
 
         Between two depths of the chart it is interpolated.
         """
@@ -72,7 +72,7 @@ class StabilityChart:
 
 
 def stability_chart(cut: DynamicCuts, speed: ArrayLike, depth: ArrayLike) -> StabilityChart:
-    """The chart of one cut.
+    """Return the stability chart of one cut.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def stability_chart(cut: DynamicCuts, speed: ArrayLike, depth: ArrayLike) -> Sta
 
 
 def critical_depth(cut: DynamicCuts, deepest: float) -> float:
-    """Least axial depth [mm] at which one cut chatters at its speed; ``deepest`` where none up to it does.
+    """Return the critical depth [mm] of one cut at its speed; ``deepest`` if it is stable up to that depth.
 
     Stable islands above it are not told. A lobe narrower than a 48th of ``deepest`` may be missed.
 
@@ -159,7 +159,7 @@ def _has_depth(cut: DynamicCuts) -> bool:
 
 
 def _at_depths(cut: DynamicCuts, speed: Floats, depth: Floats) -> DynamicCuts:
-    """The cut at speeds [rad/s] and depths (n,) [mm]."""
+    """Return the cut at speeds [rad/s] and depths (n,) [mm]."""
     some = cut.chosen(np.zeros(len(depth), dtype=np.int64))
     rows = some.rows.copy()
     rate = (rows[:, 3] - rows[:, 2]) / rows[:, 4]
@@ -195,7 +195,7 @@ def _unsure(
     finer_j: NDArray[np.int64],
     shape: tuple[int, ...],
 ) -> NDArray[np.bool_]:
-    """Points of the finer grid in cells through which the limit may pass."""
+    """Return the points of the finer grid in cells through which the limit may pass."""
     each = np.stack([corners[:-1, :-1], corners[1:, :-1], corners[:-1, 1:], corners[1:, 1:]])
     low, high = each.min(axis=0), each.max(axis=0)
     unsure = (low * high <= 0.0) | (np.minimum(np.abs(low), np.abs(high)) < CERTAIN * (high - low))
@@ -210,6 +210,6 @@ def _unsure(
 def _interpolated(
     corners: Floats, i: NDArray[np.int64], j: NDArray[np.int64], finer_i: NDArray[np.int64], finer_j: NDArray[np.int64]
 ) -> Floats:
-    """Bilinear values on the finer grid."""
+    """Return bilinear values on the finer grid."""
     along = np.array([np.interp(finer_i, i, column) for column in corners.T])
     return np.array([np.interp(finer_j, j, row) for row in along.T])

@@ -33,13 +33,13 @@ Ints = NDArray[np.int64]
 
 
 def no_rows() -> Floats:
-    """Rows of no process damping."""
+    """Return kernel rows without process damping."""
     return np.zeros((0, 11))
 
 
 @dataclass(frozen=True, eq=False)
 class DynamicCuts:
-    """n cuts by one cutter.
+    """Tooth engagement, force coefficients, speeds and modes of n cuts by one cutter.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class DynamicCuts:
 
     @property
     def uneven(self) -> bool:
-        """Whether teeth are not alike: by their pitches or by runout."""
+        """Whether teeth differ by pitch or runout."""
         return bool(self.pitches) or len(self.delay) > 0
 
     @property
@@ -83,14 +83,14 @@ class DynamicCuts:
         return self.uneven or self.U.shape[1] == 3
 
     def at_speeds(self, period: ArrayLike) -> DynamicCuts:
-        """The same cuts with other times between two teeth [s]."""
+        """Return the same cuts with other times between two teeth [s]."""
         times = np.array(np.broadcast_to(np.asarray(period, dtype=np.float64), (len(self),)))
         if not ((times > 0.0) & np.isfinite(times)).all():
             raise InputError("stability: the time between two teeth must be above 0 s")
         return replace(self, period=times)
 
     def chosen(self, index: ArrayLike) -> DynamicCuts:
-        """Some of the cuts, also several times."""
+        """Return some of the cuts; a cut may be chosen several times."""
         at = np.asarray(index, dtype=np.int64).ravel()
         size = np.diff(self.start)[at]
         start = np.concatenate([[0], np.cumsum(size)])
@@ -101,7 +101,7 @@ class DynamicCuts:
         return replace(self, start=start, rows=rows, period=period, omega=omega, U=U, damped=damped, delay=delay)
 
     def with_modes(self, damping: ArrayLike, omega: ArrayLike, U: ArrayLike) -> DynamicCuts:
-        """The same cuts with more modes: (m,) damping ratios, (n, m) [rad/s], (n, d, m) [1/sqrt(t)]."""
+        """Return the same cuts with further modes: (m,) damping ratios, (n, m) [rad/s], (n, d, m) [1/sqrt(t)]."""
         more = tuple(np.asarray(x, dtype=np.float64) for x in (damping, omega, U))
         z = np.concatenate([self.damping, more[0]])
         w, shapes = np.concatenate([self.omega, more[1]], axis=1), np.concatenate([self.U, more[2]], axis=2)
@@ -109,7 +109,7 @@ class DynamicCuts:
 
 
 def joined(some: Sequence[DynamicCuts]) -> DynamicCuts:
-    """Cuts of one cutter with the same modes, one behind the other."""
+    """Return cuts of one cutter with the same modes joined in order."""
     sizes = np.concatenate([np.diff(c.start) for c in some])
     start = np.concatenate([[0], np.cumsum(sizes)])
     names = ("rows", "period", "omega", "U", "damped", "delay")
@@ -130,7 +130,7 @@ def dynamic_cuts(
     A: ArrayLike | None = None,
     directions: int | None = None,
 ) -> DynamicCuts:
-    """Cuts of a cutter at their speeds.
+    """Return the cuts of a cutter at their speeds for the stability kernels.
 
     Parameters
     ----------

@@ -1,13 +1,13 @@
-"""Cuts with several delays (uneven pitch, runout) or three directions: the map of their period.
+"""Greatest multipliers of cuts with several delays (uneven pitch, runout) or three directions.
 
-Notation: pitch of tooth j, the angle by which it follows the tooth before it. A tooth cuts what another one left: the
-one before it, or with runout the m-th before it where m h + (r_j - r_(j-m)) sin(kappa) is the least, as in
+Notation: pitch of tooth j, the angle by which it follows the tooth before it. A tooth cuts the surface that another one
+left: the one before it, or with runout the m-th before it for which m h + (r_j - r_(j-m)) sin(kappa) is least, as in
 :mod:`chipload.engagement.tooth_engagement`. Its delay is the time in which the spindle turns by the pitches between
-them. Which tooth that is follows from the nominal chip. The period is a revolution; that of even teeth without runout
-in three directions is a tooth period. A revolution costs some times what the periods of even teeth cost together.
+them. The nominal chip determines which tooth that is. The period is a revolution; that of even teeth without runout in
+three directions is a tooth period. A revolution takes several times as long as the periods of even teeth together.
 
-Teeth that are not evenly spaced cut the same engagement; what each cuts is thicker or thinner by its pitch, which
-counts only where the coefficients have exponents.
+Unevenly spaced teeth have the same engagement; the chip of each is thicker or thinner by its pitch, which matters only
+if the coefficients have exponents.
 """
 
 from __future__ import annotations

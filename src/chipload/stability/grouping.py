@@ -1,8 +1,8 @@
-"""Grouping of steps that cut alike, so that a program needs a few hundred stability calculations.
+"""Grouping of steps with the same cut, so that a program needs only a few hundred stability calculations.
 
-Steps are alike where speed, feed direction and engagement are, after rounding: immersion outward to 0.1 deg, places on
-the edge to 0.01 mm, the direction to 1 deg, chip thickness to 1 % where the coefficients have exponents (it does not
-enter otherwise). Rows of one immersion that follow one another along the edge are one row.
+Steps have the same cut if speed, feed direction and engagement are equal after rounding: immersion outward to 0.1 deg,
+positions on the edge to 0.01 mm, the direction to 1 deg, chip thickness to 1 % if the coefficients have exponents
+(otherwise it has no effect). Consecutive rows along the edge with one immersion are joined.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SLACK = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class CutGroups:
-    """Steps by what they cut.
+    """Steps grouped by their cuts.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class CutGroups:
 
 
 def grouped(engagement: ToothEngagement, speed: Floats, powers: bool) -> CutGroups:
-    """Steps with what they cut rounded, and their keys.
+    """Return the steps with rounded cuts, and the keys of these cuts.
 
     Parameters
     ----------

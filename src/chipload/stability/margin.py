@@ -2,8 +2,8 @@
 
 Notation: mu the greatest multiplier of the map of one tooth period; |mu| < 1: a disturbance dies out. The margin is the
 factor on all cutting coefficients, and for straight teeth on the axial depth, at which |mu| = 1: below 1 the cut
-chatters. It is found up to :data:`MOST_MARGIN` and is that where the cut is stable at each factor that is looked at.
-At the margin the vector of mu says which mode chatters, its angle at which frequency.
+chatters. It is calculated up to :data:`MOST_MARGIN`, which is its value if the cut is stable at every factor tried.
+At the margin the eigenvector of mu determines the mode that chatters, and the angle of mu its frequency.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ CHUNK, MOST_THREADS = 32, 8
 
 @dataclass(frozen=True, eq=False)
 class StabilityMargins:
-    """What is known of n cuts.
+    """Stability margins of n cuts, with the modes and frequencies of chatter.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def largest_multipliers(
 
 
 def stability_margins(cuts: DynamicCuts) -> StabilityMargins:
-    """Margins of cuts; each costs five to ten evaluations of the map.
+    """Return the stability margins of cuts; each takes five to ten evaluations of the map.
 
     Where a cell of the map has no solution or eigenvalues are not found, the cut is looked at again in finer cells.
 
@@ -181,7 +181,7 @@ def _several_margins(cuts: DynamicCuts) -> StabilityMargins:
 
 
 def _margins(cuts: DynamicCuts, per_wave: float) -> Floats:
-    """(n, 5) as the kernel gives them."""
+    """Return the results (n, 5) of the kernel."""
     out = np.zeros((len(cuts), 5))
     pitch = np.full(len(cuts), cuts.pitch)
 

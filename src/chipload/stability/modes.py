@@ -1,4 +1,4 @@
-"""Modes of cutter and workpiece at the cut.
+"""Modes of vibration of cutter and workpiece at the cut.
 
 Notation: f natural frequency [Hz], w = 2 pi f, z damping ratio, k modal stiffness [N/mm], m = k / w^2 modal mass [t];
 a unit direction in the machine's x and y, or x, y and z; U = direction / sqrt(m), so that r = U q with
@@ -80,12 +80,12 @@ class Modes:
 
     @property
     def omega(self) -> Floats:
-        """(M,) natural frequencies [rad/s]."""
+        """Natural frequencies (M,) [rad/s]."""
         return np.asarray(2.0 * np.pi * self.frequency)
 
     @property
     def mass(self) -> Floats:
-        """(M,) modal masses [t]."""
+        """Modal masses (M,) [t]."""
         return np.asarray(self.stiffness / self.omega**2)
 
     @property
@@ -94,7 +94,7 @@ class Modes:
         return self.direction.shape[1] == 3 and bool(self.direction[:, 2].any())
 
     def in_frames(self, T: ArrayLike, n: ArrayLike, A: ArrayLike | None = None, *, directions: int = 2) -> Floats:
-        """U (c, 2, M) of cuts whose T and n are given as (c, 2) or (c, 3) in axes of the machine [1/sqrt(t)].
+        """Return U (c, 2, M) [1/sqrt(t)] of cuts with T and n as (c, 2) or (c, 3) in axes of the machine.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class Modes:
         return np.ascontiguousarray(np.einsum("caj,kj->cak", np.stack(each, axis=1), own) / np.sqrt(self.mass))
 
     def receptance(self, omega: ArrayLike) -> NDArray[np.complex128]:
-        """(.., 2, 2), or (.., 3, 3) with z, displacement per force at angular frequencies [rad/s], [mm/N]."""
+        """Return the receptance (.., 2, 2), or (.., 3, 3) with z, at angular frequencies [rad/s], [mm/N]."""
         w = np.asarray(omega, dtype=np.float64)[..., None]
         share = 1.0 / (self.omega**2 - w**2 + 2j * self.damping * self.omega * w)
         shape = self.direction.T / np.sqrt(self.mass)

@@ -2,8 +2,8 @@
 
 Notation: every frequency, damping ratio and stiffness, and the tangential and the radial coefficient, is its value
 times 1 + s n with s its relative standard deviation and n normal; those of different modes are independent. The
-probability is the share of quasi-random samples (Sobol, always the same ones) in which |mu| < 1: on the flank of a
-lobe an expansion about the mean is too sure.
+probability is the share of quasi-random samples (Sobol, always the same ones) in which |mu| < 1. On the flank of a lobe
+an expansion about the mean would underestimate the uncertainty.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class ModeSpread:
 def stable_probability(
     cuts: DynamicCuts, spread: ModeSpread, coefficients: ArrayLike, samples: int = SAMPLES
 ) -> Floats:
-    """Probability that each cut is stable, (n,) float, in steps of one over ``samples``.
+    """Return the probability (n,) that each cut is stable, in steps of one over ``samples``.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def stable_probability(
 
 
 def variance_shares(cut: DynamicCuts, spread: ModeSpread, coefficients: ArrayLike) -> tuple[Floats, float]:
-    """What makes log|mu| of one cut unsure, and so which measurement to improve first.
+    """Return the variance shares of log|mu| of one cut by cause; improve the measurement with the greatest share first.
 
     Each value's part of the variance to first order, at the values as they are stated: (d log|mu| / d n)^2 over the
     sum of all. On the flank of a lobe that is a guide, not a probability.
@@ -116,13 +116,13 @@ def variance_shares(cut: DynamicCuts, spread: ModeSpread, coefficients: ArrayLik
 
 
 def _root(coefficients: ArrayLike) -> Floats:
-    """(2, 2) square root of a covariance."""
+    """Return a square root (2, 2) of a covariance."""
     values, vectors = np.linalg.eigh(np.asarray(coefficients, dtype=np.float64))
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _sample(cuts: DynamicCuts, spread: ModeSpread, root: Floats, n: Floats) -> DynamicCuts:
-    """The cuts at normal values (3 M + 2,): of frequencies, damping ratios, stiffnesses and coefficients."""
+    """Return the cuts at normal values (3 M + 2,) of frequencies, damping ratios, stiffnesses and coefficients."""
     count = len(cuts.damping)
     f, z, k = (
         np.maximum(1.0 + s * n[i * count : (i + 1) * count], LEAST)

@@ -6,7 +6,7 @@ L_w^2 r' / (2 v) for each mm of edge, so that
 
     dF = -C_p (nu + mu e) (nu . r'),   C_p = K_sp L_w^2 / (2 v),
 
-for small amplitudes. It only ever damps, most at low speeds: it is counted where the job states it, and never assumed.
+for small amplitudes. It always damps, most at low speeds; it is included if the job states it, and never assumed.
 
 Reference: [Altintas2008].
 """
@@ -30,7 +30,7 @@ INDENTATION, WEAR_LAND, FRICTION = (1e2, 1e7), (1e-4, 1.0), (0.0, 2.0)
 
 @dataclass(frozen=True)
 class ProcessDamping:
-    """What damps where a worn edge rubs.
+    """Process damping of a worn edge: wear land, indentation coefficient and friction.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Quiet speeds: the least margin of several cuts over spindle speed, its windows, and the best speed.
 
-Notation: margin as in :mod:`chipload.stability.margin`; at a speed the least over all cuts counts. A window is a range
-of the speeds that were looked at in which it is at least what is wanted. The speed to take has the greatest least
-margin; where many have the same (the greatest that is told), the one farthest from where it falls, then the nearest to
-the present speed.
+Notation: margin as in :mod:`chipload.stability.margin`; at each speed the least over all cuts is used. A window is a
+range of the calculated speeds in which it is at least the wanted margin. The advised speed has the greatest least
+margin. If many speeds have it (the greatest margin that is calculated), it is the one farthest from where the margin
+falls, then the nearest to the present speed.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ ALIKE = 0.02
 
 @dataclass(frozen=True)
 class SpeedWindow:
-    """Speeds from ``low`` to ``high`` [rad/s], both looked at; the greatest least margin is ``margin`` at ``best``."""
+    """Speeds from ``low`` to ``high`` [rad/s], both calculated; the greatest least margin is ``margin`` at ``best``."""
 
     low: float
     high: float
@@ -36,7 +36,7 @@ class SpeedWindow:
 
 @dataclass(frozen=True, eq=False)
 class QuietSpeeds:
-    """Least margins over speeds.
+    """Least margins of cuts over spindle speeds.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ class QuietSpeeds:
 
     @property
     def windows(self) -> tuple[SpeedWindow, ...]:
-        """Ranges of speeds with the wanted margin, by speed."""
+        """Windows with the wanted margin, by speed."""
         return speed_windows(self.speed, self.margin, self.wanted)
 
     def advised(self, present: float) -> tuple[float, float]:
-        """Speed to take [rad/s] and its least margin.
+        """Return the advised speed [rad/s] and its least margin.
 
         >>> found = QuietSpeeds(np.arange(1.0, 8.0), np.array([0.5, 3.0, 3.0, 3.0, 0.9, 3.0, 0.4]), 1.0)
         >>> found.advised(6.0)
@@ -73,7 +73,7 @@ class QuietSpeeds:
 
 
 def speed_windows(speed: Floats, value: Floats, wanted: float) -> tuple[SpeedWindow, ...]:
-    """Ranges of speeds (s,) in which values (s,) are at least what is wanted, by speed.
+    """Return the windows of speeds (s,) in which values (s,) are at least the wanted one, by speed.
 
     >>> [(w.low, w.high) for w in speed_windows(np.arange(1.0, 6.0), np.array([1.0, 2.0, 2.0, 0.0, 2.0]), 1.5)]
     [(2.0, 3.0), (5.0, 5.0)]
@@ -89,7 +89,7 @@ def speed_windows(speed: Floats, value: Floats, wanted: float) -> tuple[SpeedWin
 
 
 def quiet_speeds(parts: Sequence[DynamicCuts], speed: ArrayLike, wanted: float) -> QuietSpeeds:
-    """Least margins of cuts at speeds.
+    """Return the least margins of cuts at speeds.
 
     Parameters
     ----------

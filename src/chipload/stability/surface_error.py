@@ -5,7 +5,7 @@ Notation: a stable motion without runout has the tooth period, so that r(t) = r(
 The wall at a height is made when the edge passes there at phi = 0 (up milling) or pi (down milling). The error is
 positive where material is left, as a form error is. It changes sign where the tooth frequency passes that of a mode.
 
-It says nothing of a cut that chatters. Modes that are left out are rigid here.
+It is not valid for a cut that chatters. Modes that are not stated count as rigid.
 
 Reference: [Schmitz2009] ch. 5 for the effect.
 """
@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 
 
 def force_rows(engagement: ToothEngagement, material: Material) -> Floats:
-    """(b, 11) float, rows as the kernel takes them.
+    """Return rows (b, 11) for the kernel.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def location_error(
     T: ArrayLike | None = None,
     n: ArrayLike | None = None,
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Error of the wall of greatest size over its height, (n,) float [mm], and whether a cut makes a wall, (n,) bool.
+    """Return the wall's error of greatest size over its height, (n,) [mm], and whether a cut makes a wall, (n,) bool.
 
     Parameters as :func:`chipload.stability.cuts.dynamic_cuts`. A cut that makes no wall has the error 0.
     """
@@ -73,7 +73,7 @@ def location_error(
 
 
 def wall_errors(cuts: DynamicCuts, rows: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """As :func:`location_error`, of cuts and the rows of :func:`force_rows`."""
+    """Return :func:`location_error` of cuts and the rows of :func:`force_rows`."""
     out = np.zeros((len(cuts), 2))
     teeth = round(math.tau / cuts.pitch)
 

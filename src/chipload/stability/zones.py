@@ -1,9 +1,10 @@
-"""Zones: as few spindle speeds for the passes of a tool as give each pass its best margin.
+"""Zones: the fewest spindle speeds for the passes of a tool with which each pass has its required margin.
 
 Notation: margin (p, s) of p passes in their order at s speeds, the least over the cuts of a pass. Between two passes
-the cutter is out of the material, so that its speed can change there. A pass can have its greatest margin over the
-speeds; what is asked of it is that, but no more than is wanted, nor than the pass that can have least. A zone is the
-longest run of passes which one speed gives what is asked: taken from the front, there is no division into fewer zones.
+the cutter is out of the material, so that its speed can change there. The required margin of a pass is its greatest
+over the speeds, but at most the greater of the wanted margin and the greatest margin of the worst pass. A zone is the
+longest run of passes for which one speed gives the required margin. Taken from the first pass on, this gives the fewest
+zones.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class SpeedZone:
 
 
 def speed_zones(speed: ArrayLike, margin: ArrayLike, wanted: float, present: ArrayLike) -> tuple[SpeedZone, ...]:
-    """The fewest zones, in the order of the passes.
+    """Return the fewest zones, in the order of the passes.
 
     Parameters
     ----------

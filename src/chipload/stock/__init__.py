@@ -1,4 +1,4 @@
-"""What is left of the stock."""
+"""Representations of the stock during removal: layers, dexels and capsules in the plane."""
 
 from __future__ import annotations
 

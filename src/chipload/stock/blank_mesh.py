@@ -17,7 +17,7 @@ OVERLAP_MM = 2e-3
 
 
 def blank_mesh(stock: LayeredStock) -> trimesh.Trimesh:
-    """The stock before a program as a closed mesh [mm], from which a removal mesh can begin.
+    """Return the initial stock as a closed mesh [mm], from which a removal mesh can begin.
 
     Neighbouring layers of one section are one prism; of more than :data:`PRISMS` different ones as many are joined as
     needed, with the section of the middle one.

@@ -7,7 +7,7 @@ interval from the least to the greatest coordinate that it covers. Passages are 
 their beginning, end and extremes between the instants by halving and golden section. A passage that falls between two
 instants is lost: of a surface with radius of curvature q at most s^2 / (8 q), s the distance between instants.
 
-This is a route of its own to the removed volume: nothing of the engagement or of the layers is used.
+This is an independent calculation of the removed volume: it uses neither the engagement nor the layers.
 """
 
 from __future__ import annotations
@@ -61,14 +61,14 @@ class Rays:
         return float(lengths.sum() * self.grid[2] * self.grid[3])
 
     def places(self) -> tuple[Floats, Floats]:
-        """(n,), (n,) float [mm]: u and v of each ray."""
+        """Return u and v (n,), (n,) [mm] of each ray."""
         u0, v0, du, dv, nu, nv = self.grid
         u, v = np.meshgrid(u0 + du * np.arange(int(nu)), v0 + dv * np.arange(int(nv)), indexing="ij")
         return u.ravel(), v.ravel()
 
 
 class TriDexel:
-    """Solid in dexels that loses what a cutter covers; :meth:`remove_move` and :meth:`remove_poses` change it.
+    """A solid in dexels; :meth:`remove_move` and :meth:`remove_poses` remove the volume that a cutter covers.
 
     Examples
     --------
@@ -86,7 +86,7 @@ class TriDexel:
 
     @classmethod
     def block(cls, low: ArrayLike, high: ArrayLike, pitch: float, directions: str = "xyz") -> TriDexel:
-        """A cuboid between the corners ``low`` and ``high`` (3,) [mm].
+        """Return a cuboid between the corners ``low`` and ``high`` (3,) [mm].
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class TriDexel:
 
     @classmethod
     def of_mesh(cls, mesh: trimesh.Trimesh, pitch: float, directions: str = "xyz") -> TriDexel:
-        """A closed mesh; overlapping bodies are joined. Parameters as for :meth:`block`.
+        """Return the dexels of a closed mesh; overlapping bodies are joined. Parameters as for :meth:`block`.
 
         Raises
         ------
@@ -121,11 +121,11 @@ class TriDexel:
         return cls([_loaded(mesh, caster, k, grid) for k, grid in _grids(low, high, pitch, directions)])
 
     def volume_by_direction(self) -> dict[str, float]:
-        """Solid volume [mm^3] by the rays along each axis."""
+        """Return the solid volume [mm^3] by the rays along each axis."""
         return {"xyz"[r.k]: r.volume() for r in self.rays}
 
     def volume(self) -> float:
-        """Solid volume [mm^3], the mean over the directions."""
+        """Return the solid volume [mm^3], the mean over the directions."""
         return math.fsum(r.volume() for r in self.rays) / len(self.rays)
 
     def remove_move(
@@ -219,7 +219,7 @@ def _unit(axis: ArrayLike) -> Floats:
 
 
 def _shape(apt: Sequence[float]) -> Floats:
-    """What the kernels know of a cutter."""
+    """Return the shape of a cutter for the kernels."""
     d, r, e, f, alpha, beta, h = (float(x) for x in apt)
     good = all(math.isfinite(x) for x in (d, r, e, f, alpha, beta, h)) and d > 0.0 and h > 0.0 and r >= 0.0
     if not (good and min(e, alpha, beta) >= 0.0 and alpha + beta < 0.5 * math.pi):

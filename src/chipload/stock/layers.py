@@ -1,4 +1,4 @@
-"""The workpiece as a pile of horizontal layers, each a set of polygons that lose what a cutter covers.
+"""The workpiece as a stack of horizontal layers, each a set of polygons from which covered areas are removed.
 
 Notation: layer i is the prism between ``bounds[i]`` and ``bounds[i + 1]`` [mm]; its section S_i is taken at its middle,
 ``heights[i]``. The plane is cut into rectangular **tiles** (columns x rows); a layer keeps one geometry a tile, so
@@ -55,7 +55,7 @@ ROOM = 128
 
 
 class LayeredStock:
-    """Solid layers that lose polygons.
+    """A stock of solid layers from which polygons are removed.
 
     :meth:`remove`, :meth:`remove_many`, :meth:`refine`, :meth:`refine_at` and :meth:`restore` change the stock; all
     else reads. Splitting layers shifts the numbers of those above. Polygons are values and are never changed.
@@ -94,7 +94,7 @@ class LayeredStock:
 
     @classmethod
     def block(cls, low: ArrayLike, high: ArrayLike, bounds_or_layer_mm: ArrayLike, tile_mm: float) -> LayeredStock:
-        """A cuboid between the corners ``low`` and ``high`` (3,) [mm].
+        """Return a cuboid between the corners ``low`` and ``high`` (3,) [mm].
 
         Parameters
         ----------
@@ -127,7 +127,7 @@ class LayeredStock:
 
     @classmethod
     def of_mesh(cls, mesh: trimesh.Trimesh, bounds_or_layer_mm: ArrayLike, tile_mm: float) -> LayeredStock:
-        """A closed mesh, cut at the middles of the layers; it is kept for :meth:`refine`.
+        """Return the layers of a closed mesh, cut at their middles; the mesh is kept for :meth:`refine`.
 
         Parameters
         ----------
@@ -169,13 +169,13 @@ class LayeredStock:
         return 0.5 * (self.bounds[:-1] + self.bounds[1:])
 
     def layers_between(self, z0: float, z1: float) -> range:
-        """Layers that reach into the open interval z0 < z < z1 [mm]."""
+        """Return the layers that reach into the open interval z0 < z < z1 [mm]."""
         first = int(np.searchsorted(self.bounds, z0, "right")) - 1
         last = int(np.searchsorted(self.bounds, z1, "left"))
         return range(max(first, 0), max(min(last, self.layers), first, 0))
 
     def section(self, layer: int, low: ArrayLike | None = None, high: ArrayLike | None = None) -> MultiPolygon:
-        """What is left of a layer, its tiles joined; with ``low`` and ``high`` (2,) [mm] those under a rectangle."""
+        """Return the remaining section of a layer; with ``low`` and ``high`` (2,) [mm] of tiles under a rectangle."""
         tiles = self.tiles[self._layer(layer)]
         if low is not None and high is not None:
             (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
@@ -184,11 +184,11 @@ class LayeredStock:
         return MultiPolygon(polygons(shapely.union_all(tiles.ravel())))
 
     def area(self, layer: int) -> float:
-        """Area that is left of a layer [mm^2]."""
+        """Return the remaining area of a layer [mm^2]."""
         return math.fsum(shapely.area(self.tiles[self._layer(layer)]).ravel())
 
     def edges(self, layers: range, low: ArrayLike, high: ArrayLike) -> tuple[Floats, Ints, Floats]:
-        """The rings in the tiles of neighbouring layers under a rectangle.
+        """Return the rings in the tiles of neighbouring layers under a rectangle.
 
         Parameters
         ----------
@@ -212,22 +212,22 @@ class LayeredStock:
         return self.bounds[layers.start : layers.stop + 1], start, edges[:count].copy()
 
     def volumes(self) -> Floats:
-        """(n,) float [mm^3] that is left of each layer."""
+        """Return the remaining volume (n,) [mm^3] of each layer."""
         areas = shapely.area(self.tiles).reshape(self.layers, -1)
         return np.array([math.fsum(row) for row in areas]) * self.thickness
 
     def volume(self) -> float:
-        """What is left [mm^3]."""
+        """Return the remaining volume [mm^3]."""
         return math.fsum(self.volumes())
 
     def remove(self, layer: int, polygon: Polygon | MultiPolygon) -> list[Polygon]:
-        """Take a polygon from a layer; what was really taken, see :meth:`remove_many`."""
+        """Remove a polygon from a layer and return the part that was removed, see :meth:`remove_many`."""
         return self.remove_many([layer], [polygon])[0]
 
     def remove_many(
         self, layers: Sequence[int] | Ints, shapes: Sequence[Polygon | MultiPolygon] | Shapes, tidy: float = 0.0
     ) -> list[list[Polygon]]:
-        """Take polygon k from layer ``layers[k]``, for all k; in turn where a layer comes more than once.
+        """Remove polygon k from layer ``layers[k]``, for all k; in order if a layer occurs more than once.
 
         Parameters
         ----------
@@ -304,7 +304,7 @@ class LayeredStock:
             self.tiles[again] = cut_up(self.part, heights[again], boxes)
 
     def copied(self) -> LayeredStock:
-        """The stock as it is now, as a stock of its own; polygons are shared."""
+        """Return a copy of the present stock; polygons are shared."""
         out = LayeredStock(self.bounds, self.xs, self.ys, self.tiles.copy(), self.part)
         out.cut, out.room, out.tidied = self.cut.copy(), self.room.copy(), self.tidied
         return out
@@ -328,7 +328,7 @@ class LayeredStock:
         return out
 
     def body(self) -> trimesh.Trimesh:
-        """What is there as one closed mesh [mm]: the part or the block itself where nothing was removed yet."""
+        """Return the stock as one closed mesh [mm]: the mesh or block itself if nothing was removed yet."""
         if self.part is not None and not self.cut.any():
             return self.part
         low, high = ([float(axis[k]) for axis in (self.xs, self.ys, self.bounds)] for k in (0, -1))
@@ -336,28 +336,28 @@ class LayeredStock:
         return self.mesh() if self.volume() < whole * (1.0 - 1e-12) else trimesh.creation.box(bounds=[low, high])
 
     def mesh(self) -> trimesh.Trimesh:
-        """What is left as one closed mesh [mm], the prism of each layer by itself, z up."""
+        """Return the remaining stock as one closed mesh [mm] of a prism for each layer, z up."""
         return prisms([polygons(self.section(i)) for i in range(self.layers)], self.bounds)
 
     def to_glb(self) -> bytes:
-        """What is left as binary glTF: in metres, y up, as that format has it."""
+        """Return the remaining stock as binary glTF, in metres with y up as the format requires."""
         return glb(self.mesh())
 
     def state(self) -> tuple[Floats, Shapes, NDArray[np.bool_], Ints, float]:
-        """What :meth:`restore` needs to take back all that is done from now on."""
+        """Return the state with which :meth:`restore` undoes all later changes."""
         return self.bounds, self.tiles.copy(), self.cut.copy(), self.room.copy(), self.tidied
 
     def restore(self, state: tuple[Floats, Shapes, NDArray[np.bool_], Ints, float]) -> None:
-        """The stock as it was."""
+        """Restore the stock to a state."""
         self.bounds, self.tiles, self.cut = state[0], state[1].copy(), state[2].copy()
         self.room, self.tidied = state[3].copy(), state[4]
 
     def save(self, path: str | Path) -> None:
-        """Write all of it to one ``.npz`` file, whole or not at all."""
+        """Write the stock to one ``.npz`` file, completely or not at all."""
         write_whole(path, self.to_bytes())
 
     def to_bytes(self) -> bytes:
-        """All of it as the bytes of a ``.npz`` file."""
+        """Return the stock as the bytes of a ``.npz`` file."""
         part = self.part
         vertices = np.zeros((0, 3)) if part is None else np.asarray(part.vertices, dtype=np.float64)
         faces = np.zeros((0, 3), dtype=np.int64) if part is None else np.asarray(part.faces, dtype=np.int64)
@@ -367,7 +367,7 @@ class LayeredStock:
 
     @classmethod
     def load(cls, path: str | Path) -> LayeredStock:
-        """Read what :meth:`save` wrote; the stock goes on as the one that was saved, bit for bit.
+        """Read a file of :meth:`save`; the stock is equal to the saved one, bit for bit.
 
         Raises
         ------
@@ -459,7 +459,7 @@ class LayeredStock:
         return turn[of][near], layer[near], j[near], i[near]
 
     def _tidy(self, layer: Ints, j: Ints, i: Ints, tidy: float) -> None:
-        """Leave vertices out of tiles that have twice as many as when they were last tidied."""
+        """Simplify tiles that have twice as many vertices as after their last simplification."""
         many = shapely.get_num_coordinates(self.tiles[layer, j, i]) > self.room[layer, j, i]
         if not many.any():
             return

@@ -1,9 +1,9 @@
-"""Stock in the plane that loses capsules: what the cutter's rim still meets, exactly.
+"""Stock in the plane from which capsules are removed, with the exact engagement of the cutter's rim.
 
 Notation: R [mm] cutter radius; a **capsule** is the disc of radius R swept along a straight step from A to B. What is
 cleared is the union of the capsules. The rim of a cutter at O is covered by each capsule over ONE arc, in closed form;
 what no capsule covers is uncut. A grid of cells keeps, for each place, only the capsules that end there: a cell wholly
-cleared keeps none. No boundary is built, so no tangency can break one: an error of 1e-12 mm in a touch stays one.
+cleared keeps none. No boundary is built, so that tangencies cause no errors: an error of 1e-12 mm stays that small.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ EMPTY = _kernels.EMPTY
 
 
 class PlanarStock:
-    """Solid plane within ``bounds`` from which capsules of radius R are taken.
+    """Solid plane within ``bounds`` from which capsules of radius R are removed.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class PlanarStock:
         self.rim: Floats = np.zeros((_kernels.RIM, 2))
 
     def reserve(self, capsules: int) -> None:
-        """Make room for so many more capsules."""
+        """Reserve memory for a number of further capsules."""
         if self.capsules + capsules > len(self.axis):
             self.axis = np.vstack([self.axis, np.zeros((max(capsules, len(self.axis)), 9))])
         need = self.used + (2 * capsules + 2) * int(self.grid[7])
@@ -90,20 +90,20 @@ class PlanarStock:
             )
 
     def state(self) -> tuple[Ints, Ints, int, int]:
-        """What :meth:`restore` needs to take back all that is removed from now on."""
+        """Return the state with which :meth:`restore` undoes all later removals."""
         return self.head.copy(), self.count.copy(), self.capsules, self.used
 
     def restore(self, state: tuple[Ints, Ints, int, int]) -> None:
-        """The stock as it was: chain entries never change, so that the heads of the cells are enough."""
+        """Restore the stock to a state: chain entries never change, so that the heads of the cells suffice."""
         self.head[:], self.count[:], self.capsules, self.used = state
 
     def remove(self, axes: ArrayLike) -> None:
-        """Take away the capsules about ``axes`` (n, 4) [mm], rows ``ax, ay, bx, by``."""
+        """Remove the capsules about ``axes`` (n, 4) [mm], rows ``ax, ay, bx, by``."""
         rows = np.asarray(axes, dtype=np.float64).reshape(-1, 4)
         self.remove_segments(np.column_stack([rows, np.zeros((len(rows), 3))]))
 
     def remove_segments(self, segments: ArrayLike) -> None:
-        """Take away the capsules about ``segments`` (n, 7), lines and arcs of a contour; lines may have no length."""
+        """Remove the capsules about ``segments`` (n, 7), lines and arcs of a contour; lines may have no length."""
         for row in np.asarray(segments, dtype=np.float64).reshape(-1, 7):
             length = math.hypot(row[2] - row[0], row[3] - row[1])
             if row[6] != 0.0:
@@ -114,7 +114,7 @@ class PlanarStock:
             )
 
     def arcs(self, centre: ArrayLike, heading: ArrayLike, whole: bool = False) -> Floats:
-        """(k, 2) uncut arcs [rad] of the rim about ``centre``, counter-clockwise from the unit ``heading``.
+        """Return the uncut arcs (k, 2) [rad] of the rim about ``centre``, counter-clockwise from the unit ``heading``.
 
         Those of the front half, -pi/2 to pi/2; or of the ``whole`` rim, -pi/2 to 3 pi/2.
         """
@@ -124,6 +124,6 @@ class PlanarStock:
         return self.rim[:n].copy()
 
     def engagement(self, centre: ArrayLike, heading: ArrayLike) -> float:
-        """Engagement angle [rad]: all that is uncut on the front half of the rim."""
+        """Return the engagement angle [rad]: the sum of the uncut arcs on the front half of the rim."""
         a = self.arcs(centre, heading)
         return float((a[:, 1] - a[:, 0]).sum())

@@ -47,7 +47,7 @@ def ring_stock(
     bosses: Sequence[Boss] = (),
     tile_mm: float = 40.0,
 ) -> LayeredStock:
-    """Layers of rings.
+    """Return a stock of layers of rings.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ UNREADABLE = (
 
 
 def shape_bytes(kind: str, arrays: dict[str, NDArray[Any]], shapes: NDArray[np.object_]) -> bytes:
-    """A file of named arrays and (n,) geometries; the same values give the same bytes."""
+    """Return a file of named arrays and (n,) geometries; equal values give equal bytes."""
     binary = shapely.to_wkb(shapes, byte_order=1)
     out = io.BytesIO()
     np.savez_compressed(
@@ -65,7 +65,7 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
 def read_shapes(
     path: str | Path, kind: str, names: dict[str, int]
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.object_]]:
-    """What :func:`shape_bytes` made: the arrays ``names`` with their numbers of dimensions, and the geometries.
+    """Read a file of :func:`shape_bytes`: the arrays ``names`` with their numbers of dimensions, and the geometries.
 
     Raises
     ------

@@ -24,7 +24,7 @@ Ints = NDArray[np.int64]
 
 
 def prisms(sections: Sequence[Sequence[Polygon]], bounds: Floats) -> trimesh.Trimesh:
-    """One closed mesh of the prisms over ``sections[i]`` from ``bounds[i]`` to ``bounds[i + 1]`` [mm].
+    """Return one closed mesh of the prisms over ``sections[i]`` from ``bounds[i]`` to ``bounds[i + 1]`` [mm].
 
     Faces between two layers stay, so that its volume is the sum of area times thickness.
 
@@ -85,7 +85,7 @@ def _prism(part: Polygon, z0: float, z1: float) -> tuple[Floats, Ints]:
 
 
 def glb(mesh: trimesh.Trimesh) -> bytes:
-    """Binary glTF of a mesh in mm with z up: the format counts in metres with y up, and a node turns it."""
+    """Return binary glTF of a mesh in mm with z up; a node converts to the metres and y up of the format."""
     if not len(mesh.faces):
         text = b'{"asset": {"version": "2.0"}}   '
         return struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text

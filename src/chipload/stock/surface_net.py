@@ -1,4 +1,4 @@
-"""The surface of dexels as quads, kept up to date while material is removed: each quad knows when it is seen.
+"""The surface of dexels as quads, updated while material is removed; each quad has the frames in which it is visible.
 
 Notation: the rays of a :class:`chipload.stock.dexel.TriDexel` along x, y and z run through the points of one lattice; a
 point is solid or not. An edge of the lattice whose ends differ crosses the surface where the ray along it ends. A cell
@@ -83,7 +83,7 @@ class SurfaceNet:
         return float(six.sum()) / 6.0
 
     def update(self, low: Floats, high: Floats, frame: int) -> None:
-        """See what has changed in the box from ``low`` to ``high`` (3,) [mm] since the last frame."""
+        """Update the quads in the box from ``low`` to ``high`` (3,) [mm] for a new frame."""
         a = np.floor((low - self.first) / self.pitch).astype(np.int64)
         b = np.ceil((high - self.first) / self.pitch).astype(np.int64) + 2
         if (b < 0).any() or (a > self.count + 1).any():

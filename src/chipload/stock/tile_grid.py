@@ -1,4 +1,4 @@
-"""Tiles and layers of a pile: their borders, which of them something reaches into, what a mesh fills of them.
+"""Tiles and layers of a stock: their borders, those that an interval meets, and their content from a mesh.
 
 Notation: as in :mod:`chipload.stock.layers`.
 """

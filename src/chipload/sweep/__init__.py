@@ -1,4 +1,4 @@
-"""Many jobs: every combination of some keys of a job, and samples of its material, on this computer or on a cluster."""
+"""Sweeps: jobs for all combinations of values of some keys and samples of the material, locally or on a cluster."""
 
 from chipload.lazy import attach
 

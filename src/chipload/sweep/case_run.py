@@ -1,4 +1,4 @@
-"""One case of a sweep: run its job and keep its summary and history; this is what a worker executes."""
+"""The run of one case of a sweep, which a worker executes: run its job, store its summary and history."""
 
 from __future__ import annotations
 
@@ -62,13 +62,13 @@ def case_record(
 
 
 def case_key(job: bytes, inputs: Mapping[str, str], overrides: tuple[str, ...]) -> str:
-    """What a case depends on, as a hash: the text of the job, hashes of its files, overrides and the program itself."""
+    """Return a hash of all inputs of a case: text of the job, hashes of its files, overrides and chipload itself."""
     values = [RECORD_VERSION, sources(), sha256(job).hexdigest(), dict(inputs), list(overrides)]
     return sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
 
 def kept_record(folder: Path, key: str) -> Record | None:
-    """The record of a case that an earlier sweep finished with the same key; None: there is none."""
+    """Return the record of a case that an earlier sweep finished with the same key; None if there is none."""
     try:
         record = json.loads(read_regular(f"{folder}.json", "case", LARGEST_RECORD))
     except (InputError, ValueError):
@@ -78,7 +78,7 @@ def kept_record(folder: Path, key: str) -> Record | None:
 
 
 def _numbers(result: Result) -> Record:
-    """Verdict, time and limits of a result."""
+    """Return verdict, time and limits of a result."""
     times = [track.time_s for track in result.in_use if track.time_s is not None]
     limits = {
         check.name: {"limit": check.limit, "worst": check.worst, "state": check.state.value} for check in result.limits

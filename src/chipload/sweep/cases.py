@@ -48,7 +48,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples of the force coefficients, and of the modes, within what is known of them.
+    """Samples of the force coefficients and of the modes from their distributions.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Samples:
     seed: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse counts that mean nothing."""
+        """Refuse invalid counts."""
         if not 0 <= self.count <= MOST:
             raise InputError(f"--samples = {self.count}: must be from 0 to {MOST}")
         if self.seed < 0:
@@ -111,7 +111,7 @@ def _root(variances: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def cases_of(over: Sequence[str], samples: int = 0) -> tuple[Case, ...]:
-    """Every combination of the values of ``over``, the last key varying first.
+    """Return every combination of the values of ``over``, the last key varying fastest.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A sweep: every case of a job run, a table of all, and the combination that holds in the least time."""
+"""The run of a sweep: all cases of a job, and the combination that holds in the least time."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Combination:
 
 @dataclass(frozen=True, eq=False)
 class SweepResult:
-    """What a sweep found.
+    """Result of a sweep.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class SweepResult:
 
     @property
     def message(self) -> str:
-        """What was found, in one line."""
+        """The result in one line."""
         all_of_them, best = self.combinations, self.best
         refused = sum(c.refused for c in all_of_them)
         head = f"{len(self.cases)} cases, {len(all_of_them)} combinations, {refused} refused"

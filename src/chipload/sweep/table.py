@@ -49,7 +49,7 @@ def state_of(combination: Combination, confidence: float) -> str:
 
 
 def table_text(result: SweepResult) -> str:
-    """The table as CSV: a row for each combination, units in the names of the columns."""
+    """Return the table as CSV, with a row for each combination and units in the names of the columns."""
     combinations = result.combinations
     keys = [key for key, _ in combinations[0].values]
     limits = sorted({name for c in combinations for record in c.records for name in record["limits"]})
@@ -112,7 +112,7 @@ def plot_page(result: SweepResult) -> str:
 
 
 def pareto(combinations: list[Combination]) -> list[Combination]:
-    """Those that no other beats in time and in use of limits, by time."""
+    """Return the combinations that no other beats in both time and use of limits, by time."""
     out: list[Combination] = []
     for c in sorted(combinations, key=lambda c: (c.time_s or 0.0, c.use_of_limits or 0.0)):
         if not out or (c.use_of_limits or 0.0) < (out[-1].use_of_limits or 0.0):
@@ -121,7 +121,7 @@ def pareto(combinations: list[Combination]) -> list[Combination]:
 
 
 def job_text(job: Path, best: Combination, out: Path) -> str:
-    """The job file with the best values; its comments stay, and its files are found from the folder of the sweep."""
+    """Return the job file with the best values and its comments; file names are relative to the folder of the sweep."""
     text = read_regular(job, str(job), LARGEST_FILE, "not a job").decode()
     document = tomlkit.parse(text)
     _move_files(document, job.parent, out)

@@ -61,7 +61,7 @@ class PinValues(NamedTuple):
 
 
 class ControlledMachine(Protocol):
-    """Whatever takes an override and says where it is."""
+    """A machine that accepts a feed override and reports its position."""
 
     def exchange(self, feed: float, beat: bool, torque: float, status: int, s: float, limit: float) -> PinValues | None:
         """Set the out pins, read the in pins; None: the machine is gone.

@@ -71,7 +71,7 @@ class ToolPath:
 
     @property
     def over_relief(self) -> TorqueProfile:
-        """The model as the controller is told it, over the relief."""
+        """The model for the controller: torque over the relief."""
         return replace(self.model, edge=self.model.edge / self.relief, cut=self.model.cut / self.relief)
 
 
@@ -82,7 +82,7 @@ def tool_path(
     truth: ArrayLike | None = None,
     relief: ArrayLike | None = None,
 ) -> ToolPath:
-    """A path from points (n, 3) [mm], feed (n,) [mm/s], torque (n, 2), edge and cut [N mm], and relief (n,)."""
+    """Return a path from points (n, 3) [mm], feed (n,) [mm/s], torque (n, 2), edge and cut [N mm], and relief (n,)."""
     p = np.asarray(points, dtype=np.float64)
     if p.ndim != 2 or p.shape[1] != 3:
         raise InputError("path.points: must be rows of x, y, z")
@@ -95,7 +95,7 @@ def tool_path(
 
 
 def read_path(file: str | File) -> ToolPath:
-    """A path from a CSV with the columns ``COLUMNS`` and, for a plant, ``TRUE_COLUMNS``; ``RELIEF`` is 1 if not there.
+    """Read a path from a CSV with the columns ``COLUMNS`` and, for a plant, ``TRUE_COLUMNS``; default ``RELIEF`` 1.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def read_path(file: str | File) -> ToolPath:
 
 
 def write_path(path: ToolPath) -> str:
-    """The CSV of a path, truth and all."""
+    """Return the CSV of a path with its true torque."""
     lines = [",".join((*COLUMNS, *TRUE_COLUMNS, RELIEF))]
     torque = [x * 1e-3 for x in (path.model.edge, path.model.cut, path.truth.edge, path.truth.cut)]
     rows = np.column_stack([path.points, path.model.feed * mm_min_from_mm_s(1.0), *torque, path.relief])
@@ -141,7 +141,7 @@ def write_path(path: ToolPath) -> str:
 
 
 def locate(path: ToolPath, position: ArrayLike, s: float, window: float) -> tuple[float, float]:
-    """Place along the path nearest to a position.
+    """Return the place along the path nearest to a position.
 
     Parameters
     ----------

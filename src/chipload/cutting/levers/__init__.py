@@ -1,4 +1,4 @@
-"""Loads of the teeth times a lever that depends on the height, over a revolution."""
+"""Tooth loads multiplied by levers that depend on the height, over a revolution."""
 
 from __future__ import annotations
 

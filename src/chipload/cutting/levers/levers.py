@@ -1,7 +1,7 @@
-"""Loads of the teeth over a revolution, each piece of the edge times levers that depend on its height above the tip.
+"""Tooth loads over a revolution, multiplied along the edge by levers: polynomials of the height above the tip.
 
-Bending moments and deflections are such sums: that of a section at the height H has the lever H - z, the deflection of
-the tip the compliance between z and the tip, a polynomial of the third degree along the fluted part.
+Bending moments and deflections are such sums. The moment at a section at the height H has the lever H - z. The
+deflection of the tip has the compliance between z and the tip, a cubic polynomial along the fluted part.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ FIXED = 4
 
 
 def has_lever_loads(bites: ToothEngagement, cutter: Cutter, material: Material) -> bool:
-    """Whether :func:`lever_loads` can take them: a linear law, and teeth that are alike where there is no runout."""
+    """Return whether :func:`lever_loads` applies: a linear force law, and equal teeth where there is no runout."""
     return not any(material.exponents) and (not cutter.teeth_alike or not bool((bites.tooth >= 0).any()))
 
 
 def greatest_height(bites: ToothEngagement) -> float:
-    """Greatest height above the tip that an edge in material has [mm]; 0 where none is."""
+    """Return the greatest height [mm] above the tip at which an edge is in material; 0 if none is."""
     if not len(bites.rows):
         return 0.0
     own = bites.slices[bites.slice]
@@ -38,7 +38,7 @@ def greatest_height(bites: ToothEngagement) -> float:
 
 
 def lever_loads(bites: ToothEngagement, cutter: Cutter, material: Material, count: int, levers: ArrayLike) -> Floats:
-    """Loads of each step over a period of ``count`` rotations: the pitch, or the revolution where teeth have runout.
+    """Return the loads of each step over ``count`` rotations of a period: a pitch, or a revolution with runout.
 
     Parameters
     ----------

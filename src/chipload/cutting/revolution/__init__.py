@@ -1,4 +1,4 @@
-"""Loads over a revolution, all rotations of a step at once."""
+"""Loads over a revolution, with all rotations of a step in one calculation."""
 
 from __future__ import annotations
 

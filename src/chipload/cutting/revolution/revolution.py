@@ -25,15 +25,15 @@ COLUMNS = 15
 
 
 def rotations(cutter: Cutter, rotation: float) -> int:
-    """Number of rotations, at most ``rotation`` [rad] apart, over the pitch of the teeth, or over the revolution where
-    they have runout.
+    """Return the number of rotations at most ``rotation`` [rad] apart over a tooth pitch, or over a revolution if teeth
+    have runout.
     """
     pitch = math.tau / cutter.flutes if cutter.teeth_alike else math.tau
     return max(math.ceil(pitch / rotation), 8)
 
 
 def first_greatest(loads: Floats) -> NDArray[np.int64]:
-    """(n,) number of the first rotation at which a load (n, m) is as good as the greatest.
+    """Return for each step (n,) the first rotation at which a load (n, m) equals the greatest within rounding.
 
     >>> first_greatest(np.array([[1.0, 2.0 - 1e-12, 2.0], [0.0, 0.0, -1.0]])).tolist()
     [1, 0]
@@ -45,8 +45,8 @@ def first_greatest(loads: Floats) -> NDArray[np.int64]:
 def loads_over_turn(
     bites: ToothEngagement, cutter: Cutter, material: Material, rotation: float, left: ArrayLike
 ) -> tuple[Floats, Floats, Floats]:
-    """(n, 15) mean, greatest and least force x, y, z [N] on the cutter in the frame of the work, greatest size of the
-    force, mean and greatest torque [N mm], 0, thickest chip [mm], greatest force against ``left`` [N]; (n, 2)
+    """Return (n, 15) mean, greatest and least force x, y, z [N] on the cutter in the frame of the work, greatest size
+    of the force, mean and greatest torque [N mm], 0, thickest chip [mm], greatest force against ``left`` [N]; (n, 2)
     rotations [rad] at which the size of the force and the torque are greatest; and (n, 4, 6) the basis of the mean
     loads along T, n and the axis, see :func:`chipload.cutting.band.mean_basis`.
 

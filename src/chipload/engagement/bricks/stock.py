@@ -170,7 +170,7 @@ class BrickStock:
             self.floor = min(self.floor, float((tips - wide - down * tall).min()))
 
     def _grow(self) -> None:
-        """Room for lists half as long again, and for twice the blocks."""
+        """Extend the lists by half, and double the space for blocks."""
         blocks = int(self.used[1])
         if 2 * blocks > len(self.alive):
             self.bricks = np.concatenate([self.bricks, np.empty_like(self.bricks)])
@@ -181,14 +181,14 @@ class BrickStock:
         self.kept = fresh
 
     def instants(self, rows: Floats, tool: Ints) -> Ints:
-        """(n,) at how many times each step is looked at: an odd number, so that the middle is one of them."""
+        """Return the number of instants (n,) at which each step is calculated: odd, to include the middle."""
         of = np.array([self.tools[n] for n in tool.tolist()], dtype=np.int64)
         length = rows[:, 13] + rows[:, 12] * self.cutters[of, moves.FLUTE]
         more = np.maximum(0.5 * (length / (INSTANT * self.cutters[of, moves.WIDE]) - 1.0), 0.0)
         return np.asarray(2 * np.ceil(more - 1e-9).astype(np.int64) + 1)
 
     def skip(self, p0: Floats, p1: Floats, a0: Floats, a1: Floats, tool: Ints) -> None:
-        """Make steps without looking at what they cut."""
+        """Make steps without calculating their engagement."""
         rows = move_rows(p0, p1, a0, a1)
         self._run(rows, tool, np.zeros(len(rows), dtype=np.int64), 1, dict.fromkeys(self.tools, 1.0))
 
@@ -203,7 +203,7 @@ class BrickStock:
         corner_slices: int,
         flank_mm: Mapping[int, float],
     ) -> Engaged:
-        """Make steps, one after the other, and find what each engages.
+        """Make steps one after the other and return the engagement of each.
 
         Parameters
         ----------
@@ -261,11 +261,11 @@ class BrickStock:
         )  # fmt: skip
 
     def lowest(self) -> float:
-        """A height [mm] below which nothing was cut."""
+        """Return a height [mm] below which nothing was cut."""
         return max(self.floor, float(self.low[2]))
 
     def outlines(self, z: float, tolerance: float) -> MultiPolygon:
-        """What was swept at a height, within the box of the body and a little beyond: see
+        """Return the outlines of the swept area at a height, within the box of the body and a little beyond: see
         :meth:`chipload.engagement.moves.stock.MoveStock.outlines`.
         """
         xs, ys = nodes_of(self.low, self.high, float(self.grid[3:5].min()), float(self.cutters[:, 8].min()), tolerance)

@@ -1,4 +1,4 @@
-"""Undeformed chips on layers: what a cutter covers during a move, and what of it is new."""
+"""Undeformed chips on layers: the area that a cutter covers during a move, and the new part of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Chips on a layer: what a move covers of the stock that was still there.
+"""Chips on a layer: the area that a move covers of the remaining stock.
 
 Notation: chip = covered now, within the section of the stock, less what was covered before. It may be several pieces;
 every edge of a piece knows whether it is old surface or new, and which piece of the diagram made it.
@@ -48,7 +48,7 @@ def chips(
     before: CoveredArea | shapely.Polygon | shapely.MultiPolygon | None = None,
     slivers: bool = False,
 ) -> tuple[Chip, ...]:
-    """Pieces of stock that a move takes from a layer, the largest first.
+    """Return the pieces of stock that a move removes from a layer, the largest first.
 
     Parameters
     ----------

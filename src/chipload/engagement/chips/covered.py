@@ -59,7 +59,7 @@ _GRID = 1e-5  # of the tolerance: nearer than this two points are one when piece
 
 @dataclass(frozen=True, eq=False)
 class CoveredArea:
-    """What a move covers of a layer.
+    """Area of a layer that a move covers.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class CoveredArea:
 
 
 def covered(move: Move, cutter: Cutter, height: float, tolerance: float) -> CoveredArea | None:
-    """What the move covers of the layer z = height; None where the open cutter is never in it.
+    """Return the area of the layer z = height that a move covers; None if the open cutter never reaches it.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def covered(move: Move, cutter: Cutter, height: float, tolerance: float) -> Cove
 
 
 def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], tolerance: float) -> list[CoveredArea | None]:
-    """``covered`` of many layers."""
+    """Return the covered areas of many layers, as :func:`covered`."""
     K, levels = cutter_numbers(cutter), np.array([float(h) for h in heights])
     along = _along(move, K, tolerance)
     if along is not None:
@@ -191,7 +191,7 @@ def _along(move: Move, K: Floats, tolerance: float) -> tuple[Move, Floats] | Non
 
 
 def _standing(move: Move, K: Floats, h: float, tolerance: float) -> CoveredArea | None:
-    """What a cutter that stands covers of a layer: its section."""
+    """Return the area of a layer that a standing cutter covers: its section."""
     if not 0.0 < tolerance < math.inf:
         raise InputError(f"covered: tolerance = {tolerance:g} mm: must be above 0")
     edges = whole_section(move, K, h, 0.0, tolerance)
@@ -201,7 +201,7 @@ def _standing(move: Move, K: Floats, h: float, tolerance: float) -> CoveredArea 
 def _polygons(
     moves: Sequence[Move], K: Floats, heights: Sequence[Floats], tolerance: float
 ) -> list[list[Shape | None]]:
-    """What :func:`covered_polygons` gives, of a cutter by its numbers."""
+    """Return :func:`covered_polygons` for a cutter by its numbers."""
     levels = np.concatenate([np.empty(0), *heights])
     first = np.cumsum([0, *(len(h) for h in heights)])
     buffer, count, knots, whole = _loops(moves, K, levels, first, tolerance)
@@ -255,7 +255,7 @@ def _filled(coefficients: Sequence[Floats]) -> Floats:
 
 
 def _untangled(loop: shapely.Polygon) -> Shape:
-    """What a counter-clockwise loop that may cross itself goes round at least once."""
+    """Return the area that a counter-clockwise loop, which may cross itself, surrounds at least once."""
     return cast(Shape, shapely.buffer(loop, 0.0))
 
 

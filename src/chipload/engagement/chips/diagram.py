@@ -1,4 +1,4 @@
-"""The boundary construction diagram: theta around the section across, t up, and all that may bound what is covered.
+"""The boundary construction diagram: theta around the section, time t, and all candidate boundaries of the area.
 
 Notation: V(theta, t) speed of the section's edge outward. Candidates are the curves V = 0, the row t = 0 where
 V < 0 and the row t = 1 where V > 0; those that bound the covered area are a part of them.
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Diagram:
-    """What the figure draws.
+    """Data of the diagram for its figure.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Diagram:
 def diagram(
     move: Move, cutter: Cutter, height: float, tolerance: float, times: int = 121, angles: int = 181
 ) -> Diagram:
-    """The diagram of a move on the layer z = height; O(times angles)."""
+    """Return the diagram of a move on the layer z = height; O(times angles)."""
     K, S, C, row = cutter_numbers(cutter), np.empty(27), np.empty((8, 5)), np.empty(7)
     t, theta = np.linspace(0.0, 1.0, times), np.linspace(0.0, 2.0 * np.pi, angles)
     V = np.full((times, angles), np.nan)

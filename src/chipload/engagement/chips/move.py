@@ -1,4 +1,4 @@
-"""A five-axis move: where the tip is and how the axis stands, as polynomials of time.
+"""A five-axis move: tip and axis of the cutter as polynomials of time.
 
 Notation: t in 0 .. 1; p(t) [mm] tip, A(t) unit axis from the tip to the spindle, B(t) any vector along it; T_k
 Chebyshev polynomial of u = 2 t - 1. p = sum_k P_k T_k(u), B = sum_k B_k T_k(u), A = B / |B|: one form for every
@@ -65,7 +65,7 @@ class Move:
             )
 
     def at(self, t: ArrayLike) -> tuple[Floats, Floats]:
-        """Tip (n, 3) [mm] and unit axis (n, 3) at the times t (n,).
+        """Return tip (n, 3) [mm] and unit axis (n, 3) at the times t (n,).
 
         >>> Move.lerp([0, 0, 0], [0, 0, 1], [4, 0, 0], [0, 0, 1]).at([0.25])[0].tolist()
         [[1.0, 0.0, 0.0]]
@@ -76,7 +76,7 @@ class Move:
         return tip, np.asarray(b / np.linalg.norm(b, axis=1)[:, None])
 
     def rates(self, t: ArrayLike) -> tuple[Floats, Floats]:
-        """Rates p' (n, 3) [mm] and A' (n, 3), per unit of t."""
+        """Return the rates p' (n, 3) [mm] and A' (n, 3), per unit of t."""
         u = 2.0 * np.asarray(t, dtype=np.float64) - 1.0
         b, db = chebyshev.chebval(u, self.axis).T, 2.0 * chebyshev.chebval(u, chebyshev.chebder(self.axis)).T
         length = np.linalg.norm(b, axis=1)[:, None]
@@ -93,7 +93,7 @@ class Move:
 
     @staticmethod
     def slerp(p0: ArrayLike, a0: ArrayLike, p1: ArrayLike, a1: ArrayLike) -> Move:
-        """Tip straight, axis at an even rate in the plane of both directions."""
+        """Return a move with a straight tip path and the axis at a constant rate in the plane of both directions."""
         (p0, p1), (a0, a1) = (_three("tip", p0), _three("tip", p1)), (_unit(a0), _unit(a1))
         angle = 2.0 * math.atan2(float(np.linalg.norm(a1 - a0)), float(np.linalg.norm(a1 + a0)))
         middle, across = a0 + a1, a1 - a0
@@ -113,7 +113,7 @@ class Move:
         tool_length: float = 0.0,
         work_zero: ArrayLike | None = None,
     ) -> Move:
-        """Every axis of the machine at an even rate, as G1 without tool centre point control.
+        """Return a move with every machine axis at a constant rate, as G1 without tool centre point control.
 
         Parameters
         ----------

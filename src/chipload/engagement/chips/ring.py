@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 class Origin(IntEnum):
-    """What a piece of boundary comes from.
+    """Origin of a piece of boundary.
 
     FIRST: leaving edge of the first section; LAST: advancing edge of the last one; GRAZING: envelope of flank and
     corner; CHORD: envelope of the chord that the bottom face, or the top of the flutes, cuts off; CHORD_END: track of

@@ -1,4 +1,4 @@
-"""Which part of each slice of a cutter is in the layered workpiece, and how thick it cuts there."""
+"""Immersion of each slice of a cutter in the layered workpiece, and its chip thickness."""
 
 from __future__ import annotations
 

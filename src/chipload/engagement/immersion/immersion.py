@@ -1,4 +1,4 @@
-"""The bites of a cutter in a layered workpiece: from where to where each slice of each tooth cuts, and how thick.
+"""Tooth engagement in a layered workpiece: immersion and chip thickness of each slice of the edge.
 
 Notation: p, A tip [mm] and unit axis at an instant, T, n with T x n = A (n mirrored where the spindle turns
 counter-clockwise), phi immersion, u = cos(phi) n + sin(phi) T; a slice of the cutter is a circle of radius rho at the
@@ -13,7 +13,7 @@ a sinusoid of phi, f_z sin(phi) for a flank that moves across its axis, the feed
 tooth cuts where h > 0 (by more than rounding: 1e-9 of its way) and the point is in the material that the move before it
 has left.
 
-The material is known in layers, each by its section at half its height. A point is held against the section of its
+The material is known in layers, each by its section at half its height. A point is compared with the section of its
 layer at the place where the cutter's surface, uphill or downhill of the point, has the height of that section: on a
 convex cutter both lie on the same front, so that what the cutter left half a step behind is not taken for air, and the
 end of a stock at a bound of layers is met exactly. Where the surface has no such place (flat bottom, tip of a ball), or
@@ -60,8 +60,9 @@ class Section:
 
 
 def tool_frame(axis: ArrayLike, toward: ArrayLike, clockwise: bool = True) -> Floats:
-    """(3, 3) rows T, n, A: T the direction ``toward`` (3,) across the unit axis (3,), n left of it (right where the
-    spindle turns counter-clockwise); where ``toward`` has no part across the axis T is any direction across it.
+    """Return the tool frame (3, 3), rows T, n, A: T the direction ``toward`` (3,) across the unit axis (3,), n left of
+    it (right if the spindle turns counter-clockwise). Where ``toward`` is parallel to the axis, T is any direction
+    across it.
 
     >>> tool_frame([0, 0, 1], [3, 0, 4]).tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -104,7 +105,7 @@ def immersed(
     cutter: Slices,
     section: Section,
 ) -> tuple[Floats, Ints]:
-    """Rows of :class:`chipload.engagement.tooth_engagement.ToothEngagement` of one instant, and the slice of each.
+    """Return the rows of :class:`chipload.engagement.tooth_engagement.ToothEngagement` of one instant, with slices.
 
     Parameters
     ----------

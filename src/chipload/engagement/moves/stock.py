@@ -103,7 +103,7 @@ def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tupl
 
 @dataclass(frozen=True, eq=False)
 class Engaged:
-    """What some steps engage, an entry an instant that cuts.
+    """Engagement of some steps, with an entry for each instant that cuts.
 
     Parameters
     ----------
@@ -246,18 +246,18 @@ class MoveStock:
         self.kept, self.reach = kept, reach
 
     def instants(self, p0: Floats, p1: Floats, tool: Ints) -> Ints:
-        """(n,) at how many times each step is looked at: an odd number, so that the middle is one of them."""
+        """Return the number of instants (n,) at which each step is calculated: odd, to include the middle."""
         radius = np.array([self.radii[self.tools[n]] for n in tool.tolist()]).reshape(len(p0))
         length = np.linalg.norm(p1 - p0, axis=1)
         more = np.maximum(0.5 * (length / (INSTANT * radius) - 1.0), 0.0)
         return np.asarray(2 * np.ceil(more - 1e-9).astype(np.int64) + 1)
 
     def skip(self, p0: Floats, p1: Floats, tool: Ints) -> None:
-        """Make steps without looking at what they cut."""
+        """Make steps without calculating their engagement."""
         self._run(p0, p1, tool, np.zeros(len(p0), dtype=np.int64), 1, dict.fromkeys(self.tools, 1.0))
 
     def take(self, p0: Floats, p1: Floats, tool: Ints, *, corner_slices: int, flank_mm: Mapping[int, float]) -> Engaged:
-        """Make steps, one after the other, and find what each engages.
+        """Make steps one after the other and return the engagement of each.
 
         Parameters
         ----------
@@ -321,12 +321,12 @@ class MoveStock:
         )  # fmt: skip
 
     def lowest(self) -> float:
-        """A height [mm] below which nothing was cut."""
+        """Return a height [mm] below which nothing was cut."""
         cut = self.level[:, 1] > -math.inf
         return float(np.where(cut, self.level[:, 0], math.inf).min()) if self.body is None else float(self.low[2])
 
     def outlines(self, z: float, tolerance: float) -> MultiPolygon:
-        """What was swept at a height, within the box of the body and a little beyond.
+        """Return the outlines of the swept area at a height, within the box of the body and a little beyond.
 
         Borders are found where they cross the sides of a net; between them they are chords, within ``tolerance`` of the
         smallest cutter's circle unless the net would have more than ``NODES`` nodes. Corners are cut off by a chord.

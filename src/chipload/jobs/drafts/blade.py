@@ -30,7 +30,7 @@ _NUMBERED = re.compile(r"^(.*?)(\d+)(\D*)$")
 
 
 def holds_sections(file: Path) -> bool:
-    """Whether a file holds sections of a blade: by its ending, or by the heading of a table of points."""
+    """Return whether a file holds sections of a blade: by its ending, or by the heading of a table of points."""
     if file.suffix.lower() in ENDINGS:
         return True
     if file.suffix.lower() not in (".txt", ".csv", ".dat"):

@@ -1,4 +1,4 @@
-"""What the comments and headers of a program state beside its motions: cutters, stock, material.
+"""Reading of cutters, stock and material from the comments and headers of a program.
 
 Read are the forms of common posts: Fusion 360 (``T1 D=10. CR=0. - flat end mill``), Mastercam (``T1 | 10. FLAT
 ENDMILL | H1``), FreeCAD (``TC: 5mm Endmill`` before ``M6 T1``), Carbide Create (``TOOL/MILL,3.17,0,0,0``,
@@ -93,7 +93,7 @@ _MATERIALS = (
 
 @dataclass(frozen=True)
 class Header:
-    """What a text states beside its motions.
+    """Cutters, stock and material that a text states beside its motions.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class Header:
 
 
 def read_header(text: str, apt: bool = False, mm: float = 1.0) -> Header:
-    r"""What a text states in comments and declarations; what cannot be read is left out.
+    r"""Read comments and declarations of a text; those that cannot be read are left out.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The ``[[cutter]]`` of a draft: what sources state about a tool, and guesses for the rest."""
+"""The ``[[cutter]]`` table of a draft: values that sources state, and guesses for the rest."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KEYS = (
 
 
 def cutter_table(number: int, sources: Iterable[Stated], deepest: float = 0.0) -> DraftTable:
-    """The table of a tool; the first source that states a key counts.
+    """Return the table of a tool; the first source that states a key determines its value.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def cutter_table(number: int, sources: Iterable[Stated], deepest: float = 0.0) -
 
 
 def _guesses(stated: Mapping[str, tuple[Any, str]], deepest: float) -> dict[str, tuple[Any, str]]:
-    """Values for the keys that a cutter cannot be without."""
+    """Return guesses for the required keys of a cutter."""
     out: dict[str, tuple[Any, str]] = {}
     if "body_mm" in stated:
         body = stated["body_mm"][0]

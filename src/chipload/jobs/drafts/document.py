@@ -40,7 +40,7 @@ class DocumentObject:
 
     @property
     def label(self) -> str:
-        """What the user sees."""
+        """The label that the user sees."""
         return self.text("Label") or self.name
 
 

@@ -41,7 +41,7 @@ class Entry:
     example: str = ""
 
     def line(self) -> str:
-        """The line of the job file."""
+        """Return the line of the job file."""
         if self.value is None:
             text = f"# {self.key} = {self.example}"
             return f"{text:{COMMENT_COLUMN}} # {self.note}" if self.note else text
@@ -74,7 +74,7 @@ class DraftTable:
         return tuple(e for e in self.entries if e.guess)
 
     def text(self) -> str:
-        """Its lines in the job file."""
+        """Return its lines in the job file."""
         head = f"[[{self.name}]]" if self.repeated else f"[{self.name}]"
         confirm = ["confirm = true"] if self.guesses else []
         note = [f"# {line}" for line in self.note.splitlines()]
@@ -125,12 +125,12 @@ class Draft:
 
 
 def plain_line(text: str) -> str:
-    """A text on one line without control characters, as a comment holds it."""
+    """Return a text on one line without control characters, for a comment."""
     return "".join(c if c.isprintable() else " " for c in text)
 
 
 def toml(value: Any) -> str:
-    r"""A value as TOML text.
+    r"""Return a value as TOML text.
 
     >>> toml([1, 2.5, "a\"b"]), toml(True), toml(1e-05)
     ('[1, 2.5, "a\\"b"]', 'true', '1e-05')
@@ -157,7 +157,7 @@ def _key(key: str) -> str:
 
 
 def relative(path: Path, folder: Path) -> str:
-    """How a job in a folder names a file."""
+    """Return the name of a file relative to the folder of a job."""
     return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
 
 

@@ -56,7 +56,7 @@ OPEN_DIAMETER, OPEN_TOLERANCE_MM, LEAD, SEMIFINISH = 10.0, 0.02, 0.3, 0.1
 
 
 def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft:
-    """The draft of a pocket where the drawing has closed contours, else of a contour.
+    """Return the draft of a pocket if the drawing has closed contours, else of a contour.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def _side_of(contours: Sequence[Contour]) -> tuple[float, str]:
 
 
 def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
-    """The draft of a pocket on the floor of a model, or of a thin wall where it has no horizontal plane.
+    """Return the draft of a pocket on the floor of a model, or of a thin wall if it has no horizontal plane.
 
     Raises
     ------
@@ -278,12 +278,12 @@ def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float, bool]:
 
 
 def _opened(area: Any, d: float) -> Any:
-    """What a cutter of diameter d [mm] reaches of an area."""
+    """Return the part of an area that a cutter of diameter d [mm] reaches."""
     return area.buffer(-0.5 * d).buffer(0.5 * d)
 
 
 def _narrow(area: Any, d: float) -> bool:
-    """Whether an area has channels in which a cutter of diameter d [mm] has no room."""
+    """Return whether an area has channels that are too narrow for a cutter of diameter d [mm]."""
     wide = ROOM * d
     lost = shapely.get_parts(_opened(area, d).difference(_opened(area, wide)))
     if max((float(piece.area) for piece in lost), default=0.0) > CHANNEL * d * d:

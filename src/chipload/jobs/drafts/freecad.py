@@ -37,7 +37,7 @@ _BIT = (
 
 
 def draft_freecad(file: Path, folder: Path, machine: str | None = None, job: str | None = None) -> Draft:
-    """The draft of a job for a FreeCAD document.
+    """Return the draft of a job for a FreeCAD document.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def _commands(document: Document, operation: DocumentObject) -> list[str]:
 
 
 def _cutter(document: Document, controller: DocumentObject, name: str) -> Stated:
-    """What the tool bit of a controller states."""
+    """Return the values that the tool bit of a tool controller states."""
     bit = document.objects.get(controller.text("Tool"))
     if bit is None:
         return {}

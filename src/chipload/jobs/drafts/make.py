@@ -1,4 +1,4 @@
-"""Which draft a file proposes, by its ending."""
+"""Selection of the kind of draft by the ending of a file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from chipload.jobs.drafts.draft import Draft
 def draft_of(
     file: Path, folder: Path, *, machine: str | None = None, tools: Path | None = None, job: str | None = None
 ) -> Draft:
-    """The draft of a job for a file.
+    """Return the draft of a job for a file.
 
     Parameters
     ----------

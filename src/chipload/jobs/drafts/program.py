@@ -1,4 +1,4 @@
-"""A draft of a job that simulates a program: NC text or CL data, with what is known from a project beside it."""
+"""Drafts of jobs that simulate a program: NC text or CL data, with data from the project that contains it."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ _COMMENTS = re.compile(r"\([^()\n]*\)|;[^\n]*")
 
 @dataclass(frozen=True)
 class Known:
-    """What a project or the caller knows about a program.
+    """Data of a program that a project or the caller states.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Known:
 
 @dataclass(frozen=True, eq=False)
 class _Chosen:
-    """How a program is read: machine, dialect (None: by ending or machine), feed [mm/min] before the first F."""
+    """Reading of a program: machine, dialect (None: by ending or machine), feed [mm/min] before the first F."""
 
     machine: Machine
     dialect: str | None
@@ -84,7 +84,7 @@ class _Chosen:
 
 
 def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft:
-    """The draft of a job that simulates a program.
+    """Return the draft of a job that simulates a program.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
 
 
 def _stated(number: int, known: Known, header: Header) -> list[Stated]:
-    """What is stated about a tool, the surest first."""
+    """Return the stated values of a tool, the most reliable source first."""
     stated = header.cutters.get(number, {})
     if number == 0 and len(header.cutters) == 1:  # a text without a change of tools cuts with the one that it names
         (stated,) = header.cutters.values()
@@ -293,7 +293,7 @@ def _layer(deepest: Mapping[int, float], sizes: Sequence[float]) -> Entry:
 
 
 def _of_table(tools: Path | None, number: int) -> Stated:
-    """What a tool table states about a tool."""
+    """Return the values that a tool table states about a tool."""
     if tools is None:
         return {}
     tool = read_tools(tools).tools.get(number)

@@ -17,7 +17,7 @@ from chipload.units import MM_PER
 
 
 def draft_camotics(file: Path, folder: Path, machine: str | None = None) -> Draft:
-    """The draft of a job that simulates the program of a CAMotics project.
+    """Return the draft of a job that simulates the program of a CAMotics project.
 
     Raises
     ------

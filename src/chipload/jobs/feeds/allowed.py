@@ -1,9 +1,9 @@
-"""New feeds of a program: from the engagement of its steps to new F words.
+"""Calculation of the greatest feed of each line from the engagement of its steps, and of the new F words.
 
-Notation: a factor is the new feed over the programmed one, see :mod:`chipload.planning.feeds`. The loads of a step at
-other feeds are those of the same bites, thicker or thinner; runout is added after that. The new text is read again, and
-motion by motion it must be the old program at the wanted feeds; what then holds is said by simulating it from fresh
-stock, which is done by the caller.
+Notation: a factor is the new feed over the programmed one, see :mod:`chipload.planning.feeds`. At another feed a step
+cuts with the same tooth engagement and a chip thickness in proportion to the feed; runout is added afterwards. The new
+text is read again and compared with the old program motion by motion: only the feeds may differ, by the wanted
+factors. The caller proves the limits by simulating the new program from fresh stock.
 """
 
 from __future__ import annotations
@@ -54,17 +54,17 @@ _FACTOR, _BY = "feed_factor", "feed_by"
 
 @dataclass(frozen=True, eq=False)
 class FeedRequest:
-    """What the job asks of feeds.
+    """Requirements of the job on the new feeds.
 
     Parameters
     ----------
     table : keys of the job
-    limits : by name, those that the feed changes
-    rotation : between two rotations at which the force is looked at [rad]
+    limits : by name, those that depend on the feed
+    rotation : angle between two rotations at which the force is calculated [rad]
     checks : made by default; the stress of the cutters is a limit unless it is switched off
-    errors : relative error of loads by the resolution of the simulation, by column; a load is held at most at its limit
-        over 1 + error, so that the limit holds whatever the error is within that
-    more : columns of what a cutter cut beside its greatest loads; None: none
+    errors : relative error of loads by the resolution of the simulation, by column; a load is at most its limit
+        over 1 + error, so that the limit holds for any error up to this one
+    more : watch that computes further columns beside the greatest loads; None: none
     """
 
     table: FeedsTable
@@ -76,13 +76,13 @@ class FeedRequest:
 
     @property
     def feed_limits(self) -> tuple[str, ...]:
-        """Names of the limits that hold the feed: ``limits``, then the stress of the cutter."""
+        """Names of the limits that restrict the feed: ``limits``, then the stress of the cutter."""
         return (*self.limits, *(() if "cutter_strength" in self.checks.off else (STRESS,)))
 
     def error(self, limit: str) -> float:
-        """Relative error of the column that a limit bounds, measured peaks above predicted ones included.
+        """Return the relative error of the column that a limit bounds, including the peak excess of the material.
 
-        An error that is not finite counts as 0: then nothing has this load.
+        An error that is not finite counts as 0: no step has this load.
         """
         column = column_of(limit).name
         error = load_error(self.errors, column)
@@ -98,11 +98,11 @@ def watching(
     machine: Machine,
     before: Mapping[str, NDArray[Any]],
 ) -> Watch:
-    """A watch that says of each step that cuts the greatest factor within the limits and what holds it.
+    """Return a watch that computes, for each cutting step, the greatest feed factor within the limits and its cause.
 
-    ``before`` are the columns at the programmed feeds. A watch gets the instant of a step with the greatest force;
-    where another has more torque its loads are raised to that, in the same ratio at any feed. A thicker chip of another
-    instant is that of :func:`_chip_of_instant`.
+    The cause is the limit that determines the factor. ``before`` are the columns at the programmed feeds. A watch
+    receives the instant of a step with the greatest force. Where another instant has a greater torque, the loads are
+    raised to it in the same ratio at every feed. :func:`_chip_of_instant` gives the thicker chip of another instant.
     """
     least, most, by = _bounds(steps, asked.table, cutters, machine)
 
@@ -145,10 +145,11 @@ def watching(
 
 
 def _chip_of_instant(chip: Floats, cutter: Cutter, sines: Floats) -> Callable[[Floats], Floats]:
-    """The thickest chip [mm] at a factor on the feed, from that of an instant at the programmed feed.
+    """Return a function that gives the thickest chip [mm] of an instant at a feed factor.
 
-    Without runout it goes with the feed. What runout adds does not depend on the feed, so a slower feed makes a chip
-    thinner by less. The greatest for any angle kappa of the edge counts, since that of the instant is not known.
+    Without runout the thickness is proportional to the feed. The part that runout adds does not depend on the feed, so
+    that a slower feed reduces the thickness by less. The angle kappa of the edge at the instant is not known: the
+    greatest thickness over all angles is taken.
 
     Parameters
     ----------
@@ -188,16 +189,16 @@ def with_new_feeds(
     read: Callable[[str], ProgramReading],
     seconds: float,
 ) -> tuple[FeedResult, ProgramReading]:
-    """The text with other feeds, and what it does.
+    """Return the text with new feeds, and its program as it is read again.
 
     Parameters
     ----------
     text, dialect : see :func:`changeable`
-    reading : of it
-    steps, before : of its program, and what they remove
-    allowed : columns of a removal seen by :func:`watching`
-    read : reads a text
-    seconds : time of the program as it is [s]
+    reading : of this text
+    steps, before : steps of its program, and their removal
+    allowed : columns of a removal with the watch of :func:`watching`
+    read : function that reads a text
+    seconds : time of the unchanged program [s]
 
     Raises
     ------
@@ -237,7 +238,7 @@ def with_new_feeds(
 def _bounds(
     steps: Steps, table: FeedsTable, cutters: Mapping[int, Cutter], machine: Machine
 ) -> tuple[Floats, Floats, Ints]:
-    """The least and the greatest factor of each step that the job and the machine allow, and what holds the latter."""
+    """Return the least and the greatest factor of each step by job and machine, and the cause of the greatest."""
     speed = speeds_of(steps)
     n = len(steps)
     most, by = np.full(n, 0.01 * table.fastest_percent), np.full(n, FASTEST)
@@ -253,7 +254,7 @@ def _bounds(
 
 
 def _in_air(lines: LineFeeds, steps: Steps, feeds: NDArray[np.bool_], table: FeedsTable, machine: Machine) -> LineFeeds:
-    """Lines that touch nothing get the feed for it, if theirs is slower; else they keep theirs."""
+    """Raise the feed of lines that cut nothing to the feed in air of the job; faster lines keep theirs."""
     air = lines.touch == StepContact.AIR
     allowed, by = np.where(air, 1.0, lines.allowed), np.where(air, KEPT, lines.by)
     if table.air_mm_min is not None:
@@ -266,7 +267,7 @@ def _in_air(lines: LineFeeds, steps: Steps, feeds: NDArray[np.bool_], table: Fee
 
 
 def _wanted(lines: LineFeeds, reading: ProgramReading, machine: Machine, table: FeedsTable) -> tuple[Floats, Floats]:
-    """(m,) factors that are written, and those beyond which the machine is no faster; at least 1 or what is allowed."""
+    """Return factors (m,) to write, and those above which the machine is no faster (at least 1 or the allowed)."""
     program = reading.program
     row = np.flatnonzero(np.isin(program.line, lines.line) & (program.motion != RAPID) & (program.motion != DWELL))
     of, m = np.searchsorted(lines.line, program.line[row]), len(lines.line)
@@ -293,7 +294,7 @@ def _wanted(lines: LineFeeds, reading: ProgramReading, machine: Machine, table: 
 
 
 def _by_rates(lines: LineFeeds, reading: ProgramReading, machine: Machine) -> Floats:
-    """(m,) factor at which each line takes the time that the rates of its axes need."""
+    """Return the factor (m,) at which each line takes the time that the axis rates require."""
     least = np.concatenate([[0.0], row_time_limited(machine, reading.axes)])[: len(reading.commands)]
     own = np.concatenate([[0.0], program_time(reading.program, machine)[1:]])
     rates, path = np.zeros(len(lines.line)), np.zeros(len(lines.line))

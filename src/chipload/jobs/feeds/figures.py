@@ -36,7 +36,7 @@ LISTED = 60
 
 
 def presentation_of(program: FeedsProgram) -> Presentation:
-    """The presentation of a program with new feeds."""
+    """Return the presentation of a program with new feeds."""
     result, name = result_of(program), changed_name(program, "feeds")
     own, checks, time_s = program.feeds, result.in_use[0].limits, float(program.seconds.sum())
     return program_presentation(
@@ -53,7 +53,7 @@ def feed_sections(
     program: str,
     figures: dict[str, go.Figure],
 ) -> list[str]:
-    """The sections of the report about new feeds; figures are put among ``figures``."""
+    """Return the report sections on new feeds; their figures are added to ``figures``."""
     what = feed_numbers(feeds, simulation, checks, time_s, program)
     before, after = what["before"], what["after"]
     gain = 100.0 * (1.0 - time_s / feeds.seconds_before) if feeds.seconds_before > 0.0 else 0.0
@@ -93,7 +93,7 @@ def feed_sections(
 
 
 def along(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck]) -> go.Figure:
-    """Feed, and what is limited, before and after, along the path."""
+    """Plot the feed and the limited loads along the path, before and after the change."""
     c = simulation.removal.columns
     s = np.asarray(c["s_mm"])
     rows: list[tuple[str, str, float | None]] = [("feed_mm_min", "feed [mm/min]", None)]

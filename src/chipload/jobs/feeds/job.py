@@ -21,12 +21,12 @@ class FeedsJob(ProgramJob):
 
     @property
     def operation(self) -> FeedsOperationTable:
-        """Its operation."""
+        """The operation of the job."""
         return self.table.operation[0]
 
 
 def load(path: Path, table: FeedsJobTable, overrides: Sequence[str]) -> FeedsJob:
-    """The job of a table that was read.
+    """Return the job of a table that was read.
 
     Raises
     ------
@@ -47,5 +47,5 @@ def _contradictions(table: FeedsJobTable) -> Iterator[str]:
 
 
 def resume_note(job: FeedsJob) -> str:
-    """What is not kept while the job runs; the simulation of the program that comes out is."""
+    """Return a note on what a stopped job does not resume."""
     return note_of_passes(job, "new feeds")

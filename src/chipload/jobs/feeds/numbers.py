@@ -23,7 +23,7 @@ MOST_LINES = 2000
 
 
 def exceeding(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck]) -> list[dict[str, Any]]:
-    """Lines that exceed a limit of a load after all: the worst step of each."""
+    """Return the lines of the new program that exceed a load limit, each with its worst step."""
     c, before, out = simulation.removal.columns, feeds.before.columns, []
     factor = dict(zip(feeds.line.tolist(), zip(feeds.factor.tolist(), feeds.by, strict=True), strict=True))
     place = np.column_stack([c[f"{x}_mm"] for x in "xyz"])
@@ -58,7 +58,7 @@ def exceeding(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[
 def feed_numbers(
     feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck], time_s: float, program: str
 ) -> dict[str, Any]:
-    """``feeds`` of the operation in summary.json.
+    """Return the key ``feeds`` of the operation in summary.json.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class FeedResult(ChangedText):
 
 @dataclass(frozen=True, eq=False)
 class FeedsProgram(ProgramResult):
-    """A program with new feeds, simulated; ``feeds`` says how it came to them."""
+    """A simulated program with new feeds; ``feeds`` describes the change."""
 
     simulated: SimulationResult = field(kw_only=True)
     feeds: FeedResult = field(kw_only=True)

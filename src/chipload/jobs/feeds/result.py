@@ -17,7 +17,7 @@ from chipload.result.limits import Columns
 
 
 def result_of(program: FeedsProgram) -> Result:
-    """The result of a program with new feeds."""
+    """Return the result of a program with new feeds."""
     simulation, own = program.simulated, program.feeds
     time_s, name = float(program.seconds.sum()), changed_name(program, "feeds")
     tracks = changed_tracks(
@@ -30,7 +30,7 @@ def result_of(program: FeedsProgram) -> Result:
 
 
 def _rubbing(feeds: FeedResult) -> tuple[Finding, ...]:
-    """Lines that cut below the least feed per tooth."""
+    """Return a finding for each line that cuts below the least feed per tooth."""
     least = feeds.tooth_feed_least
     return tuple(
         Finding("rubbing", line, f"feed per tooth {feed:.3g} mm is less than {least:g} mm", Severity.EXCEEDS)
@@ -39,7 +39,7 @@ def _rubbing(feeds: FeedResult) -> tuple[Finding, ...]:
 
 
 def _with_cause(simulation: SimulationResult, feeds: FeedResult) -> Iterator[Columns]:
-    """The rows with what limits the feed of each."""
+    """Yield the rows with the cause that limits the feed of each."""
     by = np.array([*feeds.by, ""], dtype=object)
     for block in step_rows(simulation):
         line, known = block["line"], np.zeros(len(block["line"]), dtype=np.bool_)

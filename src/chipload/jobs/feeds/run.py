@@ -75,7 +75,7 @@ def run(
 
 
 def check(job: FeedsJob) -> tuple[list[str], bool]:
-    """What the files of a job hold, and what its simulations need; nothing is cut, errors are those of :func:`run`."""
+    """Return a line for each file of a job and for the simulations; nothing is simulated. Errors as :func:`run`."""
     machine = simulation.machine_of(job)
     reading = simulation.read_for(job, machine)
     simulation.text_to_change(job, reading, stock_body(job, reading.program), machine, material_of(job), "feeds")

@@ -22,7 +22,7 @@ Ints = NDArray[np.int64]
 
 
 def require_same(old: Program, new: Program, line: Ints, factor: Floats) -> None:
-    """Refuse a new text that is not the old program at the wanted feeds, which rounding makes slower by a digit.
+    """Refuse a new text that differs from the old program in more than the wanted feeds, rounded down by one digit.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def rubbing_lines(
     table: FeedsTable,
     cutters: Mapping[int, Cutter],
 ) -> tuple[tuple[int, float], ...]:
-    """Lines that cut below the least feed per tooth, and their feeds per tooth [mm]."""
+    """Return the lines that cut below the least feed per tooth, and their feeds per tooth [mm]."""
     if table.tooth_feed_least_mm is None:
         return ()
     new = tooth_feeds(steps, cutters)[cuts] * factor[np.searchsorted(lines.line, steps.line[cuts])]
@@ -63,14 +63,14 @@ def rubbing_lines(
 
 
 def speeds_of(steps: Steps) -> Floats:
-    """(n,) speed of the tip [mm/s]; 0 where it stands and in rapids."""
+    """Return the speed of the tip (n,) [mm/s]; 0 at rest and in rapids."""
     length = np.linalg.norm(steps.p1 - steps.p0, axis=1)
     moves = steps.seconds > 0.0
     return np.asarray(np.where(moves, length / np.where(moves, steps.seconds, 1.0), 0.0))
 
 
 def tooth_feeds(steps: Steps, cutters: Mapping[int, Cutter]) -> Floats:
-    """(n,) feed per tooth [mm]; inf where the spindle stands or the tip does."""
+    """Return the feed per tooth (n,) [mm]; inf where the spindle or the tip is at rest."""
     flutes = np.ones(len(steps))
     for number in np.unique(steps.tool).tolist():
         if number in cutters:

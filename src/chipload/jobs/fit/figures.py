@@ -1,4 +1,4 @@
-"""How a fit is presented: coefficients, measured beside predicted forces, the scene of the cutter, the material."""
+"""The presentation of a fit: coefficients, measured and predicted forces, scene of the cutter, material file."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ CLOUD, LINE = 1200, 360
 
 
 def presentation_of(done: FitResult) -> Presentation:
-    """How a fit is presented."""
+    """Return the presentation of a fit."""
     return Presentation(lambda figures: sections(done, figures), lambda: scene_bytes(done), lambda: files_of(done))
 
 
 def files_of(done: FitResult) -> Mapping[str, Content]:
-    """The material, where there is one."""
+    """Return the material file, if there is a material."""
     return {} if done.material is None else {MATERIAL: material_text(done.material).encode()}
 
 
 def scene_bytes(done: FitResult) -> bytes:
-    """scene.glb: the envelope of the cutter that was used."""
+    """Return scene.glb: the envelope of the cutter of the measurements."""
     cutter = done.job.cutter
     body = trimesh.creation.cylinder(radius=cutter.radius, height=cutter.overhang, sections=64)
     body.apply_translation([0.0, 0.0, 0.5 * cutter.overhang])
@@ -54,7 +54,7 @@ def scene_bytes(done: FitResult) -> bytes:
 
 
 def sections(done: FitResult, figures: dict[str, go.Figure]) -> list[str]:
-    """Sections of the report."""
+    """Return the sections of the report."""
     fit = done.fit
     rows = [
         [name, _text_of(fit.coefficients.values[k], "not identified"), _span(fit.coefficients.interval[k]), unit]
@@ -120,7 +120,7 @@ def _errors(done: FitResult) -> str:
 
 
 def _means(done: FitResult) -> go.Figure:
-    """Mean force of each channel against feed per tooth, with the model and its band."""
+    """Plot the mean force of each channel against feed per tooth, with the model and its band."""
     out = go.Figure()
     cuts = [c.cut for c in done.comparisons]
     flutes = done.fit.cutter.flutes
@@ -157,7 +157,7 @@ def _means(done: FitResult) -> go.Figure:
 
 
 def _turn(done: FitResult, left: bool) -> go.Figure:
-    """Samples and model over a turn, or their difference; a column a cut, a row a channel."""
+    """Plot samples and model over a turn, or their difference; a column for each cut, a row for each channel."""
     cuts = done.comparisons
     shown = np.flatnonzero(np.any([c.cut.measured for c in cuts], axis=0))
     titles = [f"{mm_min_from_mm_s(c.cut.feed):g} mm/min, {c.use}" for c in cuts]

@@ -1,4 +1,4 @@
-"""A job that identifies force coefficients: its tables checked against one another, its files found."""
+"""The job that identifies force coefficients: checks of its tables against one another, and its files."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class FitJob(Limited):
 
 
 def load(path: Path, table: FitJobTable, overrides: Sequence[str]) -> FitJob:
-    """The job of a table that was read.
+    """Return the job of a table that was read.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def load(path: Path, table: FitJobTable, overrides: Sequence[str]) -> FitJob:
 
 
 def missing(values: Mapping[str, Any]) -> list[str]:
-    """What a job lacks that one of its tables alone cannot see; ``values`` are those of the file."""
+    """Return missing keys that no single table can detect; ``values`` are those of the file."""
     found, channels = [], values.get("channels")
     if isinstance(channels, Mapping) and not set(CHANNELS) & set(channels):
         found.append('channels: name at least one of feed, across, axis, as feed = "-Fy"')
@@ -77,7 +77,7 @@ def missing(values: Mapping[str, Any]) -> list[str]:
 
 
 def _arc(engagement: EngagementTable, cutter: Cutter) -> tuple[float, float]:
-    """The engaged immersion [rad]."""
+    """Return the engaged immersion [rad]."""
     depth = engagement.radial_depth_mm
     if engagement.milling == "slot":
         if depth is not None and abs(depth - cutter.diameter) > 1e-6:

@@ -1,7 +1,7 @@
-"""What a fit ends with.
+"""The outcome of a fit: coefficients, and every measurement compared with its prediction.
 
-Peaks are means over the turns of the greatest and the least of each turn. The error of a peak is taken of that of the
-two that is larger in size; a measured 0 has no error in percent.
+Peaks are means over the turns of the greatest and the least force of each turn. The error of a peak is that of the one
+of larger size; a measured 0 has no error in percent.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MeasuredForces:
-    """What was measured of a cut, (3,) [N], as in the prediction; ``plane`` greatest in-plane force [N]."""
+    """Measured forces of a cut, (3,) [N], as in the prediction; ``plane`` greatest in-plane force [N]."""
 
     mean: Floats
     high: Floats
@@ -35,7 +35,7 @@ class MeasuredForces:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A cut beside its prediction.
+    """A measured cut with its prediction.
 
     Errors in percent of the measured, (3,): ``mean_percent``, and ``peak_percent`` of the larger peak; ``phase``
     rotation of tooth 0 at the first sample [rad].
@@ -59,7 +59,7 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class FitResult:
-    """What a fit ends with.
+    """Result of a fit.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ UNITS = ("MPa", "MPa", "MPa", "N/mm", "N/mm", "N/mm")
 
 
 def result_of(done: FitResult) -> Result:
-    """The result of a fit; the measurements that are predicted are in use."""
+    """Return the result of a fit; the tracks of the predicted measurements are in use."""
     names = Counter(c.cut.name for c in done.comparisons)
     tracks = tuple(
         _track(done, c, c.cut.name if names[c.cut.name] == 1 else f"{c.cut.name} {k}")
@@ -44,7 +44,7 @@ def result_of(done: FitResult) -> Result:
 
 
 def history(done: FitResult, c: Comparison) -> Columns:
-    """One turn of a measurement: measured and predicted forces on the cutter, a row a rotation.
+    """Return one turn of a measurement: measured and predicted forces on the cutter, with a row for each rotation.
 
     A channel whose coefficients are not identified has no column of predicted forces.
     """
@@ -73,7 +73,7 @@ def _track(done: FitResult, c: Comparison, name: str) -> Track:
 
 
 def _check(c: Comparison, track: str, name: str, limit: float, errors: Floats) -> LimitCheck:
-    """The greatest error of the channels that were measured; one that has none leaves the limit unproven."""
+    """Return the check of the greatest error of the measured channels; unproven if one has no error."""
     known = np.isfinite(errors)
     lost = [CHANNELS[k] for k in np.flatnonzero(c.cut.measured & ~known)]
     reason = f"{', '.join(lost)}: no error could be calculated" if lost else ""
@@ -86,7 +86,7 @@ def _check(c: Comparison, track: str, name: str, limit: float, errors: Floats) -
 
 # -- numbers ----------------------------------------------------------------------------------------------------
 def numbers(done: FitResult) -> dict[str, Any]:
-    """The numbers of the fit as JSON values; what is not known is null."""
+    """Return the numbers of the fit as JSON values; unknown values are null."""
     fit = done.fit
     size, direction = fit.cutter.runout
     return {

@@ -1,4 +1,4 @@
-"""A fit from beginning to end: its files are read, the coefficients fitted, every measurement predicted."""
+"""The run of a fit: read the force files, fit the coefficients, predict every measurement."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SMALL = 0.1
 
 
 def read_cuts(job: FitJob) -> tuple[tuple[MeasuredCut, ...], tuple[Finding, ...]]:
-    """Read every force file of a job; cuts in its order.
+    """Read every force file of a job and return its cuts in their order.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def run(job: FitJob, progress: Progress = silent) -> FitResult:
 
 
 def check(job: FitJob) -> tuple[list[str], bool]:
-    """What the files of a job hold; nothing is fitted."""
+    """Return lines on the files of a job, without fitting."""
     cuts, findings = read_cuts(job)
     if job.table.method == "instantaneous":
         fitted = [cut for cut, m in zip(cuts, job.table.measurement, strict=True) if m.use == "fit"]
@@ -134,13 +134,13 @@ def _compared(fit: Fit, cut: MeasuredCut, use: str) -> Comparison:
 
 
 def _percent(said: Floats, seen: Floats) -> Floats:
-    """How far off, in percent of what was seen; NaN where that is 0."""
+    """Return the error in percent of the measured value; NaN where that is 0."""
     size = np.where(seen == 0.0, np.nan, np.abs(seen))
     return np.asarray((said - seen) / size * 100.0)
 
 
 def peak_excess(comparisons: Sequence[Comparison]) -> float | None:
-    """How far measured peaks are above predicted ones, relative; None: there is no run.
+    """Return the peak excess: the relative amount by which measured peaks exceed predicted ones; None without runs.
 
     Of each run, fitted or kept back, and each direction (feed, across, axis, and the greatest force in the plane) the
     larger peak of each turn over the predicted one: :data:`COVERED` of the turns are below, and the worst of these
@@ -160,7 +160,7 @@ def peak_excess(comparisons: Sequence[Comparison]) -> float | None:
 
 
 def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple[Material | None, tuple[Finding, ...]]:
-    """The material, or why there is none."""
+    """Return the material, or the reason why there is none."""
     table = job.table
     values = fit.coefficients.values.copy()
     source = table.source

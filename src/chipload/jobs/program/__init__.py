@@ -1,4 +1,4 @@
-"""Jobs that read and simulate a program, and give it new spindle speeds."""
+"""Jobs that read and simulate a program, and can change its spindle speeds."""
 
 from __future__ import annotations
 

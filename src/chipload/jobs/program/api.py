@@ -1,7 +1,7 @@
 """Simulate a program from plain Python values, as in a notebook.
 
-What a job file names is given as values here: a Program or a file, a stock, cutters, a material, a machine, limits.
-Only how fine the simulation looks has values of its own where none is given, and the summary says them.
+The inputs of a job file are plain values here: a Program or a file, a stock, cutters, a material, a machine, limits.
+Only the resolution of the simulation has default values; the summary states them.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def simulate(
     progress: Progress = silent,
     **settings: Any,
 ) -> History:
-    """Run a program through a stock: what each step removes, what that costs, what it does to the part.
+    """Simulate a program in its stock: the removal, the loads and the deflection of each step, and the part it leaves.
 
     Parameters
     ----------
@@ -85,16 +85,16 @@ def simulate(
     cutter : a ``chipload.Cutter``, keys of a ``[[cutter]]``, or several by tool number; one is the only tool
     material, machine : a value, a shipped name, or a file
     limits : by the names that ``[limits]`` of a job has, as ``{"force_n": 800.0}``; none: the default checks
-    part : what should come out: mesh [mm], file, or keys of ``[part]`` (``mesh`` in place of ``file``)
-    fixtures : what no tool may touch, likewise
+    part : the finished part: mesh [mm], file, or keys of ``[part]`` (``mesh`` in place of ``file``)
+    fixtures : bodies that no tool may touch, likewise
     stiffness : keys of ``[stiffness]``; what is not stated leaves deflections unproven
     dynamics : keys of ``[dynamics]``, as ``{"mode": ({"frequency_hz": 812.0, ...},)}``; each step then has a margin
     workpiece : keys of ``[workpiece]``, as ``{"modulus_gpa": 70.0, "poisson": 0.33, "clamp": ({"face": "z-"},)}``;
-        how far the workpiece gives way in its clamps, in the state of each step
+        the deflection of the workpiece in its clamps is then calculated in the state of each step
     checks : keys of ``[checks]``, which are made unless one is false, as ``{"cutter_strength": False}``
     step_mm : longest step of the tip; None: a quarter of the smallest diameter
     layer_mm : thickness of the layers of a block or a mesh; None: from depths of cut and cutters
-    tolerance_mm : how far the edges of chips, and moves with a rotary axis, may leave what they are
+    tolerance_mm : greatest deviation of the edges of chips, and of moves with a rotary axis
     dialect, feed_mm_min : of the program's file, as in ``[program]``
     settings : further keys of the operation: ``interpolation``, ``engine``, ``corner_slices``, ``flank_mm``,
         ``stock_points_mm``, ``confidence``, ``workers``
@@ -148,7 +148,7 @@ def simulate(
 def _stock(
     stock: Stock, layer_mm: float | None, meshes: dict[str, trimesh.Trimesh], files: dict[str, Path]
 ) -> dict[str, Any]:
-    """The table of the stock; layers have none."""
+    """Return the table of the stock; a stock in layers has none."""
     if not isinstance(stock, LayeredStock):
         return {"stock": _solid(stock, layer_mm, meshes, files)}
     if layer_mm is not None:
@@ -163,14 +163,14 @@ def _bodies(
     meshes: dict[str, trimesh.Trimesh],
     files: dict[str, Path],
 ) -> dict[str, Any]:
-    """The tables of the part, if there is one, and of the fixtures."""
+    """Return the tables of the part, if there is one, and of the fixtures."""
     found = {} if part is None else {"part": _body("part", part, TargetTable, spacing, meshes, files)}
     of_fixtures = (_body(f"fixture {k}", body, FixtureTable, spacing, meshes, files) for k, body in enumerate(fixtures))
     return {**found, "fixture": tuple(of_fixtures)}
 
 
 def _require_sources(made: ProgramJobTable) -> None:
-    """Refuse limits of what nothing is stated of, and speeds, which only a text has."""
+    """Refuse limits whose inputs are not stated, and new speeds, which only a program text can have."""
     for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if made.part is None and getattr(made.limits, key) is not None:
             raise InputError(f"limits.{key}: needs the part that should come out: give part or leave it out")
@@ -192,7 +192,7 @@ def _with_cutters(
     tolerance: float,
     cutter: Cutters,
 ) -> tuple[ProgramReading, dict[int, Cutter]]:
-    """The program on its machine, and its cutters by tool number."""
+    """Return the program on its machine, and its cutters by tool number."""
     reading = _reading(program, machine, dialect, feed, tolerance)
     cutters = _cutters(cutter, reading.program)
     if isinstance(program, Program):
@@ -209,7 +209,7 @@ def _reading(
     tolerance: float,
     cutters: Mapping[int, Cutter] | None = None,
 ) -> ProgramReading:
-    """The program on its machine."""
+    """Return the program on its machine."""
     if isinstance(program, Program):
         for key, value in (("dialect", dialect), ("feed_mm_min", feed)):
             if value is not None:
@@ -237,7 +237,7 @@ def _material(given: Material | str | Path) -> Material:
 
 
 def _cutters(given: Cutters, program: Program) -> dict[int, Cutter]:
-    """By tool number; one cutter alone is the only tool that the program has."""
+    """Return the cutters by tool number; a single cutter is the only tool of the program."""
     if isinstance(given, Mapping) and all(isinstance(k, int) for k in given):
         if not given:
             raise InputError("cutter: missing: give at least one")
@@ -265,7 +265,7 @@ def _cutter(given: Any, number: int) -> Cutter:
 def _solid(
     stock: Any, layer: float | None, meshes: dict[str, trimesh.Trimesh], files: dict[str, Path]
 ) -> SolidTable | dict[str, Any]:
-    """The table of a stock."""
+    """Return the table of a stock."""
     if isinstance(stock, (list, tuple, np.ndarray)):
         low, high = (tuple(float(v) for v in np.asarray(corner, dtype=np.float64).ravel()) for corner in stock)
         return {"low_mm": low, "high_mm": high, "layer_mm": layer}
@@ -284,12 +284,12 @@ def _body(
     meshes: dict[str, trimesh.Trimesh],
     files: dict[str, Path],
 ) -> Table:
-    """The table of a part or a fixture."""
+    """Return the table of a part or a fixture."""
     return _table({"spacing_mm": spacing, **_source(name, given, meshes, files)}, kind)
 
 
 def _source(name: str, given: Any, meshes: dict[str, trimesh.Trimesh], files: dict[str, Path]) -> dict[str, Any]:
-    """Keys of a table whose body is a mesh or a file; what is a mesh is put among ``meshes``."""
+    """Return the keys of a table whose body is a mesh or a file; a mesh is added to ``meshes``."""
     keys = dict(given) if isinstance(given, Mapping) else {}
     body = keys.pop("mesh", keys.pop("file", None)) if isinstance(given, Mapping) else given
     if isinstance(body, trimesh.Trimesh):
@@ -312,7 +312,7 @@ def _table(values: Mapping[str, Any], kind: type[Model]) -> Model:
 
 
 def _copy(stock: Stock) -> LayeredStock | None:
-    """The same layers, so that those of the caller stay as they are; None: the stock is stated in another way."""
+    """Return a copy of the layers, so that those of the caller do not change; None if the stock is not in layers."""
     if not isinstance(stock, LayeredStock):
         return None
     out = LayeredStock(stock.bounds, stock.xs, stock.ys, stock.tiles, stock.part)

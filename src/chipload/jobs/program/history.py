@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """A program that was run through a stock, a row a step.
+    """The history of a simulated program, with a row for each step, and its result.
 
     Parameters
     ----------
-    program : the program, its machine and what the simulation found
+    program : the program, its machine and the results of the simulation
     """
 
     program: ProgramResult
@@ -42,55 +42,55 @@ class History:
         return f"History({self.program.name} on {self.program.machine.name}, {len(self)} steps: {self.verdict})"
 
     def __getitem__(self, column: str) -> NDArray[Any]:
-        """(n,) values of a column, as ``history["force_n"]``."""
+        """Return the values (n,) of a column, as ``history["force_n"]``."""
         if column not in self.columns:
             raise InputError(f"history: no column {column!r}: it has {', '.join(self.columns)}")
         return self.columns[column]
 
     @cached_property
     def result(self) -> Result:
-        """Verdict, limits and findings, as :func:`chipload.load_result` gives them of a folder."""
+        """Verdict, limits and findings, as :func:`chipload.load_result` returns them for a folder."""
         return result_of(self.program)
 
     @cached_property
     def columns(self) -> Mapping[str, NDArray[Any]]:
-        """(n,) arrays by name, those of history.parquet: see :data:`chipload.result.COLUMNS`."""
+        """Columns (n,) of history.parquet by name, see :data:`chipload.result.COLUMNS`."""
         return self.result.in_use[0].columns
 
     @property
     def stock(self) -> LayeredStock:
-        """The stock that is left."""
+        """The stock after the program."""
         if self.program.simulated is None:
             raise InputError(f"{self.program.name}: was only read, not simulated: it has no stock")
         return self.program.simulated.stock
 
     @property
     def energy_balance(self) -> Mapping[int, float]:
-        """Work over the specific energy of the volume removed, less 1, by tool number."""
+        """Work over the specific energy of the removed volume, less 1, by tool number."""
         return {} if self.program.simulated is None else self.program.simulated.removal.energy_balance
 
     @property
     def resolution_error(self) -> Mapping[str, float]:
-        """Stated error of the greatest value of a column, as a share of it."""
+        """Relative resolution error of the greatest value of each column."""
         return {} if self.program.simulated is None else self.program.simulated.removal.resolution_error
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the program holds the limits of its machine and of the job."""
+        """Verdict on the limits of the machine and of the job."""
         return self.result.verdict
 
     @property
     def message(self) -> str:
-        """The verdict in a sentence."""
+        """The verdict as a sentence."""
         return self.result.message
 
     @property
     def numbers(self) -> Mapping[str, Any]:
-        """The operation in numbers, as in summary.json: ``force_n``, ``torque_nm``, ``removed_mm3``, ``collisions``."""
+        """Numbers of the operation as in summary.json: ``force_n``, ``torque_nm``, ``removed_mm3``, ``collisions``."""
         return self.result.operations[0]
 
     def plot(self, *columns: str, x: Literal["t_s", "s_mm"] = "t_s") -> go.Figure:
-        """Columns one below the other against time or path, with their limits; none named: the loads.
+        """Plot columns one below the other against time or path, with their limits; without names, plot the loads.
 
         Raises
         ------
@@ -103,28 +103,28 @@ class History:
         return columns_figure(self.columns, limits, columns or USUAL, x)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The columns as a table of pandas. Needs ``chipload[notebook]``."""
+        """Return the columns as a pandas DataFrame. Needs ``chipload[notebook]``."""
         return pandas_of(self.columns)
 
     def to_xarray(self) -> xarray.Dataset:
-        """The columns as a dataset of xarray, with units. Needs ``chipload[notebook]``."""
+        """Return the columns as an xarray Dataset with units. Needs ``chipload[notebook]``."""
         return xarray_of(self.columns)
 
     def save(self, out: str | Path) -> Path:
-        """Write the folder that ``chipload run`` writes: report, summary, history, scene, stock."""
+        """Write the result folder of ``chipload run``: report, summary, history, scene, stock."""
         from chipload.jobs.program.figures import presentation_of
         from chipload.report.folder import write_result
 
         return write_result(self.result, presentation_of(self.program), out)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
+        """HTML for notebooks."""
         numbers = table_html(("program", self.program.name), _rows(self.numbers))
         return message_html(self.verdict, self.message) + numbers
 
 
 def _rows(numbers: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Names and values that a notebook shows."""
+    """Return the names and values that a notebook shows."""
     shown = (
         ("time [s]", numbers["time_s"]),
         ("in air [s]", numbers["air_cut_s"]),

@@ -12,7 +12,7 @@ __all__ = ["load", "missing", "resume_note"]
 
 
 def load(path: Path, table: ProgramJobTable, overrides: Sequence[str]) -> ProgramJob:
-    """The job of a table that was read.
+    """Return the job of a table that was read.
 
     Raises
     ------
@@ -23,6 +23,6 @@ def load(path: Path, table: ProgramJobTable, overrides: Sequence[str]) -> Progra
 
 
 def resume_note(job: ProgramJob) -> str:
-    """What is not kept while the job runs; the simulation of the program that comes out is."""
+    """Return a note on what a stopped job does not resume."""
     changes = job.simulates and job.table.operation[0].speeds is not None
     return note_of_passes(job, *(("new speeds",) if changes else ()))

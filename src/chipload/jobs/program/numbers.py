@@ -11,7 +11,7 @@ from chipload.jobs.simulation.stability import StabilityResult, stability_number
 def speed_numbers(
     speeds: SpeedResult, stability: StabilityResult, simulation: SimulationResult, time_s: float, program: str
 ) -> dict[str, Any]:
-    """``speeds`` of the operation in summary.json; ``program`` is the file with them."""
+    """Return ``speeds`` of the operation in summary.json; ``program`` is the file with the new speeds."""
     before = stability_numbers(speeds.stability, speeds.before.columns)
     after = stability_numbers(stability, simulation.removal.columns)
     keys = ("margin_min", "line", "chatter_hz", "mode", "speed_rpm")

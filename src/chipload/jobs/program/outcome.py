@@ -9,7 +9,7 @@ from chipload.jobs.simulation.outcome import ProgramResult, SimulationResult, Sp
 
 @dataclass(frozen=True, eq=False)
 class SpeedsProgram(ProgramResult):
-    """A program with new spindle speeds, simulated; ``speeds`` says how it came to them."""
+    """A simulated program with new spindle speeds; ``speeds`` describes the change."""
 
     simulated: SimulationResult = field(kw_only=True)
     speeds: SpeedResult = field(kw_only=True)

@@ -27,7 +27,7 @@ PROGRAM = "program"
 
 
 def result_of(program: ProgramResult) -> Result:
-    """The result of a program."""
+    """Return the result of a program."""
     numbers: dict[str, Any] = {}
     simulation = program.simulated
     if isinstance(program, SpeedsProgram) and simulation is not None and simulation.stability is not None:
@@ -48,7 +48,7 @@ def result_of(program: ProgramResult) -> Result:
 
 
 def _track(program: ProgramResult) -> Track:
-    """The program as it is."""
+    """Return the track of the unchanged program."""
     time_s, simulation = float(program.seconds.sum()), program.simulated
     if simulation is None:
         unproven = Finding("not-simulated", 0, "the program was not simulated in its stock", Severity.UNPROVEN)

@@ -31,11 +31,11 @@ from chipload.workers import Workers
 def run(
     job: ProgramJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: Workers | None = None
 ) -> ProgramResult:
-    """Read the program of a job for its machine; simulate it where the job says so, with new speeds if it asks.
+    """Read the program of a job for its machine; simulate it if the job states an operation, and change its speeds.
 
     Parameters
     ----------
-    checkpoint : the folder that keeps what is finished, from which the run goes on; None: all is kept in memory
+    checkpoint : folder with finished work, from which a stopped run continues; None: all stays in memory
     workers : processes or a cluster that remove strips of a layered stock; None: as the operation states
 
     Raises
@@ -67,7 +67,7 @@ def run(
 
 
 def check(job: ProgramJob) -> tuple[list[str], bool]:
-    """What the program and the other files of a job hold, and what its simulation needs; nothing is cut.
+    """Return lines on the files of a job and on time and memory of its simulation, without simulating it.
 
     Raises
     ------
@@ -91,12 +91,12 @@ def simulate_read(
     provenance: Provenance,
     progress: Progress = silent,
 ) -> ProgramResult:
-    """Run a program that was read already through a stock.
+    """Simulate a program that was already read.
 
     Parameters
     ----------
-    job : its operation, cutters, limits, part, fixtures and stiffness count
-    stock : which changes; None: that of the job
+    job : its operation, cutters, limits, part, fixtures and stiffness are used
+    stock : changes; None: that of the job
     """
     if stock is None:
         stock = stock_body(job, reading.program)

@@ -1,9 +1,9 @@
-"""New spindle speeds of a program: from the margins of its steps to new S words.
+"""Calculation of new spindle speeds from the stability margins of the steps, and of the new S words.
 
-One speed a tool, the one with the greatest least margin of those cuts of the tool that are nearest to chatter or
-longest in cut; or one a zone, see :mod:`chipload.jobs.program.zones`. The feed per tooth stays. The new text is read
-again, and motion by motion it must be the old program at the wanted speeds and feeds; what then holds is said by
-simulating it from fresh stock, which is done by the caller.
+Each tool gets one speed: that with the greatest least margin over the cuts of the tool that are nearest to chatter or
+longest in cut. Or each zone gets one, see :mod:`chipload.jobs.program.zones`. The feed per tooth does not change. The
+new text is read again and compared with the old program motion by motion: only speeds and feeds may differ, as wanted.
+The caller proves the limits by simulating the new program from fresh stock.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ GAIN = 0.02
 def text_with_speeds(
     job: ProgramJob, reading: ProgramReading, stock: LayeredStock, machine: Machine, material: Material
 ) -> tuple[str, str]:
-    """The text of a program whose speeds can be changed, and its dialect.
+    """Return the text of a program whose speeds can be changed, and its dialect.
 
     Raises
     ------
     InputError
-        They cannot be changed in the text; the message says what to do.
+        They cannot be changed in the text; the message states the remedy.
     """
     text, dialect = text_to_change(job, reading, stock, machine, material, "speeds")
     speed_words(text)
@@ -71,7 +71,7 @@ def new_speeds(
     progress: Progress,
     workers: Workers | None = None,
 ) -> tuple[SpeedResult, ProgramReading]:
-    """The text with new speeds, from what the program cuts of a stock, which changes; and what it does then.
+    """Simulate the program in a stock, which changes, and return its text with new speeds and the new program.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def new_speeds(
 
 
 def _advised(stability: StabilityResult, program: Program) -> tuple[ToolSpeed, ...]:
-    """What each tool with known cuts gets; a tool that has one speed which is as good keeps it."""
+    """Return the new speed of each tool with known cuts; a tool with one speed that is as good keeps it."""
     out = []
     for tool, quiet in stability.quiet.items():
         moving = (
@@ -129,7 +129,7 @@ def _advised(stability: StabilityResult, program: Program) -> tuple[ToolSpeed, .
 
 
 def _new_text(text: str, program: Program, wanted: Floats, added: Mapping[int, float]) -> str:
-    """The text with the wanted speeds of its rows (n,) [rad/s], NaN where they stay, and ``added`` S words by line."""
+    """Return the text with the wanted speeds of its rows (n,) [rad/s] (NaN: unchanged) and the ``added`` S words."""
     old = speed_words(text)
     starts = np.array(sorted({w.line for w in old} | set(added)), dtype=np.int64)
     cuts = (program.motion != RAPID) & (program.motion != DWELL) & (program.spindle != 0.0)
@@ -167,7 +167,7 @@ def _new_text(text: str, program: Program, wanted: Floats, added: Mapping[int, f
 
 
 def _same(old: Program, new: Program, wanted: Floats) -> None:
-    """Refuse a new text that is not the old program at the wanted speeds and with its feed per tooth."""
+    """Refuse a new text that differs from the old program in more than the wanted speeds at the same feed per tooth."""
     wrong, at = len(old) != len(new), 0
     if not wrong:
         off = differing(old, new, "motion", "p_work", "axis", "centre", "normal", "turns", "tool", "line")

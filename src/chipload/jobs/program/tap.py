@@ -1,4 +1,4 @@
-"""Modes from hammer tests, as a file that ``[dynamics]`` of a job names."""
+"""Identification of modes from hammer tests, and the file of modes that ``[dynamics]`` of a job names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from chipload.structure.receptance_files import read_receptance
 
 @dataclass(frozen=True, eq=False)
 class TappedModes:
-    """A file, its direction and its modes."""
+    """The modes identified from one file, with its direction."""
 
     name: str
     direction: str
@@ -26,7 +26,7 @@ def tap(
     unit: str | None = None,
     band: tuple[float | None, float | None] = (None, None),
 ) -> tuple[TappedModes, ...]:
-    """Modes of hammer tests, one file a direction.
+    """Identify modes from hammer tests, with one file for each direction.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def tap(
 
 
 def modes_text(tapped: Sequence[TappedModes], tool: int | None = None) -> str:
-    """The file of the modes (TOML)."""
+    """Return the file of the modes (TOML)."""
     names = ", ".join(t.name for t in tapped)
     lines = [f'source = "hammer test: {names}"']
     for one in tapped:

@@ -1,7 +1,7 @@
 """The passes of a program, and the zones with separate spindle speeds.
 
-A pass is what a tool cuts from one line that is wholly out of the material to the next. Its speed can change in the
-first line behind the pass before it; S words that stand between two passes are used.
+A pass is a continuous cut of a tool between two lines that are wholly out of the material. Its speed can change in the
+first line after the previous pass; existing S words between two passes are used.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ NEAREST, LARGEST, LEAST = 12, 12, 2
 
 @dataclass(frozen=True, eq=False)
 class ProgramPass:
-    """What a tool cuts without leaving the material.
+    """A pass: a cut of a tool that does not leave the material.
 
     Parameters
     ----------
     tool : its number
     lines : first and last that cut
-    change : line in which its speed can change, behind the pass before it
-    cuts : (c,) int, numbers of what its steps cut
-    present : its greatest speed now [rad/s]
+    change : line in which its speed can change, after the previous pass
+    cuts : (c,) int, numbers of the cuts of its steps
+    present : its greatest present speed [rad/s]
     """
 
     tool: int
@@ -52,7 +52,7 @@ class ProgramPass:
 
 
 def passes_of(stability: StabilityResult, program: Program, columns: Columns, tool: int) -> tuple[ProgramPass, ...]:
-    """The passes of a tool, in their order.
+    """Return the passes of a tool in their order.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def passes_of(stability: StabilityResult, program: Program, columns: Columns, to
 
 
 def _together(passes: Sequence[ProgramPass]) -> tuple[ProgramPass, ...]:
-    """At most :data:`MOST_PASSES`, of neighbours."""
+    """Join neighbouring passes so that at most :data:`MOST_PASSES` remain."""
     if len(passes) <= MOST_PASSES:
         return tuple(passes)
     return tuple(
@@ -104,7 +104,7 @@ def _together(passes: Sequence[ProgramPass]) -> tuple[ProgramPass, ...]:
 def zone_speeds(
     stability: StabilityResult, program: Program, columns: Columns, tool: int
 ) -> tuple[tuple[ToolSpeed, int], ...]:
-    """Speeds of the zones of a tool, each with the line in which it can begin; one or none: it needs no zones."""
+    """Return the speeds of the zones of a tool, each with its first line; with one or none, zones are unused."""
     low, high = stability.range_of(tool)
     passes = passes_of(stability, program, columns, tool)
     if len(passes) < 2 or not high > low:
@@ -128,7 +128,7 @@ def zone_speeds(
 
 
 def _chosen(stability: StabilityResult, tool: int, passes: Sequence[ProgramPass]) -> list[Ints]:
-    """Of each pass the cuts that its speed is looked for with."""
+    """Return for each pass the cuts with which its speed is searched."""
     margin = np.array([x[0] for x in stability.watch.known[tool].values()])
     edge = engaged_edge(joined(stability.watch.cuts[tool]))
     near, large = (max(LEAST, count // len(passes)) for count in (NEAREST, LARGEST))
@@ -143,7 +143,7 @@ def _chosen(stability: StabilityResult, tool: int, passes: Sequence[ProgramPass]
 def row_speeds(
     program: Program, tools: Sequence[tuple[ToolSpeed, int]], words: Ints
 ) -> tuple[Floats, dict[int, float]]:
-    """Wanted speed of each row of a program [rad/s], NaN where it stays, and new S words by line [1/min].
+    """Return the wanted speed [rad/s] of each row of a program (NaN: unchanged), and new S words by line [1/min].
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ SIDE = 0.04
 
 @dataclass(frozen=True, eq=False)
 class BentWorkpiece:
-    """The workpiece at its worst step.
+    """The deformed workpiece in the step with its greatest deflection, and the best place for a support.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class BentWorkpiece:
 def bent_workpiece(
     work: CellWorkpiece, stock: LayeredStock, step: int, line: Floats, force: Floats, diameter: float
 ) -> BentWorkpiece:
-    """How a state of the workpiece bends under a force on a contact line."""
+    """Return the deformation of a state of the workpiece under a force on a contact line, and the best support."""
     sections = StockSections(stock)
     parts = [polygons(shape) for shape in sections.shapes]
     bodies = [prisms([part], np.array(ends)) for part, *ends in zip(parts, sections.low, sections.high, strict=True)]
@@ -82,7 +82,7 @@ def bent_workpiece(
 
 
 def _candidates(sections: StockSections, stock: LayeredStock, contact: Floats, away: float) -> tuple[Floats, Floats]:
-    """(n, 3) places on upright surfaces and their normals, evenly along the outlines at some heights."""
+    """Return places (n, 3) on upright surfaces and their normals, evenly along the outlines at some heights."""
     low, high = float(stock.bounds[0]), float(stock.bounds[-1])
     places, normals = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for share in HEIGHTS:

@@ -25,7 +25,7 @@ ROUND = 48
 
 
 def clamp_errors(table: SimulationJobTable) -> Iterator[str]:
-    """What keys of the workpiece contradict."""
+    """Yield a message for each contradiction between the keys of ``[workpiece]`` and others."""
     limited = table.limits.deflection_workpiece_um is not None
     given = table.stiffness is not None and table.stiffness.work_n_um is not None
     if limited and table.workpiece is None and not given:
@@ -44,7 +44,7 @@ def clamp_errors(table: SimulationJobTable) -> Iterator[str]:
 
 
 def wrong_clamps(clamps: Sequence[ClampTable]) -> Iterator[str]:
-    """Clamps that state no place, or more than one."""
+    """Yield a message for each clamp that states no place, or more than one."""
     for k, clamp in enumerate(clamps):
         key = f"workpiece.clamp.{k}"
         box = (clamp.low_mm is not None, clamp.high_mm is not None)
@@ -60,12 +60,12 @@ def wrong_clamps(clamps: Sequence[ClampTable]) -> Iterator[str]:
 
 
 def clamps_of(table: WorkpieceTable, stock: LayeredStock) -> tuple[Clamp, ...]:
-    """The clamps on a stock before its first cut."""
+    """Return the clamps on a stock before its first cut."""
     return tuple(_clamp(clamp, f"workpiece.clamp.{k}", stock) for k, clamp in enumerate(table.clamp))
 
 
 def elastic_of(table: WorkpieceTable) -> Elastic:
-    """What the workpiece is made of."""
+    """Return the elastic properties of the workpiece."""
     density = None if table.density_kg_m3 is None else T_MM3 * table.density_kg_m3
     return Elastic(PER * table.modulus_gpa, table.poisson, density)
 
@@ -97,7 +97,7 @@ def _clamp(table: ClampTable, name: str, stock: LayeredStock) -> Clamp:
 
 
 def clamped_volumes(table: WorkpieceTable, stock: LayeredStock) -> NDArray[np.float64]:
-    """(c,) float [mm^3] of the stock that each clamp holds.
+    """Return the volume of stock (c,) [mm^3] that each clamp holds.
 
     Raises
     ------
@@ -116,6 +116,6 @@ def require_clamped(table: WorkpieceTable | None, stock: LayeredStock) -> None:
 
 
 def stock_cells(stock: LayeredStock, cell_mm: float, order: int) -> CellGrid:
-    """Cells over a whole stock."""
+    """Return the cells over a whole stock."""
     low, high = ([float(v[k]) for v in (stock.xs, stock.ys, stock.bounds)] for k in (0, -1))
     return grid_over(low, high, cell_mm, order)

@@ -1,7 +1,7 @@
 """The contact lines of the steps of a program, and the stock before some of them.
 
-The program is run through the stock once ahead, for this alone: what a step touches and what is left then do not depend
-on the feed.
+An additional run of the program through the stock, before the simulation, finds them: contact and remaining stock of a
+step do not depend on the feed.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TOGETHER = 24
 
 @dataclass(frozen=True, eq=False)
 class CutAhead:
-    """A program that was run ahead.
+    """Result of the additional run of a program before its simulation.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ def cut_ahead(
     interpolation: Interpolation,
     progress: Progress = silent,
 ) -> CutAhead:
-    """Run a program through a stock, which changes, and keep where it cuts and what is left every few steps."""
+    """Run a program through a stock, which changes; store its contact lines, and the stock every few steps."""
     count = counted(program, cutters, resolution)
     setting = setting_of(cutters, material, resolution, interpolation, None, 2)
     sums, known = RunningSums(stock.volume()), list[tuple[NDArray[np.int64], Floats, Floats, Floats, Floats]]()
@@ -85,7 +85,7 @@ def cut_ahead(
 
 
 def contact_lines(cuts: Cuts) -> Floats:
-    """(c, 2, 3) float [mm], ends of the line along which each step touches the surface that it leaves.
+    """Return the ends (c, 2, 3) [mm] of the contact line of each step on the surface that it leaves.
 
     It runs along the axis through the mean of the ends of the engagement at which the chip has no thickness, from the
     lowest to the highest of them; where a step leaves no surface, through the middle of its engagement.

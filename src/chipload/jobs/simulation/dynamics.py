@@ -1,6 +1,6 @@
 """The modes of every tool of a job.
 
-A mode without damping or stiffness is left out, and what it is of is named: stability is then unproven.
+A mode without damping or stiffness is left out and its tool or workpiece is named: stability is then unproven.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Dynamics:
 
     Parameters
     ----------
-    modes : by tool number; a tool of which none is known is not among them
+    modes : by tool number; a tool without known modes is left out
     number : of each mode of a tool, from 1 as the job and its file list them
     name : of each mode by this number
     unknown : what is not stated and would be needed
@@ -56,14 +56,14 @@ class Dynamics:
 
     @property
     def first_followed(self) -> int:
-        """Number of the first mode of the workpiece that is followed."""
+        """Number of the first workpiece mode that is followed through the removal."""
         return max(self.name, default=0) + 1
 
 
 def dynamics_of(
     table: DynamicsTable, folder: Path, cutters: Mapping[int, Cutter], workpiece: WorkpieceTable | None = None
 ) -> Dynamics:
-    """Modes of every tool, and the damping of those of the workpiece.
+    """Return the modes of every tool, and the damping of the modes of the workpiece.
 
     Raises
     ------
@@ -113,13 +113,13 @@ def dynamics_of(
 
 
 def _process(table: DynamicsTable) -> ProcessDamping | None:
-    """Damping by worn edges, where it is stated."""
+    """Return the damping by worn edges, if it is stated."""
     stated = table.process_damping
     return None if stated is None else ProcessDamping(stated.indentation_n_mm3, stated.wear_land_mm, stated.friction)
 
 
 def _spread(table: DynamicsTable) -> ModeSpread | None:
-    """Spreads of the modes, all or none."""
+    """Return the spreads of the modes, which are stated all or not at all."""
     names = ("frequency_percent", "damping_percent", "stiffness_percent")
     stated = [0.01 * value for name in names if (value := getattr(table, name)) is not None]
     if stated and len(stated) < len(names):
@@ -128,7 +128,7 @@ def _spread(table: DynamicsTable) -> ModeSpread | None:
 
 
 def read_modes(path: Path) -> tuple[ModeTable, ...]:
-    """Modes of a file.
+    """Read the modes of a file.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def read_modes(path: Path) -> tuple[ModeTable, ...]:
 
 
 def _modes(some: Iterable[tuple[int, ModeTable, float]]) -> Modes:
-    """Modes with directions in x, y and z where one moves along z, else in x and y."""
+    """Return modes with directions in x, y and z if one moves along z, else in x and y."""
     rows = list(some)
     stated = [DIRECTIONS[m.direction] if isinstance(m.direction, str) else m.direction for _, m, _ in rows]
     direction = np.array([(*d, 0.0)[:3] for d in stated])

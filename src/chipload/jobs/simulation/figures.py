@@ -67,12 +67,12 @@ def program_presentation(
     changed: Mapping[str, ChangedText] = MappingProxyType({}),
     sections: Callable[[dict[str, go.Figure]], list[str]] = lambda figures: [],
 ) -> Presentation:
-    """The presentation of a program's result.
+    """Return the presentation of a program's result.
 
     Parameters
     ----------
-    changed : texts with other words, by the name of their file
-    sections : of the report, before those of every program
+    changed : program texts with changed words, by the name of their file
+    sections : report sections before those that every program has
     """
     speeds = next((text for text in changed.values() if isinstance(text, SpeedResult)), None)
     return Presentation(
@@ -85,7 +85,7 @@ def program_presentation(
 
 
 def _blanks(program: ProgramResult, result: Result) -> dict[str, Blank]:
-    """The stock before, the same for every track."""
+    """Return the initial stock for the page; it is the same for every track."""
     simulated = program.simulated
     if simulated is None or simulated.blank is None:
         return {}
@@ -93,13 +93,13 @@ def _blanks(program: ProgramResult, result: Result) -> dict[str, Blank]:
 
 
 def _samples(program: ProgramResult, result: Result) -> dict[str, EngagementSamples]:
-    """Tooth engagement of the program that was simulated last: the track in use."""
+    """Return the tooth engagement of the program that was simulated last, which is the track in use."""
     found = None if program.simulated is None else program.simulated.removal.samples
     return {} if found is None else {track.name: found for track in result.tracks if track.in_use}
 
 
 def _files(program: ProgramResult, result: Result, changed: Mapping[str, ChangedText]) -> dict[str, Content]:
-    """CL data of the program, the stock that it leaves, and its own text where that is new."""
+    """Return the files of the result: CL data of the program, its remaining stock, and its text if that is new."""
     path = program.reading.program
     tools = set(np.unique(path.tool).tolist())
     known = program.cutters if tools - {0} <= set(program.cutters) else None
@@ -132,7 +132,7 @@ def _sections(program: ProgramResult, speeds: SpeedResult | None, figures: dict[
 
 
 def _load_sections(simulation: SimulationResult, time_s: float, figures: dict[str, go.Figure]) -> list[str]:
-    """Chips, forces, torque, power, deflection, the part, collisions."""
+    """Return the report sections on chips, forces, torque, power, deflection, the part and collisions."""
     what, c = operation_numbers(simulation, time_s), simulation.removal.columns
     force, torque, power = what["force_n"], what["torque_nm"], what["power_w"]
     rows = [
@@ -177,13 +177,13 @@ def _load_sections(simulation: SimulationResult, time_s: float, figures: dict[st
 
 
 def _mean(values: Mapping[str, Any]) -> str:
-    """A mean, with twice its standard deviation where that is known."""
+    """Return a mean as a text, with twice its standard deviation if that is known."""
     sd = values["mean_sd"]
     return f"{values['mean']:.4g}" if sd is None else f"{values['mean']:.4g} \u00b1 {2.0 * sd:.2g}"
 
 
 def along(simulation: SimulationResult) -> go.Figure:
-    """Force, torque, power, chip thickness, deflection and removal against time."""
+    """Plot force, torque, power, chip thickness, deflection and removal against time."""
     columns = simulation.removal.columns
     seconds, of = columns["seconds"], columns["line"]
     t = columns["t_s"] - 0.5 * columns["duration_s"]
@@ -235,7 +235,7 @@ def along(simulation: SimulationResult) -> go.Figure:
 
 
 def feed_figure(read: ProgramResult) -> go.Figure:
-    """Programmed feed against time, motion after motion."""
+    """Plot the programmed feed of each motion against time."""
     columns = motion_rows(read)
     t, feed = np.asarray(columns["t_s"]) / 60.0, np.asarray(columns["feed_mm_min"])
     step = -(-len(t) // SPACE_POINTS)
@@ -253,7 +253,7 @@ def feed_figure(read: ProgramResult) -> go.Figure:
 
 
 def _drawn(program: Program) -> tuple[Floats, NDArray[np.bool_]]:
-    """Points with arcs as chords, and whether a rapid leads to each."""
+    """Return the points of the path with arcs as chords, and whether a rapid leads to each."""
     chords = chords_of(program)
     return np.asarray(chords.p_work), np.asarray(chords.motion == RAPID)
 
@@ -265,7 +265,7 @@ def _drawn_feeds(program: Program) -> Floats:
 
 
 def _runs(chosen: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """(first, past the last) of each run of chosen rows that has a row before it."""
+    """Return (first, past the last) of each run of chosen rows that has a row before it."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
     return [(max(int(a), 1), int(b)) for a, b in edges.reshape(-1, 2) if b > 1]
 
@@ -282,7 +282,7 @@ def _slowest(read: ProgramResult) -> str:
 
 
 def scene_bytes(read: ProgramResult) -> bytes:
-    """scene.glb: rapids and cutting motions as lines, what is left of the stock; lengths are mm, Z is up."""
+    """Return scene.glb: rapids and cutting motions as lines, and the remaining stock; lengths in mm, Z up."""
     points, rapid = _drawn(read.reading.program)
     scene = trimesh.Scene()
     for name, chosen, colour in (("rapids", rapid, (179, 38, 30, 255)), ("path", ~rapid, (34, 120, 132, 255))):

@@ -3,9 +3,9 @@
 Notation: a point of the part is made by the step whose tool comes nearest to it; the error there is that of
 :mod:`chipload.simulation.deflection`, at the moment when an edge makes the point, positive where material is left.
 
-Only points count that had stock over them, that the rigid tool leaves within ``NEAR`` of the part (over the others
-there is a later operation's stock, or a gouge), and that lie on a smooth piece of the surface. A point is looked for
-among the cuts of the block of steps that its nearest step is in, so that nothing of earlier blocks has to be kept.
+A point counts if it had stock over it, if the rigid tool leaves it within ``NEAR`` of the part (otherwise there is
+stock for a later operation, or a gouge), and if it lies on a smooth piece of the surface. Only the cuts in the block of
+steps of its nearest step are searched for a point, so that no data of earlier blocks need be kept.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SMOOTH = math.radians(15.0)
 
 
 def forming(left: Difference, stiffness: Stiffness, material: Material) -> Callable[[Cuts], dict[str, Floats]]:
-    """Columns of a simulation: ``form_error_um`` of greatest size, with its sign, and how many points it is of.
+    """Return a watch with the columns ``form_error_um`` (of greatest size, signed) and ``form_points`` (points made).
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def forming(left: Difference, stiffness: Stiffness, material: Material) -> Calla
 
 
 def _work(stiffness: Stiffness, left: Difference, points: NDArray[np.int64]) -> Floats | None:
-    """Compliance of the work at points of the part: that of the step which makes each, at its height on the contact."""
+    """Return the compliance of the work at points of the part: that of the step that makes each, at its height."""
     if stiffness.work is None or isinstance(stiffness.work, float):
         return None if stiffness.work is None else np.full(len(points), stiffness.work)
     return stiffness.work.at_points(left.step[points], left.points[points])

@@ -55,12 +55,12 @@ class ProgramJob(Limited):
 def program_job(
     kind: type[Job], path: Path, table: SimulationJobTable, overrides: Sequence[str], wrong: Iterable[str] = ()
 ) -> Job:
-    """The job of a table that was read.
+    """Return the job of a table that was read.
 
     Parameters
     ----------
     kind : of job
-    wrong : what the capability itself finds wrong in the table of a simulation
+    wrong : function that yields the errors that the capability itself finds in the table of a simulation
 
     Raises
     ------
@@ -118,7 +118,7 @@ def program_job(
 
 
 def missing(values: Mapping[str, Any]) -> list[str]:
-    """The tables that a simulation lacks; ``values`` are those of the file."""
+    """Return the tables that a simulation lacks; ``values`` are those of the file."""
     if not values.get("operation"):
         return []
     needs = ("stock", "material", "cutter")
@@ -126,7 +126,7 @@ def missing(values: Mapping[str, Any]) -> list[str]:
 
 
 def _contradictions(table: SimulationJobTable) -> Iterator[str]:
-    """What values of a simulation contradict, and that nothing is checked at all."""
+    """Yield a message for each contradiction between values of a simulation, and if nothing is checked."""
     stock = table.stock
     if stock is not None:
         block = (stock.low_mm is not None, stock.high_mm is not None)
@@ -163,8 +163,9 @@ def _contradictions(table: SimulationJobTable) -> Iterator[str]:
 
 
 def note_of_passes(job: ProgramJob, *passes: str) -> str:
-    """What is not kept while the job runs: what these passes find, and the compliance of a workpiece; the simulation
-    of the program that comes out is.
+    """Return a note on what a stopped job does not resume: these passes and the compliance of a workpiece.
+
+    The simulation of the resulting program does resume.
     """
     if not job.simulates:
         return ""

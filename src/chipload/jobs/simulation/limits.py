@@ -22,7 +22,7 @@ BY_STIFFNESS = ("deflection_um", "form_error_um")
 def program_limits(
     simulation: SimulationResult, columns: Columns, track: str, stability: StabilityResult | None = None
 ) -> tuple[LimitCheck, ...]:
-    """Every limit of the job, then those that are checked by default.
+    """Return every limit check of the job, then the default checks.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def program_limits(
 
 
 def _yield_limit(simulation: SimulationResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
-    """The stress of the workpiece against its yield stress, where that is stated."""
+    """Return the check of the stress of the workpiece against its yield stress, if that is stated."""
     own = None if simulation.workpiece is None else simulation.workpiece.strained
     if simulation.workpiece is None or own is None:
         return ()
@@ -60,8 +60,9 @@ def _yield_limit(simulation: SimulationResult, columns: Columns, track: str) -> 
 
 
 def spindle_limits(machine: Machine, speeds: ArrayLike = ()) -> dict[str, float]:
-    """What the spindle of a machine gives at every one of some speeds [rad/s], by name of the limit; empty where its
-    file does not say it.
+    """Return limits of torque and power that the spindle of a machine gives at each of some speeds [rad/s], by name.
+
+    A limit that the file of the machine does not state is left out.
     """
     torque = float(machine.torque_at(speeds).min(initial=math.inf if machine.torque is None else machine.torque))
     stated = {"spindle_torque_nm": torque / 1000.0, "spindle_power_w": machine.power_w}
@@ -69,7 +70,7 @@ def spindle_limits(machine: Machine, speeds: ArrayLike = ()) -> dict[str, float]
 
 
 def greatest_difference(left: Difference, name: str) -> tuple[float, int, tuple[float, float, float] | None]:
-    """Deepest gouge (``gouge_mm``) or highest excess (``excess_mm``) [mm], the step that left it, and its place."""
+    """Return the deepest gouge (``gouge_mm``) or highest excess (``excess_mm``) [mm], its step and its place."""
     sign = -1.0 if name == "gouge_mm" else 1.0
     counts = np.isfinite(left.distance) & (left.over | (left.distance < 0.0))
     value = np.where(counts, sign * left.distance, -np.inf)
@@ -94,7 +95,7 @@ def _stated(simulation: SimulationResult, columns: Columns, track: str, name: st
 
 
 def _difference(simulation: SimulationResult, columns: Columns, track: str, name: str, limit: float) -> LimitCheck:
-    """The part against the cutter's path; points of the part are what is compared, so the step is that of a point."""
+    """Return the check of the cutter's path against points of the part; its row is the step of the worst point."""
     if simulation.left is None:
         return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason="no [part] is stated")
     worst, k, place = greatest_difference(simulation.left, name)

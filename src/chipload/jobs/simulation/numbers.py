@@ -1,7 +1,7 @@
 """The numbers of a program in summary.json: of its text and of its simulation.
 
-Notation: means are over the time in which something is cut at a feed; greatest and least values are those of any
-rotation of the spindle in any step. Forces are on the cutter, in the workpiece frame.
+Notation: means are over the time in which material is cut at a feed; greatest and least values are over all rotations
+of the spindle in all steps. Forces are on the cutter, in the workpiece frame.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 
 def program_numbers(read: ProgramResult) -> dict[str, Any]:
-    """What the program is, in numbers."""
+    """Return the numbers of the program text."""
     program = read.reading.program
     length, rapid = lengths(program), program.motion == RAPID
     cuts = ~rapid & (program.motion != DWELL)
@@ -45,7 +45,7 @@ def program_numbers(read: ProgramResult) -> dict[str, Any]:
 
 
 def operation_numbers(simulation: SimulationResult, time_s: float) -> dict[str, Any]:
-    """The operation in summary.json; ``time_s`` is its time on the machine, with rapids and accelerations."""
+    """Return the operation in summary.json; ``time_s`` is its time on the machine, with rapids and accelerations."""
     removal = simulation.removal
     c = removal.columns
     cuts = (c["chip_volume_mm3"] > 0.0) & ~c["rapid"]
@@ -101,7 +101,7 @@ def operation_numbers(simulation: SimulationResult, time_s: float) -> dict[str, 
 
 
 def _allowed(simulation: SimulationResult) -> dict[str, dict[str, Any]]:
-    """Stress that each cutter may have, and where its strength comes from."""
+    """Return the allowed stress of each cutter, and the source of its strength."""
     return {
         str(n): {
             "mpa": allowed_stress(c),
@@ -115,7 +115,7 @@ def _allowed(simulation: SimulationResult) -> dict[str, dict[str, Any]]:
 
 
 def deflection(simulation: SimulationResult) -> dict[str, Any]:
-    """How far tool and work give way, in summary.json; what was not stated counts as rigid."""
+    """Return the deflection of tool and work for summary.json; what is not stated counts as rigid."""
     c = simulation.removal.columns
     k = int(np.argmax(c["deflection_um"]))
     return {
@@ -129,7 +129,7 @@ def deflection(simulation: SimulationResult) -> dict[str, Any]:
 
 
 def workpiece(simulation: SimulationResult) -> dict[str, Any]:
-    """How far the workpiece gives way where it is cut, in summary.json; empty: no [workpiece] is stated."""
+    """Return the deflection of the workpiece at the cut for summary.json; empty if no [workpiece] is stated."""
     if simulation.workpiece is None:
         return {}
     c = simulation.removal.columns
@@ -142,7 +142,7 @@ def workpiece(simulation: SimulationResult) -> dict[str, Any]:
 
 
 def form_error(simulation: SimulationResult) -> dict[str, Any]:
-    """What giving way leaves on the part (below 0: takes), in summary.json; None: no finished point of a part."""
+    """Return the form error by deflection (below 0: removed) for summary.json; None without finished points."""
     c = simulation.removal.columns
     points = int(c["form_points"].sum()) if "form_points" in c else 0
     if not points:

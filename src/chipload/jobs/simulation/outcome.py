@@ -27,14 +27,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class CollisionCheck:
-    """What cutter, shank and holder were held against, and what they ran into.
+    """Collisions of cutter, shank and holder, and the bodies with which they were compared.
 
     Parameters
     ----------
-    found : what ran into what
-    compared_with : names of what they were held against
+    found : the collisions
+    compared_with : names of the bodies that were compared
     no_holder : tools whose holder is not stated
-    fixtures : what no tool may touch, by name
+    fixtures : bodies that no tool may touch, by name
     """
 
     found: tuple[Collision, ...] = ()
@@ -45,22 +45,22 @@ class CollisionCheck:
 
 @dataclass(frozen=True, eq=False)
 class SimulationResult:
-    """A program that was run through a stock.
+    """Result of the simulation of a program in its stock.
 
     Parameters
     ----------
-    removal : what every step removed and what it cost
-    stock : as it is afterwards
-    machine : whose spindle has to give torque and power
+    removal : removal and loads of every step
+    stock : after the program
+    machine : whose spindle supplies torque and power
     limit_table : limits of the job
     settings : the keys of the operation
     checks : made beside the stated limits, with the cutters and the material
-    collisions : what ran into what
-    left : what is left on the part; None: no part is stated
-    rigid : what was not stated of what gives way, and counts as rigid
+    collisions : of cutter, shank and holder
+    left : differences from the part; None: no part is stated
+    rigid : compliant components that are not stated and count as rigid
     stability : margins and quiet speeds; None: no modes are stated
-    workpiece : how far the workpiece gives way where it is cut; None: no [workpiece] is stated
-    blank : the stock before
+    workpiece : compliance of the workpiece where it is cut; None: no [workpiece] is stated
+    blank : the stock before the program
     """
 
     removal: Removal
@@ -89,14 +89,14 @@ class SimulationResult:
 
 @dataclass(frozen=True, eq=False)
 class ChangedText:
-    """The text of a program with other words, and the program before.
+    """The text of a program with changed words, and the results of the unchanged program.
 
     Parameters
     ----------
-    text : the program with them
+    text : of the changed program
     dialect : of the text
-    before : what the program removes as it was
-    seconds_before : time of the program as it was [s]
+    before : removal of the unchanged program
+    seconds_before : time of the unchanged program [s]
     """
 
     text: str
@@ -107,7 +107,7 @@ class ChangedText:
 
 @dataclass(frozen=True)
 class ToolSpeed:
-    """A new spindle speed of a tool [1/min], and the least margin that its steps are expected to have with it.
+    """A new spindle speed of a tool [1/min], and the least expected margin of its steps at that speed.
 
     ``lines`` are the first and the last line that cut at it.
     """
@@ -125,7 +125,7 @@ class SpeedResult(ChangedText):
 
     Parameters
     ----------
-    tools : what each tool has
+    tools : new speed of each tool or zone
     stability : margins at the programmed speeds
     """
 
@@ -141,11 +141,11 @@ class ProgramResult:
     ----------
     title : name of the job
     name : of the program's file
-    reading : what it does
-    lines, seconds : (m,) lines of the source that move, and their times [s]
-    machine : that it was read for
+    reading : its motions and findings
+    lines, seconds : (m,) lines of the source with motions, and their times [s]
+    machine : for which it was read
     provenance : where the numbers come from
-    simulated : what the program does to its stock; None: it was only read
+    simulated : result of the simulation; None: it was only read
     cutters : by tool number; empty: not known
     """
 

@@ -1,7 +1,7 @@
 """Figures of the part (gouge in red, finished in grey, excess in blue) and of collisions.
 
-Notation: distance [mm] of the part's points from the tool, below 0 gouge, above 0 excess; what is more than ``look`` is
-not known and drawn pale.
+Notation: distance [mm] of the part's points from the tool, below 0 gouge, above 0 excess; a distance of more than
+``look`` is not known and is drawn pale.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LISTED = 200
 
 
 def colours(left: Difference, span: float) -> NDArray[np.uint8]:
-    """(p, 4) colour of each point; ``span`` [mm] of distance is the full colour."""
+    """Return the colour (p, 4) of each point; a distance of ``span`` [mm] has the full colour."""
     known = np.isfinite(left.distance) & (left.over | (left.distance < 0.0))
     share = np.clip(np.where(known, left.distance, 0.0) / span, -1.0, 1.0)
     ends = np.array([GOUGE, DONE, EXCESS], dtype=np.float64)
@@ -39,13 +39,13 @@ def colours(left: Difference, span: float) -> NDArray[np.uint8]:
 
 
 def span_of(left: Difference, columns: Mapping[str, NDArray[Any]]) -> float:
-    """[mm] of distance that is drawn in full colour."""
+    """Return the distance [mm] that is drawn in full colour."""
     found = (part_numbers.worst(left, columns, kind)["max"] for kind in ("gouge_mm", "excess_mm"))
     return float(max(*found, 1e-6))
 
 
 def coloured_mesh(left: Difference, span: float) -> trimesh.Trimesh:
-    """The part for a scene."""
+    """Return the coloured mesh of the part for a scene."""
     mesh = trimesh.Trimesh(left.points, left.faces, process=False)
     mesh.visual.vertex_colors = colours(left, span)
     mesh.metadata["legend"] = legend(
@@ -63,7 +63,7 @@ def section(
     compared_with: tuple[str, ...],
     figures: dict[str, go.Figure],
 ) -> list[str]:
-    """The part of the page on the surface and on collisions."""
+    """Return the report section on the surface of the part and on collisions."""
     body: list[str] = []
     if left is not None:
         what = part_numbers.numbers(left, columns)

@@ -13,7 +13,7 @@ from chipload.simulation.surface import Collision, Difference
 
 
 def worst(left: Difference, columns: Mapping[str, NDArray[Any]], name: str) -> dict[str, Any]:
-    """Deepest gouge or highest excess: ``{max, line, place, t_s}``; line 0 and no place where there is none."""
+    """Return deepest gouge or highest excess as ``{max, line, place, t_s}``; line 0 and no place if there is none."""
     value, step, place = greatest_difference(left, name)
     if place is None:
         return {"max": 0.0, "line": 0, "place": None, "t_s": None}
@@ -21,7 +21,7 @@ def worst(left: Difference, columns: Mapping[str, NDArray[Any]], name: str) -> d
 
 
 def numbers(left: Difference | None, columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-    """Keys of an operation in summary.json; without a part nothing is known of gouges and excess."""
+    """Return the keys of an operation in summary.json; without a part gouge and excess are not known."""
     if left is None:
         nothing = {"max": None, "line": 0, "place": None, "t_s": None}
         return dict.fromkeys(("gouge_mm", "excess_mm"), nothing)
@@ -37,7 +37,7 @@ def numbers(left: Difference | None, columns: Mapping[str, NDArray[Any]]) -> dic
 
 
 def listed(collisions: tuple[Collision, ...], columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
-    """``collisions`` of an operation in summary.json."""
+    """Return ``collisions`` of an operation in summary.json."""
     t, tool = columns["t_s"], columns["tool"]
     return [
         {

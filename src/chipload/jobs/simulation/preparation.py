@@ -36,14 +36,14 @@ LEANING_FLANK, LEANING_BOTTOM = 0.1, 12
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """What a simulation starts from, beside the program and the stock.
+    """Inputs of a simulation beside the stock: program, resolution, part, fixtures and stiffness.
 
     Parameters
     ----------
     program, times : from the first tool on, and the time of each row [s]
-    resolution : how fine it looks
-    stock_points : points of the stock that shank and holder are held against; None: they are not
-    part : that should come out
+    resolution : of the simulation
+    stock_points : points of the stock with which shank and holder are compared; None: they are not compared
+    part : the finished part
     fixtures : their points by name
     stiffness : of cutters, holders, spindle and work
     checks : made by default
@@ -64,7 +64,7 @@ class Bodies:
 def bodies_of(
     job: ProgramJob, reading: ProgramReading, stock: LayeredStock, machine: Machine, material: Material
 ) -> Bodies:
-    """Read what a simulation needs and refuse what it could not use: the check of a job and its run both begin so.
+    """Read the inputs of a simulation and refuse those that it cannot use; check and run of a job begin with it.
 
     Raises
     ------
@@ -88,15 +88,17 @@ def bodies_of(
 
 
 def material_of(job: ProgramJob) -> Material:
-    """The coefficients that the job names."""
+    """Return the force coefficients that the job names."""
     if isinstance(job.material, Path):
         return read_material(job.material)
     return material_named(stated(job.material, "material"))
 
 
 def resolution_of(job: ProgramJob, program: Program) -> Resolution:
-    """What the job states. Where it does not: slices of an upright cutter end where the layers do, and are narrow near
-    the bottom; those of a leaning one do not and are more, of equal angle, for it may cut with any of them.
+    """Return the resolution that the job states, with defaults for the rest.
+
+    By default slices of an upright cutter end where the layers end and are narrow near the bottom. A leaning cutter may
+    cut with any slice: it has more of them, of equal angle, whose ends do not depend on the layers.
     """
     op: SimulateTable = job.table.operation[0]
     smallest = 0.5 * min(c.resolved_diameter for c in job.cutters.values())
@@ -110,15 +112,16 @@ def resolution_of(job: ProgramJob, program: Program) -> Resolution:
 
 
 def timed(reading: ProgramReading, job: ProgramJob, machine: Machine) -> tuple[Program, NDArray[np.float64]]:
-    """The program from its first tool on, and the time of each row; what is left out counts with the first row."""
+    """Return the program from its first tool on and the time of each row; omitted rows count with the first row."""
     program, times = with_tool(reading.program, job.cutters), times_of(reading, machine)
     first = len(times) - len(program)
     return program, np.concatenate([[times[: first + 1].sum()], times[first + 1 :]])
 
 
 def with_tool(program: Program, cutters: Mapping[int, Cutter]) -> Program:
-    """The program without the rapids at its beginning that are made before a tool is in the spindle (T0), unless the
-    job says what is in it.
+    """Return the program without the rapids at its beginning before a tool is in the spindle (T0).
+
+    They stay if the job states the tool that is in the spindle.
     """
     if 0 in cutters:
         return program

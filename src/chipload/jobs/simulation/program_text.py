@@ -21,11 +21,11 @@ WORDS = ("linuxcnc", "fanuc", "sinumerik")
 
 
 def changeable(path: Path, machine: Machine, dialect: str | None, key: str) -> tuple[str, str]:
-    """The text of a program whose words can be changed, byte by byte as in the file, and its dialect.
+    """Return the text of a program whose words can be changed, unchanged byte by byte, and its dialect.
 
     Parameters
     ----------
-    key : of the job that asks for it; its last word says what is changed
+    key : of the job that requires the change; its last word names what is changed
 
     Raises
     ------
@@ -48,12 +48,12 @@ def changeable(path: Path, machine: Machine, dialect: str | None, key: str) -> t
 
 
 def read_as(text: str) -> str:
-    """The text as a reader of the file gets it."""
+    """Return the text as a reader of the file receives it."""
     return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
 def straight(program: Program, words: str) -> None:
-    """Refuse what runs a line twice: it has one word for each of its ``words``.
+    """Refuse a program that runs a line twice, because each of its ``words`` has one value.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def straight(program: Program, words: str) -> None:
 
 
 def differing(old: Program, new: Program, *names: str) -> NDArray[np.bool_]:
-    """(n,) rows of two programs of one length of which one of the named columns differs."""
+    """Return a mask (n,) of the rows of two programs of equal length in which a named column differs."""
     off = np.zeros(len(old), dtype=np.bool_)
     for name in names:
         differs = np.asarray(getattr(old, name)) != np.asarray(getattr(new, name))
@@ -79,9 +79,9 @@ def differing(old: Program, new: Program, *names: str) -> NDArray[np.bool_]:
 
 
 def program_text(changed: ChangedText, unless: str | None) -> str:
-    """The text; where it does not hold, ``unless`` says why behind the words of its first line; no line is added.
+    """Return the text of a program; if it is not proven, ``unless`` states why, in a comment on its first line.
 
-    A line of ``%`` alone is passed over, and Sinumerik's paths.
+    A line of ``%`` alone and Sinumerik's paths do not count as the first line.
     """
     if unless is None:
         return changed.text

@@ -28,13 +28,13 @@ APT = "0-program.apt"
 def program_result(
     capability: str, program: ProgramResult, tracks: tuple[Track, ...], numbers: Mapping[str, Any], note: str = ""
 ) -> Result:
-    """The result of a program.
+    """Return the result of a program.
 
     Parameters
     ----------
     tracks : the one in use first
     numbers : of the operation, beside those of the simulation and the program
-    note : what the report says below the message
+    note : text of the report below the message
     """
     simulation = program.simulated
     own = {"kind": "read"} if simulation is None else operation_numbers(simulation, float(program.seconds.sum()))
@@ -61,13 +61,13 @@ def changed_tracks(
     stability: StabilityResult | None = None,
     blocks: Callable[[], Iterator[Columns]] | None = None,
 ) -> tuple[Track, Track]:
-    """A program with another text, then as it was.
+    """Return the tracks of the changed program and of the unchanged program.
 
     Parameters
     ----------
     name : of the file with the new text
-    not_compared : limits that are checked after the change alone
-    found : beside what the simulation found
+    not_compared : limits that are checked only after the change
+    found : findings beside those of the simulation
     stability : of the program as it was; None: that of the simulation
     blocks : rows of the history after the change; None: those of the simulation
     """
@@ -86,12 +86,12 @@ def changed_tracks(
 
 
 def changed_name(program: ProgramResult, what: str) -> str:
-    """File of the program with its new ``what``."""
+    """Return the file name of the program with its new ``what``."""
     return f"0-{what}{Path(program.name).suffix}"
 
 
 def unchecked(program: ProgramResult) -> tuple[str, ...]:
-    """What was not checked: limits that are not stated, and bodies that nothing was compared with."""
+    """Return what was not checked: limits that are not stated, and bodies that were not compared."""
     simulation = program.simulated
     if simulation is None:
         return ("removal, engagement, forces and collisions: the program was only read, not simulated",)
@@ -113,12 +113,12 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
 
 
 def findings_of(program: ProgramResult, simulation: SimulationResult) -> tuple[Finding, ...]:
-    """What the machine cannot do, then what the simulation found."""
+    """Return the findings: motions beyond the limits of the machine, then those of the simulation."""
     return (*(exceeding(f) for f in program.reading.violations), *simulation_findings(simulation))
 
 
 def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
-    """What the simulation found beside limits: rapids in material, collisions, chips beyond the coefficients."""
+    """Return findings of the simulation: rapids in material, collisions, chips beyond the range of the coefficients."""
     out = [exceeding(f) if f.code == "rapid-cuts" else f for f in simulation.removal.findings]
     for c in simulation.collisions.found:
         place = (float(c.at[0]), float(c.at[1]), float(c.at[2]))
@@ -131,7 +131,7 @@ def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
 
 
 def _bodies(simulation: SimulationResult) -> list[Finding]:
-    """Tools that are bodies without chips, each where it first moves at a feed."""
+    """Return a finding for each tool that is a body without chips, at its first motion at a feed."""
     columns, out = simulation.removal.columns, []
     for number, cutter in sorted(simulation.checks.cutters.items()):
         rows = np.flatnonzero((columns["tool"] == number) & ~columns["rapid"]) if cutter.body else np.zeros(0)
@@ -146,7 +146,7 @@ def _bodies(simulation: SimulationResult) -> list[Finding]:
 
 
 def misplaced(simulation: SimulationResult, limits: tuple[LimitCheck, ...]) -> tuple[Finding, ...]:
-    """The likely cause, if a limit is exceeded because the stock does not lie where the program cuts."""
+    """Return the finding that the stock is probably misplaced, if a limit is exceeded."""
     if all(check.state is not Verdict.EXCEEDS for check in limits):
         return ()
     stock = simulation.stock
@@ -156,7 +156,7 @@ def misplaced(simulation: SimulationResult, limits: tuple[LimitCheck, ...]) -> t
 
 
 def as_posted(limits: tuple[LimitCheck, ...], *of_part: str) -> tuple[LimitCheck, ...]:
-    """Limits of the program as it was, of which those ``of_part`` are not checked: its surface is not compared."""
+    """Return the limit checks of the unchanged program; those ``of_part`` are unproven, its surface is not compared."""
     return tuple(
         LimitCheck(c.name, c.limit, None, Verdict.UNPROVEN, c.track, reason="the part is compared with the new program")
         if c.name in of_part else c
@@ -165,12 +165,12 @@ def as_posted(limits: tuple[LimitCheck, ...], *of_part: str) -> tuple[LimitCheck
 
 
 def exceeding(f: Finding) -> Finding:
-    """A finding that counts as a limit that is exceeded."""
+    """Return a finding with the severity of an exceeded limit."""
     return Finding(f.code, f.line, f.text, Severity.EXCEEDS, f.place, f.row)
 
 
 def maps_of(simulation: SimulationResult | None) -> tuple[SurfaceMap, ...]:
-    """Gouge below 0 and excess above on the part."""
+    """Return the surface maps: gouge (below 0) and excess (above 0) on the part, and the deformed workpiece."""
     if simulation is None:
         return ()
     maps, left = _bent(simulation), simulation.left
@@ -182,7 +182,7 @@ def maps_of(simulation: SimulationResult | None) -> tuple[SurfaceMap, ...]:
 
 
 def _bent(simulation: SimulationResult) -> tuple[SurfaceMap, ...]:
-    """Displacement of the workpiece in its worst step."""
+    """Return the map of the displacement of the workpiece in its worst step."""
     bent = None if simulation.workpiece is None else simulation.workpiece.bent
     if bent is None:
         return ()

@@ -1,4 +1,4 @@
-"""Rows of the history of a program: a row a step of its simulation, or a row a motion where it was only read."""
+"""History of a program: a row for each step of its simulation, or for each motion of a program that was only read."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HISTORY_ROWS = 65_536
 
 
 def step_rows(simulation: SimulationResult, removal: Removal | None = None) -> Iterator[dict[str, NDArray[Any]]]:
-    """A row a step, some ten thousand rows at a time; ``removal`` None: that of the simulation."""
+    """Yield a row for each step in blocks of about ten thousand; ``removal`` None: that of the simulation."""
     own = removal or simulation.removal
     names = np.array([label or "program" for label in own.labels], dtype=object)
     at = 0
@@ -42,5 +42,5 @@ def step_rows(simulation: SimulationResult, removal: Removal | None = None) -> I
 
 
 def motion_rows(read: ProgramResult) -> Columns:
-    """A row a motion of the tip, or a chord of an arc, columns by name."""
+    """Return columns by name with a row for each motion of the tip or chord of an arc."""
     return motion_columns(read.reading.program, times_of(read.reading, read.machine))

@@ -52,12 +52,12 @@ SHARE = 0.2 / 3.0
 
 
 def machine_of(job: ProgramJob) -> Machine:
-    """The machine that the job names."""
+    """Return the machine that the job names."""
     return machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
 
 
 def read_for(job: ProgramJob, machine: Machine, progress: Progress = silent, text: str | None = None) -> ProgramReading:
-    """Read the program of a job for a machine; ``text`` in place of its file."""
+    """Read the program of a job for a machine; ``text`` replaces the content of its file."""
     table = job.table.program
     return read_program(
         job.program_file,
@@ -77,7 +77,7 @@ def read_for(job: ProgramJob, machine: Machine, progress: Progress = silent, tex
 def program_of(
     job: ProgramJob, machine: Machine, reading: ProgramReading, simulated: SimulationResult | None = None
 ) -> ProgramResult:
-    """The program of a job that was read, with its times, and with what its numbers come from."""
+    """Return the program of a job as it was read, with its times and its provenance."""
     lines, seconds = line_times(reading, machine)
     files: dict[str, Path] = {"program": job.program_file}
     named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
@@ -96,7 +96,7 @@ def program_of(
 
 
 def check_lines(job: ProgramJob, done: ProgramResult, passes: int) -> tuple[list[str], bool]:
-    """What the program and the other files of a job hold, and what its simulation in so many passes needs."""
+    """Return lines on the files of a job and on time and memory of its simulation, and whether the program is valid."""
     needs = []
     if job.simulates:
         stock, material = stock_body(job, done.reading.program), material_of(job)
@@ -110,7 +110,7 @@ def check_lines(job: ProgramJob, done: ProgramResult, passes: int) -> tuple[list
 
 
 def _step_times(job: ProgramJob, program: Program, stock: LayeredStock) -> tuple[float, float]:
-    """Processor time of a step [s], least and greatest, by the engine that will simulate most of a program."""
+    """Return the least and greatest processor time of a step [s] by the engine that will simulate most of a program."""
     bodies = any(c.body and n in program.tool for n, c in job.cutters.items())
     if job.table.operation[0].engine == "layers" or stock.cut.any() or bodies:
         return QUICK, SLOW
@@ -125,7 +125,7 @@ def _step_times(job: ProgramJob, program: Program, stock: LayeredStock) -> tuple
 def text_to_change(
     job: ProgramJob, reading: ProgramReading, stock: LayeredStock, machine: Machine, material: Material, key: str
 ) -> tuple[str, str]:
-    """The text of a program whose words ``key`` of the operation changes, and its dialect.
+    """Return the text of a program whose words the key ``key`` of the operation changes, and its dialect.
 
     Raises
     ------
@@ -159,8 +159,9 @@ def simulated(
     progress: Progress,
     workers: Workers | None = None,
 ) -> SimulationResult:
-    """The program, run through the stock of the job; ``compliance``: of the workpiece, None: not known yet;
-    ``workers``: in place of those that the operation states.
+    """Simulate the program in the stock of the job.
+
+    ``compliance`` is that of the workpiece (None: not known yet); ``workers`` replace those of the operation.
     """
     op: SimulateTable = job.table.operation[0]
     bodies = bodies_of(job, reading, stock, machine, material)
@@ -244,7 +245,7 @@ def simulated(
 
 
 def passes_key(job: ProgramJob, program: Program) -> str:
-    """A hash of what every pass over the steps of a program depends on."""
+    """Return a hash of all inputs on which the passes over the steps of a program depend."""
     op: SimulateTable = job.table.operation[0]
     return digest(program, job.cutters, op.step_mm, op.tolerance_mm, versions(), sources())
 
@@ -257,11 +258,11 @@ def compliance_of_workpiece(
     material: Material,
     progress: Progress,
 ) -> WorkpieceCompliance | None:
-    """How the workpiece gives way where the program cuts it; None: no [workpiece] is stated."""
+    """Return the compliance of the workpiece where the program cuts it; None if no [workpiece] is stated."""
     program, _ = timed(reading, job, machine)
     return workpiece_compliance(job, program, stock, material, resolution_of(job, program), progress)
 
 
 def _no_holder(job: ProgramJob) -> tuple[int, ...]:
-    """Tools whose holder is not stated."""
+    """Return the tools whose holder is not stated."""
     return tuple(n for n, c in sorted(job.cutters.items()) if not c.holder)

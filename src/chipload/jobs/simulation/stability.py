@@ -1,8 +1,8 @@
 """Stability of a simulated program: the margin of every step, its limit, quiet speeds, numbers.
 
-Steps that cut alike are asked once, see :mod:`chipload.stability.grouping`. Thrust is rigid unless a mode moves along
-z; modes have directions in the machine, so that a cutter that leans is not known. The margin has the error of the map
-and that of the force by the resolution of the simulation.
+One calculation serves all steps with the same cut, see :mod:`chipload.stability.grouping`. The axial direction is rigid
+unless a mode moves along z. Modes have directions in the machine, so that the margin of a leaning cutter is not known.
+The error of a margin is that of the map and that of the force by the resolution of the simulation.
 """
 
 from __future__ import annotations
@@ -49,15 +49,15 @@ SPEEDS, ROUND_RPM = 161, 10.0
 
 @dataclass(frozen=True, eq=False)
 class StabilityResult:
-    """What is known of the stability of a program.
+    """Stability of a program: margins of its different cuts, and quiet speeds of its tools.
 
     Parameters
     ----------
     watch : with every different cut
     machine : whose spindle bounds the speeds
-    wanted : the least margin that is wanted
+    wanted : the least required margin
     radii : of the cutters [mm], by tool
-    speeds : least and greatest speed that is asked for [1/min]; None: that of the machine
+    speeds : least and greatest speed to consider [1/min]; None: that of the machine
     """
 
     watch: StabilityWatch
@@ -67,7 +67,7 @@ class StabilityResult:
     speeds: tuple[float | None, float | None] = (None, None)
 
     def reason(self, tools: NDArray[Any]) -> str:
-        """Why margins may be smaller; empty: they are known. ``tools`` that cut."""
+        """Return why margins may be smaller, for the ``tools`` that cut; empty if the margins are known."""
         used = {int(t) for t in tools}
         dynamics = self.watch.dynamics
         other = {f"modes of tool {t}" for t in dynamics.number.keys() | dynamics.modes.keys()} - {
@@ -82,7 +82,7 @@ class StabilityResult:
 
     @cached_property
     def quiet(self) -> Mapping[int, QuietSpeeds]:
-        """Least margins over speeds, by tool."""
+        """Least margins of each tool over spindle speed."""
         out = {}
         for tool in sorted(self.watch.cuts):
             parts = self.watch.parts(tool)
@@ -93,8 +93,9 @@ class StabilityResult:
 
     @cached_property
     def sure(self) -> Mapping[int, Floats]:
-        """Probability of stability over the speeds of :attr:`quiet`, by tool: that of the cut with the least margin at
-        each; empty: spreads of the modes are not stated.
+        """Probability of stability over the speeds of :attr:`quiet`, by tool, of the cut with the least margin at each.
+
+        Empty if spreads of the modes are not stated.
         """
         spread, out = self.watch.dynamics.spread, {}
         if spread is not None:
@@ -106,7 +107,7 @@ class StabilityResult:
         return out
 
     def variance_shares(self, tool: int) -> dict[str, float]:
-        """What makes the cut of a tool that is nearest to chatter unsure: shares of the variance, greatest first."""
+        """Return the variance shares of the cut of a tool that is nearest to chatter, by cause, greatest first."""
         spread, parts = self.watch.dynamics.spread, self.watch.parts(tool)
         if spread is None or parts is None:
             return {}
@@ -120,7 +121,7 @@ class StabilityResult:
 
     @cached_property
     def frequency_share(self) -> float:
-        """Share by which the least margins fall where followed frequencies are off by their error, either way."""
+        """Relative decrease of the least margins if the followed frequencies change by their error either way."""
         watch, worst = self.watch, 0.0
         if not watch.follows or watch.workpiece is None:
             return 0.0
@@ -136,7 +137,7 @@ class StabilityResult:
         return worst
 
     def range_of(self, tool: int) -> tuple[float, float]:
-        """Speeds [rad/s] that machine, job and range of the coefficients allow a tool, but for slow ones."""
+        """Return the range of speeds [rad/s] of a tool by machine, job and coefficients, without very slow speeds."""
         per = rpm_from_rad_s(1.0)
         low, high = (x / per if x is not None else None for x in self.speeds)
         low = max(low or 0.0, self.machine.spindle_min, 0.02 * self.machine.spindle_max)
@@ -161,7 +162,7 @@ def stability_limits(
     direction: str,
     sigma: float,
 ) -> tuple[LimitCheck, ...]:
-    """Checks of :data:`STABILITY_LIMITS`: those that the job states, and a margin of 1 where modes are stated.
+    """Return the checks of :data:`STABILITY_LIMITS`: those of the job, and a margin of 1 if modes are stated.
 
     Parameters
     ----------
@@ -169,7 +170,7 @@ def stability_limits(
     stated : limits of the job
     errors : relative error of columns by the resolution of the simulation
     direction : why the direction of forces is not known; empty: it is
-    sigma : the margin is held at coefficients greater by so many of their standard deviations
+    sigma : number of standard deviations that are added to the coefficients for the margin
     """
     limits = {name: stated[name] for name in STABILITY_LIMITS if name in stated}
     if stability is None:
@@ -211,24 +212,24 @@ def stability_limits(
 
 
 def cutting_rows(columns: Columns) -> NDArray[np.bool_]:
-    """(n,) steps that cut at a feed."""
+    """Return a mask (n,) of the steps that cut at a feed."""
     return np.asarray((np.asarray(columns["chip_areas"]) > 0) & ~np.asarray(columns["rapid"]))
 
 
 def filled_margins(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.float64]:
-    """``stability_margin`` with the greatest where nothing is cut; 0 where it is not known."""
+    """Return ``stability_margin`` with the greatest margin where nothing is cut; 0 where it is not known."""
     margin = np.asarray(columns["stability_margin"])
     return np.asarray(np.where((margin == 0.0) & ~cutting_rows(columns), MOST_MARGIN, margin))
 
 
 def filled_probability(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.float64]:
-    """``stable_probability`` with 1 where nothing is cut."""
+    """Return ``stable_probability`` with 1 where nothing is cut."""
     known = np.asarray(columns[PROBABILITY])
     return np.asarray(np.where((known == 0.0) & ~cutting_rows(columns), 1.0, known))
 
 
 def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str, Any]:
-    """``stability`` of the operation in summary.json: the step nearest to chatter, and quiet speeds of its tool."""
+    """Return ``stability`` of the operation in summary.json: the step nearest to chatter, quiet speeds of its tool."""
     margin = np.asarray(columns["stability_margin"])
     known = np.flatnonzero(margin > 0.0)
     dynamics = stability.watch.dynamics
@@ -288,7 +289,7 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
 
 
 def _followed_numbers(watch: StabilityWatch, columns: Columns, wanted: float) -> dict[str, Any]:
-    """Modes of the workpiece in summary.json, and what its modes before the first cut alone would say."""
+    """Return the modes of the workpiece for summary.json, and the results with its modes before the first cut."""
     margin, line = np.asarray(columns["stability_margin"]), np.asarray(columns["line"])
     steps = np.array(sorted(watch.first_margin), dtype=np.int64)
     first = np.array([watch.first_margin[k] for k in steps.tolist()])
@@ -303,18 +304,18 @@ def _followed_numbers(watch: StabilityWatch, columns: Columns, wanted: float) ->
 
 
 def speed_of(columns: Columns, k: int) -> float:
-    """Spindle speed of a step that cuts [1/min], from its power and mean torque."""
+    """Return the spindle speed [1/min] of a cutting step from its power and mean torque."""
     torque = float(columns["torque_mean_nm"][k])
     return round(rpm_from_rad_s(float(columns["power_w"][k]) / torque), 6) if torque > 0.0 else 0.0
 
 
 def rounded_rpm(speed: float) -> float:
-    """A speed [rad/s] as it is written [1/min]."""
+    """Return a speed [rad/s] rounded as it is written in a program [1/min]."""
     return ROUND_RPM * round(rpm_from_rad_s(speed) / ROUND_RPM)
 
 
 def watch_of(job: ProgramJob, material: Material, workpiece: WorkpieceCompliance | None) -> StabilityWatch | None:
-    """What asks for margins; None: no modes are stated."""
+    """Return the watch that computes the margins of a job; None if no modes are stated."""
     if job.table.dynamics is None:
         return None
     dynamics = dynamics_of(job.table.dynamics, job.path.parent, job.cutters, job.table.workpiece)
@@ -322,7 +323,7 @@ def watch_of(job: ProgramJob, material: Material, workpiece: WorkpieceCompliance
 
 
 def stability_of(job: ProgramJob, watch: StabilityWatch, machine: Machine) -> StabilityResult:
-    """The result of a watch that has seen every step."""
+    """Return the stability result of a watch that has seen every step."""
     wanted = max(job.limits.get("stability_margin", DEFAULT_MARGIN), DEFAULT_MARGIN)
     radii = {n: c.radius for n, c in job.cutters.items()}
     asked = job.table.operation[0].speeds

@@ -36,7 +36,7 @@ MEASURED = 6
 def stability_sections(
     simulation: SimulationResult, speeds: SpeedResult | None, figures: dict[str, go.Figure]
 ) -> list[str]:
-    """The sections of the report; figures are put among ``figures``. Nothing where no modes are stated."""
+    """Return the report sections and add their figures to ``figures``; none if no modes are stated."""
     stability, columns = simulation.stability, simulation.removal.columns
     if stability is None:
         return []
@@ -119,7 +119,7 @@ def stability_sections(
 
 
 def worst_chart(stability: StabilityResult, tool: int) -> StabilityChart | None:
-    """The chart of the cut of a tool that is nearest to chatter; None: it has none."""
+    """Return the stability chart of the cut of a tool that is nearest to chatter; None if the tool has no cut."""
     some = stability.watch.cuts.get(tool, [])
     low, high = stability.range_of(tool)
     if not some or not high > low:
@@ -136,7 +136,7 @@ def worst_chart(stability: StabilityResult, tool: int) -> StabilityChart | None:
 def chart_figure(
     chart: StabilityChart, tool: int, stability: StabilityResult, before: StabilityResult | None
 ) -> go.Figure:
-    """Depth at which the worst cut chatters over speed, with the cuts of the tool, also at its speeds before."""
+    """Plot the critical depth of the worst cut over speed, with the cuts of the tool at new and old speeds."""
     out = go.Figure()
     out.add_trace(
         go.Scatter(
@@ -177,7 +177,7 @@ def chart_figure(
 
 
 def margin_figure(columns: Columns, before: Columns | None, stability: StabilityResult) -> go.Figure:
-    """Margin and surface location error along the path, before and after new speeds."""
+    """Plot margin and surface location error along the path, before and after new speeds."""
     out = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     tracks = [(columns, "after" if before is not None else "program", AFTER)]
     if before is not None:

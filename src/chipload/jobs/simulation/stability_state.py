@@ -31,7 +31,7 @@ Known = dict[int, dict[bytes, tuple[float, ...]]]
 
 
 def _wide(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows (b, :data:`WIDTH`), with columns of 0 where they have less."""
+    """Return rows (b, :data:`WIDTH`), with columns of 0 added to narrower ones."""
     return np.pad(rows, ((0, 0), (0, WIDTH - rows.shape[1])))
 
 
@@ -42,7 +42,7 @@ def asked_bytes(
     columns: int,
     first_margin: Mapping[int, float],
 ) -> bytes:
-    """The file of the different cuts of every tool.
+    """Return the file of the different cuts of every tool.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def asked_bytes(
 def read_asked(
     path: Path, exponents: ArrayLike
 ) -> tuple[Known, dict[int, list[DynamicCuts]], set[int], dict[int, float]]:
-    """What :func:`asked_bytes` wrote: values by key, cuts, leaning tools and the margins with the first modes.
+    """Read a file of :func:`asked_bytes`: values by key, cuts, leaning tools, and margins with the first modes.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""The observer of a simulation that requests the stability of every step and stores the answers.
+"""The watch of a simulation that calculates the stability of every step and stores the results.
 
-Steps that cut alike are asked once, see :mod:`chipload.stability.grouping`; where the modes of the workpiece are
-followed through its removal each step has modes of its own and is asked by itself.
+One calculation serves all steps with the same cut, see :mod:`chipload.stability.grouping`. If the modes of the
+workpiece are followed through the removal, each step has its own modes and its own calculation.
 """
 
 from __future__ import annotations
@@ -44,16 +44,16 @@ UNEVEN = (4, 2)
 
 @dataclass(eq=False)
 class StabilityWatch:
-    """A watch that gives :data:`STABILITY_COLUMNS`, and keeps what it was asked.
+    """A watch that computes :data:`STABILITY_COLUMNS` and stores the results of all different cuts.
 
     Parameters
     ----------
     dynamics : modes by tool
-    material : whose coefficients count
+    material : force coefficients
     workpiece : modes of the workpiece in the state of each step; None: none are known
-    first_margin : of the steps so far, their margin with the modes that the workpiece has before its first cut
-    known : columns of the different cuts of each tool by what they cut, in the order of ``cuts``
-    cut_of, numbers_of : by tool, steps and the numbers of their cuts; and these numbers by what is cut
+    first_margin : by step so far, the margin with the modes that the workpiece has before its first cut
+    known : by tool, the columns of its different cuts by their key, in the order of ``cuts``
+    cut_of, numbers_of : by tool, steps and the numbers of their cuts; and these numbers by the key of the cut
     """
 
     dynamics: Dynamics
@@ -72,7 +72,7 @@ class StabilityWatch:
         return STABILITY_COLUMNS if self.dynamics.spread is None else (*STABILITY_COLUMNS, PROBABILITY)
 
     def __call__(self, cuts: Cuts) -> dict[str, Floats]:
-        """The columns of some steps of one cutter."""
+        """Return the columns of some steps of one cutter."""
         out = np.zeros((len(cuts), len(self.columns)))
         frame, modes = cuts.plain.frames, self.dynamics.modes.get(cuts.tool)
         upright = bool((frame[:, 2, 2] >= UPRIGHT).all())
@@ -109,36 +109,36 @@ class StabilityWatch:
         return dict(zip(self.columns, out.T.copy(), strict=True))
 
     def uneven(self, tool: int) -> bool:
-        """Whether the teeth of a tool are not alike."""
+        """Return whether the teeth of a tool differ."""
         return any(c.uneven for c in self.cuts.get(tool, []))
 
     def spatial(self, tool: int) -> bool:
-        """Whether cutter and workpiece move along the axis as well."""
+        """Return whether cutter and workpiece also move along the axis."""
         return any(c.U.shape[1] == 3 for c in self.cuts.get(tool, []))
 
     def _directions(self, cutter: Cutter, modes: Modes | None) -> int:
-        """3 where a mode moves along the axis and the chip changes by it, or the cutter answers it; else 2."""
+        """Return 3 if a mode moves along the axis, or workpiece modes meet a cutter with a corner radius; else 2."""
         axial = modes is not None and modes.axial
         return 3 if axial or (self.follows and cutter.corner_radius > 0.0) else 2
 
     @property
     def follows(self) -> bool:
-        """Whether modes of the workpiece are known."""
+        """Whether modes of the workpiece are followed through the removal."""
         return self.workpiece is not None and self.dynamics.workpiece_damping is not None
 
     def numbers(self, tool: int) -> tuple[int, ...]:
-        """Number of each mode of the cuts of a tool."""
+        """Return the number of each mode of the cuts of a tool."""
         stated, first = self.dynamics.number.get(tool, ()), self.dynamics.first_followed
         count = self.workpiece.frequency.shape[1] if self.follows and self.workpiece is not None else 0
         return (*stated, *range(first, first + count))
 
     def name_of(self, number: int) -> str | None:
-        """What a mode is called."""
+        """Return the name of a mode."""
         first = self.dynamics.first_followed
         return f"workpiece mode {number - first + 1}" if number >= first else self.dynamics.name.get(number)
 
     def _with_modes(self, some: DynamicCuts, hertz: Floats, shapes: Floats, frame: Floats) -> DynamicCuts:
-        """Cuts with the modes of the workpiece, of each step."""
+        """Return cuts with the modes of the workpiece of each step."""
         U = np.einsum("cai,cik->cak", frame[:, : some.U.shape[1]], shapes)
         damping = np.full(hertz.shape[1], self.dynamics.workpiece_damping)
         return some.with_modes(damping, math.tau * hertz, U)
@@ -146,7 +146,7 @@ class StabilityWatch:
     def _values(
         self, some: DynamicCuts, whole: DynamicCuts, at: NDArray[np.int64], engagement: Any
     ) -> Iterator[tuple[float, ...]]:
-        """The columns of new cuts."""
+        """Return the columns of new cuts."""
         found = stability_margins(some)
         error = np.zeros(len(some))
         if not any(self.material.exponents) and not some.several:
@@ -160,27 +160,27 @@ class StabilityWatch:
         return zip(*(x.tolist() for x in columns), strict=True)
 
     def to_bytes(self) -> bytes:
-        """What it was asked so far, for the state of a run."""
+        """Return the results so far as bytes for the state of a run."""
         return asked_bytes(self.known, self.cuts, self.leaning, len(self.columns), self.first_margin)
 
     def restore(self, path: Path) -> None:
-        """Keep what an earlier run was asked."""
+        """Load the results of an earlier run."""
         self.known, self.cuts, self.leaning, self.first_margin = read_asked(path, self.material.exponents)
 
     def clear(self) -> None:
-        """Keep nothing."""
+        """Delete all stored results."""
         self.known, self.cuts, self.leaning, self.first_margin = {}, {}, set(), {}
         self.cut_of, self.numbers_of = {}, {}
 
     def cuts_of(self, tool: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Steps of a tool that cut, rising, and the number of what each cuts."""
+        """Return the cutting steps of a tool, rising, and the number of the cut of each."""
         some = self.cut_of.get(tool, [])
         steps, numbers = (np.concatenate([x[k] for x in some] or [np.zeros(0, dtype=np.int64)]) for k in range(2))
         order = np.argsort(steps, kind="stable")
         return steps[order], numbers[order]
 
     def parts(self, tool: int) -> DynamicCuts | None:
-        """Cuts of a tool that speeds are looked for with; None: it has none."""
+        """Return the cuts of a tool with which new speeds are searched; None if the tool has no cut."""
         some = self.cuts.get(tool, [])
         if not some:
             return None
@@ -193,12 +193,12 @@ class StabilityWatch:
 
 
 def runs_out(cutter: Cutter) -> bool:
-    """Whether teeth differ by runout."""
+    """Return whether teeth differ by runout."""
     return cutter.flutes > 1 and cutter.runout[0] != 0.0
 
 
 def engaged_edge(cuts: DynamicCuts) -> Floats:
-    """(n,) length of the edge in cut times its immersion, of each cut [mm rad]."""
+    """Return the length of the edge in cut times its immersion for each cut, (n,) [mm rad]."""
     step = np.repeat(np.arange(len(cuts)), np.diff(cuts.start))
     return np.asarray(
         np.bincount(step, (cuts.rows[:, 1] - cuts.rows[:, 0]) * cuts.rows[:, 4], len(cuts)), dtype=np.float64
@@ -206,7 +206,7 @@ def engaged_edge(cuts: DynamicCuts) -> Floats:
 
 
 def relative_covariance(material: Material) -> Floats:
-    """(2, 2) of the tangential and the radial cutting coefficient, over their sizes; 0: the material does not say."""
+    """Return the relative covariance (2, 2) of tangential and radial cutting coefficients; 0 if it is not known."""
     size = np.abs(np.array(material.coefficients[:2]))
     if not material.has_band or not (size > 0.0).all():
         return np.zeros((2, 2))

@@ -1,7 +1,7 @@
 """The stiffness of cutter, holder, spindle and workpiece of a job, as far as it is stated.
 
-Notation: a stiffness that is not stated counts as infinite, so that every deflection is then a lower bound; what was
-taken so is named.
+Notation: a stiffness that is not stated counts as infinite and is named in the result; every deflection is then a lower
+bound.
 
 Reference: [Altintas2012] ch. 2; [Schmitz2009] ch. 9 for the joints.
 """
@@ -33,15 +33,15 @@ MODULI = (50.0, 1000.0)
 
 @dataclass(frozen=True)
 class Stiffness:
-    """What gives way.
+    """Compliant components of a job: cutter, holder and spindle as bars, and the workpiece.
 
     Parameters
     ----------
     bars : by tool number, from the tip to the spindle
     work : compliance of the work [mm/N], the same everywhere, or that of a workpiece in the state of each step; None:
         not stated
-    room : whether the room for chips is stated of a cutter
-    unknown : what was not stated and counts as rigid
+    room : whether a cutter states its chip space
+    unknown : keys that are not stated; their components count as rigid
     """
 
     bars: Mapping[int, tuple[Bar, ...]]
@@ -53,7 +53,7 @@ class Stiffness:
 def stiffness_of(
     table: StiffnessTable | None, cutters: Mapping[int, Cutter], workpiece: StepCompliances | None = None
 ) -> Stiffness:
-    """Bars and joints of every cutter, and the compliance of the work.
+    """Return bars and joints of every cutter, and the compliance of the work.
 
     Raises
     ------
@@ -94,16 +94,14 @@ def stiffness_of(
 
 
 def _part(length: float, diameter: float, modulus: float | None) -> Bar:
-    """A part of a holder, as a solid bar [mm, GPa]."""
+    """Return a part of a holder as a solid bar [mm, GPa]."""
     if modulus is None or math.isinf(modulus):
         return Bar(length, 0.0, RIGID)
     return tube(length, diameter, PER * modulus)
 
 
 def deflecting(stiffness: Stiffness, material: Material) -> Callable[[Cuts], dict[str, Floats]]:
-    """More columns of a simulation: how far tool and work give way in the steps of one cutter, and how full its flutes
-    are where their room is stated.
-    """
+    """Return a watch with the columns of deflection of tool and work, and of flute fill if the chip space is stated."""
 
     def columns(cuts: Cuts) -> dict[str, Floats]:
         work = stiffness.work.at(cuts.step) if isinstance(stiffness.work, StepCompliances) else stiffness.work
@@ -114,7 +112,7 @@ def deflecting(stiffness: Stiffness, material: Material) -> Callable[[Cuts], dic
 
 
 def watched(stiffness: Stiffness, *, formed: bool = False) -> tuple[str, ...]:
-    """Names of the columns that are watched; ``formed``: also those of the form error."""
+    """Return the names of the watched columns; with ``formed`` also those of the form error."""
     work = () if stiffness.work is None else ("deflection_workpiece_um",)
     room = ("flute_fill",) if stiffness.room else ()
     return (
@@ -127,6 +125,6 @@ def watched(stiffness: Stiffness, *, formed: bool = False) -> tuple[str, ...]:
 
 
 def with_columns(removal: Removal, names: tuple[str, ...]) -> Removal:
-    """The same with these columns also where no step cut at all."""
+    """Return a removal that has these columns even if no step cuts."""
     still = {name: np.zeros(len(removal.columns["line"])) for name in names if name not in removal.columns}
     return replace(removal, columns={**removal.columns, **still}) if still else removal

@@ -32,7 +32,7 @@ COARSE = 4.0
 
 
 def part_body(job: ProgramJob) -> trimesh.Trimesh | None:
-    """The part that should come out."""
+    """Return the finished part."""
     table = job.table.part
     if table is None or "part" in job.meshes:
         return job.meshes.get("part")
@@ -40,13 +40,13 @@ def part_body(job: ProgramJob) -> trimesh.Trimesh | None:
 
 
 def machine_table_of(job: ProgramJob, machine: Machine) -> MachineTable | None:
-    """The table of the machine: as the job states it, else as the file of the machine does; None: neither does."""
+    """Return the table of the machine from the job, else from the machine file; None if neither states it."""
     block = job.table.machine_table
     return machine.table if block is None else MachineTable(block.low_mm, block.high_mm, block.spacing_mm)
 
 
 def fixture_points(job: ProgramJob, machine: Machine) -> dict[str, NDArray[np.float64]]:
-    """Points of the fixtures by name."""
+    """Return points of the fixtures by name."""
     keys = [(table.spacing_mm, f"fixture.{k}") for k, table in enumerate(job.table.fixture)]
     if (block := machine_table_of(job, machine)) is not None:
         keys.append((block.spacing, "machine_table" if job.table.machine_table is not None else "machine.table"))
@@ -55,7 +55,7 @@ def fixture_points(job: ProgramJob, machine: Machine) -> dict[str, NDArray[np.fl
 
 
 def fixture_meshes(job: ProgramJob, machine: Machine) -> dict[str, trimesh.Trimesh]:
-    """The fixtures by name, and the table of the machine after them."""
+    """Return the meshes of the fixtures by name, followed by that of the machine table."""
     out = {}
     for k, table in enumerate(job.table.fixture):
         path, key = job.path.parent / table.file, f"fixture.{k}.file"
@@ -69,7 +69,7 @@ def fixture_meshes(job: ProgramJob, machine: Machine) -> dict[str, trimesh.Trime
 
 
 def stock_points(stock: LayeredStock, pitch: float) -> NDArray[np.float64]:
-    """Points [mm] of a grid that lie in the stock."""
+    """Return the points [mm] of a grid that lie in the stock."""
     low, high = (np.array([stock.xs[i], stock.ys[i], stock.bounds[i]]) for i in (0, -1))
     count = float(np.prod(np.ceil((high - low) / pitch)))
     if not count <= MOST_POINTS:
@@ -83,7 +83,7 @@ def stock_points(stock: LayeredStock, pitch: float) -> NDArray[np.float64]:
 
 
 def insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.bool_]]:
-    """Which points [mm] lie in the stock as it is now."""
+    """Return a function that tells which points [mm] lie in the present stock."""
     bounds, sections = np.asarray(stock.bounds), [stock.section(i) for i in range(stock.layers)]
 
     def contains(points: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -98,8 +98,10 @@ def insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.b
 
 
 def stock_body(job: ProgramJob, program: Program) -> LayeredStock:
-    """The stock that the job names: its layers as thin as stated where the cutters come, and some times as thick
-    elsewhere; they end where an upright cutter stands while it cuts level.
+    """Return the stock of the job in layers.
+
+    Layers have the stated thickness where cutters move and are several times as thick elsewhere. They end at the
+    heights at which an upright cutter cuts level.
     """
     table, folder = stated(job.table.stock, "stock"), job.path.parent
     mesh = job.meshes.get("stock")
@@ -123,9 +125,9 @@ def stock_body(job: ProgramJob, program: Program) -> LayeredStock:
 
 
 def layer_thickness(program: Program, cutters: Mapping[int, Cutter], top: float) -> float:
-    """Thickness of layers [mm] where none is stated.
+    """Return the thickness of layers [mm] if none is stated.
 
-    Where at least half of the way at a feed below the top is level, with the axis upright, the layers end at its
+    Where at least half of the path at a feed below the top is level, with the axis upright, the layers end at its
     levels: a tenth (a fifth, where no cutter has a corner or a taper) of the least step down between those that
     have a twentieth of the way, at most :data:`LEVEL` of the smallest diameter. Else a sixteenth of the whole
     depth, at most :data:`SLOPED` of the smallest diameter. At least :data:`THINNEST` of the diameter, and so
@@ -150,7 +152,7 @@ def layer_thickness(program: Program, cutters: Mapping[int, Cutter], top: float)
 
 
 def _lowest(program: Program, cutters: Mapping[int, Cutter]) -> float:
-    """A height [mm] that no cutter comes below at a feed."""
+    """Return a height [mm] below which no cutter moves at a feed."""
     feeds = np.flatnonzero(program.motion != RAPID)
     if len(feeds) == 0:
         return math.inf
@@ -161,7 +163,7 @@ def _lowest(program: Program, cutters: Mapping[int, Cutter]) -> float:
 
 
 def _levels(program: Program, cutters: Mapping[int, Cutter], apart: float) -> NDArray[np.float64]:
-    """Heights [mm] at which an upright cutter moves level at a feed.
+    """Return the heights [mm] at which an upright cutter moves level at a feed.
 
     A cutter that ends in a point leaves a floor only where it goes to and fro for long: of its heights those on which
     its way is longest, none nearer to another than ``apart`` [mm].

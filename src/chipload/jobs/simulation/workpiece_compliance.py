@@ -1,10 +1,10 @@
-"""The deflection of the workpiece of a job, step by step, and its error.
+"""The compliance of the workpiece of a job in the state of each step, and its error.
 
-The program is run ahead, the stock is kept every few steps, and its compliance is solved in a few of these states. What
-the cells do to the result is found at the worst places: there the same states are solved in cells of :data:`COARSER`
-times the side, between the same faces of the part. At an inner corner of 90 degrees the error of a deflection falls
-with the power 1.09 of the side: what is left in the finer cells is then 1 / (COARSER^1.09 - 1) = 1.8 of the
-difference, :data:`CORNER`. Elsewhere it falls faster.
+An additional run of the program stores the stock every few steps, and the compliance is solved in a few of these
+states. The error by the cells is found at the worst places: the same states are solved there in cells of
+:data:`COARSER` times the side, between the same faces of the part. At an inner corner of 90 degrees the error of a
+deflection falls with the power 1.09 of the side: the error of the finer cells is then 1 / (COARSER^1.09 - 1) = 1.8 of
+the difference, :data:`CORNER`. Elsewhere it falls faster.
 
 Reference: [Szabo1991] for the power, twice 0.544.
 """
@@ -53,13 +53,13 @@ STRAINED = 6
 
 @dataclass(frozen=True, eq=False)
 class StrainedSteps:
-    """Steps whose stress in the workpiece is known.
+    """Stress in the workpiece of selected steps.
 
     Attributes
     ----------
     step : (c,) int, rows of the history
     per_force : (c,) float [MPa/N], greatest stress per force of the step
-    place : (c, 3) float [mm], where that is
+    place : (c, 3) float [mm] of that stress
     strength : yield stress [MPa]
     """
 
@@ -69,7 +69,7 @@ class StrainedSteps:
     strength: float
 
     def worst(self, force: Floats) -> tuple[int, float, tuple[float, float, float]]:
-        """Row, stress [MPa] and place of the greatest stress under the greatest force of each step (n,) [N]."""
+        """Return row, stress [MPa] and place of the greatest stress under the greatest force of each step (n,) [N]."""
         stress = self.per_force * force[self.step]
         k = int(np.argmax(stress))
         x, y, z = self.place[k].tolist()
@@ -87,8 +87,8 @@ class WorkpieceCompliance:
     cell : [mm] longest side of the cells
     unknowns : of the state with most
     error : relative error of the greatest deflection, by cells and states
-    state_change : how far the greatest deflection may lie above what was found, as states lie apart, relative
-    findings : material that hangs on nothing
+    state_change : relative amount by which the greatest deflection may exceed the calculated one between two states
+    findings : material that is not connected to a clamp
     bent : the workpiece in its worst step; None: nothing is cut
     modes : of vibration, followed through the removal; None: the density is not stated
     strained : stress of the steps that bend it most and of those with most force; None: no yield stress is stated
@@ -107,7 +107,7 @@ class WorkpieceCompliance:
 
     @property
     def numbers(self) -> Mapping[str, Any]:
-        """What summary.json says of it."""
+        """The numbers for summary.json."""
         return {
             "states": len(self.steps.states),
             "state_change_percent": 100.0 * self.state_change,
@@ -145,7 +145,7 @@ def workpiece_compliance(
     resolution: Resolution,
     progress: Progress = silent,
 ) -> WorkpieceCompliance | None:
-    """Compliance of the workpiece of a job where its program cuts; None: the job has no [workpiece].
+    """Return the compliance of the workpiece where its program cuts; None if the job has no [workpiece].
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def _strained(
     elastic: Elastic,
     strength: float,
 ) -> StrainedSteps:
-    """Stress of the steps that bend the workpiece most, and of those with most force."""
+    """Return the stress of the steps with the greatest deflection of the workpiece, and with the greatest force."""
     lines = ahead.lines
     order = np.argsort(-size_of(found.compliance) * lines.force, kind="stable")
     rows = np.unique(np.concatenate([order[:STRAINED], np.argsort(-lines.force, kind="stable")[:STRAINED]]))
@@ -242,7 +242,7 @@ def _strained(
 
 
 def _force(ahead: CutAhead, row: int) -> Floats:
-    """(3,) greatest force of a step on the workpiece [N], along the mean of its revolution."""
+    """Return the greatest force (3,) [N] of a step on the workpiece, along the mean of its revolution."""
     mean = ahead.mean[row]
     size = float(np.linalg.norm(mean))
     return np.asarray(-mean * (float(ahead.lines.force[row]) / size if size > 0.0 else 0.0))
@@ -255,7 +255,7 @@ def _bent(
     build: Callable[[LayeredStock, CellGrid], CellWorkpiece],
     job: ProgramJob,
 ) -> BentWorkpiece:
-    """The workpiece in the state after its worst step, under the force of that step."""
+    """Return the deformed workpiece in the state after its worst step, under the force of that step."""
     row, stock = int(found.worst[0]), ahead.stocks[int(found.after[0])][2]
     force = _force(ahead, row)
     away = max(cutter.diameter for cutter in job.cutters.values())
@@ -268,7 +268,7 @@ def _cell_error(
     grid: CellGrid,
     build: Callable[[LayeredStock, CellGrid], CellWorkpiece],
 ) -> float:
-    """Error by the greatest relative difference to wider cells at the worst places."""
+    """Return the error by the cells: from the greatest relative difference to wider cells at the worst places."""
     wide, error = grid.wider(COARSER), 0.0
     for state in np.unique(found.after).tolist():
         own = np.flatnonzero(found.after == state)
@@ -281,7 +281,7 @@ def _cell_error(
 def with_compliance_error(
     errors: Mapping[str, float], columns: Columns, compliance: WorkpieceCompliance | None
 ) -> dict[str, float]:
-    """Relative errors of columns, those of deflections with that of the workpiece's compliance beside the force's."""
+    """Return the relative errors of columns; those of deflections include the error of the workpiece's compliance."""
     if compliance is None or not errors:
         return dict(errors)
     work, whole = (float(columns[name].max(initial=0.0)) for name in ("deflection_workpiece_um", "deflection_um"))

@@ -16,7 +16,7 @@ DRAWN = 0.06
 
 
 def workpiece_section(simulation: SimulationResult, figures: dict[str, go.Figure]) -> list[str]:
-    """The part of the report on how far the workpiece gives way; empty: no [workpiece] is stated."""
+    """Return the report section on the deflection of the workpiece; empty if no [workpiece] is stated."""
     own = simulation.workpiece
     if own is None:
         return []
@@ -43,7 +43,7 @@ def workpiece_section(simulation: SimulationResult, figures: dict[str, go.Figure
 
 
 def bent_section(bent: BentWorkpiece, where: str, figures: dict[str, go.Figure]) -> list[str]:
-    """The part of the report on how the workpiece bends at its worst; ``where`` begins a sentence."""
+    """Return the report section on the workpiece in its worst step; ``where`` begins a sentence."""
     x, y, z = bent.place
     return [
         "<h3>Bent at its worst</h3>",
@@ -56,7 +56,7 @@ def bent_section(bent: BentWorkpiece, where: str, figures: dict[str, go.Figure])
 
 
 def _frequencies(modes: FollowedModes, figures: dict[str, go.Figure]) -> list[str]:
-    """Natural frequencies as material is removed."""
+    """Return the report section on natural frequencies during removal."""
     f = modes.state_frequency
     rows = [[str(k + 1), *(f"{value:.4g}" for value in (f[0, k], f[:, k].max(), f[-1, k]))] for k in range(f.shape[1])]
     head = ["mode", "before [Hz]", "greatest [Hz]", "after [Hz]"]
@@ -69,7 +69,7 @@ def _frequencies(modes: FollowedModes, figures: dict[str, go.Figure]) -> list[st
 
 
 def frequency_figure(modes: FollowedModes) -> go.Figure:
-    """Natural frequencies of the workpiece over the volume that is removed."""
+    """Plot the natural frequencies of the workpiece over the removed volume."""
     out = go.Figure()
     for k, f in enumerate(modes.state_frequency.T, 1):
         out.add_trace(
@@ -90,7 +90,7 @@ def _scale(bent: BentWorkpiece) -> float:
 
 
 def bent_figure(bent: BentWorkpiece) -> go.Figure:
-    """The part as it bends in its worst step, scaled, coloured by displacement; the contact and the best support."""
+    """Plot the deformed part in its worst step, scaled, coloured by displacement, with contact and best support."""
     um = 1e3 * np.linalg.norm(bent.moved, axis=1)
     p = (bent.points + _scale(bent) * bent.moved).astype(np.float32)
     i, j, k = bent.faces.T

@@ -1,4 +1,4 @@
-"""What a program of a turning pallet leaves on the walls and the floor of a channel."""
+"""Verification of programs that mill the walls and the floor of a channel: gouges, excess and removal."""
 
 from __future__ import annotations
 

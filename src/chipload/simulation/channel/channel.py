@@ -1,4 +1,4 @@
-"""The independent check of programs that mill between walls: gouges, holder included, and what is left.
+"""Independent check of programs that mill between walls: gouges by the whole tool, and remaining material.
 
 Notation: S points of the true surface, dense, N their normals out of the metal. On each stands a ray S + s N; every
 part of the tool (cutting part, neck, shank, holder) is taken through every row of the program and the exact interval
@@ -61,7 +61,7 @@ class SurfacePoints:
 
 
 def wall(name: str, surface: BSplinePatch, u: Floats, v: Floats) -> SurfacePoints:
-    """The grid u x v (a,), (b,) on a surface.
+    """Return the points of the grid u x v (a,), (b,) on a surface.
 
     Keep off the edges of the metal, as the tip of a blade: a ray inwards from there lies in the face beside it, which a
     cutter may touch.
@@ -85,7 +85,7 @@ def _weights(x: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Remainder:
-    """What a program leaves on a wall, and where it gouges.
+    """Remaining material and gouges of a program on a wall.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Remainder:
         return float(self.gouge[k]), k
 
     def message(self) -> str:
-        """Where the deepest gouge is, in words."""
+        """A sentence that locates the deepest gouge."""
         deep, k = self.deepest
         if self.row[k] < 0:
             return f"{self.wall.name}: nothing comes below the surface"
@@ -143,12 +143,12 @@ class Remainder:
         return out
 
     def excess(self, over: float) -> float:
-        """Share of the area on which more than ``over`` [mm] is left."""
+        """Return the share of the area on which more than ``over`` [mm] is left."""
         return float(self.wall.area[self.rest > over].sum() / self.wall.area.sum())
 
 
 def tool_parts(cutter: CatalogueCutter) -> tuple[Floats, Floats, Ints]:
-    """Heights above the tip (k,) [mm] at which the parts begin, their shapes (k, 10), which of :data:`PARTS`."""
+    """Return heights (k,) [mm] above the tip at which parts begin, shapes (k, 10) and kinds in :data:`PARTS`."""
     top = ENDLESS if cutter.cutting_length is None else cutter.cutting_length
     end = ENDLESS if cutter.reach is None else cutter.reach
     rows = [(0.0, min(top, end), 0.5 * cutter.diameter, cutter.corner_radius, 0)]
@@ -177,7 +177,7 @@ def left_on(
     workers: int = 1,
     progress: Progress = silent,
 ) -> tuple[Remainder, ...]:
-    """What the program leaves on each wall.
+    """Return the remaining material of a program on each wall.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def left_on(
 
 
 def parted_moves(program: Program) -> tuple[Floats, Floats, Ints]:
-    """Tips and axes (m, 3) of the rows in pieces of at most :data:`PIECE`, and the row of each."""
+    """Return tips and axes (m, 3) of the rows in pieces of at most :data:`PIECE`, and the row of each."""
     length = np.linalg.norm(np.diff(program.p_work, axis=0, prepend=program.p_work[:1]), axis=1)
     count = np.maximum(np.ceil(length / PIECE), 1.0).astype(np.int64)
     of = np.repeat(np.arange(len(program)), count)
@@ -254,7 +254,7 @@ def frames_of(normals: Floats) -> Floats:
 
 
 def scallop_numbers(crests: Floats, asked: float) -> dict[str, float]:
-    """Greatest and mean height of the scallops [mm], and the mean as a share of what is asked; 0 where there is none.
+    """Return greatest and mean scallop height [mm], and the mean over the required height; 0 if there are none.
 
     >>> scallop_numbers(np.array([0.25, 0.5]), 0.5)
     {'greatest_mm': 0.5, 'mean_mm': 0.375, 'mean_share': 0.75, 'count': 2.0}

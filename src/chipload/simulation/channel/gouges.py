@@ -1,4 +1,4 @@
-"""The deepest gouge of a program on walls, between bounds: cells of the walls are divided where more may be hidden.
+"""The deepest gouge of a program on walls within bounds, by division of wall cells that may hide a deeper one.
 
 Notation: p a point of a wall, N its normal, s(p) the least s at which the ray p + s N is in a part of the tool in any
 row; -s is the gouge. t [mm] greatest distance along a wall from a point of a cell to its nearest corner q, w [rad]
@@ -80,7 +80,7 @@ class Gouge:
 
     @property
     def message(self) -> str:
-        """Where it is, in words."""
+        """A sentence that locates the gouge."""
         if self.row < 0:
             return "nothing comes below a wall"
         x, y, z = self.place
@@ -103,7 +103,7 @@ class _Cells:
         return self.box[:, [[0, 2], [1, 2], [0, 3], [1, 3]]]
 
     def divided(self, which: NDArray[np.bool_]) -> _Cells:
-        """Each cell of ``which`` in four."""
+        """Return each cell of ``which`` divided into four."""
         box = self.box[which]
         u, v = 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[:, 2] + box[:, 3])
         a, b, c, d = box.T
@@ -115,7 +115,7 @@ def deepest_gouge(
     walls: Sequence[SurfacePoints], program: Program, cutter: CatalogueCutter, depth: float, resolution: float,
     limit: float, step: float = 0.25, tol: float = 1e-5, workers: int = 1,
 ) -> Gouge:  # fmt: skip
-    """The deepest gouge of a program, known to within the resolution, or to be below half of the limit.
+    """Return the deepest gouge of a program, within the resolution or proven to be below half of the limit.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def deepest_gouge(
 
 
 def _height(bend: Floats, grown: float) -> float:
-    """How far above a wall is looked [mm]: a tool that stays higher than a cell may bend (n,) does not gouge there."""
+    """Return the search height [mm] above a wall: a tool higher than the bend (n,) of a cell does not gouge there."""
     most = max(1.0, grown)
     known = bend[np.isfinite(bend)]
     return min(most, max(float(known.max()) + _DIP, _LOW)) if len(known) == len(bend) else most
@@ -230,7 +230,7 @@ def _bounds(low: Floats, t: Floats, w: Floats, r: float, grown: float, depth: fl
 
 
 def _sag(r: float, t: Floats, w: Floats) -> Floats:
-    """How much a ball of radius r that is lowest on a cell is met higher from its nearest corner (n,) [mm]."""
+    """Return the height (n,) [mm] by which a ball of radius r, lowest on a cell, is higher at the nearest corner."""
     wide = t + r * w
     out: Floats = np.where(wide < r, r - np.sqrt(np.maximum(r * r - wide * wide, 0.0)) + 1.5 * t * w, np.inf)
     return out

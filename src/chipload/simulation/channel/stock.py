@@ -1,7 +1,7 @@
-"""What a program takes out of a blank, row after row: rapids and the parts above the cutting part must take nothing.
+"""Removal of a channel program from its blank, row by row; rapids and parts above the cutting part must remove nothing.
 
 Notation: the blank is the part of a body of revolution between two meridional curves, inner and outer, and two angles
-theta, as triangles. It is kept as dexels, a route of its own to the removed volume.
+theta, as triangles. It is stored as dexels, an independent calculation of the removed volume.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class ChannelRemoval:
-    """What a program takes from a blank.
+    """Material that a program removes from a blank.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def taken_from(
     pitch: float,
     progress: Progress = silent,
 ) -> ChannelRemoval:
-    """What a program takes from a blank, with rays ``pitch`` [mm] apart; of dexels, which it cuts, their own.
+    """Return the removal of a program from a blank, with rays ``pitch`` [mm] apart; dexels are cut with their own rays.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The meridian of a cutter's cutting part, and of what stands above it.
+"""Meridians of the cutting part of a tool and of the shank and holder above it.
 
 Notation: rho [mm] distance from the axis, z [mm] height above the tip; an arc is ``[e, f, r, a0, a1]``, its angle
 counted from the direction -z towards +rho.
@@ -47,7 +47,7 @@ class Body:
 
 
 def cutting_part(cutter: Cutter) -> Body:
-    """Tip to end of the flutes.
+    """Return the body from the tip to the end of the flutes.
 
     >>> ball = cutting_part(Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0))
     >>> [abs(ball.distance(*p)) for p in ((0.0, -1.0), (3.0, 1.0), (4.0, 10.0), (7.0, 10.0))]
@@ -64,7 +64,7 @@ def cutting_part(cutter: Cutter) -> Body:
 
 
 def above_cutting(cutter: Cutter) -> Body:
-    """Shank and holder: what must touch nothing.
+    """Return the body of shank and holder, which must not touch anything.
 
     >>> cutter = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, shank_diameter=8.0, holder=((15.0, 40.0), (30.0, 50.0)))
     >>> body = above_cutting(cutter)

@@ -1,4 +1,4 @@
-"""How near every point of a surface comes to a tool that runs a program, and how deep the tool goes into it.
+"""Least distance of every point of a surface from the tool along a program; below 0 the tool enters the surface.
 
 Notation: a step as in :mod:`chipload.simulation.steps`; the distance of a point from the tool is its least over the
 whole program, below 0 where the tool was around the point (gouge), above 0 where material is left over it (excess).
@@ -102,11 +102,11 @@ class LeastDistance:
         return deepest
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """All that it keeps: ``distance``, ``step``, ``first`` (p,) and ``done`` (1,)."""
+        """Return the state: ``distance``, ``step``, ``first`` (p,) and ``done`` (1,)."""
         return {"distance": self.distance, "step": self.step, "first": self.first, "done": np.array([self.done])}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Keep what :meth:`state` gave for the same points, in place of what it keeps."""
+        """Replace the state by one of :meth:`state` for the same points."""
         self.distance, self.step, self.first = (state[k].copy() for k in ("distance", "step", "first"))
         self.done = int(state["done"][0])
 
@@ -140,7 +140,7 @@ def clearance(
     some: NDArray[np.bool_] | None = None,
     workers: int = 2,
 ) -> Clearance:
-    """Least distance of each point from the tool over the steps; O(places x points around the tool).
+    """Return the least distance of each point from the tool over the steps; O(places x points around the tool).
 
     Parameters
     ----------
