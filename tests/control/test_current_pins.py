@@ -207,7 +207,7 @@ def test_the_command(tmp_path, monkeypatch):
     assert {"t_s", "current_a", "speed_rad_s"} <= set(head)
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 2
-    assert "--speed-pin: missing: with --current-pin state both" in done.stderr
+    assert "--speed-pin: missing: state it with --current-pin" in done.stderr
 
 
 def test_pins_of_others_are_read_by_name(monkeypatch, capsys):

@@ -213,7 +213,7 @@ def test_the_command_ends_with_the_reason(tmp_path, monkeypatch):
     out = tmp_path / "out.csv"
     done = CliRunner().invoke(app, ["hal", str(tmp_path / "hal.toml"), "--out", str(out)])
     assert done.exit_code == 3, done.output
-    assert "stopped the machine: machine-data at" in done.stderr
+    assert "machine stopped: machine-data at" in done.stderr
     assert "40 steps, ended: machine-data" in done.stdout
     assert len(out.read_text().splitlines()) == 41
 

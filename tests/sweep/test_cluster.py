@@ -30,7 +30,7 @@ from conftest import EXAMPLES
 from slot_job import slot_job
 from worker_tasks import always_killed, shared_sum
 
-pytest.importorskip("distributed", reason="no distributed: no sweep on a cluster")
+distributed = pytest.importorskip("distributed", reason="no distributed: no sweep on a cluster")
 
 #: 12 small jobs
 OVER = ("limits.torque_nm=0.2,0.3,0.4,0.5,0.6,0.7", "operation.0.step_mm=2.0,1.5")
@@ -175,6 +175,9 @@ def test_strips_of_a_stock_on_a_cluster_that_loses_a_worker_have_the_bytes_of_on
     monkeypatch.setattr(strips, "ROUND", 1)
     alone = run_job(load_job(job, sets))
     rounds, take = list[int](), strips.Strips.next
+    # a strip a worker: both must have come
+    with distributed.Client(address, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=300)
 
     def broken(self, *more):
         if len(rounds) == 1:

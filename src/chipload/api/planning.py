@@ -136,6 +136,7 @@ def plan_thin_wall(
     part: Source | None = None,
     threshold: Source | None = None,
     dynamics: Values | None = None,
+    neighbour: Tables = (),
     checks: Values | None = None,
     folder: str | Path = ".",
     progress: Progress = silent,
@@ -151,9 +152,10 @@ def plan_thin_wall(
     operation : keys of the ``[[operation]]``
     threshold : measured calibration cuts: a file, or keys of ``[threshold]``; None: the threshold is calculated
     dynamics : keys of ``[dynamics]``; None: chatter is not calculated
+    neighbour : keys of each ``[[neighbour]]``, a body beside one wall that no part of a tool may touch
     """
     return run_tables(
         "thinwall", folder, progress, part=part, wall=wall, workpiece=workpiece, machine=machine, material=material,
-        threshold=threshold, cutter=cutters_of(cutter), dynamics=dynamics, operation=operation, limits=limits,
-        checks=checks,
+        threshold=threshold, cutter=cutters_of(cutter), dynamics=dynamics, neighbour=neighbour, operation=operation,
+        limits=limits, checks=checks,
     )  # fmt: skip

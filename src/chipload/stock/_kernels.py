@@ -49,10 +49,7 @@ def axis_distance(px, py, axis, q):
         return math.sqrt(min(wx * wx + wy * wy, vx * vx + vy * vy))
     ex, ey = axis[q, 2] - ax, axis[q, 3] - ay
     ll = ex * ex + ey * ey
-    t = 0.0
-    if ll > 0.0:
-        t = (wx * ex + wy * ey) / ll
-        t = min(1.0, max(0.0, t))
+    t = min(1.0, max(0.0, (wx * ex + wy * ey) / ll)) if ll > 0.0 else 0.0
     dx, dy = wx - t * ex, wy - t * ey
     return math.sqrt(dx * dx + dy * dy)
 
@@ -64,8 +61,7 @@ def axis_row(ax, ay, bx, by, xc, yc, sweep, row):
         ax, ay, bx, by = bx, by, ax, ay
     row[0], row[1], row[2], row[3], row[4], row[5] = ax, ay, bx, by, xc, yc
     row[6] = math.sqrt((ax - xc) ** 2 + (ay - yc) ** 2)
-    row[7] = math.atan2(ay - yc, ax - xc)
-    row[8] = abs(sweep)
+    row[7], row[8] = math.atan2(ay - yc, ax - xc), abs(sweep)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -238,8 +234,7 @@ def covered_by_capsule(q, ox, oy, tx, ty, heading, r, R, axis, out, row):
 def uncut(ox, oy, tx, ty, r, R, whole, grid, head, link, axis, out):
     """Uncut arcs of the circle of radius r about O; ``out[k] = lo, hi`` from T, counter-clockwise; returns the count.
 
-    The front half ``[-pi/2, pi/2]``, or the ``whole`` circle ``[-pi/2, 3 pi/2]``.
-    ``out`` is as of :func:`uncut_between`.
+    The front half ``[-pi/2, pi/2]``, or the ``whole`` circle ``[-pi/2, 3 pi/2]``; ``out`` as of :func:`uncut_between`.
     """
     m = round(math.pi / grid[6])
     return uncut_between(ox, oy, tx, ty, r, R, 0, 2 * m if whole else m, grid, head, link, axis, out)

@@ -268,7 +268,7 @@ def stress(
     """
     point, angle = np.broadcast_arrays(np.asarray(s_point, dtype=np.float64), np.asarray(theta, dtype=np.float64))
     shape, at, angle = point.shape, point.ravel(), angle.ravel()
-    _require_on_wall(modes.shell, at, 0.0)
+    _require_on_wall(modes.shell, np.array([s_force]), length)
     if (length == 0.0 or width == 0.0) and (np.hypot(at - s_force, modes.shell.radius_at(at) * angle) == 0.0).any():
         raise InputError(
             f"shell.stress: s = {s_force:g} mm: under a point force the stress has no limit; give the length and the "

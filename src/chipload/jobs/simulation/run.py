@@ -192,12 +192,8 @@ def simulated(
     if made is not None:
         watches.append(forming(made, gives, material))
 
-    stability_watch = watch_of(job, material, compliance)
-    if stability_watch is not None:
-        watches.append(stability_watch)
-
-    recorder = EngagementRecorder(material)
-    watches.append(recorder)
+    stability_watch, recorder = watch_of(job, material, compliance), EngagementRecorder(material)
+    watches += [recorder] if stability_watch is None else [stability_watch, recorder]
 
     def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
         return {name: values for each in watches for name, values in each(cuts).items()}

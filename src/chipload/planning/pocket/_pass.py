@@ -156,14 +156,8 @@ def run_pass(state, step, limit, most, right, left, lost, tau, slack, R, touch, 
         if not ok:
             reason = BLOCKED
     state[0], state[1], state[2], state[3], state[4], state[5] = x, y, th, bend, idle, last
-    numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5] = (
-        capsule,
-        used,
-        written,
-        done,
-        steps[written, 4],
-        n,
-    )
+    numbers[0], numbers[1], numbers[2] = capsule, used, written
+    numbers[3], numbers[4], numbers[5] = done, steps[written, 4], n
     return reason
 
 

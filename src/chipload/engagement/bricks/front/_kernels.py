@@ -194,6 +194,56 @@ _F1, _F2, _F3, _I1, _I2 = (
 WORK = types.Tuple((_F2, _F1, _F1, _F1, _F2, _F3, _F2, _F1, _F1, _I1, _I1))
 
 
+@njit(cache=True, nogil=True, inline="always")
+def instants_of(k, q, n, count, each, once, state, index, work, nodes, flank, slices, rows, owner, entry, out, entries):
+    """Find what step ``k``, the move ``q``, engages at ``count`` instants and, where it ends in a corner, at its end.
+
+    ``each``: 1, or into how many parts each part was divided, the middles of which are known. Returns the entries so
+    far, -1 where room ran out, and the engaged volume a length at the middle instant, the least and the greatest.
+    """
+    m = index[6][q]
+    tool = index[7][q]
+    c = index[8][tool]
+    at, row_at = work[7], work[9]
+    middle = 0.0
+    low = math.inf
+    high = -math.inf
+    way = m[LENGTH] + m[THETA] * c[FLUTE]
+    ends = 1 if each == 1 and turns(index[6], q, state[0] + n) else 0
+    for i in range(count + ends):
+        # the middle of each part was looked at
+        if each > 1 and i % each == each // 2:
+            continue
+        if entries == len(out):
+            return -1, middle, low, high
+        t = (i + 0.5) / count if i < count else 1.0 - 0.5 / (count * state[6])
+        instant(m, t, c[FLUTE], at)
+        if not once:
+            reach(at, c, index, 0.0, work[4])
+        before = row_at[0]
+        slices_before = row_at[1]
+        if not engaged(at, c, nodes, flank[tool], index, work, slices, rows, owner, row_at, out[entries]):
+            return -1, middle, low, high
+        now = out[entries, 0] / way
+        if i == count // 2:
+            middle = now
+        low = min(low, now)
+        high = max(high, now)
+        if out[entries, 8] > 0.0:
+            low = -math.inf
+        if i == count:
+            row_at[0] = before
+            row_at[1] = slices_before
+        elif row_at[0] > before or out[entries, 8] > 0.0:
+            for d in range(9):
+                out[entries, 10 + d] = at[ALONG_T + d]
+            entry[entries, 0] = k
+            entry[entries, 1] = i
+            entry[entries, 2] = before
+            entries += 1
+    return entries, middle, low, high
+
+
 @njit(
     types.int64(types.int64, _I1, _I1, INDEX, WORK, _F3, _F1, _F2, _F2, _I1, _I2, _F2, _I1),
     cache=True,
@@ -246,42 +296,12 @@ def run(begin, instants, state, index, work, nodes, flank, slices, rows, owner, 
                 instant(m, 0.5, c[FLUTE], at)
                 reach(at, c, index, slack, work[4])
             while count > 0:
-                middle = 0.0
-                low = math.inf
-                high = -math.inf
-                way = m[LENGTH] + m[THETA] * c[FLUTE]
-                ends = 1 if each == 1 and turns(index[6], q, state[0] + n) else 0
-                for i in range(count + ends):
-                    # the middle of each part was looked at
-                    if each > 1 and i % each == each // 2:
-                        continue
-                    if entries == len(out):
-                        return k
-                    t = (i + 0.5) / count if i < count else 1.0 - 0.5 / (count * state[6])
-                    instant(m, t, c[FLUTE], at)
-                    if not once:
-                        reach(at, c, index, 0.0, work[4])
-                    before = row_at[0]
-                    slices_before = row_at[1]
-                    if not engaged(at, c, nodes, flank[tool], index, work, slices, rows, owner, row_at, out[entries]):
-                        return k
-                    now = out[entries, 0] / way
-                    if i == count // 2:
-                        middle = now
-                    low = min(low, now)
-                    high = max(high, now)
-                    if out[entries, 8] > 0.0:
-                        low = -math.inf
-                    if i == count:
-                        row_at[0] = before
-                        row_at[1] = slices_before
-                    elif row_at[0] > before or out[entries, 8] > 0.0:
-                        for d in range(9):
-                            out[entries, 10 + d] = at[ALONG_T + d]
-                        entry[entries, 0] = k
-                        entry[entries, 1] = i
-                        entry[entries, 2] = before
-                        entries += 1
+                entries, middle, low, high = instants_of(
+                    k, q, n, count, each, once, state, index, work, nodes, flank, slices, rows, owner, entry, out,
+                    entries,
+                )  # fmt: skip
+                if entries < 0:
+                    return k
                 if instants[k] == 1 and each == 1:
                     low = min(low, rate[0])
                     high = max(high, rate[0])
