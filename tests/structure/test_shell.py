@@ -171,6 +171,12 @@ def test_stress_needs_a_patch_under_the_force(tube):
     )
 
 
+@pytest.mark.parametrize(("length", "width"), [(0.0, 2.0), (10.0, 0.0)])
+def test_the_greatest_stress_needs_a_patch(tube, length, width):
+    with pytest.raises(InputError, match="under a point force the stress has no limit"):
+        greatest_stress(tube, 50.0, length, width)
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [

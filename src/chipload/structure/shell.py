@@ -268,12 +268,8 @@ def stress(
     """
     point, angle = np.broadcast_arrays(np.asarray(s_point, dtype=np.float64), np.asarray(theta, dtype=np.float64))
     shape, at, angle = point.shape, point.ravel(), angle.ravel()
-    _require_on_wall(modes.shell, np.array([s_force]), length)
-    if (length == 0.0 or width == 0.0) and (np.hypot(at - s_force, modes.shell.radius_at(at) * angle) == 0.0).any():
-        raise InputError(
-            f"shell.stress: s = {s_force:g} mm: under a point force the stress has no limit; give the length and the "
-            "width of the patch on which the cutter acts"
-        )
+    _require_on_wall(modes.shell, at, 0.0)
+    _require_patch(modes.shell, s_force, at, angle, length, width)
     strains = _strains_under_force(modes, s_force, at, angle, length, width)
     return _stress_of(modes.shell, strains, outside).reshape(*shape, 3)
 
@@ -324,7 +320,8 @@ def greatest_stress(modes: Ritz, s_force: float, length: float, width: float, an
     """
     theta = np.concatenate([np.linspace(0.0, math.pi, angles), np.zeros(3)])
     at = np.concatenate([np.zeros(angles), s_force + 0.5 * length * np.array([-1.0, 0.0, 1.0])])
-    _require_on_wall(modes.shell, at, 0.0)
+    _require_on_wall(modes.shell, np.array([s_force]), length)
+    _require_patch(modes.shell, s_force, at, theta, length, width)
     strains = _strains_under_force(modes, s_force, at, theta, length, width)
     both = np.array([equivalent(_stress_of(modes.shell, strains, face)) for face in (True, False)])
     return float(both[:, :angles].max()), float(both[:, angles:].max())
@@ -472,3 +469,12 @@ def _require_on_wall(shell: Shell, s: Floats, length: float) -> None:
     if bad.any():
         patch = f" with a patch of {length:g} mm" if length else ""
         raise InputError(f"shell: s = {s[bad][0]:g} mm{patch}: must lie on the wall, from 0 to {shell.length:g}")
+
+
+def _require_patch(shell: Shell, s_force: float, s: Floats, theta: Floats, length: float, width: float) -> None:
+    """Refuse the stress at the place of a point force."""
+    if (length == 0.0 or width == 0.0) and (np.hypot(s - s_force, shell.radius_at(s) * theta) == 0.0).any():
+        raise InputError(
+            f"shell.stress: s = {s_force:g} mm: under a point force the stress has no limit; give the length and the "
+            "width of the patch on which the cutter acts"
+        )
