@@ -71,11 +71,11 @@ def _surface(k: int, op: Searched, figures: dict[str, go.Figure]) -> list[str]:
         f'<p class="note">{_space_note(op)}</p>',
         figure(f"space-{k}", space_figure(op), figures),
         "<h3>Table angle</h3>",
-        '<p class="note">For each table angle the contact point that admits least; the dashed line is proved: no '
-        "cutter of that corner radius above it mills every reachable contact point there.</p>",
+        '<p class="note">The largest cutter that mills every reachable contact point at a table angle. The dashed line '
+        "is a proved limit: no cutter of that corner radius above it mills all of them.</p>",
         figure(f"table-{k}", table_figure(op), figures),
         "<h3>Contact points at three table angles</h3>",
-        '<p class="note">Of contact points on the middle line the largest cutter of the catalogue at a table angle, '
+        '<p class="note">Contact points on the middle line: the largest cutter of the catalogue at three table angles, '
         "and the widest range of pallet angles in which it is clear of every check point.</p>",
         table(*contact_table(op), numbers=(0, 1)),
         "<h3>Pallet angles</h3>",
