@@ -130,7 +130,7 @@ def test_what_is_left_is_the_stock_of_the_next_job(job: Path, tmp_path: Path) ->
     op = summary["operations"][0]
     # films have no loads that are known: nothing exceeds, nothing more is said
     assert (code, err, summary["verdict"]) == (3, "", "unproven")
-    assert summary["limits"][0]["reason"] == "force is too small to be known"
+    assert summary["limits"][0]["reason"] == "the resolution error of force is not known"
     assert op["stock_before_mm3"] == pytest.approx(left.volume(), rel=1e-12)
     # the slot is cut already, but for films where its edges were made simpler
     assert op["chip_areas_max"] == 0
@@ -313,3 +313,18 @@ def test_what_is_wrong_is_said_in_one_line(job: Path, tmp_path: Path, old: str, 
     assert said in err
     assert all(line.startswith("chipload: ") for line in err.splitlines())
     assert not (tmp_path / "r").exists()
+
+
+def test_a_load_whose_resolution_error_is_not_estimated_is_unproven(job: Path, tmp_path: Path) -> None:
+    key = "operation.0.resolution_error=false"
+    code, _, _ = call("run", job, "--out", tmp_path / "s", "--set", key)
+    assert call("run", job, "--out", tmp_path / "r")[0] == 0
+    summary, whole = summary_of(tmp_path / "s"), summary_of(tmp_path / "r")
+    assert (code, summary["verdict"]) == (3, "unproven")
+    for check, other in zip(summary["limits"], whole["limits"], strict=True):
+        assert (check["name"], check["worst"]) == (other["name"], other["worst"])
+        if check["name"] == "force_n":
+            assert check["state"] == "unproven"
+            assert other["state"] == "holds"
+            assert check["reason"] == "the resolution error of force is not known"
+            assert other["resolution_error"] > 0.0

@@ -119,6 +119,9 @@ def _of_program(loaded: LoadedJob) -> list[str]:
     for k, op in enumerate(job.table.operation):
         if op.corner_slices is None:
             out.append(f"operation.{k}.corner_slices={SLICES}")
+        # nothing in a coarse run is proven; new feeds keep a reserve of the error
+        if op.resolution_error and loaded.capability.name == "program":
+            out.append(f"operation.{k}.resolution_error=false")
     return out
 
 

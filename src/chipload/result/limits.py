@@ -182,7 +182,7 @@ def check_limit(
     """
     column = column_of(name)
     if not math.isfinite(error):
-        error, reason = 0.0, reason or f"{column.label} is too small to be known"
+        error, reason = 0.0, reason or f"the resolution error of {column.label} is not known"
     if column.name not in columns:
         missing = reason or f"{column.label} was not calculated"
         return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason=missing)

@@ -11,6 +11,7 @@ and :mod:`chipload.engagement.immersion.immersion` for the one in force.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -28,7 +29,14 @@ from chipload.errors import Finding, InputError
 from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
-from chipload.simulation.accuracy import COMPARED, energy_balance, layers_again, moves_again, resolution_error
+from chipload.simulation.accuracy import (
+    COMPARED,
+    WITH_FORCE,
+    energy_balance,
+    layers_again,
+    moves_again,
+    resolution_error,
+)
 from chipload.simulation.layer_removal import removed_by_layers
 from chipload.simulation.loads import (
     LOADS,
@@ -223,7 +231,12 @@ def resolution_error_of(
     setting: RunSettings,
     names: Sequence[str] = COMPARED,
 ) -> dict[str, float]:
-    """Return the relative error of the worst value of columns of a removal (:mod:`chipload.simulation.accuracy`)."""
+    """Return the relative error of the worst value of columns of a removal (:mod:`chipload.simulation.accuracy`).
+
+    It is inf, not known, where the resolution states that it is not estimated.
+    """
+    if not setting.resolution.estimated:
+        return dict.fromkeys((*names, *WITH_FORCE), math.inf)
     blocks = StepBlocks(program, setting.resolution.step_mm, setting.resolution.tolerance)
     if setting.moves is None:
         again = layers_again(

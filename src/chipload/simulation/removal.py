@@ -54,6 +54,7 @@ class Resolution:
     rotation : angle between two rotations at which the force is calculated [rad]
     grading : of the slices of a corner, see :func:`chipload.cutter.slices.slices`
     bottom_slices : slices of the bottom line
+    estimated : whether some steps are computed again for the resolution error of the loads
     """
 
     step_mm: float
@@ -63,6 +64,7 @@ class Resolution:
     rotation: float = math.radians(1.0)
     grading: float = 1.0
     bottom_slices: int = 4
+    estimated: bool = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -127,6 +127,11 @@ class SimulateTable(Table):
     flank_mm: Positive | None = Field(
         None, description="length of a slice of the flank; default: half the radius, or a tenth of it if the axis leans"
     )
+    resolution_error: bool = Field(
+        True,
+        description="estimate the error of the loads by steps and slices from some steps that are computed again; "
+        "false: limits on loads are unproven",
+    )
     stock_points_mm: Positive | None = Field(
         None,
         description="distance of the points of the stock that are compared with shank and holder; default: not checked",
