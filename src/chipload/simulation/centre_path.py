@@ -234,8 +234,8 @@ def rim_engagement(
     precision : transitions are halved down to this [rad]
     workers : threads; the answer does not depend on it
     displacement_mm : how far the path is displaced against the initial stock and what it cut before its last
-        ``OWN_MM``, at most ``DISPLACED_MM``: above 0 gives the least engagement that such a displacement makes, below
-        0 the greatest
+        ``OWN_MM``, or before its last motion that does not cut, at most ``DISPLACED_MM``: above 0 gives the least
+        engagement that such a displacement makes, below 0 the greatest
 
     Notes
     -----
@@ -251,7 +251,8 @@ def rim_engagement(
     cut = np.linspace(0, m, max(workers, 1) + 1).astype(int)
     begins = np.concatenate([[0.0], np.cumsum(trail.lengths)])
     behind = begins[k] + w * trail.lengths[k] - OWN_MM
-    own = np.maximum(np.searchsorted(begins, behind, side="right") - 1, 0)
+    away = np.maximum.accumulate(np.where(trail.active, 0, np.arange(len(trail.segments))))
+    own = np.maximum(np.searchsorted(begins, behind, side="right") - 1, away[k])
 
     def run(i: int) -> Any:
         _kernels.rim(
