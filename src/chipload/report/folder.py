@@ -16,6 +16,7 @@ from typing import IO
 
 from chipload.errors import InputError, OutputError
 from chipload.files import cannot_write, exchanged, fresh_folder, read_regular, sweep
+from chipload.memory import return_free_memory
 from chipload.progress import Progress, silent
 from chipload.report.engagement import ENGAGEMENT, engagement_bytes
 from chipload.report.page import page_bytes
@@ -162,6 +163,7 @@ def write_files(
             for k, (name, make) in enumerate(makers):
                 progress(k / (len(makers) + 1), name)
                 _write(fresh / name, make())
+                return_free_memory()
             progress(len(makers) / (len(makers) + 1), "programs")
             for name, data in (more() if more is not None else {}).items():
                 _write(fresh / name, data)

@@ -134,11 +134,12 @@ class MoveRun:
         return self.stock.take(steps.p0, steps.p1, steps.tool, corner_slices=pieces, flank_mm=flank)
 
     def finish(self, stock: LayeredStock, workers: int) -> None:
-        """Remove the swept volume of the moves from the layers, with a number of threads."""
+        """Remove the swept volume of the moves from the layers, with a number of threads, and drop the moves."""
         low = self.stock.lowest()
         at = [i for i, z in enumerate(stock.heights.tolist()) if z > low]
         with ThreadPoolExecutor(workers) as pool:
             shapes = list(pool.map(lambda i: self.stock.outlines(float(stock.heights[i]), 0.5 * self.tolerance), at))
+        self.stock.forget()
         stock.remove_many([i for i, s in zip(at, shapes, strict=True) if not s.is_empty], [s for s in shapes if s])
 
 

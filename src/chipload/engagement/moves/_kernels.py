@@ -432,20 +432,18 @@ def thinned(at, count, ceil, kept, reach):
     return to - at
 
 
-@njit(
-    f"int64({_I2}, int32[::1], float32[::1], int32[::1], float32[::1], {_F2})",
-    cache=True,
-    nogil=True,
-)
-def packed(list_at, kept, reach, new_kept, new_reach, level):
-    """Copy the lists close together into new arrays; the room that they take."""
+@njit(f"int64(int64[::1], {_I2}, int32[::1], float32[::1], {_F2})", cache=True, nogil=True)
+def packed(order, list_at, kept, reach, level):
+    """Move the lists close together in their own arrays; the room that they take. ``order``: the cells by the place of
+    their lists, so that no list is moved over one that still waits.
+    """
     used = 0
-    for cell in range(len(list_at)):
+    for cell in order:
         at = list_at[cell, 0]
         count = thinned(at, list_at[cell, 1], level[cell, 1], kept, reach)
         for k in range(count):
-            new_kept[used + k] = kept[at + k]
-            new_reach[used + k] = reach[at + k]
+            kept[used + k] = kept[at + k]
+            reach[used + k] = reach[at + k]
         list_at[cell, 0] = used
         list_at[cell, 1] = count
         list_at[cell, 2] = count

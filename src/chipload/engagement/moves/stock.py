@@ -35,6 +35,8 @@ Ints = NDArray[np.int64]
 CELL, CELLS = 0.1, 4_000_000
 #: least side of a cell over that
 THIN = 0.1
+#: entries of lists: room that is made at least, and more if the lists take as much
+ROOM = (1 << 17, 1 << 22)
 #: a step is looked at once every so many cutter radii, at its middle at least
 INSTANT = 0.25
 #: instants of a step that is looked at once and does not cut as the one before it, and of one that enters or leaves;
@@ -99,6 +101,13 @@ def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tupl
         np.empty(spans, np.int64), np.empty(spans, np.int64), np.array([0.0, 0.0, 0.0, 0.0]),
         np.empty(2, np.int64),
     )  # fmt: skip
+
+
+def longer(values: NDArray[Any], used: int, count: int) -> NDArray[Any]:
+    """An array of ``count`` values that begins with the first ``used`` of another one."""
+    out = np.empty(count, dtype=values.dtype)
+    out[:used] = values[:used]
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,11 +248,21 @@ class MoveStock:
         self.count = end
 
     def _grow(self) -> None:
-        """Room for lists half as long again, less what is no longer needed."""
-        need = (1 << 17) + 3 * int(self.lists[:, 1].sum()) // 2
-        kept, reach = np.empty(need, dtype=np.int32), np.empty(need, dtype=np.float32)
-        self.used[0] = _kernels.packed(self.lists, self.kept, self.reach, kept, reach, self.level)
-        self.kept, self.reach = kept, reach
+        """Pack the lists where they are, less what is no longer needed, and make room for more of them."""
+        order = np.argsort(self.lists[:, 0], kind="stable")
+        used = int(_kernels.packed(order, self.lists, self.kept, self.reach, self.level))
+        need = used + ROOM[0] + max(used // 8, min(used // 2, ROOM[1]))
+        if need > len(self.kept):
+            # one after the other: the old array of the first is free when the second is made
+            self.kept = longer(self.kept, used, need)
+            self.reach = longer(self.reach, used, need)
+        self.used[0] = used
+
+    def forget(self) -> None:
+        """Drop the index and the moves, which grow with the program, when nothing more is asked of the stock."""
+        self.kept, self.reach = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.float32)
+        self.moves, self.of = np.empty((0, 8)), np.empty(0, dtype=np.int64)
+        self.lists = self.level = self.tops = np.empty(0)
 
     def instants(self, p0: Floats, p1: Floats, tool: Ints) -> Ints:
         """Return the number of instants (n,) at which each step is calculated: odd, to include the middle."""
