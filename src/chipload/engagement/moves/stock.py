@@ -104,8 +104,8 @@ def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tupl
 
 
 def longer(values: NDArray[Any], used: int, count: int) -> NDArray[Any]:
-    """An array of ``count`` values that begins with the first ``used`` of another one."""
-    out = np.empty(count, dtype=values.dtype)
+    """An array of ``count`` rows that begins with the first ``used`` of another one."""
+    out = np.empty((count, *values.shape[1:]), dtype=values.dtype)
     out[:used] = values[:used]
     return out
 
@@ -328,9 +328,10 @@ class MoveStock:
             if state[1] == 1:
                 self._grow()
             else:
-                slices = np.concatenate([slices, np.empty_like(slices)])
-                rows, owner = np.concatenate([rows, np.empty_like(rows)]), np.concatenate([owner, np.empty_like(owner)])
-                entry, out = np.concatenate([entry, np.empty_like(entry)]), np.concatenate([out, np.empty_like(out)])
+                _, _, b, k, m, *_ = state.tolist()
+                slices = longer(slices, k, 2 * len(slices))
+                rows, owner = longer(rows, b, 2 * len(rows)), longer(owner, b, 2 * len(owner))
+                entry, out = longer(entry, m, 2 * len(entry)), longer(out, m, 2 * len(out))
         _, _, b, k, m, *_ = state.tolist()
         step, out = entry[:m, 0], out[:m]
         return Engaged(
