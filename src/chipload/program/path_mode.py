@@ -78,8 +78,10 @@ def _same_rows(column: NDArray[Any]) -> bool:
     if column.strides[0] == 0:
         return True
     bits = column.view(f"u{column.dtype.itemsize}") if column.dtype.kind == "f" else column
-    return bool((bits[-1] == bits[0]).all()) and bool((bits[len(bits) // 2] == bits[0]).all()) and bool(
-        (bits == bits[0]).all()
+    return (
+        bool((bits[-1] == bits[0]).all())
+        and bool((bits[len(bits) // 2] == bits[0]).all())
+        and bool((bits == bits[0]).all())
     )
 
 

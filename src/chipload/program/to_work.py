@@ -9,6 +9,7 @@ control leaves the straight line: the row is cut into pieces. So is an arc whose
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,7 +128,7 @@ def to_work(
         tip, direction = forward(machine, axes, tool, zero)
         tip = np.where(commands.tcp[:, None], _flat(commands, base), tip)
         axis = direction / np.linalg.norm(direction, axis=1)[:, None]
-    columns = {
+    columns: dict[str, Any] = {
         "motion": np.array([WORK_RAPID, WORK_LINE, ARC_CW, WORK_DWELL, WORK_LINE])[commands.motion],
         "p_work": tip,
         "axis": axis,

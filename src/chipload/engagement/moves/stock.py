@@ -262,7 +262,7 @@ class MoveStock:
         """Drop the index and the moves, which grow with the program, when nothing more is asked of the stock."""
         self.kept, self.reach = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.float32)
         self.moves, self.of = np.empty((0, 8)), np.empty(0, dtype=np.int64)
-        self.lists = self.level = self.tops = np.empty(0)
+        self.lists, self.level, self.tops = np.empty((0, 4), dtype=np.int64), np.empty((0, 3)), np.empty(0)
 
     def instants(self, p0: Floats, p1: Floats, tool: Ints) -> Ints:
         """Return the number of instants (n,) at which each step is calculated: odd, to include the middle."""
