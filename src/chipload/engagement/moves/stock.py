@@ -193,12 +193,14 @@ class MoveStock:
         count = np.maximum(np.ceil(size[:2] / side - 1e-9), 1.0)
         self.shape = count.astype(np.int64)
         # of a stock that is thinner than a cell the one cell reaches beyond it: what cutters cover is counted in cells
-        self.grid = np.array([*self.low[:2], *np.maximum(size[:2] / count, THIN * side)])
+        self.grid = np.array(
+            [*self.low[:2], *np.maximum(size[:2] / count, THIN * side), self.low[2], _kernels.HEIGHTS / size[2]]
+        )
         cells = int(self.shape.prod())
         self.level = np.empty((cells, 3))
         self.level[:] = (self.high[2], self.high[2], self.low[2])
         self.lists = np.zeros((cells, 4), dtype=np.int64)
-        self.kept, self.reach = np.empty(1 << 16, dtype=np.int32), np.empty(1 << 16, dtype=np.float32)
+        self.kept, self.reach = np.empty(1 << 16, dtype=np.int32), np.empty(1 << 16, dtype=np.uint16)
         self.used = np.zeros(1, dtype=np.int64)
         self.moves, self.of, self.count = np.empty((1024, 8)), np.empty(1024, dtype=np.int64), 0
         self.body, self.more = body, MORE
@@ -250,7 +252,7 @@ class MoveStock:
     def _grow(self) -> None:
         """Pack the lists where they are, less what is no longer needed, and make room for more of them."""
         order = np.argsort(self.lists[:, 0], kind="stable")
-        used = int(_kernels.packed(order, self.lists, self.kept, self.reach, self.level))
+        used = int(_kernels.packed(order, self.grid, self.lists, self.kept, self.reach, self.level))
         need = used + ROOM[0] + max(used // 8, min(used // 2, ROOM[1]))
         if need > len(self.kept):
             # one after the other: the old array of the first is free when the second is made
@@ -260,7 +262,7 @@ class MoveStock:
 
     def forget(self) -> None:
         """Drop the index and the moves, which grow with the program, when nothing more is asked of the stock."""
-        self.kept, self.reach = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.float32)
+        self.kept, self.reach = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.uint16)
         self.moves, self.of = np.empty((0, 8)), np.empty(0, dtype=np.int64)
         self.lists, self.level, self.tops = np.empty((0, 4), dtype=np.int64), np.empty((0, 3)), np.empty(0)
 
@@ -352,7 +354,7 @@ class MoveStock:
         smallest cutter's circle unless the net would have more than ``NODES`` nodes. Corners are cut off by a chord.
         ``tolerance`` [mm]: by which the outline is made simpler.
         """
-        xs, ys = nodes_of(self.low, self.high, float(self.grid[2:].min()), float(self.cutters[:, 8].min()), tolerance)
+        xs, ys = nodes_of(self.low, self.high, float(self.grid[2:4].min()), float(self.cutters[:, 8].min()), tolerance)
         inside, index = np.empty((len(xs), len(ys)), dtype=np.bool_), self._index()
         outline.marked(z, xs, ys, index, self.tops, inside)
         sides, first = rings(inside)
