@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ class GltfScene:
             "accessors": [],
             "meshes": [],
         }
-        self._data: list[bytes] = []
+        self._data: list[memoryview] = []
 
     def add_lines(
         self, name: str, points: Floats, runs: Sequence[tuple[int, int]], colour: tuple[int, int, int, int]
@@ -75,14 +75,27 @@ class GltfScene:
         extras: Mapping[str, Any] | None = None,
     ) -> None:
         """Add a mesh: ``vertices`` (v, 3) float [mm], ``faces`` (f, 3), ``colour`` (4,) of all or (v, 4)."""
-        if not len(faces):
+        self.add_mesh_of_parts(name, [(vertices, faces)], colour, extras)
+
+    def add_mesh_of_parts(
+        self,
+        name: str,
+        parts: Iterable[tuple[Floats, NDArray[np.int64]]],
+        colour: Sequence[int] | NDArray[np.uint8],
+        extras: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Add meshes as one; each is converted before the next is made."""
+        points, triangles, count = list[NDArray[np.float32]](), list[NDArray[np.uint32]](), 0
+        for vertices, faces in parts:
+            points.append(np.asarray(vertices).astype("<f4"))
+            triangles.append((np.asarray(faces) + count).astype("<u4"))
+            count += len(vertices)
+        if not sum(map(len, triangles)):
             return
-        index = np.asarray(faces).astype("<u4")
+        index = np.concatenate(triangles)
+        triangles.clear()
         at = self._accessor(INDEX, "SCALAR", index, [int(index.max())], [int(index.min())])
-        attributes = {
-            "POSITION": self._points(np.asarray(vertices).astype("<f4")),
-            "COLOR_0": self._colours(colour, len(vertices)),
-        }
+        attributes = {"POSITION": self._points(np.concatenate(points)), "COLOR_0": self._colours(colour, count)}
         primitive = {"attributes": attributes, "indices": at, "mode": TRIANGLES}
         self.tree["meshes"].append({"name": name, "extras": dict(extras or {}), "primitives": [primitive]})
 
@@ -111,7 +124,7 @@ class GltfScene:
 
     def _accessor(self, kind: int, shape: str, data: NDArray[Any], most: list[Any], least: list[Any]) -> int:
         """Add an array of 4-byte rows or entries; its number."""
-        self._data.append(data.tobytes())
+        self._data.append(memoryview(data).cast("B"))
         self.tree["accessors"].append(
             {
                 "componentType": kind,

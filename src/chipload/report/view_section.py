@@ -44,7 +44,7 @@ LARGEST = 3_000_000
 
 def view_section(
     result: Result,
-    scene_glb: bytes,
+    bodies: tuple[SceneBody, ...],
     stocks: ShownStocks,
     blanks: Mapping[str, Blank],
     samples: Mapping[str, EngagementSamples] = MappingProxyType({}),
@@ -53,9 +53,6 @@ def view_section(
     shown = _shown(result)
     if not shown:
         return []
-    # where the stock is shown row by row, that of the end is not
-    without = ("stock",) if all(k in stocks.meshes for k, _, _ in shown) else ()
-    bodies = scene_bodies(scene_glb, TRIANGLES, without) if scene_glb.startswith(GLTF) else ()
     documents: dict[str, str] = {}
     notes, left, length = [bodies_note(bodies)], [], 0
     for k, track, columns in shown:
@@ -88,10 +85,18 @@ def view_section(
     ]
 
 
+def drawn_bodies(result: Result, scene_glb: bytes, stocks: ShownStocks) -> tuple[SceneBody, ...]:
+    """The bodies of a scene.glb that the view draws: without the stock of the end where it is shown row by row."""
+    if not scene_glb.startswith(GLTF):
+        return ()
+    used = [k in stocks.meshes for k, track in enumerate(result.tracks) if track.in_use]
+    return scene_bodies(scene_glb, TRIANGLES, ("stock",) if used and all(used) else ())
+
+
 def _scene(
     result: Result,
     track: Track,
-    columns: Mapping[str, NDArray[Any]],
+    columns: dict[str, NDArray[Any]],
     bodies: Sequence[SceneBody],
     removal: RemovalMesh | None,
     blanks: Mapping[str, Blank],
@@ -138,10 +143,13 @@ def _columns(track: Track) -> dict[str, NDArray[Any]]:
     return {name: np.concatenate(parts.pop(name)) for name in list(parts)}
 
 
-def _path(columns: Mapping[str, NDArray[Any]]) -> ViewPath:
-    place = np.column_stack([columns[c] for c in PLACE]).astype(np.float64, copy=False)
+def _path(columns: dict[str, NDArray[Any]]) -> ViewPath:
+    """The path of a track; its columns are taken out of ``columns``."""
+    place = np.column_stack([columns.pop(c) for c in PLACE]).astype(np.float64, copy=False)
     n = len(place)
     axis = axes_of_rows(columns, n)
+    for name in AXIS:
+        columns.pop(name, None)
     rising = [np.maximum.accumulate(np.nan_to_num(columns.get(c, np.arange(n)).astype(float))) for c in ("t_s", "s_mm")]
     tool = columns["tool"].astype(np.int64) if "tool" in columns else np.zeros(n, dtype=np.int64)
     line = columns["line"].astype(np.int64) if "line" in columns else None

@@ -41,7 +41,7 @@ LAST, LOCK = "last.json", "lock"
 #: files of passes over the steps begin so: they have keys of their own
 PASS = "pass-"
 #: columns that are kept in memory after they were read
-KEPT = 12
+KEPT = 6
 
 Arrays = Mapping[str, NDArray[Any]]
 

@@ -33,6 +33,8 @@ from chipload.result.motions import chords_of
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SPACE_POINTS, STOCK
 from chipload.result.thinning import thinned
 from chipload.simulation.engagement_samples import EngagementSamples
+from chipload.stock.solid import prisms
+from chipload.stock.tile_grid import polygons
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
@@ -288,9 +290,10 @@ def scene_bytes(read: ProgramResult) -> bytes:
     for name, chosen, colour in (("rapids", rapid, (179, 38, 30, 255)), ("path", ~rapid, (34, 120, 132, 255))):
         scene.add_lines(name, points, _runs(chosen), colour)
     if read.simulated is not None:
-        stock = read.simulated.stock.mesh()
-        scene.add_mesh("stock", stock.vertices, stock.faces, (168, 122, 58, 255))
-        del stock
+        stock = read.simulated.stock
+        # layer by layer, as LayeredStock.mesh makes them all
+        layers = (prisms([polygons(stock.section(i))], stock.bounds[i : i + 2]) for i in range(stock.layers))
+        scene.add_mesh_of_parts("stock", ((mesh.vertices, mesh.faces) for mesh in layers), (168, 122, 58, 255))
         for name, mesh in read.simulated.collisions.fixtures.items():
             scene.add_mesh(name, mesh.vertices, mesh.faces, FIXTURE)
         left, columns = read.simulated.left, read.simulated.removal.columns
