@@ -10,7 +10,7 @@ from chipload.report.page import page_bytes
 from chipload.report.presentation import Blank, Presentation
 from chipload.report.removal import removal_meshes
 from chipload.report.view import Buffers, _removal
-from chipload.report.view_section import view_section
+from chipload.report.view_section import drawn_bodies, view_section
 from square import MILL, ROWS, STOCK, VOLUMES, make_cut_result, square_result
 
 
@@ -20,7 +20,9 @@ def written(tmp_path_factory):
     folder = make_cut_result(tmp_path_factory.mktemp("report") / "r")
     result, blanks = square_result("cut"), {"program": Blank(STOCK, {1: MILL})}
     glb = (folder / "scene.glb").read_bytes()
-    view = view_section(result, glb, removal_meshes(result, blanks), blanks)
+    view = view_section(
+        result, drawn_bodies(result, glb, removal_meshes(result, blanks)), removal_meshes(result, blanks), blanks
+    )
     path = folder / "report.html"
     path.write_bytes(page_bytes(result, Presentation(lambda _: [], lambda: glb), view))
     return path
@@ -94,7 +96,9 @@ def test_a_long_report_stays_small() -> None:
     }
     result = replace(one, tracks=(replace(own, limits=(), findings=(), blocks=lambda: iter([table])),))
     blanks = {"program": Blank(STOCK, {1: MILL})}
-    view = view_section(result, _empty(), removal_meshes(result, blanks), blanks)
+    view = view_section(
+        result, drawn_bodies(result, _empty(), removal_meshes(result, blanks)), removal_meshes(result, blanks), blanks
+    )
     report = page_bytes(result, Presentation(lambda _: [], _empty), view)
     assert len(report) < 6_000_000 - 2_000_000  # figures bring plotly, 2 MB
     assert base64.b64decode(view[3].split(">")[1].split("<")[0])
@@ -114,7 +118,7 @@ def two_programs():
 def test_each_program_in_use_can_be_chosen(browser, tmp_path) -> None:
     result, blanks, stocks = two_programs()
     glb = (make_cut_result(tmp_path / "r") / "scene.glb").read_bytes()
-    view = view_section(result, glb, stocks, blanks)
+    view = view_section(result, drawn_bodies(result, glb, stocks), stocks, blanks)
     path = tmp_path / "report.html"
     path.write_bytes(page_bytes(result, Presentation(lambda _: [], lambda: glb), view))
     page = browser.new_page()
@@ -137,11 +141,12 @@ def test_each_program_in_use_can_be_chosen(browser, tmp_path) -> None:
 
 
 def test_a_program_that_makes_the_report_too_large_is_named(monkeypatch) -> None:
+    from chipload.report import drawn_bodies
     from chipload.report import view_section as module
 
     result, blanks, stocks = two_programs()
     monkeypatch.setattr(module, "LARGEST", 10_000)
-    view = view_section(result, _empty(), stocks, blanks)
+    view = view_section(result, drawn_bodies(result, _empty(), stocks), stocks, blanks)
     assert "Not in this file, to keep it small: half." in view[1]
     assert len(view) == 4
 
@@ -191,4 +196,6 @@ def test_a_stock_that_cannot_be_drawn_is_told_with_its_reason(tmp_path) -> None:
     notice = page_scene(shown, shown.tracks[0], bodies(shown), "force_n").notice
     assert f"The stock is not drawn: {stocks.refused[0]}." in notice
     glb = (folder / "scene.glb").read_bytes()
-    assert "The stock is not drawn: stock: " in view_section(result, glb, stocks, blanks)[1]
+    assert (
+        "The stock is not drawn: stock: " in view_section(result, drawn_bodies(result, glb, stocks), stocks, blanks)[1]
+    )

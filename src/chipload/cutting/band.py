@@ -132,15 +132,28 @@ def peak_band(
     >>> [x.round(9).tolist() for x in peak_band(slot, mill, plain, [math.pi / 2], [math.pi / 2])]
     [[20.0], [100.0]]
     """
-    loads = _bases_at(bites, cutter, material, at_force)
+    return force_deviation(bites, cutter, material, at_force), torque_deviation(bites, cutter, material, at_torque)
+
+
+def force_deviation(bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
+    """Return the standard deviation (n,) [N] of the size of the force of each step at its rotation, see
+    :func:`peak_band`.
+    """
+    loads = _bases_at(bites, cutter, material, theta)
     force = loads[:, :3] @ np.array(material.coefficients)
     size = np.linalg.norm(force, axis=1)
     along = np.divide(force, size[:, None], out=np.zeros_like(force), where=size[:, None] > 0.0)
-    b = np.einsum("ni,nik->nk", along, loads[:, :3])
-    C = material.variances
-    torque = _bases_at(bites, cutter, material, at_torque)[:, 3]
-    sure = [np.sqrt(np.clip(np.einsum("nk,kl,nl->n", x, C, x), 0.0, None)) for x in (b, torque)]
-    return sure[0], sure[1]
+    return _deviation(np.einsum("ni,nik->nk", along, loads[:, :3]), material)
+
+
+def torque_deviation(bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
+    """Return the standard deviation (n,) [N mm] of the torque of each step at its rotation, see :func:`peak_band`."""
+    return _deviation(_bases_at(bites, cutter, material, theta)[:, 3], material)
+
+
+def _deviation(factors: Floats, material: Material) -> Floats:
+    """Return the standard deviation of loads with the factors (n, 6) of the coefficients."""
+    return np.sqrt(np.clip(np.einsum("nk,kl,nl->n", factors, material.variances, factors), 0.0, None))
 
 
 def _bases_at(bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:

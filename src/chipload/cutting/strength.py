@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.strength import ToolMaterial
 from chipload.cutting import _strength
-from chipload.cutting.levers.levers import greatest_height, has_lever_loads, lever_loads
+from chipload.cutting.levers.levers import greatest_height, has_lever_loads, lever_loads_in_blocks
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
@@ -162,9 +162,8 @@ def cutter_stress(bites: ToothEngagement, cutter: Cutter, material: Material, ro
     if has_lever_loads(bites, cutter, material) and greatest_height(bites) <= at.height[0] * (1.0 + 1e-12):
         # all that cuts is below the sections: the force and its moment about the tip say all
         out = np.empty(len(bites))
-        _strength.greatest_stress(
-            lever_loads(bites, cutter, material, count, np.eye(4)[:2]), at.height, at.diameter, brittle, out
-        )
+        for some, loads in lever_loads_in_blocks(bites, cutter, material, count, np.eye(4)[:2]):
+            _strength.greatest_stress(loads, at.height, at.diameter, brittle, out[some])
         return cutter.strength.concentration * out
     loads = section_loads(bites, cutter, material, np.arange(count) * (pitch / count), at.height)
     stress = normal_stress(loads, at.diameter) if brittle else von_mises_stress(loads, at.diameter)

@@ -26,7 +26,7 @@ The volume that a revolution removes does not depend on runout: sum over j of h_
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -128,6 +128,20 @@ class ToothEngagement:
         if self.frame is None:
             raise InputError("tooth engagement: has no frame: needs the rows T, n and A (n, 3, 3) of each step")
         return self.frame
+
+    def part(self, kept: Ints) -> ToothEngagement:
+        """Return the steps ``kept``, rising numbers: part of what was validated, and not validated again."""
+        count = np.diff(self.start)[kept]
+        start = np.concatenate([[0], np.cumsum(count)])
+        row = np.arange(start[-1]) - np.repeat(start[:-1], count) + np.repeat(self.start[kept], count)
+        frame = None if self.frame is None else self.frame[kept]
+        out = object.__new__(ToothEngagement)
+        columns = (start, self.rows[row], self.tooth[row], self.slice[row], self.slices, frame)
+        for field, value in zip(fields(self), columns, strict=True):
+            if value is not None:
+                value.setflags(write=False)
+            object.__setattr__(out, field.name, value)
+        return out
 
     def chip_max(self) -> Floats:
         """Return the greatest chip thickness (n,) [mm] of each step; 0 where nothing is cut."""

@@ -33,6 +33,9 @@ class PathControl(IntEnum):
     UNPLACED = 4
 
 
+#: rows from which on a column of equal rows is kept as one
+LONG = 1024
+
 PathMode = tuple[float, float, float]
 
 #: of programs that do not say
@@ -42,16 +45,44 @@ FREE: PathMode = (float(PathControl.CONTINUOUS), 0.0, 0.0)
 
 
 def frozen_column(value: ArrayLike, kind: type) -> NDArray[Any]:
-    """The values as an array that nobody can change: itself where that is so already, else a copy."""
-    column: NDArray[Any] = np.asarray(value, dtype=kind, order="C")
-    owner: Any = column if column is value or column.base is value else None
-    while isinstance(owner, np.ndarray):
-        if owner.flags.writeable:
-            column = column.copy()
-            break
-        owner = owner.base
+    """The values as an array that nobody can change: itself where that is so already, else a copy.
+
+    A column of at least ``LONG`` rows that are all the same is kept as one row, which NumPy shows ``n`` times: its
+    stride along the first axis is 0, so that it takes no memory and is not contiguous.
+    """
+    given: NDArray[Any] = np.asarray(value, dtype=kind)
+    kept = (given is value or given.base is value) and _unchangeable(given)
+    if given.ndim and len(given) >= LONG and _same_rows(given):
+        if kept and given.strides[0] == 0:
+            return given
+        row = given[:1].copy()
+        row.setflags(write=False)
+        return np.broadcast_to(row, given.shape)
+    column = given if kept and given.flags.c_contiguous else np.array(given, order="C")
     column.setflags(write=False)
     return column
+
+
+def _unchangeable(column: NDArray[Any]) -> bool:
+    """Whether neither an array nor one that it is a part of can be written."""
+    owner: Any = column
+    while isinstance(owner, np.ndarray):
+        if owner.flags.writeable:
+            return False
+        owner = owner.base
+    return True
+
+
+def _same_rows(column: NDArray[Any]) -> bool:
+    """Whether all rows are the same, bit for bit; the last row is compared first."""
+    if column.strides[0] == 0:
+        return True
+    bits = column.view(f"u{column.dtype.itemsize}") if column.dtype.kind == "f" else column
+    return (
+        bool((bits[-1] == bits[0]).all())
+        and bool((bits[len(bits) // 2] == bits[0]).all())
+        and bool((bits == bits[0]).all())
+    )
 
 
 def mode_column(name: str, values: object, n: int) -> Floats:

@@ -63,16 +63,23 @@ class ProgramReading:
     ----------
     commands : motions of the machine's axes
     program : motions of the tip in the work frame; rows on which a rotary axis moves may be several here
-    axes : (n, 9) float [mm, rad], the machine's own axes at the end of each row of ``commands``
+    machine : on which it was read
+    placed : number of the work offset whose coordinates are those of the workpiece; None: the first that is used
     findings : by the reader
     violations : what the program asks of the machine that it does not give
     """
 
     commands: Commands
     program: Program
-    axes: Floats
+    machine: Machine
+    placed: int | None
     findings: tuple[Finding, ...]
     violations: tuple[Finding, ...]
+
+    @property
+    def axes(self) -> Floats:
+        """(n, 9) float [mm, rad], the machine's own axes at the end of each row of ``commands``; made at each call."""
+        return axes_of(self.commands, self.machine, self.placed)
 
 
 def read_program(
@@ -197,21 +204,21 @@ def _checked(
     placed: int | None = None,
 ) -> ProgramReading:
     """A program held against the limits of a machine."""
-    axes = axes_of(commands, machine, placed)
     violations = [*check_program(program, machine)]
     if machine.chain.rotary:
+        axes = axes_of(commands, machine, placed)
         found = limit_findings(machine, axes, commands.line, placed=bool(work_frame(commands, placed).offset.any()))
         violations += [f for f in found if f.code != "machine-offset"]
         more += tuple(f for f in found if f.code == "machine-offset")
     problems = ("machine-reach", "machine-linear")
     violations += [f for f in more if f.code in problems]
     findings += tuple(f for f in more if f.code not in problems)
-    return ProgramReading(commands, program, axes, findings, tuple(violations))
+    return ProgramReading(commands, program, machine, placed, findings, tuple(violations))
 
 
 def times_of(reading: ProgramReading, machine: Machine) -> Floats:
     """(n,) time of each row of the tip [s], see :mod:`chipload.program.time`."""
-    return row_times(reading.program, machine, reading.commands, reading.axes)
+    return row_times(reading.program, machine, reading.commands, reading.axes if machine.chain.rotary else None)
 
 
 def command_times(commands: Commands, machine: Machine) -> Floats:

@@ -9,6 +9,7 @@ control leaves the straight line: the row is cut into pieces. So is an arc whose
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,8 @@ Ints = NDArray[np.int64]
 
 #: how far the tip may leave its path where a row is cut into pieces [mm]
 TOLERANCE_MM = 1e-3
+#: rows that are taken to the workpiece at once
+ROWS = 1 << 15
 _ROTARY = slice(3, 6)
 _STILL = 1e-12  # [rad] a rotary axis that moves less stands
 
@@ -111,11 +114,12 @@ def to_work(
     zero, shift = _work_zero(machine, base, known)
     commands = chorded(commands, _turning(commands) | spirals(commands, 0.999 * ARC_SKEW_MM), tolerance)
     turning = _turning(commands)
-    axes = commands.machine() + shift
+    # only rows that turn and arcs of a machine with rotary axes are traced by the axes
+    axes = commands.machine() + shift if machine.chain.rotary or turning.any() else np.empty((0, 9))
     tool = np.array([tool_length(machine, f) for f in commands.frames])[commands.frame]
     if not machine.chain.rotary:
         tip = _flat(commands, base)
-        direction = np.tile([0.0, 0.0, 1.0], (len(tip), 1))
+        axis = np.broadcast_to([0.0, 0.0, 1.0], (len(tip), 3))
     else:
         if any(f.rotation for f in commands.frames):
             raise InputError(
@@ -123,10 +127,11 @@ def to_work(
             )
         tip, direction = forward(machine, axes, tool, zero)
         tip = np.where(commands.tcp[:, None], _flat(commands, base), tip)
-    columns = {
+        axis = direction / np.linalg.norm(direction, axis=1)[:, None]
+    columns: dict[str, Any] = {
         "motion": np.array([WORK_RAPID, WORK_LINE, ARC_CW, WORK_DWELL, WORK_LINE])[commands.motion],
         "p_work": tip,
-        "axis": direction / np.linalg.norm(direction, axis=1)[:, None],
+        "axis": axis,
         "spindle": commands.spindle,
         "tool": commands.tool,
         "line": commands.line,
@@ -160,7 +165,12 @@ def _strangers(commands: Commands, machine: Machine) -> tuple[Finding, ...]:
 
 def _turning(commands: Commands) -> NDArray[np.bool_]:
     """(n,) whether a rotary axis moves on each row."""
-    rotary = commands.machine()[:, _ROTARY]
+    rotary = np.empty((len(commands), 3))
+    for k, frame in enumerate(commands.frames):
+        rows = commands.frame == k if len(commands.frames) > 1 else slice(None)
+        # as Frame.to_machine, which turns the linear axes alone
+        own = commands.position[rows, _ROTARY] + frame.shift[_ROTARY]
+        rotary[rows] = own + frame.offset[_ROTARY] + frame.tool[_ROTARY]
     out = np.abs(np.diff(rotary, axis=0, prepend=rotary[:1])).max(axis=1) > _STILL
     return np.asarray(out)
 
@@ -197,10 +207,11 @@ def _flat(commands: Commands, base: Frame) -> Floats:
     own = replace(base, shift=np.zeros(9), tool=np.zeros(9))
     out = np.zeros((len(commands), 3))
     for k, frame in enumerate(commands.frames):
-        rows = commands.frame == k
-        if rows.any():
-            bare = replace(frame, tool=np.zeros(9))
-            out[rows] = own.from_machine(bare.to_machine(commands.position[rows]))[:, :3]
+        bare = replace(frame, tool=np.zeros(9))
+        for at in range(0, len(out), ROWS):
+            rows = at + np.flatnonzero(commands.frame[at : at + ROWS] == k)
+            if len(rows):
+                out[rows] = own.from_machine(bare.to_machine(commands.position[rows]))[:, :3]
     return out
 
 
@@ -209,9 +220,10 @@ def _arcs_to_work(
 ) -> dict[str, Floats | Ints]:
     """Centre, normal and whole turns of the arcs."""
     n = len(commands)
-    centre, normal = np.zeros((n, 3)), np.tile([0.0, 0.0, 1.0], (n, 1))
     arcs = np.flatnonzero(commands.motion == ARC)
+    centre, normal = np.broadcast_to(0.0, (n, 3)), np.broadcast_to([0.0, 0.0, 1.0], (n, 3))
     if len(arcs):
+        centre, normal = centre.copy(), normal.copy()
         first = np.array(PLANE_AXES)[commands.plane[arcs]]
         at = np.array(commands.position[arcs])
         at[np.arange(len(arcs)), first[:, 0]] = commands.centre[arcs, 0]

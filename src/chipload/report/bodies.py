@@ -6,13 +6,15 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+
+from chipload.report.gltf import node_names, selected
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -65,14 +67,24 @@ class SceneBody:
         return np.asarray(self.vertices.max(axis=0))
 
 
-def scene_bodies(glb: bytes, most: int = TRIANGLES) -> tuple[SceneBody, ...]:
+def scene_bodies(glb: bytes, most: int = TRIANGLES, without: Collection[str] = ()) -> tuple[SceneBody, ...]:
     """The bodies of a scene.glb beside path and cutter, none with more than ``most`` triangles.
+
+    Parameters
+    ----------
+    without : kinds of bodies that are not read
 
     Raises
     ------
     Exception
         Of any kind: the file cannot be read.
     """
+    names = node_names(glb)
+    wanted = [name for name in names if not _own(name) and _kind(name) not in without]
+    if not wanted:
+        return ()
+    # only what is read takes memory: the path of a long program is most of its scene
+    glb = glb if len(wanted) == len(names) else selected(glb, frozenset(wanted))
     scene = trimesh.load(io.BytesIO(glb), file_type="glb", force="scene")
     out = []
     for node in scene.graph.nodes_geometry:
@@ -143,9 +155,7 @@ def _body(name: str, mesh: trimesh.Trimesh, most: int) -> SceneBody:
     painted, triangles, moved = (each[0] if (each == each[0]).all() else each), len(faces), 0.0
     if triangles > most:
         vertices, faces, painted, moved = fewer_triangles(vertices, faces, painted, most)
-    plain = _plain(name)
-    kind = "fixture" if plain == MACHINE_TABLE else next((k for k in KINDS if plain.startswith(k)), "body")
-    return SceneBody(name, kind, vertices, faces, painted, triangles, moved, _legend(mesh.metadata))
+    return SceneBody(name, _kind(name), vertices, faces, painted, triangles, moved, _legend(mesh.metadata))
 
 
 def _legend(metadata: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -168,6 +178,16 @@ def _plain(name: str) -> str:
     """A node's name without the number of its operation."""
     head, _, tail = name.partition("-")
     return tail if head.isdigit() and tail else name
+
+
+def _kind(name: str) -> str:
+    """The kind of the body of a node.
+
+    >>> _kind("0-stock"), _kind("hub")
+    ('stock', 'body')
+    """
+    plain = _plain(name)
+    return "fixture" if plain == MACHINE_TABLE else next((k for k in KINDS if plain.startswith(k)), "body")
 
 
 def _own(name: str) -> bool:

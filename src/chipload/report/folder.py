@@ -16,12 +16,14 @@ from typing import IO
 
 from chipload.errors import InputError, OutputError
 from chipload.files import cannot_write, exchanged, fresh_folder, read_regular, sweep
+from chipload.memory import return_free_memory
 from chipload.progress import Progress, silent
+from chipload.report.bodies import SceneBody
 from chipload.report.engagement import ENGAGEMENT, engagement_bytes
 from chipload.report.page import page_bytes
 from chipload.report.presentation import Content, Presentation
 from chipload.report.removal import REMOVAL, removal_bytes, removal_meshes
-from chipload.report.view_section import view_section
+from chipload.report.view_section import drawn_bodies, view_section
 from chipload.result import Result
 from chipload.result.history import maps_bytes, write_history
 from chipload.result.load import HISTORY, MAPS, SUMMARY
@@ -111,11 +113,17 @@ def write_result(result: Result, presentation: Presentation, out: str | Path, pr
     def history(file: IO[bytes]) -> None:
         rows.update(write_history(result, file))
 
-    scene, blanks, samples = cache(presentation.scene), presentation.blanks(), presentation.samples()
+    blanks, samples, bodies = presentation.blanks(), presentation.samples(), list[SceneBody]()
     stocks = cache(lambda: removal_meshes(result, blanks))
 
+    def scene() -> bytes:
+        # the page needs some bodies of it, and a scene may be large: only they are kept
+        shown, glb = stocks(), presentation.scene()
+        bodies.extend(drawn_bodies(result, glb, shown))
+        return glb
+
     def view() -> list[str]:
-        return view_section(result, scene(), stocks(), blanks, samples)
+        return view_section(result, tuple(bodies), stocks(), blanks, samples)
 
     makers: Makers = [
         (HISTORY, lambda: history),
@@ -162,6 +170,7 @@ def write_files(
             for k, (name, make) in enumerate(makers):
                 progress(k / (len(makers) + 1), name)
                 _write(fresh / name, make())
+                return_free_memory()
             progress(len(makers) / (len(makers) + 1), "programs")
             for name, data in (more() if more is not None else {}).items():
                 _write(fresh / name, data)

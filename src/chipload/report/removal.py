@@ -88,17 +88,25 @@ def tool_path(track: Track, blank: Blank) -> ToolPoses | None:
         for name in (*PLACE, *AXIS, "s_mm", "tool"):
             if name in block:
                 parts.setdefault(name, []).append(np.asarray(block[name]))
-    columns = {name: np.concatenate(arrays) for name, arrays in parts.items()}
+    columns = {name: np.concatenate(parts.pop(name)) for name in list(parts)}
     if not set(PLACE) <= set(columns) or len(columns[PLACE[0]]) == 0:
         return None
-    tip = np.column_stack([columns[c] for c in PLACE]).astype(np.float64)
+    tip = np.column_stack([columns[c] for c in PLACE]).astype(np.float64, copy=False)
     n = len(tip)
-    axis = np.column_stack([columns[c] for c in AXIS]) if set(AXIS) <= set(columns) else np.zeros((0, 3))
-    if len(axis) == 0 or np.isnan(axis).any():
-        axis = np.tile([0.0, 0.0, 1.0], (n, 1))
+    axis = axes_of_rows(columns, n)
     only = next(iter(blank.cutters)) if len(blank.cutters) == 1 else 0
     tool = columns["tool"].astype(np.int64) if "tool" in columns else np.full(n, only, dtype=np.int64)
     return ToolPoses(tip, axis, tool, breaks(tip, columns.get("s_mm")))
+
+
+def axes_of_rows(columns: Mapping[str, NDArray[Any]], n: int) -> Floats:
+    """(n, 3) axis of each row: z where the columns do not state it everywhere; one row if all agree."""
+    upright = np.broadcast_to([0.0, 0.0, 1.0], (n, 3))
+    if not n or not set(AXIS) <= set(columns) or any(np.isnan(columns[c]).any() for c in AXIS):
+        return upright
+    if all((columns[c] == columns[c][0]).all() for c in AXIS):
+        return np.broadcast_to([float(columns[c][0]) for c in AXIS], (n, 3))
+    return np.column_stack([columns[c] for c in AXIS])
 
 
 def breaks(place: Floats, s: NDArray[Any] | None) -> NDArray[np.bool_]:

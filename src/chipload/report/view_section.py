@@ -19,7 +19,7 @@ from chipload.report.marks import marks_of
 from chipload.report.operating import COLUMNS as OPERATING
 from chipload.report.operating import operating_points
 from chipload.report.presentation import Blank
-from chipload.report.removal import AXIS, PLACE, ShownStocks, breaks, shapes_of
+from chipload.report.removal import AXIS, PLACE, ShownStocks, axes_of_rows, breaks, shapes_of
 from chipload.report.shown_maps import shown_maps
 from chipload.report.view import Colouring, ViewPath, ViewScene, pointer_parts, scene_document
 from chipload.result import LimitCheck, Result, Track
@@ -44,7 +44,7 @@ LARGEST = 3_000_000
 
 def view_section(
     result: Result,
-    scene_glb: bytes,
+    bodies: tuple[SceneBody, ...],
     stocks: ShownStocks,
     blanks: Mapping[str, Blank],
     samples: Mapping[str, EngagementSamples] = MappingProxyType({}),
@@ -53,7 +53,6 @@ def view_section(
     shown = _shown(result)
     if not shown:
         return []
-    bodies = scene_bodies(scene_glb, TRIANGLES) if scene_glb.startswith(GLTF) else ()
     documents: dict[str, str] = {}
     notes, left, length = [bodies_note(bodies)], [], 0
     for k, track, columns in shown:
@@ -86,10 +85,18 @@ def view_section(
     ]
 
 
+def drawn_bodies(result: Result, scene_glb: bytes, stocks: ShownStocks) -> tuple[SceneBody, ...]:
+    """The bodies of a scene.glb that the view draws: without the stock of the end where it is shown row by row."""
+    if not scene_glb.startswith(GLTF):
+        return ()
+    used = [k in stocks.meshes for k, track in enumerate(result.tracks) if track.in_use]
+    return scene_bodies(scene_glb, TRIANGLES, ("stock",) if used and all(used) else ())
+
+
 def _scene(
     result: Result,
     track: Track,
-    columns: Mapping[str, NDArray[Any]],
+    columns: dict[str, NDArray[Any]],
     bodies: Sequence[SceneBody],
     removal: RemovalMesh | None,
     blanks: Mapping[str, Blank],
@@ -133,15 +140,16 @@ def _columns(track: Track) -> dict[str, NDArray[Any]]:
     for block in track.blocks():
         for name in wanted & set(block):
             parts.setdefault(name, []).append(np.asarray(block[name]))
-    return {name: np.concatenate(arrays) for name, arrays in parts.items()}
+    return {name: np.concatenate(parts.pop(name)) for name in list(parts)}
 
 
-def _path(columns: Mapping[str, NDArray[Any]]) -> ViewPath:
-    place = np.column_stack([columns[c] for c in PLACE]).astype(np.float64)
+def _path(columns: dict[str, NDArray[Any]]) -> ViewPath:
+    """The path of a track; its columns are taken out of ``columns``."""
+    place = np.column_stack([columns.pop(c) for c in PLACE]).astype(np.float64, copy=False)
     n = len(place)
-    axis = np.column_stack([columns[c] for c in AXIS]) if set(AXIS) <= set(columns) else np.zeros((0, 3))
-    if len(axis) == 0 or np.isnan(axis).any():
-        axis = np.tile([0.0, 0.0, 1.0], (n, 1))
+    axis = axes_of_rows(columns, n)
+    for name in AXIS:
+        columns.pop(name, None)
     rising = [np.maximum.accumulate(np.nan_to_num(columns.get(c, np.arange(n)).astype(float))) for c in ("t_s", "s_mm")]
     tool = columns["tool"].astype(np.int64) if "tool" in columns else np.zeros(n, dtype=np.int64)
     line = columns["line"].astype(np.int64) if "line" in columns else None

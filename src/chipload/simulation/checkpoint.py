@@ -41,7 +41,7 @@ LAST, LOCK = "last.json", "lock"
 #: files of passes over the steps begin so: they have keys of their own
 PASS = "pass-"
 #: columns that are kept in memory after they were read
-KEPT = 12
+KEPT = 6
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -107,16 +107,25 @@ def in_rows(columns: Arrays, size: int, names: Sequence[str] | None = None) -> I
     >>> [some["x"].tolist() for some in in_rows({"x": np.arange(5)}, 2)]
     [[0, 1], [2, 3], [4]]
     """
-    held: dict[str, NDArray[Any]] = {}
+    held, count = list[dict[str, NDArray[Any]]](), 0
     whole = {} if isinstance(columns, Stored) else {name: columns[name] for name in names or columns}
     for piece in columns.chunks(names) if isinstance(columns, Stored) else (whole,):
-        held = {k: np.concatenate([held[k], v]) if held else v for k, v in piece.items()}
-        count = len(next(iter(held.values())))
-        for at in range(0, count - size + 1, size):
-            yield {k: v[at : at + size] for k, v in held.items()}
-        held = {k: v[count // size * size :] for k, v in held.items()}
-    if held and len(next(iter(held.values()))):
-        yield held
+        held.append(piece)
+        count += len(next(iter(piece.values())))
+        if count >= size:
+            whole = _one_below_the_other(held)
+            for at in range(0, count - size + 1, size):
+                yield {k: v[at : at + size] for k, v in whole.items()}
+            held, count = [{k: v[count // size * size :].copy() for k, v in whole.items()}], count % size
+    if count:
+        yield _one_below_the_other(held)
+
+
+def _one_below_the_other(pieces: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    """Join the columns of pieces, which are emptied: each column is there twice only while it is joined."""
+    if len(pieces) == 1:
+        return pieces[0]
+    return {k: np.concatenate([p.pop(k) for p in pieces]) for k in list(pieces[0])}
 
 
 class Checkpoint:

@@ -23,6 +23,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.engagement.chips.move import Move
 from chipload.errors import InputError
+from chipload.memory import return_free_memory
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.simulation.checkpoint import Checkpoint, digest
@@ -49,7 +50,7 @@ from chipload.workers import Workers
 Floats = NDArray[np.float64]
 
 #: steps whose columns are kept in memory at most
-MOST = 128 * BLOCK
+MOST = 32 * BLOCK
 #: writing a state takes at most this share of the time
 SHARE = 0.05
 #: what a file of sums says of itself, and its arrays with their numbers of dimensions
@@ -147,6 +148,7 @@ def remove_in_chunks(
         sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, keeps, progress)
     if setting.moves is not None:
         setting.moves.finish(stock, setting.workers)
+        return_free_memory()
     progress(1.0, "removed")
     every: Columns = unfinished.columns() if unfinished.parts else stacked(columns)
     return with_accuracy(removal_of(program, stock, material, sums, every), program, before, setting)
@@ -190,6 +192,7 @@ def _removed(
             if due or waiting >= MOST:
                 unfinished.add(stacked(columns))
                 columns, waiting = [], 0
+                return_free_memory()
             if due:
                 unfinished.commit(state())
                 since = time.monotonic()

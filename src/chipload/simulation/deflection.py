@@ -44,7 +44,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn, in_work
-from chipload.cutting.levers.levers import greatest_height, has_lever_loads, lever_loads
+from chipload.cutting.levers.levers import greatest_height, has_lever_loads, lever_loads, lever_loads_in_blocks
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import tooth_radii
 from chipload.errors import InputError
@@ -261,11 +261,12 @@ def tip_deflections(
     if has_lever_loads(cuts.engagement, cuts.cutter, material) and greatest_height(cuts.engagement) <= bars[0].length:
         # the teeth are all on the first bar
         levers = np.vstack([np.eye(4)[0], tip_compliance(bars)])
-        loads = lever_loads(cuts.engagement, cuts.cutter, material, m, levers)
         if work is None:
-            most = 1e3 * np.hypot(loads[:, 6], loads[:, 7]).max(axis=1)
+            most = np.empty(n)
+            for some, loads in lever_loads_in_blocks(cuts.engagement, cuts.cutter, material, m, levers):
+                most[some] = 1e3 * np.hypot(loads[:, 6], loads[:, 7]).max(axis=1)
             return {"deflection_cutter_um": most, "deflection_um": most}
-        loads = np.swapaxes(loads, 1, 2)
+        loads = np.swapaxes(lever_loads(cuts.engagement, cuts.cutter, material, m, levers), 1, 2)
         force, bent = loads[..., [4, 5, 0]], loads[..., 6:]
     else:
         theta = np.arange(m) * (pitch / m)

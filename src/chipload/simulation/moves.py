@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
-from chipload.cutting.band import deviations, peak_band, turned_basis
+from chipload.cutting.band import deviations, force_deviation, torque_deviation, turned_basis
 from chipload.cutting.material import Material
 from chipload.cutting.revolution.revolution import loads_over_turn
 from chipload.engagement.bricks.stock import BrickStock
@@ -134,11 +134,12 @@ class MoveRun:
         return self.stock.take(steps.p0, steps.p1, steps.tool, corner_slices=pieces, flank_mm=flank)
 
     def finish(self, stock: LayeredStock, workers: int) -> None:
-        """Remove the swept volume of the moves from the layers, with a number of threads."""
+        """Remove the swept volume of the moves from the layers, with a number of threads, and drop the moves."""
         low = self.stock.lowest()
         at = [i for i, z in enumerate(stock.heights.tolist()) if z > low]
         with ThreadPoolExecutor(workers) as pool:
             shapes = list(pool.map(lambda i: self.stock.outlines(float(stock.heights[i]), 0.5 * self.tolerance), at))
+        self.stock.forget()
         stock.remove_many([i for i, s in zip(at, shapes, strict=True) if not s.is_empty], [s for s in shapes if s])
 
 
@@ -308,11 +309,11 @@ def _bands(
     np.add.at(whole, of, basis)
     mean = deviations(whole, material)[:, 3] / 1000.0
     worst = []
-    for column, name in enumerate((FORCE, TORQUE)):
+    for column, (name, deviation) in enumerate(((FORCE, force_deviation), (TORQUE, torque_deviation))):
         kept = np.lexsort((-each[:, name], step))
         kept = kept[np.flatnonzero(np.diff(step[kept], prepend=-1))]
-        some = bites if len(kept) == len(step) else _part(bites, kept)
-        worst.append(peak_band(some, cutter, material, at[kept, 0], at[kept, 1])[column])
+        some = bites if len(kept) == len(step) else bites.part(kept)
+        worst.append(deviation(some, cutter, material, at[kept, column]))
     speed = np.zeros(len(own))
     speed[of] = spindle
     return own, (worst[0], worst[1] / 1000.0, mean, mean * speed)
@@ -444,15 +445,7 @@ def _cuts(
         less = np.where(most[step] > 0.0, np.round(1.0 - found.volume[entries] / most[step], 6), 0.0)
     order = np.lexsort((off, less, force < (1.0 - ALIKE) * greatest[step], step))
     kept = np.sort(order[np.flatnonzero(np.diff(step[order], prepend=-1))])
-    some = plain if len(kept) == len(entries) else _part(plain, kept)
+    some = plain if len(kept) == len(entries) else plain.part(kept)
     at = step[kept]
     way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
     return Cuts(number, cutter, first + at, way, with_runout(some, cutter), some, steps.spindle[at])
-
-
-def _part(bites: ToothEngagement, kept: Ints) -> ToothEngagement:
-    """Some of the steps."""
-    count = np.diff(bites.start)[kept]
-    start = np.concatenate([[0], np.cumsum(count)])
-    row = np.arange(start[-1]) - np.repeat(start[:-1], count) + np.repeat(bites.start[kept], count)
-    return ToothEngagement(start, bites.rows[row], bites.tooth[row], bites.slice[row], bites.slices, bites.frames[kept])

@@ -7,6 +7,7 @@ deflection of the tip has the compliance between z and the tip, a cubic polynomi
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +23,8 @@ Floats = NDArray[np.float64]
 
 #: columns before those of the levers: axial force, torque, moment of the axial force along T and n
 FIXED = 4
+#: steps whose loads are there together
+BLOCK = 512
 
 
 def has_lever_loads(bites: ToothEngagement, cutter: Cutter, material: Material) -> bool:
@@ -62,14 +65,27 @@ def lever_loads(bites: ToothEngagement, cutter: Cutter, material: Material, coun
     >>> found[0, :, 2].round(9).tolist()
     [0.0, 1100.0, 0.0, 0.0, -70.0, 220.0, -70.0, 220.0]
     """
+    out = np.empty((len(bites), FIXED + 2 * len(np.asarray(levers)), count))
+    for some, loads in lever_loads_in_blocks(bites, cutter, material, count, levers):
+        out[some] = loads
+    return out
+
+
+def lever_loads_in_blocks(
+    bites: ToothEngagement, cutter: Cutter, material: Material, count: int, levers: ArrayLike
+) -> Iterator[tuple[slice, Floats]]:
+    """Yield steps and their :func:`lever_loads`, ``BLOCK`` steps at a time: some MB instead of some ten."""
     polys = np.ascontiguousarray(levers, dtype=np.float64)
     alike = cutter.teeth_alike
     whole = count * (cutter.flutes if alike else 1)
     theta = np.arange(whole) * (math.tau / whole)
     table = np.vstack([np.cos(theta), np.sin(theta)])
-    out = np.empty((len(bites), FIXED + 2 * len(polys), count))
-    _kernels.over_turn(
-        bites.start, bites.rows, bites.tooth, bites.slice, bites.slices, table, cutter.flutes, count, alike,
-        np.array(material.law), polys, out,
-    )  # fmt: skip
-    return out
+    rows = (bites.rows, bites.tooth, bites.slice, bites.slices)
+    for at in range(0, len(bites), BLOCK):
+        some = slice(at, min(at + BLOCK, len(bites)))
+        out = np.empty((some.stop - at, FIXED + 2 * len(polys), count))
+        _kernels.over_turn(
+            bites.start[at : some.stop + 1], *rows, table, cutter.flutes, count, alike, np.array(material.law), polys,
+            out,
+        )  # fmt: skip
+        yield some, out

@@ -180,6 +180,12 @@ class BrickStock:
         self.used[0] = index.packed(self.bricks, self.kept, fresh, blocks)
         self.kept = fresh
 
+    def forget(self) -> None:
+        """Drop the index and the moves, which grow with the program, when nothing more is asked of the stock."""
+        self.kept = self.alive = self.blocks = np.empty(0, dtype=np.int32)
+        self.bricks = np.empty((0, 3), dtype=np.int32)
+        self.moves, self.of = np.empty((0, 23)), np.empty(0, dtype=np.int64)
+
     def instants(self, rows: Floats, tool: Ints) -> Ints:
         """Return the number of instants (n,) at which each step is calculated: odd, to include the middle."""
         of = np.array([self.tools[n] for n in tool.tolist()], dtype=np.int64)

@@ -27,8 +27,8 @@ BALL, FLAT = 0.0, 1.0
 MATERIAL, AIR = -2, -1
 #: a list is gone through for moves that no longer count when it is this much longer than after the last time
 SLACK = 8
-#: rounding of what is kept in 4 bytes
-NARROW = 1.3e-7
+#: steps of a height in which the reach of moves is kept, 2 bytes; rounding of a height in steps
+HEIGHTS, ROUNDED = 65535, 1e-2
 
 _F2, _I2 = "float64[:,::1]", "int64[:,::1]"
 
@@ -297,10 +297,20 @@ def swept_by(e, x, y, z, index):
 
 
 @njit(cache=True, nogil=True, inline="always")
+def above(z, grid):
+    """A height in steps of the grid that is above the reach, rounded down, of every move that comes below ``z``.
+
+    Moves that come below the initial body have the reach 0, and are below every height.
+    """
+    return max((z - grid[4] + EPS) * grid[5], 0.0) + ROUNDED
+
+
+@njit(cache=True, nogil=True, inline="always")
 def what_is(x, y, z, index, hint):
     """MATERIAL, AIR, or the number of a move that swept the point; ``hint`` is asked first.
 
-    ``index``: grid, shape, level, list_at, kept, reach, moves, cutter of each, cutters, and of the initial stock low,
+    ``index``: grid (corner and sides of the cells in the plan, height from which the reach of moves is counted, steps
+    in a mm of it), shape, level, list_at, kept, reach, moves, cutter of each, cutters, and of the initial stock low,
     high, first, ids, faces. Its arrays are many numbers to a call: this function, which is called most, has none.
     """
     grid = index[0]
@@ -316,8 +326,9 @@ def what_is(x, y, z, index, hint):
     reach = index[5]
     lists = index[3]
     at = lists[cell, 0]
+    high = above(z, grid)
     for k in range(at + lists[cell, 1] - 1, at - 1, -1):
-        if z > reach[k] - EPS:
+        if reach[k] < high:
             e = kept[k]
             if e != hint and swept_by(e, x, y, z, index):
                 return e
@@ -398,7 +409,7 @@ def keep(q, m, c, grid, shape, level, list_at, kept, reach, used):
             if count > 0 and kept[at + count - 1] == q:
                 continue
             if count == list_at[cell, 2] or count >= 2 * list_at[cell, 3] + SLACK:
-                count = thinned(at, count, level[cell, 1], kept, reach)
+                count = thinned(at, count, above(level[cell, 1], grid), kept, reach)
                 list_at[cell, 1] = count
                 list_at[cell, 3] = count
             if count == list_at[cell, 2]:
@@ -414,15 +425,15 @@ def keep(q, m, c, grid, shape, level, list_at, kept, reach, used):
                 list_at[cell, 2] = size
                 at = to
             kept[at + count] = q
-            # no greater than it is, whatever the rounding
-            reach[at + count] = np.float32(least - (NARROW * abs(least) + 1e-30))
+            # rounded down
+            reach[at + count] = np.uint16(min(max(math.floor((least - grid[4]) * grid[5]), 0), HEIGHTS))
             list_at[cell, 1] = count + 1
     return True
 
 
 @njit(cache=True, nogil=True)
 def thinned(at, count, ceil, kept, reach):
-    """Drop the moves of a list that do not come below ``ceil``; how many stay."""
+    """Drop the moves of a list that do not come below ``ceil``, in steps of the grid; how many stay."""
     to = at
     for k in range(at, at + count):
         if reach[k] < ceil:
@@ -432,20 +443,18 @@ def thinned(at, count, ceil, kept, reach):
     return to - at
 
 
-@njit(
-    f"int64({_I2}, int32[::1], float32[::1], int32[::1], float32[::1], {_F2})",
-    cache=True,
-    nogil=True,
-)
-def packed(list_at, kept, reach, new_kept, new_reach, level):
-    """Copy the lists close together into new arrays; the room that they take."""
+@njit(f"int64(int64[::1], float64[::1], {_I2}, int32[::1], uint16[::1], {_F2})", cache=True, nogil=True)
+def packed(order, grid, list_at, kept, reach, level):
+    """Move the lists close together in their own arrays; the room that they take. ``order``: the cells by the place of
+    their lists, so that no list is moved over one that still waits.
+    """
     used = 0
-    for cell in range(len(list_at)):
+    for cell in order:
         at = list_at[cell, 0]
-        count = thinned(at, list_at[cell, 1], level[cell, 1], kept, reach)
+        count = thinned(at, list_at[cell, 1], above(level[cell, 1], grid), kept, reach)
         for k in range(count):
-            new_kept[used + k] = kept[at + k]
-            new_reach[used + k] = reach[at + k]
+            kept[used + k] = kept[at + k]
+            reach[used + k] = reach[at + k]
         list_at[cell, 0] = used
         list_at[cell, 1] = count
         list_at[cell, 2] = count

@@ -35,6 +35,8 @@ Ints = NDArray[np.int64]
 CELL, CELLS = 0.1, 4_000_000
 #: least side of a cell over that
 THIN = 0.1
+#: entries of lists: room that is made at least, and more if the lists take as much
+ROOM = (1 << 17, 1 << 22)
 #: a step is looked at once every so many cutter radii, at its middle at least
 INSTANT = 0.25
 #: instants of a step that is looked at once and does not cut as the one before it, and of one that enters or leaves;
@@ -99,6 +101,13 @@ def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tupl
         np.empty(spans, np.int64), np.empty(spans, np.int64), np.array([0.0, 0.0, 0.0, 0.0]),
         np.empty(2, np.int64),
     )  # fmt: skip
+
+
+def longer(values: NDArray[Any], used: int, count: int) -> NDArray[Any]:
+    """An array of ``count`` rows that begins with the first ``used`` of another one."""
+    out = np.empty((count, *values.shape[1:]), dtype=values.dtype)
+    out[:used] = values[:used]
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,12 +193,14 @@ class MoveStock:
         count = np.maximum(np.ceil(size[:2] / side - 1e-9), 1.0)
         self.shape = count.astype(np.int64)
         # of a stock that is thinner than a cell the one cell reaches beyond it: what cutters cover is counted in cells
-        self.grid = np.array([*self.low[:2], *np.maximum(size[:2] / count, THIN * side)])
+        self.grid = np.array(
+            [*self.low[:2], *np.maximum(size[:2] / count, THIN * side), self.low[2], _kernels.HEIGHTS / size[2]]
+        )
         cells = int(self.shape.prod())
         self.level = np.empty((cells, 3))
         self.level[:] = (self.high[2], self.high[2], self.low[2])
         self.lists = np.zeros((cells, 4), dtype=np.int64)
-        self.kept, self.reach = np.empty(1 << 16, dtype=np.int32), np.empty(1 << 16, dtype=np.float32)
+        self.kept, self.reach = np.empty(1 << 16, dtype=np.int32), np.empty(1 << 16, dtype=np.uint16)
         self.used = np.zeros(1, dtype=np.int64)
         self.moves, self.of, self.count = np.empty((1024, 8)), np.empty(1024, dtype=np.int64), 0
         self.body, self.more = body, MORE
@@ -239,11 +250,21 @@ class MoveStock:
         self.count = end
 
     def _grow(self) -> None:
-        """Room for lists half as long again, less what is no longer needed."""
-        need = (1 << 17) + 3 * int(self.lists[:, 1].sum()) // 2
-        kept, reach = np.empty(need, dtype=np.int32), np.empty(need, dtype=np.float32)
-        self.used[0] = _kernels.packed(self.lists, self.kept, self.reach, kept, reach, self.level)
-        self.kept, self.reach = kept, reach
+        """Pack the lists where they are, less what is no longer needed, and make room for more of them."""
+        order = np.argsort(self.lists[:, 0], kind="stable")
+        used = int(_kernels.packed(order, self.grid, self.lists, self.kept, self.reach, self.level))
+        need = used + ROOM[0] + max(used // 8, min(used // 2, ROOM[1]))
+        if need > len(self.kept):
+            # one after the other: the old array of the first is free when the second is made
+            self.kept = longer(self.kept, used, need)
+            self.reach = longer(self.reach, used, need)
+        self.used[0] = used
+
+    def forget(self) -> None:
+        """Drop the index and the moves, which grow with the program, when nothing more is asked of the stock."""
+        self.kept, self.reach = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.uint16)
+        self.moves, self.of = np.empty((0, 8)), np.empty(0, dtype=np.int64)
+        self.lists, self.level, self.tops = np.empty((0, 4), dtype=np.int64), np.empty((0, 3)), np.empty(0)
 
     def instants(self, p0: Floats, p1: Floats, tool: Ints) -> Ints:
         """Return the number of instants (n,) at which each step is calculated: odd, to include the middle."""
@@ -309,9 +330,10 @@ class MoveStock:
             if state[1] == 1:
                 self._grow()
             else:
-                slices = np.concatenate([slices, np.empty_like(slices)])
-                rows, owner = np.concatenate([rows, np.empty_like(rows)]), np.concatenate([owner, np.empty_like(owner)])
-                entry, out = np.concatenate([entry, np.empty_like(entry)]), np.concatenate([out, np.empty_like(out)])
+                _, _, b, k, m, *_ = state.tolist()
+                slices = longer(slices, k, 2 * len(slices))
+                rows, owner = longer(rows, b, 2 * len(rows)), longer(owner, b, 2 * len(owner))
+                entry, out = longer(entry, m, 2 * len(entry)), longer(out, m, 2 * len(out))
         _, _, b, k, m, *_ = state.tolist()
         step, out = entry[:m, 0], out[:m]
         return Engaged(
@@ -332,7 +354,7 @@ class MoveStock:
         smallest cutter's circle unless the net would have more than ``NODES`` nodes. Corners are cut off by a chord.
         ``tolerance`` [mm]: by which the outline is made simpler.
         """
-        xs, ys = nodes_of(self.low, self.high, float(self.grid[2:].min()), float(self.cutters[:, 8].min()), tolerance)
+        xs, ys = nodes_of(self.low, self.high, float(self.grid[2:4].min()), float(self.cutters[:, 8].min()), tolerance)
         inside, index = np.empty((len(xs), len(ys)), dtype=np.bool_), self._index()
         outline.marked(z, xs, ys, index, self.tops, inside)
         sides, first = rings(inside)

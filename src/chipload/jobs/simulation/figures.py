@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-import trimesh
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
@@ -25,6 +24,7 @@ from chipload.program.apt.writer import write_apt
 from chipload.program.motions import spans
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.report.diagram import diagram_figure
+from chipload.report.gltf import GltfScene
 from chipload.report.presentation import Blank, Content, Presentation
 from chipload.report.scene import FIXTURE
 from chipload.report.sheet import figure, table
@@ -33,6 +33,8 @@ from chipload.result.motions import chords_of
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SPACE_POINTS, STOCK
 from chipload.result.thinning import thinned
 from chipload.simulation.engagement_samples import EngagementSamples
+from chipload.stock.solid import prisms
+from chipload.stock.tile_grid import polygons
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
@@ -284,29 +286,18 @@ def _slowest(read: ProgramResult) -> str:
 def scene_bytes(read: ProgramResult) -> bytes:
     """Return scene.glb: rapids and cutting motions as lines, and the remaining stock; lengths in mm, Z up."""
     points, rapid = _drawn(read.reading.program)
-    scene = trimesh.Scene()
+    scene = GltfScene()
     for name, chosen, colour in (("rapids", rapid, (179, 38, 30, 255)), ("path", ~rapid, (34, 120, 132, 255))):
-        entities = [
-            trimesh.path.entities.Line(np.arange(a - 1, b), color=np.array(colour, dtype=np.uint8))
-            for a, b in _runs(chosen)
-        ]
-        if entities:
-            path = trimesh.path.Path3D(entities=entities, vertices=points, process=False)
-            scene.add_geometry(path, node_name=name, geom_name=name)
+        scene.add_lines(name, points, _runs(chosen), colour)
     if read.simulated is not None:
-        stock = read.simulated.stock.mesh()
-        stock.visual.face_colors = (168, 122, 58, 255)
-        scene.add_geometry(stock, node_name="stock", geom_name="stock")
+        stock = read.simulated.stock
+        # layer by layer, as LayeredStock.mesh makes them all
+        layers = (prisms([polygons(stock.section(i))], stock.bounds[i : i + 2]) for i in range(stock.layers))
+        scene.add_mesh_of_parts("stock", ((mesh.vertices, mesh.faces) for mesh in layers), (168, 122, 58, 255))
         for name, mesh in read.simulated.collisions.fixtures.items():
-            body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-            body.visual.face_colors = FIXTURE
-            scene.add_geometry(body, node_name=name, geom_name=name)
+            scene.add_mesh(name, mesh.vertices, mesh.faces, FIXTURE)
         left, columns = read.simulated.left, read.simulated.removal.columns
         if left is not None:
-            scene.add_geometry(
-                part_figures.coloured_mesh(left, part_figures.span_of(left, columns)),
-                node_name="part",
-                geom_name="part",
-            )
-    glb: bytes = scene.export(file_type="glb", extension_webp=False)
-    return glb
+            part = part_figures.coloured_mesh(left, part_figures.span_of(left, columns))
+            scene.add_mesh("part", part.vertices, part.faces, part.visual.vertex_colors, part.metadata)
+    return scene.to_bytes()

@@ -217,7 +217,7 @@ _F1, _F2, _I1, _I2, _S = (
 )
 #: room for :func:`run`: candidates, levels, slices, spans, their slices, pieces, place, rows and slices so far
 WORK = types.Tuple((_F2, _F1, _F2, _F2, _I1, _I1, _F1, _I1))
-INDEX = types.Tuple((_F1, _I1, _F2, _I2, _S, types.float32[::1], _F2, _I1, _F2, _F1, _F1, _I1, _S, _F2))
+INDEX = types.Tuple((_F1, _I1, _F2, _I2, _S, types.uint16[::1], _F2, _I1, _F2, _F1, _F1, _I1, _S, _F2))
 
 
 @njit(cache=True, nogil=True)

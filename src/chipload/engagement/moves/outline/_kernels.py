@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, types
 
-from chipload.engagement.moves._kernels import AIR, EPS, MATERIAL, place, swept
+from chipload.engagement.moves._kernels import AIR, EPS, MATERIAL, above, place, swept
 from chipload.engagement.moves.borrowed._kernels import borrowed
 from chipload.engagement.moves.front._kernels import INDEX
 
@@ -40,9 +40,10 @@ def swept_in(cell, x, y, z, index, tops, hint):
     if hint >= 0 and swept(index[6][hint], index[8][index[7][hint]], x, y, z):
         return hint
     at = index[3][cell, 0]
+    high = above(z, index[0])
     for k in range(at + index[3][cell, 1] - 1, at - 1, -1):
         e = index[4][k]
-        if z > index[5][k] and e != hint and swept(index[6][e], index[8][index[7][e]], x, y, z):
+        if index[5][k] < high and e != hint and swept(index[6][e], index[8][index[7][e]], x, y, z):
             return e
     return MATERIAL
 
