@@ -6,6 +6,8 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 export NO_MKDOCS_2_WARNING := 1
 export NUMBA_CACHE_DIR := $(CURDIR)/$(VENV)/numba
+# a source file is compiled once, not by each of the processes that the tests start
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: setup test quick coverage docs real package demo reference lock
 .DELETE_ON_ERROR:
@@ -26,7 +28,8 @@ $(VENV)/.ready: $(VENV)/.run requirements.lock
 	touch $@
 
 # kernels whose types are stated are compiled when they are imported: here once, not by every process
-KERNELS := chipload.engagement.bricks.front._kernels, chipload.stability._kernels, chipload.stability.several._kernels
+KERNELS := chipload.engagement.bricks.front._kernels, chipload.engagement.chips.loop._kernels, \
+	chipload.engagement.chips.faces._kernels, chipload.stability._kernels, chipload.stability.several._kernels
 CHECKED := $(VENV)/checked.log
 
 # the slow checks beside the tests, so that no core waits; what they say stands at the end

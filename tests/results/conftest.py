@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 
 import chipload.examples
 import chipload.report.folder as folder_module
+import chipload.report.removal as removal_module
 from chipload.cli import app
 from chipload.jobs import LoadedJob, load_job
 from chipload.result import Result, Summary, load_result, read_summary
@@ -72,6 +73,8 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     ),
     "hecc": ("operation.0.tolerance_mm=0.5", *(f"surface.{k}.points=[6, 3]" for k in range(6))),
 }
+#: the stock that is shown has cells so many times as wide, but of the example whose shown volumes are tested
+WIDER, AS_SHOWN = 3.0, "impeller"
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +146,17 @@ def _run(name: str, out: Path) -> dict[str, Any]:
         made.append(result)
         return write(result, *others)
 
+    shown = removal_module.removal_mesh
+
+    def wide(blank: Any, path: Any, cutters: Any, before: Any, wider: float) -> Any:
+        return shown(blank, path, cutters, before, WIDER * wider)
+
     words = ["run", str(EXAMPLES / name / "job.toml"), "--out", str(out)]
     words += [word for value in SHORTER[name] for word in ("--set", value)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(folder_module, "write_result", kept)
+        if name != AS_SHOWN:
+            patch.setattr(removal_module, "removal_mesh", wide)
         done = CliRunner().invoke(app, words)
     differences = _differences(made[0], load_result(out)) if made else ["no result was written"]
     return {"exit_code": done.exit_code, "output": done.output, "differences": differences}
