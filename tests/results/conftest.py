@@ -45,7 +45,7 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     ),
     "trunnion": (),
     "tube": ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01"),
-    "cone": ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01"),
+    "cone": ("simulation.step_mm=3.0", "simulation.layer_mm=0.25", "simulation.tolerance_mm=0.01"),
     "plate": (
         "operation.0.least_error=false",
         "operation.0.scallop_um=45",
@@ -71,7 +71,11 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
         "operation.0.most_cutters=1",
         *(f"surface.{k}.{key}" for k in range(3) for key in ("along=[0.42, 0.58]", "points=[6, 5]")),
     ),
-    "hecc": ("operation.0.tolerance_mm=0.5", *(f"surface.{k}.points=[6, 3]" for k in range(6))),
+    "hecc": (
+        "operation.0.most_cutters=1",
+        "operation.0.tolerance_mm=1.0",
+        *(f"surface.{k}.points=[6, 3]" for k in range(6)),
+    ),
 }
 #: the stock that is shown has cells so many times as wide, but of the example whose shown volumes are tested
 WIDER, AS_SHOWN = 3.0, "impeller"
