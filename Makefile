@@ -1,4 +1,4 @@
-# make demo | test | quick | coverage | docs | real | package | archives | reference | lock
+# make demo | test | quick | coverage | coverage-own | docs | real | package | archives | reference | lock
 SHELL := /bin/bash
 PYTHON ?= $(shell /usr/bin/python3 -c 'import sys; print("/usr/bin/python3" if sys.version_info >= (3, 11) else "python3")' 2>/dev/null || echo python3)
 VENV := .venv
@@ -9,7 +9,7 @@ export NUMBA_CACHE_DIR := $(CURDIR)/$(VENV)/numba
 # a source file is compiled once, not by each of the processes that the tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup test quick coverage docs real package archives demo reference lock
+.PHONY: setup test quick coverage coverage-own docs real package archives demo reference lock
 .DELETE_ON_ERROR:
 
 # what runs jobs and shows the page
@@ -51,6 +51,10 @@ coverage: setup
 	rm -f .coverage .coverage.*
 	OPENBLAS_NUM_THREADS=1 $(BIN)/coverage run -m pytest -n 2 --dist worksteal -q
 	$(BIN)/python tools/coverage_by_package.py
+
+# which share of each package its own tests run, written to docs/reliability.md
+coverage-own: setup
+	$(BIN)/python tools/coverage_by_package.py --own --write
 
 docs: setup
 	$(BIN)/mkdocs build --strict --site-dir site
