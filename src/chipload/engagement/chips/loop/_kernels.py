@@ -1,8 +1,9 @@
 """Compiled loops that close the boundary where there are two grazing points: all layers of many moves in one call.
 
 Notation: arrays ``cp``, ``ca``, ``K``, ``S``, ``C``, rows, edges as in :mod:`chipload.engagement.chips.trace._kernels`.
-A loop goes once round a point for each time that the cutter comes over it, for it bounds the surface of space and time
-through which points enter the cutter. It may therefore cross itself; what it goes round at least once is covered.
+A loop bounds the surface in space and time through which points enter the cutter: it goes once round a point for each
+time that the cutter comes over the point. It may therefore cross itself; a point that it goes round at least once is
+covered.
 """
 
 from __future__ import annotations
@@ -209,7 +210,7 @@ def _side(cp, ca, K, h, tol, vmin, first, last, knot, sign, rows, buf, n):
 )
 def loop(cp, ca, K, h, tol, vmin, knots, ends, rows, buf, whole):
     """The covered area where its boundary is one loop: count of edges; NOTHING, GENERAL, FULL or UNSETTLED, which more
-    ``knots`` in time may mend. ``ends`` as of ``levels``; ``rows`` (k, 7) is room to work in; ``whole`` (1,).
+    ``knots`` in time may resolve. ``ends`` as of ``levels``; ``rows`` (k, 7) is room to work in; ``whole`` (1,).
     """
     span = np.empty((4, 2))
     m = spans(cp, ca, K, h, ends, span)

@@ -1,9 +1,9 @@
-"""Compiled loops that follow grazing points through a move and put pieces of boundary together.
+"""Compiled loops that follow grazing points through a move and write the edges of the boundary.
 
 Notation: arrays ``cp``, ``ca``, ``K``, ``S``, ``C`` and rows (x, y, theta, t, n_x, n_y, code) as in
 :mod:`chipload.engagement.chips._kernels`. An edge (12): x, y of its start, x, y of its end, theta, t of both, slopes of
-the curve against the edge at both ends, origin, area between the curve and the
-edge (above 0 to the right). ``sign`` of a root: +1 from inward to outward speed with theta rising.
+the curve against the edge at both ends, origin, area between the curve and the edge (above 0 to the right). ``sign`` of
+a root: +1 from inward to outward speed with theta rising.
 """
 
 from __future__ import annotations
