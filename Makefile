@@ -1,4 +1,4 @@
-# make demo | test | quick | coverage | docs | real | package | reference | lock
+# make demo | test | quick | coverage | coverage-own | docs | real | package | archives | reference | lock
 SHELL := /bin/bash
 PYTHON ?= $(shell /usr/bin/python3 -c 'import sys; print("/usr/bin/python3" if sys.version_info >= (3, 11) else "python3")' 2>/dev/null || echo python3)
 VENV := .venv
@@ -6,8 +6,10 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 export NO_MKDOCS_2_WARNING := 1
 export NUMBA_CACHE_DIR := $(CURDIR)/$(VENV)/numba
+# a source file is compiled once, not by each of the processes that the tests start
+unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup test quick coverage docs real package demo reference lock
+.PHONY: setup test quick coverage coverage-own docs real package archives demo reference lock
 .DELETE_ON_ERROR:
 
 # what runs jobs and shows the page
@@ -26,7 +28,8 @@ $(VENV)/.ready: $(VENV)/.run requirements.lock
 	touch $@
 
 # kernels whose types are stated are compiled when they are imported: here once, not by every process
-KERNELS := chipload.engagement.bricks.front._kernels, chipload.stability._kernels, chipload.stability.several._kernels
+KERNELS := chipload.engagement.bricks.front._kernels, chipload.engagement.chips.loop._kernels, \
+	chipload.engagement.chips.faces._kernels, chipload.stability._kernels, chipload.stability.several._kernels
 CHECKED := $(VENV)/checked.log
 
 # the slow checks beside the tests, so that no core waits; what they say stands at the end
@@ -49,6 +52,10 @@ coverage: setup
 	OPENBLAS_NUM_THREADS=1 $(BIN)/coverage run -m pytest -n 2 --dist worksteal -q
 	$(BIN)/python tools/coverage_by_package.py
 
+# which share of each package its own tests run, written to docs/reliability.md
+coverage-own: setup
+	$(BIN)/python tools/coverage_by_package.py --own --write
+
 docs: setup
 	$(BIN)/mkdocs build --strict --site-dir site
 
@@ -61,6 +68,10 @@ real: setup
 # the wheel and the source archive; the wheel runs a job in an environment of its own, away from the checkout
 package: setup
 	$(BIN)/python tools/package.py
+
+# the same with the dependencies of .venv: no network, a quarter of a minute
+archives: setup
+	$(BIN)/python tools/package.py --here --out $(VENV)/dist
 
 # the second core compiles for the third example while the first runs
 # 0: every limit holds; 3: done, but a limit does not hold, which the verdict says; anything else is a fault

@@ -1,7 +1,8 @@
-"""Results made by formula, so that the report is tested without a planner."""
+"""Results made by formula, so that the report is tested without a planner; what makes a run of all tests faster."""
 
 from __future__ import annotations
 
+import gc
 import math
 import shutil
 from collections.abc import Callable, Iterator
@@ -33,6 +34,26 @@ EXAMPLES = Path(__file__).parents[1] / "src" / "chipload" / "examples"
 WALL = Contour.from_bulges([[0, 28], [0, 8], [8, 0], [28, 0]], [0, math.tan(math.pi / 8), 0, 0])
 CENTRES = Contour.from_bulges([[5, 28], [5, 8], [8, 5], [28, 5]], [0, math.tan(math.pi / 8), 0, 0])
 BEFORE = Contour.from_bulges([[0.1, 28], [0.1, 8], [8, 0.1], [28, 0.1]], [0, math.tan(math.pi / 8), 0, 0])
+
+
+def pytest_configure() -> None:
+    """Collect 7,500 tests without the garbage collector, which would look through all of them again and again; and let
+    Hypothesis draw values without reading the source of each imported module for constants.
+    """
+    gc.disable()
+    try:
+        from hypothesis.internal.conjecture import providers
+    except ImportError:  # another version keeps them elsewhere, or Hypothesis is not installed: slower, not wrong
+        return
+    if hasattr(providers, "_get_local_constants"):
+        constants = providers._local_constants
+        providers._get_local_constants = lambda: constants
+
+
+def pytest_collection_finish() -> None:
+    """Leave what was collected out of each later collection of garbage."""
+    gc.enable()
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -1,4 +1,10 @@
-"""Print which share of its statements the tests run in each package: `make coverage`, or after it, this file.
+"""Print which share of its statements the tests run in each package.
+
+Usage: ``python tools/coverage_by_package.py [--own [PACKAGE ...]] [--workers N] [--write]``
+
+Without ``--own`` the data of ``make coverage`` are read: the share that all tests run. With ``--own`` the tests of each
+package run here, and their share of that package alone is measured: nothing else is traced, so that it takes little
+longer than these tests without it. ``--write`` puts the table into docs/reliability.md.
 
 The source is measured by `coverage`, in every process that the tests start. Compiled functions run outside Python and
 are left out of both counts; the laws and oracles that hold them are listed in docs/accuracy.md.
@@ -6,7 +12,10 @@ are left out of both counts; the laws and oracles that hold them are listed in d
 
 from __future__ import annotations
 
+import argparse
 import json
+import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -15,35 +24,129 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 SOURCE = "src/chipload/"
+PAGE, HEADING = ROOT / "docs" / "reliability.md", "## Test coverage"
+#: the modules that are in no package
+TOP = "chipload"
+#: tests of a package beside those in the folder of its name
+MORE = {
+    "api": ("tests/test_api.py", "tests/jobs/test_api.py"),
+    "jobs": ("tests/results", "tests/cli/test_simulate.py", "tests/cli/test_shell.py", "tests/cli/test_impeller.py"),
+    TOP: ("tests/test_errors.py", "tests/test_workers.py", "tests/cli/test_progress.py", "tests/bad/test_bad_files.py"),
+}
+Counts = dict[str, tuple[int, int]]
 
 
-def counts(data: Path) -> dict[str, tuple[int, int]]:
+def counts(data: Path) -> Counts:
     """Statements and how many of them were run, by package, from a report of `coverage json`."""
-    found: dict[str, tuple[int, int]] = defaultdict(lambda: (0, 0))
+    found: Counts = defaultdict(lambda: (0, 0))
     for name, file in json.loads(data.read_text("utf-8"))["files"].items():
         parts = name.removeprefix(SOURCE).split("/")
         # a capability of jobs/ and a planner are packages of their own
-        package = "/".join(parts[: min(len(parts) - 1, 2 if parts[0] in ("jobs", "planning") else 1)]) or "chipload"
+        package = "/".join(parts[: min(len(parts) - 1, 2 if parts[0] in ("jobs", "planning") else 1)]) or TOP
         statements, run = found[package]
         summary = file["summary"]
         found[package] = statements + summary["num_statements"], run + summary["covered_lines"]
-    return found
+    return dict(found)
 
 
-def main() -> int:
-    """One row for each package, in Markdown."""
+def packages() -> list[str]:
+    """Packages that have statements and tests of their own, and the modules beside them."""
+    folders = sorted(p.parent.name for p in (ROOT / SOURCE).glob("*/__init__.py"))
+    return [*(name for name in folders if any(map(Path.exists, tests_of(name)))), TOP]
+
+
+def tests_of(package: str) -> list[Path]:
+    """Files and folders of tests that are those of a package, its examples in docstrings with them."""
+    named = [] if package == TOP else [f"tests/{package}"]
+    return [path for name in (*named, *MORE.get(package, ())) if (path := ROOT / name).exists()]
+
+
+def own_counts(package: str, workers: int) -> Counts:
+    """The statements of a package, and how many of them its own tests run.
+
+    Raises
+    ------
+    SystemExit
+        A test fails, or the run has no data.
+    """
+    source = ROOT / SOURCE / ("" if package == TOP else package)
+    doctests = sorted(p for p in source.glob("*.py") if p.stem != "__main__") if package == TOP else [source]
+    with tempfile.TemporaryDirectory() as folder:
+        env = os.environ | {"COVERAGE_FILE": str(Path(folder) / "data"), "OPENBLAS_NUM_THREADS": "1"}
+        words = [sys.executable, "-m", "coverage"]
+        traced = [f"--source={source}"] + ([f"--omit={source}/*/*"] if package == TOP else [])
+        tests = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", str(workers), "--dist", "worksteal"]
+        paths = [str(p) for p in (*tests_of(package), *doctests)]
+        words_of_run = [*words, "run", *traced, *tests, *paths]
+        done = subprocess.run(words_of_run, cwd=ROOT, env=env, stdout=sys.stderr, check=False)
+        if done.returncode:
+            raise SystemExit(f"{package}: its tests end with {done.returncode}: nothing is stated for it")
+        report = Path(folder) / "coverage.json"
+        for more in (("combine", "--quiet"), ("json", "--quiet", "-o", str(report))):
+            subprocess.run([*words, *more], cwd=ROOT, env=env, check=True)
+        return {name: n for name, n in counts(report).items() if name.split("/")[0] == package}
+
+
+def all_counts() -> Counts:
+    """The counts of `make coverage`."""
     coverage = [sys.executable, "-m", "coverage"]
     with tempfile.TemporaryDirectory() as folder:
         data = Path(folder) / "coverage.json"
         if any(ROOT.glob(".coverage.*")):
             subprocess.run([*coverage, "combine", "--quiet"], cwd=ROOT, check=True)
         subprocess.run([*coverage, "json", "--quiet", "-o", str(data)], cwd=ROOT, check=True)
-        found = counts(data)
-    print("| package | statements | run by the tests [%] |\n|---|---:|---:|")
+        return counts(data)
+
+
+def table(found: Counts) -> str:
+    """One row for each package, in Markdown.
+
+    >>> print(table({"stock": (200, 150), "units": (0, 0)}))
+    | package | statements | run by the tests [%] |
+    |---|---:|---:|
+    | stock | 200 | 75 |
+    | all | 200 | 75 |
+    """
+    rows = ["| package | statements | run by the tests [%] |", "|---|---:|---:|"]
     whole = [sum(column) for column in zip(*found.values(), strict=True)]
     for package, (statements, run) in (*sorted(found.items()), ("all", (whole[0], whole[1]))):
         if statements:
-            print(f"| {package} | {statements} | {100.0 * run / statements:.0f} |")
+            rows.append(f"| {package} | {statements} | {100.0 * run / statements:.0f} |")
+    return "\n".join(rows)
+
+
+def with_table(page: str, rows: str) -> str:
+    r"""A page whose first table below the heading is another.
+
+    >>> with_table("## Test coverage\n\ntext\n\n| a |\n|---|\n| 1 |\n\n## Next\n", "| b |\n|---|\n| 2 |")
+    '## Test coverage\n\ntext\n\n| b |\n|---|\n| 2 |\n\n## Next\n'
+    """
+    before, after = page.split(f"{HEADING}\n", 1)
+    changed, count = re.subn(r"(?:^\|.*\n)+", lambda _: f"{rows}\n", after, count=1, flags=re.MULTILINE)
+    if not count:
+        raise SystemExit(f"{PAGE.name}: no table below {HEADING!r}")
+    return f"{before}{HEADING}\n{changed}"
+
+
+def main() -> int:
+    """Measure, and print or write the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--own", nargs="*", metavar="PACKAGE", help="run the own tests of these packages; none: of all")
+    parser.add_argument("--workers", type=int, default=2, help="processes that run tests")
+    parser.add_argument("--write", action="store_true", help=f"put the table into {PAGE.relative_to(ROOT)}")
+    given = parser.parse_args()
+    if given.own is None:
+        found = all_counts()
+    else:
+        if unknown := sorted(set(given.own) - set(packages())):
+            parser.error(f"{', '.join(unknown)}: no package with tests of its own; there are: {', '.join(packages())}")
+        found = {}
+        for package in given.own or packages():
+            found |= own_counts(package, given.workers)
+    rows = table(found)
+    print(rows)
+    if given.write:
+        PAGE.write_text(with_table(PAGE.read_text("utf-8"), rows), "utf-8")
     return 0
 
 

@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 
 import chipload.examples
 import chipload.report.folder as folder_module
+import chipload.report.removal as removal_module
 from chipload.cli import app
 from chipload.jobs import LoadedJob, load_job
 from chipload.result import Result, Summary, load_result, read_summary
@@ -44,7 +45,7 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     ),
     "trunnion": (),
     "tube": ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01"),
-    "cone": ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01"),
+    "cone": ("simulation.step_mm=3.0", "simulation.layer_mm=0.25", "simulation.tolerance_mm=0.01"),
     "plate": (
         "operation.0.least_error=false",
         "operation.0.scallop_um=45",
@@ -68,10 +69,17 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     ),
     "impeller": (
         "operation.0.most_cutters=1",
+        "operation.0.rough.grid_mm=2.5",
         *(f"surface.{k}.{key}" for k in range(3) for key in ("along=[0.42, 0.58]", "points=[6, 5]")),
     ),
-    "hecc": ("operation.0.tolerance_mm=0.5", *(f"surface.{k}.points=[6, 3]" for k in range(6))),
+    "hecc": (
+        "operation.0.most_cutters=1",
+        "operation.0.tolerance_mm=1.0",
+        *(f"surface.{k}.points=[6, 3]" for k in range(6)),
+    ),
 }
+#: the stock that is shown has cells so many times as wide; of the second the shown volumes are tested
+WIDER, WIDER_OF = 3.0, {"impeller": 1.6}
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +151,16 @@ def _run(name: str, out: Path) -> dict[str, Any]:
         made.append(result)
         return write(result, *others)
 
+    shown = removal_module.removal_mesh
+
+    def wide(blank: Any, path: Any, cutters: Any, before: Any, wider: float) -> Any:
+        return shown(blank, path, cutters, before, wider * WIDER_OF.get(name, WIDER))
+
     words = ["run", str(EXAMPLES / name / "job.toml"), "--out", str(out)]
     words += [word for value in SHORTER[name] for word in ("--set", value)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(folder_module, "write_result", kept)
+        patch.setattr(removal_module, "removal_mesh", wide)
         done = CliRunner().invoke(app, words)
     differences = _differences(made[0], load_result(out)) if made else ["no result was written"]
     return {"exit_code": done.exit_code, "output": done.output, "differences": differences}

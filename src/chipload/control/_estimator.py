@@ -1,11 +1,11 @@
-"""The torque of cutting from one reading of current and speed after the other, compiled.
+"""Estimate of the cutting torque from successive readings of current and speed, compiled.
 
-Notation: I current, w speed as read now and before, tau lag of the current sensor, w' the speed behind the same lag,
-straight between two readings; T filter of time constant t:
+Notation: I current; w speed of this and the previous reading; tau time constant of the current sensor; w' the speed
+with the same lag, linear between two readings; T the estimate, filtered with the time constant t:
 
     raw = K_T (I - i_0 - i_1 w') - J (w - w') / tau,    T += min(dt / t, 1) (raw - T).
 
-Without a lag dw/dt is the difference of two readings. Oracle: :func:`chipload.control.spindle.estimate` on a log.
+If tau = 0, dw/dt is the difference of two readings over dt. Oracle: :func:`chipload.control.spindle.estimate` on a log.
 """
 
 from __future__ import annotations

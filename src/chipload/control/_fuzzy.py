@@ -1,4 +1,4 @@
-"""The fuzzy answer, compiled.
+"""The output of the fuzzy controller, compiled.
 
 Oracle: the sampled form in :mod:`chipload.control.fuzzy`.
 """

@@ -1,7 +1,7 @@
 """One step of the override and the override that a model allows, compiled.
 
-The parameters are named tuples, the state is an array (STATE,) whose places are named below; what they mean stands in
-:mod:`chipload.control.override`, which makes them.
+The parameters are named tuples, the state is an array (STATE,) whose elements are named below.
+:mod:`chipload.control.override` makes and defines them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 # status of a step, in the order of chipload.control.override.Status; from OVERLOAD on the controller has stopped
 RUN, SETTLING, AIR, UNKNOWN, LOST, OVERLOAD, NO_READING, LOW_READING, OFF_PATH, MACHINE_DATA = range(10)
-# which answer moves the trim
+# kind of controller that changes the trim
 FIXED, PI, MAMDANI, PRODUCT_SUM = range(4)
 
 

@@ -1,31 +1,32 @@
-"""The feed override: the output of a controller within rules that protect the part and the cutter.
+"""The feed override: the output of a controller, within rules that protect the part and the cutter.
 
-Notation: T measured torque [N mm], T_ref the torque that is held; o override (feed over programmed feed); q the trim
-that the controller moves; e = (T_ref - T) / T_ref, d its change since the last step; f in [-1, 1] the fuzzy answer to
-e / error_span and d / change_span; dt time since the last step [s].
+Notation: T measured torque [N mm]; T_ref torque set point; o override (actual over programmed feed); q trim, which
+the controller changes; e = (T_ref - T) / T_ref relative error, d its change since the last step;
+f in [-1, 1] output of the fuzzy controller for e / error_span and d / change_span; dt time since the last step [s]. The
+fuzzy controller changes q by q f gain dt.
 
-Without a model q is the override itself. With one (feed-forward) the override is what the model allows along the path,
-(q T_ref - edge) / cut, early enough for what lies ahead; then q is the share of T_ref that the model may plan with and
-e = 1 - q T / T_model, so that q settles where measured and planned torque agree, in light cuts as in heavy ones; a
-torque above T_ref counts at once. The fuzzy answer moves q by q f gain dt.
+Without a model, q is the override. With a model (feed-forward), the override is the one that the model allows along the
+path, (q T_ref - edge) / cut, in time for what lies ahead. Then q is the share of T_ref that the model may use, and
+e = 1 - q T / T_model, so that q settles where measured and modelled torque agree, in light and in heavy cuts. A torque
+above T_ref takes effect at once.
 
-The rules, in the order in which they act:
+The rules, in the order in which they apply:
 
-1. a stop is final until the controller is begun anew, and its status names the reason;
-2. a reading that is none (not a number, below -light, above `torque_most`, the same value `stuck_steps` times; exactly
-   0 counts as such a value while the machine moves and nothing is predicted) lowers the override to `lost_override` and
-   stops after `lost_s`: ``no-reading``;
-3. torque above `overload` for `overload_steps` stops: ``overload``;
-4. off the path nothing rises and the override falls to `start`; a torque above `light` there while the machine moves,
-   beyond what dies away behind a cut, for `off_path_steps` stops: ``off-path``;
-5. where the model predicts a cut, a reading below `low_share` of the prediction, by more than `light`, is not believed:
-   after `air_steps` of them nothing rises, after `stuck_steps` the override falls to `lost_override`, after `low_steps`
-   it stops: ``low-reading``. A count above `stuck_steps` is taken back by a reading in the cut alone;
-6. the override rises only on a load that is known: a trusted reading, heavier than `light` (or light where the model
-   predicts so), `settle_steps` readings after a start or a loss;
-7. it falls at `slew_down` and rises at `slew_up`, at most a third of it;
-8. it stays from `floor` to `cap`, and `cap` is at most 1 unless `above_programmed`;
-9. what is sent is rounded down to whole `quantum`.
+1. A stop is final until the controller is started again. The status names the reason.
+2. A reading is invalid if it is not a number, below -light, above `torque_most`, or the same value for `stuck_steps`
+   steps; a reading of exactly 0 counts as such a value while the machine moves and no cut is predicted. An invalid
+   reading lowers the override to `lost_override`, and stops the machine after `lost_s`: ``no-reading``.
+3. A torque above `overload` for `overload_steps` steps stops the machine: ``overload``.
+4. Off the path the override does not rise, and falls to `start`. A torque above `light` there while the machine moves,
+   in excess of the decay after a cut, stops the machine after `off_path_steps` steps: ``off-path``.
+5. Where the model predicts a cut, a reading below `low_share` of the prediction, by more than `light`, is rejected.
+   After `air_steps` of them the override does not rise, after `stuck_steps` it falls to `lost_override`, after
+   `low_steps` the machine stops: ``low-reading``. Only a valid reading in the cut resets a count above `stuck_steps`.
+6. The override rises only at a known load: a valid reading above `light` (or below it, if the model predicts that),
+   `settle_steps` readings after a start or a loss of the reading.
+7. It falls at `slew_down` and rises at `slew_up`, which is at most a third of it.
+8. It stays between `floor` and `cap`; `cap` is at most 1 unless `above_programmed`.
+9. The value that is sent is rounded down to a multiple of `quantum`.
 """
 
 from __future__ import annotations
@@ -46,9 +47,9 @@ from chipload.errors import InputError
 Floats = NDArray[np.float64]
 
 KINDS = ("fixed", "pi", "mamdani", "product-sum")
-#: longest timeout_s: after it the simulated spindle begins anew [s]
+#: greatest timeout_s, after which the simulated spindle starts again [s]
 LONGEST_TIMEOUT_S = 10.0
-#: falling is at least so many times faster than rising
+#: least ratio of the rate of fall to the rate of rise
 FALL_OVER_RISE = 3.0
 
 
@@ -81,24 +82,24 @@ class Override:
     kind : ``fixed`` (start, or the model alone), ``pi``, ``mamdani``, ``product-sum``
     torque_ref : T_ref [N mm]
     overload : torque that stops [N mm]
-    torque_most : greatest torque that the spindle can give; more is no reading [N mm]
-    light : below it the estimate is not trusted [N mm]
+    torque_most : greatest torque that the spindle can give; a reading above it is invalid [N mm]
+    light : torque below which the estimate is not trusted [N mm]
     floor, cap : least and greatest override while it runs
     start : override after a start, from floor to cap
     air_override : greatest override in the air, without a model (``fixed`` keeps its own)
     lost_override : greatest override without a reading; 0: stop
-    lost_s : after so long without a reading stop [s]
-    above_programmed : the cap may be above 1
+    lost_s : time without a reading after which the machine stops [s]
+    above_programmed : whether the cap may be above 1
     slew_up, slew_down : greatest change of the override [1/s]
     gain_up, gain_down : greatest relative change of the trim [1/s]
-    error_span, change_span : e and d at which the sets end
+    error_span, change_span : e and d at which the fuzzy sets end
     pi_gain, pi_rate : dq = pi_gain d + pi_rate e dt; pi_rate [1/s]
     overload_steps, stuck_steps, air_steps, settle_steps : in steps
-    low_share, low_steps : a reading below this share of the prediction is rejected, and so many of them stop
-    off_path_steps : a load off the path stops after so many
+    low_share, low_steps : share of the prediction below which a reading is rejected; rejected readings that stop
+    off_path_steps : steps under load off the path that stop
     timeout_s : a longer time between steps counts as a start [s], at most 10
     quantum : step of the override that the controller takes; 0: any value
-    trim_least, trim_most : of q with a model
+    trim_least, trim_most : limits of q with a model
 
     Raises
     ------

@@ -2,41 +2,47 @@
 
 Both are calculated from a run and stated with its result.
 
-**Energy balance**, a cutter: W = sum of T omega dt over its steps, T the mean torque without the edge coefficients,
-against sum of K V, V [mm^3] the volume that the sections of the stock have lost in a step and K [MPa] its specific
-energy: Ktc where the material has no size effect; else the mean of Ktc h^(-m) over the engaged edge with the
-thickness h that the loads were computed with (of the whole cutter, in a step that lost volume and has no engaged
-edge). The quotient less 1 is 0 where contact, thickness and volume are right. V and the engaged edge come from
-different computations.
+**Energy balance** of each cutter: (work / energy) - 1, which is 0 if contact, chip thickness and volume are right.
+The work is the sum of T omega dt over its steps, T the mean torque without the edge coefficients. The energy is the
+sum of K V over its steps, V [mm^3] the volume that the stock has lost in the step and K [MPa] the specific energy: Ktc
+of a material without size effect, else the mean of Ktc h^(-m) over the engaged edge, h the chip thickness with which
+the loads were computed. A step that lost volume and has no engaged edge takes the mean K of its cutter. V and the
+engaged edge come from different computations.
 
-**Resolution error**, a column of loads: some steps are computed once more in a stock of their own. It is the stock
-before the run in the box of the cutter, in layers whose thickness is a share of their height over the lowest point of
-the cutter, so that the shallowest cut has several; the earlier steps that reach into the box are removed from it;
-then the step is cut in halves, with twice the slices (at least FINE, narrow near the bottom) and half the angle
-between rotations. With c the load of the run, f that of the finer one and w the worst of the run, the error is
+**Resolution error** of each column of loads, by layers: some steps are computed a second time, with a finer resolution,
+in a stock of their own. This stock is the initial stock in the box around the cutter. The thickness of its layers is a
+share of their height above the lowest point of the cutter, so that the shallowest cut has several layers. The earlier
+steps that reach into the box are removed from it. Then the step is divided into halves and computed with twice the
+slices (at least FINE, narrow near the bottom) and half the angle between rotations. With c the load of the run, f that
+of the finer run and w the worst load of the run, the error is
 
-    FACTOR max e / w + FLOOR + v / (1 - v),  e = |f - c| where c >= w / 2, else max(f - w, 0),
+    FACTOR max e / w + FLOOR + v / (1 - v),  e = |f - c| where c >= w / 2, else max(f - w, 0).
 
-for a small load matters to a limit only by what exceeds the worst; v the share of the volume that was lost in films,
-for which no loads are computed. FACTOR covers what the finer run is off itself: the error of layers, slices and steps
-is of first order at least, and the finer ones are at most half as thick, so that it is 2. Where the axis leans slices
-do not end where contact ends, the peak over a rotation comes unevenly, and it is 3. FLOOR, 1 % (2 % where an axis
-leans), is what both runs share: rotations that are looked at, edges of the stock within the tolerance. The steps are
-a worst one of each column, the ones that lose most, others evenly spaced among those in cut, some that lose nothing at
-the height of a section though the cutter is in the stock, and MISSED of those that lose more than their middle engages:
-a mill that meets a wall at the end of a step, which is seen there only when the step is cut in PARTS instead of halves.
-How many: as the earlier steps that they need allow, at most SHARE of the steps of the run, as many again for the last
-kind, but for the first and for short programs.
+A small load matters to a limit only if the finer one exceeds the worst.
 
-By moves the stock has no layers. The earlier steps that reach into the box are made again in the initial body, then the
-step with MORE times the slices and half the angle between rotations, once at the same instants, for f - c, and once in
-halves, for what exceeds the worst: where the contact is exact, a load that differs between the halves of a step, as
-where the cutter enters, is no error of the resolution unless it is greater than any that was found. FLOOR is that of
-:data:`MOVES_FLOOR`, within which 99 of 100 moves of the benchmark are (docs/design/engines.md), for of all
-steps a few are computed once more; where all cutters have a straight flank and a flat bottom, on which slices are
-exact, it is that of the layers. Where an axis leans it is :data:`LEANING_MOVES_FLOOR` for any cutter.
+* v is the share of the volume that was lost in films, for which no loads are computed.
+* FACTOR accounts for the error of the finer run itself. The errors of layers, slices and steps are at least of first
+  order, and the finer ones are at most half as large, which gives 2. If the axis leans, slices do not end where contact
+  ends and the instants of the peak are uneven: 3.
+* FLOOR, 1 % (2 % if an axis leans), is the error that both runs share: the sampled rotations, and edges of the stock
+  within the tolerance.
 
-Deflection and form error go with the force: they have its error.
+The computed steps are: a worst one of each column; those that remove most; others at even distances among those in cut;
+some that remove nothing, at the height of a section, although the cutter is in the stock; and MISSED of those that
+remove more than is engaged at their middle, as where a mill meets a wall at the end of a step. The last kind is divided
+into PARTS instead of halves, since halves may miss it too. Their number is limited by the earlier steps that they need,
+at most SHARE of the steps of the run, and as many again for the last kind; the first kind and short programs are
+computed in any case.
+
+**Resolution error** by moves: the stock has no layers. The earlier steps that reach into the box are removed from the
+initial body. The step is computed with MORE times the slices and half the angle between rotations, once at the same
+instants, which gives f - c, and once in halves, which gives the loads above the worst. The contact is exact, so that a
+load that differs between the halves of a step, as where the cutter enters, is not an error of the resolution unless it
+exceeds every load of the run. FLOOR is :data:`MOVES_FLOOR`, within which 99 of 100 moves of the benchmark are
+(docs/design/engines.md); only some of the steps are computed a second time. If all cutters have a straight flank and a
+flat bottom, on which slices are exact, it is that of the layers; if an axis leans, :data:`LEANING_MOVES_FLOOR`.
+
+Deflection and form error are proportional to the force and have its error.
 """
 
 from __future__ import annotations
@@ -66,44 +72,45 @@ Ints = NDArray[np.int64]
 Columns = Mapping[str, NDArray[Any]]
 #: columns of some steps in a stock, which changes
 Remove = Callable[[Steps, LayeredStock, "RunSettings"], Columns]
-#: greatest loads of a step that is computed once more, by column: looked at as in the run (none where that is not
+#: greatest loads of a step that is computed a second time, by column: at the instants of the run (none if that is not
 #: compared), and in its parts
 Again = Callable[["Window"], tuple[Mapping[str, float], Mapping[str, float]]]
 
-#: columns that are compared; the others that a limit may hold go with the force
+#: columns that are compared; columns of other limits that are proportional to the force
 COMPARED = ("force_n", "torque_nm", "torque_mean_nm", "power_w", "chip_max_mm")
 WITH_FORCE = ("deflection_um", "form_error_um")
-#: those that can be compared
+#: columns that can be compared
 COMPARABLE = (*COMPARED, "force_normal_n")
-#: earlier steps that are removed again: at most this share of the run's, and this number in a short run
+#: earlier steps that are removed a second time: at most this share of those of the run, or this number in a short run
 SHARE, LEAST = 0.05, 60
-#: likewise, for steps that lose more than their middle engages
+#: likewise, for steps that remove more than is engaged at their middle
 MISSED_SHARE, MISSED_LEAST = 0.05, 1000
-#: slices of the corner in the finer run, at least
+#: least number of slices of the corner in the finer run
 FINE = 48
-#: on the difference of the two resolutions, upright and where the axis leans
+#: factor on the difference of the two resolutions: upright axis, leaning axis
 FACTOR, LEANING = 2.0, 3.0
-#: error that both resolutions share, likewise
+#: error that both resolutions share: upright axis, leaning axis
 FLOOR, LEANING_FLOOR = 0.01, 0.02
-#: by moves: error of a column that is not found from a few steps, and slices of the finer run over those of the run
+#: by moves: error of a column that a few steps do not show
 MOVES_FLOOR = {
     "force_n": 0.035, "torque_nm": 0.035, "torque_mean_nm": 0.01, "power_w": 0.01, "chip_max_mm": 0.035,
     "force_normal_n": 0.035,
 }  # fmt: skip
-#: the same where an axis leans, for any cutter
+#: the same if an axis leans, for any cutter
 LEANING_MOVES_FLOOR = {
     "force_n": 0.05, "torque_nm": 0.05, "torque_mean_nm": 0.02, "power_w": 0.02, "chip_max_mm": 0.05,
     "force_normal_n": 0.05,
 }  # fmt: skip
+#: by moves: number of slices of the finer run over that of the run
 MORE = 4
-#: layers of the finer stock: the lowest in diameters, each so many times as thick as the one below it
+#: layers of the finer stock: thickness of the lowest in diameters, and ratio to the thickness of the layer below
 LOWEST, GROWTH = 5e-4, 1.3
-#: steps that are looked at beside the worst ones
+#: steps that are computed besides the worst ones
 EVEN, IDLE = 3, 2
-#: by layers: steps that lose most of what their middle does not engage, which of it is this share of what they lose at
-#: least, and into how many parts each is cut
+#: by layers: number of steps that remove most of what is not engaged at their middle, its least share of what they
+#: remove, and the number of parts of such a step
 MISSED, UNLIKE, PARTS = 3, 0.1, 16
-#: rows of columns that are read at once
+#: rows of columns that are read together
 ROWS = 65_536
 #: columns of the energy balance
 BALANCED = ("tool", "rapid", "chip_volume_mm3", "engaged_volume_mm3", "cutting_work_j")
@@ -144,8 +151,8 @@ def energy_balance(columns: Columns, ktc: float) -> dict[int, float]:
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """A step that is computed once more: its number, its box, the earlier steps that reach into the box, and into how
-    many parts it is cut.
+    """A step that is computed a second time: its number, its box, the earlier steps that reach into the box, and the
+    number of its parts.
     """
 
     step: int

@@ -20,13 +20,19 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from numba import njit, types
 
 TAU = 2.0 * math.pi
 BOTTOM, CONE, TORUS, FLANK, TOP = 0, 1, 2, 3, 4
 
 
-@njit(cache=True, nogil=True)
+#: types are stated: a constant among the arguments would else be compiled as a type of its own
+_R1 = types.Array(types.float64, 1, "C", readonly=True)
+_R2 = types.Array(types.float64, 2, "C", readonly=True)
+_F1, _F2 = types.float64[::1], types.float64[:, ::1]
+
+
+@njit(types.void(_R2, _R2, types.float64, _F1), cache=True, nogil=True)
 def state(cp, ca, t, S):
     """Tip, axis and their derivatives into ``S[:12]``."""
     u = 2.0 * t - 1.0
@@ -70,7 +76,7 @@ def extent(S, K):
     return H * Az - top * s, H * s + top * Az, zh, uh
 
 
-@njit(cache=True, nogil=True)
+@njit(types.float64(_R2, _R2, _R1, types.float64, types.float64, _F1), cache=True, nogil=True)
 def reach(cp, ca, K, h, t, S):
     """Above 0 where the layer cuts the open cutter [mm]; fills ``S[:12]``."""
     state(cp, ca, t, S)
@@ -272,7 +278,7 @@ def _circle(S, K):
     S[25] = dz * (S[8] + f * S[11]) / rho
 
 
-@njit(cache=True, nogil=True)
+@njit(types.boolean(_R2, _R2, _R1, types.float64, types.float64, _F1, _F2), cache=True, nogil=True)
 def instant(cp, ca, K, h, t, S, C):
     """Fill ``S`` and the corners ``C``; False where the layer doesn't cut the open cutter."""
     state(cp, ca, t, S)

@@ -1,14 +1,15 @@
 """The area that a cutter covers on a plane layer during a move, bounded by curves of the diagram of (theta, t).
 
-Notation: t in 0 .. 1; the section of the cutter with the layer z = h at t is convex, its edge x(theta, t); V speed of
-the edge outward in the layer. The boundary of all sections together is a subset of: the curves V = 0 (envelope), the
-first section where V < 0, the last where V > 0, likewise at both ends of a time in which the layer is cut at all.
+Notation: t in 0 .. 1 is the time of the move. The section of the cutter with the layer z = h at t is convex, with the
+edge x(theta, t); V is the outward speed of the edge in the layer. The boundary of the covered area is a subset of these
+curves: V = 0 (the envelope), the part of the first section with V < 0 and of the last one with V > 0, and the same at
+both ends of a time in which the cutter meets the layer at all.
 
-Where V has two zeros at every t the pieces form one loop; if it is simple it is the boundary: no other candidate
-exists, so nothing inside is left out and nothing outside is covered. If it isn't: it bounds the surface in space and
-time through which points enter the cutter, so it goes once round a point for each time that the cutter comes over it,
-and what it goes round at least once is covered. In all other cases the pieces are noded and those faces kept of which a
-point is covered at some t, found by branch and bound.
+If V has two zeros at every t, the curves form one loop. If the loop does not cross itself, it is the boundary, because
+no other candidate exists. If it crosses itself, it bounds the surface in space and time through which points enter the
+cutter: it goes once round a point for each time that the cutter comes over the point, and every point that it goes
+round at least once is covered. In all other cases the curves are divided where they cross, and a face between them is
+kept if one of its points is covered at some t, which branch and bound finds.
 
 Reference: Undeformed chips in five-axis milling by boundary construction diagrams, Computer-Aided Design 88 (2017)
 42-59. Differs from source: the speed of the cutter's surface stands for the derivative of the ellipse's equation, so
@@ -44,17 +45,17 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Shape: TypeAlias = shapely.Polygon | shapely.MultiPolygon
 
-#: slower than this share of the tolerance per move, the edge stands still
+#: speed below which the edge stands still, as a share of the tolerance per move
 STILL = 1e-3
-#: a way that leaves its own axis by less than this share of the tolerance is along it
+#: a tip that leaves the line along its axis by less than this share of the tolerance moves along the axis
 STRAIGHT = 1e-2
-#: instants at which the general case looks for grazing points before it halves
+#: instants at which the general case searches for grazing points before it halves a time
 _KNOTS = 64
 _MOST_EDGES = 4_000_000
 _SPANS = 8
-#: a layer that is met for a smaller share of the move is touched in a point
+#: a layer that the cutter meets for a smaller share of the move is touched at one point
 _TOUCH = 1e-12
-_GRID = 1e-5  # of the tolerance: nearer than this two points are one when pieces are noded
+_GRID = 1e-5  # of the tolerance: points that are nearer are one point where curves are divided
 
 
 @dataclass(frozen=True, eq=False)

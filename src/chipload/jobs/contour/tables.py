@@ -69,7 +69,7 @@ class PartTable(Table):
 
 
 class StockTable(Table):
-    """The stock."""
+    """Top of the stock, and the stock that an earlier job left."""
 
     top_mm: Number = Field(description="z of the top of the stock")
     file: Text | None = Field(

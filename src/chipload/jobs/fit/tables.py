@@ -1,9 +1,9 @@
 """The tables of a job that identifies force coefficients from measured cuts.
 
-Notation: T unit feed direction, n = Rot(+90 deg) T (to the left of the feed, seen from above), the axis from tip to
-holder, all for a clockwise spindle. A channel is named with its sign: ``across = "-Fx"`` says that Fx, turned round, is
-the component along n. ``on`` says whether the channels show the force on the work, as a dynamometer under it does, or
-on the cutter.
+Notation: T is the unit feed direction, n = Rot(+90 deg) T points to the left of the feed, seen from above, and the axis
+points from the tip to the holder, all for a clockwise spindle. A channel is named with its sign: with
+``across = "-Fx"``, the component along n is -Fx. ``on`` states on which body the measured force acts: on the work, as
+with a dynamometer under it, or on the cutter.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from chipload.jobs.tables import Limits, Number, Positive, Table, Text
 
 
 class EngagementTable(Table):
-    """What the cutter meets: the same in every file."""
+    """Engagement of the cutter, the same in all measurement files."""
 
     milling: Literal["slot", "up", "down"] = Field(description="kind of cut")
     axial_depth_mm: Positive = Field(description="axial depth of cut")
@@ -25,7 +25,7 @@ class EngagementTable(Table):
 
 
 class ChannelsTable(Table):
-    """Which column of the files is which component, with its sign."""
+    """Columns of the files that contain the force components, with their signs."""
 
     feed: str | None = Field(None, description='column of the force along the feed, with its sign, as "-Fy"')
     across: str | None = Field(None, description="column of the force across the feed")
@@ -36,24 +36,24 @@ class ChannelsTable(Table):
 class DynamometerTable(Table):
     """Natural frequencies of the dynamometer; a direction that is not stated is taken as rigid."""
 
-    feed_hz: Positive | None = Field(None, description="natural frequency along the feed, about")
-    across_hz: Positive | None = Field(None, description="natural frequency across the feed, about")
-    axis_hz: Positive | None = Field(None, description="natural frequency along the axis of the cutter, about")
+    feed_hz: Positive | None = Field(None, description="approximate natural frequency along the feed")
+    across_hz: Positive | None = Field(None, description="approximate natural frequency across the feed")
+    axis_hz: Positive | None = Field(None, description="approximate natural frequency along the axis of the cutter")
 
 
 class MeasurementTable(Table):
-    """One file."""
+    """One file of measured forces and its cutting conditions."""
 
     file: Text = Field(description="file with the measured forces")
     use: Literal["fit", "predict"] = Field(description="fit: coefficients are fitted to it; predict: compared only")
     feed_mm_min: Positive = Field(le=100_000.0, description="feed of the cut")
     speed_rpm: Positive = Field(le=1_000_000.0, description="spindle speed of the cut")
-    window_s: tuple[Number, Number] | None = Field(None, description="time range that is used; none: all of it")
-    channels: ChannelsTable | None = Field(None, description="channels of this file; none: those of the job")
+    window_s: tuple[Number, Number] | None = Field(None, description="time range that is used; default: the whole file")
+    channels: ChannelsTable | None = Field(None, description="channels of this file; default: those of the job")
 
 
 class AxialTable(Table):
-    """Axial coefficients from elsewhere, where the axis was not measured."""
+    """Axial coefficients from another source, if the axial force was not measured."""
 
     kac_mpa: Number = Field(description="axial cutting coefficient")
     kae_n_mm: Number = Field(description="axial edge coefficient")
@@ -61,14 +61,14 @@ class AxialTable(Table):
 
 
 class FitLimitsTable(Limits):
-    """How far the predictions may be off."""
+    """Greatest errors of the predicted forces."""
 
     mean_percent: Positive | None = Field(None, description="greatest error of a predicted mean force")
     peak_percent: Positive | None = Field(None, description="greatest error of a predicted peak force")
 
 
 class FitJobTable(Table):
-    """The whole file of a job that identifies force coefficients from measured forces."""
+    """The job file of a job that fits force coefficients to measured forces."""
 
     name: Text = Field(description="name of the material that is written")
     source: Text = Field(description="where the measurements come from")
@@ -80,7 +80,9 @@ class FitJobTable(Table):
     band_hz: Positive | None = Field(
         None, description="highest frequency of the harmonics that are used; required with instantaneous"
     )
-    runout: Literal["seek", "given"] = Field("seek", description="seek: fitted too; given: that of the cutter")
+    runout: Literal["seek", "given"] = Field(
+        "seek", description="seek: the runout is fitted too; given: the runout of the cutter is used"
+    )
     zero: bool = Field(False, description="true: a constant offset of each channel is fitted too")
     cutter: CutterTable
     engagement: EngagementTable

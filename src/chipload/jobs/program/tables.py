@@ -6,4 +6,4 @@ from chipload.jobs.simulation.tables import SimulationJobTable
 
 
 class ProgramJobTable(SimulationJobTable):
-    """The whole file of a job that runs a program instead of a plan; with an operation it is simulated."""
+    """The job file of a job with an existing program; an operation simulates it."""

@@ -1,6 +1,6 @@
-"""The compiled loop that writes a pass as lines and arcs, and measures the engagement of what is written.
+"""Compiled loop that writes a pass as lines and arcs, and measures the engagement along them.
 
-Notation: as in ``_kernels``; tau [mm] how far the vertices of a pass may lie from its lines and arcs.
+Notation: as in ``_kernels``; tau [mm] the greatest distance of the vertices of a pass from its lines and arcs.
 """
 
 from __future__ import annotations

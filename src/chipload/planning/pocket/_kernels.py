@@ -1,4 +1,4 @@
-"""The compiled stepping loop of the front: one pass, step after step, in the stock and inside the inset region.
+"""Compiled loop of the steps of one pass, in the stock and inside the inset region.
 
 Notation: O centre of the cutter, th its heading [rad], phi the turn of the next step, positive to the left. Material
 lies on the RIGHT. E engagement [rad], a* its limit, l step length, R radius. ``reach`` is the centre region: O may be

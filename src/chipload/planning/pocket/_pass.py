@@ -1,4 +1,4 @@
-"""The compiled loop of one pass: steps into the stock, written as lines and arcs as it goes.
+"""Compiled loop of one pass: steps into the stock, which are written as lines and arcs at once.
 
 Notation: as in ``_kernels``.
 """

@@ -1,4 +1,4 @@
-"""The compiled loop that measures the engagement along the motions of a pocket, in stock of its own."""
+"""Compiled loop that measures the engagement along the motions of a pocket, in a stock of its own."""
 
 from __future__ import annotations
 

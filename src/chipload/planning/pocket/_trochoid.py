@@ -1,4 +1,4 @@
-"""The compiled loop of a trochoid: what a circle of the centre meets.
+"""Compiled loop of a trochoid: the engagement along a circle of the centre path.
 
 Notation: as in ``_kernels``.
 """

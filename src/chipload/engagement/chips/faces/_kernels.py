@@ -1,4 +1,4 @@
-"""Compiled loops of the general case: all pieces of the diagram as edges, and the test whether a point is covered.
+"""Compiled loops of the general case: all curves of the diagram as edges, and the test whether a point is covered.
 
 Notation: arrays, rows and edges as in :mod:`chipload.engagement.chips._kernels` and its ``trace``.
 """

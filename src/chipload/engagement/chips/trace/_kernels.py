@@ -1,9 +1,9 @@
-"""Compiled loops that follow grazing points through a move and put pieces of boundary together.
+"""Compiled loops that follow grazing points through a move and write the edges of the boundary.
 
 Notation: arrays ``cp``, ``ca``, ``K``, ``S``, ``C`` and rows (x, y, theta, t, n_x, n_y, code) as in
 :mod:`chipload.engagement.chips._kernels`. An edge (12): x, y of its start, x, y of its end, theta, t of both, slopes of
-the curve against the edge at both ends, origin, area between the curve and the
-edge (above 0 to the right). ``sign`` of a root: +1 from inward to outward speed with theta rising.
+the curve against the edge at both ends, origin, area between the curve and the edge (above 0 to the right). ``sign`` of
+a root: +1 from inward to outward speed with theta rising.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from chipload.engagement.chips._kernels import BOTTOM, TAU, TOP, extent, instant, point, reach, speed, state
 from chipload.engagement.chips.zeros._kernels import CORNER, MAX_ROOTS, NODES, deviation, root_near, roots, wrapped
@@ -22,7 +22,13 @@ INSET = 1e-10  # of a span of time: where a section that begins as a point is lo
 SAME = 1e-12  # [rad] a corner this near to the end of an arc is its end
 
 
-@njit(cache=True, nogil=True)
+#: types are stated: a constant among the arguments would else be compiled as a type of its own
+_R1 = types.Array(types.float64, 1, "C", readonly=True)
+_R2 = types.Array(types.float64, 2, "C", readonly=True)
+_F1, _F2, _I1 = types.float64[::1], types.float64[:, ::1], types.int64[::1]
+
+
+@njit(types.void(_R2, _R2, _R1, _F2), cache=True, nogil=True)
 def levels(cp, ca, K, ends):
     """Lowest and highest point of the cutter [mm] at even instants, into ``ends`` (n + 1, 2)."""
     S = np.empty(27)
@@ -34,7 +40,25 @@ def levels(cp, ca, K, ends):
         ends[i, 1] = S[2] + high
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    types.int64(_R2, _R2, _R1, types.float64, types.float64, types.float64, types.boolean, _F1, types.int64, _F1),
+    cache=True,
+    nogil=True,
+)
+def _crossing(cp, ca, K, h, a, b, rising, cut, m, S):
+    for _ in range(60):
+        x = 0.5 * (a + b)
+        if x <= a or x >= b:
+            break
+        if (reach(cp, ca, K, h, x, S) > 0.0) == rising:
+            b = x
+        else:
+            a = x
+    cut[m] = b if rising else a
+    return m + 1
+
+
+@njit(types.int64(_R2, _R2, _R1, types.float64, _F2, _F2), cache=True, nogil=True)
 def spans(cp, ca, K, h, ends, out):
     """Times during which the layer cuts the cutter, into ``out`` (m, 2); their count. ``ends`` as of ``levels``."""
     S = np.empty(27)
@@ -84,21 +108,11 @@ def spans(cp, ca, K, h, ends, out):
     return count
 
 
-@njit(cache=True, nogil=True)
-def _crossing(cp, ca, K, h, a, b, rising, cut, m, S):
-    for _ in range(60):
-        x = 0.5 * (a + b)
-        if x <= a or x >= b:
-            break
-        if (reach(cp, ca, K, h, x, S) > 0.0) == rising:
-            b = x
-        else:
-            a = x
-    cut[m] = b if rising else a
-    return m + 1
-
-
-@njit(cache=True, nogil=True)
+@njit(
+    types.int64(_F2, types.int64, _F1, _F1, types.float64, types.float64, types.float64, types.float64, types.int64),
+    cache=True,
+    nogil=True,
+)
 def edge(buf, n, a, b, ax, ay, bx, by, origin):
     """Write the edge from row a to row b, of which (ax, ay), (bx, by) are normals; the new count."""
     dx, dy = b[0] - a[0], b[1] - a[1]
@@ -118,7 +132,7 @@ def edge(buf, n, a, b, ax, ay, bx, by, origin):
     return n + 1
 
 
-@njit(cache=True, nogil=True)
+@njit(types.int64(_F1, _R1, _F2, _F1, _F1, types.float64, types.int64, _F2, types.int64), cache=True, nogil=True)
 def arc(S, K, C, a, b, tol, origin, buf, n):
     """Edges of the section from row a on to row b, counter-clockwise, b[2] > a[2]; new count, -1 where full."""
     cur = a.copy()
@@ -175,7 +189,7 @@ def arc(S, K, C, a, b, tol, origin, buf, n):
             code = cur[6]
 
 
-@njit(cache=True, nogil=True)
+@njit(types.int64(_F1, _R1, _F2, types.float64, types.int64, _F2, types.int64), cache=True, nogil=True)
 def ring(S, K, C, tol, origin, buf, n):
     """The whole section at one instant."""
     a = np.empty(7)
@@ -190,7 +204,13 @@ def ring(S, K, C, tol, origin, buf, n):
     return arc(S, K, C, a, b, tol, origin, buf, n)
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    types.int64(
+        _F1, _R1, _F2, _F2, _I1, types.int64, types.int64, types.int64, types.float64, types.int64, _F2, types.int64
+    ),
+    cache=True,
+    nogil=True,
+)
 def sides(S, K, C, R, sign, count, around, wanted, tol, origin, buf, n):
     """Edges of the section where V has the sign ``wanted``; -1 where full."""
     if count == 0:
@@ -216,7 +236,11 @@ def kind(a, b):
     return CHORD if code in (BOTTOM, TOP) else GRAZING
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    types.int64(_R2, _R2, _R1, types.float64, types.float64, types.float64, _F1, types.int64, _F2, types.int64),
+    cache=True,
+    nogil=True,
+)
 def track(cp, ca, K, h, tol, vmin, last, sign, out, n):
     """The curve V = 0 on from row ``out[n - 1]`` to row ``last``, the only one of its sign; count of rows, -1."""
     S = np.empty(27)

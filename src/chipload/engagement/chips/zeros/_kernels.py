@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from chipload.engagement.chips._kernels import TAU, on_circle, point, point_at, speed
 
@@ -19,7 +19,12 @@ _COS = np.cos(np.arange(NODES) * (TAU / NODES))
 _SIN = np.sin(np.arange(NODES) * (TAU / NODES))
 
 
-@njit(cache=True, nogil=True)
+#: types are stated: a constant among the arguments would else be compiled as a type of its own
+_R1 = types.Array(types.float64, 1, "C", readonly=True)
+_F1, _F2 = types.float64[::1], types.float64[:, ::1]
+
+
+@njit(types.boolean(_F1, types.float64, types.int64, _F1), cache=True, nogil=True)
 def _newton(S, guess, sign, row):
     """The grazing point of an ellipse near ``guess`` by Newton's method, theta into ``row[2]``; False if it fails."""
     theta = guess
@@ -41,7 +46,7 @@ def _newton(S, guess, sign, row):
     return False
 
 
-@njit(cache=True, nogil=True)
+@njit(types.boolean(_F1, types.int64, _F1), cache=True, nogil=True)
 def _graze(S, sign, row):
     """The grazing point of this sign of a ball's circle into ``row``, V = 0 in closed form; False if there is none."""
     size2 = S[23] * S[23] + S[24] * S[24]
@@ -100,7 +105,7 @@ def _zero(S, K, lo, vlo, hi, vhi, row):
             break
 
 
-@njit(cache=True, nogil=True)
+@njit(types.UniTuple(types.float64, 2)(_F1, _R1, _F2, types.int64, _F1), cache=True, nogil=True)
 def _corner(S, K, C, i, row):
     """The corner i into ``row``, across its own velocity; returns V of the pieces before and after it."""
     x, y = C[i, 1], C[i, 2]
@@ -255,7 +260,7 @@ def deviation(a, b):
     return 0.25 * max(abs(dx * a[4] + dy * a[5]), abs(dx * b[4] + dy * b[5]))
 
 
-@njit(cache=True, nogil=True)
+@njit(types.boolean(_F1, _R1, _F2, types.float64, types.float64, types.int64, _F1), cache=True, nogil=True)
 def root_near(S, K, C, guess, width, sign, row):
     """The change of V of this sign near ``guess``, into ``row``; False if there is none within a quarter turn."""
     if S[22] < 0.0:
