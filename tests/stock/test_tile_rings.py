@@ -35,10 +35,10 @@ def test_a_removal_takes_what_geos_takes_and_leaves_what_geos_leaves() -> None:
         assert found.area == pytest.approx([math.fsum(p.area for p in some) for some in pieces], abs=1e-9), n
         for e, some in enumerate(pieces):
             whole = [p.area for p in some if 2.0 * p.area > film * p.length]
-            assert found.pieces[e] == len(whole), n
+            assert found.parts[e] == len(whole), n
             assert found.least[e] == pytest.approx(min(whole, default=0.0), abs=1e-9), n
             assert found.whole[e] == pytest.approx(math.fsum(whole), abs=1e-9), n
-            assert sum(p.area for p in tiles.pieces(e)) == pytest.approx(found.area[e], abs=1e-9)
+            assert sum(p.area for p in tiles.parts_of(e)) == pytest.approx(found.area[e], abs=1e-9)
         if n % 10 == 9:
             tiles.finish()
             tiles = TileRings(stock)
@@ -58,11 +58,11 @@ def test_a_piece_goes_over_the_borders_of_tiles_and_two_that_meet_in_a_corner_ar
     whole = shapely.box(5.0, 5.0, 15.0, 15.0)
     halves = shapely.MultiPolygon([shapely.box(2.0, 2.0, 4.0, 3.0), shapely.box(16.0, 16.0, 17.0, 18.0)])
     first = tiles.remove(np.array([0]), np.array([0]), areas_of([halves]), 0.0)
-    assert (first.pieces.tolist(), first.area.tolist()) == ([2], [4.0])
+    assert (first.parts.tolist(), first.area.tolist()) == ([2], [4.0])
     corner = shapely.MultiPolygon([shapely.box(9.0, 9.0, 10.0, 10.0), shapely.box(10.0, 10.0, 11.0, 11.0)])
-    assert tiles.remove(np.array([0]), np.array([0]), areas_of([corner]), 0.0).pieces.tolist() == [2]
+    assert tiles.remove(np.array([0]), np.array([0]), areas_of([corner]), 0.0).parts.tolist() == [2]
     second = tiles.remove(np.array([0]), np.array([0]), areas_of([whole]), 0.0)
-    assert second.pieces.tolist() == [1]
+    assert second.parts.tolist() == [1]
     assert second.area[0] == pytest.approx(98.0, abs=1e-12)
 
 
@@ -100,7 +100,7 @@ def test_what_crosses_itself_goes_to_geos_and_is_counted() -> None:
     tiles.finish()
     assert stock.by_geos == 1
     assert found.area[0] == pytest.approx(known.intersection(bar).area, rel=1e-12)
-    assert found.pieces[0] == 2
+    assert found.parts[0] == 2
     assert stock.volume() == pytest.approx(known.difference(bar).area, rel=1e-12)
 
 

@@ -76,13 +76,13 @@ def removed_by_layers(
             tidied, stock.tidied = stock.tidied, 0.0
             taken = tiles.remove(swept.met, swept.shape, swept.areas, FILM * tolerance, 0.5 * tolerance)
             gained[k], stock.tidied = stock.tidied, tidied + stock.tidied
-            most = int(taken.pieces.max())
+            most = int(taken.parts.max())
             # exact, so that layers that lose nothing do not change how it is rounded
             removed[k, 0] = math.fsum((taken.area * thickness[swept.met]).tolist()) - float(gained[k])
             removed[k, 1:3] = most, np.count_nonzero(taken.area)
             if most:
                 cutter = setting.cutters[int(steps.tool[k])]
-                found = _most_pieces(tiles, taken, swept, rank, first + k, cutter, FILM * tolerance)
+                found = _most_parts(tiles, taken, swept, rank, first + k, cutter, FILM * tolerance)
                 if found is not None:
                     best, rank = found, rank_of(found.chips)
                 removed[k, 3] = axial_overrun(tiles, cutter, steps.p1[k], steps.a1[k], FILM * tolerance)
@@ -103,16 +103,14 @@ def rank_of(whole: Sequence[Polygon]) -> tuple[int, float]:
     return len(areas), min(areas) / sum(areas) if areas else 0.0
 
 
-def _most_pieces(
+def _most_parts(
     tiles: TileRings, taken: Taken, swept: Swept, rank: tuple[int, float], step: int, cutter: Cutter, film: float
 ) -> ChipAreas | None:
     """The chip of a step with a higher rank than ``rank``, the highest of its layers; None: it has none."""
     best = None
-    share = taken.least / np.where(taken.pieces > 0, taken.whole, 1.0)
-    for e in np.flatnonzero(
-        (taken.pieces > rank[0]) | ((taken.pieces == rank[0]) & (share > rank[1] + EQUAL))
-    ).tolist():
-        pieces = tiles.pieces(e)
+    share = taken.least / np.where(taken.parts > 0, taken.whole, 1.0)
+    for e in np.flatnonzero((taken.parts > rank[0]) | ((taken.parts == rank[0]) & (share > rank[1] + EQUAL))).tolist():
+        pieces = tiles.parts_of(e)
         whole = [p for p in pieces if 2.0 * p.area > film * p.length]
         if rank_of(whole) > rank:
             rank, i = rank_of(whole), int(swept.met[e])

@@ -35,12 +35,12 @@ class Taken:
     Parameters
     ----------
     area : (e,) float [mm^2]
-    pieces : (e,) int, pieces joined over the tiles that are no films
+    parts : (e,) int, pieces joined over the tiles that are no films
     least, whole : (e,) float [mm^2], the smallest of these pieces and their sum
     """
 
     area: Floats
-    pieces: Ints
+    parts: Ints
     least: Floats
     whole: Floats
 
@@ -233,7 +233,7 @@ class TileRings:
         rings = self.rings[first : first + count].tolist()
         return polygon_of([self.points[a : a + n] for a, n in rings]) if rings else Polygon()
 
-    def pieces(self, entry: int) -> list[Polygon]:
+    def parts_of(self, entry: int) -> list[Polygon]:
         """Return what an entry of the last removal took, joined over the tiles."""
         flat = list[Polygon]()
         ops = self.ops[: self.count]

@@ -33,9 +33,9 @@ from chipload.stock.clip.crossings._kernels import (
     RING_A,
     RING_C,
     crossings,
-    inside_moved,
-    moved_inside,
+    holds_shifted,
     ordered_on_c,
+    shifted_holds,
 )
 
 #: results of :func:`clip` beside DEGENERATE and FULL (no room for the result): A and C do not meet, they were cut
@@ -203,7 +203,7 @@ def whole_rings(P, A, a0, a1, Q, C, c0, c1, box, left, left_rings, left_used, ch
         if crossed:
             continue
         x, y = P[start, 0], P[start, 1]
-        inside = box[0] <= x <= box[2] and box[1] <= y <= box[3] and inside_moved(x, y, Q, C, c0, c1)
+        inside = box[0] <= x <= box[2] and box[1] <= y <= box[3] and shifted_holds(x, y, Q, C, c0, c1)
         into, used = (chip, chip_used) if inside else (left, left_used)
         met = met or inside
         end = used[0]
@@ -216,7 +216,7 @@ def whole_rings(P, A, a0, a1, Q, C, c0, c1, box, left, left_rings, left_used, ch
         crossed = False
         for k in range(n):
             crossed = crossed or cross[k, RING_C] == r
-        if crossed or not moved_inside(Q[start, 0], Q[start, 1], P, A, a0, a1):
+        if crossed or not holds_shifted(Q[start, 0], Q[start, 1], P, A, a0, a1):
             continue
         met = True
         end, back = chip_used[0], left_used[0] + count - 1

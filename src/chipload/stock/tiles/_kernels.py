@@ -26,6 +26,8 @@ DONE, MISSING = 0, -3
 ENTRY, LAYER, J, I, OLD, NEW, CHIP_0, CHIP_1, AS = range(9)
 #: ends of an edge this near a border are on it [mm]
 ON_BORDER = 1e-9
+#: most that edges are moved when they are made simpler, over the width of a film
+SIMPLER = 0.125
 #: columns of what an entry takes: area, pieces that are no films, least and whole area of these
 AREA, PIECES, LEAST, WHOLE = range(4)
 
@@ -170,12 +172,12 @@ def around(h, n0, n1, area, ring, points, rings):
 
 
 @njit(
-    "float64(int64[::1], int64[::1], float64[::1], float64[::1], float64[:,::1], int64[::1], int64[::1])",
+    "float64(int64[::1], int64[::1], float64[::1], float64[::1], float64[:,::1], int64[::1], int64[::1], float64)",
     cache=True,
     nogil=True,
 )
-def border(a, b, xs, ys, points, ring_a, ring_b):
-    """Length that two rings of the tiles of operations a and b share on the border of these tiles."""
+def border(a, b, xs, ys, points, ring_a, ring_b, near):
+    """Length that two rings of the tiles of operations a and b share on the border of these tiles, within ``near``."""
     if a[J] == b[J] and abs(a[I] - b[I]) == 1:
         across, at = 0, xs[max(a[I], b[I])]
     elif a[I] == b[I] and abs(a[J] - b[J]) == 1:
@@ -185,11 +187,11 @@ def border(a, b, xs, ys, points, ring_a, ring_b):
     along, total = 1 - across, 0.0
     p = ring_a[0] + ring_a[1] - 1
     for q in range(ring_a[0], ring_a[0] + ring_a[1]):
-        if abs(points[p, across] - at) <= ON_BORDER and abs(points[q, across] - at) <= ON_BORDER:
+        if abs(points[p, across] - at) <= near and abs(points[q, across] - at) <= near:
             low, high = min(points[p, along], points[q, along]), max(points[p, along], points[q, along])
             r = ring_b[0] + ring_b[1] - 1
             for s in range(ring_b[0], ring_b[0] + ring_b[1]):
-                if abs(points[r, across] - at) <= ON_BORDER and abs(points[s, across] - at) <= ON_BORDER:
+                if abs(points[r, across] - at) <= near and abs(points[s, across] - at) <= near:
                     least, most = min(points[r, along], points[s, along]), max(points[r, along], points[s, along])
                     total += max(min(high, most) - max(low, least), 0.0)
                 r = s
@@ -205,8 +207,10 @@ def border(a, b, xs, ys, points, ring_a, ring_b):
 def joined(k0, k1, ops, xs, ys, chip, chip_rings, film, out):
     """Pieces of the chip of one entry, whose operations are k0 to k1 - 1, joined over the tiles, into ``out``.
 
-    A piece is a film if twice its area is at most ``film`` times its length.
+    A piece is a film if twice its area is at most ``film`` times its length. Pieces that come as near to a border of
+    tiles as edges are moved when they are made simpler are joined over it.
     """
+    near = max(ON_BORDER, SIMPLER * film)
     n = 0
     for k in range(k0, k1):
         n += ops[k, CHIP_1] - ops[k, CHIP_0]
@@ -230,7 +234,7 @@ def joined(k0, k1, ops, xs, ys, chip, chip_rings, film, out):
         for b in range(a + 1, n):
             if of[a] == of[b] or area[a] <= 0.0 or area[b] <= 0.0:
                 continue
-            shared = border(ops[of[a]], ops[of[b]], xs, ys, chip, chip_rings[ring[a]], chip_rings[ring[b]])
+            shared = border(ops[of[a]], ops[of[b]], xs, ys, chip, chip_rings[ring[a]], chip_rings[ring[b]], near)
             if shared > ON_BORDER:
                 length[a] -= 2.0 * shared
                 p, q = root(parent, a), root(parent, b)

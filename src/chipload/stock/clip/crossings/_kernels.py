@@ -25,7 +25,7 @@ RING_A, EDGE_A, RING_C, EDGE_C, ENTERS, NEXT_A, NEXT_C, BEFORE_C, PASSED, ROW, R
 
 
 @njit(cache=True, nogil=True, inline="always")
-def left_of_moved(value, dx, dy):
+def left_of_shifted(value, dx, dy):
     """Whether a point is left of an edge (dx, dy) of C, by :func:`orient` of the edge and the point."""
     if value != 0.0:
         return value > 0.0
@@ -33,7 +33,7 @@ def left_of_moved(value, dx, dy):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def moved_left_of(value, dx, dy):
+def shifted_left_of(value, dx, dy):
     """Whether a point of C is left of an edge (dx, dy), by :func:`orient` of the edge and the point."""
     if value != 0.0:
         return value > 0.0
@@ -41,7 +41,7 @@ def moved_left_of(value, dx, dy):
 
 
 @njit("boolean(float64, float64, float64[:,::1], int64[:,::1], int64, int64)", cache=True, nogil=True)
-def inside_moved(x, y, points, rings, first, last):
+def shifted_holds(x, y, points, rings, first, last):
     """Whether a point lies in the area C, moved."""
     odd = False
     for r in range(first, last):
@@ -54,13 +54,13 @@ def inside_moved(x, y, points, rings, first, last):
                 continue
             if max(ux, vx) < x:
                 continue
-            if min(ux, vx) > x or left_of_moved(orient(ux, uy, vx, vy, x, y), vx - ux, vy - uy) == (vy >= y):
+            if min(ux, vx) > x or left_of_shifted(orient(ux, uy, vx, vy, x, y), vx - ux, vy - uy) == (vy >= y):
                 odd = not odd
     return odd
 
 
 @njit("boolean(float64, float64, float64[:,::1], int64[:,::1], int64, int64)", cache=True, nogil=True)
-def moved_inside(x, y, points, rings, first, last):
+def holds_shifted(x, y, points, rings, first, last):
     """Whether a point of C, moved, lies in an area."""
     odd = False
     for r in range(first, last):
@@ -73,7 +73,7 @@ def moved_inside(x, y, points, rings, first, last):
                 continue
             if max(ux, vx) < x:
                 continue
-            if min(ux, vx) > x or moved_left_of(orient(ux, uy, vx, vy, x, y), vx - ux, vy - uy) == (vy > y):
+            if min(ux, vx) > x or shifted_left_of(orient(ux, uy, vx, vy, x, y), vx - ux, vy - uy) == (vy > y):
                 odd = not odd
     return odd
 
@@ -159,11 +159,11 @@ def edge_crossings(px, py, qx, qy, r, e, Q, C, c0, c1, X, cross, n):
             if max(bx, ux) < x0 or min(bx, ux) > x1 or max(by, uy) < y0 or min(by, uy) > y1:
                 continue
             s3, s4 = orient(bx, by, ux, uy, px, py), orient(bx, by, ux, uy, qx, qy)
-            inside = left_of_moved(s4, ux - bx, uy - by)
-            if left_of_moved(s3, ux - bx, uy - by) == inside:
+            inside = left_of_shifted(s4, ux - bx, uy - by)
+            if left_of_shifted(s3, ux - bx, uy - by) == inside:
                 continue
             s1, s2 = orient(px, py, qx, qy, bx, by), orient(px, py, qx, qy, ux, uy)
-            if moved_left_of(s1, qx - px, qy - py) == moved_left_of(s2, qx - px, qy - py):
+            if shifted_left_of(s1, qx - px, qy - py) == shifted_left_of(s2, qx - px, qy - py):
                 continue
             if n == X.shape[0]:
                 return FULL
@@ -224,7 +224,7 @@ def crossings(P, A, a0, a1, Q, C, c0, c1, box, X, cross):
             continue
         if cross[ring, ENTERS] == cross[n - 1, ENTERS]:
             return DEGENERATE
-        if inside_moved(P[start, 0], P[start, 1], Q, C, c0, c1) == (cross[ring, ENTERS] == 1):
+        if shifted_holds(P[start, 0], P[start, 1], Q, C, c0, c1) == (cross[ring, ENTERS] == 1):
             return DEGENERATE
     return n
 
@@ -275,7 +275,7 @@ def ordered_on_c(n, X, cross, Q, C, P, A, a0, a1):
         if cross[a, ENTERS] == cross[cross[end - 1, ROW], ENTERS]:
             return False
         start = C[cross[a, RING_C], 0]
-        if moved_inside(Q[start, 0], Q[start, 1], P, A, a0, a1) != (cross[a, ENTERS] == 1):
+        if holds_shifted(Q[start, 0], Q[start, 1], P, A, a0, a1) != (cross[a, ENTERS] == 1):
             return False
         begin = end
     return True
