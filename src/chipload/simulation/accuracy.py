@@ -63,6 +63,7 @@ from chipload.simulation.moves import MoveRun, moved
 from chipload.simulation.steps import Steps
 from chipload.simulation.swept_area import boxes, swept_ahead
 from chipload.stock.layers import LayeredStock
+from chipload.stock.tile_rings import TileRings
 
 if TYPE_CHECKING:
     from chipload.simulation.removal import RunSettings
@@ -390,8 +391,10 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
     again = replace(setting, profiles={tool: profile}, resolution=fine, watch=None)
     tolerance = fine.tolerance
     for some in window.earlier:
+        tiles = TileRings(stock)
         for _, swept in swept_ahead(some, stock, setting.cutters, setting.interpolation, tolerance, setting.workers):
-            stock.remove_many([i for i, _ in swept.met], [shape for _, shape in swept.met], 0.5 * tolerance)
+            tiles.remove(swept.met, swept.shape, swept.areas, 0.0, 0.5 * tolerance)
+        tiles.finish()
     columns = remove(_parts(window.own, window.parts), stock, again)
     return {name: float(columns[name].max()) for name in COMPARABLE}
 

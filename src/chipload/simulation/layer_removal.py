@@ -5,26 +5,30 @@ Notation: as in :mod:`chipload.simulation.chips`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon, box
 
+from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section
 from chipload.simulation.loads import StepEngagement, engagement_of_step
 from chipload.simulation.removal import ChipAreas, RunSettings, TakenByLayers
 from chipload.simulation.shank import axial_overrun
 from chipload.simulation.steps import Steps
-from chipload.simulation.swept_area import TOGETHER, Plan, swept_ahead
+from chipload.simulation.swept_area import TOGETHER, Plan, Swept, swept_ahead
 from chipload.stock.layers import LayeredStock
 from chipload.stock.tile_grid import polygons
+from chipload.stock.tile_rings import Taken, TileRings
 
 #: a piece of a chip narrower than so many tolerances is a film left by chords, no piece
 FILM = 4.0
+#: two chips are equally shared out within this
+EQUAL = 1e-9
 
 
 def removed_by_layers(
@@ -45,7 +49,7 @@ def removed_by_layers(
     own : (n,) steps whose chip and tooth engagement is asked for; the others are only removed. None: all
     plan : x and y of the whole stock [mm], where ``stock`` is a strip of it; see :mod:`chipload.simulation.strips`
     """
-    thickness, tolerance = stock.thickness.tolist(), setting.resolution.tolerance
+    thickness, tolerance = stock.thickness, setting.resolution.tolerance
     rank = rank_of(best.chips) if best is not None else (0, 0.0)
     removed, gained = np.zeros((len(steps), 4)), np.zeros(len(steps))
     cutting: list[tuple[int, Move, Section]] = []
@@ -59,34 +63,29 @@ def removed_by_layers(
         ]
 
     ahead = swept_ahead(steps, stock, setting.cutters, setting.interpolation, tolerance, setting.workers, plan)
+    tiles = TileRings(stock)
     with ThreadPoolExecutor(1) as beside:
         for k, swept in ahead:
-            met, low, high = swept.met, swept.low[:2], swept.high[:2]
-            shapes = [shape for _, shape in met]
             if own is not None and not own[k]:
-                stock.remove_many([i for i, _ in met], shapes, 0.5 * tolerance)
+                tiles.remove(swept.met, swept.shape, swept.areas, FILM * tolerance, 0.5 * tolerance)
                 continue
             # a point below the lowest section of the box is held against the section below it
             layers = range(max(swept.layers.start - 1, 0), min(swept.layers.stop + 1, stock.layers))
-            there = Section(*stock.edges(layers, low, high))
+            there = Section(*tiles.edges(layers, swept.low[:2], swept.high[:2]))
             # from 0, so that what the step gains does not depend on what was gained before it
             tidied, stock.tidied = stock.tidied, 0.0
-            taken = stock.remove_many([i for i, _ in met], shapes, 0.5 * tolerance)
+            taken = tiles.remove(swept.met, swept.shape, swept.areas, FILM * tolerance, 0.5 * tolerance)
             gained[k], stock.tidied = stock.tidied, tidied + stock.tidied
-            volume, most, lost = 0.0 - float(gained[k]), 0, 0
-            for i, pieces, area, whole in _chips(met, taken, tolerance):
-                volume, lost, most = volume + area * thickness[i], lost + 1, max(most, len(whole))
-                if whole and rank < (len(whole), 1.0 / len(whole)) and rank_of(whole) > rank:
-                    rank = rank_of(whole)
-                    near = polygons(
-                        stock.section(i, low, high).union(MultiPolygon(pieces)).intersection(box(*low, *high))
-                    )
-                    cutter, z = setting.cutters[int(steps.tool[k])], float(stock.heights[i])
-                    best = ChipAreas(first + k, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
-            removed[k, :3] = volume, most, lost
+            most = int(taken.parts.max())
+            # exact, so that layers that lose nothing do not change how it is rounded
+            removed[k, 0] = math.fsum((taken.area * thickness[swept.met]).tolist()) - float(gained[k])
+            removed[k, 1:3] = most, np.count_nonzero(taken.area)
             if most:
                 cutter = setting.cutters[int(steps.tool[k])]
-                removed[k, 3] = axial_overrun(stock, cutter, steps.p1[k], steps.a1[k], FILM * tolerance)
+                found = _most_parts(tiles, taken, swept, rank, first + k, cutter, FILM * tolerance)
+                if found is not None:
+                    best, rank = found, rank_of(found.chips)
+                removed[k, 3] = axial_overrun(tiles, cutter, steps.p1[k], steps.a1[k], FILM * tolerance)
             # what is thinner than the tolerance can tell is no cut
             if most and not steps.rapid[k]:
                 cutting.append((k, swept.move, there))
@@ -94,6 +93,7 @@ def removed_by_layers(
                 waiting.append(beside.submit(engaged, cutting))
                 cutting = []
         waiting.append(beside.submit(engaged, cutting))
+        tiles.finish()
         return TakenByLayers(removed, gained, [bite for several in waiting for bite in several.result()], best)
 
 
@@ -103,17 +103,19 @@ def rank_of(whole: Sequence[Polygon]) -> tuple[int, float]:
     return len(areas), min(areas) / sum(areas) if areas else 0.0
 
 
-def _chips(
-    met: list[tuple[int, Polygon | MultiPolygon]], taken: list[list[Polygon]], tolerance: float
-) -> Iterator[tuple[int, list[Polygon], float, list[Polygon]]]:
-    """Of each layer that lost something: its number, the pieces, their area, those that are more than films."""
-    flat = [p for pieces in taken for p in pieces]
-    area = shapely.area(flat)
-    film = (2.0 * area <= FILM * tolerance * shapely.length(flat)).tolist()
-    at = 0
-    for (i, _), pieces in zip(met, taken, strict=True):
-        if pieces:
-            a, b = at, at + len(pieces)
-            whole = [p for p, thin in zip(pieces, film[a:b], strict=True) if not thin]
-            yield i, pieces, float(area[a] if b - a == 1 else area[a:b].sum()), whole
-            at = b
+def _most_parts(
+    tiles: TileRings, taken: Taken, swept: Swept, rank: tuple[int, float], step: int, cutter: Cutter, film: float
+) -> ChipAreas | None:
+    """The chip of a step with a higher rank than ``rank``, the highest of its layers; None: it has none."""
+    best = None
+    share = taken.least / np.where(taken.parts > 0, taken.whole, 1.0)
+    for e in np.flatnonzero((taken.parts > rank[0]) | ((taken.parts == rank[0]) & (share > rank[1] + EQUAL))).tolist():
+        pieces = tiles.parts_of(e)
+        whole = [p for p in pieces if 2.0 * p.area > film * p.length]
+        if rank_of(whole) > rank:
+            rank, i = rank_of(whole), int(swept.met[e])
+            low, high = swept.low[:2], swept.high[:2]
+            near = polygons(tiles.section(i, low, high).union(MultiPolygon(pieces)).intersection(box(*low, *high)))
+            z = float(tiles.stock.heights[i])
+            best = ChipAreas(step, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
+    return best

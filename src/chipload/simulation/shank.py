@@ -11,11 +11,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.stock.layers import LayeredStock
+from chipload.stock.tile_rings import TileRings
 
 Floats = NDArray[np.float64]
 
@@ -23,15 +22,16 @@ Floats = NDArray[np.float64]
 AROUND = 32
 
 
-def axial_overrun(stock: LayeredStock, cutter: Cutter, tip: Floats, axis: Floats, margin: float) -> float:
+def axial_overrun(tiles: TileRings, cutter: Cutter, tip: Floats, axis: Floats, margin: float) -> float:
     """Return the length of the shank in material, from the end of the flutes upwards [mm]; 0 if none.
 
     Parameters
     ----------
-    stock : as it is
+    tiles : of the stock, as they are
     tip, axis : (3,) where the cutter is [mm], and its axis, unit
     margin : what the shank may touch [mm]
     """
+    stock = tiles.stock
     shank = cutter.diameter if cutter.shank_diameter is None else cutter.shank_diameter
     radius = 0.5 * shank - margin
     low = float(tip[2] + cutter.flute_length * axis[2])
@@ -48,18 +48,7 @@ def axial_overrun(stock: LayeredStock, cutter: Cutter, tip: Floats, axis: Floats
     # the lowest section above the flutes decides where an upright cutter begins
     offset = float(stock.heights[first] - low) if lean < 1e-9 else 0.5 * step
     found = 0.0
-    while height + offset < cutter.overhang and _holds(stock, tip + (height + offset) * axis + ring):
+    while height + offset < cutter.overhang and tiles.holds(tip + (height + offset) * axis + ring):
         height += step
         found = height - cutter.flute_length
     return found
-
-
-def _holds(stock: LayeredStock, points: Floats) -> bool:
-    """Return whether one of some points (n, 3) [mm] lies in the stock."""
-    layer = np.searchsorted(stock.bounds, points[:, 2], "right") - 1
-    i = np.searchsorted(stock.xs, points[:, 0], "right") - 1
-    j = np.searchsorted(stock.ys, points[:, 1], "right") - 1
-    layers, rows, columns = stock.tiles.shape
-    known = (layer >= 0) & (layer < layers) & (i >= 0) & (i < columns) & (j >= 0) & (j < rows)
-    tiles = stock.tiles[layer[known], j[known], i[known]]
-    return bool(shapely.intersects_xy(tiles, points[known, 0], points[known, 1]).any())

@@ -13,10 +13,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from shapely import MultiPolygon, Polygon
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.chips.covered import covered_polygons
+from chipload.engagement.chips.covered import covered_rings
 from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
 from chipload.engagement.chips.section import cutter_numbers
 from chipload.errors import InputError
@@ -24,6 +23,7 @@ from chipload.program.program import Program
 from chipload.simulation.flute_end import Tiles, in_air, met
 from chipload.simulation.reach import reached
 from chipload.simulation.steps import StepBlocks, Steps
+from chipload.stock.areas import PlaneAreas
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
@@ -40,13 +40,20 @@ TOGETHER = 16
 
 @dataclass(frozen=True, eq=False)
 class Swept:
-    """Area that a step covers: its bounding box, the layers in it, and the layers that it meets with their areas."""
+    """Area that a step covers: its bounding box, the layers in it, and the layers that it meets with their areas.
+
+    Parameters
+    ----------
+    met, shape : (e,) int, layers, and which of ``areas`` the step covers of each
+    """
 
     move: Move
     low: Floats
     high: Floats
     layers: range
-    met: list[tuple[int, Polygon | MultiPolygon]]
+    met: Ints
+    shape: Ints
+    areas: PlaneAreas
 
 
 def swept_ahead(
@@ -86,15 +93,15 @@ def swept_ahead(
         for tool, K, those in profiles:
             own = {k: both for k, both in found.items() if k in those}
             areas = _covered(steps, own, cutters[tool], K, stock, tolerance) if own else []
-            for (k, (move, layers, _)), covered in zip(own.items(), areas, strict=True):
-                out[k] = Swept(move, low[k], high[k], layers, covered)
+            for (k, (move, layers, _)), (which, shape, of) in zip(own.items(), areas, strict=True):
+                out[k] = Swept(move, low[k], high[k], layers, which, shape, of)
         return sorted(out.items())
 
     parts = [range(i, min(i + TOGETHER, len(steps))) for i in range(0, len(steps), TOGETHER)]
     with ThreadPoolExecutor(workers) as pool:
         for several in pool.map(swept, parts):
             for k, found in several:
-                if found.met:
+                if len(found.met):
                     yield k, found
 
 
@@ -191,8 +198,8 @@ def _profiles(
 
 def _covered(
     steps: Steps, own: Mapping[int, Met], cutter: Cutter, K: Floats, stock: LayeredStock, tolerance: float
-) -> list[list[tuple[int, Polygon | MultiPolygon]]]:
-    """Return the area that steps cover of each layer; layers that an upright flank crosses share a polygon."""
+) -> list[tuple[Ints, Ints, PlaneAreas]]:
+    """Return the layers that steps cover and their areas; layers that an upright flank crosses share one."""
     heights = stock.heights
     asked: list[Floats] = []
     of: list[Ints] = []
@@ -207,11 +214,16 @@ def _covered(
             asked[-1] = np.append(asked[-1], z[flank][0])
             rows[flank] = len(asked[-1]) - 1
         of.append(np.where(left, rows, -1))
-    shapes = covered_polygons([move for move, _, _ in own.values()], K, asked, tolerance)
-    return [
-        [(i, shape) for i, n in zip(layers, rows.tolist(), strict=True) if n >= 0 and (shape := found[n]) is not None]
-        for (_, layers, _), rows, found in zip(own.values(), of, shapes, strict=True)
-    ]
+    areas = covered_rings([move for move, _, _ in own.values()], K, asked, tolerance)
+    some = np.append(areas.first[:, 1] > areas.first[:, 0], False)
+    out = list[tuple[Ints, Ints, PlaneAreas]]()
+    before = 0
+    for (_, layers, _), rows, heights_asked in zip(own.values(), of, asked, strict=True):
+        shape = np.where(rows >= 0, rows + before, -1)
+        there = some[shape]
+        out.append((np.arange(layers.start, layers.stop)[there], shape[there], areas))
+        before += len(heights_asked)
+    return out
 
 
 def _flank(steps: Steps, k: int, cutter: Cutter, heights: Floats) -> NDArray[np.bool_]:

@@ -70,7 +70,8 @@ class LayeredStock:
     Notes
     -----
     Besides these it keeps ``tidied`` [mm^3], what it has gained by edges that were made simpler, and for every tile the
-    number of points (``room``) beyond which that is done next.
+    number of points (``room``) beyond which that is done next. ``by_geos`` is the number of tiles that
+    :class:`chipload.stock.tile_rings.TileRings` left to GEOS, since the stock was made or loaded.
 
     Examples
     --------
@@ -91,6 +92,7 @@ class LayeredStock:
         self.cut: NDArray[np.bool_] = np.zeros(len(tiles), dtype=np.bool_)
         self.room: Ints = np.full(tiles.shape, ROOM, dtype=np.int64)
         self.tidied = 0.0
+        self.by_geos = 0
 
     @classmethod
     def block(cls, low: ArrayLike, high: ArrayLike, bounds_or_layer_mm: ArrayLike, tile_mm: float) -> LayeredStock:

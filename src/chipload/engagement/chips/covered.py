@@ -35,6 +35,7 @@ from chipload.engagement.chips.ring import Origin, Ring, ring_of_edges, rings_of
 from chipload.engagement.chips.section import cutter_numbers
 from chipload.errors import InputError
 from chipload.lazy import LateModule
+from chipload.stock.areas import PlaneAreas, areas_of
 
 _kernels = LateModule("chipload.engagement.chips._kernels")
 faces = LateModule("chipload.engagement.chips.faces._kernels")
@@ -148,7 +149,18 @@ def covered_polygons(
     moves: Sequence[Move], K: Floats, heights: Sequence[Floats], tolerance: float
 ) -> list[list[Shape | None]]:
     """``CoveredArea.polygon`` of many layers of many moves: ``heights[m]`` of move m; None where it is never in the
-    layer.
+    layer. See :func:`covered_rings`.
+    """
+    found = covered_rings(moves, K, heights, tolerance)
+    some = (found.first[:, 1] > found.first[:, 0]).tolist()
+    shapes = [found.polygon(k) if there else None for k, there in enumerate(some)]
+    first = np.cumsum([0, *(len(h) for h in heights)]).tolist()
+    return [shapes[a:b] for a, b in itertools.pairwise(first)]
+
+
+def covered_rings(moves: Sequence[Move], K: Floats, heights: Sequence[Floats], tolerance: float) -> PlaneAreas:
+    """Return the areas of many layers of many moves, ``heights[m]`` of move m, one after the other; without rings where
+    the move is never in the layer.
 
     One loop over all of them without the interpreter: in threads it costs no more than the areas do.
 
@@ -157,18 +169,53 @@ def covered_polygons(
     K : of :func:`chipload.engagement.chips.section.cutter_numbers`
     """
     along = [_along(move, K, tolerance) for move in moves]
-    if not any(along):
-        return _polygons(moves, K, heights, tolerance)
-    kept = [(move, h) for move, h, found in zip(moves, heights, along, strict=True) if found is None]
-    others = iter(_polygons([move for move, _ in kept], K, [h for _, h in kept], tolerance))
-    out: list[list[Shape | None]] = []
-    for found, levels in zip(along, heights, strict=True):
-        if found is None:
-            out.append(next(others))
+    levels = np.concatenate([np.empty(0), *heights])
+    first = np.cumsum([0, *(len(h) for h in heights)])
+    # of a cutter that moves along itself no layer is asked for here
+    asked = np.cumsum([0, *(len(h) if found is None else 0 for h, found in zip(heights, along, strict=True))])
+    kept = np.repeat([found is None for found in along], np.diff(first))
+    buffer, count, knots, whole = _loops(moves, K, levels[kept], asked, tolerance)
+    at = np.flatnonzero(kept)
+    rings, shapes = dict[int, Ints](), dict[int, Shape | None]()
+    simple = np.flatnonzero(count >= 0)
+    end = np.cumsum(count[simple])
+    for i, a, n in zip(simple.tolist(), (end - count[simple]).tolist(), count[simple].tolist(), strict=True):
+        if whole[i]:
+            rings[int(at[i])] = np.array([a, n])
         else:
-            areas = [_standing(*found, h, tolerance) for h in levels.tolist()]
-            out.append([area.polygon if area is not None else None for area in areas])
-    return out
+            shapes[int(at[i])] = _thick(_untangled(shapely.Polygon(buffer[a : a + n, :2])), tolerance)
+    for i in np.flatnonzero(count == trace.GENERAL).tolist():
+        move = moves[int(np.searchsorted(first, at[i], "right")) - 1]
+        found = _noded_shape(
+            _candidates(move, K, float(levels[at[i]]), tolerance, max(_KNOTS, 4 * int(knots[i]))),
+            move,
+            K,
+            float(levels[at[i]]),
+            tolerance,
+        )
+        shapes[int(at[i])] = None if found is None else _thick(found, tolerance)
+    for m, standing in enumerate(along):
+        for k in range(first[m], first[m + 1]) if standing is not None else ():
+            area = _standing(*standing, float(levels[k]), tolerance) if standing is not None else None
+            shapes[k] = None if area is None else area.polygon
+    return _together(buffer[:, :2], rings, shapes, len(levels))
+
+
+def _together(points: Floats, rings: dict[int, Ints], shapes: dict[int, Shape | None], count: int) -> PlaneAreas:
+    """Areas of ``count`` layers: some have one ring of ``points``, some a shape, the others none."""
+    some = np.array(list(rings), dtype=np.int64)
+    table = np.array(list(rings.values()), dtype=np.int64).reshape(-1, 2)
+    first = np.zeros((count, 2), dtype=np.int64)
+    first[some] = np.arange(len(some))[:, None] + [0, 1]
+    used = points[: int(table[-1].sum()) if len(table) else 0]
+    more = [k for k, shape in shapes.items() if shape is not None]
+    if not more:
+        return PlaneAreas(np.ascontiguousarray(used), table, first)
+    added = areas_of([shapes[k] for k in more])
+    first[more] = added.first + len(table)
+    return PlaneAreas(
+        np.concatenate([used, added.points]), np.concatenate([table, added.rings + np.array([len(used), 0])]), first
+    )
 
 
 def _along(move: Move, K: Floats, tolerance: float) -> tuple[Move, Floats] | None:
@@ -197,34 +244,6 @@ def _standing(move: Move, K: Floats, h: float, tolerance: float) -> CoveredArea 
         raise InputError(f"covered: tolerance = {tolerance:g} mm: must be above 0")
     edges = whole_section(move, K, h, 0.0, tolerance)
     return CoveredArea((ring_of_edges(edges),), h, tolerance, True) if len(edges) else None
-
-
-def _polygons(
-    moves: Sequence[Move], K: Floats, heights: Sequence[Floats], tolerance: float
-) -> list[list[Shape | None]]:
-    """Return :func:`covered_polygons` for a cutter by its numbers."""
-    levels = np.concatenate([np.empty(0), *heights])
-    first = np.cumsum([0, *(len(h) for h in heights)])
-    buffer, count, knots, whole = _loops(moves, K, levels, first, tolerance)
-    which = np.flatnonzero(count >= 0)
-    shapes: NDArray[np.object_] = np.full(len(levels), None, dtype=object)
-    points = buffer[: int(count[which].sum()), :2]
-    if len(which):
-        ring = np.repeat(np.arange(len(which)), count[which])
-        shapes[which] = shapely.polygons(shapely.linearrings(points, indices=ring))
-    for i in which[~whole[which]]:
-        shapes[i] = _thick(_untangled(shapes[i]), tolerance)
-    for i in np.flatnonzero(count == trace.GENERAL).tolist():
-        move = moves[int(np.searchsorted(first, i, "right")) - 1]
-        found = _noded_shape(
-            _candidates(move, K, float(levels[i]), tolerance, max(_KNOTS, 4 * int(knots[i]))),
-            move,
-            K,
-            float(levels[i]),
-            tolerance,
-        )
-        shapes[i] = None if found is None else _thick(found, tolerance)
-    return [list(shapes[a:b]) for a, b in itertools.pairwise(first.tolist())]
 
 
 def _loops(
@@ -358,4 +377,13 @@ def _without_slivers(rings: tuple[Ring, ...], tolerance: float) -> tuple[Ring, .
     return tuple(kept)
 
 
-__all__ = ["CoveredArea", "Origin", "candidates", "covered", "covered_areas", "covered_polygons", "whole_section"]
+__all__ = [
+    "CoveredArea",
+    "Origin",
+    "candidates",
+    "covered",
+    "covered_areas",
+    "covered_polygons",
+    "covered_rings",
+    "whole_section",
+]

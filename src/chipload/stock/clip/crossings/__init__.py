@@ -1,0 +1,1 @@
+"""Crossings of the boundaries of two areas, compiled."""

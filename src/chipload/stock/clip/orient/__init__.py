@@ -1,0 +1,1 @@
+"""Side of a line on which a point lies, compiled."""
