@@ -261,8 +261,12 @@ def _helps(
 
 def _scaled(posture: Pose, diameter: float) -> Pose:
     cutter = posture.cutter
-    corner = cutter.corner_radius * diameter / cutter.diameter
-    other = replace(cutter, diameter=diameter, corner_radius=corner, corner_e=None, corner_f=None, shank_diameter=None)
+    ratio = diameter / cutter.diameter
+    size = {"diameter": diameter, "corner_radius": ratio * cutter.corner_radius, "corner_e": None, "corner_f": None}
+    if cutter.barrel_radius is not None:
+        size |= {"barrel_radius": ratio * cutter.barrel_radius, "corner_e": ratio * cutter.apt[2]}
+        size |= {"flute_length": ratio * cutter.flute_length}
+    other = replace(cutter, **size, shank_diameter=None)
     return replace(posture, cutter=other)
 
 
