@@ -247,8 +247,9 @@ def test_a_barrel_cutter_is_refused(formula):
     formula.with_name("cutters.toml").write_text(f'name = "own"\ncutter = [{row}]\n')
     changed(formula, 'name = "wu2019"', 'file = "cutters.toml"')
     assert refused(formula).endswith(
-        "cutter 1: barrel_radius_mm = 85.0: barrel cutters are not planned with: state flat, bull-nose or ball cutters "
-        "by diameter_mm and corner_radius_mm"
+        "cutter 1: barrel_radius_mm = 85.0: the search of table angles and the gouge check know cutters by "
+        "cylinders and one corner circle: state flat, bull-nose or ball cutters by diameter_mm and corner_radius_mm, "
+        "and simulate a program for the barrel cutter with kind = program"
     )
 
 

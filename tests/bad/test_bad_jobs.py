@@ -69,9 +69,8 @@ IN_FILE = [
     ('name = "vmc"', "", "machine: none is stated: state either machine.name or machine.file"),
     ('name = "vmc"', 'name = "vmc"\nfile = "a.toml"', "machine: both are stated: state either machine.name or "
      "machine.file"),
-    ("number = 1", "number = 1\nside_radius_mm = 60.0", "cutter.0.side_radius_mm: chips of barrel cutters are not "
-     "simulated: state a flat, bull-nose or ball cutter, or the outline of the barrel as body_mm, which "
-     "is only checked for collisions"),
+    ("number = 1", "number = 1\nside_radius_mm = 60.0", "cutter.0.side_radius_mm: the radius of the flank arc of "
+     "a barrel cutter is barrel_radius_mm: state that"),
     ("number = 1", "", "cutter.0.number is missing: state it; dimensions of a cutter are never guessed"),
 ]  # fmt: skip
 

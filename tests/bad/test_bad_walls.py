@@ -186,17 +186,33 @@ def test_a_flat_end_and_a_taper_cut_no_wall(plate_job: Path, shape: str, says: s
     assert run(plate_job) == f"chipload: {says}"
 
 
-def test_a_barrel_is_no_cutter_of_a_wall(plate_job: Path) -> None:
-    """A body of revolution, as tool libraries state a barrel: the cutter, and the operation that names it."""
+def test_a_body_is_no_cutter_of_a_wall(plate_job: Path) -> None:
+    """A body of revolution, as tool libraries state some barrels: the cutter, and the operation that names it."""
     body = "body_mm = [[0.0, 0.0], [3.0, 0.5], [4.0, 5.0], [3.6, 8.0]]"
     plate_job.write_text(plate_job.read_text().replace("corner_radius_mm = 4.0", body))
     done = CliRunner().invoke(app, ["run", str(plate_job), "--out", str(plate_job.parent / "result")])
     assert done.exit_code == 2
     assert done.stderr.strip().splitlines() == [
         "chipload: job.toml: cutter 1: body_mm: for a program that is simulated: leave it out, and state its numbers",
-        "chipload: job.toml: operation.0.cutter = 1: is a body (barrel, tap), whose chips are not simulated: state a "
-        "ball nose or a bull nose",
+        "chipload: job.toml: operation.0.cutter = 1: is a body (tap, thread mill), whose chips are not simulated: "
+        "state a ball nose, a bull nose or a barrel by barrel_radius_mm",
     ]
+
+
+@pytest.mark.parametrize(
+    ("lean", "says"),
+    [
+        ("60.0", "lean_deg, lead_deg: the axis leans by 60 deg: must be between 69.24 and 90, where the flank arc of the "
+         "barrel touches"),
+        ("79.0", "wall.foot_mm = 5: must be at least 8.027: the barrel reaches so far below its last row, towards the "
+         "clamp: state that, or touch nearer to the tip by less lean_deg"),
+    ],
+)  # fmt: skip
+def test_a_barrel_touches_a_wall_with_its_arc_above_the_foot(plate_job: Path, lean: str, says: str) -> None:
+    text = plate_job.read_text().replace("flute_length_mm = 8.0", "flute_length_mm = 16.0")
+    text = text.replace("corner_radius_mm = 4.0", "corner_radius_mm = 1.5\nbarrel_radius_mm = 40.0")
+    plate_job.write_text(text.replace("lean_deg = 45.0", f"lean_deg = {lean}").replace("depth_max_mm = 0.4", "depth_max_mm = 0.1"))
+    assert run(plate_job) == f"chipload: {says}"
 
 
 def test_a_run_refuses_a_table_with_one_place(plate_job: Path) -> None:

@@ -158,3 +158,18 @@ def test_tools_of_a_camotics_project() -> None:
     assert (found[3]["diameter_mm"], found[3]["taper_deg"]) == (2.0, pytest.approx(math.degrees(math.atan(0.2))))
     with pytest.raises(InputError, match="shape spheroid: must be cylindrical"):
         project_tools({"tools": {"1": {"shape": "spheroid", "length": 1, "diameter": 1}}}, "p")
+
+
+def test_a_barrel_that_ends_at_its_widest_place_is_read(tmp_path: Path) -> None:
+    """Fusion states the flank's radius and the height of the widest place: the arc there is upright."""
+    sizes = {"DC": 12, "LCF": 10, "lower-radius": 1, "upper-radius": 1, "profile-radius": 48, "axial-distance": 10}
+    path = tmp_path / "library.json"
+    path.write_text(json.dumps({"data": [tool(3, "circle segment barrel", **sizes)]}))
+    values = read_fusion_tool(path, 3)
+    assert (values["corner_radius_mm"], values["barrel_radius_mm"]) == (1.0, 48.0)
+    cutter = cutter_from_table({**values, "number": 3, "helix_deg": 30.0})
+    assert cutter.radius_at([10.0])[0] == pytest.approx(6.0)
+    assert cutter.flank_arc.f == pytest.approx(10.0)
+    longer = tool(3, "circle segment barrel", **{**sizes, "LCF": 20})
+    path.write_text(json.dumps({"data": [longer]}))
+    assert read_fusion_tool(path, 3)["body_mm"] == ((6.0, 0.0), (6.0, 20.0))  # it cuts above the widest place too

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from chipload.cutter.table import BARREL_KEYS
+from chipload.cutter.table import BARREL_NAMES
 from chipload.errors import InputError
 from chipload.tables import Labelled, nearest, read_table, shipped_table
 
@@ -197,11 +197,13 @@ def _from_table(labelled: Labelled) -> Catalogue:
 def _cutter(k: int, row: Any) -> CatalogueCutter:
     if not isinstance(row, dict):
         raise InputError(f"cutter {k}: must be a table")
-    barrel = next((key for key in row if key in BARREL_KEYS or row[key] == "barrel"), None)
+    known = ("barrel_radius_mm", *BARREL_NAMES)
+    barrel = next((key for key in row if key in known or row[key] == "barrel"), None)
     if barrel is not None:
         raise InputError(
-            f"cutter {k}: {barrel} = {row[barrel]!r}: barrel cutters are not planned with: state flat, bull-nose or "
-            "ball cutters by diameter_mm and corner_radius_mm"
+            f"cutter {k}: {barrel} = {row[barrel]!r}: the search of table angles and the gouge check know cutters by "
+            "cylinders and one corner circle: state flat, bull-nose or ball cutters by diameter_mm and "
+            "corner_radius_mm, and simulate a program for the barrel cutter with kind = program"
         )
     taper = next((key for key in row if key in _TAPER or row[key] == "tapered"), None)
     if taper is not None:

@@ -8,16 +8,21 @@ above the tip. A flat end mill has r = 0, e = d/2, f = 0; a ball has r = d/2, e 
 Bottom line z = rho tan(alpha), flank line rho = d/2 + (z - d/2 tan(alpha)) tan(beta); the corner circle touches both:
 e (1 - tan(alpha) tan(beta)) = d/2 (1 - tan(alpha) tan(beta)) + r tan(beta) / cos(alpha) - r / cos(beta),
 f = e tan(alpha) + r / cos(alpha).
+
+A barrel cutter has an arc of large radius between corner and flank (:mod:`chipload.cutter.barrel`). Its corner touches
+the bottom and that arc, so that e is free: 0 for a round tip.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chipload.cutter.barrel import FlankArc, flank_arc
 from chipload.cutter.bodies import Profile, check_body
 from chipload.cutter.strength import ToolStrength, check_material
 from chipload.errors import InputError
@@ -44,7 +49,8 @@ class Cutter:
     modulus : Young's modulus of the cutter [MPa]
     corner_radius : r [mm], r >= 0 and e >= 0: without taper and bottom angle r <= d / 2
     corner_e, corner_f : APT e and f [mm]; None: where the corner touches bottom and flank, as e = d/2 - r, f = r of a
-        bull nose. A given one must agree with that within 1e-3 mm
+        bull nose. A given one must agree with that within 1e-3 mm. With ``barrel_radius`` e is free, None: 0
+    barrel_radius : radius of the flank arc of a barrel cutter [mm]; None: no such arc
     bottom : alpha [rad], 0 <= alpha, alpha + beta < 90 deg
     taper : beta [rad], 0 <= beta
     runout : (offset [mm], direction [rad] from tooth 0): the axis of the teeth beside that of the spindle
@@ -77,6 +83,7 @@ class Cutter:
     corner_radius: float = 0.0
     corner_e: float | None = None
     corner_f: float | None = None
+    barrel_radius: float | None = None
     bottom: float = 0.0
     taper: float = 0.0
     runout: tuple[float, float] = (0.0, 0.0)
@@ -97,7 +104,7 @@ class Cutter:
             if not ok:
                 raise InputError(f"cutter.{key} = {value:g}: {limit}")
 
-        optional = (self.corner_e, self.corner_f, self.shank_diameter)
+        optional = (self.corner_e, self.corner_f, self.barrel_radius, self.shank_diameter)
         numbers = (self.diameter, self.helix, self.flute_length, self.overhang, self.modulus, self.corner_radius)
         more = (self.bottom, self.taper, *self.runout, *(x for x in optional if x is not None))
         if not all(math.isfinite(x) for x in (*numbers, *more)):
@@ -136,20 +143,8 @@ class Cutter:
             math.degrees(self.taper),
             f"must be from 0 to below 90 - bottom_deg = {90.0 - math.degrees(self.bottom):g}",
         )
-        largest = self._largest_corner
-        limit = f"must be at most diameter_mm / 2 = {self.radius:g}"
-        if self.bottom > 0.0 or self.taper > 0.0:
-            limit = f"must be at most {largest:.6g}, where the corner's centre is on the axis"
-        slack = 1e-9 * self.diameter
         need(self.corner_radius >= 0.0, "corner_radius_mm", self.corner_radius, "must be at least 0")
-        need(self.corner_radius <= largest + slack, "corner_radius_mm", self.corner_radius, limit)
-        for key, given, touching in zip(("e", "f"), (self.corner_e, self.corner_f), self.apt[2:4], strict=True):
-            need(
-                given is None or abs(given - touching) <= 1e-3,
-                f"corner_{key}_mm",
-                given or 0.0,
-                f"must be {touching:.6g}, where the corner touches bottom and flank; leave it out",
-            )
+        self._check_corner()
         need(self.runout[0] >= 0.0, "runout_mm", self.runout[0], "must be at least 0")
         self._check_pitch()
         if self.body:
@@ -175,6 +170,38 @@ class Cutter:
         need(0.0 < factor <= 1.0, "fluted_factor", factor, "must be above 0 and at most 1 (0.8 is usual for end mills)")
         check_material(self.strength, self.modulus)
         need(self.number >= 0, "number", self.number, "must be at least 0")
+
+    def _check_corner(self) -> None:
+        """Check the corner against bottom and flank, or against the arc of a barrel."""
+        r, e, touching = self.corner_radius, self.corner_e or 0.0, self.apt[2:4]
+        slack = 1e-9 * self.diameter
+        if self.barrel_radius is None:
+            largest = self._largest_corner
+            limit = f"must be at most diameter_mm / 2 = {self.radius:g}"
+            if self.bottom > 0.0 or self.taper > 0.0:
+                limit = f"must be at most {largest:.6g}, where the corner's centre is on the axis"
+            if r > largest + slack:
+                raise InputError(f"cutter.corner_radius_mm = {r:g}: {limit}")
+        else:
+            if self.body:
+                raise InputError(
+                    f"cutter.barrel_radius_mm = {self.barrel_radius:g}: with body_mm nothing cuts: leave one out"
+                )
+            if not 0.0 <= e < self.radius:
+                raise InputError(
+                    f"cutter.corner_e_mm = {e:g}: must be from 0, a round tip, to below diameter_mm / 2 = {self.radius:g}"
+                )
+            if self.flank_arc is not None and self.flute_length <= self.flank_arc.z_from + slack:
+                raise InputError(
+                    f"cutter.flute_length_mm = {self.flute_length:g}: must be above {self.flank_arc.z_from:.6g}, where "
+                    "the arc of barrel_radius_mm begins"
+                )
+        for key, given, where in zip(("e", "f"), (self.corner_e, self.corner_f), touching, strict=True):
+            if given is not None and abs(given - where) > 1e-3:
+                raise InputError(
+                    f"cutter.corner_{key}_mm = {given:g}: must be {where:.6g}, where the corner touches bottom and "
+                    f"flank; leave it out"
+                )
 
     def _check_pitch(self) -> None:
         if not self.pitch:
@@ -229,7 +256,7 @@ class Cutter:
 
     @property
     def apt(self) -> tuple[float, float, float, float, float, float, float]:
-        """(d, r, e, f, alpha, beta, h) [mm, rad].
+        """(d, r, e, f, alpha, beta, h) [mm, rad]; of a barrel e, f are those of its corner.
 
         >>> bull = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5, corner_radius=1.0)
         >>> bull.apt
@@ -238,14 +265,38 @@ class Cutter:
         r, ta, tb = self.corner_radius, math.tan(self.bottom), math.tan(self.taper)
         pull = r / math.cos(self.taper) - r * tb / math.cos(self.bottom)
         e = max(self.radius - pull / (1.0 - ta * tb), 0.0)
+        if self.barrel_radius is not None:
+            e = self.corner_e or 0.0
         f = e * ta + r / math.cos(self.bottom)
         return (self.diameter, r, e, f, self.bottom, self.taper, self.flute_length)
+
+    @cached_property
+    def flank_arc(self) -> FlankArc | None:
+        """The flank arc of a barrel cutter; None: it has none."""
+        return None if self.barrel_radius is None else flank_arc(self.apt, self.barrel_radius)
+
+    @property
+    def outline(self) -> tuple[float, ...]:
+        """The seven numbers of :attr:`apt`; of a barrel cutter then E, F, R of its arc and the kappa where it begins."""
+        arc = self.flank_arc
+        return self.apt if arc is None else (*self.apt, arc.e, arc.f, arc.radius, arc.kappa_from)
+
+    @property
+    def finishing_arc(self) -> tuple[float, float, float]:
+        """(r, e, f) [mm] of the arc of the profile that finishes a surface: a barrel's flank arc, else the corner."""
+        arc = self.flank_arc
+        return self.apt[1:4] if arc is None else (arc.radius, arc.e, arc.f)
+
+    @property
+    def corner_end(self) -> float:
+        """kappa [rad] at which the corner ends: pi/2 - beta, or where the arc of a barrel begins."""
+        return 0.5 * math.pi - self.taper if self.flank_arc is None else self.flank_arc.kappa_from
 
     def radius_at(self, z: ArrayLike) -> NDArray[np.float64]:
         """Return the radius rho of the envelope at heights z above the tip; at z = 0 that of the flat bottom.
 
         Bottom line up to z = f - r cos(alpha), corner circle e + sqrt(r^2 - (f - z)^2) up to z = f - r sin(beta), flank
-        line above, on beyond the flutes.
+        line above, on beyond the flutes; of a barrel its arc between corner and flank line.
 
         Parameters
         ----------
@@ -277,10 +328,17 @@ class Cutter:
         bottom = np.where(z < low, z, 0.0) / math.tan(alpha) if alpha > 0.0 else e
         circle = e + np.sqrt(np.clip(r * r - (f - z) ** 2, 0.0, None))
         flank = e + r * math.cos(beta) + (z - high) * math.tan(beta)
+        arc = self.flank_arc
+        if arc is not None:
+            high = arc.z_from
+            bow = arc.e + np.sqrt(np.clip(arc.radius**2 - (arc.f - z) ** 2, 0.0, None))
+            flank = np.where(
+                z < arc.z_to, bow, arc.e + arc.radius * math.cos(beta) + (z - arc.z_to) * math.tan(beta)
+            )
         return np.asarray(np.where(z < low, bottom, np.where(z < high, circle, flank)))
 
     def profile(self, chord_mm: float) -> NDArray[np.float64]:
-        """Return the envelope (m, 2) as (rho, z) [mm] from the tip to h, its corner by chords within ``chord_mm``.
+        """Return the envelope (m, 2) as (rho, z) [mm] from the tip to h, its arcs by chords within ``chord_mm``.
 
         >>> Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5).profile(0.01).tolist()
         [[0.0, 0.0], [5.0, 0.0], [5.0, 20.0]]
@@ -289,13 +347,16 @@ class Cutter:
             return np.array([(0.0, 0.0), *self.body] if self.body[0][0] > 0.0 else self.body)
         _, r, e, f, alpha, beta, h = self.apt
         points = [(0.0, 0.0)]
-        if r > 0.0:
-            turn = 0.5 * math.pi - alpha - beta
-            n = max(1, math.ceil(turn / (2.0 * math.acos(1.0 - min(chord_mm / r, 1.0)))))
-            angles = [alpha + turn * i / n for i in range(n + 1)]
-            points += [(e + r * math.sin(a), f - r * math.cos(a)) for a in angles]
-        else:
-            points.append((e, f))
+
+        def chords(e: float, f: float, r: float, first: float, last: float) -> list[tuple[float, float]]:
+            n = max(1, math.ceil((last - first) / (2.0 * math.acos(1.0 - min(chord_mm / r, 1.0)))))
+            angles = [first + (last - first) * i / n for i in range(n + 1)]
+            return [(e + r * math.sin(a), f - r * math.cos(a)) for a in angles]
+
+        points += chords(e, f, r, alpha, self.corner_end) if r > 0.0 else [(e, f)]
+        arc = self.flank_arc
+        if arc is not None:
+            points += chords(arc.e, arc.f, arc.radius, arc.kappa_from, arc.kappa_at(min(h, arc.z_to)))
         points.append((float(self.radius_at(h)), h))
         p: NDArray[np.float64] = np.array(points)
         keep = np.hypot(*np.diff(p, axis=0).T) > 1e-9

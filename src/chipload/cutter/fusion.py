@@ -2,9 +2,10 @@
 
 A tool's ``geometry`` has the symbols of ISO 13399 in the tool's own unit: DC diameter, RE corner radius, LCF flute
 length, LB length below the holder, SFDM shank, NOF flutes, SIG point, TA taper, HA helix angle [deg], TP pitch.
-Read are end mills (flat, ball, bull nose, tapered), face mills, slot mills (T-slot), chamfer mills and drills. Taps,
-thread mills, reamers, dovetail, lollipop and circle segment (barrel, lens) mills are bodies, whose chips are not
-simulated. Other shapes are refused.
+Read are end mills (flat, ball, bull nose, tapered), face mills, slot mills (T-slot), chamfer mills and drills, and
+circle segment barrels that do not cut above their widest place: lower-radius corner, profile-radius flank, both
+tangent, axial-distance height of the widest place. Taps, thread mills, reamers, dovetail, lollipop and other circle
+segment mills (lens, oval, taper) are bodies, whose chips are not simulated. Other shapes are refused.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ SHAPES = {
     "chamfer mill": "cone", "spot drill": "point", "drill": "point", "center drill": "point", "counter sink": "point",
     "tapered mill": "taper", "slot mill": "slot", "tap right hand": "tap", "tap left hand": "tap",
     "thread mill": "body", "reamer": "body", "dovetail mill": "body", "lollipop mill": "body",
-    "circle segment barrel": "body", "circle segment lens": "body", "circle segment oval": "body",
+    "circle segment barrel": "barrel", "circle segment lens": "body", "circle segment oval": "body",
     "circle segment taper": "body",
 }  # fmt: skip
 #: Young's modulus [GPa] by the material of the body
@@ -147,7 +148,9 @@ def _tip(shape: str, geometry: dict[str, Any], out: dict[str, Any], mm: float, l
     if shape == "taper":
         angle, corner = _number(geometry, "TA", label), _number(geometry, "RE", label) or 0.0
         return {"taper_deg": angle or 0.0} | ({"corner_radius_mm": corner * mm} if corner else {})
-    if shape in ("tap", "body") and d is not None:
+    if shape == "barrel" and d is not None and (barrel := _barrel(geometry, d, out, mm, label)):
+        return barrel
+    if shape in ("tap", "body", "barrel") and d is not None:
         high = out.get("flute_length_mm", out.get("overhang_mm"))
         if high is None:
             raise InputError(f"{label}: LCF, the flute length: must be given and above 0")
@@ -160,6 +163,27 @@ def _tip(shape: str, geometry: dict[str, Any], out: dict[str, Any], mm: float, l
             raise InputError(f"{label}: TA, the taper angle: must be above 0 and below 90 deg")
         return {"diameter_mm": max(tip * mm, 0.01), "taper_deg": angle, "shank_diameter_mm": d}
     return {}
+
+
+def _barrel(geometry: dict[str, Any], d: float, out: dict[str, Any], mm: float, label: str) -> dict[str, Any]:
+    """Corner and flank arc of a barrel; nothing where they are not stated, or where it cuts above its widest place.
+
+    The corner's centre lies so far from the axis, e = d / 2 - R + sqrt((R - r)^2 - (F - r)^2), that the arc is
+    widest at the height F.
+    """
+    corner, radius, widest = (_number(geometry, key, label) for key in ("lower-radius", "profile-radius", "axial-distance"))
+    high = out.get("flute_length_mm")
+    if radius is None or widest is None or high is None or high > widest * mm * (1.0 + 1e-9):
+        return {}
+    r, R, F = (corner or 0.0) * mm, radius * mm, widest * mm
+    square = (R - r) ** 2 - (F - r) ** 2
+    e = 0.5 * d - R + math.sqrt(square) if R > r and F > r and square > 0.0 else -1.0
+    if e < 0.0:
+        raise InputError(
+            f"{label}: profile-radius = {R:g} mm with axial-distance = {F:g} mm: its arc meets the axis above the tip: "
+            "must reach a flat or rounded tip"
+        )
+    return {"corner_radius_mm": r, "barrel_radius_mm": R, "corner_e_mm": e}
 
 
 def _holder(holder: Any, mm: float) -> list[list[float]]:

@@ -5,7 +5,7 @@ corner and the flank to the end of the flutes; rho [mm] distance from the axis, 
 diameter; kappa [rad] angle of the outward normal nu with the downward axis: nu = sin(kappa) u - cos(kappa) A, u the
 radial direction, A the axis from the tip to the holder. A flat bottom has kappa = 0, a bottom line alpha, a straight
 flank pi/2, a tapered one pi/2 - beta; along the corner kappa rises evenly from alpha to pi/2 - beta and s - s' =
-r (kappa - kappa').
+r (kappa - kappa'), likewise along the flank arc of a barrel.
 
 The edge has a constant lead: at height z it lags behind the tip by z tan(helix) / R, also where it is nearer to the
 axis, so that along s the lag grows by sin(kappa) tan(helix) / R. On a flat bottom it does not lag.
@@ -110,7 +110,8 @@ def slices(
     ----------
     cutter : any
     bottom_slices : slices of the bottom line, where there is one; one at least
-    corner_slices : slices of the corner, where there is one; one at least
+    corner_slices : slices of the corner, where there is one; one at least. Of the flank arc of a barrel as many, more
+        if they would be longer than ``flank_mm``
     grading : the bounds of those in kappa are spaced as (j / n)^grading, from 1 (evenly) to 3; above 1 they are narrow
         near the bottom, where shallow cuts lie
     flank_mm : greatest length of a slice of the flank [mm], above 0; None: the flank is one slice (with a taper its rho
@@ -148,18 +149,24 @@ def slices(
     reach = 0.0
     if r > tiny:
         share = np.linspace(0.0, 1.0, corner_slices + 1)
-        kappa = alpha + (0.5 * math.pi - beta - alpha) * (share if grading == 1.0 else share**grading)
-        mid = 0.5 * (kappa[:-1] + kappa[1:])
-        s = r * (kappa - alpha)
-        reach = float(s[-1])
-        parts.append((s, e + r * np.sin(mid), f - r * np.cos(kappa[:-1]), np.sin(mid), np.cos(mid), r + 0.0 * mid))
+        kappa = alpha + (cutter.corner_end - alpha) * (share if grading == 1.0 else share**grading)
+        parts.append(_bow(0.0, kappa, e, f, r))
+        reach = float(parts[-1][0][-1])
     else:
         high = low
+    arc = cutter.flank_arc
+    if arc is not None:
+        last = arc.kappa_at(min(height, arc.z_to))
+        length = arc.radius * (last - arc.kappa_from)
+        number = corner_slices if flank_mm is None else max(corner_slices, math.ceil(length / flank_mm * (1.0 - 1e-12)))
+        parts.append(_bow(reach, np.linspace(arc.kappa_from, last, number + 1), arc.e, arc.f, arc.radius))
+        reach += length
+        high = arc.z_to
     if height > high + tiny:
         length = (height - high) / math.cos(beta)
         number = 1 if flank_mm is None else max(1, math.ceil(length / flank_mm * (1.0 - 1e-12)))
         along = np.linspace(0.0, length, number + 1)
-        foot = e + r * math.cos(beta) if r > tiny else end
+        foot = float(cutter.radius_at([high])[0]) if arc is not None else e + r * math.cos(beta) if r > tiny else end
         parts.append(
             _line(reach + along, foot + along * math.sin(beta), high + along * math.cos(beta), 0.5 * math.pi - beta)
         )
@@ -168,6 +175,15 @@ def slices(
     rho, z, sin, cos, bend = (np.concatenate([p[i] for p in parts]) for i in range(1, 6))
     lead = edge_lag(cutter)
     return Slices(s_from, s_to, rho, z, sin, cos, lead * z, lead * sin, bend)
+
+
+def _bow(start: float, kappa: Floats, e: float, f: float, r: float) -> Part:
+    """Slices of an arc between nodes of kappa, ``start`` its s: as :func:`_line`."""
+    mid = 0.5 * (kappa[:-1] + kappa[1:])
+    s = start + r * (kappa - kappa[0])
+    # a sharp corner on the bottom: its height is 0 but for rounding
+    z = np.maximum(f - r * np.cos(kappa[:-1]), 0.0)
+    return s, e + r * np.sin(mid), z, np.sin(mid), np.cos(mid), r + 0.0 * mid
 
 
 def _line(s: Floats, rho: Floats, z: Floats, kappa: float) -> Part:

@@ -28,12 +28,9 @@ ENDINGS = (".fctb", ".json", ".tools", ".p21", ".camotics", ".tbl")
 NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "overhang_mm", "modulus_gpa")
 
 
-#: keys by which shops and tool libraries state the large radius of a barrel cutter, and the message about them
-BARREL_KEYS = ("barrel_radius_mm", "profile_radius_mm", "side_radius_mm")
-BARREL = (
-    "chips of barrel cutters are not simulated: state a flat, bull-nose or ball cutter, or the outline of the barrel "
-    "as body_mm, which is only checked for collisions"
-)
+#: other names of ``barrel_radius_mm`` in shops and tool libraries
+BARREL_NAMES = ("profile_radius_mm", "side_radius_mm", "segment_radius_mm")
+BARREL = "the radius of the flank arc of a barrel cutter is barrel_radius_mm: state that"
 
 
 def _rows(value: Any) -> Any:
@@ -65,6 +62,11 @@ class CutterTable(BaseModel):
     )
     corner_f_mm: float | None = Field(
         None, description="APT parameter f: axial position of the centre of the corner; default: tangent corner"
+    )
+    barrel_radius_mm: float | None = Field(
+        None,
+        description="barrel cutter: radius of the arc between corner and flank, tangent to both; with it corner_e_mm is "
+        "free, default 0, a round tip",
     )
     bottom_deg: float | None = Field(None, description="angle of the bottom, APT parameter alpha; default 0")
     taper_deg: float | None = Field(None, description="half angle of a tapered flank, APT parameter beta; default 0")
@@ -134,6 +136,7 @@ class CutterTable(BaseModel):
             corner_radius=values.get("corner_radius_mm", 0.0),
             corner_e=values.get("corner_e_mm"),
             corner_f=values.get("corner_f_mm"),
+            barrel_radius=values.get("barrel_radius_mm"),
             bottom=math.radians(values.get("bottom_deg", 0.0)),
             taper=math.radians(values.get("taper_deg", 0.0)),
             runout=(values.get("runout_mm", 0.0), math.radians(values.get("runout_deg", 0.0))),
@@ -220,7 +223,7 @@ def _first(err: ValidationError, table: Mapping[str, Any]) -> str:
     key = ".".join(str(x) for x in row["loc"])
     if row["type"] == "extra_forbidden":
         near = nearest(key, list(CutterTable.model_fields))
-        return f"cutter.{key}: {BARREL if key in BARREL_KEYS else f'unknown key: the nearest known one is {near}'}"
+        return f"cutter.{key}: {BARREL if key in BARREL_NAMES else f'unknown key: the nearest known one is {near}'}"
     wanted = {
         "float_type": "must be a number",
         "finite_number": "must be a finite number",

@@ -72,9 +72,9 @@ def sections_of(cutter: Cutter) -> Sections:
     ([20.0, 35.0], [8.0, 10.0])
     """
     top = cutter.flute_length
-    if cutter.taper > 0.0:
-        _, r, _, f, _, beta, _ = cutter.apt
-        low = min(max(f - r * math.sin(beta), 0.0), top)
+    if cutter.taper > 0.0 or cutter.flank_arc is not None:
+        _, r, _, f, _, _, _ = cutter.apt
+        low = min(max(f - r * math.cos(cutter.corner_end), 0.0), top)
         height = np.unique(np.linspace(low, top, TAPER_SECTIONS))
     else:
         height = np.array([top])

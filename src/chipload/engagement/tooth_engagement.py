@@ -310,7 +310,8 @@ def engagement_of_arcs(
 
 def _check_cutter(cutter: Cutter, axial_depth: float) -> None:
     """Refuse a cutter whose flank is not straight."""
-    for key, value in (("corner_radius_mm", cutter.corner_radius), ("taper", cutter.taper), ("bottom", cutter.bottom)):
+    round_ = (("corner_radius_mm", cutter.corner_radius), ("barrel_radius_mm", cutter.barrel_radius or 0.0))
+    for key, value in (*round_, ("taper", cutter.taper), ("bottom", cutter.bottom)):
         if value != 0.0:
             raise InputError(
                 f"cutter.{key} = {value:g}: forces are known for a straight flank only; choose a flat end mill"

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import BaseModel, Tag, ValidationError
 from pydantic.fields import FieldInfo
 
-from chipload.cutter.table import BARREL, BARREL_KEYS
+from chipload.cutter.table import BARREL, BARREL_NAMES
 from chipload.errors import InputError, InputErrors
 
 #: tables of a job file that have another name now
@@ -99,7 +99,7 @@ def _line(e: Any, root: type[BaseModel], foreign: Collection[str] = ()) -> str:
     if kind == "extra_forbidden" and key in foreign:
         return f"{key}: not used where a [program] is run: leave it out"
     if kind == "extra_forbidden":
-        if loc[0] == "cutter" and loc[-1] in BARREL_KEYS:
+        if loc[0] == "cutter" and loc[-1] in BARREL_NAMES:
             return f"{key}: {BARREL}"
         known = keys_at(loc[:-1], root)
         return f"{key}: unknown key; did you mean {nearest_key(str(loc[-1]), known)}?"

@@ -227,7 +227,9 @@ def resolution_error(
             off = max(halves[name] - w, abs(same - c) if c >= 0.5 * w else same - w)
             lost[name] = max(lost[name], window.factor * off)
     # the flank of a flat mill is cut into slices where its contact changes: exact
-    straight = all(c.corner_radius == 0.0 and c.taper == 0.0 and c.bottom == 0.0 for c in _used(windows, setting))
+    straight = all(
+        c.corner_radius == c.taper == c.bottom == 0.0 and c.barrel_radius is None for c in _used(windows, setting)
+    )
     films, least = _films(columns), FLOOR if all(w.upright for w in windows.values()) else LEANING_FLOOR
     for name in names:
         if worst[name] > 0.0 and films < 1.0:

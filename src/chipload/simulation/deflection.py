@@ -440,7 +440,9 @@ def _work(work: ArrayLike | None, n: Floats, name: str) -> Floats:
 def _shape(cutter: Cutter) -> Floats:
     """Return the shape of the cutter for the kernels."""
     _, r, e, f, alpha, beta, h = cutter.apt
-    return np.array([r, e, f, alpha, beta, h, e + r * math.sin(alpha)])
+    arc, end = cutter.flank_arc, cutter.corner_end
+    bow = (e, f, 0.0, end, end) if arc is None else (arc.e, arc.f, arc.radius, end, arc.kappa_at(min(h, arc.z_to)))
+    return np.array([r, e, f, alpha, beta, h, e + r * math.sin(alpha), *bow])
 
 
 def _bent(

@@ -54,6 +54,6 @@ def slowest_step(cutter: Cutter) -> float:
     True
     """
     _, corner, _, _, bottom, taper, _ = cutter.apt
-    if taper > 0.0:
+    if taper > 0.0 or cutter.barrel_radius is not None:
         return TAPERED
     return ROUND if corner > 0.0 or bottom > 0.0 else FLAT

@@ -146,7 +146,7 @@ def _removed(
     """Take away what a run of rows cuts; its tips, axes and cutter."""
     cutter = cutters[int(path.tool[places[-1]])]
     tip, axis = _between(path, places, APART * cutter.radius)
-    stock.remove_poses(tip, axis, cutter.apt, tol=0.02 * pitch)
+    stock.remove_poses(tip, axis, cutter.outline, tol=0.02 * pitch)
     return tip, axis, cutter
 
 

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from chipload.cutter.cutter import Cutter
+from chipload.engagement.chips.section import distance as profile_distance
 from chipload.geometry.mesh import sections
 from chipload.program.program import Program
 from chipload.stock.layers import LayeredStock
@@ -31,6 +32,8 @@ Floats = NDArray[np.float64]
 
 #: spacing of the balls that stand for flank and shank, over the radius
 BALLS = 0.5
+#: distance of a barrel from the body [mm] beyond which it is not measured
+NEAR = 0.5
 #: motions whose flank is looked at: every so many
 FLANKS = 4
 
@@ -59,7 +62,7 @@ def nearest(program: Program, cutter: Cutter, points: ArrayLike) -> WallClearanc
 
     Parameters
     ----------
-    cutter : ball or bull nose
+    cutter : ball, bull nose or barrel
     points : (p, 3) float [mm] of the body's surface
     """
     cloud = np.asarray(points, dtype=np.float64).reshape(-1, 3)
@@ -73,7 +76,9 @@ def nearest(program: Program, cutter: Cutter, points: ArrayLike) -> WallClearanc
     r, e, f = cutter.apt[1:4]
     C = tip + f * axis
     distance, which = tree.query(C)
-    if e == 0.0:
+    if cutter.flank_arc is not None:
+        corner, which = _barrel_distances(cutter, tip, axis, cloud, tree)
+    elif e == 0.0:
         corner = distance - r
     else:
         corner, which = distance - e - r, which.copy()
@@ -88,7 +93,10 @@ def nearest(program: Program, cutter: Cutter, points: ArrayLike) -> WallClearanc
     best = WallClearance(float(corner[low]), _place(cloud[which[low]]), int(row[low]))
     some = np.arange(0, len(tip), FLANKS)
     # a ball lower than its radius would reach out of the bottom of a bull nose
-    for height in np.arange(max(f + BALLS * cutter.radius, cutter.radius), cutter.overhang, BALLS * cutter.radius):
+    first = max(f + BALLS * cutter.radius, cutter.radius)
+    if cutter.flank_arc is not None:  # balls would reach out of the arc below them
+        first = cutter.flute_length + cutter.radius
+    for height in np.arange(first, cutter.overhang, BALLS * cutter.radius):
         thick = float(cutter.radius_at([min(height, cutter.flute_length)])[0])
         if height > cutter.flute_length and cutter.shank_diameter is not None:
             thick = max(thick, 0.5 * cutter.shank_diameter)
@@ -99,6 +107,24 @@ def nearest(program: Program, cutter: Cutter, points: ArrayLike) -> WallClearanc
         if distance[low] - thick < best.distance:
             best = WallClearance(float(distance[low] - thick), _place(cloud[near[low]]), int(row[some[low]]))
     return best
+
+
+def _barrel_distances(
+    cutter: Cutter, tip: Floats, axis: Floats, cloud: Floats, tree: cKDTree
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Least distance (n,) of a barrel from a body in each place, as far as it is near, and the point (n,)."""
+    half = 0.5 * cutter.flute_length
+    reach = float(np.hypot(half, cutter.radius_at([cutter.flute_length])[0])) + NEAR
+    least, which = np.full(len(tip), NEAR), np.zeros(len(tip), dtype=np.int64)
+    for k, some in enumerate(tree.query_ball_point(tip + half * axis, reach)):
+        if some:
+            v = cloud[some] - tip[k]
+            w = v @ axis[k]
+            far = profile_distance(cutter, np.linalg.norm(v - w[:, None] * axis[k], axis=1), w)
+            low = int(far.argmin())
+            if far[low] < NEAR:
+                least[k], which[k] = far[low], some[low]
+    return least, which
 
 
 def section_deviation(stock: LayeredStock, body: trimesh.Trimesh, low: float) -> SectionDeviation:

@@ -232,9 +232,10 @@ def _flank(steps: Steps, k: int, cutter: Cutter, heights: Floats) -> NDArray[np.
         return np.zeros(len(heights), dtype=np.bool_)
     _, r, _, f, _, _, top = cutter.apt
     low, high = sorted((steps.p0[k, 2], steps.p1[k, 2]))
-    return np.asarray(
-        (heights > high + (f if r > 0.0 else cutter.radius * math.tan(cutter.bottom))) & (heights < low + top)
-    )
+    foot = f if r > 0.0 else cutter.radius * math.tan(cutter.bottom)
+    if cutter.flank_arc is not None:
+        foot = cutter.flank_arc.z_to
+    return np.asarray((heights > high + foot) & (heights < low + top))
 
 
 def boxes(steps: Steps, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats]:

@@ -22,7 +22,7 @@ BULL = Cutter(8.0, 4, math.radians(30.0), 20.0, 30.0, 6e5, corner_radius=2.0)
 
 def simulated(posture: CutterPose, d: float, layers: int, feed: float, spindle: float) -> tuple[float, float]:
     """Size of the mean and greatest size of the normal force [N] in the middle of the second row."""
-    x, y = np.meshgrid(np.linspace(0.0, 10.0, 6), [0.0, 0.5], indexing="ij")
+    x, y = np.meshgrid(np.linspace(0.0, 10.0, 6), [0.0, abs(posture.step or 0.0)], indexing="ij")
     points = np.stack([x, y, 0.0 * x], axis=-1)
     surface = FinishSurface(points, np.broadcast_to([0.0, 0.0, 1.0], points.shape), d)
     none = np.zeros(x.shape)
@@ -53,3 +53,37 @@ def test_simulated_row(cutter, lead, tilt, step, threshold):
     mean = float(normal_force(posture, STEEL, [d], measure="mean")[0])
     assert 2.0 * fine[0] - coarse[0] == pytest.approx(mean, rel=0.012)
     assert fine[1] == pytest.approx(threshold, rel=0.04)
+
+
+BARREL = Cutter(8.0, 2, math.radians(30.0), 16.0, 30.0, 6e5, corner_radius=1.5, barrel_radius=40.0)
+
+
+@pytest.mark.parametrize(("lead", "tilt", "step"), [(0.0, 77.0, -1.2), (3.0, -76.0, 1.0)])
+def test_simulated_row_of_a_barrel(lead, tilt, step):
+    """Its flank arc touches: the plane-stock formulas with e = D / 2 - R below 0 against the layered block."""
+    feed, spindle, d = 10.0, 628.0, 0.12
+    tooth = feed * math.tau / (spindle * BARREL.flutes)
+    posture = CutterPose(BARREL, tooth, step, math.radians(lead), math.radians(tilt))
+    assert posture.deepest > d
+    found = simulated(posture, d, 30, feed, spindle)
+    mean = float(normal_force(posture, STEEL, [d], measure="mean")[0])
+    greatest = float(normal_force(posture, STEEL, [d], measure="greatest")[0])
+    assert found[0] == pytest.approx(mean, rel=0.015)
+    assert found[1] == pytest.approx(greatest, rel=0.03)
+
+
+def test_the_outline_of_a_barrel_is_its_arc_across_the_feed():
+    """With no lead the circle of radius R lies across the feed: step-over^2 / (8 R) is left between two rows."""
+    posture = CutterPose(BARREL, 0.05, 1.2, 0.0, math.radians(-77.0))
+    y = np.linspace(-2.0, 2.0, 41)
+    assert posture.outline(y) == pytest.approx(40.0 - np.sqrt(40.0**2 - y**2), abs=2e-6)
+    assert posture.deepest == pytest.approx(
+        40.0 * (1.0 - math.cos(math.radians(77.0) - BARREL.flank_arc.kappa_from)), rel=1e-12
+    )
+    tip = posture.centre - BARREL.flank_arc.f * posture.axis
+    z = np.linspace(0.0, 16.0, 400)
+    # every circle of the profile: its lowest point is at z = 0 or above, and its reach towards the tip within `below`
+    low = tip[2] + z * posture.axis[2] - BARREL.radius_at(z) * math.sin(posture.beta)
+    assert low.min() == pytest.approx(0.0, abs=1e-4)
+    assert low.min() > -1e-9
+    assert float(np.max(np.abs(tip[1]))) <= posture.below

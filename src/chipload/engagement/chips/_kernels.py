@@ -7,7 +7,8 @@ V is that over |N_xy|, the speed of the section's edge in the layer. A point of 
 theta, sin theta), c halfway between the ends of the section along a, M = I + a a' / (A_z (1 + A_z)).
 
 Arrays: ``cp``, ``ca`` (n, 3) Chebyshev coefficients of the tip and of the axis, its length aside, on t in 0 .. 1.
-``K`` cutter: e, r, f, sin, cos, tan of alpha, sin, cos, tan of beta, flank radius at w = 0, H, rho(H).
+``K`` cutter: e, r, f, sin, cos, tan of alpha, sin, cos, tan of beta, flank radius at w = 0, H, rho(H) 0-11, of the flank
+arc of a barrel E, R (0: none), F 12-14, sin, cos of kappa where the corner ends 15-16.
 ``S`` instant: p, A, p', A' (0-11), h 12, c 13-14, w at c 15, from the axis to c 16-18, its square 19, corners 20, t 21;
 where the section is a whole ellipse, 22 is R (else 0) and N . v = g . c + (R a . c / A_z)(m . c), c = (cos theta, sin
 theta), g 23-24, m = M a' 25-26; where it is a whole circle of a ball about b, 22 is -rho and V = b' . u + rho', u
@@ -23,7 +24,7 @@ import math
 from numba import njit, types
 
 TAU = 2.0 * math.pi
-BOTTOM, CONE, TORUS, FLANK, TOP = 0, 1, 2, 3, 4
+BOTTOM, CONE, TORUS, FLANK, TOP, BOW = 0, 1, 2, 3, 4, 6  # 5: a corner of the section
 
 
 #: types are stated: a constant among the arguments would else be compiled as a type of its own
@@ -67,11 +68,14 @@ def extent(S, K):
     H, top = K[10], K[11]
     zh = H * Az + top * s
     uh = H * s - top * Az
-    w = K[2] - K[1] * Az
+    e, r, f = K[0], K[1], K[2]
+    if s > K[15] and K[13] > 0.0:
+        e, r, f = K[12], K[13], K[14]
+    w = f - r * Az
     if s < K[3]:
         return 0.0, 0.0, zh, uh
     if s <= K[7] and w <= H:
-        rho = K[0] + K[1] * s
+        rho = e + r * s
         return w * Az - rho * s, w * s + rho * Az, zh, uh
     return H * Az - top * s, H * s + top * Az, zh, uh
 
@@ -95,6 +99,18 @@ def _exit(A2, B, C):
         return (root - B) / A2
     den = B + root
     return -C / den if den > 0.0 else math.inf
+
+
+@njit(cache=True, nogil=True)
+def _round(K, rho, w):
+    """The arc that the nearest point of the surface is on: TORUS or BOW (FLANK: neither), centre's rho, radius, w."""
+    if K[13] > 0.0:
+        x, y = rho - K[12], K[14] - w
+        if x * K[16] >= y * K[15]:
+            return (BOW if x * K[6] < y * K[7] else FLANK), K[12], K[13], K[14]
+    x, y = rho - K[0], K[2] - w
+    below = x * K[16] < y * K[15] or K[13] > 0.0
+    return (TORUS if x * K[4] > y * K[3] and below else FLANK), K[0], K[1], K[2]
 
 
 @njit(cache=True, nogil=True)
@@ -122,14 +138,14 @@ def ray(S, K, ct, st):
     if dw > 0.0 and (K[10] - w0) / dw < lam:
         lam = (K[10] - w0) / dw
         code = TOP
-    e, r, f = K[0], K[1], K[2]
-    if r > 0.0:
+    if K[1] > 0.0 or K[13] > 0.0:
         w = w0 + lam * dw
         rho = math.sqrt(max(q0 + lam * (2.0 * q1 + lam), 0.0))
+        on, e, r, f = _round(K, rho, w)
         y, x = f - w, rho - e
-        if x * K[4] > y * K[3] and x * K[6] < y * K[7] and x * x + y * y > r * r:
-            code = TORUS
-            if e == 0.0:
+        if on != FLANK and x * x + y * y > r * r:
+            code = on
+            if e == 0.0 and K[13] == 0.0:
                 y0 = w0 - f
                 lam = _exit(1.0 + dw * dw, q1 + dw * y0, q0 + y0 * y0 - r * r)
             else:
@@ -145,6 +161,11 @@ def ray(S, K, ct, st):
                     if step <= 4e-16 * lam:
                         break
                     rho = math.sqrt(max(q0 + lam * (2.0 * q1 + lam), 0.0))
+                    if K[13] > 0.0:
+                        next_, e, r, f = _round(K, rho, w0 + lam * dw)
+                        code = code if next_ == FLANK else next_
+            if K[1] == 0.0:
+                code = BOW  # the sharp corner is its end
     return lam, code
 
 
@@ -170,8 +191,8 @@ def speed(S, K, x, y, code):
     elif code == CONE:
         sg, cg = K[3], K[4]
     else:
-        sg = max(rho - K[0], 0.0)
-        cg = K[2] - w
+        sg = max(rho - (K[12] if code == BOW else K[0]), 0.0)
+        cg = (K[14] if code == BOW else K[2]) - w
         d = math.hypot(sg, cg)
         sg /= d
         cg /= d
@@ -313,9 +334,11 @@ def instant(cp, ca, K, h, t, S, C):
         if (which == 0 and K[1] > 0.0) or s == 0.0:
             continue
         low = FLANK if which == 1 else (BOTTOM if K[5] == 0.0 else CONE)
-        if which == 1 and K[1] > 0.0 and K[10] < K[2] - K[1] * K[6]:
+        if which == 1 and K[13] > 0.0 and K[10] < K[14] - K[13] * K[6]:
+            low = BOW
+        elif which == 1 and K[1] > 0.0 and K[10] < K[2] - K[1] * K[16]:
             low = TORUS
-        high = TOP if which == 1 else FLANK
+        high = TOP if which == 1 else (BOW if K[13] > 0.0 else FLANK)
         cphi = (z - w * Az) / (rho * s)
         if not -1.0 < cphi < 1.0:
             continue

@@ -144,7 +144,8 @@ def layer_thickness(program: Program, cutters: Mapping[int, Cutter], top: float)
         heights, at = np.unique(p[level, 2].round(9), return_inverse=True)
         long = np.bincount(at.ravel(), way[level], minlength=len(heights)) >= 0.05 * whole
         down = np.diff(np.append(heights[long], top))
-        share = 0.2 if all(c.corner_radius == c.taper == c.bottom == 0.0 for c in cutters.values()) else 0.1
+        straight = all(c.corner_radius == c.taper == c.bottom == 0.0 and not c.barrel_radius for c in cutters.values())
+        share = 0.2 if straight else 0.1
         layer = min(LEVEL * smallest, share * float(down.min(initial=math.inf)))
     else:
         layer = min(SLOPED * smallest, 0.0625 * deep) if deep > 0.0 else SLOPED * smallest

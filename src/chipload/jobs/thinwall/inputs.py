@@ -149,9 +149,9 @@ class WallInputs:
         return None if self.line is None else ContactLine(self.line.length, self.line.length)
 
     @property
-    def corner_radius(self) -> float:
-        """Greatest corner radius of the cutters [mm]."""
-        return max(o.cut.cutter.corner_radius for o in self.operations)
+    def below(self) -> float:
+        """How far the cutters reach below their contact at most [mm]: the corner radius, of a barrel nearly its arc."""
+        return max(o.cut.posture.below for o in self.operations)
 
     @property
     def top(self) -> float:

@@ -137,15 +137,16 @@ def _of_operation(
     yield from unknown_cutter(f"{where}.cutter", op.cutter, tools)
     if op.cutter in tools and tools[op.cutter].body:
         yield (
-            f"{where}.cutter = {op.cutter}: is a body (barrel, tap), whose chips are not simulated: state a "
-            "ball nose or a bull nose"
+            f"{where}.cutter = {op.cutter}: is a body (tap, thread mill), whose chips are not simulated: state a "
+            "ball nose, a bull nose or a barrel by barrel_radius_mm"
         )
     yield from _of_rows(op, where)
     if op.rows is None and op.contact == "corner" and (op.step_over_mm is None) == (op.scallop_um is None):
         said = "none is" if op.step_over_mm is None else "both are"
         yield f"{where}: {said} stated: state either step_over_mm or scallop_um"
     for key, foot in feet:
-        if op.cutter in tools and foot < tools[op.cutter].corner_radius:
+        barrel = op.cutter in tools and tools[op.cutter].barrel_radius is not None
+        if op.cutter in tools and not barrel and foot < tools[op.cutter].corner_radius:
             yield (
                 f"{key} = {foot:g}: must be at least the corner radius of cutter {op.cutter}, "
                 f"{tools[op.cutter].corner_radius:g}: the cutter reaches so far below its last row, towards the clamp"

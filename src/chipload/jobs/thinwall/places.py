@@ -45,12 +45,12 @@ def wall_stock(inputs: WallInputs) -> LayeredStock:
     layer = min(o.table.layer_mm for o in inputs.operations)
     diameter = max(o.cut.cutter.diameter for o in inputs.operations)
     stock = LayeredStock.of_mesh(inputs.stock_mesh(), COARSE * layer, TILE * diameter)
-    low = (inputs.lowest_row if inputs.body.part else inputs.foot_height) - inputs.corner_radius
+    low = (inputs.lowest_row if inputs.body.part else inputs.foot_height) - inputs.below
     if isinstance(inputs.body.shape, PartShape):
         stock.refine_at(inputs.body.shape.levels())
     if inputs.line is not None:  # the ends of the flank, row by row
         rows = np.concatenate([inputs.fine(s).surface.points[0, :, 2] for s in inputs.body.side_numbers])
-        stock.refine_at(np.unique(np.concatenate([rows, rows - inputs.corner_radius]).round(9)))
+        stock.refine_at(np.unique(np.concatenate([rows, rows - inputs.below]).round(9)))
     stock.refine(max(low, float(stock.bounds[0])), float(stock.bounds[-1]), layer)
     return stock
 

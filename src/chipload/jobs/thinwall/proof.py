@@ -318,7 +318,7 @@ def _shape(places: Places, stock: LayeredStock, legs: Sequence[PassProgram]) -> 
         for k, o in enumerate(inputs.operations)
     ]
     gap = min(gaps, key=lambda one: one.distance)
-    found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.corner_radius)
+    found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.below)
     at = found.at if found.gouge > -gap.distance else gap.at
     touched = wall_collisions(inputs, legs) if inputs.body.part is None else part_collisions(inputs, places.uncut, legs)
     return Shape(found.gouge, found.left, at, found.points, gap.distance, touched)

@@ -15,7 +15,7 @@ from chipload.errors import InputError
 from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.program_rows import ProgramRows
-from chipload.jobs.thinwall.tables import WallOperationTable
+from chipload.jobs.thinwall.tables import WallOperationTable, WallTable
 from chipload.machine.machine import Machine
 from chipload.planning.thinwall.depth import DepthRange, Measure
 from chipload.planning.thinwall.flank_stock import FlankPose, Pose
@@ -107,10 +107,12 @@ def wall_operation(
     poses: tuple[Pose, ...] = (
         _planned_poses(op, number, cutter, feed_per_tooth) if rows is None else rows.poses(cutter, feed_per_tooth)
     )
+    if cutter.flank_arc is not None:
+        _check_foot(job, max(pose.below for pose in poses))
     # between rows: an axial depth apart where the flank cuts
     step_over = abs(stated(poses[0].step, f"operation.{number}.step_over_mm"))
     # step-over^2 / 8 r of a plane; the stock has the scallops of the pass before, which may be one of the one before
-    scallop = 0.0 if op.contact == "flank" else step_over**2 / (8.0 * cutter.corner_radius)
+    scallop = 0.0 if op.contact == "flank" else step_over**2 / (8.0 * cutter.finishing_arc[0])
     met = scallop if before is None else max(scallop, before.cut.scallop)
     limits = DepthRange(op.depth_min_mm, op.depth_max_mm)
     sloped = 0.0 if op.contact == "flank" else op.slope  # a flank meets the steps of its own rows
@@ -153,14 +155,35 @@ def _planned_poses(op: WallOperationTable, number: int, cutter: Cutter, feed_per
     return (CutterPose(cutter, feed_per_tooth, step, math.radians(lead), tilt),)
 
 
+def _check_foot(job: ThinWallJob, below: float) -> None:
+    """Refuse a barrel that reaches below the foot of a wall."""
+    wall = job.table.wall
+    feet = [("wall.foot_mm", wall.foot_mm)] if isinstance(wall, WallTable) else [
+        (f"wall.{k}.foot_mm", one.foot_mm) for k, one in enumerate(wall)
+    ]  # fmt: skip
+    for key, foot in feet:
+        if foot < below:
+            raise InputError(
+                f"{key} = {foot:g}: must be at least {below:.4g}: the barrel reaches so far below its last row, towards "
+                "the clamp: state that, or touch nearer to the tip by less lean_deg"
+            )
+
+
 def _step_over(op: WallOperationTable, number: int, cutter: Cutter) -> float:
-    """Step-over [mm], stated or from the height h of what two rows leave: 2 sqrt(2 r h - h^2) of a ball on a plane."""
+    """Step-over [mm], stated or from the height h of what two rows leave: 2 sqrt(2 r h - h^2) of a ball on a plane, and
+    of a barrel's arc that lies across the feed.
+    """
     if op.step_over_mm is not None:
         return op.step_over_mm
-    r, h = cutter.corner_radius, stated(op.scallop_um, f"operation.{number}.scallop_um") / 1000.0
-    if not math.isclose(2.0 * r, cutter.diameter):
+    r, h = cutter.finishing_arc[0], stated(op.scallop_um, f"operation.{number}.scallop_um") / 1000.0
+    if cutter.flank_arc is not None and op.lead_deg:
         raise InputError(
-            f"operation.{number}.scallop_um: applies to ball-nose cutters only: state step_over_mm for cutter "
+            f"operation.{number}.scallop_um: of a barrel only with lead_deg = 0, where its arc lies across the feed: "
+            "state step_over_mm"
+        )
+    if cutter.flank_arc is None and not math.isclose(2.0 * r, cutter.diameter):
+        raise InputError(
+            f"operation.{number}.scallop_um: applies to ball-nose and barrel cutters only: state step_over_mm for cutter "
             f"{cutter.number} with corner_radius_mm = {r:g}"
         )
     if not h < 0.5 * r:

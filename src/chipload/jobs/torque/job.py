@@ -176,6 +176,12 @@ def _wrong_round(shell: ShellTable, ask: RoundTable, tools: Mapping[int, Cutter]
         return
     if not ask.bottom_mm < ask.top_mm:
         yield f"round.bottom_mm = {ask.bottom_mm:g}: must be below top_mm = {ask.top_mm:g}"
+    if (barrel := tools[ask.cutter].barrel_radius) is not None:
+        yield (
+            f"round.cutter = {ask.cutter}: barrel_radius_mm = {barrel:g}: its flank is an arc and leaves no straight "
+            "wall: state a cutter with a straight flank"
+        )
+        return
     taper = math.degrees(tools[ask.cutter].taper)
     # a flank that is wider upwards leaves a wall that is narrower upwards
     upwards = shell.angle_deg * (1.0 if shell.clamped == "low" else -1.0)

@@ -1,7 +1,7 @@
-"""Contact points of a ball or bull-nose cutter on a side of a wall.
+"""Contact points of a ball, bull-nose or barrel cutter on a side of a wall.
 
-Notation: S(u, v) a point of the side, N its normal out of the wall; tip p, axis A, corner radius r, e the radius of
-the circle that the corner's centres lie on, C its middle. The centre of the corner that is nearest to the side is
+Notation: S(u, v) a point of the side, N its normal out of the wall; tip p, axis A, r the radius of the corner, or of
+the flank arc of a barrel, e the radius of the circle that its centres lie on (below 0 on a barrel), C its middle. The centre of the corner that is nearest to the side is
 M = C - e m, m the part of N across A as a unit vector (M = C on a ball). The cutter touches where M - S lies along N
 and is r long; the clearance is what is left between both, below 0 where the cutter cuts into the side.
 
@@ -71,11 +71,13 @@ class ContactFinder:
         tip, axis : (n, 3) float [mm], unit vectors
         far : [mm]; where the clearance is certainly greater it is infinite
         """
-        r, e, height = self.cutter.apt[1:4]
+        r, e, height = self.cutter.finishing_arc
         C = tip + height * axis
+        # a barrel's arc lies beside C, along the axis
+        reach = r + e if e >= 0.0 else self.cutter.flute_length + self.cutter.diameter
         away, nearest = self.tree.query(C)
         clearance, u, v = np.full(len(C), np.inf), self.u[nearest], self.v[nearest]
-        near = np.flatnonzero(away <= r + e + far + 2.0 * self.mesh)
+        near = np.flatnonzero(away <= reach + far + 2.0 * self.mesh)
         if len(near):
             u[near], v[near], clearance[near] = _nearest(self.side, r, e, C[near], axis[near], u[near], v[near])
         clearance[v < self.lowest] = np.inf

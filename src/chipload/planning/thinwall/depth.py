@@ -39,6 +39,8 @@ LOOKS = 49
 NO_FEED = 1e-6
 #: rotations between which the greatest force is searched; the engagement of a flank begins and ends abruptly
 STEP_DEG, FLANK_STEP_DEG = 1.0, 0.25
+#: so many times as many nodes on the flank arc of a barrel, of which a row touches a small part: 0.7 % of the mean
+BARREL_NODES = 4
 #: depths whose tooth engagement is in memory at once
 BLOCK = 256
 
@@ -136,10 +138,11 @@ def normal_force(
     N = posture.frame[:, 2]
     cutter = posture.cutter
     turn = math.tau / (cutter.flutes if cutter.teeth_alike else 1)
+    own = BARREL_NODES if cutter.flank_arc is not None else 1
     apart = step_deg or (FLANK_STEP_DEG if isinstance(posture, FlankPose) else STEP_DEG)
     theta = np.linspace(0.0, turn, max(8, math.ceil(math.degrees(turn) / apart)), endpoint=False)
     for at in range(0, len(d), BLOCK):
-        bites = posture.engagement(d[at : at + BLOCK], nodes or (8 if measure == "mean" else 16))
+        bites = posture.engagement(d[at : at + BLOCK], nodes or own * (8 if measure == "mean" else 16))
         if measure == "mean":
             out[at : at + BLOCK] = np.abs(mean_forces(bites, cutter, material)[0] @ N)
         else:
@@ -261,8 +264,12 @@ def _helps(
 
 def _scaled(posture: Pose, diameter: float) -> Pose:
     cutter = posture.cutter
-    corner = cutter.corner_radius * diameter / cutter.diameter
-    other = replace(cutter, diameter=diameter, corner_radius=corner, corner_e=None, corner_f=None, shank_diameter=None)
+    ratio = diameter / cutter.diameter
+    size = {"diameter": diameter, "corner_radius": ratio * cutter.corner_radius, "corner_e": None, "corner_f": None}
+    if cutter.barrel_radius is not None:
+        size |= {"barrel_radius": ratio * cutter.barrel_radius, "corner_e": ratio * cutter.apt[2]}
+        size |= {"flute_length": ratio * cutter.flute_length}
+    other = replace(cutter, **size, shank_diameter=None)
     return replace(posture, cutter=other)
 
 

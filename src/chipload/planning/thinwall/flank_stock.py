@@ -68,6 +68,11 @@ class FlankPose:
 
     def __post_init__(self) -> None:
         cutter = self.cutter
+        if cutter.barrel_radius is not None:
+            raise InputError(
+                f"cutter.barrel_radius_mm = {cutter.barrel_radius:g}: its flank touches a wall in a point, not along a "
+                "line: state contact = corner with a lean_deg at which its arc touches"
+            )
         for key, value in (("taper", cutter.taper), ("bottom", cutter.bottom)):
             if value != 0.0:
                 raise InputError(
@@ -109,6 +114,11 @@ class FlankPose:
     def deepest(self) -> float:
         """Radius R [mm]: at greater depths the teeth enter behind the axis."""
         return self.cutter.radius
+
+    @property
+    def below(self) -> float:
+        """How far [mm] the cutter reaches below the contact line, towards the tip: its corner."""
+        return self.cutter.corner_radius
 
     @property
     def deepest_is(self) -> str:

@@ -131,13 +131,13 @@ def placed(rows: Rows, posture: Pose) -> tuple[Floats, Floats, Floats]:
     each.
     """
     if rows.axis is not None:
-        r, e, height = posture.cutter.apt[1:4]
+        r, e, height = posture.cutter.finishing_arc
         C = rows.contact + r * rows.normal + e * across(rows.normal, rows.axis)
         return C - height * rows.axis, rows.axis, C
     frame = np.stack([rows.feed, np.cross(rows.normal, rows.feed), rows.normal], axis=2)
     axis = np.einsum("k,rskc->rsc", posture.axis, frame)
     C = rows.contact + np.einsum("k,rskc->rsc", posture.centre, frame)
-    return C - posture.cutter.apt[3] * axis, _unit(axis), C
+    return C - posture.cutter.finishing_arc[2] * axis, _unit(axis), C
 
 
 def program_of(rows: Rows, pass_motion: PassMotion, label: str) -> Program:
@@ -210,8 +210,10 @@ def gouges(rows: Rows, surface: FinishSurface, low: Floats, posture: Pose, toler
     """
     q = (surface.points + low[..., None] * surface.normals).reshape(-1, 3)
     _, axis, C = placed(rows, posture)
-    r, e = posture.cutter.apt[1:3]
-    near = cKDTree(q).query_ball_point(C.reshape(-1, 3), e + r)
+    r, e = posture.cutter.finishing_arc[:2]
+    # a barrel's arc lies beside the middle of its centres' circle, along the axis
+    reach = e + r if e >= 0.0 else posture.cutter.flute_length + posture.cutter.diameter
+    near = cKDTree(q).query_ball_point(C.reshape(-1, 3), reach)
     bad = []
     for k, (c, A, some) in enumerate(zip(C.reshape(-1, 3), axis.reshape(-1, 3), near, strict=True)):
         v = q[some] - c

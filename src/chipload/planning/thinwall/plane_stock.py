@@ -1,10 +1,10 @@
-"""Tooth engagement of a ball or bull-nose cutter in plane stock of given depth, beside the row that was cut before.
+"""Tooth engagement of a ball, bull-nose or barrel cutter in plane stock of given depth, beside the row that was cut before.
 
 Notation: the surface that the row leaves is the plane z = 0 with its normal N = +z; d [mm] depth of the stock above it;
 x the direction of the feed, f_z [mm] feed per tooth; the row before lies at y = -b, b the step-over with its sign
 (None: full slot, nothing cut beside). Axis A = (sin(lead), sin(tilt) cos(lead), cos(tilt) cos(lead)): a positive lead
 leans the spindle forward, a positive tilt to the left of the feed; beta the angle of A with N. r corner radius, e
-radius of its centre's circle, C the middle of that circle; kappa, rho, s, phi, u, nu, T, n as in
+radius of its centre's circle, C the middle of that circle (of a barrel cutter those of its flank arc, with e below 0); kappa, rho, s, phi, u, nu, T, n as in
 :mod:`chipload.engagement.tooth_engagement`. The cutter touches z = 0 at the origin.
 
 A convex cutter that moves straight on along x meets uncut material wherever its surface faces forward (h > 0), so that
@@ -55,7 +55,8 @@ class CutterPose:
 
     Parameters
     ----------
-    cutter : ball or bull nose: corner radius above 0, no taper, flat bottom
+    cutter : ball or bull nose: corner radius above 0, no taper, flat bottom; or a barrel that leans so that its flank
+        arc touches
     feed_per_tooth : f_z > 0 [mm]
     step : b [mm]; the row before lies on the right of the feed (b > 0) or on its left; None: full slot
     lead, tilt : [rad], each below 90 deg in size
@@ -80,7 +81,8 @@ class CutterPose:
             raise InputError(
                 f"cutter.corner_radius_mm = {cutter.corner_radius:g}: must be above 0: choose a ball or bull nose"
             )
-        for key, value in (("taper", cutter.taper), ("bottom", cutter.bottom)):
+        angles = (("taper", cutter.taper), ("bottom", cutter.bottom))
+        for key, value in () if cutter.flank_arc is not None else angles:
             if value != 0.0:
                 raise InputError(f"cutter.{key}_deg = {math.degrees(value):g}: must be 0: choose a ball or bull nose")
         if not 0.0 < self.feed_per_tooth < math.inf:
@@ -93,6 +95,12 @@ class CutterPose:
         for key, value in (("lead", self.lead), ("tilt", self.tilt)):
             if not abs(value) < math.radians(89.0):
                 raise InputError(f"{key}_deg = {math.degrees(value):g}: must be below 89 in size")
+        low, high = self._arc
+        if not low < self.beta < high:
+            raise InputError(
+                f"lean_deg, lead_deg: the axis leans by {math.degrees(self.beta):.4g} deg: must be between "
+                f"{math.degrees(low):.4g} and {math.degrees(high):.4g}, where the flank arc of the barrel touches"
+            )
 
     @property
     def axis(self) -> Floats:
@@ -112,23 +120,51 @@ class CutterPose:
 
     @property
     def deepest(self) -> float:
-        """Depth r (1 - sin(beta)) [mm]: at greater depths the flank cuts too.
+        """Depth r (1 - sin(beta)) [mm]: at greater depths the flank cuts too; of a barrel the corner or the flank line.
 
         >>> ball = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
         >>> round(CutterPose(ball, 0.05, None, lead=math.radians(30.0)).deepest, 9)
         2.5
         """
-        return self.cutter.corner_radius * (1.0 - math.sin(self.beta))
+        if self.cutter.flank_arc is None:
+            return self.cutter.corner_radius * (1.0 - math.sin(self.beta))
+        low, high = self._arc
+        return self.arc[0] * (1.0 - math.cos(min(self.beta - low, high - self.beta)))
+
+    @property
+    def arc(self) -> tuple[float, float]:
+        """(r, e) [mm] of the arc that touches the surface: radius, and the circle of its centres."""
+        return self.cutter.finishing_arc[:2]
+
+    @property
+    def _arc(self) -> tuple[float, float]:
+        """Range of kappa [rad] of the arc."""
+        arc = self.cutter.flank_arc
+        if arc is None:
+            return -1.0, math.pi
+        return arc.kappa_from, arc.kappa_at(min(self.cutter.flute_length, arc.z_to))
+
+    @property
+    def below(self) -> float:
+        """Bound [mm] of how far the cutter reaches along the surface below the contact, towards the tip."""
+        cutter, b = self.cutter, self.beta
+        if cutter.flank_arc is None:
+            return cutter.corner_radius
+        rho, z = cutter.profile(1e-3).T
+        r, e, f = cutter.finishing_arc
+        up, out = f - r * math.cos(b), e + r * math.sin(b)
+        return float(((up - z) * math.sin(b) + (out + rho) * math.cos(b)).max())
 
     @property
     def deepest_is(self) -> str:
         """Text for messages: the meaning of ``deepest``."""
-        return "where the flank begins to cut"
+        return "where the flank begins to cut" if self.cutter.flank_arc is None else "where the barrel's arc ends"
 
     @property
     def meets(self) -> float:
         """Radius [mm] of the circle with which the cutter meets the stock, in the plane of feed and normal."""
-        return self.cutter.corner_radius
+        r, e = self.arc
+        return r if e >= 0.0 else r + e / math.sin(self.beta)
 
     def engagement(self, depths: ArrayLike, nodes: int = 8) -> ToothEngagement:
         """Tooth engagement on stock of given depths: :func:`engagement_of_depths`."""
@@ -137,19 +173,23 @@ class CutterPose:
     @property
     def centre(self) -> Floats:
         """C, (3,) float [mm], from the point where the cutter touches z = 0."""
-        r, e = self.cutter.apt[1:3]
+        r, e = self.arc
         s = math.sin(self.beta)
         up = np.array([0.0, 0.0, 1.0])
         return r * up if s < 1e-12 else r * up - e * (math.cos(self.beta) * self.axis - up) / s
 
     def outline(self, y: Floats) -> Floats:
         """Height g of the cutter's lower outline, seen along the feed, at y [mm]; infinite beside it."""
-        r, e = self.cutter.apt[1:3]
+        r, e = self.arc
         C = self.centre
         if e == 0.0:
             inside = np.abs(y - C[1]) <= r
             return np.where(inside, C[2] - np.sqrt(np.where(inside, r * r - (y - C[1]) ** 2, 0.0)), np.inf)
-        a = np.linspace(-0.5 * math.pi, 0.5 * math.pi, OUTLINE)
+        low, high = self._arc
+        a = np.linspace(-0.5 * math.pi, 0.5 * math.pi, OUTLINE * (1 if e > 0.0 else 16))
+        if e < 0.0:
+            kappa = np.arccos(np.clip(np.cos(a) * self.axis[2] - np.sin(a) * self.axis[1], -1.0, 1.0))
+            a = a[(kappa > low) & (kappa < high)]
         w = np.stack([0.0 * a, np.sin(a), -np.cos(a)], axis=1)
         across = w - (w @ self.axis)[:, None] * self.axis
         size = np.linalg.norm(across, axis=1)
@@ -171,7 +211,7 @@ def _breaks(posture: CutterPose, d: Floats) -> Floats:
     Where the circle of z = d is touched, and where two of the three borders (z = d, h = 0, the row before) meet; of a
     ball also where the border of the row before is touched. With C as origin h = 0 is x = 0 on a ball.
     """
-    r, e = posture.cutter.apt[1:3]
+    r, e = posture.arc
     A, b, step = posture.axis, posture.beta, posture.step
     psi = np.arccos(np.clip(1.0 - d / r, -1.0, 1.0))
     low, high = np.maximum(b - psi, 0.0), b + psi
@@ -201,13 +241,13 @@ def _breaks(posture: CutterPose, d: Floats) -> Floats:
 
 def _profile(posture: CutterPose, d: Floats, number: int) -> tuple[Floats, Floats, Floats]:
     """Nodes of the part of the profile below z = d: kappa, rho and weight [mm], (n, k) each; weight 0: none."""
-    r, e = posture.cutter.apt[1:3]
+    r, e = posture.arc
     b, s = posture.beta, math.sin(posture.beta)
     edges = _breaks(posture, d)
     parts = [_nodes(edges[:, i], edges[:, i + 1], number) for i in range(edges.shape[1] - 1)]
     kappa, weight = np.hstack([k for k, _ in parts]), r * np.hstack([w for _, w in parts])
     rho = e + r * np.sin(kappa)
-    if e == 0.0 or s < 1e-12:
+    if e <= 0.0 or s < 1e-12:
         return kappa, rho, weight
     rise = d - r * (1.0 - math.cos(b))
     inner = np.clip(e - rise / s, 0.0, e)
@@ -256,8 +296,12 @@ def engagement_of_depths(posture: CutterPose, depths: ArrayLike, nodes: int = 8)
     wrong = np.flatnonzero(~((d > 0.0) & (d <= posture.deepest * (1.0 + 1e-12))))
     if len(wrong):
         raise InputError(
-            f"depth_mm = {d[wrong[0]]:g}: must be above 0 and at most {posture.deepest:.6g}, where the flank begins to "
-            "cut: lean the cutter less or take a greater corner radius"
+            f"depth_mm = {d[wrong[0]]:g}: must be above 0 and at most {posture.deepest:.6g}, {posture.deepest_is}: "
+            + (
+                "lean the cutter less or take a greater corner radius"
+                if posture.cutter.flank_arc is None
+                else "lean the cutter so that it touches the middle of the arc"
+            )
         )
     circles = _circles(posture, d, nodes)
     starts, lengths = _ranges(circles, d)
@@ -268,7 +312,7 @@ def engagement_of_depths(posture: CutterPose, depths: ArrayLike, nodes: int = 8)
     sine, cosine, weight = circles.sine, circles.cosine, circles.weight
     s_to = np.cumsum(weight, axis=1)
     s_from = s_to - weight
-    height = posture.cutter.apt[3] - posture.cutter.apt[1] * cosine
+    height = posture.cutter.finishing_arc[2] - posture.arc[0] * cosine
     rate = edge_lag(posture.cutter) * sine
     lag = np.maximum(edge_lag(posture.cutter) * height - 0.5 * rate * weight, 0.0)
     table = np.stack([s_from, circles.rho, height, sine, cosine, lag, rate], axis=-1).reshape(-1, 7)
@@ -326,7 +370,7 @@ def _circles(posture: CutterPose, d: Floats, nodes: int) -> _Circles:
     T, _, A = posture.frame
     kappa, rho, weight = _profile(posture, d, nodes)
     sine, cosine = np.sin(kappa), np.cos(kappa)
-    above = -posture.cutter.apt[1] * cosine  # of the circle over C, along the axis
+    above = -posture.arc[0] * cosine  # of the circle over C, along the axis
     speed = posture.feed_per_tooth * np.array([1.0, 0.0, 0.0])
     along, offset = sine * float(speed @ T), -cosine * float(speed @ A)
     y0, z0 = (posture.centre[i] + above * A[i] for i in (1, 2))

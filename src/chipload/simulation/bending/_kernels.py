@@ -2,7 +2,8 @@
 
 Notation as in :mod:`chipload.simulation.deflection`: q point of the surface, n its normal, p tip, A axis, d distance
 from q to the cutter, (rho, z) its foot on the profile, s the length along it; theta rotation of tooth 0 at the tip. A
-``shape`` is (r, e, f, alpha, beta, h, rho where the bottom line ends), a bar (length, 1 / (E I), c_ff, c_mm, c_fm), a
+``shape`` is (r, e, f, alpha, beta, h, rho where the bottom line ends, E, F, R of the flank arc of a barrel (0: none),
+kappa where the corner ends, and where that arc ends below h), a bar (length, 1 / (E I), c_ff, c_mm, c_fm), a
 row of ``steps`` (p0, p1, a0, a1), 12 numbers; bites and slices as in :mod:`chipload.cutting._kernels`.
 Oracles: closed forms, the wall of :mod:`chipload.cutting.wall_error` and sums over slices in tests/simulation.
 """
@@ -27,18 +28,22 @@ def foot(rho, z, shape, out):
     """Distance of a point at (rho, z) from the profile, below 0 inside: out = d, s, foot's z, sin and cos of kappa
     (of the direction to the point on a sharp corner, 0 and 0 where the foot is the end of the flutes).
     """
-    r, e, f, alpha, beta, h, end = shape
+    r, e, f, alpha, beta, h, end, E, F, R, first, last = shape
     sa, ca = math.sin(alpha), math.cos(alpha)
     sb, cb = math.sin(beta), math.cos(beta)
     low = f - r * ca
-    high = f - r * sb
+    turn = f - r * math.cos(first)
+    high, wide = f - r * sb, e + r * cb
+    if R > 0.0:
+        high, wide = F - R * sb, E + R * cb
     inside = z >= 0.0 and z <= h
-    wide = e + r * cb
     if inside:
         if z < low:
             inside = sa > 0.0 and rho * sa <= z * ca
-        elif z < high:
+        elif z < turn:
             inside = rho <= e + math.sqrt(max(r * r - (f - z) ** 2, 0.0))
+        elif z < high:
+            inside = rho <= E + math.sqrt(max(R * R - (F - z) ** 2, 0.0))
         else:
             inside = rho <= wide + (z - high) * sb / cb
     best = math.inf
@@ -52,20 +57,32 @@ def foot(rho, z, shape, out):
             out[3], out[4] = (rho - end) / best, -(z - low) / best
     if r > 0.0:
         kappa = math.atan2(rho - e, f - z)
-        if alpha <= kappa <= 0.5 * math.pi - beta:
+        if alpha <= kappa <= first:
             d = abs(math.hypot(rho - e, f - z) - r)
             if d < best:
                 best = d
                 out[1] = r * (kappa - alpha)
                 out[2] = f - r * math.cos(kappa)
                 out[3], out[4] = math.sin(kappa), math.cos(kappa)
+    reach = r * (first - alpha)
+    if R > 0.0:
+        kappa = min(max(math.atan2(rho - E, F - z), first), last)
+        d = math.hypot(rho - E - R * math.sin(kappa), z - F + R * math.cos(kappa))
+        if d < best:
+            best = d
+            out[1] = reach + R * (kappa - first)
+            out[2] = F - R * math.cos(kappa)
+            out[3], out[4] = math.sin(kappa), math.cos(kappa)
+            if kappa == last and out[2] >= h and d > 0.0:
+                out[3], out[4] = 0.0, 0.0
+        reach += R * (last - first)
     top = (h - high) / cb
     if top > 0.0:
         t = min(max((rho - wide) * sb + (z - high) * cb, 0.0), top)
         d = math.hypot(rho - wide - t * sb, z - high - t * cb)
         if d < best:
             best = d
-            out[1] = r * (0.5 * math.pi - beta - alpha) + t
+            out[1] = reach + t
             out[2] = high + t * cb
             out[3], out[4] = cb, sb
             if t == top and d > 0.0:

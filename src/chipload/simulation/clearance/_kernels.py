@@ -1,8 +1,8 @@
 """Compiled loops: the least distance of points from a body of revolution in many places.
 
 Notation: the body stands with its tip at T and its unit axis A; z [mm] height above the tip, rho [mm] distance from the
-axis. Its meridian is ``lines`` (m, 4) ``[rho0, z0, rho1, z1]``, z0 <= z1, and one arc ``[e, f, r, a0, a1]``,
-centre, radius and range of the angle from the direction -z towards +rho (r = 0: none). A distance is below 0 inside.
+axis. Its meridian is ``lines`` (m, 4) ``[rho0, z0, rho1, z1]``, z0 <= z1, and ``arcs`` (k, 5) ``[e, f, r, a0, a1]``,
+centre, radius and range of the angle from the direction -z towards +rho. A distance is below 0 inside.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def meridian(rho, z, lines, arc, top):
+def meridian(rho, z, lines, arcs, top):
     """Signed distance of (rho, z) from the meridian; the flat end at ``top`` is no surface, above it is outside."""
     best = 1e300
-    e, f, r = arc[0], arc[1], arc[2]
-    if r > 0.0:
-        x, y = rho - e, f - z
-        size = math.hypot(x, y)
-        if size > 0.0:
-            angle = math.atan2(x, y)
-            if arc[3] <= angle <= arc[4]:
-                best = abs(size - r)
-        else:
-            best = r
     inside = 0.0 <= z <= top
     reach = -1.0
+    for i in range(len(arcs)):
+        e, f, r = arcs[i, 0], arcs[i, 1], arcs[i, 2]
+        x, y = rho - e, f - z
+        size = math.hypot(x, y)
+        if size == 0.0:
+            best = min(best, r)
+        elif arcs[i, 3] <= math.atan2(x, y) <= arcs[i, 4]:
+            best = min(best, abs(size - r))
+        if r * math.cos(arcs[i, 4]) <= y <= r * math.cos(arcs[i, 3]):
+            reach = max(reach, e + math.sqrt(max(r * r - y * y, 0.0)))
     for i in range(len(lines)):
         x0, y0, x1, y1 = lines[i, 0], lines[i, 1], lines[i, 2], lines[i, 3]
         dx, dy = x1 - x0, y1 - y0
@@ -39,11 +39,6 @@ def meridian(rho, z, lines, arc, top):
         best = min(best, gap)
         if y0 < y1 and y0 <= z <= y1:
             reach = max(reach, x0 + (z - y0) / (y1 - y0) * dx)
-    if r > 0.0:
-        y = f - z
-        low, high = r * math.cos(arc[4]), r * math.cos(arc[3])
-        if low <= y <= high:
-            reach = max(reach, e + math.sqrt(max(r * r - y * y, 0.0)))
     if inside and rho <= reach:
         return -best
     return best
@@ -51,7 +46,7 @@ def meridian(rho, z, lines, arc, top):
 
 @njit(cache=True, nogil=True)
 def nearest(
-    points, order, starts, low, cell, count, tips, axes, rows, lines, arc, top, widest, far, depth, done, out, at, deep,
+    points, order, starts, low, cell, count, tips, axes, rows, lines, arcs, top, widest, far, depth, done, out, at, deep,
     first,
 ):  # fmt: skip
     """Lower ``out`` to the signed distance of each point from the body in any of its places; ``at`` its step.
@@ -88,7 +83,7 @@ def nearest(
                     square = x * x + y * y + z * z - up * up
                     if square > reach * reach:
                         continue
-                    gap = meridian(math.sqrt(max(square, 0.0)), up, lines, arc, top)
+                    gap = meridian(math.sqrt(max(square, 0.0)), up, lines, arcs, top)
                     if gap > far:
                         continue
                     deep[rows[k]] = min(deep[rows[k]], gap)

@@ -27,23 +27,23 @@ class Body:
     Parameters
     ----------
     lines : (m, 4) float [mm], ``[rho0, z0, rho1, z1]``, z0 <= z1
-    arc : (5,) float [mm, rad]; radius 0: none
+    arcs : (k, 5) float [mm, rad]
     top : [mm] height at which it ends
     """
 
     lines: Floats
-    arc: Floats
+    arcs: Floats
     top: float
 
     @property
     def widest(self) -> float:
         """Greatest rho [mm]."""
-        corner = self.arc[0] + self.arc[2] if self.arc[2] > 0.0 else 0.0
+        corner = (self.arcs[:, 0] + self.arcs[:, 2]).max(initial=0.0)
         return float(max(self.lines[:, [0, 2]].max(initial=0.0), corner))
 
     def distance(self, rho: float, z: float) -> float:
         """Signed distance [mm] of a point from the surface, below 0 inside."""
-        return float(_kernels.meridian(rho, z, self.lines, self.arc, self.top))
+        return float(_kernels.meridian(rho, z, self.lines, self.arcs, self.top))
 
 
 def cutting_part(cutter: Cutter) -> Body:
@@ -55,12 +55,16 @@ def cutting_part(cutter: Cutter) -> Body:
     """
     if cutter.body:
         p = cutter.profile(0.0)
-        return Body(np.hstack([p[:-1], p[1:]]), np.zeros(5), cutter.flute_length)
+        return Body(np.hstack([p[:-1], p[1:]]), np.zeros((0, 5)), cutter.flute_length)
     _, r, e, f, alpha, beta, h = cutter.apt
     foot = (e + r * math.sin(alpha), f - r * math.cos(alpha))
-    flank = (e + r * math.cos(beta), f - r * math.sin(beta))
-    lines = [[0.0, 0.0, *foot], [*flank, float(cutter.radius_at(h)), h]]
-    return Body(np.array(lines), np.array([e, f, r, alpha, 0.5 * math.pi - beta]), h)
+    arcs = [(e, f, r, alpha, cutter.corner_end)] if r > 0.0 else []
+    low, bow = f - r * math.sin(beta), cutter.flank_arc
+    if bow is not None:
+        low = min(bow.z_to, h)
+        arcs.append((bow.e, bow.f, bow.radius, bow.kappa_from, bow.kappa_at(low)))
+    lines = [[0.0, 0.0, *foot], [float(cutter.radius_at(low)), low, float(cutter.radius_at(h)), h]]
+    return Body(np.array(lines), np.array(arcs, dtype=np.float64).reshape(-1, 5), h)
 
 
 def above_cutting(cutter: Cutter) -> Body:
@@ -80,4 +84,4 @@ def above_cutting(cutter: Cutter) -> Body:
     for length, diameter in cutter.holder:
         lines += [[radius, z, 0.5 * diameter, z], [0.5 * diameter, z, 0.5 * diameter, z + length]]
         z, radius = z + length, 0.5 * diameter
-    return Body(np.array(lines, dtype=np.float64).reshape(-1, 4), np.zeros(5), z)
+    return Body(np.array(lines, dtype=np.float64).reshape(-1, 4), np.zeros((0, 5)), z)

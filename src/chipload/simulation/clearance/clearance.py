@@ -112,7 +112,7 @@ class LeastDistance:
 
     def _lower(self, grid: Grid, steps: Steps, own: Ints, body: Body, deepest: Floats) -> None:
         tips, axes, rows = _places(steps, own, body, self.tolerance)
-        meridian = (body.lines, body.arc, body.top, body.widest)
+        meridian = (body.lines, body.arcs, body.top, body.widest)
 
         def lowered(span: Ints) -> tuple[Floats, Ints, Ints, Floats]:
             out = self.distance.copy(), self.step.copy(), self.first.copy(), deepest.copy()
@@ -185,7 +185,7 @@ def _places(steps: Steps, own: Ints, body: Body, tolerance: float) -> tuple[Floa
     with np.errstate(divide="ignore"):
         across = math.sqrt(8.0 * body.widest * tolerance)
         sharp = np.where(oblique > 1e-9, tolerance / np.maximum(oblique, 1e-9), np.inf)
-        round_ = math.sqrt(8.0 * body.arc[2] * tolerance)
+        round_ = math.sqrt(8.0 * (body.arcs[:, 2].min() if len(body.arcs) else 0.0) * tolerance)
         apart = np.minimum(across, np.where(oblique > 1e-9, np.maximum(sharp, round_), np.inf))
     count = np.maximum(np.ceil(span / apart), 1.0).astype(np.int64)
     at = np.repeat(np.arange(len(own)), count + 1)

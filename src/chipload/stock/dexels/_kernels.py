@@ -4,7 +4,7 @@ Notation: a ray runs along the axis k of the grid, s [mm] is its coordinate k; i
 v = (k + 2) % 3. The cutter stands with its tip at T and its unit axis A; z [mm] is the height above the tip, rho [mm]
 the distance from the axis. ``shape`` is ``[r, e, f, m, z1, z2, c, tb, h, big]``: APT corner radius r and its centre
 (e, f), the bottom rho = m z up to z1 (m = 0: none), the corner up to z2, the flank rho = c + tb z up to the height h;
-``big`` is the largest rho. Such a body is convex, so that a ray is in it over one interval; an empty one has lo > hi.
+``big`` is the largest rho; then ``[R, E, F, z3]`` of the flank arc of a barrel, between z2 and z3 (R = 0: none). Such a body is convex, so that a ray is in it over one interval; an empty one has lo > hi.
 
 In a move lo(t) and hi(t) are continuous while the ray is in the body, so that one passage takes the interval from min
 lo to max hi. A straight move makes lo convex and hi concave: chords bound what lies between two moments; a turn bends
@@ -104,6 +104,7 @@ def pierce(k, u, v, tip, axis, shape):
     """Interval (lo, hi) of the ray (u, v) along axis k in the cutter; lo > hi: none."""
     r, e, f, m, z1, z2 = shape[0], shape[1], shape[2], shape[3], shape[4], shape[5]
     c, tb, h = shape[6], shape[7], shape[8]
+    R, z3 = shape[10], shape[13]
     ku, kv = (k + 1) % 3, (k + 2) % 3
     wu, wv = u - tip[ku], v - tip[kv]
     au, av, slope = axis[ku], axis[kv], axis[k]
@@ -137,8 +138,22 @@ def pierce(k, u, v, tip, axis, shape):
                         a, b = 1.0, 0.0
             if a <= b:
                 lo, hi = min(lo, a), max(hi, b)
-    if z2 < h:
-        a, b = band(z0, slope, z2, h)
+    if R > 0.0 and z2 < h:
+        a, b = band(z0, slope, z2, min(z3, h))
+        if a <= b:
+            E, F = shape[11], shape[12]
+            # the cylinder around the arc is finite for every ray that is not along it
+            a, b = below(u2, u1, u0 - (E + R) ** 2, a, b)
+            if a <= b:
+                there, a = corner_end(a, 1.0, b, u2, u1, u0, z0, slope, R, E, F)
+                if there:
+                    there, b = corner_end(b, -1.0, a, u2, u1, u0, z0, slope, R, E, F)
+                if not there:
+                    a, b = 1.0, 0.0
+            if a <= b:
+                lo, hi = min(lo, a), max(hi, b)
+    if z3 < h:
+        a, b = band(z0, slope, z3, h)
         if a <= b:
             ms, at = tb * slope, c + tb * z0
             a, b = below(u2 - ms * ms, u1 - at * ms, u0 - at * at, a, b)

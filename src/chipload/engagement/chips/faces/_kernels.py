@@ -179,8 +179,12 @@ def depth(S, K, x, y, h):
     d = w - K[10]
     d = max(d, (rho - K[9]) * K[7] - w * K[6])
     d = max(d, rho * K[3] - w * K[4])
-    if K[1] > 0.0 and u * K[4] > v * K[3] and u * K[6] < v * K[7]:
+    if u * K[4] > v * K[3] and u * K[16] < v * K[15] and (K[1] > 0.0 or K[13] > 0.0):
         d = max(d, math.hypot(u, v) - K[1])
+    if K[13] > 0.0:
+        u, v = rho - K[12], K[14] - w
+        if u * K[16] >= v * K[15] and u * K[6] < v * K[7]:
+            d = max(d, math.hypot(u, v) - K[13])
     return d
 
 
