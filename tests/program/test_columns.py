@@ -54,8 +54,8 @@ def test_equal_rows_take_the_memory_of_one(long: int, monkeypatch: pytest.Monkey
     # equal bits, not equal numbers: 0 and -0 are two rows
     signs = frozen_column(np.array([0.0, -0.0, 0.0]), float)
     assert np.signbit(signs).tolist() == [False, True, False]
-    middle = frozen_column(np.array([1, 1, 2, 1, 1]), int)
-    assert middle.tolist() == [1, 1, 2, 1, 1]
+    for values in ([1, 1, 2, 1, 1], [1, 2, 1, 1, 1], [1, 1, 1, 1, 2]):
+        assert frozen_column(np.array(values), int).tolist() == values
 
 
 def test_a_program_is_the_same_with_columns_of_one_row(monkeypatch: pytest.MonkeyPatch) -> None:
