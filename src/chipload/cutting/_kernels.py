@@ -1,9 +1,9 @@
 """Compiled loops of the force; arrays and scalars only.
 
 Notation as in :mod:`chipload.engagement.tooth_engagement` and :mod:`chipload.cutting.force`: theta [rad] rotation of
-tooth 0 at
-the tip, c = (Ktc, Krc, Kac, Kte, Kre, Kae, m_t, m_r, m_a), a bite row = (phi from, phi to, s from, s to, along, offset,
-across), a slice = (s from, rho, z, sin(kappa), cos(kappa), lag, rate of the lag), ``piece`` the slice of each row.
+tooth 0 at the tip, c = (Ktc, Krc, Kac, Kte, Kre, Kae, m_t, m_r, m_a), a row of an engagement range = (phi from, phi to,
+s from, s to, along, offset, across), a slice = (s from, rho, z, sin(kappa), cos(kappa), lag, rate of the lag),
+``piece`` the slice of each row.
 Oracles: slice summation and quadrature in tests/cutting.
 """
 
@@ -230,7 +230,7 @@ def size(what, theta, rows, tooth, piece, slices, lo, hi, teeth, c):
 
 @njit(cache=True, nogil=True)
 def breaks_of(rows, tooth, piece, slices, lo, hi, teeth, period, out):
-    """Rotations in [0, period) where a bite begins or ends at either end of its s: fills out, returns count."""
+    """Rotations in [0, period) where a range begins or ends at either end of its s, into ``out``; their number."""
     count = 0
     for r in range(lo, hi):
         one = tooth[r] >= 0

@@ -160,14 +160,14 @@ class Prediction:
 # -- the model --------------------------------------------------------------------------------------------------
 def unit_forces(cut: MeasuredCut, cutter: Cutter, theta: Floats) -> Floats:
     """Return the forces on the cutter for unit coefficients, (m, 3, 6) float: force = unit_forces @ x."""
-    bites = engagement_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
-    return _columns(lambda material: forces_over_turn(bites, cutter, material, theta)[0][0])
+    engagement = engagement_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
+    return _columns(lambda material: forces_over_turn(engagement, cutter, material, theta)[0][0])
 
 
 def unit_means(cut: MeasuredCut, cutter: Cutter) -> Floats:
     """Return :func:`unit_forces` averaged over the turn in closed form, (3, 6) float."""
-    bites = engagement_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
-    return _columns(lambda material: mean_forces(bites, cutter, material)[0][0])
+    engagement = engagement_of_arcs([cut.arc[0]], [cut.arc[1]], cut.feed_per_tooth(cutter.flutes), cutter, cut.depth)
+    return _columns(lambda material: mean_forces(engagement, cutter, material)[0][0])
 
 
 def _columns(force: Callable[[Material], Floats]) -> Floats:

@@ -2,10 +2,9 @@
 
 Notation: A the axis from the tip to the holder, T the direction that immersion is counted from less pi/2 (that of the
 feed where the feed is normal to A), n = Rot(+90 deg about A) T; phi immersion, h chip thickness, s length along the
-profile, rho, kappa, u, nu and bites as in :mod:`chipload.engagement.tooth_engagement`; theta rotation of tooth 0 at
-the tip,
-counted as phi; the edge at s lags as :mod:`chipload.cutter.slices` says. Ft, Fr, Fa and their coefficients as in
-:mod:`chipload.cutting.material`.
+profile, rho, kappa, u, nu and engagement ranges as in :mod:`chipload.engagement.tooth_engagement`; theta rotation of
+tooth 0 at the tip, counted as phi; lag of the edge at s as in :mod:`chipload.cutter.slices`; Ft, Fr, Fa and their
+coefficients as in :mod:`chipload.cutting.material`.
 
 Every force is the force ON THE CUTTER; the one on the work is its opposite. With a clockwise spindle (M3, seen from
 above) the rim at phi lies in the direction u = cos(phi) n + sin(phi) T and moves along t = cos(phi) T - sin(phi) n. The
@@ -18,9 +17,8 @@ right-hand cut out of the holder:
 On a straight flank nu = u and e = A; on a flat bottom the radial force is the thrust, along A. With a counter-clockwise
 spindle (M4, left-hand cutter) n is mirrored and everything else is unchanged.
 
-Between the bounds of a bite h is a sinusoid, and the integral over s has a closed form: a straight flank needs no
-slices. If the material has a size effect, h^(1 - m) in place of h, the integral is a quadrature with an error of 1e-7
-or less.
+Within an engagement range h is a sinusoid, and the integral over s has a closed form: a straight flank needs no slices.
+If the material has a size effect, h^(1 - m) in place of h, the integral is a quadrature with an error of 1e-7 or less.
 
 Reference: [Altintas2012] ch. 2, analytic forces of a helical end mill; [Engin2001] for kappa and the sign of the axial
 force; [Kienzle1952] for the size effect.
@@ -47,26 +45,26 @@ Spindle = Literal["cw", "ccw"]
 #: distance of samples over the revolution [rad]; the greatest is refined between them
 SAMPLE_STEP = math.radians(1.0)
 
-#: most bites of a step whose ends are looked up one by one in the search of the greatest load
+#: greatest number of engagement ranges of a step whose ends the search of the greatest load computes
 EXACT_ROWS = 24
 
 
-def _arrays(bites: ToothEngagement, cutter: Cutter) -> tuple[Any, ...]:
+def _arrays(engagement: ToothEngagement, cutter: Cutter) -> tuple[Any, ...]:
     """Return tooth engagement as arrays for the kernels, after a check that the cutter has its teeth."""
-    top = int(bites.tooth.max(initial=-1))
+    top = int(engagement.tooth.max(initial=-1))
     if top >= cutter.flutes:
         raise InputError(f"tooth engagement: tooth {top}: must be below cutter.flutes = {cutter.flutes}")
-    return bites.start, bites.rows, bites.tooth, bites.slice, bites.slices
+    return engagement.start, engagement.rows, engagement.tooth, engagement.slice, engagement.slices
 
 
 def forces_over_turn(
-    bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike
+    engagement: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike
 ) -> tuple[Floats, Floats]:
     """Return the force on the cutter and the torque at given rotations.
 
     Parameters
     ----------
-    bites : of n steps
+    engagement : of n steps
     cutter, material : number of teeth; coefficients
     theta : (m,) float [rad], rotation of tooth 0 at the tip
 
@@ -82,18 +80,18 @@ def forces_over_turn(
 
     >>> mill = Cutter(10.0, 1, 0.0, 20.0, 30.0, 6e5)
     >>> plain = Material("plain", 1000.0, 300.0, 0.0, 10.0, 5.0, 0.0, source="made up for this example")
-    >>> bites = engagement_of_arcs([0.0], [math.pi], 0.1, mill, 2.0)
-    >>> force, torque = forces_over_turn(bites, mill, plain, [math.pi / 2])
+    >>> engagement = engagement_of_arcs([0.0], [math.pi], 0.1, mill, 2.0)
+    >>> force, torque = forces_over_turn(engagement, mill, plain, [math.pi / 2])
     >>> force[0, 0].round(9).tolist(), torque.round(9).tolist()
     ([-70.0, 220.0, 0.0], [[1100.0]])
     """
     angles = np.ascontiguousarray(theta, dtype=np.float64)
-    out = np.zeros((len(bites), len(angles), 4))
-    _kernels.turn_of(*_arrays(bites, cutter), angles, cutter.flutes, np.array(material.law), out)
+    out = np.zeros((len(engagement), len(angles), 4))
+    _kernels.turn_of(*_arrays(engagement, cutter), angles, cutter.flutes, np.array(material.law), out)
     return out[..., :3], out[..., 3]
 
 
-def mean_forces(bites: ToothEngagement, cutter: Cutter, material: Material) -> tuple[Floats, Floats]:
+def mean_forces(engagement: ToothEngagement, cutter: Cutter, material: Material) -> tuple[Floats, Floats]:
     """Return force on the cutter and torque averaged over a revolution; they do not depend on the lag of the edge.
 
     Returns
@@ -103,13 +101,13 @@ def mean_forces(bites: ToothEngagement, cutter: Cutter, material: Material) -> t
 
     Reference: [Altintas2012] ch. 2, average forces.
     """
-    out = np.zeros((len(bites), 4))
-    _kernels.means(*_arrays(bites, cutter), cutter.flutes, np.array(material.law), out)
+    out = np.zeros((len(engagement), 4))
+    _kernels.means(*_arrays(engagement, cutter), cutter.flutes, np.array(material.law), out)
     return out[:, :3], out[:, 3]
 
 
 def greatest_forces(
-    bites: ToothEngagement,
+    engagement: ToothEngagement,
     cutter: Cutter,
     material: Material,
     sample_step: float = SAMPLE_STEP,
@@ -117,12 +115,14 @@ def greatest_forces(
 ) -> Mapping[str, Floats]:
     """Return the greatest in-plane force, torque and axial force over a revolution.
 
-    The rotations where a bite begins or ends are found exactly; between them the load is smooth, is sampled at most
-    ``sample_step`` apart and refined by golden section. Jumps (zero helix) count with their one-sided limits.
+    The rotations where an engagement range begins or ends are found exactly; between them the load is smooth. It is
+    sampled there at most ``sample_step`` apart and refined by golden section. Jumps (zero helix) count with their
+    one-sided limits.
 
-    In a step of more than ``exact_rows`` bites (None: no such limit) the ends are not searched, because their number
-    times the number of bites grows too fast: the revolution, or the pitch where all teeth are alike, is sampled
-    ``sample_step`` apart and the best sample refined between its neighbours. A peak narrower than that may be missed.
+    In a step of more than ``exact_rows`` engagement ranges (None: no such limit) the ends are not computed, because
+    their number times that of the ranges grows too fast. The revolution, or the pitch if all teeth are alike, is
+    sampled ``sample_step`` apart and the best sample refined between its neighbours. A peak narrower than that may be
+    missed.
 
     Returns
     -------
@@ -131,9 +131,9 @@ def greatest_forces(
     """
     if not 0.0 < sample_step <= math.radians(15.0):
         raise InputError(f"sample_step = {math.degrees(sample_step):g} deg: must be above 0 and at most 15")
-    out = np.zeros((len(bites), 5))
-    exact = len(bites.rows) if exact_rows is None else exact_rows
-    _kernels.greatest(*_arrays(bites, cutter), cutter.flutes, np.array(material.law), sample_step, exact, out)
+    out = np.zeros((len(engagement), 5))
+    exact = len(engagement.rows) if exact_rows is None else exact_rows
+    _kernels.greatest(*_arrays(engagement, cutter), cutter.flutes, np.array(material.law), sample_step, exact, out)
     names = ("force_t", "force_n", "theta", "torque", "force_axis")
     return dict(zip(names, out.T, strict=True))
 
@@ -223,10 +223,10 @@ def forces_along(
     if spindle not in ("cw", "ccw"):
         raise InputError(f"spindle = {spindle!r}: must be cw or ccw")
     heading = np.asarray(T, dtype=np.float64)
-    bites = engagement_of_arcs(
+    engagement = engagement_of_arcs(
         phi_in, phi_out, feed_per_tooth, cutter, axial_depth, count=count, clockwise=spindle == "cw"
     )
-    n = len(bites)
+    n = len(engagement)
     if heading.shape != (n, 2) or not np.all(np.abs(np.hypot(heading[:, 0], heading[:, 1]) - 1.0) < 1e-6):
         raise InputError(f"T of shape {heading.shape}: need ({n}, 2) unit vectors, one a step")
     speed = np.broadcast_to(np.asarray(spindle_speed, dtype=np.float64), (n,))
@@ -234,8 +234,8 @@ def forces_along(
         raise InputError("spindle_speed: must be finite and at least 0 rad/s")
     side = 1.0 if spindle == "cw" else -1.0
     left = side * np.column_stack([-heading[:, 1], heading[:, 0]])
-    peak = greatest_forces(bites, cutter, material, sample_step, exact_rows=None)
-    mean, torque_mean = mean_forces(bites, cutter, material)
+    peak = greatest_forces(engagement, cutter, material, sample_step, exact_rows=None)
+    mean, torque_mean = mean_forces(engagement, cutter, material)
     plane = peak["force_t"][:, None] * heading + peak["force_n"][:, None] * left
     mean_plane = mean[:, :1] * heading + mean[:, 1:2] * left
     return {
@@ -249,5 +249,5 @@ def forces_along(
         "torque_nm": peak["torque"] / 1000.0,
         "torque_mean_nm": torque_mean / 1000.0,
         "power_w": torque_mean * speed / 1000.0,
-        "chip_max_mm": bites.chip_max(),
+        "chip_max_mm": engagement.chip_max(),
     }

@@ -30,13 +30,13 @@ OF_FEED, OF_DEPTH = 2.0, 0.25
 
 
 def deflection_share(
-    bites: ToothEngagement, deflection_um: ArrayLike, of_feed: float = OF_FEED, of_depth: float = OF_DEPTH
+    engagement: ToothEngagement, deflection_um: ArrayLike, of_feed: float = OF_FEED, of_depth: float = OF_DEPTH
 ) -> Floats:
     """Return the column ``deflection_share`` (n,): deflection over the greatest for which the rigid model is valid.
 
     Parameters
     ----------
-    bites : without runout
+    engagement : without runout
     deflection_um : (n,) float
     of_feed : greatest deflection over the feed per tooth
     of_depth : greatest deflection over the radial depth
@@ -59,5 +59,5 @@ def deflection_share(
         if not value > 0.0:
             raise InputError(f"checks.{name} = {value:g}: must be above 0")
     delta = np.asarray(deflection_um, dtype=np.float64) / 1000.0
-    room = np.minimum(of_feed * tooth_feed(bites), of_depth * radial_depth(bites))
+    room = np.minimum(of_feed * tooth_feed(engagement), of_depth * radial_depth(engagement))
     return np.asarray(np.divide(delta, room, out=np.zeros(len(delta)), where=room > 0.0))

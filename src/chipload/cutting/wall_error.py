@@ -1,7 +1,7 @@
 """Form error of a wall that the deflection of the cutter causes.
 
-Notation: phi immersion, theta rotation, bites as in :mod:`chipload.engagement.tooth_engagement`; z [mm] height above
-the tip;
+Notation: phi immersion, theta rotation, engagement ranges as in :mod:`chipload.engagement.tooth_engagement`; z [mm]
+height above the tip;
 C(z', z) [mm/N] the beam's compliance; e(z) [mm] error of the wall, positive where material is left on it (the cutter
 was pushed away), negative where it is cut away.
 
@@ -15,7 +15,8 @@ own height; c_w a compliance of the work normal to the wall. With zero helix and
 made, so that the edge force alone shows. With runout the wall is made by the tooth of greatest radius, which takes its
 excess r_j - R away: e(z) lessened by it.
 
-The load is that of the rigid model: bending does not thin the chip. A straight flank only: another bite is refused.
+The load is that of the rigid model: bending does not thin the chip. Only a straight flank is accepted: an engagement
+range elsewhere is refused.
 
 Reference: [Uddin2007]; [Altintas2012] ch. 2.
 """
@@ -53,24 +54,24 @@ def _wall_immersion(milling: Milling) -> float:
     return 0.0 if milling == "up" else math.pi
 
 
-def _makes_wall(bites: ToothEngagement, phi_wall: float, reach: float) -> NDArray[np.bool_]:
-    """Return for each step whether a bite comes within ``reach`` of the wall, (n,) bool."""
-    made = np.zeros(len(bites), dtype=np.bool_)
-    near = np.abs(bites.rows[:, 0 if phi_wall == 0.0 else 1] - phi_wall) <= reach
-    np.logical_or.at(made, np.repeat(np.arange(len(bites)), np.diff(bites.start)), near)
+def _makes_wall(engagement: ToothEngagement, phi_wall: float, reach: float) -> NDArray[np.bool_]:
+    """Return for each step whether an engagement range comes within ``reach`` of the wall, (n,) bool."""
+    made = np.zeros(len(engagement), dtype=np.bool_)
+    near = np.abs(engagement.rows[:, 0 if phi_wall == 0.0 else 1] - phi_wall) <= reach
+    np.logical_or.at(made, np.repeat(np.arange(len(engagement)), np.diff(engagement.start)), near)
     return made
 
 
-def _straight(bites: ToothEngagement, cutter: Cutter) -> Floats:
+def _straight(engagement: ToothEngagement, cutter: Cutter) -> Floats:
     """Return rows (b, 7) with heights in place of lengths along the profile; refuse all but a straight flank."""
-    own = bites.slices[bites.slice]
+    own = engagement.slices[engagement.slice]
     bad = np.flatnonzero(~((np.abs(own[:, 3] - 1.0) <= 1e-12) & (np.abs(own[:, 1] - cutter.radius) <= 1e-9)))
     if len(bad):
         raise InputError(
             f"tooth engagement: row {bad[0]}: rho = {own[bad[0], 1]:g} mm, sin(kappa) = {own[bad[0], 3]:g}: the wall's "
             f"error is known for a straight flank only, rho = {cutter.radius:g} mm and sin(kappa) = 1"
         )
-    rows = bites.rows.copy()
+    rows = engagement.rows.copy()
     rows[:, 2:4] += (own[:, 2] - own[:, 0])[:, None]
     return rows
 
@@ -91,7 +92,7 @@ def _check_work(work_compliance: float) -> None:
 
 
 def wall_profile(
-    bites: ToothEngagement,
+    engagement: ToothEngagement,
     cutter: Cutter,
     material: Material,
     z: ArrayLike,
@@ -105,7 +106,7 @@ def wall_profile(
 
     Parameters
     ----------
-    bites : of n steps
+    engagement : of n steps
     cutter, material : as for the force
     z : (p,) float [mm], heights above the tip, 0 .. overhang
     milling : ``up`` or ``down``: which wall
@@ -123,11 +124,11 @@ def wall_profile(
     _check_work(work_compliance)
     _check_teeth(cutter)
     phi_wall = _wall_immersion(milling)
-    out = np.zeros((len(bites), len(heights)))
+    out = np.zeros((len(engagement), len(heights)))
     _kernels.wall_profiles(
-        bites.start,
-        _straight(bites, cutter),
-        bites.tooth,
+        engagement.start,
+        _straight(engagement, cutter),
+        engagement.tooth,
         phi_wall,
         edge_lag(cutter),
         cutter.flutes,
@@ -136,7 +137,7 @@ def wall_profile(
         heights,
         _beam(cutter, fluted_factor),
         work_compliance,
-        _makes_wall(bites, phi_wall, reach),
+        _makes_wall(engagement, phi_wall, reach),
         out,
     )
     return out
@@ -192,17 +193,17 @@ def wall_error_along(
     _check_work(work_compliance)
     _check_teeth(cutter)
     phi_wall = _wall_immersion(milling)
-    bites = engagement_of_arcs(
+    engagement = engagement_of_arcs(
         phi_in, phi_out, feed_per_tooth, cutter, axial_depth, count=count, clockwise=spindle == "cw"
     )
-    made = _makes_wall(bites, phi_wall, reach)
-    out = np.zeros((len(bites), 2))
+    made = _makes_wall(engagement, phi_wall, reach)
+    out = np.zeros((len(engagement), 2))
     _kernels.wall_worst(
-        bites.start,
-        bites.rows,
-        bites.tooth,
-        bites.slice,
-        bites.slices,
+        engagement.start,
+        engagement.rows,
+        engagement.tooth,
+        engagement.slice,
+        engagement.slices,
         phi_wall,
         edge_lag(cutter),
         cutter.flutes,

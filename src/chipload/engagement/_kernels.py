@@ -270,13 +270,12 @@ def engage(centres, headings, r, seg, box, first, last, angle, count, phi):
 
 @njit(cache=True, nogil=True)
 def runout_engagement(whole, every, sine, radii, turns, sizes, rows, tooth, fill):
-    """Tooth engagement of each tooth for teeth of unlike radii. With g the thickness of a bite of every tooth: the
-    lower envelope
-    of N lines in g, where positive, and then the immersions at which g lies between its corners.
+    """Tooth engagement of each tooth for teeth of unlike radii. With g the chip thickness of a range of equal teeth:
+    the lower envelope of N lines in g, where positive, and then the immersions at which g lies between its corners.
 
-    ``whole`` (b, 7) and ``every`` (b,) the bites and their teeth, ``sine`` (b,) sin(kappa), ``radii`` (N,) [mm],
-    ``turns`` (N, N) the m of each tooth by the number of teeth before it, from 1. First call (fill False) counts into
-    ``sizes``, the second fills ``rows`` and ``tooth``.
+    ``whole`` (b, 7) and ``every`` (b,) the engagement ranges and their teeth, ``sine`` (b,) sin(kappa), ``radii`` (N,)
+    [mm], ``turns`` (N, N) the m of each tooth by the number of teeth before it, from 1. First call (fill False) counts
+    into ``sizes``, the second fills ``rows`` and ``tooth``.
     """
     teeth = len(radii)
     at = 0

@@ -1,9 +1,10 @@
 """Contact height, feed per tooth and radial depth of cut of a step, from its tooth engagement.
 
-Notation as in :mod:`chipload.engagement.tooth_engagement`: a bite from phi p to q, s a to b, with the chip thickness
-h = along sin(phi) + across cos(phi) + offset; kappa the angle of the profile. The feed per tooth has the parts
-hypot(along, across) / sin(kappa) across the axis and offset / cos(kappa) along it. Where the feed is not normal to a
-surface of the cutter, that surface does not determine the feed per tooth; the greatest over the bites is taken.
+Notation as in :mod:`chipload.engagement.tooth_engagement`: an engagement range from phi p to q, s a to b, with the chip
+thickness h = along sin(phi) + across cos(phi) + offset; kappa the angle of the profile. The feed per tooth has the
+parts hypot(along, across) / sin(kappa) across the axis and offset / cos(kappa) along it. Where the feed is not normal
+to a surface of the cutter, that surface does not determine the feed per tooth: the greatest of the engagement ranges is
+taken.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ Floats = NDArray[np.float64]
 FLAT = 1e-3
 
 
-def contact_height(bites: ToothEngagement) -> Floats:
+def contact_height(engagement: ToothEngagement) -> Floats:
     """Return the height (n,) [mm] above the tip of the highest point of the edge that cuts; 0 where nothing is cut."""
-    s0, _, z0, sine = bites.slices[bites.slice, :4].T
-    return _greatest(bites, z0 + sine * (bites.rows[:, 3] - s0))
+    s0, _, z0, sine = engagement.slices[engagement.slice, :4].T
+    return _greatest(engagement, z0 + sine * (engagement.rows[:, 3] - s0))
 
 
-def tooth_feed(bites: ToothEngagement) -> Floats:
-    """Return the feed per tooth (n,) [mm] of bites without runout; 0 where nothing is cut.
+def tooth_feed(engagement: ToothEngagement) -> Floats:
+    """Return the feed per tooth (n,) [mm] of engagement ranges without runout; 0 where nothing is cut.
 
     Examples
     --------
@@ -37,34 +38,34 @@ def tooth_feed(bites: ToothEngagement) -> Floats:
     >>> tooth_feed(slot).tolist(), radial_depth(slot).round(9).tolist(), contact_height(slot).tolist()
     ([0.1], [10.0], [2.0])
     """
-    sine, cosine = np.abs(bites.slices[bites.slice, 3:5].T)
-    along, offset, across = bites.rows[:, 4:].T
+    sine, cosine = np.abs(engagement.slices[engagement.slice, 3:5].T)
+    along, offset, across = engagement.rows[:, 4:].T
     lateral = np.divide(np.hypot(along, across), sine, out=np.zeros(len(sine)), where=sine > FLAT)
     axial = np.divide(np.abs(offset), cosine, out=np.zeros(len(sine)), where=cosine > FLAT)
-    return np.hypot(_greatest(bites, lateral), _greatest(bites, axial))
+    return np.hypot(_greatest(engagement, lateral), _greatest(engagement, axial))
 
 
-def radial_depth(bites: ToothEngagement) -> Floats:
-    """Return the radial depth of cut (n,) [mm]: width of all bites seen along T; 0 where nothing is cut."""
-    p, q = bites.rows[:, :2].T
-    rho = bites.slices[bites.slice, 1]
+def radial_depth(engagement: ToothEngagement) -> Floats:
+    """Return the radial depth of cut (n,) [mm]: width of all engagement ranges seen along T; 0 where nothing is cut."""
+    p, q = engagement.rows[:, :2].T
+    rho = engagement.slices[engagement.slice, 1]
     # across = rho cos(phi): its ends, and its extremes at 0 (or 2 pi) and pi where the arc holds them
     ends = rho * np.cos([p, q])
     high, low = ends.max(axis=0, initial=-np.inf), ends.min(axis=0, initial=np.inf)
     high = np.where((q >= 2.0 * np.pi) | (p == 0.0), rho, high)
     low = np.where(((p <= np.pi) & (q >= np.pi)) | (q >= 3.0 * np.pi), -rho, low)
-    top, bottom = np.full(len(bites), -np.inf), np.full(len(bites), np.inf)
-    owner = _owner(bites)
+    top, bottom = np.full(len(engagement), -np.inf), np.full(len(engagement), np.inf)
+    owner = _owner(engagement)
     np.maximum.at(top, owner, high)
     np.minimum.at(bottom, owner, low)
     return np.asarray(np.where(np.isfinite(top), top - bottom, 0.0))
 
 
-def _owner(bites: ToothEngagement) -> NDArray[np.int64]:
-    return np.repeat(np.arange(len(bites)), np.diff(bites.start))
+def _owner(engagement: ToothEngagement) -> NDArray[np.int64]:
+    return np.repeat(np.arange(len(engagement)), np.diff(engagement.start))
 
 
-def _greatest(bites: ToothEngagement, values: Floats) -> Floats:
-    out = np.zeros(len(bites))
-    np.maximum.at(out, _owner(bites), values)
+def _greatest(engagement: ToothEngagement, values: Floats) -> Floats:
+    out = np.zeros(len(engagement))
+    np.maximum.at(out, _owner(engagement), values)
     return out

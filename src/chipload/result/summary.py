@@ -1,4 +1,4 @@
-"""The schema of summary.json, with a version and the same for every capability; source of docs/summary.schema.json."""
+"""The schema of summary.json, with a version, the same for every capability; source of docs/summary.schema.json."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Place = tuple[float, float, float]
 
 
 class _SummaryPart(BaseModel):
-    """A part of summary.json: no other keys, no number that is not finite; what is written has every key."""
+    """A part of summary.json: no other keys, finite numbers only; every key is written."""
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, json_schema_serialization_defaults_required=True
@@ -30,91 +30,95 @@ class _SummaryPart(BaseModel):
 
 
 class LimitModel(_SummaryPart):
-    """A limit against the worst value that was found."""
+    """A limit, and the worst value of its column."""
 
     name: str = Field(description="name of the limit, as in [limits] of the job")
     column: str = Field(description="column of the history that it bounds")
-    unit: str
-    limit: float
-    worst: float | None = Field(description="greatest value; null: not known")
-    state: Verdict
-    track: str
+    unit: str = Field(description="unit of limit and worst")
+    limit: float = Field(description="value of the limit")
+    worst: float | None = Field(description="worst value; null: not known")
+    state: Verdict = Field(description="result of the check")
+    track: str = Field(description="name of the track")
     row: int | None = Field(description="row of the track's history, from 0; null: not a row of it")
     line: int = Field(description="line of the program; 0: none")
     place: Place | None = Field(description="x, y, z in mm in the workpiece frame")
-    t_s: float | None
-    resolution_error: float = Field(description="relative error of worst by the resolution of the calculation")
+    t_s: float | None = Field(description="time of the row from the start of the program; null: not a row of it")
+    resolution_error: float = Field(description="relative error of worst that the resolution of the calculation causes")
     reason: str = Field(description="why the limit is unproven")
 
 
 class FindingModel(_SummaryPart):
-    """What was noticed."""
+    """An observation of a reader, a planner or a check."""
 
-    code: str
-    text: str
-    severity: Literal["note", "unproven", "exceeds"]
-    line: int
-    place: Place | None
-    row: int | None
+    code: str = Field(description="code of the kind of finding")
+    text: str = Field(description="the finding in a sentence")
+    severity: Literal["note", "unproven", "exceeds"] = Field(description="effect on the verdict; note: none")
+    line: int = Field(description="line of the program; 0: none")
+    place: Place | None = Field(description="x, y, z in mm in the workpiece frame")
+    row: int | None = Field(description="row of the track's history, from 0; null: not a row of it")
 
 
 class TrackModel(_SummaryPart):
     """One program along its path."""
 
-    name: str
-    kind: TrackKind
-    operation: int
-    in_use: bool
-    verdict: Verdict
-    time_s: float | None = Field(description="time of the program on the machine; null: it was not run")
-    parameters: dict[str, float | str]
+    name: str = Field(description="name of the track, unique in the result")
+    kind: TrackKind = Field(description="kind of the track")
+    operation: int = Field(description="number of its [[operation]], from 0")
+    in_use: bool = Field(description="whether its program is the one that is released")
+    verdict: Verdict = Field(description="verdict of this track")
+    time_s: float | None = Field(description="cycle time of the program; null: not calculated")
+    parameters: dict[str, float | str] = Field(description="parameters that distinguish the track from the others")
     programs: tuple[str, ...] = Field(description="files in the result folder")
-    rows: int = Field(description="rows in history.parquet")
+    rows: int = Field(description="number of its rows in history.parquet")
     energy_balance: dict[int, float] = Field(
         default_factory=dict,
-        description="work over the specific energy of the volume removed, less 1, by tool; empty: not simulated",
+        description="work over the specific energy of the removed volume, less 1, by tool; empty: not simulated",
     )
-    limits: tuple[LimitModel, ...]
-    findings: tuple[FindingModel, ...]
+    limits: tuple[LimitModel, ...] = Field(description="limit checks of this track")
+    findings: tuple[FindingModel, ...] = Field(description="findings of this track")
 
 
 class MapModel(_SummaryPart):
     """A quantity over a surface; its arrays are in maps.npz."""
 
-    name: str
-    column: str
-    track: str
-    points: int
-    least: float | None
-    greatest: float | None
-    greatest_place: Place | None
+    name: str = Field(description="name of the map")
+    column: str = Field(description="column that it shows")
+    track: str = Field(description="name of its track; empty: the whole result")
+    points: int = Field(description="number of points")
+    least: float | None = Field(description="least value; null: no point has a value")
+    greatest: float | None = Field(description="greatest value; null: no point has a value")
+    greatest_place: Place | None = Field(description="place of the greatest value, x, y, z in mm")
 
 
 class ProvenanceModel(_SummaryPart):
-    """Where the numbers come from."""
+    """Files, settings and versions from which the numbers of the result come."""
 
-    inputs: dict[str, str]
-    overrides: tuple[str, ...]
-    machine: str
-    materials: dict[str, str]
-    versions: dict[str, str]
+    inputs: dict[str, str] = Field(description="file name and hash of each input, by name")
+    overrides: tuple[str, ...] = Field(description="keys of the job that were overridden")
+    machine: str = Field(description="name of the machine, and a note")
+    materials: dict[str, str] = Field(description="source of the coefficients of each material")
+    versions: dict[str, str] = Field(
+        description="versions of chipload, Python and the libraries that may change a number"
+    )
 
 
 class Summary(_SummaryPart):
     """The content of summary.json."""
 
-    schema_version: Literal[1]
-    capability: str
-    job: str
-    verdict: Verdict
-    message: str = Field(description="the verdict in a sentence or two")
-    note: str = Field(description="what the message adds where everything holds")
-    limits: tuple[LimitModel, ...] = Field(description="of the tracks in use")
-    tracks: tuple[TrackModel, ...]
-    findings: tuple[FindingModel, ...]
-    unchecked: tuple[str, ...] = Field(description="limits that are not stated and checks that are switched off")
-    maps: tuple[MapModel, ...]
-    operations: tuple[dict[str, JsonValue], ...] = Field(description="numbers particular to the capability")
+    schema_version: Literal[1] = Field(description="version of this schema")
+    capability: str = Field(description="kind of job")
+    job: str = Field(description="title of the job")
+    verdict: Verdict = Field(
+        description="worst verdict of the tracks in use and the findings; unproven if no limit was checked"
+    )
+    message: str = Field(description="the verdict in one or two sentences")
+    note: str = Field(description="addition to the message if everything holds")
+    limits: tuple[LimitModel, ...] = Field(description="limit checks of the tracks in use")
+    tracks: tuple[TrackModel, ...] = Field(description="all tracks")
+    findings: tuple[FindingModel, ...] = Field(description="findings that belong to no track")
+    unchecked: tuple[str, ...] = Field(description="limits that are not stated, and checks that are switched off")
+    maps: tuple[MapModel, ...] = Field(description="surface maps")
+    operations: tuple[dict[str, JsonValue], ...] = Field(description="values of this capability, by operation")
     provenance: ProvenanceModel
 
 

@@ -51,7 +51,7 @@ LOADS = (
 BANDS = ("force_sd_n", "torque_sd_nm", "torque_mean_sd_nm", "power_sd_w")
 #: the front is at least so many tolerances ahead of the one that the step before left
 AHEAD = 20.0
-#: a bite ends where h = 0 if h is at most this share of its greatest
+#: an engagement range ends where h = 0 if h is at most this share of its greatest
 GRAZES = 1e-6
 #: a mean normal shorter than this stands for surfaces that face each other
 ONE_SIDE = 0.5
@@ -169,8 +169,8 @@ def engagement_of_steps(cuts: list[StepEngagement], profile: Slices) -> ToothEng
 def _with_parts(rows: Floats, owner: Ints, profile: Slices) -> tuple[Ints, Floats]:
     """Return slices of the engaged edge, and the columns of the profile followed by those of parts of its arcs.
 
-    A bite that ends within a slice of an arc has the radius and the normal of its own middle, not of the slice's: in a
-    shallow cut by a ball nose the uppermost slice holds much of the torque.
+    An engagement range that ends within a slice of an arc has the radius and the normal of its own middle, not those of
+    the slice: in a shallow cut by a ball nose the uppermost slice has much of the torque.
     """
     s, part = rows[:, 2:4], profile.radius[owner] > 0.0
     part &= (s[:, 0] != profile.s_from[owner]) | (s[:, 1] != profile.s_to[owner])

@@ -1,8 +1,8 @@
 """Compiled loops of the wall error; arrays and scalars only.
 
 Notation as in :mod:`chipload.cutting.wall_error`: theta [rad] rotation of tooth 0 at the tip, lag [rad/mm] =
-tan(helix) / R,
-c = (Ktc, Krc, Kac, Kte, Kre, Kae, m_t, m_r, m_a), a bite row = (phi from, phi to, z from, z to, along, offset, across).
+tan(helix) / R, c = (Ktc, Krc, Kac, Kte, Kre, Kae, m_t, m_r, m_a), a row of an engagement range = (phi from, phi to,
+z from, z to, along, offset, across).
 Oracles: slice summation and quadrature in tests/cutting.
 """
 
@@ -105,7 +105,7 @@ def wall_profiles(start, rows, tooth, gen, lag, teeth, radii, c, z, beam, work, 
 @njit(cache=True, nogil=True)
 def wall_worst(start, rows, tooth, piece, flank, gen, lag, teeth, radii, c, heights, depth, beam, work, made, out):
     """Wall error of greatest size of every step, and its height: out (n, 2). Sampled at ``heights`` equal heights and
-    at those where a bite begins or ends as the generating edge passes; then refined by golden section.
+    at those where an engagement range begins or ends as the generating edge passes; then refined by golden section.
     """
     last = np.max(radii) > np.min(radii)
     pitch = TAU / teeth

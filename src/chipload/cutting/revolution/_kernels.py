@@ -1,11 +1,11 @@
 """Compiled loop of the loads over a revolution where the law of the material is linear; arrays and scalars only.
 
-Notation as in :mod:`chipload.cutting._kernels`. Over the part lo .. hi of the immersion in which a bite's edge lies at
-a rotation the load of the edge is (I(hi) - I(lo)) / rate, I the integral of the load of a mm over the immersion:
-products of sine and cosine. These of all rotations come from one table. Where all of the edge cuts, its load is a sum
-of cosine and sine of the rotation and of twice it, the factors of which are added where that begins and taken away
-where it ends: a bite costs the same however many rotations it cuts.
-Oracle: :func:`chipload.cutting.force.forces_over_turn`, which integrates bite by bite and rotation by rotation.
+Notation as in :mod:`chipload.cutting._kernels`. At a rotation the edge of an engagement range lies in the part lo .. hi
+of the immersion. Its load is (I(hi) - I(lo)) / rate, I the integral over the immersion of the load per mm: products of
+sine and cosine, which one table contains for all rotations. Where the whole edge cuts, the load is a sum of the cosine
+and sine of the rotation and of its double. Their factors are added where this part begins and subtracted where it ends,
+so that the time for a range does not depend on the number of rotations in which it cuts.
+Oracle: :func:`chipload.cutting.force.forces_over_turn`, which integrates each range at each rotation.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit, types
 
 TAU = 2.0 * math.pi
-#: an edge that lags by less than this over a bite counts as one that does not [rad]
+#: an edge that lags by less than this over an engagement range counts as one that does not [rad]
 STRAIGHT = 1e-5
 #: loads that differ by no more than this share are alike: rounding does not say which rotation has the greatest
 ALIKE = 1e-7
@@ -127,7 +127,7 @@ def summed(sums, table, acc):
 
 @njit(cache=True, nogil=True)
 def add_part(acc, m0, k0, k1, m1, at, step, back, table, first, last, p, q, w, arm, rate):
-    """Add the loads of a bite to ``acc`` (4, m), rows along T, n, the axis and torque, for the rotations ``m0`` to
+    """Add the loads of a range to ``acc`` (4, m), rows along T, n, the axis and torque, for the rotations ``m0`` to
     ``k0`` and ``k1`` to ``m1``, at which the edge is cut off at an end; they begin at ``back`` [rad] and are the
     entries ``at`` on of the table of cosines and sines.
 

@@ -43,7 +43,7 @@ def first_greatest(loads: Floats) -> NDArray[np.int64]:
 
 
 def loads_over_turn(
-    bites: ToothEngagement, cutter: Cutter, material: Material, rotation: float, left: ArrayLike
+    engagement: ToothEngagement, cutter: Cutter, material: Material, rotation: float, left: ArrayLike
 ) -> tuple[Floats, Floats, Floats]:
     """Return (n, 15) mean, greatest and least force x, y, z [N] on the cutter in the frame of the work, greatest size
     of the force, mean and greatest torque [N mm], 0, thickest chip [mm], greatest force against ``left`` [N]; (n, 2)
@@ -52,46 +52,46 @@ def loads_over_turn(
 
     Parameters
     ----------
-    bites : of n steps, with frames
+    engagement : of n steps, with frames
     left : (n, 3) float
     """
     away = np.ascontiguousarray(left, dtype=np.float64)
     count = rotations(cutter, rotation)
     alike = cutter.teeth_alike
     teeth = cutter.flutes if alike else 1
-    basis = mean_basis(bites, cutter, material)
-    if any(material.exponents) or (alike and bool((bites.tooth >= 0).any())):
-        out = _one_by_one(bites, cutter, material, count, away)
+    basis = mean_basis(engagement, cutter, material)
+    if any(material.exponents) or (alike and bool((engagement.tooth >= 0).any())):
+        out = _one_by_one(engagement, cutter, material, count, away)
     else:
-        out = np.empty((len(bites), COLUMNS + 2))
+        out = np.empty((len(engagement), COLUMNS + 2))
         theta = np.arange(count * teeth) * (math.tau / (count * teeth))
         table = np.vstack([np.cos(theta), np.sin(theta)])
         _kernels.over_turn(
-            bites.start, bites.rows, bites.tooth, bites.slice, bites.slices, table, bites.frames, cutter.flutes, count,
-            alike, np.array(material.law), away, out,
+            engagement.start, engagement.rows, engagement.tooth, engagement.slice, engagement.slices, table,
+            engagement.frames, cutter.flutes, count, alike, np.array(material.law), away, out,
         )  # fmt: skip
         mean = basis @ np.array(material.coefficients)
-        out[:, :3] = in_work(mean[:, :3], bites.frames)
+        out[:, :3] = in_work(mean[:, :3], engagement.frames)
         out[:, 10] = mean[:, 3]
     return out[:, :COLUMNS], out[:, COLUMNS:] * (math.tau / teeth / count), basis
 
 
-def _one_by_one(bites: ToothEngagement, cutter: Cutter, material: Material, count: int, left: Floats) -> Floats:
+def _one_by_one(engagement: ToothEngagement, cutter: Cutter, material: Material, count: int, left: Floats) -> Floats:
     """(n, 17) the same by the loads at each rotation, for any law; the last two are numbers of rotations."""
     pitch = math.tau / cutter.flutes if cutter.teeth_alike else math.tau
-    force, torque = forces_over_turn(bites, cutter, material, np.arange(count) * (pitch / count))
-    mean, torque_mean = mean_forces(bites, cutter, material)
-    turned, size = in_work(force, bites.frames), np.linalg.norm(force, axis=2)
+    force, torque = forces_over_turn(engagement, cutter, material, np.arange(count) * (pitch / count))
+    mean, torque_mean = mean_forces(engagement, cutter, material)
+    turned, size = in_work(force, engagement.frames), np.linalg.norm(force, axis=2)
     return np.column_stack(
         [
-            in_work(mean, bites.frames),
+            in_work(mean, engagement.frames),
             turned.max(axis=1),
             turned.min(axis=1),
             size.max(axis=1),
             torque_mean,
             torque.max(axis=1),
-            np.zeros(len(bites)),
-            bites.chip_max(),
+            np.zeros(len(engagement)),
+            engagement.chip_max(),
             -np.einsum("nmi,ni->nm", turned, left).min(axis=1).clip(None, 0.0),
             first_greatest(size),
             first_greatest(torque),

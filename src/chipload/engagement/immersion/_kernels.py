@@ -120,7 +120,7 @@ def thickness(rho, z, sk, ck, frame, speed, turn, out):
 
 @njit(cache=True, nogil=True)
 def add_row(rows, owner, total, p, q, s_from, s_to, h, k):
-    """Write a bite; the number of bites after it, -1 where there is no room."""
+    """Write an engagement range; the number of engagement ranges after it, -1 where there is no room."""
     if total == len(rows):
         return -1
     first = p % TAU

@@ -122,9 +122,9 @@ def immersed(
 
     Notes
     -----
-    O(k m) for k slices and m edges. Upright, nothing is sampled: slices are divided at bounds of layers, bites end
-    where a circle meets an edge or where h = 0. Where the axis leans 96 immersions a turn are looked at and each change
-    is bisected; what is narrower than 3.75 degrees between two of them may be missed.
+    O(k m) for k slices and m edges. Upright, nothing is sampled: slices are divided at bounds of layers, and an
+    engagement range ends where a circle meets an edge or where h = 0. If the axis leans, 96 immersions per turn are
+    sampled and each change is bisected; what is narrower than 3.75 degrees between two of them may be missed.
     """
     R = np.ascontiguousarray(frame, dtype=np.float64)
     if R.shape != (3, 3) or not R[2, 2] > 0.0:

@@ -90,11 +90,11 @@ def contact_lines(cuts: Cuts) -> Floats:
     It runs along the axis through the mean of the ends of the engagement at which the chip has no thickness, from the
     lowest to the highest of them; where a step leaves no surface, through the middle of its engagement.
     """
-    bites = cuts.engagement
-    owner = np.repeat(np.arange(len(bites)), np.diff(bites.start))
-    p, q, a, b, along, offset, across = bites.rows.T
-    s0, rho, z0, sk = bites.slices[bites.slice, :4].T
-    n = len(bites)
+    engagement = cuts.engagement
+    owner = np.repeat(np.arange(len(engagement)), np.diff(engagement.start))
+    p, q, a, b, along, offset, across = engagement.rows.T
+    s0, rho, z0, sk = engagement.slices[engagement.slice, :4].T
+    n = len(engagement)
     total, weight = np.zeros((n, 3)), np.zeros(n)
     low, high = np.full(n, np.inf), np.full(n, -np.inf)
     size = GRAZES * (np.hypot(along, across) + np.abs(offset))
@@ -120,4 +120,4 @@ def contact_lines(cuts: Cuts) -> Floats:
     ends = np.repeat(mean[:, None], 2, axis=1)
     ends[known, 0, 2], ends[known, 1, 2] = low[known], high[known]
     tip = 0.5 * (cuts.ends[:, :3] + cuts.ends[:, 3:6])
-    return np.asarray(tip[:, None] + np.einsum("nei,nij->nej", ends, bites.frames))
+    return np.asarray(tip[:, None] + np.einsum("nei,nij->nej", ends, engagement.frames))
