@@ -39,6 +39,9 @@ def support(K, A, nx, ny, nz, out):
     """The point of the cutter farthest in a direction, from its tip, into ``out``."""
     na = nx * A[0] + ny * A[1] + nz * A[2]
     rx, ry, rz = nx - na * A[0], ny - na * A[1], nz - na * A[2]
+    # once more: where N is almost along the axis all that is left of it is rounding, which need not be across the axis
+    over = rx * A[0] + ry * A[1] + rz * A[2]
+    rx, ry, rz = rx - over * A[0], ry - over * A[1], rz - over * A[2]
     nr = math.sqrt(rx * rx + ry * ry + rz * rz)
     n = math.sqrt(nr * nr + na * na)
     sg, cg = nr / n, -na / n
