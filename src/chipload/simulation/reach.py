@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.simulation.steps import Steps
 from chipload.stock.layers import LayeredStock
-from chipload.stock.tile_grid import span
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -92,18 +91,14 @@ def _touched(support: Floats, layer: Ints, stock: LayeredStock) -> NDArray[np.bo
     x = (support * u[:, 1] - after * _U[:, 1]) / cross
     y = (after * _U[:, 0] - support * u[:, 0]) / cross
     shapes = shapely.polygons(np.stack([x, y], axis=-1))
-    xs, ys = stock.xs.tolist(), stock.ys.tolist()
-    pair: list[int] = []
-    tiles = []
-    for n, (i, x0, y0, x1, y1) in enumerate(
-        zip(layer.tolist(), x.min(axis=1), y.min(axis=1), x.max(axis=1), y.max(axis=1), strict=True)
-    ):
-        for row, column in itertools.product(span(ys, y0, y1), span(xs, x0, x1)):
-            pair.append(n)
-            tiles.append(stock.tiles[i, row, column])
+    both = ((stock.xs, x), (stock.ys, y))
+    i0, j0 = (np.maximum(np.searchsorted(b, c.min(axis=1), "right") - 1, 0) for b, c in both)
+    i1, j1 = (np.minimum(np.searchsorted(b, c.max(axis=1), "left"), len(b) - 1) for b, c in both)
+    wide = np.maximum(i1 - i0, 0)
+    count = wide * np.maximum(j1 - j0, 0)
+    of = np.repeat(np.arange(len(support)), count)
+    at = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+    tiles = stock.tiles[layer[of], j0[of] + at // wide[of].clip(1), i0[of] + at % wide[of].clip(1)]
     out = np.zeros(len(support), dtype=np.bool_)
-    if pair:
-        at, those = np.array(pair), np.empty(len(tiles), dtype=object)
-        those[:] = tiles
-        out[at[shapely.intersects(those, shapes[at])]] = True
+    out[of[shapely.intersects(tiles, shapes[of])]] = True
     return out

@@ -255,6 +255,8 @@ def boxes(steps: Steps, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats]:
 
 
 def _move(steps: Steps, k: int, interpolation: Interpolation) -> Move:
+    if steps.a0[k, 2] == steps.a1[k, 2] == 1.0:
+        return Move.upright(steps.p0[k], steps.p1[k])
     make = Move.slerp if interpolation == "slerp" else Move.lerp
     try:
         return make(steps.p0[k], steps.a0[k], steps.p1[k], steps.a1[k])

@@ -162,7 +162,10 @@ def test_along_its_own_leaning_axis(cutter, way, height):
     assert dense.difference(c.polygon.buffer(2e-3)).area < 1e-9
     assert c.area == pytest.approx(dense.area, rel=3e-3)
     (many,) = covered_polygons([move], cutter_numbers(CUTTERS[cutter]), [np.array([height])], 1e-3)
-    assert many[0].equals(c.polygon)
+    # another construction: its outline is within the tolerance too
+    assert many[0] is not None
+    assert dense.difference(many[0].buffer(2e-3)).area < 1e-9
+    assert many[0].area == pytest.approx(dense.area, rel=3e-3)
 
 
 def test_a_rapid_along_a_leaning_axis_ends():

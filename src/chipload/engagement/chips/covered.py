@@ -40,6 +40,7 @@ from chipload.stock.areas import PlaneAreas, areas_of
 _kernels = LateModule("chipload.engagement.chips._kernels")
 faces = LateModule("chipload.engagement.chips.faces._kernels")
 loop = LateModule("chipload.engagement.chips.loop._kernels")
+straight = LateModule("chipload.engagement.chips.straight._kernels")
 trace = LateModule("chipload.engagement.chips.trace._kernels")
 
 Floats = NDArray[np.float64]
@@ -168,54 +169,99 @@ def covered_rings(moves: Sequence[Move], K: Floats, heights: Sequence[Floats], t
     ----------
     K : of :func:`chipload.engagement.chips.section.cutter_numbers`
     """
-    along = [_along(move, K, tolerance) for move in moves]
     levels = np.concatenate([np.empty(0), *heights])
     first = np.cumsum([0, *(len(h) for h in heights)])
-    # of a cutter that moves along itself no layer is asked for here
-    asked = np.cumsum([0, *(len(h) if found is None else 0 for h, found in zip(heights, along, strict=True))])
-    kept = np.repeat([found is None for found in along], np.diff(first))
-    buffer, count, knots, whole = _loops(moves, K, levels[kept], asked, tolerance)
-    at = np.flatnonzero(kept)
-    rings, shapes = dict[int, Ints](), dict[int, Shape | None]()
+    fixed = np.array([_is_straight(move, K) for move in moves], dtype=np.bool_)
+    along = {m: found for m in np.flatnonzero(~fixed).tolist() if (found := _along(moves[m], K, tolerance)) is not None}
+    turning = ~fixed
+    turning[list(along)] = False
+    shapes = dict[int, Shape | None]()
+    for m, standing in along.items():
+        for k in range(first[m], first[m + 1]):
+            area = _standing(*standing, float(levels[k]), tolerance)
+            shapes[k] = None if area is None else area.polygon
+    points, count = _outlines(moves, K, heights, fixed, tolerance)
+    at = np.flatnonzero(np.repeat(fixed, np.diff(first)))
+    loops, ends, general = _turning(moves, K, heights, turning, tolerance)
+    shapes |= general
+    # both tables in the order of their points
+    which = np.concatenate([at[count > 0], np.array(list(ends), dtype=np.int64)])
+    size = np.concatenate([count[count > 0], np.array([n for _, n in ends.values()], dtype=np.int64)])
+    begin = np.concatenate(
+        [np.cumsum(count[count > 0]) - count[count > 0], [len(points) + a for a, _ in ends.values()]]
+    )
+    table = np.column_stack([begin, size]).astype(np.int64)
+    return _together(np.concatenate([points, loops]), table, which, shapes, len(levels))
+
+
+def _is_straight(move: Move, K: Floats) -> bool:
+    """Whether a convex cutter goes straight with a fixed axis that leans, or with a pointed bottom."""
+    if len(move.tip) > 2 or move.axis[1:].any() or min(K[0], K[5], K[8]) < 0.0:
+        return False
+    return bool(move.axis[0, :2].any() or K[5] > 0.0)
+
+
+def _outlines(
+    moves: Sequence[Move], K: Floats, heights: Sequence[Floats], some: NDArray[np.bool_], tolerance: float
+) -> tuple[Floats, Ints]:
+    """Outlines of the layers of ``some`` moves, which are straight: points, and how many of each layer."""
+    which = np.flatnonzero(some).tolist()
+    levels = np.concatenate([np.empty(0), *(heights[m] for m in which)])
+    first = np.cumsum([0, *(len(heights[m]) for m in which)])
+    if not len(levels):
+        return np.empty((0, 2)), np.empty(0, dtype=np.int64)
+    tips, axes = _filled([moves[m].tip for m in which]), _filled([moves[m].axis for m in which])[:, 0]
+    axes = axes / np.linalg.norm(axes, axis=1)[:, None]
+    half = tips[:, 1] if tips.shape[1] > 1 else np.zeros((len(which), 3))
+    out, count = np.empty((max(2048, 128 * len(levels)), 2)), np.empty(len(levels), dtype=np.int64)
+    start = np.ascontiguousarray(tips[:, 0] - half)
+    while straight.outlines(start, 2.0 * half, axes, np.array(K), levels, first, tolerance, out, count) < len(levels):
+        if 4 * len(out) > _MOST_EDGES:
+            raise InputError("covered: the boundary has more than four million edges: make the tolerance larger")
+        out = np.empty((4 * len(out), 2))
+    return out[: int(count.clip(0).sum())], count
+
+
+def _turning(
+    moves: Sequence[Move], K: Floats, heights: Sequence[Floats], some: NDArray[np.bool_], tolerance: float
+) -> tuple[Floats, dict[int, tuple[int, int]], dict[int, Shape | None]]:
+    """Layers of ``some`` moves whose boundary is one loop: points, and the first and the number of those of each layer;
+    and the shapes of the others.
+    """
+    first = np.cumsum([0, *(len(h) for h in heights)])
+    which = np.flatnonzero(some).tolist()
+    own = [moves[m] for m in which]
+    asked = np.cumsum([0, *(len(heights[m]) for m in which)])
+    levels = np.concatenate([np.empty(0), *(heights[m] for m in which)])
+    at = np.flatnonzero(np.repeat(some, np.diff(first))).tolist()
+    buffer, count, knots, whole = _loops(own, K, levels, asked, tolerance)
+    rings, shapes = dict[int, tuple[int, int]](), dict[int, Shape | None]()
     simple = np.flatnonzero(count >= 0)
     end = np.cumsum(count[simple])
     for i, a, n in zip(simple.tolist(), (end - count[simple]).tolist(), count[simple].tolist(), strict=True):
         if whole[i]:
-            rings[int(at[i])] = np.array([a, n])
+            rings[at[i]] = (a, n)
         else:
-            shapes[int(at[i])] = _thick(_untangled(shapely.Polygon(buffer[a : a + n, :2])), tolerance)
+            shapes[at[i]] = _thick(_untangled(shapely.Polygon(buffer[a : a + n, :2])), tolerance)
     for i in np.flatnonzero(count == trace.GENERAL).tolist():
-        move = moves[int(np.searchsorted(first, at[i], "right")) - 1]
-        found = _noded_shape(
-            _candidates(move, K, float(levels[at[i]]), tolerance, max(_KNOTS, 4 * int(knots[i]))),
-            move,
-            K,
-            float(levels[at[i]]),
-            tolerance,
-        )
-        shapes[int(at[i])] = None if found is None else _thick(found, tolerance)
-    for m, standing in enumerate(along):
-        for k in range(first[m], first[m + 1]) if standing is not None else ():
-            area = _standing(*standing, float(levels[k]), tolerance) if standing is not None else None
-            shapes[k] = None if area is None else area.polygon
-    return _together(buffer[:, :2], rings, shapes, len(levels))
+        move, h = own[int(np.searchsorted(asked, i, "right")) - 1], float(levels[i])
+        edges = _candidates(move, K, h, tolerance, max(_KNOTS, 4 * int(knots[i])))
+        found = _noded_shape(edges, move, K, h, tolerance)
+        shapes[at[i]] = None if found is None else _thick(found, tolerance)
+    return buffer[: int(end[-1]) if len(end) else 0, :2], rings, shapes
 
 
-def _together(points: Floats, rings: dict[int, Ints], shapes: dict[int, Shape | None], count: int) -> PlaneAreas:
-    """Areas of ``count`` layers: some have one ring of ``points``, some a shape, the others none."""
-    some = np.array(list(rings), dtype=np.int64)
-    table = np.array(list(rings.values()), dtype=np.int64).reshape(-1, 2)
+def _together(points: Floats, table: Ints, which: Ints, shapes: dict[int, Shape | None], count: int) -> PlaneAreas:
+    """Areas of ``count`` layers: those of ``which`` have the rings ``table``, some a shape, the others none."""
     first = np.zeros((count, 2), dtype=np.int64)
-    first[some] = np.arange(len(some))[:, None] + [0, 1]
-    used = points[: int(table[-1].sum()) if len(table) else 0]
+    first[which] = np.arange(len(which))[:, None] + np.array([0, 1])
     more = [k for k, shape in shapes.items() if shape is not None]
-    if not more:
-        return PlaneAreas(np.ascontiguousarray(used), table, first)
-    added = areas_of([shapes[k] for k in more])
-    first[more] = added.first + len(table)
-    return PlaneAreas(
-        np.concatenate([used, added.points]), np.concatenate([table, added.rings + np.array([len(used), 0])]), first
-    )
+    if more:
+        added = areas_of([shapes[k] for k in more])
+        first[more] = added.first + len(table)
+        table = np.concatenate([table, added.rings + np.array([len(points), 0])])
+        points = np.concatenate([points, added.points])
+    return PlaneAreas(points, table, first)
 
 
 def _along(move: Move, K: Floats, tolerance: float) -> tuple[Move, Floats] | None:

@@ -92,6 +92,20 @@ class Move:
         return Move(np.array([p0 + p1, p1 - p0]) / 2.0, np.array([a0 + a1, a1 - a0]) / 2.0)
 
     @staticmethod
+    def upright(p0: Floats, p1: Floats) -> Move:
+        """Return :meth:`lerp` between two tips (3,) [mm], known to be finite, with an upright axis.
+
+        >>> Move.upright(np.zeros(3), np.array([4.0, 0.0, 0.0])).at([0.25])[0].tolist()
+        [[1.0, 0.0, 0.0]]
+        """
+        # known to be valid: to check it took most of the time of a move
+        out, tip = object.__new__(Move), np.array([p0 + p1, p1 - p0]) / 2.0
+        tip.setflags(write=False)
+        object.__setattr__(out, "tip", tip)
+        object.__setattr__(out, "axis", _UPRIGHT)
+        return out
+
+    @staticmethod
     def slerp(p0: ArrayLike, a0: ArrayLike, p1: ArrayLike, a1: ArrayLike) -> Move:
         """Return a move with a straight tip path and the axis at a constant rate in the plane of both directions."""
         (p0, p1), (a0, a1) = (_three("tip", p0), _three("tip", p1)), (_unit(a0), _unit(a1))
@@ -147,6 +161,10 @@ class Move:
             if miss <= FIT:
                 return Move(_short(P), _short(B))
         raise InputError(f"move: polynomials of order 32 are off by {miss:.3g}: must be within {FIT:g} mm: {_REMEDY}")
+
+
+_UPRIGHT: Floats = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
+_UPRIGHT.setflags(write=False)
 
 
 def _nodes(order: int) -> tuple[Floats, Floats, Floats]:

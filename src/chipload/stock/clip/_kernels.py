@@ -9,7 +9,7 @@ of C moved by (e, e^2), with e above 0 and smaller than any number. So moved, no
 no edges overlap. Where rings coincide the result has parts of no width, which are left out. Places of crossings are
 rounded.
 
-Rings are followed from crossing to crossing, as Weiler and Atherton do. On a ring of either, crossings into and out of
+Rings are followed from crossing to crossing ([Weiler1977]). On a ring of either, crossings into and out of
 the other alternate. Where they do not, because A or C crosses itself by rounding, the two are not cut: DEGENERATE.
 """
 
