@@ -211,7 +211,9 @@ def test_a_body_is_no_cutter_of_a_wall(plate_job: Path) -> None:
 def test_a_barrel_touches_a_wall_with_its_arc_above_the_foot(plate_job: Path, lean: str, says: str) -> None:
     text = plate_job.read_text().replace("flute_length_mm = 8.0", "flute_length_mm = 16.0")
     text = text.replace("corner_radius_mm = 4.0", "corner_radius_mm = 1.5\nbarrel_radius_mm = 40.0")
-    plate_job.write_text(text.replace("lean_deg = 45.0", f"lean_deg = {lean}").replace("depth_max_mm = 0.4", "depth_max_mm = 0.1"))
+    plate_job.write_text(
+        text.replace("lean_deg = 45.0", f"lean_deg = {lean}").replace("depth_max_mm = 0.4", "depth_max_mm = 0.1")
+    )
     assert run(plate_job) == f"chipload: {says}"
 
 

@@ -154,6 +154,8 @@ def test_distances_from_the_body_and_its_foot_are_those_of_dense_points(name: st
         assert body.distance(rho, up) == pytest.approx(far, abs=2e-4)
         _kernels.foot(rho, up, shape, out)
         assert out[0] == pytest.approx(far, abs=2e-4)
-        assert abs(cutter.radius_at([out[2]])[0] - (rho - out[0] * out[3])) < 1e-6 or out[3] == out[4] == 0.0 or (
-            out[2] < 1e-9
+        assert (
+            abs(cutter.radius_at([out[2]])[0] - (rho - out[0] * out[3])) < 1e-6
+            or out[3] == out[4] == 0.0
+            or (out[2] < 1e-9)
         )

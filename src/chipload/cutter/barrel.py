@@ -51,6 +51,21 @@ class FlankArc:
         return self.f - self.radius * math.cos(self.kappa_to)
 
 
+def tip_of_barrel(apt: tuple[float, float, float, float, float, float, float]) -> float | None:
+    """Return e [mm] of the sharp tip where the arc of the seven numbers is that of a barrel with a flat bottom, or None.
+
+    >>> round(tip_of_barrel((10.0, 20.0, -15.0, 10.0, 0.0, 0.0, 16.0)), 4)
+    2.3205
+    """
+    d, r, e, f, alpha, beta, _ = apt
+    inside = r * r - f * f
+    touches = abs((0.5 * d - e) * math.cos(beta) + f * math.sin(beta) - r) <= 1e-3
+    if not (alpha == 0.0 and e < 0.0 < f and inside > 0.0 and touches):
+        return None
+    tip = e + math.sqrt(inside)
+    return tip if 0.0 <= tip < 0.5 * d else None
+
+
 def flank_arc(apt: tuple[float, float, float, float, float, float, float], radius: float) -> FlankArc:
     """Return the arc of this radius between the corner and the flank line of the seven numbers of APT.
 
@@ -85,6 +100,4 @@ def flank_arc(apt: tuple[float, float, float, float, float, float, float], radiu
             f"cutter.barrel_radius_mm = {radius:g}: its arc leaves the corner at {math.degrees(first):.4g} deg from "
             f"the axis: must be at least bottom_deg = {math.degrees(alpha):g}: state a larger radius"
         )
-    return FlankArc(
-        e - (radius - q) * cb + t * sb, f + (radius - q) * sb + t * cb, radius, first, 0.5 * math.pi - beta
-    )
+    return FlankArc(e - (radius - q) * cb + t * sb, f + (radius - q) * sb + t * cb, radius, first, 0.5 * math.pi - beta)

@@ -332,9 +332,7 @@ class Cutter:
         if arc is not None:
             high = arc.z_from
             bow = arc.e + np.sqrt(np.clip(arc.radius**2 - (arc.f - z) ** 2, 0.0, None))
-            flank = np.where(
-                z < arc.z_to, bow, arc.e + arc.radius * math.cos(beta) + (z - arc.z_to) * math.tan(beta)
-            )
+            flank = np.where(z < arc.z_to, bow, arc.e + arc.radius * math.cos(beta) + (z - arc.z_to) * math.tan(beta))
         return np.asarray(np.where(z < low, bottom, np.where(z < high, circle, flank)))
 
     def profile(self, chord_mm: float) -> NDArray[np.float64]:
