@@ -202,8 +202,8 @@ def test_a_body_is_no_cutter_of_a_wall(plate_job: Path) -> None:
 @pytest.mark.parametrize(
     ("lean", "says"),
     [
-        ("60.0", "lean_deg, lead_deg: the axis leans by 60 deg: must be between 69.24 and 90, where the flank arc of the "
-         "barrel touches"),
+        ("60.0", "lean_deg, lead_deg: the axis leans by 60 deg: must be between 69.24 and 90, where the flank arc of "
+         "the barrel touches"),
         ("79.0", "wall.foot_mm = 5: must be at least 8.027: the barrel reaches so far below its last row, towards the "
          "clamp: state that, or touch nearer to the tip by less lean_deg"),
     ],

@@ -14,6 +14,7 @@ With r = 0 the arc begins at a sharp corner: the seven numbers of APT with the a
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chipload.errors import InputError
@@ -51,8 +52,8 @@ class FlankArc:
         return self.f - self.radius * math.cos(self.kappa_to)
 
 
-def tip_of_barrel(apt: tuple[float, float, float, float, float, float, float]) -> float | None:
-    """Return e [mm] of the sharp tip where the arc of the seven numbers is that of a barrel with a flat bottom, or None.
+def tip_of_barrel(apt: Sequence[float]) -> float | None:
+    """Return e [mm] of the sharp tip if the seven numbers are those of a barrel with a flat bottom, or None.
 
     >>> round(tip_of_barrel((10.0, 20.0, -15.0, 10.0, 0.0, 0.0, 16.0)), 4)
     2.3205
@@ -85,13 +86,13 @@ def flank_arc(apt: tuple[float, float, float, float, float, float, float], radiu
     if not q > r + tiny:
         room = f * sb / cb
         raise InputError(
-            f"cutter.corner_radius_mm = {r:g}: must be below {(foot - e + room) * cb:.6g}, the distance of the corner's "
-            "centre from the flank, with barrel_radius_mm"
+            f"cutter.corner_radius_mm = {r:g}: must be below {(foot - e + room) * cb:.6g}, the distance of the "
+            "corner's centre from the flank, with barrel_radius_mm"
         )
     if not radius > q + tiny:
         raise InputError(
-            f"cutter.barrel_radius_mm = {radius:g}: must be above {q:.6g}, the distance of the corner's centre from the "
-            "flank"
+            f"cutter.barrel_radius_mm = {radius:g}: must be above {q:.6g}, the distance of the corner's centre from "
+            "the flank"
         )
     t = math.sqrt((radius - r) ** 2 - (radius - q) ** 2)
     first = 0.5 * math.pi - beta - math.atan2(t, radius - q)

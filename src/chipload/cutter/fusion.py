@@ -179,7 +179,7 @@ def _barrel(geometry: dict[str, Any], d: float, out: dict[str, Any], mm: float, 
         return {}
     r, R, F = (corner or 0.0) * mm, radius * mm, widest * mm
     square = (R - r) ** 2 - (F - r) ** 2
-    e = 0.5 * d - R + math.sqrt(square) if R > r and F > r and square > 0.0 else -1.0
+    e = 0.5 * d - R + math.sqrt(square) if r < R and r < F and square > 0.0 else -1.0
     if e < 0.0:
         raise InputError(
             f"{label}: profile-radius = {R:g} mm with axial-distance = {F:g} mm: its arc meets the axis above the tip: "

@@ -124,7 +124,7 @@ def write_apt(
 
 
 def cutter_statement(cutter: Cutter) -> str:
-    """CUTTER/d,r,e,f,alpha,beta,h in mm and degrees; of a barrel r, e, f are those of its flank arc, the tip is left out.
+    """CUTTER/d,r,e,f,alpha,beta,h in mm and degrees; r, e, f of a barrel are those of its flank arc, without the tip.
 
     >>> cutter_statement(Cutter(14.0, 2, 0.0, 30.0, 73.0, 6e5, corner_radius=7.0))
     'CUTTER/14,7,0,7,0,0,30'
