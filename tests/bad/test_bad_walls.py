@@ -202,8 +202,8 @@ def test_a_body_is_no_cutter_of_a_wall(plate_job: Path) -> None:
 @pytest.mark.parametrize(
     ("lean", "says"),
     [
-        ("60.0", "lean_deg, lead_deg: the axis leans by 60 deg: must be between 69.24 and 90, where the flank arc of the "
-         "barrel touches"),
+        ("60.0", "lean_deg, lead_deg: the axis leans by 60 deg: must be between 69.24 and 90, where the flank arc of "
+         "the barrel touches"),
         ("79.0", "wall.foot_mm = 5: must be at least 8.027: the barrel reaches so far below its last row, towards the "
          "clamp: state that, or touch nearer to the tip by less lean_deg"),
     ],
@@ -211,7 +211,9 @@ def test_a_body_is_no_cutter_of_a_wall(plate_job: Path) -> None:
 def test_a_barrel_touches_a_wall_with_its_arc_above_the_foot(plate_job: Path, lean: str, says: str) -> None:
     text = plate_job.read_text().replace("flute_length_mm = 8.0", "flute_length_mm = 16.0")
     text = text.replace("corner_radius_mm = 4.0", "corner_radius_mm = 1.5\nbarrel_radius_mm = 40.0")
-    plate_job.write_text(text.replace("lean_deg = 45.0", f"lean_deg = {lean}").replace("depth_max_mm = 0.4", "depth_max_mm = 0.1"))
+    plate_job.write_text(
+        text.replace("lean_deg = 45.0", f"lean_deg = {lean}").replace("depth_max_mm = 0.4", "depth_max_mm = 0.1")
+    )
     assert run(plate_job) == f"chipload: {says}"
 
 

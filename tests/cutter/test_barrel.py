@@ -62,8 +62,16 @@ def test_a_job_states_a_barrel() -> None:
         ("corner_e_mm", 6.0, "cutter.corner_e_mm = 6: must be from 0, a round tip, to below diameter_mm / 2 = 6"),
         ("flute_length_mm", 1.0, "cutter.flute_length_mm = 1: must be above 1.38"),
         ("bottom_deg", 80.0, "cutter.barrel_radius_mm = 85: its arc leaves the corner at"),
-        ("body_mm", [[6.0, 0.0], [6.0, 28.0]], "cutter.barrel_radius_mm = 85: with body_mm nothing cuts: leave one out"),
-        ("profile_radius_mm", 85.0, "cutter.profile_radius_mm: the radius of the flank arc of a barrel cutter is barrel"),
+        (
+            "body_mm",
+            [[6.0, 0.0], [6.0, 28.0]],
+            "cutter.barrel_radius_mm = 85: with body_mm nothing cuts: leave one out",
+        ),
+        (
+            "profile_radius_mm",
+            85.0,
+            "cutter.profile_radius_mm: the radius of the flank arc of a barrel cutter is barrel",
+        ),
     ],
 )
 def test_what_makes_no_barrel_is_refused(key: str, value: object, says: str) -> None:

@@ -16,6 +16,7 @@ from chipload.cutter.fusion import read_fusion_tool
 from chipload.cutter.table import cutter_from_table
 from chipload.errors import InputError
 from chipload.jobs.drafts.comments import read_header
+from chipload.program.apt.writer import cutter_statement
 from chipload.simulation.clearance.body import cutting_part
 
 FLAT = {"number": 1, "overhang_mm": 40.0}
@@ -43,11 +44,18 @@ def test_an_ordinary_bull_nose_has_the_profile_of_the_cutter() -> None:
     np.testing.assert_allclose(points[:, 0], cutter.radius_at(points[:, 1]), atol=1e-9)
 
 
-def test_a_barrel_in_cl_data_is_drafted_as_a_body() -> None:
+def test_a_barrel_in_cl_data_is_drafted_as_a_cutter_and_written_as_it_was() -> None:
     text = "UNITS/MM\nCUTTER/10,20,-15,10,0,0,16\nLOADTL/3\nGOTO/0,0,0\nFINI"
     own = read_header(text, apt=True).cutters[3]
-    assert set(own) == {"body_mm"}
-    assert own["body_mm"][0][-1] == [5.0, 16.0]
+    assert {key: value for key, (value, _) in own.items()} == {
+        "diameter_mm": 10.0, "barrel_radius_mm": 20.0, "corner_e_mm": 2.320508
+    }  # fmt: skip
+    cutter = Cutter(10.0, 2, 0.5, 16.0, 40.0, 6e5, corner_e=2.320508, barrel_radius=20.0)
+    body = np.array(apt_body((10.0, 20.0, -15.0, 10.0, 0.0, 0.0, 16.0)))
+    np.testing.assert_allclose(body[1:, 0], cutter.radius_at(body[1:, 1]), atol=1e-6)
+    assert cutter_statement(cutter) == "CUTTER/10,20,-15,10,0,0,16"
+    lens = read_header("UNITS/MM\nCUTTER/10,20,-19,20,0,0,16\nLOADTL/3\nGOTO/0,0,0\nFINI", apt=True).cutters[3]
+    assert set(lens) == {"body_mm"}
     plain = read_header("UNITS/MM\nCUTTER/10,1\nLOADTL/3\nGOTO/0,0,0\nFINI", apt=True).cutters[3]
     assert "body_mm" not in plain
 

@@ -1,4 +1,4 @@
-"""Barrel cutters by layers: volumes against the profile and dexels, forces against a fine stack of discs, the energy."""
+"""Barrel cutters by layers: volumes against profile and dexels, forces against a fine stack of discs, the energy."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_a_wall_takes_the_volume_under_the_profile(name: str) -> None:
 
 @pytest.mark.parametrize("name", BARRELS)
 def test_forces_are_those_of_a_fine_stack_of_discs(name: str) -> None:
-    """Mean over a revolution of each disc in closed form: phi from acos(-rest / rho) to pi, h = f sin(kappa) sin(phi)."""
+    """Mean over a revolution of each disc: phi from acos(-rest / rho) to pi, h = f sin(kappa) sin(phi)."""
     cutter = BARRELS[name]
     found = remove(along(cutter), wall(), {1: cutter}, PLAIN, FINE, accuracy=False).columns
     k = int(np.flatnonzero(np.abs(found["x_mm"] - 15.0) < 1.1)[0])
@@ -92,7 +92,7 @@ def test_forces_are_those_of_a_fine_stack_of_discs(name: str) -> None:
     ss, sc = 0.5 * (math.pi - phi + s1 * c1), -0.5 * s1**2
     h = f * np.sin(kappa)
     m, share = PLAIN, cutter.flutes / math.tau
-    # t = (cos, -sin) along the feed and left of it, u = (sin, cos); phi = 0 on the left, pi on the right, where the stock is
+    # t = (cos, -sin) along the feed and left of it, u = (sin, cos); phi = pi on the right, where the stock is
     tangential_x, tangential_y = m.Ktc * h * sc + m.Kte * c, -(m.Ktc * h * ss + m.Kte * s)
     normal = m.Krc * h, m.Kre
     normal_x, normal_y = normal[0] * ss + normal[1] * s, normal[0] * sc + normal[1] * c
@@ -154,6 +154,8 @@ def test_distances_from_the_body_and_its_foot_are_those_of_dense_points(name: st
         assert body.distance(rho, up) == pytest.approx(far, abs=2e-4)
         _kernels.foot(rho, up, shape, out)
         assert out[0] == pytest.approx(far, abs=2e-4)
-        assert abs(cutter.radius_at([out[2]])[0] - (rho - out[0] * out[3])) < 1e-6 or out[3] == out[4] == 0.0 or (
-            out[2] < 1e-9
+        assert (
+            abs(cutter.radius_at([out[2]])[0] - (rho - out[0] * out[3])) < 1e-6
+            or out[3] == out[4] == 0.0
+            or (out[2] < 1e-9)
         )

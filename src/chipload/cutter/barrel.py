@@ -14,6 +14,7 @@ With r = 0 the arc begins at a sharp corner: the seven numbers of APT with the a
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chipload.errors import InputError
@@ -51,6 +52,21 @@ class FlankArc:
         return self.f - self.radius * math.cos(self.kappa_to)
 
 
+def tip_of_barrel(apt: Sequence[float]) -> float | None:
+    """Return e [mm] of the sharp tip if the seven numbers are those of a barrel with a flat bottom, or None.
+
+    >>> round(tip_of_barrel((10.0, 20.0, -15.0, 10.0, 0.0, 0.0, 16.0)), 4)
+    2.3205
+    """
+    d, r, e, f, alpha, beta, _ = apt
+    inside = r * r - f * f
+    touches = abs((0.5 * d - e) * math.cos(beta) + f * math.sin(beta) - r) <= 1e-3
+    if not (alpha == 0.0 and e < 0.0 < f and inside > 0.0 and touches):
+        return None
+    tip = e + math.sqrt(inside)
+    return tip if 0.0 <= tip < 0.5 * d else None
+
+
 def flank_arc(apt: tuple[float, float, float, float, float, float, float], radius: float) -> FlankArc:
     """Return the arc of this radius between the corner and the flank line of the seven numbers of APT.
 
@@ -70,13 +86,13 @@ def flank_arc(apt: tuple[float, float, float, float, float, float, float], radiu
     if not q > r + tiny:
         room = f * sb / cb
         raise InputError(
-            f"cutter.corner_radius_mm = {r:g}: must be below {(foot - e + room) * cb:.6g}, the distance of the corner's "
-            "centre from the flank, with barrel_radius_mm"
+            f"cutter.corner_radius_mm = {r:g}: must be below {(foot - e + room) * cb:.6g}, the distance of the "
+            "corner's centre from the flank, with barrel_radius_mm"
         )
     if not radius > q + tiny:
         raise InputError(
-            f"cutter.barrel_radius_mm = {radius:g}: must be above {q:.6g}, the distance of the corner's centre from the "
-            "flank"
+            f"cutter.barrel_radius_mm = {radius:g}: must be above {q:.6g}, the distance of the corner's centre from "
+            "the flank"
         )
     t = math.sqrt((radius - r) ** 2 - (radius - q) ** 2)
     first = 0.5 * math.pi - beta - math.atan2(t, radius - q)
@@ -85,6 +101,4 @@ def flank_arc(apt: tuple[float, float, float, float, float, float, float], radiu
             f"cutter.barrel_radius_mm = {radius:g}: its arc leaves the corner at {math.degrees(first):.4g} deg from "
             f"the axis: must be at least bottom_deg = {math.degrees(alpha):g}: state a larger radius"
         )
-    return FlankArc(
-        e - (radius - q) * cb + t * sb, f + (radius - q) * sb + t * cb, radius, first, 0.5 * math.pi - beta
-    )
+    return FlankArc(e - (radius - q) * cb + t * sb, f + (radius - q) * sb + t * cb, radius, first, 0.5 * math.pi - beta)

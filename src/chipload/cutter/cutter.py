@@ -189,7 +189,8 @@ class Cutter:
                 )
             if not 0.0 <= e < self.radius:
                 raise InputError(
-                    f"cutter.corner_e_mm = {e:g}: must be from 0, a round tip, to below diameter_mm / 2 = {self.radius:g}"
+                    f"cutter.corner_e_mm = {e:g}: must be from 0, a round tip, to below diameter_mm / 2 = "
+                    f"{self.radius:g}"
                 )
             if self.flank_arc is not None and self.flute_length <= self.flank_arc.z_from + slack:
                 raise InputError(
@@ -277,7 +278,7 @@ class Cutter:
 
     @property
     def outline(self) -> tuple[float, ...]:
-        """The seven numbers of :attr:`apt`; of a barrel cutter then E, F, R of its arc and the kappa where it begins."""
+        """The seven numbers of :attr:`apt`; of a barrel then E, F, R of its flank arc and the kappa where it begins."""
         arc = self.flank_arc
         return self.apt if arc is None else (*self.apt, arc.e, arc.f, arc.radius, arc.kappa_from)
 
@@ -289,7 +290,7 @@ class Cutter:
 
     @property
     def corner_end(self) -> float:
-        """kappa [rad] at which the corner ends: pi/2 - beta, or where the arc of a barrel begins."""
+        """Kappa [rad] at which the corner ends: pi/2 - beta, or where the arc of a barrel begins."""
         return 0.5 * math.pi - self.taper if self.flank_arc is None else self.flank_arc.kappa_from
 
     def radius_at(self, z: ArrayLike) -> NDArray[np.float64]:
@@ -332,9 +333,7 @@ class Cutter:
         if arc is not None:
             high = arc.z_from
             bow = arc.e + np.sqrt(np.clip(arc.radius**2 - (arc.f - z) ** 2, 0.0, None))
-            flank = np.where(
-                z < arc.z_to, bow, arc.e + arc.radius * math.cos(beta) + (z - arc.z_to) * math.tan(beta)
-            )
+            flank = np.where(z < arc.z_to, bow, arc.e + arc.radius * math.cos(beta) + (z - arc.z_to) * math.tan(beta))
         return np.asarray(np.where(z < low, bottom, np.where(z < high, circle, flank)))
 
     def profile(self, chord_mm: float) -> NDArray[np.float64]:
@@ -345,7 +344,7 @@ class Cutter:
         """
         if self.body:
             return np.array([(0.0, 0.0), *self.body] if self.body[0][0] > 0.0 else self.body)
-        _, r, e, f, alpha, beta, h = self.apt
+        _, r, e, f, alpha, _, h = self.apt
         points = [(0.0, 0.0)]
 
         def chords(e: float, f: float, r: float, first: float, last: float) -> list[tuple[float, float]]:

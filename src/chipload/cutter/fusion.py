@@ -171,13 +171,15 @@ def _barrel(geometry: dict[str, Any], d: float, out: dict[str, Any], mm: float, 
     The corner's centre lies so far from the axis, e = d / 2 - R + sqrt((R - r)^2 - (F - r)^2), that the arc is
     widest at the height F.
     """
-    corner, radius, widest = (_number(geometry, key, label) for key in ("lower-radius", "profile-radius", "axial-distance"))
+    corner, radius, widest = (
+        _number(geometry, key, label) for key in ("lower-radius", "profile-radius", "axial-distance")
+    )
     high = out.get("flute_length_mm")
     if radius is None or widest is None or high is None or high > widest * mm * (1.0 + 1e-9):
         return {}
     r, R, F = (corner or 0.0) * mm, radius * mm, widest * mm
     square = (R - r) ** 2 - (F - r) ** 2
-    e = 0.5 * d - R + math.sqrt(square) if R > r and F > r and square > 0.0 else -1.0
+    e = 0.5 * d - R + math.sqrt(square) if r < R and r < F and square > 0.0 else -1.0
     if e < 0.0:
         raise InputError(
             f"{label}: profile-radius = {R:g} mm with axial-distance = {F:g} mm: its arc meets the axis above the tip: "

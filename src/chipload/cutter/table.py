@@ -65,8 +65,8 @@ class CutterTable(BaseModel):
     )
     barrel_radius_mm: float | None = Field(
         None,
-        description="barrel cutter: radius of the arc between corner and flank, tangent to both; with it corner_e_mm is "
-        "free, default 0, a round tip",
+        description="barrel cutter: radius of the arc between corner and flank, tangent to both; with it "
+        "corner_e_mm is free, default 0, a round tip",
     )
     bottom_deg: float | None = Field(None, description="angle of the bottom, APT parameter alpha; default 0")
     taper_deg: float | None = Field(None, description="half angle of a tapered flank, APT parameter beta; default 0")

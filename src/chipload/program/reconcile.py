@@ -164,9 +164,12 @@ def _same(name: str, number: int, cutter: Cutter, stated: StatedDiameter, remedy
 def _same_shape(name: str, number: int, cutter: Cutter, shape: Shape) -> None:
     """Refuse a CUTTER of CL data that is not the cutter of the job."""
     d, r, _, _, alpha, beta, _ = shape
+    arc = ("corner radius", r, cutter.corner_radius, "corner_radius_mm")
+    if cutter.barrel_radius is not None:
+        arc = ("radius of the flank arc", r, cutter.barrel_radius, "barrel_radius_mm")
     pairs = (
         ("diameter", d, cutter.diameter, "diameter_mm", WEAR_MM, 1.0, "mm"),
-        ("corner radius", r, cutter.corner_radius, "corner_radius_mm", WEAR_MM, 1.0, "mm"),
+        (*arc, WEAR_MM, 1.0, "mm"),
         ("bottom angle", alpha, cutter.bottom, "bottom_deg", SAME_ANGLE, 180.0 / math.pi, "deg"),
         ("taper", beta, cutter.taper, "taper_deg", SAME_ANGLE, 180.0 / math.pi, "deg"),
     )

@@ -199,7 +199,9 @@ def with_engine(
         barrels = np.isin(program.tool, [n for n, c in setting.cutters.items() if c.flank_arc is not None])
         if barrels.any():
             k = int(np.argmax(barrels))
-            raise HandOver(int(program.line[k]), f"tool {int(program.tool[k])} is a barrel cutter, whose flank is an arc")
+            raise HandOver(
+                int(program.line[k]), f"tool {int(program.tool[k])} is a barrel cutter, whose flank is an arc"
+            )
         run = run_by_moves(
             program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm,
             setting.interpolation,

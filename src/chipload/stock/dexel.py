@@ -2,10 +2,11 @@
 
 Notation: along each axis k in use there is a grid of rays in the middles of equal cells, no wider than the pitch. A
 ray keeps (lo, hi) [mm] of its solid intervals in order. The cutter is the solid of revolution of the APT numbers (d, r,
-e, f, alpha, beta, h), of a barrel cutter with the arc of its flank (E, F, R, kappa where it begins); T is its tip, A its unit axis. On a move a ray loses, for each passage of the cutter, the
-interval from the least to the greatest coordinate that it covers. Passages are found at **instants** along the move,
-their beginning, end and extremes between the instants by halving and golden section. A passage that falls between two
-instants is lost: of a surface with radius of curvature q at most s^2 / (8 q), s the distance between instants.
+e, f, alpha, beta, h), of a barrel cutter with the arc of its flank (E, F, R, kappa where it begins); T is its tip, A
+its unit axis. On a move a ray loses, for each passage of the cutter, the interval from the least to the greatest
+coordinate that it covers. Passages are found at **instants** along the move, their beginning, end and extremes between
+the instants by halving and golden section. A passage that falls between two instants is lost: of a surface with radius
+of curvature q at most s^2 / (8 q), s the distance between instants.
 
 This is an independent calculation of the removed volume: it uses neither the engagement nor the layers.
 """
@@ -223,7 +224,7 @@ def _shape(apt: Sequence[float]) -> Floats:
     d, r, e, f, alpha, beta, h = (float(x) for x in apt[:7])
     E, F, R, end = (float(x) for x in apt[7:]) if len(apt) == 11 else (e, f, 0.0, 0.5 * math.pi - beta)
     good = all(math.isfinite(x) for x in (d, r, e, f, alpha, beta, h)) and d > 0.0 and h > 0.0 and r >= 0.0
-    good = good and all(math.isfinite(x) for x in (E, F)) and (R == 0.0 or R > r) and alpha <= end + 1e-12
+    good = good and all(math.isfinite(x) for x in (E, F)) and (R == 0.0 or r < R) and alpha <= end + 1e-12
     if not (good and min(e, alpha, beta) >= 0.0 and alpha + beta < 0.5 * math.pi):
         raise InputError(f"stock: cutter {tuple(apt)}: not the seven APT numbers of a cutter that is convex")
     m = 1.0 / math.tan(alpha) if alpha > 0.0 else 0.0

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.cutter.barrel import tip_of_barrel
 from chipload.cutter.cutter import Cutter
 from chipload.errors import ChiploadError, InputError
 from chipload.jobs import load_job
@@ -58,6 +59,8 @@ def outline_parts(shape: Sequence[float], height: float) -> Parts:
     """The envelope (d, r, e, f, alpha, beta, h) [mm, rad] that CL data states, up to ``height`` where h is 0."""
     d, r, _, _, alpha, beta, h = shape
     length = h if h > 0.0 else height
+    if (tip := tip_of_barrel(shape)) is not None:
+        return parts_of(Cutter(d, 1, 0.0, length, length, 2e5, corner_e=tip, barrel_radius=r, taper=beta))
     return parts_of(Cutter(d, 1, 0.0, length, length, 2e5, corner_radius=r, bottom=alpha, taper=beta))
 
 

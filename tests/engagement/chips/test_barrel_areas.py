@@ -22,9 +22,7 @@ TOLERANCE, MARGIN, MOVES = 1e-3, 1e-2, 120
 BARRELS = {
     "round tip": Cutter(10.0, 4, 0.5, 14.0, 40.0, 6e5, corner_radius=1.0, barrel_radius=60.0),
     "short arc": Cutter(10.0, 4, 0.5, 16.0, 40.0, 6e5, corner_radius=2.5, barrel_radius=20.0),
-    "conical": Cutter(
-        6.0, 4, 0.5, 14.0, 40.0, 6e5, corner_radius=1.5, barrel_radius=90.0, taper=math.radians(9.0)
-    ),
+    "conical": Cutter(6.0, 4, 0.5, 14.0, 40.0, 6e5, corner_radius=1.5, barrel_radius=90.0, taper=math.radians(9.0)),
     "sharp": Cutter(10.0, 4, 0.5, 14.0, 40.0, 6e5, corner_e=2.0, barrel_radius=25.0),
     "flat tip": Cutter(10.0, 4, 0.5, 14.0, 40.0, 6e5, corner_radius=1.0, corner_e=2.0, barrel_radius=40.0),
     "drilled": Cutter(

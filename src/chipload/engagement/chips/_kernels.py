@@ -7,8 +7,8 @@ V is that over |N_xy|, the speed of the section's edge in the layer. A point of 
 theta, sin theta), c halfway between the ends of the section along a, M = I + a a' / (A_z (1 + A_z)).
 
 Arrays: ``cp``, ``ca`` (n, 3) Chebyshev coefficients of the tip and of the axis, its length aside, on t in 0 .. 1.
-``K`` cutter: e, r, f, sin, cos, tan of alpha, sin, cos, tan of beta, flank radius at w = 0, H, rho(H) 0-11, of the flank
-arc of a barrel E, R (0: none), F 12-14, sin, cos of kappa where the corner ends 15-16.
+``K`` cutter: e, r, f, sin, cos, tan of alpha, sin, cos, tan of beta, flank radius at w = 0, H, rho(H) 0-11, of the
+flank arc of a barrel E, R (0: none), F 12-14, sin, cos of kappa where the corner ends 15-16.
 ``S`` instant: p, A, p', A' (0-11), h 12, c 13-14, w at c 15, from the axis to c 16-18, its square 19, corners 20, t 21;
 where the section is a whole ellipse, 22 is R (else 0) and N . v = g . c + (R a . c / A_z)(m . c), c = (cos theta, sin
 theta), g 23-24, m = M a' 25-26; where it is a whole circle of a ball about b, 22 is -rho and V = b' . u + rho', u

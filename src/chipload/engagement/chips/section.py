@@ -1,10 +1,10 @@
 """The section of a cutter with a plane layer at an instant, and whether a point lies in it.
 
 Notation: p tip, A = (a, A_z) unit axis, layer z = h. A cutter is a convex solid of revolution: bottom face or cone,
-corner circle, flank arc of a barrel, flank, and the plane at the end of the flutes. Its section is convex: x(theta) = c + l(theta) M (cos
-theta, sin theta), M = I + a a' / (A_z (1 + A_z)), c halfway between the ends of the section along a; l is where the ray
-leaves the solid, in closed form but at a corner of radius below d / 2 (Newton, to rounding). For a flank alone c is the
-centre of the ellipse, l = R and theta its own parameter.
+corner circle, flank arc of a barrel, flank, and the plane at the end of the flutes. Its section is convex: x(theta) = c
++ l(theta) M (cos theta, sin theta), M = I + a a' / (A_z (1 + A_z)), c halfway between the ends of the section along a;
+l is where the ray leaves the solid, in closed form but at a corner of radius below d / 2 (Newton, to rounding). For a
+flank alone c is the centre of the ellipse, l = R and theta its own parameter.
 
 F(x) >= 0 outside, < 0 inside: the greatest of the distances to bottom, flank and top and to the corner's torus.
 """

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from chipload.cutter.barrel import tip_of_barrel
 from chipload.cutter.bodies import Profile, apt_body
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
@@ -231,10 +232,19 @@ def _apt_cutters(text: str) -> dict[int, Stated]:
     out: dict[int, Stated] = {}
     for number, shape in shapes.items():
         d, r, e, f, alpha, beta, _ = shape
+        if (tip := tip_of_barrel(shape)) is not None:
+            where = f"CUTTER, r {r:g}, e {e:g}, f {f:g}"
+            own: Stated = {
+                "diameter_mm": (d, "CUTTER"),
+                "barrel_radius_mm": (r, where),
+                "corner_e_mm": (round(tip, 6), where),
+            }
+            out[number] = own | ({"taper_deg": (math.degrees(beta), "CUTTER")} if beta > 0.0 else {})
+            continue
         if (body := _apt_body(shape)) is not None:
             out[number] = {"body_mm": ([[round(x, 6) for x in p] for p in body], f"CUTTER, r {r:g}, e {e:g}, f {f:g}")}
             continue
-        own: Stated = {"diameter_mm": (d, "CUTTER")}
+        own = {"diameter_mm": (d, "CUTTER")}
         if r > 0.0:
             own["corner_radius_mm"] = (r, "CUTTER")
         if alpha > 0.0:
@@ -263,7 +273,9 @@ def _apt_cutters(text: str) -> dict[int, Stated]:
 
 
 def _apt_body(shape: Shape) -> Profile | None:
-    """The body of seven numbers that are no cutter of this program: a barrel, a lens; None: they are one."""
+    """The body of seven numbers that are no cutter of this program: a lens, a barrel without bottom; None: they are
+    one.
+    """
     d, r, e, f, alpha, beta, h = shape
     try:
         Cutter(d, 1, 0.0, h or d, h or d, 2.1e5, r, e if r > 0.0 else None, f if r > 0.0 else None, alpha, beta)

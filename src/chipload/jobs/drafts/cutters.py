@@ -11,7 +11,8 @@ from chipload.jobs.drafts.draft import DraftTable, Entry
 
 #: keys that a cutter has, in the order of the file
 KEYS = (
-    "diameter_mm", "corner_radius_mm", "bottom_deg", "taper_deg", "flutes", "helix_deg", "flute_length_mm",
+    "diameter_mm", "corner_radius_mm", "barrel_radius_mm", "corner_e_mm", "bottom_deg", "taper_deg",
+    "flutes", "helix_deg", "flute_length_mm",
     "overhang_mm", "shank_diameter_mm", "modulus_gpa", "body_mm",
 )  # fmt: skip
 

@@ -164,8 +164,8 @@ def _check_foot(job: ThinWallJob, below: float) -> None:
     for key, foot in feet:
         if foot < below:
             raise InputError(
-                f"{key} = {foot:g}: must be at least {below:.4g}: the barrel reaches so far below its last row, towards "
-                "the clamp: state that, or touch nearer to the tip by less lean_deg"
+                f"{key} = {foot:g}: must be at least {below:.4g}: the barrel reaches so far below its last row, "
+                "towards the clamp: state that, or touch nearer to the tip by less lean_deg"
             )
 
 
@@ -183,8 +183,8 @@ def _step_over(op: WallOperationTable, number: int, cutter: Cutter) -> float:
         )
     if cutter.flank_arc is None and not math.isclose(2.0 * r, cutter.diameter):
         raise InputError(
-            f"operation.{number}.scallop_um: applies to ball-nose and barrel cutters only: state step_over_mm for cutter "
-            f"{cutter.number} with corner_radius_mm = {r:g}"
+            f"operation.{number}.scallop_um: applies to ball-nose and barrel cutters only: state step_over_mm for "
+            f"cutter {cutter.number} with corner_radius_mm = {r:g}"
         )
     if not h < 0.5 * r:
         raise InputError(

@@ -1,9 +1,10 @@
 """Contact points of a ball, bull-nose or barrel cutter on a side of a wall.
 
 Notation: S(u, v) a point of the side, N its normal out of the wall; tip p, axis A, r the radius of the corner, or of
-the flank arc of a barrel, e the radius of the circle that its centres lie on (below 0 on a barrel), C its middle. The centre of the corner that is nearest to the side is
-M = C - e m, m the part of N across A as a unit vector (M = C on a ball). The cutter touches where M - S lies along N
-and is r long; the clearance is what is left between both, below 0 where the cutter cuts into the side.
+the flank arc of a barrel, e the radius of the circle that its centres lie on (below 0 on a barrel), C its middle. The
+centre of the corner that is nearest to the side is M = C - e m, m the part of N across A as a unit vector (M = C on a
+ball). The cutter touches where M - S lies along N and is r long; the clearance is what is left between both, below 0
+where the cutter cuts into the side.
 
 The place is found by Newton's method from the nearest point of a grid, kept within 0..1: beyond an edge M - S has a
 part along the side.

@@ -265,11 +265,19 @@ def _helps(
 def _scaled(posture: Pose, diameter: float) -> Pose:
     cutter = posture.cutter
     ratio = diameter / cutter.diameter
-    size = {"diameter": diameter, "corner_radius": ratio * cutter.corner_radius, "corner_e": None, "corner_f": None}
+    corner = ratio * cutter.corner_radius
+    other = replace(cutter, diameter=diameter, corner_radius=corner, corner_e=None, corner_f=None, shank_diameter=None)
     if cutter.barrel_radius is not None:
-        size |= {"barrel_radius": ratio * cutter.barrel_radius, "corner_e": ratio * cutter.apt[2]}
-        size |= {"flute_length": ratio * cutter.flute_length}
-    other = replace(cutter, **size, shank_diameter=None)
+        other = replace(
+            cutter,
+            diameter=diameter,
+            corner_radius=corner,
+            corner_e=ratio * cutter.apt[2],
+            corner_f=None,
+            barrel_radius=ratio * cutter.barrel_radius,
+            flute_length=ratio * cutter.flute_length,
+            shank_diameter=None,
+        )
     return replace(posture, cutter=other)
 
 

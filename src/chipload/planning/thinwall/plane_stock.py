@@ -1,11 +1,12 @@
-"""Tooth engagement of a ball, bull-nose or barrel cutter in plane stock of given depth, beside the row that was cut before.
+"""Tooth engagement of a ball, bull nose or barrel in plane stock of given depth, beside the row that was cut before.
 
 Notation: the surface that the row leaves is the plane z = 0 with its normal N = +z; d [mm] depth of the stock above it;
 x the direction of the feed, f_z [mm] feed per tooth; the row before lies at y = -b, b the step-over with its sign
 (None: full slot, nothing cut beside). Axis A = (sin(lead), sin(tilt) cos(lead), cos(tilt) cos(lead)): a positive lead
 leans the spindle forward, a positive tilt to the left of the feed; beta the angle of A with N. r corner radius, e
-radius of its centre's circle, C the middle of that circle (of a barrel cutter those of its flank arc, with e below 0); kappa, rho, s, phi, u, nu, T, n as in
-:mod:`chipload.engagement.tooth_engagement`. The cutter touches z = 0 at the origin.
+radius of its centre's circle, C the middle of that circle (of a barrel cutter those of its flank arc, with e below 0);
+kappa, rho, s, phi, u, nu, T, n as in :mod:`chipload.engagement.tooth_engagement`. The cutter touches z = 0 at the
+origin.
 
 A convex cutter that moves straight on along x meets uncut material wherever its surface faces forward (h > 0), so that
 a point of it cuts where h > 0, z < d and z < g(y + b): g is the lower outline of the cutter seen along x, which the row

@@ -79,7 +79,10 @@ def write_apt(
             if cutters is not None and tool not in cutters and tool != 0:
                 raise InputError(f"program row {k}: tool {tool} has no cutter: give its [[cutter]]")
             if cutters is not None and tool in cutters and not cutters[tool].body:
-                out.append(cutter_statement(cutters[tool]))
+                own = cutters[tool]
+                if own.flank_arc is not None and own.corner_radius > 0.0:
+                    out.append(f"PPRINT/{_text(f'BARREL CUTTER, TIP RADIUS {_number(own.corner_radius)}')}")
+                out.append(cutter_statement(own))
             out.append(f"LOADTL/{tool}")
         if speeds[k] != spindle:
             spindle = speeds[k]
@@ -121,12 +124,13 @@ def write_apt(
 
 
 def cutter_statement(cutter: Cutter) -> str:
-    """CUTTER/d,r,e,f,alpha,beta,h in mm and degrees.
+    """CUTTER/d,r,e,f,alpha,beta,h in mm and degrees; r, e, f of a barrel are those of its flank arc, without the tip.
 
     >>> cutter_statement(Cutter(14.0, 2, 0.0, 30.0, 73.0, 6e5, corner_radius=7.0))
     'CUTTER/14,7,0,7,0,0,30'
     """
-    d, r, e, f, alpha, beta, h = cutter.apt
+    d, _, _, _, alpha, beta, h = cutter.apt
+    r, e, f = cutter.finishing_arc
     return f"CUTTER/{_numbers((d, r, e, f, math.degrees(alpha), math.degrees(beta), h))}"
 
 

@@ -46,8 +46,8 @@ def meridian(rho, z, lines, arcs, top):
 
 @njit(cache=True, nogil=True)
 def nearest(
-    points, order, starts, low, cell, count, tips, axes, rows, lines, arcs, top, widest, far, depth, done, out, at, deep,
-    first,
+    points, order, starts, low, cell, count, tips, axes, rows, lines, arcs, top, widest, far, depth, done, out, at,
+    deep, first,
 ):  # fmt: skip
     """Lower ``out`` to the signed distance of each point from the body in any of its places; ``at`` its step.
 

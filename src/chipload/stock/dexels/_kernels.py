@@ -4,7 +4,8 @@ Notation: a ray runs along the axis k of the grid, s [mm] is its coordinate k; i
 v = (k + 2) % 3. The cutter stands with its tip at T and its unit axis A; z [mm] is the height above the tip, rho [mm]
 the distance from the axis. ``shape`` is ``[r, e, f, m, z1, z2, c, tb, h, big]``: APT corner radius r and its centre
 (e, f), the bottom rho = m z up to z1 (m = 0: none), the corner up to z2, the flank rho = c + tb z up to the height h;
-``big`` is the largest rho; then ``[R, E, F, z3]`` of the flank arc of a barrel, between z2 and z3 (R = 0: none). Such a body is convex, so that a ray is in it over one interval; an empty one has lo > hi.
+``big`` is the largest rho; then ``[R, E, F, z3]`` of the flank arc of a barrel, between z2 and z3 (R = 0: none). Such a
+body is convex, so that a ray is in it over one interval; an empty one has lo > hi.
 
 In a move lo(t) and hi(t) are continuous while the ray is in the body, so that one passage takes the interval from min
 lo to max hi. A straight move makes lo convex and hi concave: chords bound what lies between two moments; a turn bends
