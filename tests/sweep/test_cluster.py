@@ -27,6 +27,7 @@ from chipload.simulation import strips
 from chipload.sweep.run import run_sweep
 from chipload.workers import WorkerDied, Workers, completed
 from conftest import EXAMPLES
+from impeller_job import impeller_job, impeller_outcome
 from slot_job import slot_job
 from worker_tasks import always_killed, shared_sum
 
@@ -162,6 +163,29 @@ def test_surfaces_of_an_impeller_are_searched_by_processes_and_on_a_cluster(impe
     assert alone[0][0] != alone[0][1]
     for where in (Workers(dask=address), Workers(2)):
         assert numbers(run_job(load_job(impeller), workers=where)) == alone
+
+
+def test_programs_of_an_impeller_on_a_cluster_that_loses_a_worker_are_those_of_one_process(cluster, tmp_path):
+    """Paths, links, rest passes and checks; the worker that is left does what the other had begun."""
+    address, workers = cluster
+    job = impeller_job(tmp_path)
+    alone = impeller_outcome(run_job(load_job(job)))
+    assert len(alone[0]) > 1
+    with distributed.Client(address, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=300)
+    ended: list[str] = []
+
+    def progress(_: float, what: str) -> None:
+        if what.startswith("paths of patches, ") and not ended:
+            os.kill(workers[0].pid, signal.SIGKILL)
+            workers[0].wait()
+            ended.append(what)
+
+    spread = impeller_outcome(run_job(load_job(job), progress, workers=Workers(dask=address)))
+    assert ended
+    assert ended[0].split()[3] < ended[0].split()[5]
+    assert workers[1].poll() is None
+    assert spread == alone
 
 
 def test_strips_of_a_stock_on_a_cluster_that_loses_a_worker_have_the_bytes_of_one_process(
