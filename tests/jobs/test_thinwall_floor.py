@@ -144,13 +144,13 @@ def said(call) -> str:
         ('contact = "end"', 'contact = "end"\nslope = 0.05', "operation.0.slope: not used with contact = end"),
         ("allowance_mm = [1.0]", "allowance_mm = [1.0]\nfoot_mm = 2.0", "wall.0.foot_mm: not used with contact = end"),
         ("step_over_mm = 4.0", "scallop_um = 4.0", "operation.0.step_over_mm: missing: state it"),
-        ("step_over_mm = 4.0", "step_over_mm = 7.5", "must be from above 0 to 7, the flat of the bottom"),
+        ("step_over_mm = 4.0", "step_over_mm = 8.5", "must be from above 0 to 8, the flat of the bottom"),
         ("face = [23.0, 18.0, 5.0]", "face = [23.0, 18.0, 3.5]", "looks down, or its facets do not make one outline"),
         ("face = [23.0, 18.0, 5.0]", "face = [23.0, 0.0, 5.0]", "is no level face"),
         (
             "diameter_mm = 8.0",
             "diameter_mm = 31.0\nshank_diameter_mm = 8.0",
-            "the cutter fits nowhere between its walls",
+            "cutter 1: diameter_mm = 31: fits nowhere between the walls of face",
         ),
     ],
 )

@@ -1,7 +1,7 @@
 """Form error of a floor that an upright cutter with a flat bottom makes, by the deflection of the floor.
 
-Notation: q point of the floor; a radius of the flat of the bottom; c centre of the cutter in a step, where it is nearest to q; w
-motion of the floor along the normal at q, positive where it is pushed away from the cutter.
+Notation: q point of the floor; a radius of the flat of the bottom; c centre of the cutter in a step, where it is
+nearest to q; w motion of the floor along the normal at q, positive where it is pushed away from the cutter.
 
 An edge passes over q whenever q lies under the flat, |q - c| <= a, at the rotation at which the edge has the direction
 of q - c. A floor that is pulled towards the cutter at such a moment is cut too deep there, and nothing makes up for it;

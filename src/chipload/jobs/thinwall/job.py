@@ -197,7 +197,7 @@ def _of_end_keys(op: WallOperationTable, where: str) -> Iterator[str]:
             yield f"{where}.{key}: missing: state it (contact = end needs it)"
     for key in ("rows", "lean_deg", "lead_deg", "scallop_um", "axial_depth_mm", "slope"):
         if getattr(op, key) is not None:
-            yield f"{where}.{key}: not used with contact = end, whose level passes and upright axis need none: leave it out"
+            yield f"{where}.{key}: not used with contact = end (level passes, upright axis): leave it out"
     if op.compensate_um > 0.0:
         yield f"{where}.compensate_um: not for floors, whose form error is a bound only: leave it out"
 

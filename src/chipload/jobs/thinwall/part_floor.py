@@ -124,6 +124,11 @@ class PartFloor:
         centres = MultiPolygon([p for p in shapely.get_parts(centres) if p.geom_type == "Polygon" and p.area > 0.0])
         # a separate room beside the floor does not belong to it
         centres = MultiPolygon([p for p in centres.geoms if p.intersects(self.face)])
+        if centres.intersection(self.face).is_empty:
+            raise InputError(
+                f"cutter {cutter.number}: diameter_mm = {cutter.diameter:g}: fits nowhere between the walls of face "
+                f"{self.name}: choose a smaller one"
+            )
         walls = _walls(centres, self.face)
         return FloorArea(self.origin, self.along, self.across, self.box, self.face, centres, walls, spacing, ramp)
 

@@ -203,8 +203,8 @@ class WallOperationTable(Table):
     slope: Positive | None = Field(
         None,
         le=1.0,
-        description="greatest change of depth per length along the surface; flank contact: from row to row up the wall; not used by "
-        "end contact, whose passes are level",
+        description="greatest change of depth per length along the surface; flank contact: from row to row up the "
+        "wall; not used by end contact, whose passes are level",
     )
     reserve: NotNegative = Field(
         lt=1.0, description="share of the threshold that the planner keeps free for what its force model leaves out"

@@ -152,7 +152,7 @@ def floor_pass(
     Raises
     ------
     InputError
-        The pass finds no stock, or the cutter fits nowhere.
+        The pass finds no stock.
     """
     area, posture = side.area, pass_motion.posture
     step = float(posture.step or 0.0)
@@ -175,8 +175,6 @@ def rows_over(area: FloorArea, step: float) -> list[Floats]:
     The next row lies on the left of the feed where the step is above 0: the feed is then along x, else against it.
     """
     over = area.centres.intersection(area.outline)
-    if over.is_empty:
-        raise InputError("floor: the cutter fits nowhere between its walls: choose a smaller one")
     (x0, _, x1, _), (_, y0, _, y1) = area.centres.bounds, over.bounds
     count = math.ceil((y1 - y0) / abs(step) - NEAR) + 1
     out: list[Floats] = []

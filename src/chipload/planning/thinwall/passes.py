@@ -198,7 +198,7 @@ def at_one_level(low: Floats, high: Floats, allowance: float, smallest: float) -
     if whole.all():
         return np.full_like(high, allowance)
     level = min(float(row[~whole].min()), allowance - smallest)
-    return np.maximum(np.tile(np.where(whole, allowance, level), (len(high), 1)), low)
+    return np.asarray(np.maximum(np.tile(np.where(whole, allowance, level), (len(high), 1)), low))
 
 
 def _no_sliver(low: Floats, high: Floats, allowance: float, smallest: float) -> Floats:
