@@ -194,8 +194,7 @@ class WallInputs:
 
     def floor_area(self, side: int, operation: int = -1) -> FloorArea:
         """Where the cutter of an operation may go over a floor."""
-        floor, own = self.floor(side), self.operations[operation]
-        assert floor is not None
+        floor, own = stated(self.floor(side), "floor"), self.operations[operation]
         return floor.area(own.cut.cutter, own.table.step_mm, math.radians(own.table.ramp_deg or RAMP_DEG))
 
     def fine(self, side: int, operation: int = -1) -> FineSide | FlankSide | FloorSide:

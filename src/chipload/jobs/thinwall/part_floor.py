@@ -143,8 +143,8 @@ class PartFloor:
         z0 = float(self.origin[2])
         if float(np.ptp(left)) == 0.0:
             return self._prisms([self._within], np.full(1, float(left.flat[0])), z0)
-        pieces = [p for p, _ in self._pieces]
-        middle = np.array([c for _, c in self._pieces])
+        pieces = [p for p, _ in self._grid_prisms]
+        middle = np.array([c for _, c in self._grid_prisms])
         return self._prisms(pieces, np.asarray(RegularGridInterpolator(places, left)(middle)), z0)
 
     @cached_property
@@ -155,7 +155,7 @@ class PartFloor:
         return self.face.buffer(-SLIT, join_style="mitre")
 
     @cached_property
-    def _pieces(self) -> list[tuple[Polygon, tuple[float, float]]]:
+    def _grid_prisms(self) -> list[tuple[Polygon, tuple[float, float]]]:
         """Pieces of the outline on a grid over the box, and the parameters of their middles."""
         x, y = (np.linspace(0.0, size, k + 1) for size, k in zip(self.box, PIECES, strict=True))
         out = []

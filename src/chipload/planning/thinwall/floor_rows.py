@@ -234,7 +234,7 @@ class _FloorPath:
     def cut(self, stroke: Floats) -> None:
         """Enter a stroke and cut it."""
         start, cuts = stroke[0], bool(self.heights.cuts(stroke[:1])[0])
-        entry = start if not cuts else self._beside(start)
+        entry = start if not cuts else self._sideways_entry(start)
         if entry is None:
             self._go(start, float(self.heights.top(start[None])[0]) + ABOVE)
             self._ramp(stroke)
@@ -252,7 +252,7 @@ class _FloorPath:
         if self.now is not None:
             self._rapid(self.now, self.safe)
 
-    def _beside(self, start: Floats) -> Floats | None:
+    def _sideways_entry(self, start: Floats) -> Floats | None:
         """Nearest point of the strokes before from which the cutter reaches ``start`` sideways."""
         near = [p for line in self.free for p in line[np.linalg.norm(line - start, axis=1) <= self.aside]]
         for p in sorted(near, key=lambda q: float(np.linalg.norm(q - start))):
