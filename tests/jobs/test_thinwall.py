@@ -18,6 +18,7 @@ from chipload.jobs.thinwall.places import places_of
 from chipload.jobs.thinwall.result import failures_of, result_of
 from chipload.jobs.thinwall.scene import scene_bytes
 from chipload.jobs.thinwall.tries import TRIES, Tried, unlimited_plan
+from chipload.jobs.thinwall.wall_figures import space
 from chipload.program.gcode.writer import NOT_VERIFIED, VERIFIED
 from chipload.program.read import read_program, read_tools, times_of
 from chipload.report.folder import write_result
@@ -277,6 +278,12 @@ def test_files(folder, done):
     assert wanted <= set(table.column_names)
     scene = trimesh.load(io.BytesIO(scene_bytes(done)), file_type="glb")
     assert {"0-wall", "0-stock", "0-path-variable", "0-cutter"} <= set(scene.graph.nodes_geometry)
+    box = trimesh.creation.box(bounds=[[0.0, 9.0, 2.0], [20.0, 15.0, 16.0]])
+    mesh = np.asarray(box.vertices), np.asarray(box.faces)
+    beside = replace(done, geometry=replace(done.geometry, neighbours={"neighbour 0": mesh}))
+    drawn = trimesh.load(io.BytesIO(scene_bytes(beside)), file_type="glb").geometry["0-fixture-neighbour-0"]
+    assert drawn.bounds.tolist() == box.bounds.tolist()
+    assert "neighbour 0" in {trace.name for trace in space(beside, beside.variants["variable"]).data}
     page = (folder / "report.html").read_text()
     for text in ("Variants", "Allowable normal force", "Depth of each pass", "Places that allow no cut"):
         assert text in page

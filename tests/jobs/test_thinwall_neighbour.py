@@ -67,6 +67,9 @@ def test_a_holder_that_comes_down_on_the_wall(folder):
     loaded, _ = with_neighbour(folder, 14.5, short)
     _, touched = found(loaded)
     assert touched == ()
+    vertices, faces = read_wall(loaded.job).neighbour_meshes["neighbour 0"]
+    assert np.ptp(vertices, axis=0).tolist() == pytest.approx([30.0, 6.0, 14.0])
+    assert len(faces) == 12
     path = folder / "beside.stl"
     high = trimesh.load(path)
     high.apply_translation([0.0, 0.0, 6.0])

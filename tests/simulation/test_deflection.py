@@ -177,6 +177,26 @@ def test_the_surface_is_made_at_its_moment_not_under_the_greatest_force() -> Non
     assert place.point[at, 1:] == pytest.approx([0.0, -2.0], abs=1e-6)
 
 
+@pytest.mark.parametrize("helix", [0.0, 30.0])
+@pytest.mark.parametrize("width", [0.3, 4.0])
+def test_the_greatest_deflection_of_a_flank(helix, width) -> None:
+    """Its engagement begins or ends abruptly: beside forces 0.02 deg apart it is at most 0.5 % too small."""
+    mill = replace(MILL, helix=math.radians(helix))
+    removal = along_a_wall(mill, AL, 4.0, width=width)
+    place = contacts(removal)
+    found = step_deflections(removal, AL, place, work=np.full(len(place.step), 1e-4), bars=None)
+    (cuts,) = removal.cuts
+    theta = np.arange(0.0, math.tau / mill.flutes, math.radians(0.02))
+    force = in_work(forces_over_turn(cuts.engagement, mill, AL, theta)[0], cuts.engagement.frames)
+    n = place.normal[np.searchsorted(place.step, cuts.step)]
+    greatest = np.einsum("cmi,ci->cm", force, n).max(axis=1).clip(0.0)
+    assert greatest.max() > 50.0
+    ratio = found["force_normal_n"][cuts.step][greatest > 1.0] / greatest[greatest > 1.0]
+    assert ratio.min() > 0.995
+    assert ratio.max() < 1.0 + 1e-6
+    assert found["work_mm"] == pytest.approx(1e-4 * found["force_normal_n"], rel=1e-12)
+
+
 def test_with_runout_the_longer_tooth_makes_the_wall_and_takes_more() -> None:
     """Two teeth, their radii 0.01 mm apart and 0.01 mm a tooth: the longer one alone, and it is 5 um longer."""
     mill = replace(MILL, flutes=2, runout=(0.005, 0.0))

@@ -43,7 +43,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.force import forces_over_turn, in_work
 from chipload.cutting.levers.levers import greatest_height, has_lever_loads, lever_loads, lever_loads_in_blocks
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import tooth_radii
@@ -66,6 +65,9 @@ FACING = 0.5
 REACH = 0.2
 #: points whose pairs with steps are held at once
 CHUNK = 4096
+#: the greatest force is sought between rotations at which it is at least 1 less this share of the greatest found, in so
+#: many parts: at 2 deg it is up to 3 % too small, where an edge begins or leaves abruptly, then 0.4 %
+MAY_RISE, FINER = 0.06, 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +193,7 @@ def step_deflections(
     work : compliance at these places in the state of removal in which each is cut, (c,) [mm/N] normal or (c, 3, 3);
         None: rigid
     bars : by tool number, from the tip upwards; None: rigid
-    rotation : between two rotations that are looked at [rad]
+    rotation : between two rotations that are looked at [rad]; near the greatest a sixteenth of it
 
     Returns
     -------
@@ -208,22 +210,42 @@ def step_deflections(
             raise InputError("step_deflections: the contacts are not those of this removal")
         pitch = math.tau / cuts.cutter.flutes if cuts.cutter.teeth_alike else math.tau
         count = max(math.ceil(pitch / rotation), 8)
-        theta = np.arange(count) * (pitch / count)
-        force = in_work(forces_over_turn(cuts.engagement, cuts.cutter, material, theta)[0], cuts.engagement.frames)
-        n = place.normal[at]
-        away = np.einsum("cmi,ci->cm", force, n)
-        bent = np.einsum("cij,cmj,ci->cm", stiff[at], force, n)
-        middle = 0.5 * (cuts.ends[:, :3] + cuts.ends[:, 3:6])
-        z = np.einsum("ci,ci->c", place.point[at] - middle, cuts.engagement.frames[:, 2])
-        m = len(theta)
-        moments = _bent(
-            cuts, np.repeat(np.arange(len(cuts)), m), np.tile(theta, len(cuts)), np.repeat(z, m), material, bars
-        )
-        swing = np.einsum("cmi,cij->cmj", moments[:, 3:].reshape(-1, m, 2), cuts.engagement.frames[:, :2])
-        pushed = np.einsum("cmi,ci->cm", swing, n)
-        for name, values in zip(names, (bent, pushed, bent + pushed, away), strict=True):
-            out[name][cuts.step] = values.max(axis=1).clip(0.0)
+        model = _Parting(cuts, place.point[at], place.normal[at], stiff[at], material, bars)
+        number, theta = np.arange(len(cuts)), np.arange(count) * (pitch / count)
+        values = model(np.repeat(number, count), np.tile(theta, len(cuts))).reshape(len(cuts), count, 4)
+        most = values.max(axis=1)
+        # between two rotations of which one is nearly the greatest, the force may rise further before an edge leaves
+        near = ((values >= (1.0 - MAY_RISE) * most[:, None]) & (most[:, None] > 0.0)).any(axis=2)
+        k, low = np.nonzero(near | np.roll(near, -1, axis=1))
+        share = np.arange(1, FINER) / FINER
+        finer = (theta[low][:, None] + share * (pitch / count)).ravel()
+        np.maximum.at(most, np.repeat(k, FINER - 1), model(np.repeat(k, FINER - 1), finer))
+        for name, column in zip(names, most.T, strict=True):
+            out[name][cuts.step] = column.clip(0.0)
     return out
+
+
+class _Parting:
+    """How work and cutter part along the normals of the contacts of some steps, at any rotation."""
+
+    def __init__(
+        self, cuts: Cuts, point: Floats, normal: Floats, stiff: Floats, material: Material,
+        bars: Mapping[int, tuple[Bar, ...]] | None,
+    ) -> None:  # fmt: skip
+        self.cuts, self.material, self.bars = cuts, material, bars
+        frames = cuts.engagement.frames
+        self.z = np.einsum("ci,ci->c", point - 0.5 * (cuts.ends[:, :3] + cuts.ends[:, 3:6]), frames[:, 2])
+        # in the frames of the cutter, as the force is
+        self.normal = np.einsum("cji,ci->cj", frames, normal)
+        self.gives = np.einsum("cij,ckj,ck->ci", frames, stiff, normal)
+
+    def __call__(self, k: Ints, theta: Floats) -> Floats:
+        """Motion of the work and of the cutter, their sum [mm], and the force [N], (m, 4), of steps k at rotations."""
+        moments = _bent(self.cuts, k, theta, self.z[k], self.material, self.bars)
+        force, n = moments[:, :3], self.normal[k]
+        bent = np.einsum("mi,mi->m", force, self.gives[k])
+        pushed = np.einsum("mi,mi->m", moments[:, 3:], n[:, :2])
+        return np.stack([bent, pushed, bent + pushed, np.einsum("mi,mi->m", force, n)], axis=1)
 
 
 def tip_deflections(
@@ -245,7 +267,8 @@ def tip_deflections(
     bars : of cutter, holder and spindle, from the tip upwards
     work : c [mm/N]; (c, s, 3, 3): compliance of the work in the frame of the program at some places of each step, of
         which the one that moves farthest counts; None: the work counts as rigid
-    rotation : between two rotations that are looked at [rad]
+    rotation : between two rotations that are looked at [rad]; without helix, where edges leave at once, a sixteenth of
+        it. At 2 deg the greatest deflection was at most 0.3 % too small, that of a single step 1.4 %
 
     Returns
     -------
@@ -256,7 +279,7 @@ def tip_deflections(
     if isinstance(work, float) and not 0.0 <= work < math.inf:
         raise InputError(f"tip_deflections: work = {work:g} mm/N: a compliance must be at least 0")
     pitch = math.tau / cuts.cutter.flutes if cuts.cutter.teeth_alike else math.tau
-    m = max(math.ceil(pitch / rotation), 8)
+    m = max(math.ceil(pitch / (rotation if cuts.cutter.helix > 0.0 else rotation / FINER)), 8)
     n = len(cuts)
     if has_lever_loads(cuts.engagement, cuts.cutter, material) and greatest_height(cuts.engagement) <= bars[0].length:
         # the teeth are all on the first bar

@@ -15,7 +15,8 @@ from chipload.planning.thinwall.contact import ContactFinder
 from chipload.planning.thinwall.depth import DepthRange
 from chipload.planning.thinwall.finish_rows import depth_at, row_frames
 from chipload.planning.thinwall.force_table import greatest_law, law_on_stock
-from chipload.planning.thinwall.linking import FineSide, Margins, OperationMotion, beyond_edges, link_passes, refined
+from chipload.planning.thinwall.linking import FineSide, OperationMotion, beyond_edges, link_passes, refined
+from chipload.planning.thinwall.pass_program import Margins
 from chipload.planning.thinwall.passes import WallPass
 from chipload.planning.thinwall.paths import PassMotion, Rows, placed
 from chipload.planning.thinwall.plane_stock import CutterPose

@@ -10,7 +10,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.geometry.thin_wall import plate
 from chipload.planning.thinwall.blank import FinishSurface
-from chipload.planning.thinwall.linking import FineSide, Margins, OperationMotion, link_passes, refined
+from chipload.planning.thinwall.linking import FineSide, OperationMotion, link_passes, refined
+from chipload.planning.thinwall.pass_program import Margins
 from chipload.planning.thinwall.passes import WallPass
 from chipload.planning.thinwall.paths import PassMotion
 from chipload.planning.thinwall.plane_stock import CutterPose

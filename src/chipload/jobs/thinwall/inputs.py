@@ -23,6 +23,7 @@ from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.faces import wall_of_faces
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_blank import PartBlank, part_blank
+from chipload.jobs.thinwall.part_floor import PartFloor
 from chipload.jobs.thinwall.part_shape import PartShape, part_of_faces
 from chipload.jobs.thinwall.program_rows import program_rows
 from chipload.jobs.thinwall.tables import SHAPES
@@ -32,6 +33,7 @@ from chipload.planning.thinwall.blank import SIDES, ContactLine, FinishSurface, 
 from chipload.planning.thinwall.finish_rows import FinishSide
 from chipload.planning.thinwall.flank_rows import FlankSide
 from chipload.planning.thinwall.flank_stock import FlankPose
+from chipload.planning.thinwall.floor_rows import FloorArea, FloorSide
 from chipload.planning.thinwall.linking import FineSide
 from chipload.planning.thinwall.passes import ThresholdOf
 from chipload.planning.thinwall.table import read_cuts
@@ -50,6 +52,8 @@ GOUGE = 0.003
 LOADED = 0.5
 #: share of a step-over that rows may be farther apart: a height of whole step-overs, with rounded digits, stays so
 SLACK = 1e-4
+#: angle of entries over a floor [deg], where the job states none
+RAMP_DEG = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +115,7 @@ class WallInputs:
     ----------
     operations : in the order of cutting
     findings : while it was read
-    neighbours : points of what stands beside one wall, by name
+    neighbours, neighbour_meshes : points, and vertices and faces, of what stands beside one wall, by name
     """
 
     job: ThinWallJob
@@ -120,6 +124,7 @@ class WallInputs:
     operations: tuple[WallOperation, ...]
     findings: tuple[Finding, ...]
     neighbours: Mapping[str, Floats] = field(default_factory=dict)
+    neighbour_meshes: Mapping[str, tuple[Floats, NDArray[np.int64]]] = field(default_factory=dict)
 
     @property
     def cut(self) -> WallCut:
@@ -181,7 +186,18 @@ class WallInputs:
         """Finish surface at the places."""
         return self._surface(side, *self.body.places)
 
-    def fine(self, side: int, operation: int = -1) -> FineSide | FlankSide:
+    def floor(self, side: int) -> PartFloor | None:
+        """A side that is a floor; None: it is the side of a wall."""
+        shape = self.body.shape
+        found = shape.each[side] if isinstance(shape, PartShape) else None
+        return found if isinstance(found, PartFloor) else None
+
+    def floor_area(self, side: int, operation: int = -1) -> FloorArea:
+        """Where the cutter of an operation may go over a floor."""
+        floor, own = stated(self.floor(side), "floor"), self.operations[operation]
+        return floor.area(own.cut.cutter, own.table.step_mm, math.radians(own.table.ramp_deg or RAMP_DEG))
+
+    def fine(self, side: int, operation: int = -1) -> FineSide | FlankSide | FloorSide:
         """Finish surface at the contact points of an operation: a step apart along the wall, a row apart up it."""
         own = self.operations[operation]
         u, v = np.linspace(0.0, 1.0, 65), np.linspace(self.body.foot, 1.0, 33)
@@ -191,10 +207,12 @@ class WallInputs:
         n = max(math.ceil(along / own.table.step_mm), self._chords(side, own.table.chord_mm), 2) + 1
         m = math.ceil(up / abs(own.cut.step_over) - SLACK) + 1
         u, v = np.linspace(0.0, 1.0, n), np.linspace(self.body.foot, 1.0, m)
+        if self.floor(side) is not None:
+            return FloorSide(self._surface(side, u, v), u, v, self.floor_area(side, operation))
         made = FlankSide if own.table.contact == "flank" else FineSide
         return made(self._surface(side, u, v), u, v)
 
-    def sides_of(self, operation: int) -> tuple[FineSide | FinishSide | FlankSide, ...]:
+    def sides_of(self, operation: int) -> tuple[FineSide | FinishSide | FlankSide | FloorSide, ...]:
         """Sides with stock, each with the rows of an operation: planned, or those of its program."""
         rows = self.operations[operation].rows
         if rows is not None:
@@ -286,23 +304,26 @@ def read_wall(job: ThinWallJob) -> WallInputs:
         before = operations[-1] if operations else None
         operations.append(wall_operation(job, k, machine, material, experiments, rows, before))
     step_over = min(abs(o.cut.step_over) for o in operations)
+    beside = _neighbours(job)
     return WallInputs(
         job=job,
         title=title_of(job.path),
         body=_part_body(job, shape, step_over) if isinstance(shape, PartShape) else _wall_body(job, shape, sides, foot),
         operations=tuple(operations),
         findings=findings,
-        neighbours=_neighbours(job),
+        neighbours={name: points for name, (points, _) in beside.items()},
+        neighbour_meshes={name: mesh for name, (_, mesh) in beside.items()},
     )
 
 
-def _neighbours(job: ThinWallJob) -> dict[str, Floats]:
-    """Points of the neighbours of one wall, by name."""
+def _neighbours(job: ThinWallJob) -> dict[str, tuple[Floats, tuple[Floats, NDArray[np.int64]]]]:
+    """Points of the neighbours of one wall, and their vertices and faces, by name."""
     out = {}
     for k, table in enumerate(job.table.neighbour):
         key = f"neighbour.{k}"
         mesh = read_mesh(job.path.parent / table.file, unit=table.units, chord_mm=table.chord_mm, key=f"{key}.file")
-        out[f"neighbour {k}"] = points_of_mesh(mesh, table.spacing_mm, key)[0]
+        drawn = np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
+        out[f"neighbour {k}"] = points_of_mesh(mesh, table.spacing_mm, key)[0], drawn
     return out
 
 

@@ -121,12 +121,13 @@ def _contradictions(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Ite
         feet, stock = [("wall.foot_mm", wall.foot_mm)], [a for a in wall.allowance_mm if a > 0.0]
     else:
         yield from _part_contradictions(table, wall)
-        feet = [(f"wall.{k}.foot_mm", w.foot_mm) for k, w in enumerate(wall)]
+        feet = [(f"wall.{k}.foot_mm", w.foot_mm) for k, w in enumerate(wall) if w.foot_mm is not None]
         stock = [a for w in wall for a in w.allowance_mm]
     for k, op in enumerate(table.operation):
         yield from _of_operation(op, k, tools, feet, max(stock, default=0.0))
     yield from _of_several(table, min(stock, default=0.0))
     yield from _of_flanks(table, tools)
+    yield from _of_ends(table)
 
 
 def _of_operation(
@@ -160,8 +161,15 @@ def _of_operation(
 
 def _of_rows(op: WallOperationTable, where: str) -> Iterator[str]:
     """Keys of planned rows that a finishing program gives, or that are missing without one."""
+    if op.ramp_deg is not None and op.contact != "end":
+        yield f"{where}.ramp_deg: for contact = end only: leave it out"
+    if op.slope is None and op.contact != "end":
+        yield f"{where}.slope: missing: state it"
     if op.contact == "flank":
         yield from _of_flank_keys(op, where)
+        return
+    if op.contact == "end":
+        yield from _of_end_keys(op, where)
         return
     if op.axial_depth_mm is not None:
         yield f"{where}.axial_depth_mm: for contact = flank only: leave it out"
@@ -181,6 +189,40 @@ def _of_flank_keys(op: WallOperationTable, where: str) -> Iterator[str]:
     for key in ("rows", "lean_deg", "lead_deg", "step_over_mm", "scallop_um"):
         if getattr(op, key) is not None:
             yield f"{where}.{key}: not used with contact = flank, whose axis stands along the wall: leave it out"
+
+
+def _of_end_keys(op: WallOperationTable, where: str) -> Iterator[str]:
+    """Keys that end contact needs, and those that it does not use."""
+    for key in ("milling", "step_over_mm"):
+        if getattr(op, key) is None:
+            yield f"{where}.{key}: missing: state it (contact = end needs it)"
+    for key in ("rows", "lean_deg", "lead_deg", "scallop_um", "axial_depth_mm", "slope"):
+        if getattr(op, key) is not None:
+            yield f"{where}.{key}: not used with contact = end (level passes, upright axis): leave it out"
+    if op.compensate_um > 0.0:
+        yield f"{where}.compensate_um: not for floors, whose form error is a bound only: leave it out"
+
+
+def _of_ends(table: ThinWallJobTable) -> Iterator[str]:
+    """What end contact contradicts: the walls, and operations with other contact."""
+    ends = [k for k, op in enumerate(table.operation) if op.contact == "end"]
+    if not ends:
+        if not isinstance(table.wall, WallTable):
+            for k, wall in enumerate(table.wall):
+                if wall.foot_mm is None:
+                    yield f"wall.{k}.foot_mm: missing: state it (a side of a wall needs it)"
+        return
+    where = f"operation.{ends[0]}.contact = end"
+    if isinstance(table.wall, WallTable):
+        yield f"{where}: cuts floors of a part: state them as [[wall]], or contact = corner"
+        return
+    if len(ends) < len(table.operation):
+        yield f"{where}: all operations of the job must have it: plan floors and sides in jobs of their own"
+    for k, wall in enumerate(table.wall):
+        if wall.foot_mm is not None:
+            yield f"wall.{k}.foot_mm: not used with contact = end: leave it out"
+        if wall.opposite is not None:
+            yield f"wall.{k}.opposite: a floor is cut from above only: plan its lower side in a setup of its own"
 
 
 def _of_flanks(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator[str]:

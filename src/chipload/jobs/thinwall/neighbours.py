@@ -13,7 +13,7 @@ import numpy as np
 from chipload.jobs.simulation.workpiece import stock_points
 from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.inputs import WallInputs
-from chipload.planning.thinwall.linking import PassProgram
+from chipload.planning.thinwall.pass_program import PassProgram
 from chipload.program.program import Program
 from chipload.simulation.steps import steps_of
 from chipload.simulation.surface import Collision, collisions, fine, in_stock

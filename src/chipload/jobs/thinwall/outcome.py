@@ -7,7 +7,7 @@ threshold of the place: the limit over the normal compliance in the state of tha
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -227,12 +227,14 @@ class WallGeometry:
     shape : finished
     allowance : [mm] on k- and k+, or on each side of a part's walls
     stock, finished : (vertices (n, 3), faces (m, 3)) of the workpiece before, and of the finished wall or part
+    neighbours : the same of what stands beside one wall, by name
     """
 
     shape: ThinWall | PartShape
     allowance: tuple[float, ...]
     stock: tuple[Floats, NDArray[np.int64]]
     finished: tuple[Floats, NDArray[np.int64]]
+    neighbours: Mapping[str, tuple[Floats, NDArray[np.int64]]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

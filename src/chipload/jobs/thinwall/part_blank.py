@@ -19,12 +19,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
 
 from chipload.jobs.simulation.clamped import clamped_volumes, clamps_of, elastic_of
 from chipload.jobs.simulation.tables import WorkpieceTable
 from chipload.jobs.simulation.workpiece_compliance import COARSER, CORNER, FLOOR
 from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.job import ThinWallJob
+from chipload.jobs.thinwall.part_floor import PartFloor
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import Clamp
@@ -45,6 +47,8 @@ ACROSS, WEIGHTS = (-math.sqrt(0.6), 0.0, math.sqrt(0.6)), (5.0 / 18.0, 8.0 / 18.
 MEAN = 0.95
 #: right-hand sides at once
 TOGETHER = 64
+#: layers through the greatest stock on a floor
+THIN = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,14 +95,22 @@ class PartBlank:
 
     def compliance(self, left: Sequence[Floats], side: int, wide: bool = False) -> Floats:
         """C_nn of the places of a side while stock ``left`` is on all of them, (p,) [mm/N]."""
+        return np.asarray((self.motion(left, side, wide) * self._lines(left, side)[1]).sum(axis=1))
+
+    def motion(self, left: Sequence[Floats], side: int, wide: bool = False) -> Floats:
+        """Mean displacement (p, 3) [mm/N] of the contact square of each place under a normal force of 1 N on it.
+
+        By Betti's theorem it is also the normal displacement under a force of 1 N along x, y and z.
+        """
         lines, normals = self._lines(left, side)
         work = self.state(left, wide)
         loads = sum(w * line_means(work, line) for line, w in zip(lines, WEIGHTS, strict=True)).T.toarray()
-        out = np.empty(len(normals))
-        for at in range(0, len(lines), TOGETHER):
+        out = np.empty(normals.shape)
+        for at in range(0, len(normals), TOGETHER):
             some = slice(at, at + TOGETHER)
-            right = (loads[:, None, some] * normals[some].T).reshape(-1, len(out[some]))
-            out[some] = (right * work.solve(right)).sum(axis=0)
+            right = loads[:, None, some] * normals[some].T
+            found = work.solve(right.reshape(-1, right.shape[2])).reshape(right.shape)
+            out[some] = np.einsum("mk,mdk->kd", loads[:, some], found)
         return out
 
     def error(self, side: int) -> Floats:
@@ -122,6 +134,8 @@ class PartBlank:
         """Lines up the contact squares (w, p, 2, 3) [mm] on what is left of a side, and the normals (p, 3) there."""
         a, b = (x.ravel() for x in np.meshgrid(*(places or self.places), indexing="ij"))
         one = self.body.each[side]
+        if isinstance(one, PartFloor):
+            return self._squares(one, left[side] if places is None else np.zeros(self.shape), np.column_stack([a, b]))
         length, height = one.size()
         # at an edge the square lies within the side
         along, up = (min(0.5, 0.5 * self.contact / size) for size in (length, height * (1.0 - one.foot)))
@@ -132,6 +146,18 @@ class PartBlank:
             [self.body.sides(u + t * along, v + s * up)[side] + stock for s in (-1.0, 1.0)] for t in ACROSS
         ]  # fmt: skip
         return np.moveaxis(np.array(lines), 1, 2), normals
+
+    def _squares(self, floor: PartFloor, left: Floats, uv: Floats) -> tuple[Floats, Floats]:
+        """Lines across the contact squares of places (p, 2) of a floor, within its outline, and the normals there."""
+        half = 0.5 * self.contact
+        xy = floor.on(uv * floor.box, half)
+        D = RegularGridInterpolator(self.places, left)(np.clip(xy / floor.box, 0.0, 1.0))
+        z = D[:, None] * np.array([0.0, 0.0, 1.0])
+        lines = []
+        for t in ACROSS:
+            ends = [(xy + half * np.array([t, s])) / floor.box for s in (-1.0, 1.0)]
+            lines.append([floor.at(*e.T) + z for e in ends])
+        return np.moveaxis(np.array(lines), 1, 2), floor.normal(*uv.T)
 
 
 def part_blank(job: ThinWallJob, body: PartShape, step_over: float) -> PartBlank:
@@ -160,8 +186,11 @@ def part_blank(job: ThinWallJob, body: PartShape, step_over: float) -> PartBlank
 
 
 def _layered(body: PartShape, places: tuple[Floats, Floats], left: Sequence[Floats], layer: float) -> LayeredStock:
-    """The part with its stock in layers, one tile each, that end at its level faces."""
+    """The part with its stock in layers, one tile each, that end at its level faces and divide the stock of floors."""
     mesh = body.body(places, left)
     stock = LayeredStock.of_mesh(mesh, layer, 2.0 * float(np.ptp(mesh.bounds, axis=0).max()))
     stock.refine_at(body.levels())
+    for side, D in zip(body.each, left, strict=True):
+        if isinstance(side, PartFloor) and float(D.max()) > 0.0:
+            stock.refine_at(float(side.origin[2]) + float(D.max()) * np.linspace(0.0, 1.0, THIN + 1))
     return stock

@@ -1,4 +1,4 @@
-"""Walls of a part, named by faces of its model: the sides that are cut, and the part with the stock left on them.
+"""Walls and floors of a part, named by faces of its model: sides that are cut, and the part with stock left on them.
 
 Notation: u in 0..1 along a side, v in 0..1 from the top of its foot to its free edge; w in 0..1 from its lower edge, so
 that the foot ends at w = f; N the normal out of the metal, D [mm] stock that is left. The frame is that of the model, z
@@ -26,6 +26,7 @@ from chipload.geometry.step_patch import patch_of
 from chipload.geometry.thin_wall import closed_between
 from chipload.jobs.tables import FaceName, stated
 from chipload.jobs.thinwall.job import ThinWallJob
+from chipload.jobs.thinwall.part_floor import PartFloor, floor_of
 from chipload.jobs.thinwall.tables import FaceWallTable
 
 Floats = NDArray[np.float64]
@@ -63,6 +64,14 @@ class PartSide:
     wall: int
     allowance: float
 
+    def at(self, u: Floats, v: Floats) -> Floats:
+        """Points (n, 3) [mm] of the side."""
+        return np.asarray(self.patch.at(u, np.clip(self.foot + v * (1.0 - self.foot), 0.0, 1.0)))
+
+    def normal(self, u: Floats, v: Floats) -> Floats:
+        """Unit normals (n, 3), out of the metal."""
+        return np.asarray(self.patch.normal(u, np.clip(self.foot + v * (1.0 - self.foot), 0.0, 1.0)))
+
     def size(self) -> tuple[float, float]:
         """Length at half height, and height from the lower edge [mm]."""
         along, up = self.patch.at(FEW, 0.5), self.patch.at(0.5, FEW)
@@ -95,13 +104,13 @@ class PartShape:
     ----------
     name : what it is, in words
     part : the finished part
-    each : its sides, wall by wall
+    each : its sides or floors, wall by wall
     thickness : [mm] of the thinnest wall or floor that is left
     """
 
     name: str
     part: trimesh.Trimesh
-    each: tuple[PartSide, ...]
+    each: tuple[PartSide | PartFloor, ...]
     thickness: float = 0.0
 
     def sides(self, u: ArrayLike, v: ArrayLike) -> tuple[Floats, ...]:
@@ -113,11 +122,15 @@ class PartShape:
         return tuple(self._at(s, u, v, normal=True) for s in self.each)
 
     @staticmethod
-    def _at(side: PartSide, u: ArrayLike, v: ArrayLike, normal: bool) -> Floats:
+    def _at(side: PartSide | PartFloor, u: ArrayLike, v: ArrayLike, normal: bool) -> Floats:
         a, b = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64))
-        w = np.clip(side.foot + b.ravel() * (1.0 - side.foot), 0.0, 1.0)
-        at = side.patch.normal if normal else side.patch.at
-        return np.asarray(at(a.ravel(), w)).reshape(*a.shape, 3)
+        at = side.normal if normal else side.at
+        return at(a.ravel(), b.ravel()).reshape(*a.shape, 3)
+
+    @property
+    def floors(self) -> bool:
+        """Whether its sides are floors: all are, or none is."""
+        return isinstance(self.each[0], PartFloor)
 
     def size(self) -> tuple[float, float, float]:
         """Length of the longest side, height of the highest one, and least thickness [mm]."""
@@ -150,7 +163,7 @@ def part_of_faces(job: ThinWallJob) -> PartShape:
     if not model.solid:
         raise InputError(f"part.file = {file.name}: its faces bound no solid: write the part as a solid")
     part = read_mesh(file, chord_mm=table.chord_mm, key="part.file")
-    each: list[PartSide] = []
+    each: list[PartSide | PartFloor] = []
     names: dict[int, str] = {}
     for k, wall in enumerate(job.walls):
         asked: list[tuple[str, FaceName]] = [("face", wall.face)]
@@ -161,11 +174,12 @@ def part_of_faces(job: ThinWallJob) -> PartShape:
             if face.number in names:
                 raise InputError(f"{key}: face {face.number} is {names[face.number]} too: state each face once")
             names[face.number] = key
-            each.append(_side(face, key, wall, k, allowance))
+            floor = job.operation.contact == "end"
+            each.append(floor_of(face, key, part, k, allowance) if floor else _side(face, key, wall, k, allowance))
     numbers = ", ".join(s.name for s in each)
-    count = len(job.walls)
+    count, what = len(job.walls), "floor" if job.operation.contact == "end" else "wall"
     return PartShape(
-        f"{count} wall{'s' if count > 1 else ''} of {model.file.name} (faces {numbers})", part, tuple(each)
+        f"{count} {what}{'s' if count > 1 else ''} of {model.file.name} (faces {numbers})", part, tuple(each)
     )
 
 
@@ -174,13 +188,14 @@ def _side(face: Face, key: str, wall: FaceWallTable, number: int, allowance: flo
     patch = _standing(patch_of(face, key, wall.fit_mm).patch, key, face)
     made = PartSide(f"{face.number}", patch, 0.0, number, allowance)
     height = made.size()[1]
-    if not wall.foot_mm < 0.8 * height:
+    foot = stated(wall.foot_mm, f"wall.{number}.foot_mm")
+    if not foot < 0.8 * height:
         raise InputError(
-            f"wall.{number}.foot_mm = {wall.foot_mm:g}: must be below 0.8 of the height of face {face.number}, "
+            f"wall.{number}.foot_mm = {foot:g}: must be below 0.8 of the height of face {face.number}, "
             f"{height:.4g} mm: the rest is cut"
         )
     up = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(patch.at(0.5, FEW), axis=0), axis=1))])
-    return PartSide(made.name, patch, float(np.interp(wall.foot_mm, up, FEW)), number, allowance)
+    return PartSide(made.name, patch, float(np.interp(foot, up, FEW)), number, allowance)
 
 
 def _standing(patch: BSplinePatch, key: str, face: Face) -> BSplinePatch:
@@ -196,8 +211,8 @@ def _standing(patch: BSplinePatch, key: str, face: Face) -> BSplinePatch:
     if flat > STEEPEST:
         raise InputError(
             f"{key}: face {face.number} lies rather than stands: its normal is {np.degrees(np.arcsin(flat)):.3g} deg "
-            f"off the horizontal, at most {np.degrees(np.arcsin(STEEPEST)):g}: floors are not planned: state the "
-            "side of a wall, z up; for a floor, simulate its program with [workpiece] and [operation.feeds]"
+            f"off the horizontal, at most {np.degrees(np.arcsin(STEEPEST)):g}: state the side of a wall, z up, or "
+            "contact = end, which plans a level floor"
         )
     ways = [q for p in (patch, patch.swapped()) for q in (p, p.reversed(False, True))]
     patch = max(ways, key=lambda q: float((q.at(FEW, 1.0) - q.at(FEW, 0.0))[:, 2].mean()))

@@ -8,18 +8,21 @@ by cubics, as in the simulation. A state of the wall is solved once, for all who
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline
+from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 
 from chipload.jobs.kept_parts import KeptRecords
+from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.chatter import WallChatter, chatter_of
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.jobs.thinwall.mesh_error import error_at, mesh_error
+from chipload.jobs.thinwall.part_floor import PartFloor
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.planning.thinwall.blank import ContactLine, FinishSurface
 from chipload.planning.thinwall.passes import ThresholdOf
@@ -32,6 +35,8 @@ Floats = NDArray[np.float64]
 TILE = 1.0
 #: layers below the reach of the cutter are so many times as thick
 COARSE = 8.0
+#: circles under an upright cutter on which the least stock is sought, in radii, and points on each
+CIRCLES, ROUND = (0.0, 0.5, 1.0), 16
 
 
 def wall_stock(inputs: WallInputs) -> LayeredStock:
@@ -46,12 +51,16 @@ def wall_stock(inputs: WallInputs) -> LayeredStock:
     diameter = max(o.cut.cutter.diameter for o in inputs.operations)
     stock = LayeredStock.of_mesh(inputs.stock_mesh(), COARSE * layer, TILE * diameter)
     low = (inputs.lowest_row if inputs.body.part else inputs.foot_height) - inputs.below
+    high = float(stock.bounds[-1])
     if isinstance(inputs.body.shape, PartShape):
         stock.refine_at(inputs.body.shape.levels())
+        if inputs.body.shape.floors:  # from below the lowest floor, where a gouge would be, to the highest stock
+            low = inputs.lowest_row - layer
+            high = max(float(s.origin[2]) + s.allowance for s in inputs.body.shape.each if isinstance(s, PartFloor))
     if inputs.line is not None:  # the ends of the flank, row by row
         rows = np.concatenate([inputs.fine(s).surface.points[0, :, 2] for s in inputs.body.side_numbers])
         stock.refine_at(np.unique(np.concatenate([rows, rows - inputs.below]).round(9)))
-    stock.refine(max(low, float(stock.bounds[0])), float(stock.bounds[-1]), layer)
+    stock.refine(max(low, float(stock.bounds[0])), high, layer)
     return stock
 
 
@@ -75,6 +84,8 @@ class Places:
     keep: KeptRecords | None = None
     _solved: dict[tuple[bytes, int, ContactLine | None], Floats] = field(default_factory=dict)
     _errors: dict[int, Floats] = field(default_factory=dict)
+    _moved: dict[tuple[bytes, int, None], Floats] = field(default_factory=dict)
+    _reached: dict[int, Floats] = field(default_factory=dict)
 
     @cached_property
     def uncut(self) -> LayeredStock:
@@ -92,9 +103,24 @@ class Places:
         return len(self.u), len(self.v)
 
     def coarse(self, left: Sequence[Floats]) -> list[Floats]:
-        """Stock at the places of the elements, from the stock at these places."""
+        """Stock at the places of the elements, from the stock at these places; on a floor what an upright cutter
+        leaves whose tip follows it, the least within its radius.
+        """
         v = self.inputs.body.places[1]
-        return [np.array([np.interp(v, self.v, row) for row in D]) for D in left]
+        return [
+            np.array([np.interp(v, self.v, row) for row in D]) if floor is None else self._under_cutter(floor, D)
+            for D, floor in zip(left, map(self.inputs.floor, self.inputs.body.side_numbers), strict=True)
+        ]
+
+    def _under_cutter(self, floor: PartFloor, left: Floats) -> Floats:
+        """Least stock of a floor within the radius of the greatest cutter, at the places of the elements."""
+        radius = max(o.cut.cutter.radius for o in self.inputs.operations)
+        angle = np.arange(ROUND) * (math.tau / ROUND)
+        circle = np.column_stack([np.cos(angle), np.sin(angle)])
+        under = np.concatenate([share * radius * circle for share in CIRCLES]) / floor.box
+        at = np.stack(np.meshgrid(*self.inputs.body.places, indexing="ij"), axis=-1)
+        near = np.clip(at[:, :, None] + under, 0.0, 1.0)
+        return np.asarray(RegularGridInterpolator(self.grid, left)(near).min(axis=2))
 
     def compliance(self, left: Sequence[Floats], side: int, *, of_surface: bool = False) -> Floats:
         """C_nn at the elements' places of a side with stock ``left`` at these places on all sides.
@@ -118,6 +144,29 @@ class Places:
             self._solved[key] = C.reshape(body.elastic.shape)
         return self._solved[key]
 
+    def motion(self, left: Sequence[Floats], side: int) -> Floats:
+        """Displacement (n, m, 3) [mm/N] of the elements' places of a part's side under a normal force of 1 N."""
+        states, part = self.inputs.both(self.coarse(left)), stated(self.inputs.body.part, "part")
+        key = (b"".join(D.tobytes() for D in states), side, None)
+        if key not in self._moved:
+            number = self.inputs.body.side_numbers[side]
+            found = (self.keep or KeptRecords(None, "", ()))(
+                ("motion", number, tuple(states)), lambda: part.motion(states, number)
+            )
+            self._moved[key] = found.reshape(*part.shape, 3)
+        return self._moved[key]
+
+    def pressed(self, left: Sequence[Floats], side: int, uv: Floats) -> Floats:
+        """Displacement (..., 3) [mm/N] of places (..., 2) of a floor under a normal force of 1 N on them.
+
+        C_nn between places by cubics of its logarithm, the other components over it straight.
+        """
+        known, places = self.motion(left, side), self.inputs.body.places
+        flat = np.clip(uv.reshape(-1, 2), 0.0, 1.0)
+        C = between(places, known[..., 2], *flat.T)
+        share = RegularGridInterpolator(places, known / known[..., 2:])(flat)
+        return np.asarray((C[:, None] * share).reshape(*uv.shape[:-1], 3))
+
     def error(self, side: int) -> Floats:
         """Relative error of the compliance of a side by its mesh, at the elements' places of the finished wall."""
         if side not in self._errors:
@@ -137,6 +186,8 @@ class Places:
         u, v = (x.ravel() for x in np.meshgrid(self.u, self.v, indexing="ij"))
 
         def limited(left: Sequence[Floats], side: int) -> Threshold:
+            if self.inputs.floor(self.inputs.body.side_numbers[side]) is not None:
+                return modelled(self._softest(left, side, spare), deflection, factor)
             C = between(self.inputs.body.places, self.compliance(left, side), u, v)
             if spare:
                 C *= 1.0 + error_at(self.inputs.body.places, self.error(side), u, v)
@@ -149,6 +200,22 @@ class Places:
 
         found = limited if self.inputs.depths.experiments is None else measured
         return found if self.chatter is None or not spare else self.chatter.limited(self, found)
+
+    def _softest(self, left: Sequence[Floats], side: int, spare: bool) -> Floats:
+        """Greatest C_nn (p,) of the places that a cutter presses on over each place of a floor; ``spare``: with its
+        error.
+        """
+        if side not in self._reached:
+            number = self.inputs.body.side_numbers[side]
+            floor, radius = self.inputs.floor(number), max(o.cut.cutter.radius for o in self.inputs.operations)
+            u, v = (x.ravel() for x in np.meshgrid(self.u, self.v, indexing="ij"))
+            self._reached[side] = stated(floor, "floor").reached(u, v, self.inputs.floor_area(number), radius)
+        reached = self._reached[side]
+        C = self.pressed(left, side, reached)[..., 2]
+        if spare:
+            error = error_at(self.inputs.body.places, self.error(side), *reached.reshape(-1, 2).T)
+            C = C * (1.0 + error.reshape(C.shape))
+        return np.asarray(C.max(axis=0))
 
 
 def rows_up(inputs: WallInputs, operation: int) -> Floats:

@@ -18,14 +18,17 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from chipload.jobs.checks import check_columns
+from chipload.jobs.thinwall.floor_loads import FloorLoads, floor_finish, floor_loads
+from chipload.jobs.thinwall.floor_shape import floor_shape
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.jobs.thinwall.load_error import SimulatedPass, load_error
 from chipload.jobs.thinwall.mesh_error import error_at
 from chipload.jobs.thinwall.neighbours import part_collisions, wall_collisions
 from chipload.jobs.thinwall.outcome import Finish, Shape
+from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.places import Places, between
 from chipload.planning.thinwall.blank import SIDES
-from chipload.planning.thinwall.linking import PassProgram
+from chipload.planning.thinwall.pass_program import PassProgram
 from chipload.planning.thinwall.passes import Plan
 from chipload.program.program import Program
 from chipload.progress import Progress
@@ -125,7 +128,9 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         F_th = places.threshold(inputs.depths.deflection, 1.0, spare=False)(left, p.side).force.reshape(places.shape)
         thresholds.append(F_th)
         error = places.error(p.side)
-        columns = _columns(places, removal, leg, C, F_th, error, bars)
+        floor = inputs.floor(number) is not None
+        loads = floor_loads(places, removal, left, p.side, error) if floor and removal.cuts else None
+        columns = _columns(places, removal, leg, C, F_th, error, bars, loads)
         u, v = np.clip(columns["u"], 0.0, 1.0), np.clip(columns["v"], inputs.body.foot, 1.0)
         share = RegularGridInterpolator(places.grid, p.correction)(np.column_stack([u, v]))
         law = rules.even_law if plan.name in EVEN else rules.law
@@ -139,8 +144,10 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
         parts.append(columns)
         stress = max(stress, _stress(inputs, places.coarse(left), number, columns))
         if k == last[p.side]:
-            finish[number] = _finish(
-                inputs, removal, number, places.compliance(left, p.side, of_surface=True), error, bars
+            finish[number] = (
+                floor_finish(places, removal, left, p.side, error)
+                if floor
+                else _finish(inputs, removal, number, places.compliance(left, p.side, of_surface=True), error, bars)
             )
     whole = stacked(parts)  # a pass that cuts films alone has no bands
     find = partial(load_error, simulated, inputs.cut.material)
@@ -193,8 +200,9 @@ def _columns(
     F_th: Floats,
     error: Floats,
     bars: Mapping[int, Any],
+    loads: FloorLoads | None = None,
 ) -> dict[str, NDArray[Any]]:
-    """Columns of a pass: those of the removal, and what its contact points feel.
+    """Columns of a pass: those of the removal, and what its contact points feel; ``loads`` of a floor.
 
     The force of a step acts anywhere in it: threshold and compliance are the worst of its beginning, middle and end, so
     that edges and corners of the wall are among them. `contact_*_mm` is the place of that threshold, the upper end of a
@@ -219,13 +227,17 @@ def _columns(
     unsure = np.stack([error_at(inputs.body.places, error, u, v) for u, v in uv]).max(axis=0)
     place, values = spots[MIDDLE]
     u, v = uv[MIDDLE]
-    if removal.cuts:
+    if loads is not None:
+        gives, unsure = loads.normal[None], loads.error
+        allowable = inputs.depths.deflection / gives
+        found = _floor_deflections(n, loads)
+    elif removal.cuts:
         found = _deflections(inputs, removal, place, gives.max(axis=0), bars)
     else:  # a pass that takes only films: its loads are not known, as its load_error says
         found = dict.fromkeys(("work_mm", "cutter_mm", "deflection_mm", "force_normal_n"), np.zeros(n))
     weakest, each = allowable.argmin(axis=0), np.arange(len(u))
     threshold = allowable[weakest, each]
-    judged = np.stack([spot.point for spot, _ in spots])[weakest, each]
+    judged = np.stack([spot.point for spot, _ in spots])[weakest if loads is None else np.full(len(u), MIDDLE), each]
     if inputs.line is not None:  # along the wall, which is plane
         up = np.stack([_acting(inputs, b) - b for _, b in uv])[weakest, each]
         judged = judged + (up * inputs.body.shape.size()[1])[:, None] * UP
@@ -253,6 +265,14 @@ def _columns(
     columns["side"] = np.full(n, leg.side)
     columns["operation"] = np.full(n, leg.operation)
     return columns
+
+
+def _floor_deflections(n: int, loads: FloorLoads) -> dict[str, NDArray[Any]]:
+    """As :func:`chipload.simulation.deflection.step_deflections`; the cutter is stiff along its axis."""
+    out = {name: np.zeros(n) for name in ("work_mm", "cutter_mm", "deflection_mm", "force_normal_n")}
+    out["work_mm"][loads.step] = out["deflection_mm"][loads.step] = loads.motion
+    out["force_normal_n"][loads.step] = loads.motion / loads.normal
+    return out
 
 
 def _deflections(
@@ -306,6 +326,8 @@ def _finish(
 def _shape(places: Places, stock: LayeredStock, legs: Sequence[PassProgram]) -> Shape:
     """Path and stock beside the finished wall, the tool beside its neighbours or the part."""
     inputs = places.inputs
+    if isinstance(inputs.body.shape, PartShape) and inputs.body.shape.floors:
+        return floor_shape(places, stock, legs)
     length, height, _ = inputs.body.shape.size()
     u, v = np.meshgrid(
         np.linspace(0.0, 1.0, round(length / CLOUD) + 1),

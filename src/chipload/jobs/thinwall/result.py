@@ -55,12 +55,20 @@ def result_of(walled: ThinWallResult) -> Result:
             *(f"limit {name}: not stated" for name in walled.unchecked),
             *_unchecked_bodies(walled),
             *(() if "dynamics" in walled.settings else ("chatter: not calculated",)),
-            "bending by tangential forces, smaller depth of cut on a bent wall: not calculated",
+            _not_calculated(walled),
         ),
         provenance=walled.provenance,
         maps=tuple(_maps(walled)),
         note=_note(walled),
     )
+
+
+def _not_calculated(walled: ThinWallResult) -> str:
+    """Effects of the deflection that no variant accounts for."""
+    shape = walled.geometry.shape
+    if isinstance(shape, PartShape) and shape.floors:
+        return "smaller depth of cut on a bent floor: not calculated"
+    return "bending by tangential forces, smaller depth of cut on a bent wall: not calculated"
 
 
 def _unchecked_bodies(walled: ThinWallResult) -> tuple[str, ...]:

@@ -31,6 +31,7 @@ from chipload.jobs.thinwall.wall_operation import WallOperation
 from chipload.jobs.thinwall.wall_program import linked, on_machine
 from chipload.planning.thinwall.blank import SIDES
 from chipload.planning.thinwall.experiments import Proposal, propose_cuts
+from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.result import Provenance
@@ -100,6 +101,7 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
             allowance=inputs.body.allowance,
             stock=(np.asarray(body.vertices), np.asarray(body.faces)),
             finished=(np.asarray(finished.vertices), np.asarray(finished.faces)),
+            neighbours=inputs.neighbour_meshes,
         ),
         planning=WallPlanning(
             operations=tuple(_planned_operation(o) for o in inputs.operations),
@@ -232,7 +234,8 @@ def _findings(inputs: WallInputs) -> tuple[Finding, ...]:
     asked: list[str] = []
     for one in inputs.operations:
         cut = one.cut
-        speed = cut.pass_motion.spindle * cut.cutter.radius * math.sin(cut.posture.beta)
+        lean = math.sin(cut.posture.beta) if isinstance(cut.posture, CutterPose) else 1.0
+        speed = cut.pass_motion.spindle * cut.cutter.radius * lean
         asked += beyond(cut.material, cut.posture.feed_per_tooth, speed)
     beyond_range = (Finding("chip-beyond-coefficients", 0, text, Severity.UNPROVEN) for text in dict.fromkeys(asked))
     return (*beyond_range, *inputs.findings)

@@ -1,5 +1,5 @@
-"""The file scene.glb of a thin wall: finished wall, workpiece before, the cutter, and the contact points of each
-variant coloured by depth. Lengths are mm, Z is up, as the extras say.
+"""The file scene.glb of a thin wall: finished wall, workpiece before, neighbours, the cutter, and the contact points of
+each variant coloured by depth. Lengths are mm, Z is up, as the extras say.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from chipload.jobs.thinwall.outcome import USED, ThinWallResult, Variant
-from chipload.report.scene import ROWS, STOCK, TOOL, WALL, engagement_colours
+from chipload.report.scene import FIXTURE, ROWS, STOCK, TOOL, WALL, engagement_colours
 
 Floats = NDArray[np.float64]
 
@@ -22,6 +22,7 @@ def scene_bytes(walled: ThinWallResult) -> bytes:
     for (vertices, faces), name, colour in (
         (walled.geometry.finished, "wall", WALL),
         (walled.geometry.stock, "stock", STOCK),
+        *((mesh, f"fixture-{name.replace(' ', '-')}", FIXTURE) for name, mesh in walled.geometry.neighbours.items()),
     ):
         mesh = trimesh.Trimesh(vertices, faces, process=False)
         mesh.visual.face_colors = np.tile(np.array(colour, dtype=np.uint8), (len(faces), 1))

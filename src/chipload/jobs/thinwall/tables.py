@@ -118,11 +118,13 @@ class FacePartTable(Table):
 
 
 class FaceWallTable(Table):
-    """A wall of a part by one of its sides, or both; walls are cut in the order of the file."""
+    """A wall of a part by one of its sides, or both, or a floor; they are cut in the order of the file."""
 
-    face: FaceName = Field(description="side that is cut, by number or point [mm] on it")
+    face: FaceName = Field(description="side or floor that is cut, by number or point [mm] on it")
     opposite: FaceName | None = Field(None, description="its other side, where that has stock too")
-    foot_mm: Positive = Field(description="height above the lower edge of each side that keeps its stock")
+    foot_mm: Positive | None = Field(
+        None, description="height above the lower edge of each side that keeps its stock; not for a floor"
+    )
     allowance_mm: tuple[Positive, ...] = Field(
         min_length=1, max_length=2, description="stock on the face, and on the opposite one"
     )
@@ -174,10 +176,13 @@ class WallOperationTable(Table):
         "it gives direction, lean and step-over; none: rows are planned",
     )
     milling: Literal["down", "up"] | None = Field(None, description="direction of milling; required without rows")
-    contact: Literal["corner", "flank"] = Field(
+    contact: Literal["corner", "flank", "end"] = Field(
         "corner",
-        description="what touches the surface: the corner radius of a ball or bull nose, or the flank of an end mill "
-        "whose axis stands along the wall",
+        description="what touches the surface: the corner radius of a ball or bull nose, the flank of an end mill "
+        "whose axis stands along the wall, or the end of an upright end mill or bull nose on a level floor",
+    )
+    ramp_deg: Positive | None = Field(
+        None, le=30.0, description="end contact: angle at which the cutter goes down into stock along a row; none: 2"
     )
     axial_depth_mm: Positive | None = Field(None, description="flank contact: distance between rows along the axis")
     feed_mm_min: Positive = Field(le=1e5, description="feed of the centre of the cutter's corner radius")
@@ -195,9 +200,11 @@ class WallOperationTable(Table):
     leave_mm: NotNegative = Field(
         0.0, description="stock on every side for the operation after this one; 0 in the last one, which finishes"
     )
-    slope: Positive = Field(
+    slope: Positive | None = Field(
+        None,
         le=1.0,
-        description="greatest change of depth per length along the surface; flank contact: from row to row up the wall",
+        description="greatest change of depth per length along the surface; flank contact: from row to row up the "
+        "wall; not used by end contact, whose passes are level",
     )
     reserve: NotNegative = Field(
         lt=1.0, description="share of the threshold that the planner keeps free for what its force model leaves out"

@@ -95,6 +95,7 @@ def _depth_operations(places: Places, share: float, corrections: Corrections, ev
             o.depths.slope,
             c,
             o.table.contact == "flank",
+            o.table.contact == "end",
         )
         for o, c in zip(places.inputs.operations, corrections, strict=True)
     ]

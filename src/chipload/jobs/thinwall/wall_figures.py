@@ -135,11 +135,12 @@ def along(walled: ThinWallResult) -> go.Figure:
 
 
 def space(walled: ThinWallResult, one: Variant) -> go.Figure:
-    """The finished wall, the workpiece before, and the contact points coloured by depth."""
+    """The finished wall, the workpiece before, its neighbours, and the contact points coloured by depth."""
     out = go.Figure()
     for (vertices, faces), name, colour, opacity in (
         (walled.geometry.finished, "finished wall", "#8b97a6", 1.0),
         (walled.geometry.stock, "stock", "#d6aa6e", 0.22),
+        *((mesh, name, "#5c7a96", 0.5) for name, mesh in walled.geometry.neighbours.items()),
     ):
         x, y, z = vertices.astype(np.float32).T
         i, j, k = faces.astype(np.int32).T

@@ -18,6 +18,7 @@ from chipload.jobs.thinwall.program_rows import ProgramRows
 from chipload.jobs.thinwall.tables import WallOperationTable, WallTable
 from chipload.machine.machine import Machine
 from chipload.planning.thinwall.depth import DepthRange, Measure
+from chipload.planning.thinwall.end_stock import EndPose
 from chipload.planning.thinwall.flank_stock import FlankPose, Pose
 from chipload.planning.thinwall.force_table import ForceTable, greatest_law
 from chipload.planning.thinwall.paths import PassMotion
@@ -112,10 +113,11 @@ def wall_operation(
     # between rows: an axial depth apart where the flank cuts
     step_over = abs(stated(poses[0].step, f"operation.{number}.step_over_mm"))
     # step-over^2 / 8 r of a plane; the stock has the scallops of the pass before, which may be one of the one before
-    scallop = 0.0 if op.contact == "flank" else step_over**2 / (8.0 * cutter.finishing_arc[0])
+    scallop = 0.0 if op.contact != "corner" else step_over**2 / (8.0 * cutter.finishing_arc[0])
     met = scallop if before is None else max(scallop, before.cut.scallop)
     limits = DepthRange(op.depth_min_mm, op.depth_max_mm)
-    sloped = 0.0 if op.contact == "flank" else op.slope  # a flank meets the steps of its own rows
+    # a flank meets the steps of its own rows; an upright cutter at most the depth at its axis
+    sloped = (op.slope or 0.0) if op.contact == "corner" else 0.0
     (law, worst), (even, _) = (
         greatest_law(poses, material, limits, slope=slope, scallop=met, measure="greatest") for slope in (sloped, 0.0)
     )
@@ -135,7 +137,7 @@ def wall_operation(
         depths=DepthRules(
             law=law,
             even_law=even,
-            slope=op.slope,
+            slope=op.slope or 0.0,
             deflection=job.table.limits.deflection_workpiece_um / 1000.0,
             factor=1.0 - op.reserve,
             experiments=experiments,
@@ -149,6 +151,9 @@ def _planned_poses(op: WallOperationTable, number: int, cutter: Cutter, feed_per
     if op.contact == "flank":
         deep = stated(op.axial_depth_mm, f"operation.{number}.axial_depth_mm")
         return (FlankPose(cutter, feed_per_tooth, deep if op.milling == "down" else -deep),)
+    if op.contact == "end":
+        across = stated(op.step_over_mm, f"operation.{number}.step_over_mm")
+        return (EndPose(cutter, feed_per_tooth, -across if op.milling == "down" else across),)
     lean, lead = (stated(getattr(op, key), f"operation.{number}.{key}") for key in ("lean_deg", "lead_deg"))
     step = _step_over(op, number, cutter) * (-1.0 if op.milling == "down" else 1.0)
     tilt = -math.copysign(math.radians(lean), step)

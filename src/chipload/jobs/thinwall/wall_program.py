@@ -12,7 +12,8 @@ from chipload.errors import Finding, Severity
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
-from chipload.planning.thinwall.linking import Margins, OperationMotion, PassProgram, link_passes
+from chipload.planning.thinwall.linking import OperationMotion, link_passes
+from chipload.planning.thinwall.pass_program import Margins, PassProgram
 from chipload.planning.thinwall.passes import Plan
 from chipload.program.check import check_program
 from chipload.program.commands import Commands

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from chipload.planning.thinwall.depth import DepthRange, largest_depths
     from chipload.planning.thinwall.experiments import Proposal, propose_cuts
     from chipload.planning.thinwall.force_table import ForceTable, law_on_stock
-    from chipload.planning.thinwall.linking import FineSide, Margins, OperationMotion, PassProgram, link_passes
+    from chipload.planning.thinwall.linking import FineSide, OperationMotion, link_passes
+    from chipload.planning.thinwall.pass_program import Margins, PassProgram
     from chipload.planning.thinwall.passes import Plan
     from chipload.planning.thinwall.paths import PassMotion
     from chipload.planning.thinwall.plane_stock import CutterPose
@@ -52,7 +53,8 @@ __getattr__, __dir__ = attach(
         "depth": "DepthRange largest_depths",
         "experiments": "Proposal propose_cuts",
         "force_table": "ForceTable law_on_stock",
-        "linking": "FineSide Margins OperationMotion PassProgram link_passes",
+        "linking": "FineSide OperationMotion link_passes",
+        "pass_program": "Margins PassProgram",
         "passes": "Plan",
         "paths": "PassMotion",
         "plane_stock": "CutterPose",

@@ -25,7 +25,9 @@ from chipload.cutting.force import forces_over_turn, mean_forces
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import with_runout
 from chipload.errors import InputError
+from chipload.planning.thinwall.end_stock import EndPose
 from chipload.planning.thinwall.flank_stock import FlankPose, Pose
+from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.progress import Progress, silent
 
 Floats = NDArray[np.float64]
@@ -37,7 +39,7 @@ THRESHOLD, DEEPEST, INFEASIBLE = 0, 1, 2
 LOOKS = 49
 #: share of the feed at which the force is the edge force alone
 NO_FEED = 1e-6
-#: rotations between which the greatest force is searched; the engagement of a flank begins and ends abruptly
+#: rotations between which the greatest force is searched; the engagement of a flank or an end begins and ends abruptly
 STEP_DEG, FLANK_STEP_DEG = 1.0, 0.25
 #: so many times as many nodes on the flank arc of a barrel, of which a row touches a small part: 0.7 % of the mean
 BARREL_NODES = 4
@@ -116,7 +118,7 @@ def normal_force(
     measure : ``greatest`` size over the revolution, or the size of the ``mean``
     nodes : as of :func:`chipload.planning.thinwall.plane_stock.engagement_of_depths`; None: 8 of a mean (1e-4 of a
         ball's), 16 of the greatest (1 to 4 % too great: the engagement begins and ends abruptly)
-    step_deg : between the rotations at which the greatest is searched; None: 1, of a flank 0.25
+    step_deg : between the rotations at which the greatest is searched; None: 1, of a flank or an end 0.25
 
     Examples
     --------
@@ -139,7 +141,7 @@ def normal_force(
     cutter = posture.cutter
     turn = math.tau / (cutter.flutes if cutter.teeth_alike else 1)
     own = BARREL_NODES if cutter.flank_arc is not None else 1
-    apart = step_deg or (FLANK_STEP_DEG if isinstance(posture, FlankPose) else STEP_DEG)
+    apart = step_deg or (STEP_DEG if isinstance(posture, CutterPose) else FLANK_STEP_DEG)
     theta = np.linspace(0.0, turn, max(8, math.ceil(math.degrees(turn) / apart)), endpoint=False)
     for at in range(0, len(d), BLOCK):
         bites = posture.engagement(d[at : at + BLOCK], nodes or own * (8 if measure == "mean" else 16))
@@ -254,12 +256,21 @@ def _helps(
     def at_diameter(diameter: float) -> float:
         return float(normal_force(_scaled(posture, diameter), material, [depth], measure=measure)[0])
 
-    across = 0.0 if isinstance(posture, FlankPose) else abs(posture.step or 0.0) / posture.cutter.diameter
-    ratio = max(depth / posture.deepest, across)
+    ratio = _least_share(posture, depth)
     smallest = 1.001 * ratio * posture.cutter.diameter
     if smallest >= posture.cutter.diameter or at_diameter(smallest) > threshold:
         return edge, None, None
     return edge, None, _bisect(at_diameter, threshold, smallest, posture.cutter.diameter)
+
+
+def _least_share(posture: Pose, depth: float) -> float:
+    """Least diameter of a cutter of the same shape for this depth and step-over, over its own."""
+    if isinstance(posture, FlankPose):
+        return depth / posture.deepest
+    step, cutter = abs(posture.step or 0.0), posture.cutter
+    if isinstance(posture, EndPose):  # the flat of the bottom covers the step-over
+        return step / (cutter.diameter - 2.0 * cutter.corner_radius)
+    return max(depth / posture.deepest, step / cutter.diameter)
 
 
 def _scaled(posture: Pose, diameter: float) -> Pose:

@@ -28,6 +28,7 @@ from chipload.cutter.slices import edge_lag, slices
 from chipload.engagement.immersion.immersion import tool_frame
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
+from chipload.planning.thinwall.end_stock import EndPose
 from chipload.planning.thinwall.plane_stock import CutterPose
 
 Floats = NDArray[np.float64]
@@ -214,5 +215,5 @@ class FlankPose:
         return piece, s_from, s_to, own.rho[piece], own.sin_kappa[piece], left, own.columns
 
 
-#: how a cutter touches the surface: at a point of its corner or along its flank
-Pose = CutterPose | FlankPose
+#: how a cutter touches the surface: at a point of its corner, along its flank or with its end
+Pose = CutterPose | FlankPose | EndPose

@@ -27,9 +27,10 @@ from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.finish_rows import FinishSide
 from chipload.planning.thinwall.flank_rows import FlankSide
 from chipload.planning.thinwall.flank_stock import Pose
+from chipload.planning.thinwall.floor_rows import FloorSide, floor_pass
+from chipload.planning.thinwall.pass_program import Margins, PassPath, PassProgram
 from chipload.planning.thinwall.passes import WallPass
 from chipload.planning.thinwall.paths import PassMotion, Rows, placed, rows_of
-from chipload.program.program import LINE, RAPID, Program
 
 Floats = NDArray[np.float64]
 
@@ -60,31 +61,6 @@ class FineSide:
 
 
 @dataclass(frozen=True, eq=False)
-class PassProgram:
-    """One pass as a program, with the side, contact point and planned depth of its rows.
-
-    Attributes
-    ----------
-    program : from the safe height to the safe height; ``line`` counts the rows of the whole tour from 1
-    side : number of the side
-    contact : (k,) bool, rows that end at a contact point
-    points, normals : (k, 3) float [mm], q and n of those rows; 0 elsewhere
-    place : (k, 2) float, u and v
-    depth : (k,) float [mm], planned; 0 beyond the edges
-    operation : number of the operation
-    """
-
-    program: Program
-    side: int
-    contact: NDArray[np.bool_]
-    points: Floats
-    normals: Floats
-    place: Floats
-    depth: Floats
-    operation: int = 0
-
-
-@dataclass(frozen=True, eq=False)
 class OperationMotion:
     """Path data of an operation: sides, pass motion and margins.
 
@@ -95,25 +71,9 @@ class OperationMotion:
     margins : of its links
     """
 
-    sides: Sequence[FineSide | FinishSide | FlankSide]
+    sides: Sequence[FineSide | FinishSide | FlankSide | FloorSide]
     pass_motion: PassMotion
     margins: Margins
-
-
-@dataclass(frozen=True)
-class Margins:
-    """Distances [mm] of links: beyond the edges of the wall, the safe height of the tip, and the tolerance of a link's
-    distance to the surface.
-    """
-
-    beyond: float
-    safe: float
-    sag: float
-
-    def __post_init__(self) -> None:
-        for key in ("beyond", "safe", "sag"):
-            if not 0.0 < getattr(self, key) < math.inf:
-                raise InputError(f"tour.{key}_mm = {getattr(self, key):g}: must be above 0")
 
 
 def refined(values: Floats, at: tuple[Floats, Floats], to: tuple[Floats, Floats]) -> Floats:
@@ -168,7 +128,11 @@ def link_passes(
     for number, p in enumerate(passes):
         own = operations[p.operation]
         label = f"pass {number + 1} side {p.side + 1}"
-        leg = _pass_program(p, own.sides[p.side], places, own.pass_motion, own.margins, label)
+        side = own.sides[p.side]
+        if isinstance(side, FloorSide):
+            leg = floor_pass(p, side, places, own.pass_motion, own.margins, label)
+        else:
+            leg = _pass_program(p, side, places, own.pass_motion, own.margins, label)
         count = len(leg.program)
         program = replace(leg.program, line=np.arange(line, line + count))
         out.append(replace(leg, program=program, operation=p.operation))
@@ -200,7 +164,7 @@ def _pass_program(
             f"{label}: the cutter's axis stands {math.degrees(math.asin(low_axis)):.3g} deg above the horizontal: lean "
             "it more towards the free edge (operation.lean_deg)"
         )
-    path = _Path()
+    path = PassPath()
     lifted = tip + pass_motion.clearance * rows.normal
     away = axis + ASIDE * rows.normal
     outside = lifted + ((margins.safe - lifted[..., 2]) / away[..., 2]).clip(0.0)[..., None] * away
@@ -271,60 +235,3 @@ def _known(rows: Rows, side: FineSide, depth: Floats) -> tuple[Floats, Floats]:
         along, values = along[::-1], values[:, ::-1]
     place = np.stack(np.broadcast_arrays(along[None, :], up[:, None]), axis=-1)
     return place, values
-
-
-class _Path:
-    """Rows of a leg as they come."""
-
-    def __init__(self) -> None:
-        self.points: list[Floats] = []
-        self.axes: list[Floats] = []
-        self.motion: list[int] = []
-        self.ratio: list[float] = []
-        self.at: dict[int, tuple[Floats, Floats, Floats, float]] = {}
-
-    def rapid(self, tip: Floats, axis: Floats) -> None:
-        if self.points and np.allclose(tip, self.points[-1], atol=1e-9) and np.allclose(axis, self.axes[-1], atol=1e-9):
-            return
-        self._add(tip, axis, RAPID, 0.0)
-
-    def line(self, tip: Floats, axis: Floats, centre: Floats, before: Floats) -> None:
-        """``before`` is the centre at the point before."""
-        way = float(np.linalg.norm(centre - before))
-        own = float(np.linalg.norm(tip - self.points[-1]))
-        self._add(tip, axis, LINE, own / way if self.motion[-1] == LINE and way > 0.0 else 1.0)
-
-    def known(self, point: Floats, normal: Floats, place: Floats, depth: float) -> None:
-        """What the last row ends at."""
-        self.at[len(self.points) - 1] = (point, normal, place, depth)
-
-    def _add(self, tip: Floats, axis: Floats, motion: int, ratio: float) -> None:
-        self.points.append(tip)
-        self.axes.append(axis)
-        self.motion.append(motion)
-        self.ratio.append(ratio)
-
-    def pass_program(self, side: int, pass_motion: PassMotion, label: str) -> PassProgram:
-        count = len(self.points)
-        zero, none = np.zeros((count, 3)), np.zeros(count, dtype=np.int64)
-        program = Program(
-            motion=np.array(self.motion),
-            p_work=np.array(self.points),
-            axis=np.array(self.axes),
-            centre=zero,
-            normal=np.tile([0.0, 0.0, 1.0], (count, 1)),
-            turns=none,
-            feed=pass_motion.feed * np.array(self.ratio),
-            spindle=np.full(count, pass_motion.spindle if pass_motion.posture.clockwise else -pass_motion.spindle),
-            tool=np.full(count, pass_motion.posture.cutter.number),
-            line=none,
-            label=none,
-            labels=(label,),
-        )
-        at = np.array(sorted(self.at))
-        points, normals, place, depth = zero.copy(), zero.copy(), np.zeros((count, 2)), np.zeros(count)
-        for k in at.tolist():
-            points[k], normals[k], place[k], depth[k] = self.at[k]
-        contact = np.zeros(count, dtype=np.bool_)
-        contact[at] = True
-        return PassProgram(program, side, contact, points, normals, place, depth)

@@ -183,6 +183,24 @@ def in_steps(values: Floats) -> Floats:
     return np.tile(lowered, (len(values), 1))
 
 
+def at_one_level(low: Floats, high: Floats, allowance: float, smallest: float) -> Floats:
+    """Stock (n, m) before a level pass over a floor, lowered so that each row is left whole or cut by earlier passes
+    down to one level: the least of the rows that need them.
+
+    An end mill that goes down along a row presses with its bottom, so a pass is level. ``low`` is the stock after it.
+
+    >>> none = np.zeros((2, 3))
+    >>> at_one_level(none, np.array([[0.9, 0.3, 0.9], [0.9, 0.4, 0.5]]), 0.8, 0.1).tolist()
+    [[0.8, 0.3, 0.3], [0.8, 0.3, 0.3]]
+    """
+    row = high.min(axis=0)
+    whole = row >= allowance - NOTHING
+    if whole.all():
+        return np.full_like(high, allowance)
+    level = min(float(row[~whole].min()), allowance - smallest)
+    return np.asarray(np.maximum(np.tile(np.where(whole, allowance, level), (len(high), 1)), low))
+
+
 def _no_sliver(low: Floats, high: Floats, allowance: float, smallest: float) -> Floats:
     """Stock before a pass: the allowance where it is reached, else at least the smallest depth below it."""
     rest = np.maximum(np.minimum(high, allowance - smallest), low)
@@ -199,6 +217,7 @@ def variable(
     corrections: Sequence[Floats] | None = None,
     leave: float = 0.0,
     steps: bool = False,
+    level: bool = False,
     most: int = 200,
     progress: Progress = silent,
 ) -> Plan:
@@ -215,6 +234,7 @@ def variable(
     leave : [mm] stock that stays on every side
     steps : a pass leaves the same stock along each row, and no more of it up the wall: a flank reaches over the rows
         before
+    level : each pass is level, over the rows that need it; ``slope`` has no meaning
     most : passes on a side before it is given up
 
     Raises
@@ -240,9 +260,13 @@ def variable(
             depth = threshold.within(law.depth(F / c[side]))
             weak = (depth == 0.0) & open_
             infeasible |= {(side, int(i), int(j)) for i, j in np.argwhere(weak)}
-            depth = lower_envelope(surfaces[side].points, np.maximum(depth, law.limits.smallest), slope)
-            high = _no_sliver(D[side], D[side] + depth, a, law.limits.smallest)
-            high = in_steps(high) if steps else high
+            depth = np.maximum(depth, law.limits.smallest)
+            if level:
+                high = at_one_level(D[side], np.minimum(D[side] + depth, a), a, law.limits.smallest)
+            else:
+                depth = lower_envelope(surfaces[side].points, depth, slope)
+                high = _no_sliver(D[side], D[side] + depth, a, law.limits.smallest)
+                high = in_steps(high) if steps else high
             done.append(planned_pass(side, D[side], high, threshold, law, c[side]))
             D[side] = high
             progress(

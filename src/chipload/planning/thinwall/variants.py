@@ -50,6 +50,7 @@ class DepthOperation:
     slope : greatest change of its depth along the surface
     corrections : of the law's forces, side by side
     steps : its passes leave steps, one a row
+    level : its passes are level
     """
 
     threshold_of: ThresholdOf
@@ -58,6 +59,7 @@ class DepthOperation:
     slope: float = 1.0
     corrections: Corrections = None
     steps: bool = False
+    level: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +135,7 @@ def limited_to(
                 corrections=one.corrections,
                 leave=leave,
                 steps=one.steps,
+                level=one.level,
             )
 
         return planned
