@@ -8,6 +8,7 @@ import pytest
 
 from chipload.examples import copy_example
 from chipload.jobs import load_job, run_job
+from chipload.result import Verdict
 
 SMALL = (
     "wall.length_mm=8.0",
@@ -25,7 +26,7 @@ SMALL = (
     "operation.0.reserve=0.1",
     "operation.0.least_error=false",
     "operation.0.compensate_um=0.0",
-    "limits.deflection_workpiece_um=45.0",
+    "limits.deflection_workpiece_um=60.0",
 )
 BARREL = ("cutter.0.corner_radius_mm=1.5", "cutter.0.barrel_radius_mm=40.0", "operation.0.lean_deg=78.5")
 
@@ -42,16 +43,19 @@ def test_rows_follow_the_radius_of_the_arc(finished) -> None:
     own = {name: done.result.operations[0] for name, done in finished.items()}
     for name, r in (("ball", 4.0), ("barrel", 40.0)):
         assert own[name]["step_over_mm"] == pytest.approx(2.0 * math.sqrt(2.0 * r * 0.008 - 0.008**2), rel=1e-9)
-    assert own["barrel"]["variants"]["constant"]["time_min"] < 0.6 * own["ball"]["variants"]["constant"]["time_min"]
+    once = {name: one["variants"]["variable"] for name, one in own.items()}
+    assert once["barrel"]["passes"] == once["ball"]["passes"] == 1
+    assert once["barrel"]["time_min"] < 0.6 * once["ball"]["time_min"]
+    # the longer contact of the arc costs force
+    assert once["barrel"]["force_normal_n_max"] > 1.1 * once["ball"]["force_normal_n_max"]
 
 
 def test_the_simulation_confirms_the_plan(finished) -> None:
-    """No gouge, the scallop that the rows leave, the planned force, the volume of the stock."""
+    """No gouge, the scallop that the rows leave, at most the planned force, the limit."""
     for name, done in finished.items():
-        one = done.result.operations[0]["variants"]["constant"]
+        one = done.result.operations[0]["variants"]["variable"]
         assert one["gouge_um"] <= 8.0, name
         assert one["left_um"] < 8.0, name
-        assert one["force_over_planned"]["median"] == pytest.approx(1.0, abs=0.1), name
-        assert one["deflection_workpiece_um_max"] < 45.0, name
-    volumes = [d.result.operations[0]["variants"]["constant"]["chip_volume_mm3"] for d in finished.values()]
-    assert volumes[0] == pytest.approx(volumes[1], rel=0.01)
+        assert 0.8 < one["force_over_planned"]["median"] < 1.05, name
+        assert one["deflection_workpiece_um_max"] < 60.0, name
+        assert done.result.verdict is Verdict.HOLDS, name
