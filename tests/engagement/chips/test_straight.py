@@ -103,6 +103,19 @@ def test_what_a_leaning_cylinder_covers_level_is_its_ellipse_swept() -> None:
         assert found.polygon(0).area == pytest.approx(math.pi * 25.0 / 0.8 + 7.0 * wide, rel=1e-4)
 
 
+def test_no_point_of_a_finer_general_loop_is_further_out_than_the_tolerance() -> None:
+    """Each loop of a tolerance of 1e-4 mm lies within the outline of 0.1 mm and its tolerance; some come near it."""
+    cutter, most = CUTTERS["ball"], 0.0
+    for p, v, a in ways(5, 8):
+        move, heights = Move.lerp(p, a, p + v, a), np.linspace(-2.0, 16.0, 7)
+        found = covered_rings([move], np.array(cutter_numbers(cutter)), [heights], 0.1)
+        for k, area in enumerate(covered_areas(move, cutter, heights.tolist(), 1e-4)):
+            if area is not None:
+                off = shapely.distance(found.polygon(k), shapely.points(area.rings[0].points))
+                most = max(most, float(off.max()))
+    assert 0.08 < most <= 0.1
+
+
 def test_a_finer_tolerance_has_more_points_and_fourth_of_the_error() -> None:
     cutter, (p, v, a) = CUTTERS["bull"], ways(11, 1)[0]
     move, heights = Move.lerp(p, a, p + v, a), np.array([3.0])
