@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from chipload.geometry.bspline import through
+from chipload.planning.impeller import _scallop
 from chipload.planning.impeller.scallop_height import distance, scallop_heights
 from chipload.planning.impeller.scallop_width import reaches
 from chipload.stock.dexels._kernels import pierce
@@ -99,3 +100,18 @@ def test_distance_of_points_from_the_cutting_part():
     assert out.sum() > 100
     assert np.abs(got[out] - (core[out] - r)).max() < 1e-12
     assert (got[~out] <= 1e-12).all()
+
+
+def test_distances_of_many_poses_are_those_of_each():
+    """The loop of vector instructions against NumPy: beside the corner, above, below, inside; and no pose."""
+    rng = np.random.default_rng(3)
+    tips, axes = rng.uniform(-8.0, 8.0, (40, 3)), rng.normal(size=(40, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    tips[7] = axes[7] = np.nan
+    poses = np.stack([np.hstack([tips, axes]).T] * 2)
+    got = np.empty(40)
+    for point in rng.uniform(-8.0, 8.0, (50, 3)):
+        _scallop.distances(*point, poses, 1, 40, R - r, r, got)
+        want = distance(point, tips, axes, R - r, r)
+        assert got[7] > 1e6
+        assert np.delete(got, 7) == pytest.approx(np.delete(want, 7), abs=1e-12)

@@ -38,7 +38,8 @@ from chipload.progress import Progress
 #: greatest number of divisions of a partition
 _ROUNDS = 2
 #: where the check finds more than asked on a patch or surface, what is left is counted on points so many times closer
-#: together and planned again; not for those where it finds more than this share of what is asked: there no cutter goes
+#: together and planned again; not where it finds more than this share of what is asked on a surface that the planner
+#: knows to be out of reach in part
 _FINER, _NEARLY = (0.5, 0.25), 1.25
 
 
@@ -212,33 +213,53 @@ def _checked(
     own = job.with_catalogue(done.partition.catalogue)
     programs, covered = _looked_at(own, done.plan, machine, paths, memory, keep)
     for fine in _FINER:
-        left = _left_shares(programs, covered)
-        if not any(1.0 < x <= _NEARLY for x in left):
+        if not _mendable(_left_shares(programs, covered)):
             break
         plan = planned(
             own, done.partition.division.patches, _changes(way), known=memory.millings, keep=keep, fine=fine
         )  # fmt: skip
         again = _looked_at(own, plan, machine, paths, memory, keep)
-        if _too_high(_left_shares(*again)) < _too_high(left):
+        kept, new = ((_left_shares(*x), sum(p.seconds for p in x[0])) for x in ((programs, covered), again))
+        if _rank(*new) < _rank(*kept):
             programs, covered = again
     repeats = way.costs[0].terms.repeats
     changes = _change_time([p.setting for p in programs], way)
     return CheckedPartition(done.partition, programs, covered, repeats, done.predicted, changes)
 
 
-def _left_shares(programs: Sequence[Checked], covered: Sequence[Covered]) -> list[float]:
-    """The most that is left in each patch and on each surface, as a share of what is asked."""
-    scallops = [x.greatest / x.asked for p in programs for x in p.scallops]
-    return [*scallops, *(c.greatest[0] / c.asked for c in covered)]
+def _left_shares(programs: Sequence[Checked], covered: Sequence[Covered]) -> list[tuple[float, bool]]:
+    """The most that is left in each patch and on each surface, as a share of what is asked, and whether some of the
+    surface is known to be out of reach.
+    """
+    lost = {(c.body, c.side): c.unreached > 0.0 for c in covered}
+    patches = [
+        (x.greatest / x.asked, lost[m.patch.body, m.patch.side])
+        for p in programs
+        for x, m in zip(p.scallops, p.setting.millings, strict=True)
+    ]
+    return [*patches, *((c.greatest[0] / c.asked, c.unreached > 0.0) for c in covered)]
 
 
-def _too_high(left: Sequence[float]) -> tuple[int, float]:
-    """How many patches and surfaces have more left than asked, and the most: a corner that no cutter reaches stays.
+def _mendable(left: Sequence[tuple[float, bool]]) -> bool:
+    """Whether more is left somewhere than asked that rest passes might take: little, or all of it is within reach.
 
-    >>> _too_high([0.9, 1.05, 5.4]) > _too_high([0.9, 1.0, 5.4])
+    >>> _mendable([(0.9, False), (1.4, True)]), _mendable([(1.4, False)]), _mendable([(1.2, True)])
+    (False, True, True)
+    """
+    return any(x > 1.0 and (x <= _NEARLY or not lost) for x, lost in left)
+
+
+def _rank(left: Sequence[tuple[float, bool]], seconds: float) -> tuple[int, float, float]:
+    """Order of plans: in how many patches and surfaces more is left than asked; the most, to a hundredth of what is
+    asked, where that is too much: a corner that no cutter reaches stays; the time [s].
+
+    >>> _rank([(0.9, False), (1.05, False), (5.4, True)], 9.0) > _rank([(1.0, False), (5.4, True)], 10.0)
+    True
+    >>> _rank([(5.401, True)], 9.0) < _rank([(5.4, True)], 10.0)
     True
     """
-    return sum(x > 1.0 for x in left), max(left, default=0.0)
+    most = max((x for x, _ in left), default=0.0)
+    return sum(x > 1.0 for x, _ in left), round(most, 2) if most > 1.0 else 0.0, seconds
 
 
 def _looked_at(

@@ -56,24 +56,45 @@ def along_normal(
 
 
 @njit(cache=True, nogil=True)
+def distances(
+    x: float, y: float, z: float, poses: Any, m: int, count: int, rho: float, corner: float, out: Any
+) -> None:
+    """As :func:`distance`, of the first ``count`` of the ``poses`` (2, 6, k) of a line m, tips and axes, into ``out``.
+
+    Both cases of the corner are computed for all, so that the loop is one of vector instructions.
+    """
+    for j in range(count):
+        u, v, w = x - poses[m, 0, j], y - poses[m, 1, j], z - poses[m, 2, j]
+        high = u * poses[m, 3, j] + v * poses[m, 4, j] + w * poses[m, 5, j]
+        off = u * u + v * v + w * w - high * high
+        d = math.sqrt(off if off > 0.0 else 0.0)
+        h = high - corner
+        edge = math.sqrt((d - rho) * (d - rho) + h * h) - corner
+        low = edge if d > rho else -h - corner
+        D = d - rho - corner if h > 0.0 else low
+        out[j] = D if high == high else _FAR
+
+
+@njit(cache=True, nogil=True)
 def left_at(
-    x: float, y: float, z: float, N: Any, i: int, tips: Any, axes: Any, wide: Any, near: Any, rho: float, corner: float
-) -> float:
-    """What the poses of two lines beside the place i leave at a point; ``near`` is room to work."""
-    n = tips.shape[1]
-    best, line, pose = math.inf, 0, i
+    x: float, y: float, z: float, N: Any, tips: Any, axes: Any, poses: Any, first: Any, count: Any, near: Any,
+    rho: float, corner: float,
+) -> float:  # fmt: skip
+    """What the ``poses`` of two lines, ``count`` from ``first`` on, leave at a point; ``near`` is room to work."""
+    best, line, pose = math.inf, 0, 0
     for m in range(2):
-        first, last = max(i - wide[m], 0), min(i + wide[m], n - 1)
-        at = first
-        for j in range(first, last + 1):
-            near[j - first] = distance(x, y, z, tips[m, j], axes[m, j], rho, corner)
-            if near[j - first] < near[at - first]:
-                at = j
-        low = near[at - first]
-        if first < at < last:
-            low = lowest(near[at - first - 1], low, near[at - first + 1])
+        distances(x, y, z, poses, m, count[m], rho, corner, near)
+        least = near[0]
+        for j in range(count[m]):
+            least = min(near[j], least)
+        at = 0
+        while near[at] != least:
+            at += 1
+        low = near[at]
+        if 0 < at < count[m] - 1:
+            low = lowest(near[at - 1], low, near[at + 1])
         if low < best:
-            best, line, pose = low, m, at
+            best, line, pose = low, m, first[m] + at
     return float(along_normal(best, x, y, z, N, tips[line, pose], axes[line, pose], rho, corner))
 
 
@@ -86,16 +107,25 @@ def heights(
     The crest is an edge: between the shares beside the highest one it is looked for in so many ``steps`` of thirds.
     """
     n, shares = points.shape[0], points.shape[1]
-    near, N, both = np.empty(2 * max(wide[0], wide[1]) + 1), np.empty(3), np.empty(2)
+    most = 2 * max(wide[0], wide[1]) + 1
+    near, N, both = np.empty(most), np.empty(3), np.empty(2)
+    poses, first, count = np.empty((2, 6, most)), np.empty(2, dtype=np.int64), np.empty(2, dtype=np.int64)
     for i in range(n):
         out[i] = math.nan
         if math.isnan(tips[0, i, 0]) or math.isnan(tips[1, i, 0]):
             continue
+        for m in range(2):
+            first[m] = max(i - wide[m], 0)
+            count[m] = min(i + wide[m], n - 1) + 1 - first[m]
+            for k in range(3):
+                for j in range(count[m]):
+                    poses[m, k, j], poses[m, 3 + k, j] = tips[m, first[m] + j, k], axes[m, first[m] + j, k]
         crest, top = -math.inf, 0
         for k in range(shares):
             left = left_at(
-                points[i, k, 0], points[i, k, 1], points[i, k, 2], normals[i, k], i, tips, axes, wide, near, rho, corner
-            )
+                points[i, k, 0], points[i, k, 1], points[i, k, 2], normals[i, k], tips, axes, poses, first, count,
+                near, rho, corner,
+            )  # fmt: skip
             if left > crest:
                 crest, top = left, k
         low, high = float(max(top - 1, 0)), float(min(top + 1, shares - 1))
@@ -111,7 +141,7 @@ def heights(
                     (1.0 - w) * points[i, k, 0] + w * points[i, k + 1, 0],
                     (1.0 - w) * points[i, k, 1] + w * points[i, k + 1, 1],
                     (1.0 - w) * points[i, k, 2] + w * points[i, k + 1, 2],
-                    N, i, tips, axes, wide, near, rho, corner,
+                    N, tips, axes, poses, first, count, near, rho, corner,
                 )  # fmt: skip
             crest = max(crest, both[0], both[1])
             if both[0] < both[1]:
