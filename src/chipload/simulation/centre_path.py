@@ -251,7 +251,7 @@ def rim_engagement(
     cut = np.linspace(0, m, max(workers, 1) + 1).astype(int)
     begins = np.concatenate([[0.0], np.cumsum(trail.lengths)])
     behind = begins[k] + w * trail.lengths[k] - OWN_MM
-    away = np.maximum.accumulate(np.where(trail.active, 0, np.arange(len(trail.segments))))
+    away = np.maximum.accumulate(np.where(np.asarray(trail.active), 0, np.arange(len(trail.segments))))
     own = np.maximum(np.searchsorted(begins, behind, side="right") - 1, away[k])
 
     def run(i: int) -> Any:

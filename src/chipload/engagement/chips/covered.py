@@ -195,8 +195,10 @@ def covered_rings(moves: Sequence[Move], K: Floats, heights: Sequence[Floats], t
 
 
 def _is_straight(move: Move, K: Floats) -> bool:
-    """Whether a convex cutter goes straight with a fixed axis that leans, or with a pointed bottom."""
-    if len(move.tip) > 2 or move.axis[1:].any() or min(K[0], K[5], K[8]) < 0.0:
+    """Whether a convex cutter without the flank arc of a barrel goes straight with a fixed axis that leans, or with a
+    pointed bottom.
+    """
+    if len(move.tip) > 2 or move.axis[1:].any() or min(K[0], K[5], K[8]) < 0.0 or K[13] > 0.0:
         return False
     return bool(move.axis[0, :2].any() or K[5] > 0.0)
 

@@ -106,9 +106,7 @@ def resolution_of(job: ProgramJob, program: Program) -> Resolution:
     if op.corner_slices is not None:
         return Resolution(op.step_mm, op.tolerance_mm, op.corner_slices, flank, estimated=op.resolution_error)
     if (np.asarray(program.axis)[:, 2] > 1.0 - 1e-12).all():
-        return Resolution(
-            op.step_mm, op.tolerance_mm, CORNER, flank, grading=GRADING, estimated=op.resolution_error
-        )
+        return Resolution(op.step_mm, op.tolerance_mm, CORNER, flank, grading=GRADING, estimated=op.resolution_error)
     flank = op.flank_mm or LEANING_FLANK * smallest
     return Resolution(
         op.step_mm, op.tolerance_mm, 2 * CORNER, flank, bottom_slices=LEANING_BOTTOM, estimated=op.resolution_error

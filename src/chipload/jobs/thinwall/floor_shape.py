@@ -31,7 +31,8 @@ def floor_shape(places: Places, stock: LayeredStock, legs: Sequence[PassProgram]
     """Path and stock beside the finished part."""
     inputs = places.inputs
     gap, at = _nearest(inputs, legs)
-    found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.corner_radius)
+    corner = max(o.cut.cutter.corner_radius for o in inputs.operations)
+    found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + corner)
     return Shape(
         found.gouge,
         found.left,

@@ -167,7 +167,7 @@ def _check_foot(job: ThinWallJob, below: float) -> None:
         (f"wall.{k}.foot_mm", one.foot_mm) for k, one in enumerate(wall)
     ]  # fmt: skip
     for key, foot in feet:
-        if foot < below:
+        if foot is not None and foot < below:
             raise InputError(
                 f"{key} = {foot:g}: must be at least {below:.4g}: the barrel reaches so far below its last row, "
                 "towards the clamp: state that, or touch nearer to the tip by less lean_deg"

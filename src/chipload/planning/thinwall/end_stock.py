@@ -69,6 +69,11 @@ class EndPose:
                 raise InputError(
                     f"cutter.{key}_deg = {math.degrees(value):g}: must be 0 on a floor: choose an end mill or bull nose"
                 )
+        if cutter.barrel_radius is not None:
+            raise InputError(
+                f"cutter.barrel_radius_mm = {cutter.barrel_radius:g}: the flank of a barrel makes no floor: choose an end "
+                "mill or bull nose"
+            )
         if cutter.body:
             raise InputError("cutter.body: chips of a body are not simulated: choose an end mill or bull nose")
         flat = cutter.diameter - 2.0 * cutter.corner_radius
@@ -84,6 +89,11 @@ class EndPose:
                 f"step_over_mm = {abs(self.step):g}: must be from above 0 to {flat:g}, the flat of the bottom: "
                 "cusps would stay on the floor"
             )
+
+    @property
+    def below(self) -> float:
+        """How far the cutter reaches below the floor that it makes [mm]."""
+        return 0.0
 
     @property
     def axis(self) -> Floats:
