@@ -81,6 +81,9 @@ def test_the_outline_of_a_barrel_is_its_arc_across_the_feed():
         40.0 * (1.0 - math.cos(math.radians(77.0) - BARREL.flank_arc.kappa_from)), rel=1e-12
     )
     tip = posture.centre - BARREL.flank_arc.f * posture.axis
+    # the arc ends 40 sin(7.8 deg) from the contact towards the tip, and 40 sin(13 deg) towards the shank
+    ends = np.sign(tip[1]) * np.array([5.3, 5.5, -8.9, -9.1])
+    assert np.isfinite(posture.outline(ends)).tolist() == [True, False, True, False]
     z = np.linspace(0.0, 16.0, 400)
     # every circle of the profile: its lowest point is at z = 0 or above, and its reach towards the tip within `below`
     low = tip[2] + z * posture.axis[2] - BARREL.radius_at(z) * math.sin(posture.beta)
