@@ -124,7 +124,7 @@ class GltfScene:
 
     def _accessor(self, kind: int, shape: str, data: NDArray[Any], most: list[Any], least: list[Any]) -> int:
         """Add an array of 4-byte rows or entries; its number."""
-        self._data.append(memoryview(data).cast("B"))
+        self._data.append(data.data.cast("B"))
         self.tree["accessors"].append(
             {
                 "componentType": kind,
