@@ -141,7 +141,6 @@ def test_each_program_in_use_can_be_chosen(browser, tmp_path) -> None:
 
 
 def test_a_program_that_makes_the_report_too_large_is_named(monkeypatch) -> None:
-    from chipload.report import drawn_bodies
     from chipload.report import view_section as module
 
     result, blanks, stocks = two_programs()

@@ -153,8 +153,7 @@ def torque_deviation(bites: ToothEngagement, cutter: Cutter, material: Material,
 
 def _deviation(factors: Floats, material: Material) -> Floats:
     """Return the standard deviation of loads with the factors (n, 6) of the coefficients."""
-    variance: Floats = np.einsum("nk,kl,nl->n", factors, material.variances, factors)
-    return np.sqrt(np.clip(variance, 0.0, None))
+    return np.asarray(np.sqrt(np.clip(np.einsum("nk,kl,nl->n", factors, material.variances, factors), 0.0, None)))
 
 
 def _bases_at(bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
