@@ -36,8 +36,8 @@ def test_both_parts_are_those_of_the_law():
     whole = Material("x", 700.0, 200.0, 0.0, 12.0, 10.0, 0.0, source="made up")
     light = Material("x", 10.0, 200.0 / 70.0, 0.0, 12.0, 10.0, 0.0, source="made up")
     start, end, feed, depth = 2.0, math.pi, 0.1, 3.0
-    bites = engagement_of_arcs([start], [end], feed, mill, depth)
-    torque, little = (mean_forces(bites, mill, m)[1] for m in (whole, light))
+    engagement = engagement_of_arcs([start], [end], feed, mill, depth)
+    torque, little = (mean_forces(engagement, mill, m)[1] for m in (whole, light))
     parts = two_parts(torque, torque, little, little, 10.0 / 700.0)
     scale = 3 * depth * 5.0 / math.tau
     assert parts.torque_cut[0] == pytest.approx(scale * 700.0 * feed * (math.cos(start) - math.cos(end)), rel=1e-6)

@@ -88,19 +88,19 @@ def test_refuses_a_material_that_does_not_say():
 def test_the_band_of_the_greatest_force_is_that_of_materials_drawn_at_random(runout):
     """2000 materials, each coefficient wrong by itself by 2 %: the scatter of |F| and of the torque at the peak."""
     mill = replace(MILL, runout=runout)
-    bites = with_runout(BITES, mill)
+    engagement = with_runout(BITES, mill)
     al = replace(material_named("al7075-t6"), spread=0.02)
     theta = np.linspace(0.0, math.tau, 181)
-    force, torque = forces_over_turn(bites, mill, al, theta)
+    force, torque = forces_over_turn(engagement, mill, al, theta)
     at = theta[np.linalg.norm(force, axis=2).argmax(axis=1)], theta[torque.argmax(axis=1)]
-    found = peak_band(bites, mill, al, *at)
+    found = peak_band(engagement, mill, al, *at)
     rng = np.random.default_rng(7)
     sizes, torques = [], []
     for factors in 1.0 + 0.02 * rng.standard_normal((2000, 6)):
         ktc, krc, kac, kte, kre, kae = factors * al.coefficients
         drawn = replace(al, Ktc=ktc, Krc=krc, Kac=kac, Kte=kte, Kre=kre, Kae=kae)
-        f, m = (forces_over_turn(bites, mill, drawn, np.array(x)) for x in at)
-        k = range(len(bites))
+        f, m = (forces_over_turn(engagement, mill, drawn, np.array(x)) for x in at)
+        k = range(len(engagement))
         sizes.append(np.linalg.norm(f[0][k, k], axis=1))
         torques.append(m[1][k, k])
     np.testing.assert_allclose(found[0], np.std(sizes, axis=0), rtol=0.06)

@@ -64,9 +64,9 @@ def sliced(theta, arcs, feed, cutter, material, depth, slices):
 def test_closed_form_equals_two_thousand_slices(arcs, helix, flutes, depth):
     mill = replace(MILL, helix=math.radians(helix), flutes=flutes)
     ends = np.array([arcs])
-    bites = engagement_of_arcs(ends[..., 0], ends[..., 1], 0.06, mill, depth)
+    engagement = engagement_of_arcs(ends[..., 0], ends[..., 1], 0.06, mill, depth)
     theta = np.append(np.random.default_rng(1).uniform(0.0, math.tau, 8), arcs[0][0] + np.array([0.01, 0.1]))
-    force, torque = forces_over_turn(bites, mill, AL, theta)
+    force, torque = forces_over_turn(engagement, mill, AL, theta)
     ours = np.column_stack([force[0], torque[0]])
     brute = np.array([sliced(t, arcs, 0.06, mill, AL, depth, 2000) for t in theta])
     assert np.abs(brute).max() > 1.0
@@ -77,9 +77,9 @@ def test_closed_form_equals_two_thousand_slices(arcs, helix, flutes, depth):
 @pytest.mark.parametrize("runout", [(0.008, 0.0), (0.004, 0.7), (0.004, math.pi / 4), (0.02, 3.0)])
 def test_runout_equals_fine_slices(feed, runout):
     mill = replace(MILL, runout=runout)
-    bites = engagement_of_arcs([0.2], [math.pi], feed, mill, 6.0)
+    engagement = engagement_of_arcs([0.2], [math.pi], feed, mill, 6.0)
     theta = np.random.default_rng(2).uniform(0.0, math.tau, 8)
-    force, torque = forces_over_turn(bites, mill, AL, theta)
+    force, torque = forces_over_turn(engagement, mill, AL, theta)
     brute = np.array([sliced(t, [(0.2, math.pi)], feed, mill, AL, 6.0, 20000) for t in theta])
     np.testing.assert_allclose(np.column_stack([force[0], torque[0]]), brute, rtol=0.0, atol=1e-4 * np.abs(brute).max())
 
@@ -139,21 +139,21 @@ def test_means_equal_the_textbook_closed_form(arc):
         )
     )
     fz = -bound(lambda p: d * (-k.Kac * feed * math.cos(p) + k.Kae * p))
-    bites = engagement_of_arcs([s], [e], feed, MILL, depth)
-    force, _ = mean_forces(bites, MILL, AL)
+    engagement = engagement_of_arcs([s], [e], feed, MILL, depth)
+    force, _ = mean_forces(engagement, MILL, AL)
     np.testing.assert_allclose(force[0], [fx, fy, fz], rtol=1e-12)
     theta = (np.arange(4000) + 0.5) * math.tau / 4000
-    turn, torque = forces_over_turn(bites, MILL, AL, theta)
+    turn, torque = forces_over_turn(engagement, MILL, AL, theta)
     np.testing.assert_allclose(turn[0].mean(axis=0), force[0], rtol=1e-5)
-    assert torque[0].mean() == pytest.approx(mean_forces(bites, MILL, AL)[1][0], rel=1e-5)
+    assert torque[0].mean() == pytest.approx(mean_forces(engagement, MILL, AL)[1][0], rel=1e-5)
 
 
 def test_straight_teeth_are_at_their_worst_where_they_enter():
     """Helix 0, down milling: F = depth hypot(Ktc f sin a + Kte, Krc f sin a + Kre) at phi = pi - a."""
     mill = replace(MILL, helix=0.0)
     a, feed, depth = 0.33, 0.05, 5.0
-    bites = engagement_of_arcs([math.pi - a], [math.pi], feed, mill, depth)
-    peak = greatest_forces(bites, mill, AL)
+    engagement = engagement_of_arcs([math.pi - a], [math.pi], feed, mill, depth)
+    peak = greatest_forces(engagement, mill, AL)
     h = feed * math.sin(a)
     tangential = AL.Ktc * h + AL.Kte
     resultant = depth * math.hypot(tangential, AL.Krc * h + AL.Kre)
@@ -166,11 +166,11 @@ def test_straight_teeth_are_at_their_worst_where_they_enter():
 def test_four_teeth_in_a_full_slot_are_steady(helix):
     """Sum of sin^2 over two teeth a quarter turn apart is 1, of sin cos is 0: F = depth f (-Krc, Ktc), never else."""
     mill = replace(MILL, helix=math.radians(helix))
-    bites = engagement_of_arcs([0.0], [math.pi], 0.05, mill, 5.0)
-    force, _ = forces_over_turn(bites, mill, NO_EDGE, np.linspace(0.01, 6.0, 50))
+    engagement = engagement_of_arcs([0.0], [math.pi], 0.05, mill, 5.0)
+    force, _ = forces_over_turn(engagement, mill, NO_EDGE, np.linspace(0.01, 6.0, 50))
     np.testing.assert_allclose(force[0, :, 0], -5.0 * 0.05 * NO_EDGE.Krc, rtol=1e-12)
     np.testing.assert_allclose(force[0, :, 1], 5.0 * 0.05 * NO_EDGE.Ktc, rtol=1e-12)
-    peak = greatest_forces(bites, mill, NO_EDGE)
+    peak = greatest_forces(engagement, mill, NO_EDGE)
     resultant = 0.25 * math.hypot(NO_EDGE.Ktc, NO_EDGE.Krc)
     assert math.hypot(peak["force_t"][0], peak["force_n"][0]) == pytest.approx(resultant)
 
@@ -186,10 +186,10 @@ def test_greatest_is_no_accident_of_sampling(runout):
         low = float(rng.uniform(0.0, 2.5))
         high = float(rng.uniform(low + 0.02, math.pi))
         depth = float(rng.uniform(0.3, 25.0))
-        bites = engagement_of_arcs([low], [high], 0.04, mill, depth)
-        peak = greatest_forces(bites, mill, AL)
+        engagement = engagement_of_arcs([low], [high], 0.04, mill, depth)
+        peak = greatest_forces(engagement, mill, AL)
         theta = np.arange(36000) * math.tau / 36000
-        force, torque = forces_over_turn(bites, mill, AL, theta)
+        force, torque = forces_over_turn(engagement, mill, AL, theta)
         for ours, fine in (
             (math.hypot(peak["force_t"][0], peak["force_n"][0]), np.hypot(force[0, :, 0], force[0, :, 1]).max()),
             (peak["torque"][0], torque[0].max()),
@@ -222,7 +222,7 @@ def test_padding_is_not_cut():
 
 
 def test_slices_of_a_cut_add_up_to_the_cut():
-    """The interface of bites: a depth cut into slices is the same cut."""
+    """The interface of engagement ranges: a depth cut into slices is the same cut."""
     whole = engagement_of_arcs([2.7], [math.pi], 0.05, MILL, 6.0)
     heights = np.linspace(0.0, 6.0, 8)
     rows = [[2.7, math.pi, a, b, 0.05, 0.0, 0.0] for a, b in pairwise(heights)]

@@ -100,8 +100,8 @@ def test_every_form_against_vectors_of_elements(form, feed, low, high):
     top = 7.0
     theta = np.random.default_rng(3).uniform(0.0, math.tau, 4)
     expected = np.array([brute(cutter, PLAIN, feed, low, high, top, t, 4000) for t in theta])
-    bites = feed_bites(cutter, feed, low, high, top, corner_slices=400, flank_mm=0.5)
-    force, torque = forces_over_turn(bites, cutter, PLAIN, theta)
+    engagement = feed_bites(cutter, feed, low, high, top, corner_slices=400, flank_mm=0.5)
+    force, torque = forces_over_turn(engagement, cutter, PLAIN, theta)
     assert np.abs(expected).max() > 50.0
     ours = np.column_stack([force[0], torque[0]])
     np.testing.assert_allclose(ours, expected, rtol=0.0, atol=2e-3 * np.abs(expected).max(axis=0).max())
@@ -113,8 +113,8 @@ def test_slices_of_the_corner_converge_with_their_square():
     expected = NO_EDGE.Ktc * 2 * 2.0 * (3.0 + 2.0 * math.pi / 4.0)
     error = []
     for pieces in (10, 20, 40):
-        bites = feed_bites(bull, (feed, 0.0, 0.0), 0.0, math.pi, math.pi, pieces)
-        torque = mean_forces(bites, bull, NO_EDGE)[1][0] * math.tau / (3 * feed)
+        engagement = feed_bites(bull, (feed, 0.0, 0.0), 0.0, math.pi, math.pi, pieces)
+        torque = mean_forces(engagement, bull, NO_EDGE)[1][0] * math.tau / (3 * feed)
         error.append(abs(torque / expected - 1.0))
     assert error[0] < 1e-3
     assert all(3.9 < a / b < 4.1 for a, b in pairwise(error))
@@ -124,16 +124,16 @@ def test_plunge_with_a_full_bottom():
     """h = f everywhere: the thrust is N R (Krc f + Kre) along the axis, the torque N (Ktc f + Kte) R^2 / 2; steady."""
     mill = Cutter(10.0, 4, 0.6, 20.0, 30.0, 6e5)
     f = 0.03
-    bites = feed_bites(mill, (0.0, 0.0, -f), 0.0, math.tau, 0.0)
+    engagement = feed_bites(mill, (0.0, 0.0, -f), 0.0, math.tau, 0.0)
     thrust = 4 * 5.0 * (PLAIN.Krc * f + PLAIN.Kre)
     twist = 4 * (PLAIN.Ktc * f + PLAIN.Kte) * 12.5
-    force, torque = mean_forces(bites, mill, PLAIN)
+    force, torque = mean_forces(engagement, mill, PLAIN)
     np.testing.assert_allclose(force[0], [0.0, 0.0, thrust], rtol=1e-12, atol=1e-9)
     assert torque[0] == pytest.approx(twist, rel=1e-12)
-    force, torque = forces_over_turn(bites, mill, PLAIN, np.linspace(0.0, 7.0, 40))
+    force, torque = forces_over_turn(engagement, mill, PLAIN, np.linspace(0.0, 7.0, 40))
     np.testing.assert_allclose(force[0], np.broadcast_to([0.0, 0.0, thrust], (40, 3)), rtol=1e-12, atol=1e-9)
     np.testing.assert_allclose(torque[0], twist, rtol=1e-12)
-    assert bites.chip_max()[0] == pytest.approx(f, rel=1e-15)
+    assert engagement.chip_max()[0] == pytest.approx(f, rel=1e-15)
 
 
 def test_a_drill_with_a_point_angle_plunges():
@@ -143,8 +143,8 @@ def test_a_drill_with_a_point_angle_plunges():
     drill = Cutter(6.0, 2, 0.5, 20.0, 30.0, 6e5, bottom=math.radians(30.0))
     f = 0.05
     h = f * math.cos(math.radians(30.0))
-    bites = feed_bites(drill, (0.0, 0.0, -f), 0.0, math.tau, 0.0)
-    force, torque = mean_forces(bites, drill, PLAIN)
+    engagement = feed_bites(drill, (0.0, 0.0, -f), 0.0, math.tau, 0.0)
+    force, torque = mean_forces(engagement, drill, PLAIN)
     one = (PLAIN.Krc * h + PLAIN.Kre) - math.tan(math.radians(30.0)) * (PLAIN.Kac * h + PLAIN.Kae)
     assert force[0, 2] == pytest.approx(2 * 3.0 * one, rel=1e-12)
     assert torque[0] == pytest.approx(2 * (PLAIN.Ktc * h + PLAIN.Kte) * 4.5 / math.cos(math.radians(30.0)), rel=1e-12)
@@ -175,8 +175,8 @@ def test_energy_of_any_engagement(form, feed, low, width):
     the edge force jumps, so that each of its ends is right to half a step of phi.
     """
     cutter = FORMS[form]
-    bites = feed_bites(cutter, feed, low, low + width, 6.0)
-    _, torque = mean_forces(bites, cutter, PLAIN)
+    engagement = feed_bites(cutter, feed, low, low + width, 6.0)
+    _, torque = mean_forces(engagement, cutter, PLAIN)
     edge = slices(cutter)
     phi = low + (np.arange(4000) + 0.5) * width / 4000
     total = jump = 0.0
@@ -192,9 +192,9 @@ def test_energy_of_any_engagement(form, feed, low, width):
 @pytest.mark.parametrize("form", FORMS)
 def test_the_mean_is_the_mean_over_the_turn(form):
     cutter = FORMS[form]
-    bites = feed_bites(cutter, (0.05, 0.02, -0.02), 0.3, 4.0, 7.0)
-    turn, torque = forces_over_turn(bites, cutter, AL, (np.arange(3000) + 0.5) * math.tau / 3000)
-    mean, torque_mean = mean_forces(bites, cutter, AL)
+    engagement = feed_bites(cutter, (0.05, 0.02, -0.02), 0.3, 4.0, 7.0)
+    turn, torque = forces_over_turn(engagement, cutter, AL, (np.arange(3000) + 0.5) * math.tau / 3000)
+    mean, torque_mean = mean_forces(engagement, cutter, AL)
     np.testing.assert_allclose(turn[0].mean(axis=0), mean[0], rtol=0.0, atol=1e-4 * np.abs(turn).max())
     assert torque[0].mean() == pytest.approx(torque_mean[0], rel=1e-4)
 
@@ -219,12 +219,12 @@ def test_where_immersion_is_counted_from_does_not_matter():
 
 
 def test_greatest_of_many_rows_by_samples_is_that_by_breaks():
-    bites = feed_bites(BALL, (0.05, 0.01, -0.02), 0.2, 2.4, 8.0, corner_slices=40, flank_mm=1.0)
-    assert len(bites.rows) > 40
-    by_breaks = greatest_forces(bites, BALL, AL, exact_rows=None)
-    by_samples = greatest_forces(bites, BALL, AL)
+    engagement = feed_bites(BALL, (0.05, 0.01, -0.02), 0.2, 2.4, 8.0, corner_slices=40, flank_mm=1.0)
+    assert len(engagement.rows) > 40
+    by_breaks = greatest_forces(engagement, BALL, AL, exact_rows=None)
+    by_samples = greatest_forces(engagement, BALL, AL)
     theta = np.arange(20000) * math.tau / 20000
-    force, torque = forces_over_turn(bites, BALL, AL, theta)
+    force, torque = forces_over_turn(engagement, BALL, AL, theta)
     for peak in (by_breaks, by_samples):
         plane = np.hypot(peak["force_t"], peak["force_n"])[0]
         assert plane == pytest.approx(np.hypot(force[0, :, 0], force[0, :, 1]).max(), rel=1e-5)

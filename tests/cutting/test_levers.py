@@ -1,4 +1,6 @@
-"""Loads times levers in one call against those rotation by rotation, which integrate each bite by quadrature."""
+"""Loads times levers in one call against those rotation by rotation, which integrate each engagement range by
+quadrature.
+"""
 
 from __future__ import annotations
 
@@ -32,14 +34,16 @@ def test_compliance_of_the_tip_is_that_of_the_chain() -> None:
 @pytest.mark.parametrize("runout", [0.0, 0.01])
 def test_loads_are_those_rotation_by_rotation(flutes: int, helix: float, runout: float) -> None:
     cutter = Cutter(10.0, flutes, helix, 20.0, 30.0, 6e5, runout=(runout, 0.4))
-    bites = with_runout(some_engagement(flutes, helix, flutes), cutter)
-    assert has_lever_loads(bites, cutter, STEEL)
-    assert greatest_height(bites) < 25.0
-    count, n = 36, len(bites)
+    engagement = with_runout(some_engagement(flutes, helix, flutes), cutter)
+    assert has_lever_loads(engagement, cutter, STEEL)
+    assert greatest_height(engagement) < 25.0
+    count, n = 36, len(engagement)
     theta = np.arange(count) * ((math.tau if runout else math.tau / flutes) / count)
-    found = lever_loads(bites, cutter, STEEL, count, [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], tip_compliance(BARS)])
+    found = lever_loads(
+        engagement, cutter, STEEL, count, [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], tip_compliance(BARS)]
+    )
     # a section above all of the edge, and the deflection of the tip
-    known = section_loads(bites, cutter, STEEL, theta, [30.0])[:, :, 0]
+    known = section_loads(engagement, cutter, STEEL, theta, [30.0])[:, :, 0]
     bend = 30.0 * found[:, 4:6] - found[:, 6:8] + found[:, 2:4]
     # quadrature of two to five points: of what is left out, see points_of
     np.testing.assert_allclose(bend, np.swapaxes(known[..., :2], 1, 2), rtol=1e-5, atol=1e-5 * abs(known).max())
@@ -47,7 +51,7 @@ def test_loads_are_those_rotation_by_rotation(flutes: int, helix: float, runout:
     np.testing.assert_allclose(found[:, 1], known[..., 3], rtol=1e-5, atol=1e-5 * abs(found[:, 1]).max())
     chain = np.array([[b.length, b.flexibility, b.joint.c_ff, b.joint.c_mm, b.joint.c_fm] for b in BARS])
     out, law = np.empty((n * count, 5)), np.array(STEEL.law)
-    rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
+    rows = (engagement.start, engagement.rows, engagement.tooth, engagement.slice, engagement.slices)
     at = (np.repeat(np.arange(n), count), np.tile(theta, n), np.zeros(n * count))
     bent_many(*at, *rows, cutter.flutes, law, chain, out)
     moments = np.swapaxes(out.reshape(n, count, 5), 1, 2)
@@ -58,10 +62,10 @@ def test_loads_are_those_rotation_by_rotation(flutes: int, helix: float, runout:
 @pytest.mark.parametrize("modulus", [6e5, 2.1e5])
 def test_stress_is_that_of_the_loads_of_the_sections(modulus: float) -> None:
     cutter = Cutter(10.0, 3, 0.5, 25.0, 40.0, modulus)
-    bites = some_engagement(4, 0.5, 3)
+    engagement = some_engagement(4, 0.5, 3)
     at = sections_of(cutter)
-    loads = section_loads(bites, cutter, STEEL, np.arange(60) * (math.tau / 180.0), at.height)
+    loads = section_loads(engagement, cutter, STEEL, np.arange(60) * (math.tau / 180.0), at.height)
     stress = (normal_stress if modulus > 3e5 else von_mises_stress)(loads, at.diameter).max(axis=(1, 2))
     np.testing.assert_allclose(
-        cutter_stress(bites, cutter, STEEL), cutter.strength.concentration * stress, rtol=1e-5, atol=1e-6
+        cutter_stress(engagement, cutter, STEEL), cutter.strength.concentration * stress, rtol=1e-5, atol=1e-6
     )

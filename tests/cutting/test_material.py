@@ -62,8 +62,8 @@ def test_specific_cutting_force_of_a_group(name):
     own = material_named(name)
     mill = Cutter(10.0, 1, 0.0, 20.0, 30.0, 6e5)
     for h, kc in zip((0.02, 0.05, 0.1), GROUPS[name], strict=True):
-        bites = engagement_of_arcs([0.0], [math.pi], h, mill, 1.0)
-        force, torque = forces_over_turn(bites, mill, own, [math.pi / 2])
+        engagement = engagement_of_arcs([0.0], [math.pi], h, mill, 1.0)
+        force, torque = forces_over_turn(engagement, mill, own, [math.pi / 2])
         assert torque[0, 0] / (5.0 * h) == pytest.approx(kc, abs=0.51 + 1e-6 * kc)
         assert np.linalg.norm(force[0, 0]) == pytest.approx(kc * h, rel=1e-3)
 

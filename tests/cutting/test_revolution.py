@@ -1,4 +1,6 @@
-"""Loads over a revolution in one call against those rotation by rotation, which integrate each bite in closed form."""
+"""Loads over a revolution in one call against those rotation by rotation, which integrate each engagement range in
+closed form.
+"""
 
 from __future__ import annotations
 
@@ -48,18 +50,18 @@ def some_engagement(seed: int, helix: float, flutes: int) -> ToothEngagement:
 def test_loads_are_those_rotation_by_rotation(flutes: int, helix: float, runout: float) -> None:
     cutter = Cutter(10.0, flutes, helix, 20.0, 30.0, 6e5, runout=(runout, 0.4))
     plain = some_engagement(flutes, helix, flutes)
-    bites = with_runout(plain, cutter)
-    left = np.random.default_rng(5).normal(size=(len(bites), 3))
-    found, at, _ = loads_over_turn(bites, cutter, STEEL, math.radians(3.0), left)
+    engagement = with_runout(plain, cutter)
+    left = np.random.default_rng(5).normal(size=(len(engagement), 3))
+    found, at, _ = loads_over_turn(engagement, cutter, STEEL, math.radians(3.0), left)
     count = rotations(cutter, math.radians(3.0))
-    known = _one_by_one(bites, cutter, STEEL, count, left)
+    known = _one_by_one(engagement, cutter, STEEL, count, left)
     np.testing.assert_allclose(found, known[:, :15], rtol=1e-6, atol=1e-6)
     # at the rotations that are said to be worst the loads are the greatest
     pitch = math.tau if runout > 0.0 else math.tau / flutes
     numbers = np.rint(at * count / pitch).astype(int)
     np.testing.assert_allclose(at, numbers * pitch / count, atol=1e-12)
-    force, torque = forces_over_turn(bites, cutter, STEEL, np.arange(count) * (pitch / count))
-    rows = np.arange(len(bites))
+    force, torque = forces_over_turn(engagement, cutter, STEEL, np.arange(count) * (pitch / count))
+    rows = np.arange(len(engagement))
     np.testing.assert_allclose(np.linalg.norm(force[rows, numbers[:, 0]], axis=1), known[:, 9], rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(torque[rows, numbers[:, 1]], known[:, 11], rtol=1e-6, atol=1e-6)
 
@@ -72,8 +74,8 @@ def test_a_full_circle_that_begins_at_a_rotation_counts_once() -> None:
     )
     slices = np.array([[0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0], [2.0, 3.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
     frame = np.eye(3)[None]
-    bites = ToothEngagement(np.array([0, 2]), rows, np.full(2, -1), np.arange(2), slices, frame)
-    found, _, _ = loads_over_turn(bites, cutter, STEEL, math.radians(3.0), np.zeros((1, 3)))
+    engagement = ToothEngagement(np.array([0, 2]), rows, np.full(2, -1), np.arange(2), slices, frame)
+    found, _, _ = loads_over_turn(engagement, cutter, STEEL, math.radians(3.0), np.zeros((1, 3)))
     # two teeth, 2 mm each of edge
     known = 2 * 2.0 * ((1800.0 * 0.05 + 25.0) * 1.0 + (1800.0 * 0.1 + 25.0) * 3.0)
     assert found[0, 10] == pytest.approx(known)
@@ -82,12 +84,12 @@ def test_a_full_circle_that_begins_at_a_rotation_counts_once() -> None:
 
 def test_a_size_effect_takes_the_other_way() -> None:
     cutter = Cutter(10.0, 2, 0.4, 20.0, 30.0, 6e5)
-    bites = some_engagement(3, 0.4, 2)
-    left = np.zeros((len(bites), 3))
+    engagement = some_engagement(3, 0.4, 2)
+    left = np.zeros((len(engagement), 3))
     law = replace(STEEL, exponents=(0.2, 0.2, 0.2))
     assert not np.allclose(
-        loads_over_turn(bites, cutter, law, 0.05, left)[0][:, 9],
-        loads_over_turn(bites, cutter, STEEL, 0.05, left)[0][:, 9],
+        loads_over_turn(engagement, cutter, law, 0.05, left)[0][:, 9],
+        loads_over_turn(engagement, cutter, STEEL, 0.05, left)[0][:, 9],
     )
 
 
@@ -107,9 +109,9 @@ def test_entries_that_cut_alike_have_the_loads_of_the_first(runout: float) -> No
     five = ToothEngagement(start, rows, plain.tooth[row], plain.slice[row], plain.slices, frames)
     left = np.repeat(np.random.default_rng(5).normal(size=(n, 3)), 5, axis=0)
     left[4::5] = 0.0
-    bites = with_runout(five, cutter)
-    found = loads_over_turn(bites, cutter, STEEL, math.radians(3.0), left)[0]
-    known = _one_by_one(bites, cutter, STEEL, rotations(cutter, math.radians(3.0)), left)[:, :15]
+    engagement = with_runout(five, cutter)
+    found = loads_over_turn(engagement, cutter, STEEL, math.radians(3.0), left)[0]
+    known = _one_by_one(engagement, cutter, STEEL, rotations(cutter, math.radians(3.0)), left)[:, :15]
     np.testing.assert_allclose(found, known, rtol=1e-6, atol=1e-6)
     each = found.reshape(n, 5, 15)[size > 0]
     np.testing.assert_array_equal(each[:, 1, 9], each[:, 0, 9])

@@ -40,10 +40,10 @@ def test_a_soft_cutter_settles_as_the_docstring_says() -> None:
     ("phi", "depth"), [((math.pi / 2, math.pi), 5.0), ((0.0, math.acos(0.6)), 2.0), ((0.0, math.pi), 10.0)]
 )
 def test_engagement_by_hand(phi: tuple[float, float], depth: float) -> None:
-    bites = engagement_of_arcs([phi[0]], [phi[1]], 0.07, MILL, 3.0)
-    assert radial_depth(bites) == pytest.approx([depth])
-    assert tooth_feed(bites) == pytest.approx([0.07])
-    assert contact_height(bites) == pytest.approx([3.0])
+    engagement = engagement_of_arcs([phi[0]], [phi[1]], 0.07, MILL, 3.0)
+    assert radial_depth(engagement) == pytest.approx([depth])
+    assert tooth_feed(engagement) == pytest.approx([0.07])
+    assert contact_height(engagement) == pytest.approx([3.0])
 
 
 def test_share_is_by_the_feed_or_by_the_depth() -> None:

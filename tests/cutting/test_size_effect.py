@@ -47,44 +47,46 @@ def vector(phi, h, kappa, rho, material):
     )
 
 
-def one(bite, kappa, rate, rho=4.0):
-    low, high, along, offset, across = bite
+def one(engaged, kappa, rate, rho=4.0):
+    low, high, along, offset, across = engaged
     edge = [[0.0, rho, 0.0, math.sin(kappa), math.cos(kappa), 0.2, rate]]
     return ToothEngagement([0, 1], [[low, high, 1.0, 4.0, along, offset, across]], [0], [0], edge)
 
 
-def thick(bite, phi):
-    return max(bite[2] * math.sin(phi) + bite[4] * math.cos(phi) + bite[3], 0.0)
+def thick(engaged, phi):
+    return max(engaged[2] * math.sin(phi) + engaged[4] * math.cos(phi) + engaged[3], 0.0)
 
 
-@pytest.mark.parametrize("bite", BITES)
-def test_means_against_adaptive_quadrature(bite):
+@pytest.mark.parametrize("engagement range", BITES)
+def test_means_against_adaptive_quadrature(engaged):
     kappa = 1.1
-    force, torque = mean_forces(one(bite, kappa, 0.1), MILL, KIENZLE)
-    zeros = [z for z in np.arange(0.0, 14.0, math.pi / 6) if bite[0] < z < bite[1]]
+    force, torque = mean_forces(one(engaged, kappa, 0.1), MILL, KIENZLE)
+    zeros = [z for z in np.arange(0.0, 14.0, math.pi / 6) if engaged[0] < z < engaged[1]]
     for i, ours in enumerate([*force[0], torque[0]]):
         value = quad(
-            lambda phi, i=i: vector(phi, thick(bite, phi), kappa, 4.0, KIENZLE)[i],
-            bite[0], bite[1], points=zeros or None, epsabs=1e-10, epsrel=1e-12, limit=800,
+            lambda phi, i=i: vector(phi, thick(engaged, phi), kappa, 4.0, KIENZLE)[i],
+            engaged[0], engaged[1], points=zeros or None, epsabs=1e-10, epsrel=1e-12, limit=800,
         )[0]  # fmt: skip
         scale = 1500.0 * 0.05**0.7 * 4.0
         assert ours == pytest.approx(value * 3.0 / math.tau, rel=1e-8, abs=3e-8 * scale)
 
 
-@pytest.mark.parametrize("bite", BITES)
+@pytest.mark.parametrize("engagement range", BITES)
 @pytest.mark.parametrize("rate", [0.0, 1e-9, 0.05, 1.2])
-def test_over_the_turn_against_adaptive_quadrature(bite, rate):
+def test_over_the_turn_against_adaptive_quadrature(engaged, rate):
     kappa = 0.8
-    theta = np.array([bite[0] + 0.3, bite[0] + 0.75, bite[1] + 0.1, 3.0])
-    force, torque = forces_over_turn(one(bite, kappa, rate), MILL, KIENZLE, theta)
+    theta = np.array([engaged[0] + 0.3, engaged[0] + 0.75, engaged[1] + 0.1, 3.0])
+    force, torque = forces_over_turn(one(engaged, kappa, rate), MILL, KIENZLE, theta)
     for k, turn in enumerate(theta):
 
         def at(s, i, turn=turn):
-            phi = bite[0] + (turn - 0.2 - rate * s - bite[0]) % math.tau
-            return vector(phi, thick(bite, phi), kappa, 4.0, KIENZLE)[i] if phi < bite[1] else 0.0
+            phi = engaged[0] + (turn - 0.2 - rate * s - engaged[0]) % math.tau
+            return vector(phi, thick(engaged, phi), kappa, 4.0, KIENZLE)[i] if phi < engaged[1] else 0.0
 
         phases = [(turn - 0.2 - x) / rate for x in np.arange(-15, 15, math.pi / 6)] if rate > 1e-3 else []
-        ends = [(turn - 0.2 - x - math.tau * m) / rate for x in bite[:2] for m in range(-3, 4)] if rate > 1e-3 else []
+        ends = (
+            [(turn - 0.2 - x - math.tau * m) / rate for x in engaged[:2] for m in range(-3, 4)] if rate > 1e-3 else []
+        )
         points = sorted({p for p in phases + ends if 1.0 < p < 4.0})
         for i, ours in enumerate([*force[0, k], torque[0, k]]):
             value = quad(at, 1.0, 4.0, args=(i,), points=points or None, epsabs=1e-9, epsrel=1e-11, limit=800)[0]
@@ -101,14 +103,16 @@ def test_mean_torque_of_a_full_slot_is_a_beta_function():
 
 
 def test_exponents_go_to_zero_as_the_linear_law():
-    bites = engagement_of_arcs([0.3, 2.0], [2.5, math.pi], 0.05, MILL, 8.0)
+    engagement = engagement_of_arcs([0.3, 2.0], [2.5, math.pi], 0.05, MILL, 8.0)
     plain = replace(KIENZLE, exponents=(0.0, 0.0, 0.0))
     near = replace(KIENZLE, exponents=(1e-10, 1e-10, 1e-10))
     theta = np.linspace(0.0, 6.0, 25)
     np.testing.assert_allclose(
-        forces_over_turn(bites, MILL, near, theta)[0], forces_over_turn(bites, MILL, plain, theta)[0], atol=1e-6
+        forces_over_turn(engagement, MILL, near, theta)[0],
+        forces_over_turn(engagement, MILL, plain, theta)[0],
+        atol=1e-6,
     )
-    peak, other = greatest_forces(bites, MILL, near), greatest_forces(bites, MILL, plain)
+    peak, other = greatest_forces(engagement, MILL, near), greatest_forces(engagement, MILL, plain)
     for name in ("torque", "force_axis"):
         np.testing.assert_allclose(peak[name], other[name], rtol=1e-7)
 
@@ -127,9 +131,9 @@ def test_the_wall_without_helix_up_milling_feels_the_size_effect():
     pi/2 the normal force of a mm is Kc f^(1 - m) + Kte there and -Kre at the wall.
     """
     mill = replace(MILL, helix=0.0)
-    bites = engagement_of_arcs([0.0], [2.0], 0.05, mill, 4.0)
+    engagement = engagement_of_arcs([0.0], [2.0], 0.05, mill, 4.0)
     z = np.array([1.0, 3.0])
-    ours = wall_profile(bites, mill, KIENZLE, z, milling="up", work_compliance=1e-3)[0]
+    ours = wall_profile(engagement, mill, KIENZLE, z, milling="up", work_compliance=1e-3)[0]
     normal = 1500.0 * 0.05 ** (1 - 0.26) + 8.0 - 6.0
     heights = (np.arange(4000) + 0.5) * 4.0 / 4000
     bend = [np.sum(compliance(mill, heights, x) + 1e-3) * 4.0 / 4000 for x in z]

@@ -74,9 +74,9 @@ def test_a_notch_multiplies_the_stress(material: Material, mill: Cutter) -> None
 
 def test_loads_of_a_helix_are_those_of_its_slices() -> None:
     """A sum over 4000 thin pieces of the edge of each tooth, forces as the edge's definition has them."""
-    bites, z = slot(HELIX, 0.08, 6.0), np.array([4.0, 18.0, 40.0])
+    engagement, z = slot(HELIX, 0.08, 6.0), np.array([4.0, 18.0, 40.0])
     theta = np.array([0.3, 1.1, 1.9])
-    found = section_loads(bites, HELIX, THREE, theta, z)[0]
+    found = section_loads(engagement, HELIX, THREE, theta, z)[0]
     n, lag = 4000, math.tan(HELIX.helix) / HELIX.radius
     heights = (np.arange(n) + 0.5) * 6.0 / n
     dz = 6.0 / n
@@ -100,9 +100,9 @@ def test_loads_of_a_helix_are_those_of_its_slices() -> None:
 
 
 def test_above_the_cut_the_lever_grows_by_the_force() -> None:
-    bites, theta = slot(HELIX, 0.08, 6.0), np.linspace(0.0, 2.0, 7)
-    low, high = section_loads(bites, HELIX, THREE, theta, [10.0, 40.0])[0].transpose(1, 0, 2)
-    force, torque = forces_over_turn(bites, HELIX, THREE, theta)
+    engagement, theta = slot(HELIX, 0.08, 6.0), np.linspace(0.0, 2.0, 7)
+    low, high = section_loads(engagement, HELIX, THREE, theta, [10.0, 40.0])[0].transpose(1, 0, 2)
+    force, torque = forces_over_turn(engagement, HELIX, THREE, theta)
     np.testing.assert_allclose((high - low)[:, :2], 30.0 * force[0, :, :2], atol=1e-6)
     np.testing.assert_allclose(high[:, 2], force[0, :, 2], atol=1e-9)
     np.testing.assert_allclose(high[:, 3], torque[0], rtol=1e-9)

@@ -46,9 +46,9 @@ def sliced_error(z, arc, feed, cutter, depth, milling, work=0.0, slices=20000):
 )
 def test_profile_equals_the_sum_of_slices(milling, arc, depth, helix, flutes):
     mill = replace(MILL, helix=math.radians(helix), flutes=flutes)
-    bites = engagement_of_arcs([arc[0]], [arc[1]], 0.05, mill, depth)
+    engagement = engagement_of_arcs([arc[0]], [arc[1]], 0.05, mill, depth)
     z = np.linspace(0.01 * depth, 0.99 * depth, 7)
-    ours = wall_profile(bites, mill, AL, z, milling=milling, work_compliance=2e-6)[0]
+    ours = wall_profile(engagement, mill, AL, z, milling=milling, work_compliance=2e-6)[0]
     brute = np.array([sliced_error(x, arc, 0.05, mill, depth, milling, 2e-6) for x in z])
     assert np.abs(brute).max() > 1e-4
     np.testing.assert_allclose(ours, brute, rtol=0.0, atol=3e-4 * np.abs(brute).max())
@@ -61,8 +61,8 @@ def test_without_helix_down_milling_shows_the_edge_force_alone():
     z = np.array([0.0, 3.0, 6.0])
     expected = [AL.Kre * compliance(mill, zs, x).sum() * 6.0 / 4000 for x in z]
     for feed, a in ((0.01, 0.1), (0.2, 1.2)):
-        bites = engagement_of_arcs([math.pi - a], [math.pi], feed, mill, 6.0)
-        np.testing.assert_allclose(wall_profile(bites, mill, AL, z, milling="down")[0], expected, rtol=1e-6)
+        engagement = engagement_of_arcs([math.pi - a], [math.pi], feed, mill, 6.0)
+        np.testing.assert_allclose(wall_profile(engagement, mill, AL, z, milling="down")[0], expected, rtol=1e-6)
         worst = wall_error_along([math.pi - a], [math.pi], feed, mill, AL, 6.0, milling="down")
         assert worst["form_error_um"][0] == pytest.approx(1000.0 * expected[0], rel=1e-6)
         assert worst["error_z_mm"][0] == 0.0
@@ -92,10 +92,10 @@ def test_worst_is_that_of_a_fine_profile(milling, depth):
         arc = (math.pi - a, math.pi) if milling == "down" else (0.0, a)
         mill = replace(MILL, helix=math.radians(38.0))
         worst = wall_error_along([arc[0]], [arc[1]], 0.05, mill, AL, depth, milling=milling)
-        bites = engagement_of_arcs([arc[0]], [arc[1]], 0.05, mill, depth)
-        fine = wall_profile(bites, mill, AL, np.linspace(0.0, depth, 3001), milling=milling)[0]
+        engagement = engagement_of_arcs([arc[0]], [arc[1]], 0.05, mill, depth)
+        fine = wall_profile(engagement, mill, AL, np.linspace(0.0, depth, 3001), milling=milling)[0]
         assert worst["form_error_um"][0] == pytest.approx(1000.0 * np.abs(fine).max(), rel=1e-3)
-        at = wall_profile(bites, mill, AL, worst["error_z_mm"], milling=milling)[0, 0]
+        at = wall_profile(engagement, mill, AL, worst["error_z_mm"], milling=milling)[0, 0]
         assert worst["form_error_signed_um"][0] == pytest.approx(1000.0 * at, rel=1e-9)
 
 
@@ -121,9 +121,9 @@ def test_a_step_that_does_not_reach_the_wall_makes_none():
 
 def test_work_that_gives_way_adds_the_whole_normal_force():
     mill = replace(MILL, helix=0.0)
-    bites = engagement_of_arcs([2.8], [math.pi], 0.05, mill, 4.0)
-    rigid = wall_profile(bites, mill, AL, [1.0], milling="down")[0, 0]
-    soft = wall_profile(bites, mill, AL, [1.0], milling="down", work_compliance=1e-4)[0, 0]
+    engagement = engagement_of_arcs([2.8], [math.pi], 0.05, mill, 4.0)
+    rigid = wall_profile(engagement, mill, AL, [1.0], milling="down")[0, 0]
+    soft = wall_profile(engagement, mill, AL, [1.0], milling="down", work_compliance=1e-4)[0, 0]
     assert soft - rigid == pytest.approx(1e-4 * AL.Kre * 4.0, rel=1e-6)
 
 
@@ -147,9 +147,9 @@ def test_refused(change, message):
 
 
 def test_refuses_heights_outside_the_cutter():
-    bites = engagement_of_arcs([2.8], [math.pi], 0.05, MILL, 4.0)
+    engagement = engagement_of_arcs([2.8], [math.pi], 0.05, MILL, 4.0)
     with pytest.raises(InputError) as err:
-        wall_profile(bites, MILL, AL, [40.0], milling="down")
+        wall_profile(engagement, MILL, AL, [40.0], milling="down")
     assert str(err.value) == "z: must be heights from 0 to cutter.overhang_mm = 35"
 
 

@@ -19,15 +19,19 @@ MILL = Cutter(10.0, 4, 0.5, 25.0, 35.0, 6e5)
 
 
 def one_bite(low, width, along, offset, across, kappa):
-    """A bite of every tooth, cut down to where h > 0 by bisection of the range; None where there is no such part."""
+    """An engagement range of every tooth, cut down to where h > 0 by bisection of the range; None where there is no
+    such part.
+    """
     edge = [[0.0, 5.0, 0.0, math.sin(kappa), math.cos(kappa), 0.0, 0.1]]
     return ToothEngagement([0, 1], [[low, low + width, 0.0, 2.0, along, offset, across]], [-1], [0], edge)
 
 
-def thickness(bites, phi, tooth):
-    """h of one tooth at the immersions phi (turns apart count as one), 0 where no bite holds; and how many hold."""
+def thickness(engagement, phi, tooth):
+    """h of one tooth at the immersions phi (turns apart count as one), 0 where no engagement range holds; and how
+    many hold.
+    """
     h, number = np.zeros(len(phi)), np.zeros(len(phi), dtype=int)
-    for row, owner in zip(bites.rows, bites.tooth, strict=True):
+    for row, owner in zip(engagement.rows, engagement.tooth, strict=True):
         if owner in (-1, tooth):
             inside = (phi - row[0]) % math.tau < row[1] - row[0]
             h += np.where(inside, row[4] * np.sin(phi) + row[6] * np.cos(phi) + row[5], 0.0)
@@ -106,11 +110,11 @@ def test_bites_of_one_tooth_stay_and_no_runout_is_nothing():
 @settings(max_examples=100, deadline=None)
 @given(st.floats(0.0, 6.28), st.floats(0.0, 6.28), st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(0.0, 0.1))
 def test_the_thickest_chip(low, width, along, across, offset):
-    bites = one_bite(low, width, along, offset, across, 1.0)
+    engagement = one_bite(low, width, along, offset, across, 1.0)
     phi = low + np.linspace(0.0, width, 2001)
     h = along * np.sin(phi) + across * np.cos(phi) + offset
-    assert bites.chip_max()[0] >= max(h.max(), 0.0) - 1e-15
-    assert bites.chip_max()[0] == pytest.approx(max(h.max(), 0.0), abs=1e-6)
+    assert engagement.chip_max()[0] >= max(h.max(), 0.0) - 1e-15
+    assert engagement.chip_max()[0] == pytest.approx(max(h.max(), 0.0), abs=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -58,8 +58,8 @@ def test_a_thin_cutter_breaks_and_the_report_says_where() -> None:
     assert "cutter stress" in done.message
     assert "exceeds 1500 MPa" in done.message
     found = held(done, "cutter_stress_mpa")
-    bites = engagement_of_arcs([0.0], [math.pi], FEED, thin, 3.0)
-    assert found.worst == pytest.approx(cutter_stress(bites, thin, AL)[0], rel=1e-3)
+    engagement = engagement_of_arcs([0.0], [math.pi], FEED, thin, 3.0)
+    assert found.worst == pytest.approx(cutter_stress(engagement, thin, AL)[0], rel=1e-3)
     allowed = done.numbers["cutter_stress_mpa"]["allowed"]["1"]
     assert (allowed["mpa"], allowed["tool_material"], allowed["safety_factor"]) == (1500.0, "carbide", 2.0)
     # a stronger grade carries it; then the rigid model is not valid
@@ -133,14 +133,14 @@ def test_chips_thinner_than_the_coefficients_hold_for_are_unproven() -> None:
 def test_a_band_on_every_limit_of_the_force_and_the_verdict_at_its_upper_end() -> None:
     done = slot()
     theta = np.radians(np.arange(180.0))
-    bites = engagement_of_arcs([0.0], [math.pi], FEED, MILL, 1.0)
-    force = np.linalg.norm(forces_over_turn(bites, MILL, AL, theta)[0][0], axis=1)
+    engagement = engagement_of_arcs([0.0], [math.pi], FEED, MILL, 1.0)
+    force = np.linalg.norm(forces_over_turn(engagement, MILL, AL, theta)[0][0], axis=1)
     # each coefficient by itself, by a central difference of the greatest force
     gradient = []
     for k, name in enumerate(("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")):
         step = 1e-4 * AL.coefficients[k]
         ends = [replace(AL, **{name: AL.coefficients[k] + s}) for s in (step, -step)]
-        f, g = (np.linalg.norm(forces_over_turn(bites, MILL, m, theta)[0][0], axis=1).max() for m in ends)
+        f, g = (np.linalg.norm(forces_over_turn(engagement, MILL, m, theta)[0][0], axis=1).max() for m in ends)
         gradient.append((f - g) / (2.0 * step) * 0.25 * AL.coefficients[k])
     relative = math.hypot(*gradient) / force.max()
     band = done.program.simulated.removal.band_error

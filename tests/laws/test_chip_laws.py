@@ -287,9 +287,9 @@ def test_upright_the_chip_is_the_feed_times_the_sine() -> None:
     # one straight tooth at any rotation, against the textbook
     mill = Cutter(10.0, 1, 0.0, 20.0, 30.0, 6e5)
     start = np.array([0, len(rows)])
-    bites = ToothEngagement(start, rows, np.full(len(rows), -1), owner, slices(mill).columns, frame[None])
+    engagement = ToothEngagement(start, rows, np.full(len(rows), -1), owner, slices(mill).columns, frame[None])
     al, phi = material_named("al7075-t6"), np.linspace(0.05, math.pi - 0.05, 41)
-    force, torque = forces_over_turn(bites, mill, al, phi)
+    force, torque = forces_over_turn(engagement, mill, al, phi)
     ft, fr = (depth * (K * f_z * np.sin(phi) + E) for K, E in ((al.Ktc, al.Kte), (al.Krc, al.Kre)))
     np.testing.assert_allclose(force[0, :, 0], -ft * np.cos(phi) - fr * np.sin(phi), rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(force[0, :, 1], ft * np.sin(phi) - fr * np.cos(phi), rtol=1e-9, atol=1e-9)

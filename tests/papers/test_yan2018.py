@@ -63,7 +63,9 @@ def test_less_time_at_no_more_deflection(plans):
 
 
 def test_every_pass_in_its_own_state(plans):
-    """Force by the bites of the depth itself, compliance by the full tensor of a workpiece made for the pass."""
+    """Force by the engagement ranges of the depth itself, compliance by the full tensor of a workpiece made for the
+    pass.
+    """
     wall, _, _, uneven, _, _ = plans
     for p in uneven.passes[-2:]:
         other = next((q for q in uneven.passes[-2:] if q.side != p.side), p)

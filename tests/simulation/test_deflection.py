@@ -90,8 +90,8 @@ def test_it_is_the_wall_of_the_closed_form(milling: str, helix: float) -> None:
     found = form_error(removal, AL, p, n, work=np.full(len(p), work), bars={1: cutter_bars(mill)}, near=0.1)
     a = math.acos(1.0 - width / 5.0)
     arc = (math.pi - a, math.pi) if milling == "down" else (0.0, a)
-    bites = engagement_of_arcs([arc[0]], [arc[1]], math.tau * 20.0 / (4 * 300.0), mill, depth)
-    closed = wall_profile(bites, mill, AL, z, milling=milling, work_compliance=work)[0]
+    engagement = engagement_of_arcs([arc[0]], [arc[1]], math.tau * 20.0 / (4 * 300.0), mill, depth)
+    closed = wall_profile(engagement, mill, AL, z, milling=milling, work_compliance=work)[0]
     assert abs(closed).max() > 1e-4
     np.testing.assert_allclose(found.error, closed, rtol=0.0, atol=1e-5 * abs(closed).max())
 

@@ -268,13 +268,13 @@ def test_every_load_is_that_of_the_layered_engine_for_the_same_engagement(tool: 
     """
     removal = run(zigzag(), keep=True)
     cuts = removal.cuts[tool]
-    bites, seconds = cuts.engagement, removal.columns["seconds"][cuts.step]
+    engagement, seconds = cuts.engagement, removal.columns["seconds"][cuts.step]
     parts = [
-        StepEngagement(k, bites.frame[k], bites.rows[a:b], bites.slice[a:b])  # type: ignore[index]
-        for k, (a, b) in enumerate(itertools.pairwise(bites.start.tolist()))
+        StepEngagement(k, engagement.frame[k], engagement.rows[a:b], engagement.slice[a:b])  # type: ignore[index]
+        for k, (a, b) in enumerate(itertools.pairwise(engagement.start.tolist()))
     ]
-    turn = over_turn(bites, cuts.cutter, ALLOY, FINE.rotation)
-    known = loads_of_steps(bites, parts, cuts.cutter, ALLOY, turn, cuts.spindle, seconds)
+    turn = over_turn(engagement, cuts.cutter, ALLOY, FINE.rotation)
+    known = loads_of_steps(engagement, parts, cuts.cutter, ALLOY, turn, cuts.spindle, seconds)
     for i, name in enumerate(LOADS):
         if name != "force_normal_n":
             some = removal.columns[name][cuts.step]

@@ -56,7 +56,7 @@ def test_a_boss():
 
 
 def test_distance_from_the_surface():
-    """A bite of 0.3 mm into a wall at 20 mm, and 1.5 mm left elsewhere."""
+    """An engagement range of 0.3 mm into a wall at 20 mm, and 1.5 mm left elsewhere."""
     stock = ring_stock(BOUNDS, flat(18.0), flat(21.5))
     stock.remove(2, Point(24.7, 0.0).buffer(5.0, 256))
     low, high = surface_off(stock, flat(20.0), -4.0, 0.0)

@@ -23,13 +23,14 @@ Floats = NDArray[np.float64]
 
 
 def mean_band(
-    bites: ToothEngagement, cutter: Cutter, material: Material, frame: ArrayLike | None = None
+    engagement: ToothEngagement, cutter: Cutter, material: Material, frame: ArrayLike | None = None
 ) -> tuple[Floats, Floats]:
     """Return the standard deviation of the mean force and torque.
 
     Parameters
     ----------
-    bites, cutter, material : as :func:`chipload.cutting.force.mean_forces`; the material with a spread or a covariance
+    engagement, cutter, material : as :func:`chipload.cutting.force.mean_forces`; the material with a spread or a
+        covariance
     frame : (n, 3, 3) float, see :func:`chipload.cutting.force.in_work`; None: along T, n and the axis
 
     Returns
@@ -54,19 +55,21 @@ def mean_band(
     >>> force[0].round(9).tolist()
     [0.0, 10.0, 0.0]
     """
-    deviation = deviations(mean_basis(bites, cutter, material, frame), material)
+    deviation = deviations(mean_basis(engagement, cutter, material, frame), material)
     return deviation[:, :3], deviation[:, 3]
 
 
-def mean_basis(bites: ToothEngagement, cutter: Cutter, material: Material, frame: ArrayLike | None = None) -> Floats:
+def mean_basis(
+    engagement: ToothEngagement, cutter: Cutter, material: Material, frame: ArrayLike | None = None
+) -> Floats:
     """Return B (n, 4, 6) of the mean loads: loads for 1 of each coefficient; B of a sum of loads is the sum of B."""
-    basis = np.zeros((len(bites), 4, 6))
-    rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
+    basis = np.zeros((len(engagement), 4, 6))
+    rows = (engagement.start, engagement.rows, engagement.tooth, engagement.slice, engagement.slices)
     if not any(material.exponents):
         bases.mean_bases(*rows, cutter.flutes, basis)
     else:
         for k, law in enumerate(_unit_laws(material)):
-            out = np.zeros((len(bites), 4))
+            out = np.zeros((len(engagement), 4))
             _kernels.means(*rows, cutter.flutes, law, out)
             basis[:, :, k] = out
     return basis if frame is None else turned_basis(basis, frame)
@@ -79,13 +82,13 @@ def deviations(basis: Floats, material: Material) -> Floats:
 
 
 def band_over_turn(
-    bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike, frame: ArrayLike | None = None
+    engagement: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike, frame: ArrayLike | None = None
 ) -> tuple[Floats, Floats]:
     """Return the standard deviation of force and torque at given rotations.
 
     Parameters
     ----------
-    bites, cutter, material, theta : as :func:`chipload.cutting.force.forces_over_turn`
+    engagement, cutter, material, theta : as :func:`chipload.cutting.force.forces_over_turn`
     frame : as :func:`mean_band`
 
     Returns
@@ -94,10 +97,10 @@ def band_over_turn(
     torque : (n, m) float [N mm]
     """
     angles = np.ascontiguousarray(theta, dtype=np.float64)
-    basis = np.zeros((len(bites), len(angles), 4, 6))
+    basis = np.zeros((len(engagement), len(angles), 4, 6))
     for k, law in enumerate(_unit_laws(material)):
-        out = np.zeros((len(bites), len(angles), 4))
-        rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
+        out = np.zeros((len(engagement), len(angles), 4))
+        rows = (engagement.start, engagement.rows, engagement.tooth, engagement.slice, engagement.slices)
         _kernels.turn_of(*rows, angles, cutter.flutes, law, out)
         basis[..., k] = out
     deviation = deviations(basis if frame is None else turned_basis(basis, frame), material)
@@ -105,7 +108,7 @@ def band_over_turn(
 
 
 def peak_band(
-    bites: ToothEngagement, cutter: Cutter, material: Material, at_force: ArrayLike, at_torque: ArrayLike
+    engagement: ToothEngagement, cutter: Cutter, material: Material, at_force: ArrayLike, at_torque: ArrayLike
 ) -> tuple[Floats, Floats]:
     """Return the standard deviation of the size of the force, and of the torque, at one rotation of each step.
 
@@ -114,7 +117,7 @@ def peak_band(
 
     Parameters
     ----------
-    bites, cutter, material : the material with a spread or a covariance
+    engagement, cutter, material : the material with a spread or a covariance
     at_force, at_torque : (n,) float [rad], rotation of tooth 0 at which each is asked, as where it is greatest
 
     Returns
@@ -132,23 +135,25 @@ def peak_band(
     >>> [x.round(9).tolist() for x in peak_band(slot, mill, plain, [math.pi / 2], [math.pi / 2])]
     [[20.0], [100.0]]
     """
-    return force_deviation(bites, cutter, material, at_force), torque_deviation(bites, cutter, material, at_torque)
+    return force_deviation(engagement, cutter, material, at_force), torque_deviation(
+        engagement, cutter, material, at_torque
+    )
 
 
-def force_deviation(bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
+def force_deviation(engagement: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
     """Return the standard deviation (n,) [N] of the size of the force of each step at its rotation, see
     :func:`peak_band`.
     """
-    loads = _bases_at(bites, cutter, material, theta)
+    loads = _bases_at(engagement, cutter, material, theta)
     force = loads[:, :3] @ np.array(material.coefficients)
     size = np.linalg.norm(force, axis=1)
     along = np.divide(force, size[:, None], out=np.zeros_like(force), where=size[:, None] > 0.0)
     return _deviation(np.einsum("ni,nik->nk", along, loads[:, :3]), material)
 
 
-def torque_deviation(bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
+def torque_deviation(engagement: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
     """Return the standard deviation (n,) [N mm] of the torque of each step at its rotation, see :func:`peak_band`."""
-    return _deviation(_bases_at(bites, cutter, material, theta)[:, 3], material)
+    return _deviation(_bases_at(engagement, cutter, material, theta)[:, 3], material)
 
 
 def _deviation(factors: Floats, material: Material) -> Floats:
@@ -156,11 +161,11 @@ def _deviation(factors: Floats, material: Material) -> Floats:
     return np.asarray(np.sqrt(np.clip(np.einsum("nk,kl,nl->n", factors, material.variances, factors), 0.0, None)))
 
 
-def _bases_at(bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
+def _bases_at(engagement: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
     """Return B (n, 4, 6) of every step at a rotation of its own."""
-    out = np.zeros((len(bites), 4, 6))
+    out = np.zeros((len(engagement), 4, 6))
     angles = np.ascontiguousarray(theta, dtype=np.float64)
-    rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
+    rows = (engagement.start, engagement.rows, engagement.tooth, engagement.slice, engagement.slices)
     if not any(material.exponents):
         bases.bases_at(*rows, angles, cutter.flutes, out)
     else:

@@ -86,13 +86,13 @@ def sections_of(cutter: Cutter) -> Sections:
 
 
 def section_loads(
-    bites: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike, height: ArrayLike
+    engagement: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike, height: ArrayLike
 ) -> Floats:
     """Return bending moment, axial force and torque of sections at given rotations.
 
     Parameters
     ----------
-    bites : of n steps
+    engagement : of n steps
     theta : (m,) float [rad], rotation of tooth 0 at the tip
     height : (h,) float [mm] above the tip, rising
 
@@ -114,8 +114,8 @@ def section_loads(
     angles, heights = (np.ascontiguousarray(x, dtype=np.float64) for x in (theta, height))
     if not (np.diff(heights) > 0.0).all():
         raise InputError("section_loads: height: must rise")
-    out = np.zeros((len(bites), len(angles), len(heights), 4))
-    rows = (bites.start, bites.rows, bites.tooth, bites.slice, bites.slices)
+    out = np.zeros((len(engagement), len(angles), len(heights), 4))
+    rows = (engagement.start, engagement.rows, engagement.tooth, engagement.slice, engagement.slices)
     _strength.in_sections_over_turn(*rows, angles, cutter.flutes, np.array(material.law), heights, out)
     return out
 
@@ -141,7 +141,9 @@ def von_mises_stress(loads: ArrayLike, diameter: ArrayLike) -> Floats:
     return np.asarray(np.sqrt((bending + np.abs(axial)) ** 2 + 3.0 * tau**2))
 
 
-def cutter_stress(bites: ToothEngagement, cutter: Cutter, material: Material, rotation: float = ROTATION) -> Floats:
+def cutter_stress(
+    engagement: ToothEngagement, cutter: Cutter, material: Material, rotation: float = ROTATION
+) -> Floats:
     """Return the column ``cutter_stress_mpa``: greatest equivalent stress of each step over a revolution, (n,) [MPa].
 
     Parameters
@@ -159,13 +161,13 @@ def cutter_stress(bites: ToothEngagement, cutter: Cutter, material: Material, ro
     count = max(math.ceil(pitch / rotation), 8)
     at = sections_of(cutter)
     brittle = cutter.strength.material_at(cutter.modulus) is ToolMaterial.CARBIDE
-    if has_lever_loads(bites, cutter, material) and greatest_height(bites) <= at.height[0] * (1.0 + 1e-12):
+    if has_lever_loads(engagement, cutter, material) and greatest_height(engagement) <= at.height[0] * (1.0 + 1e-12):
         # all that cuts is below the sections: the force and its moment about the tip say all
-        out = np.empty(len(bites))
-        for some, loads in lever_loads_in_blocks(bites, cutter, material, count, np.eye(4)[:2]):
+        out = np.empty(len(engagement))
+        for some, loads in lever_loads_in_blocks(engagement, cutter, material, count, np.eye(4)[:2]):
             _strength.greatest_stress(loads, at.height, at.diameter, brittle, out[some])
         return cutter.strength.concentration * out
-    loads = section_loads(bites, cutter, material, np.arange(count) * (pitch / count), at.height)
+    loads = section_loads(engagement, cutter, material, np.arange(count) * (pitch / count), at.height)
     stress = normal_stress(loads, at.diameter) if brittle else von_mises_stress(loads, at.diameter)
     return np.asarray(cutter.strength.concentration * stress.max(axis=(1, 2), initial=0.0))
 

@@ -11,8 +11,8 @@ tooth; N teeth; j tooth, each its pitch p_j behind the one before it, 2 pi / N w
 tooth 0; r_j = R + e cos(lambda - a_j) its radius with the runout (e, lambda), lambda counted from tooth 0 towards tooth
 1; h [mm] chip thickness along nu.
 
-A bite is a range of immersion and of the profile in which h = along sin(phi) + across cos(phi) + offset, at least 0. A
-motion f a tooth of the point on the edge gives along = sin(kappa) f.T, across = sin(kappa) f.n and
+An engagement range is a range of immersion and of the profile in which h = along sin(phi) + across cos(phi) + offset,
+at least 0. A motion f a tooth of the point on the edge gives along = sin(kappa) f.T, across = sin(kappa) f.n and
 offset = -cos(kappa) f.A: a plunge is an offset on the bottom.
 
 Reference: [Altintas2012] ch. 2 for h = f_z sin(phi); [Kline1983] for runout: a tooth cuts what the N teeth before it
@@ -39,7 +39,7 @@ from chipload.errors import InputError
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: how far beyond its range an end of an arc or of a bite may lie [rad]; rounding, not a setting
+#: how far beyond its range an end of an arc or of an engagement range may lie [rad]; rounding, not a setting
 _SLACK = 1e-6
 
 
@@ -49,11 +49,11 @@ class ToothEngagement:
 
     Parameters
     ----------
-    start : (n + 1,) int; the bites of step i are the rows start[i] .. start[i + 1] - 1
+    start : (n + 1,) int; the engagement ranges of step i are the rows start[i] .. start[i + 1] - 1
     rows : (b, 7) float: phi from, phi to [rad; 0 <= from <= 2 pi, from <= to <= from + 2 pi], s from, s to [mm], along,
         offset, across [mm]; those of one tooth at one place of the profile are disjoint; h >= 0 in each
     tooth : (b,) int; which tooth; -1: every tooth
-    slice : (b,) int; the row of ``slices`` in which the bite's s lies
+    slice : (b,) int; the row of ``slices`` in which the engagement range's s lies
     slices : (k, 7) float: s from [mm], rho [mm], z at s from [mm], sin(kappa), cos(kappa), lag at s from [rad], rate of
         the lag [rad/mm]; ``Slices.columns``
     frame : (n, 3, 3) float: rows T, n, A in the frame of the work; None: not needed
@@ -165,17 +165,17 @@ def tooth_radii(cutter: Cutter) -> Floats:
     return np.asarray(offset * np.cos(direction - cutter.tooth_angles))
 
 
-def with_runout(bites: ToothEngagement, cutter: Cutter) -> ToothEngagement:
+def with_runout(engagement: ToothEngagement, cutter: Cutter) -> ToothEngagement:
     """Return the tooth engagement of every tooth by itself with the cutter's runout; rows of a single tooth stay.
 
-    Each bite of every tooth, with the thickness h that it would have without runout, becomes for tooth j the ranges of
-    immersion in which one of the lines m h + (r_j - r_(j-m)) sin(kappa) is the lowest, and positive. Teeth that are not
-    evenly spaced take h by their pitch.
+    Each engagement range of every tooth, with the thickness h that it would have without runout, becomes for tooth j
+    the ranges of immersion in which one of the lines m h + (r_j - r_(j-m)) sin(kappa) is the lowest, and positive.
+    Teeth that are not evenly spaced take h by their pitch.
 
     Returns
     -------
     ToothEngagement
-        ``bites`` itself where all teeth are alike.
+        ``engagement`` itself where all teeth are alike.
 
     Examples
     --------
@@ -187,23 +187,25 @@ def with_runout(bites: ToothEngagement, cutter: Cutter) -> ToothEngagement:
     ([0], [[0.02, 0.0, 0.0]])
     """
     if cutter.teeth_alike:
-        return bites
+        return engagement
     radii, turns = tooth_radii(cutter), turns_before(cutter)
-    sine = bites.slices[bites.slice, 3]
-    sizes = np.zeros(len(bites.rows), dtype=np.int64)
+    sine = engagement.slices[engagement.slice, 3]
+    sizes = np.zeros(len(engagement.rows), dtype=np.int64)
     none = np.empty((0, 7))
-    _kernels.runout_engagement(bites.rows, bites.tooth, sine, radii, turns, sizes, none, np.empty(0, np.int64), False)
+    _kernels.runout_engagement(
+        engagement.rows, engagement.tooth, sine, radii, turns, sizes, none, np.empty(0, np.int64), False
+    )
     rows = np.empty((int(sizes.sum()), 7))
     tooth = np.empty(len(rows), dtype=np.int64)
-    _kernels.runout_engagement(bites.rows, bites.tooth, sine, radii, turns, sizes, rows, tooth, True)
-    start = np.concatenate([[0], np.cumsum(sizes)])[bites.start]
-    own, slices = np.repeat(bites.slice, sizes), bites.slices
+    _kernels.runout_engagement(engagement.rows, engagement.tooth, sine, radii, turns, sizes, rows, tooth, True)
+    start = np.concatenate([[0], np.cumsum(sizes)])[engagement.start]
+    own, slices = np.repeat(engagement.slice, sizes), engagement.slices
     if cutter.pitch:
         late = cutter.tooth_angles - math.tau / cutter.flutes * np.arange(cutter.flutes)
         own, count = own + tooth * len(slices), len(slices)
         slices = np.tile(slices, (cutter.flutes, 1))
         slices[:, 5] += np.repeat(late - late.min(), count)
-    return ToothEngagement(start, rows, tooth, own, slices, bites.frame)
+    return ToothEngagement(start, rows, tooth, own, slices, engagement.frame)
 
 
 def thickest_of_teeth(plain: ArrayLike, cutter: Cutter, sine: ArrayLike = 1.0) -> Floats:

@@ -148,8 +148,8 @@ def remove(
             for sums, some, cuts in _blocks_removed(program, stock, begun, setting, times):
                 progress(sums.steps / count, "removing")
                 columns.append(some)
-                for bite in cuts if keep else ():
-                    kept.setdefault(bite.tool, []).append(bite)
+                for engaged in cuts if keep else ():
+                    kept.setdefault(engaged.tool, []).append(engaged)
             break
         except HandOver as why:
             setting, handed = by_layers(engine, setting, why)
@@ -332,11 +332,11 @@ def remove_block(
     if setting.moves is not None:
         return _moved_block(steps, setting.moves, sums, setting, contact)
     taken = removed_by_layers(steps, stock, sums.steps, setting, sums.piece) if found is None else found
-    removed, bites, piece = taken.removed, taken.engagement, taken.piece
+    removed, engagement, piece = taken.removed, taken.engagement, taken.piece
     loads, basis, cut = np.zeros((len(steps), len(LOADS))), sums.basis, list[Cuts]()
     watched: dict[str, Floats] = {}
-    for number in sorted({int(steps.tool[c.step]) for c in bites}):
-        own = [c for c in bites if steps.tool[c.step] == number]
+    for number in sorted({int(steps.tool[c.step]) for c in engagement}):
+        own = [c for c in engagement if steps.tool[c.step] == number]
         at, cutter, material = [c.step for c in own], setting.cutters[number], setting.material
         plain = engagement_of_steps(own, setting.profiles[number])
         bitten = with_runout(plain, cutter)

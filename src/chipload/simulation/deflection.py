@@ -1,8 +1,8 @@
 """Deflection of tool and work in every step, and the form error of the surface that results.
 
 Notation: q point of the wanted surface, n its unit normal out of the part; p, A tip and axis of the cutter, T, n_c, A
-its frame; s length along its profile, phi immersion, theta rotation of tooth 0, lag(s) of its edge, bites as in
-:mod:`chipload.engagement.tooth_engagement`; F [N] force ON THE CUTTER, that on the work is -F; C (3, 3) [mm/N]
+its frame; s length along its profile, phi immersion, theta rotation of tooth 0, lag(s) of its edge, engagement ranges
+as in :mod:`chipload.engagement.tooth_engagement`; F [N] force ON THE CUTTER, that on the work is -F; C (3, 3) [mm/N]
 compliance of the
 work at q, C_nn = n . C n; C_b(z', z) that of the bars of cutter, holder and spindle.
 
@@ -16,12 +16,12 @@ positive where the cutter is pushed away. The surface is what the deflected cutt
 
     left(q) = min over k and j of d_k + e_k - (r_j - R) sin(kappa),
 
-over the steps at which q lies at the end of a bite (over all where there are none): the moment that makes q counts,
-not the greatest force, nor a tooth that has just left its bite and would spring back. d of that step is what a rigid
-cutter leaves there (cusps, and stock where the program leaves any). Steps that do not cut count as absent: what they
-would take again after a deflection is not known.
+over the steps at which q lies at the end of an engagement range (over all where there are none): the moment that makes
+q counts, not the greatest force, nor a tooth that has just left its engagement range and would spring back. d of that
+step is what a rigid cutter leaves there (cusps, and stock where the program leaves any). Steps that do not cut count as
+absent: what they would take again after a deflection is not known.
 
-Without helix a tooth leaves all of its bite at once: the moment just before counts, as in
+Without helix a tooth leaves all of its engagement range at once: the moment just before counts, as in
 :mod:`chipload.cutting.wall_error`.
 
 The load is that of the rigid model in the middle of the step: deflection does not reduce the chip thickness. The work
@@ -61,7 +61,8 @@ Bools = NDArray[np.bool_]
 
 #: cosine of the greatest angle between the surface and that of the cutter where it makes it: a cusp, not a corner
 FACING = 0.5
-#: how near to the end of a bite q must lie to be made by it, along its circle [mm]: slices of a corner know no better
+#: how near to the end of an engagement range q must lie to be made by it, along its circle [mm]: slices of a corner
+#: know no better
 REACH = 0.2
 #: points whose pairs with steps are held at once
 CHUNK = 4096
@@ -77,8 +78,8 @@ class Contacts:
     Attributes
     ----------
     step : (c,) int, rows of the removal's columns
-    point : (c, 3) float [mm], on the cutter in the middle of the step: mean of the ends of its bites at which h = 0
-    normal : (c, 3) float, unit, out of the surface that is left; 0 where it leaves two that face each other
+    point : (c, 3) float [mm], on the cutter in the middle of the step: mean of the ends of its engagement ranges at
+    which h = 0 normal : (c, 3) float, unit, out of the surface that is left; 0 where it leaves two that face each other
     """
 
     step: Ints
@@ -96,7 +97,8 @@ class FormError:
     rigid : (p,) float [mm], what the rigid cutter leaves there; below 0: it gouges
     cutter, work : (p,) float [mm], by how much each gives way along n at that moment
     force : (p,) float [N], F . n at that moment: it pushes work and cutter apart where above 0
-    at_edge : (p,) bool, whether q lies at the end of a bite, as it should; False: it is touched again by a cutter that
+    at_edge : (p,) bool, whether q lies at the end of an engagement range, as it should; False: it is touched again by
+    a cutter that
         cuts elsewhere
     """
 
@@ -144,14 +146,14 @@ def contacts(removal: Removal) -> Contacts:
     """
     parts = [(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))]
     for cuts in _kept(removal):
-        bites = cuts.engagement
-        owner = np.repeat(np.arange(len(bites)), np.diff(bites.start))
-        p, q, a, b, along, offset, across = bites.rows.T
-        s0, rho, z0, sk, ck = bites.slices[bites.slice, :5].T
+        engagement = cuts.engagement
+        owner = np.repeat(np.arange(len(engagement)), np.diff(engagement.start))
+        p, q, a, b, along, offset, across = engagement.rows.T
+        s0, rho, z0, sk, ck = engagement.slices[engagement.slice, :5].T
         half = 0.5 * (a + b) - s0
         height, radius = z0 + sk * half, rho
-        total, place, weight = np.zeros((len(bites), 3)), np.zeros((len(bites), 3)), np.zeros(len(bites))
-        frame = bites.frames[owner]
+        total, place, weight = np.zeros((len(engagement), 3)), np.zeros((len(engagement), 3)), np.zeros(len(engagement))
+        frame = engagement.frames[owner]
         tip = 0.5 * (cuts.ends[owner, :3] + cuts.ends[owner, 3:6])
         for phi in (p, q):
             h = along * np.sin(phi) + across * np.cos(phi) + offset
@@ -337,7 +339,7 @@ def form_error(
         :func:`chipload.structure.spindle.cutter_bars`; None: rigid
     near : a step that stays farther than this [mm] from a point does not make it
     facing : cosine of the greatest angle between the normals of surface and cutter
-    reach : how near to the end of a bite a point must lie to be made by it [mm], see ``FormError.at_edge``
+    reach : how near to the end of an engagement range a point must lie to be made by it [mm], see ``FormError.at_edge``
 
     Raises
     ------

@@ -94,7 +94,7 @@ def removed_by_layers(
                 cutting = []
         waiting.append(beside.submit(engaged, cutting))
         tiles.finish()
-        return TakenByLayers(removed, gained, [bite for several in waiting for bite in several.result()], best)
+        return TakenByLayers(removed, gained, [engaged for several in waiting for engaged in several.result()], best)
 
 
 def rank_of(whole: Sequence[Polygon]) -> tuple[int, float]:

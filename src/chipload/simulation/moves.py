@@ -250,16 +250,16 @@ def moved(
         entries = feeding[steps.tool[found.step[feeding]] == number]
         cutter = cutters[number]
         plain = engagement_of(found, entries, steps, cutter)
-        bites = with_runout(plain, cutter)
+        engagement = with_runout(plain, cutter)
         step = found.step[entries]
         left, spindle = _left(found, entries), np.abs(steps.spindle[step])
-        each, at, mean = loads_of_instants(bites, cutter, material, rotation, left, spindle, steps.seconds[step])
+        each, at, mean = loads_of_instants(engagement, cutter, material, rotation, left, spindle, steps.seconds[step])
         weight = 1.0 / found.instants[entries]
         _together(loads, step, each, weight)
         if material.has_band:
-            some = turned_basis(mean, bites.frames)
+            some = turned_basis(mean, engagement.frames)
             basis = basis + np.tensordot(steps.seconds[step] * weight, some, 1)
-            own, values = _bands(bites, cutter, material, step, each, at, some * weight[:, None, None], spindle)
+            own, values = _bands(engagement, cutter, material, step, each, at, some * weight[:, None, None], spindle)
             for name, column in zip(BANDS, values, strict=True):
                 bands[name][own] = column
         cuts.append(_cuts(number, cutter, first, steps, found, entries, plain, each[:, FORCE]))
@@ -267,7 +267,7 @@ def moved(
 
 
 def loads_of_instants(
-    bites: ToothEngagement,
+    engagement: ToothEngagement,
     cutter: Cutter,
     material: Material,
     rotation: float,
@@ -275,16 +275,17 @@ def loads_of_instants(
     spindle: Floats,
     seconds: Floats,
 ) -> tuple[Floats, Floats, Floats]:
-    """(m, len(LOADS)) loads of steps that take ``seconds`` (m,) and cut all over as ``bites`` say, (m, 2) rotations
-    [rad] at which force and torque are greatest, and (m, 4, 6) basis of the mean loads along T, n and the axis.
+    """(m, len(LOADS)) loads of steps that take ``seconds`` (m,) and cut all over as ``engagement`` say, (m, 2)
+    rotations [rad] at which force and torque are greatest, and (m, 4, 6) basis of the mean loads along T, n and the
+    axis.
 
     Oracle: :func:`chipload.simulation.loads.loads_of_steps`, which takes rotation by rotation.
     """
-    each, at, basis = loads_over_turn(bites, cutter, material, rotation, left)
+    each, at, basis = loads_over_turn(engagement, cutter, material, rotation, left)
     each[:, 10:12] /= 1000.0
     each[:, 12] = each[:, 10] * spindle
     if any(material.exponents):
-        volume, work = engaged_work(bites, cutter, material, spindle * seconds)
+        volume, work = engaged_work(engagement, cutter, material, spindle * seconds)
     else:
         volume = basis[:, 3, 0] * spindle * seconds
         work = material.Ktc * volume
@@ -292,7 +293,7 @@ def loads_of_instants(
 
 
 def _bands(
-    bites: ToothEngagement,
+    engagement: ToothEngagement,
     cutter: Cutter,
     material: Material,
     step: Ints,
@@ -312,7 +313,7 @@ def _bands(
     for column, (name, deviation) in enumerate(((FORCE, force_deviation), (TORQUE, torque_deviation))):
         kept = np.lexsort((-each[:, name], step))
         kept = kept[np.flatnonzero(np.diff(step[kept], prepend=-1))]
-        some = bites if len(kept) == len(step) else bites.part(kept)
+        some = engagement if len(kept) == len(step) else engagement.part(kept)
         worst.append(deviation(some, cutter, material, at[kept, column]))
     speed = np.zeros(len(own))
     speed[of] = spindle

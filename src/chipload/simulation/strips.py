@@ -248,12 +248,12 @@ class Strips:
             if not failed and self._states[0].first < self._total:
                 self._coming = self._beside.submit(self._round, ROUND)
         removed, gained = np.zeros((len(steps), 4)), np.zeros(len(steps))
-        bites, pieces = [], list[ChipAreas]()
+        engagement, pieces = [], list[ChipAreas]()
         for each in self._blocks.pop(0):
             if isinstance(each, ChiploadError):
                 raise each
             removed[each.own], gained[each.own] = each.taken.removed, each.taken.gained
-            bites += each.taken.engagement
+            engagement += each.taken.engagement
             # of the cutters of the caller, not a copy
             pieces += [] if each.piece is None else [replace(each.piece[1], cutter=self.cutters[each.piece[0]])]
         for one in sorted(pieces, key=lambda p: p.step):
@@ -264,7 +264,7 @@ class Strips:
         self.complete = not self._blocks
         for state in self._states if self.complete else ():
             self._put(state)
-        return TakenByLayers(removed, gained, sorted(bites, key=lambda b: b.step), piece)
+        return TakenByLayers(removed, gained, sorted(engagement, key=lambda b: b.step), piece)
 
     def _put(self, state: _State) -> None:
         """The tiles of a strip into the stock of the caller."""

@@ -73,19 +73,19 @@ def test_feed_keeps_the_limits_and_no_lower_one_would_do():
     size = CatalogueCutter(12.0, 2.0, cutting_length=20.0)
     mill = terms().cutter(size)
     wall = place((0, 1, 0), (0, 6.0, -5), (0, 0, 1))
-    bites = engagement_at(wall, mill, 0.1, 0.5, EarlierPoses.none())
-    ends = [loads_of(bites, wall, mill, MATERIAL, np.full(1, f))[1][0] for f in (LEAST, 1.0)]
+    engagement = engagement_at(wall, mill, 0.1, 0.5, EarlierPoses.none())
+    ends = [loads_of(engagement, wall, mill, MATERIAL, np.full(1, f))[1][0] for f in (LEAST, 1.0)]
     t = terms(deflection=0.5 * sum(ends) * (1.0 + terms().error))
-    f = allowed_factor(bites, wall, mill, t)
+    f = allowed_factor(engagement, wall, mill, t)
     assert LEAST < f[0] < 1.0
-    _, bend, _ = loads_of(bites, wall, mill, MATERIAL, f)
+    _, bend, _ = loads_of(engagement, wall, mill, MATERIAL, f)
     assert 0.97 <= bend[0] * (1.0 + t.error) / t.deflection <= 1.0
     # a stepped cantilever by integration of its moments
     E = 5.8e5
     theta = np.linspace(0.0, math.pi, 24, endpoint=False)
-    rows = bites.rows.copy()
+    rows = engagement.rows.copy()
     rows[:, 4:7] *= f[0]
-    fed = type(bites)(bites.start, rows, bites.tooth, bites.slice, bites.slices)
+    fed = type(engagement)(engagement.start, rows, engagement.tooth, engagement.slice, engagement.slices)
     lateral = np.hypot(*forces_over_turn(fed, mill, MATERIAL, theta)[0][0, :, :2].T).max()
     z = np.linspace(5.0, 70.0, 20001)
     inertia = math.pi * np.where(z < 20.0, 0.8 * 12.0, 12.0) ** 4 / 64.0
@@ -117,8 +117,8 @@ def test_the_second_time_along_nothing_is_left_and_the_feed_is_the_greatest():
     assert second == [5.0]
     # poses 0.4 mm apart leave next to nothing: at the greatest feed less than 3 % of what the first pass takes there
     mill = t.cutter(CatalogueCutter(12.0, 2.0))
-    bites = engagement_at(one.places(), mill, 5.0 * math.tau / 180.0, 0.5, EarlierPoses.none())
-    assert loads.force.max() < 0.03 * loads_of(bites, one.places(), mill, MATERIAL, np.ones(3))[0].max()
+    engagement = engagement_at(one.places(), mill, 5.0 * math.tau / 180.0, 0.5, EarlierPoses.none())
+    assert loads.force.max() < 0.03 * loads_of(engagement, one.places(), mill, MATERIAL, np.ones(3))[0].max()
 
 
 def test_slender_cutters_are_fed_more_slowly():

@@ -41,8 +41,8 @@ def simulated(posture: CutterPose, d: float, layers: int, feed: float, spindle: 
     [(BALL, 15.0, 0.0, -0.5, 20.0), (BULL, 8.0, 5.0, 0.5, 14.0)],
 )
 def test_simulated_row(cutter, lead, tilt, step, threshold):
-    """The mean within 1.2 % of what 30 and 60 layers tend to (their error halves); the greatest within 4 %: bites count
-    as whole slices there."""
+    """The mean within 1.2 % of what 30 and 60 layers tend to (their error halves); the greatest within 4 %: engagement
+    ranges count as whole slices there."""
     feed, spindle = 10.0, 628.0
     tooth = feed * math.tau / (spindle * cutter.flutes)
     posture = CutterPose(cutter, tooth, step, math.radians(lead), math.radians(tilt))

@@ -93,8 +93,8 @@ def test_mean_against_layers(cutter, lead, step):
     rows, owner = immersed(
         tip, posture.frame, [0.05, 0.0, 0.0], [0.0, 0.0, 0.0], profile, Section(bounds, start, np.array(edges))
     )
-    bites = ToothEngagement([0, len(rows)], rows, np.full(len(rows), -1), owner, profile.columns)
-    layered = abs(float(mean_forces(bites, cutter, FULL)[0][0] @ posture.frame[:, 2]))
+    engagement = ToothEngagement([0, len(rows)], rows, np.full(len(rows), -1), owner, profile.columns)
+    layered = abs(float(mean_forces(engagement, cutter, FULL)[0][0] @ posture.frame[:, 2]))
     assert normal_force(posture, FULL, [d], measure="mean")[0] == pytest.approx(layered, rel=0.01)
 
 

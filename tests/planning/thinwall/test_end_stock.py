@@ -24,10 +24,10 @@ FULL = Material("full", 1500.0, 600.0, 250.0, 20.0, 15.0, 5.0, source="made up")
 def test_closed_form_of_the_mean_axial_force(step, depth):
     """N d / 2 pi (Kac f (1 - cos psi) + Kae psi) along the axis, psi the angle of engagement."""
     psi = math.acos(1.0 - abs(step) / 5.0)
-    bites = EndPose(FLAT, 0.05, step).engagement([depth])
+    engagement = EndPose(FLAT, 0.05, step).engagement([depth])
     _, _, Kac, _, _, Kae = FULL.coefficients
     expected = 4.0 * depth / math.tau * (Kac * 0.05 * (1.0 - math.cos(psi)) + Kae * psi)
-    assert_allclose(abs(mean_forces(bites, FLAT, FULL)[0][0, 2]), expected, rtol=1e-9)
+    assert_allclose(abs(mean_forces(engagement, FLAT, FULL)[0][0, 2]), expected, rtol=1e-9)
     assert_allclose(normal_force(EndPose(FLAT, 0.05, step), FULL, [depth], measure="mean"), expected, rtol=1e-9)
 
 
@@ -76,8 +76,8 @@ def test_over_a_turn_against_the_sum_over_the_edges(cutter, step):
     for depth in (0.3, 1.5):
         angles = np.arange(0.0, pitch, math.radians(0.25))
         exact = np.array([summed(pose, depth, t) for t in angles])
-        bites = pose.engagement([depth], 256)
-        found = forces_over_turn(bites, cutter, FULL, np.arange(0.0, pitch, math.radians(0.25)))[0][0]
+        engagement = pose.engagement([depth], 256)
+        found = forces_over_turn(engagement, cutter, FULL, np.arange(0.0, pitch, math.radians(0.25)))[0][0]
         assert_allclose(found[:, 2].max(), exact[:, 2].max(), rtol=0.01, atol=0.02)
         assert_allclose(found[:, 2].min(), exact[:, 2].min(), rtol=0.01, atol=0.02)
         size = np.abs(exact).max()

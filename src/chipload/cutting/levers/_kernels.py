@@ -1,12 +1,13 @@
 """Compiled loop of loads times levers over a revolution, for a linear law; arrays and scalars only.
 
-Notation as in :mod:`chipload.cutting.revolution._kernels`: at a rotation the edge of a bite lies at the immersions
-theta - last .. theta - first, of which p .. q cut. A lever is a polynomial of the third degree in the height above the
-tip. Where all of a bite's edge cuts, its points of Gauss lie at the same lag at every rotation: as there, its load is a
-sum of cosine and sine of the rotation and of twice it, the factors of which are added where that begins and taken away
-where it ends.
+Notation as in :mod:`chipload.cutting.revolution._kernels`: at a rotation the edge of an engagement range lies at the
+immersions theta - last .. theta - first, of which p .. q cut. A lever is a polynomial of the third degree in the
+height above the tip. Where all of an engagement range's edge cuts, its points of Gauss lie at the same lag at every
+rotation: as there, its load is a sum of cosine and sine of the rotation and of twice it, the factors of which are
+added where that begins and taken away where it ends.
 Oracles: :func:`chipload.cutting._strength.in_sections_over_turn` and
-:func:`chipload.simulation.bending._kernels.bent_many`, which integrate bite by bite and rotation by rotation.
+:func:`chipload.simulation.bending._kernels.bent_many`, which integrate engagement range by engagement range and
+rotation by rotation.
 """
 
 from __future__ import annotations

@@ -27,25 +27,27 @@ FIXED = 4
 BLOCK = 512
 
 
-def has_lever_loads(bites: ToothEngagement, cutter: Cutter, material: Material) -> bool:
+def has_lever_loads(engagement: ToothEngagement, cutter: Cutter, material: Material) -> bool:
     """Return whether :func:`lever_loads` applies: a linear force law, and equal teeth where there is no runout."""
-    return not any(material.exponents) and (not cutter.teeth_alike or not bool((bites.tooth >= 0).any()))
+    return not any(material.exponents) and (not cutter.teeth_alike or not bool((engagement.tooth >= 0).any()))
 
 
-def greatest_height(bites: ToothEngagement) -> float:
+def greatest_height(engagement: ToothEngagement) -> float:
     """Return the greatest height [mm] above the tip at which an edge is in material; 0 if none is."""
-    if not len(bites.rows):
+    if not len(engagement.rows):
         return 0.0
-    own = bites.slices[bites.slice]
-    return float((own[:, 2] + own[:, 3] * (bites.rows[:, 3] - own[:, 0])).max())
+    own = engagement.slices[engagement.slice]
+    return float((own[:, 2] + own[:, 3] * (engagement.rows[:, 3] - own[:, 0])).max())
 
 
-def lever_loads(bites: ToothEngagement, cutter: Cutter, material: Material, count: int, levers: ArrayLike) -> Floats:
+def lever_loads(
+    engagement: ToothEngagement, cutter: Cutter, material: Material, count: int, levers: ArrayLike
+) -> Floats:
     """Return the loads of each step over ``count`` rotations of a period: a pitch, or a revolution with runout.
 
     Parameters
     ----------
-    bites : of n steps, for which :func:`has_lever_loads`
+    engagement : of n steps, for which :func:`has_lever_loads`
     levers : (f, 4) float, polynomials in the height z [mm] above the tip, from the constant on; at least two
 
     Returns
@@ -65,14 +67,14 @@ def lever_loads(bites: ToothEngagement, cutter: Cutter, material: Material, coun
     >>> found[0, :, 2].round(9).tolist()
     [0.0, 1100.0, 0.0, 0.0, -70.0, 220.0, -70.0, 220.0]
     """
-    out = np.empty((len(bites), FIXED + 2 * len(np.asarray(levers)), count))
-    for some, loads in lever_loads_in_blocks(bites, cutter, material, count, levers):
+    out = np.empty((len(engagement), FIXED + 2 * len(np.asarray(levers)), count))
+    for some, loads in lever_loads_in_blocks(engagement, cutter, material, count, levers):
         out[some] = loads
     return out
 
 
 def lever_loads_in_blocks(
-    bites: ToothEngagement, cutter: Cutter, material: Material, count: int, levers: ArrayLike
+    engagement: ToothEngagement, cutter: Cutter, material: Material, count: int, levers: ArrayLike
 ) -> Iterator[tuple[slice, Floats]]:
     """Yield steps and their :func:`lever_loads`, ``BLOCK`` steps at a time: some MB instead of some ten."""
     polys = np.ascontiguousarray(levers, dtype=np.float64)
@@ -80,12 +82,12 @@ def lever_loads_in_blocks(
     whole = count * (cutter.flutes if alike else 1)
     theta = np.arange(whole) * (math.tau / whole)
     table = np.vstack([np.cos(theta), np.sin(theta)])
-    rows = (bites.rows, bites.tooth, bites.slice, bites.slices)
-    for at in range(0, len(bites), BLOCK):
-        some = slice(at, min(at + BLOCK, len(bites)))
+    rows = (engagement.rows, engagement.tooth, engagement.slice, engagement.slices)
+    for at in range(0, len(engagement), BLOCK):
+        some = slice(at, min(at + BLOCK, len(engagement)))
         out = np.empty((some.stop - at, FIXED + 2 * len(polys), count))
         _kernels.over_turn(
-            bites.start[at : some.stop + 1], *rows, table, cutter.flutes, count, alike, np.array(material.law), polys,
-            out,
+            engagement.start[at : some.stop + 1], *rows, table, cutter.flutes, count, alike, np.array(material.law),
+            polys, out,
         )  # fmt: skip
         yield some, out

@@ -84,15 +84,17 @@ def floor_loads(places: Places, removal: Removal, left: Sequence[Floats], side: 
 
 def arc_places(cuts: Cuts, floor: PartFloor) -> Floats:
     """Parameters (3, c, 2) of the places of a floor under the beginning, the middle and the end of the arcs in cut."""
-    bites = cuts.engagement
-    first = bites.start[:-1]
-    low, high = (f.reduceat(x, first) for f, x in ((np.minimum, bites.rows[:, 0]), (np.maximum, bites.rows[:, 1])))
-    length = np.maximum(bites.rows[:, 3] - bites.rows[:, 2], 0.0)
-    rho = np.add.reduceat(bites.slices[bites.slice, 1] * length, first) / np.add.reduceat(length, first)
+    engagement = cuts.engagement
+    first = engagement.start[:-1]
+    low, high = (
+        f.reduceat(x, first) for f, x in ((np.minimum, engagement.rows[:, 0]), (np.maximum, engagement.rows[:, 1]))
+    )
+    length = np.maximum(engagement.rows[:, 3] - engagement.rows[:, 2], 0.0)
+    rho = np.add.reduceat(engagement.slices[engagement.slice, 1] * length, first) / np.add.reduceat(length, first)
     tip = 0.5 * (cuts.ends[:, :3] + cuts.ends[:, 3:6])
     out = []
     for phi in (low, 0.5 * (low + high), high):
-        T, n = bites.frames[:, 0], bites.frames[:, 1]
+        T, n = engagement.frames[:, 0], engagement.frames[:, 1]
         out.append(tip + rho[:, None] * (np.sin(phi)[:, None] * T + np.cos(phi)[:, None] * n))
     xy = floor.on(floor.parameters(np.concatenate(out)) * floor.box)
     return np.asarray((xy / floor.box).reshape(3, len(cuts), 2))
@@ -100,11 +102,12 @@ def arc_places(cuts: Cuts, floor: PartFloor) -> Floats:
 
 def _greatest(cuts: Cuts, C: Floats, inputs: WallInputs) -> Floats:
     """Greatest |C . F| over a revolution (k, c) of places with C (k, c, 3)."""
-    cutter, bites = cuts.cutter, cuts.engagement
+    cutter, engagement = cuts.cutter, cuts.engagement
     pitch = math.tau / cutter.flutes if cutter.teeth_alike else math.tau
     count = math.ceil(pitch / TURN)
     force = in_work(
-        forces_over_turn(bites, cutter, inputs.cut.material, np.arange(count) * (pitch / count))[0], bites.frames
+        forces_over_turn(engagement, cutter, inputs.cut.material, np.arange(count) * (pitch / count))[0],
+        engagement.frames,
     )
     return np.asarray(np.abs(np.einsum("kci,cmi->kcm", C, force)).max(axis=2))
 

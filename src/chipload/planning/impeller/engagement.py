@@ -157,9 +157,14 @@ def engagement_at(
         frames.append(frame)
         start.append(start[-1] + len(low))
     piece = np.concatenate(owner) if owner else np.zeros(0, dtype=np.int64)
-    bites = np.concatenate(rows) if rows else np.zeros((0, 7))
+    engagement = np.concatenate(rows) if rows else np.zeros((0, 7))
     return ToothEngagement(
-        np.array(start), bites, np.full(len(bites), -1), piece, profile.columns, np.array(frames).reshape(-1, 3, 3)
+        np.array(start),
+        engagement,
+        np.full(len(engagement), -1),
+        piece,
+        profile.columns,
+        np.array(frames).reshape(-1, 3, 3),
     )
 
 

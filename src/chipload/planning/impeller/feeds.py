@@ -145,24 +145,24 @@ class PassLoads:
 
 
 def loads_of(
-    bites: ToothEngagement, places: PassPlaces, cutter: Cutter, material: Material, factor: Floats
+    engagement: ToothEngagement, places: PassPlaces, cutter: Cutter, material: Material, factor: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Force [N], deflection [mm] and stress [MPa] (n,) of steps whose feed is ``factor`` (n,) times that of the tooth
     engagement.
 
     The deflection is that of a bar under the force at the mean height of the teeth's contact with material.
     """
-    step = np.repeat(np.arange(len(bites)), np.diff(bites.start))
-    rows = bites.rows.copy()
+    step = np.repeat(np.arange(len(engagement)), np.diff(engagement.start))
+    rows = engagement.rows.copy()
     rows[:, 4:7] *= factor[step][:, None]
-    fed = replace(bites, rows=rows)
+    fed = replace(engagement, rows=rows)
     theta = np.linspace(0.0, math.tau / cutter.flutes, _ROTATIONS, endpoint=False)
     force = forces_over_turn(fed, cutter, material, theta)[0]
-    own = bites.slices[bites.slice]
+    own = engagement.slices[engagement.slice]
     height = own[:, 2] + 0.5 * (rows[:, 3] - rows[:, 2]) * own[:, 3]
     weight = (rows[:, 3] - rows[:, 2]) * (rows[:, 1] - rows[:, 0])
-    total = np.bincount(step, weight, len(bites))
-    mean = np.bincount(step, weight * height, len(bites)) / np.where(total > 0.0, total, 1.0)
+    total = np.bincount(step, weight, len(engagement))
+    mean = np.bincount(step, weight * height, len(engagement)) / np.where(total > 0.0, total, 1.0)
     contact = ((places.contact - places.tip) * places.axis).sum(axis=1).clip(0.0, cutter.overhang)
     lateral = np.hypot(force[..., 0], force[..., 1]).max(axis=1)
     bend = lateral * compliance(cutter, mean.clip(0.0, cutter.overhang), contact)
@@ -171,15 +171,15 @@ def loads_of(
     return peaks * size, peaks * bend, peaks * cutter_stress(fed, cutter, material)
 
 
-def allowed_factor(bites: ToothEngagement, places: PassPlaces, cutter: Cutter, terms: ForceTerms) -> Floats:
+def allowed_factor(engagement: ToothEngagement, places: PassPlaces, cutter: Cutter, terms: ForceTerms) -> Floats:
     """Greatest f (n,) at which deflection and stress of a step are allowed; :data:`LEAST` where none is."""
     stress = allowed_stress(cutter)
 
     def fits(factor: Floats) -> NDArray[np.bool_]:
-        _, bend, sigma = loads_of(bites, places, cutter, terms.material, factor)
+        _, bend, sigma = loads_of(engagement, places, cutter, terms.material, factor)
         return np.maximum(bend / terms.deflection, sigma / stress) * (1.0 + terms.error) <= 1.0
 
-    n = len(bites)
+    n = len(engagement)
     low, high = np.full(n, LEAST), np.ones(n)
     whole = fits(high)
     for _ in range(_HALVINGS if not whole.all() else 0):
@@ -212,8 +212,8 @@ def nominal_feeds(catalogue: Catalogue, terms: ForceTerms, scallop: float, feed:
         x = np.linspace(-1.0, 1.0, 3)[:, None] * 1.5 * size.diameter
         before = EarlierPoses.of(tip - step * np.array([0.0, 1.0, 0.0]) + x * d, np.tile(A, (3, 1)), size.rho, r)
         places = PassPlaces(np.zeros((1, 3)), N[None], np.zeros((1, 3, 3)), tip[None], A[None], d[None])
-        bites = engagement_at(places, cutter, per_tooth(feed, terms), terms.allowance, before)
-        out.append(feed * float(allowed_factor(bites, places, cutter, terms)[0]))
+        engagement = engagement_at(places, cutter, per_tooth(feed, terms), terms.allowance, before)
+        out.append(feed * float(allowed_factor(engagement, places, cutter, terms)[0]))
     return tuple(out)
 
 
@@ -284,11 +284,11 @@ def pass_feeds(
         feeds = np.full(len(passes), feed)
         whole = _joined([p for _, p in found])
         owner = np.repeat([k for k, _ in found], [len(p) for _, p in found]).astype(np.int64)
-        bites = engagement_at(
+        engagement = engagement_at(
             whole, cutter, per_tooth(feed, terms), terms.allowance, earlier, np.array(own, dtype=np.int64)[owner]
         )
-        np.minimum.at(feeds, owner, feed * allowed_factor(bites, whole, cutter, terms))
-        loads = loads_of(bites, whole, cutter, terms.material, feeds[owner] / feed)
+        np.minimum.at(feeds, owner, feed * allowed_factor(engagement, whole, cutter, terms))
+        loads = loads_of(engagement, whole, cutter, terms.material, feeds[owner] / feed)
         out.append(
             (
                 feeds.tolist(),

@@ -144,11 +144,11 @@ def normal_force(
     apart = step_deg or (STEP_DEG if isinstance(posture, CutterPose) else FLANK_STEP_DEG)
     theta = np.linspace(0.0, turn, max(8, math.ceil(math.degrees(turn) / apart)), endpoint=False)
     for at in range(0, len(d), BLOCK):
-        bites = posture.engagement(d[at : at + BLOCK], nodes or own * (8 if measure == "mean" else 16))
+        engagement = posture.engagement(d[at : at + BLOCK], nodes or own * (8 if measure == "mean" else 16))
         if measure == "mean":
-            out[at : at + BLOCK] = np.abs(mean_forces(bites, cutter, material)[0] @ N)
+            out[at : at + BLOCK] = np.abs(mean_forces(engagement, cutter, material)[0] @ N)
         else:
-            force = forces_over_turn(with_runout(bites, cutter), cutter, material, theta)[0]
+            force = forces_over_turn(with_runout(engagement, cutter), cutter, material, theta)[0]
             out[at : at + BLOCK] = np.abs(force @ N).max(axis=1)
     return out
 

@@ -71,8 +71,8 @@ class EndPose:
                 )
         if cutter.barrel_radius is not None:
             raise InputError(
-                f"cutter.barrel_radius_mm = {cutter.barrel_radius:g}: the flank of a barrel makes no floor: choose an end "
-                "mill or bull nose"
+                f"cutter.barrel_radius_mm = {cutter.barrel_radius:g}: the flank of a barrel makes no floor: choose an "
+                "end mill or bull nose"
             )
         if cutter.body:
             raise InputError("cutter.body: chips of a body are not simulated: choose an end mill or bull nose")

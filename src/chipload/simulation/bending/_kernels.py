@@ -4,7 +4,7 @@ Notation as in :mod:`chipload.simulation.deflection`: q point of the surface, n 
 from q to the cutter, (rho, z) its foot on the profile, s the length along it; theta rotation of tooth 0 at the tip. A
 ``shape`` is (r, e, f, alpha, beta, h, rho where the bottom line ends, E, F, R of the flank arc of a barrel (0: none),
 kappa where the corner ends, and where that arc ends below h), a bar (length, 1 / (E I), c_ff, c_mm, c_fm), a
-row of ``steps`` (p0, p1, a0, a1), 12 numbers; bites and slices as in :mod:`chipload.cutting._kernels`.
+row of ``steps`` (p0, p1, a0, a1), 12 numbers; engagement ranges and slices as in :mod:`chipload.cutting._kernels`.
 Oracles: closed forms, the wall of :mod:`chipload.cutting.wall_error` and sums over slices in tests/simulation.
 """
 
@@ -189,8 +189,8 @@ def contacts(points, normals, steps, shape, most, facing, owner, moment):
 
 @njit(cache=True, nogil=True)
 def point_in_engagement(s, phi, rows, tooth, piece, slices, lo, hi, j, reach):
-    """The immersion phi moved just inside the nearest bite of tooth j at s, and whether its end is within ``reach``
-    along the circle of its slice.
+    """The immersion phi moved just inside the nearest engagement range of tooth j at s, and whether its end is within
+    ``reach`` along the circle of its slice.
     """
     best = reach
     out = phi
