@@ -138,7 +138,10 @@ def test_deflection_is_force_over_threshold_times_the_limit(done):
         )
         greatest = np.maximum(c["force_y_max_n"], -c["force_y_min_n"])
         slope = math.cos(math.atan(0.03))
-        assert (c["force_normal_n"][cut] <= greatest[cut] / slope + 0.05 * c["force_n"][cut]).all()
+        # a step that hardly cuts may have its peak between two rotations of the columns; F_n is sought more finely
+        some = cut & (c["force_n"] > 0.25 * c["force_n"].max())
+        assert some.sum() > 0.5 * cut.sum()
+        assert (c["force_normal_n"][some] <= greatest[some] / slope + 0.05 * c["force_n"][some]).all()
 
 
 def finished_plate():
