@@ -170,7 +170,9 @@ def hecc_job(folder: Path) -> Path:
 
 def cpu_s() -> float:
     """Processor time of this process and of those that it has ended [s]."""
-    multiprocessing.active_children()
+    for child in multiprocessing.active_children():
+        # what a process has taken is known when it has ended
+        child.join(10.0)
     t = os.times()
     return t.user + t.system + t.children_user + t.children_system
 
