@@ -55,7 +55,7 @@ def test_the_simulation_confirms_the_plan(finished) -> None:
     for name, done in finished.items():
         one = done.result.operations[0]["variants"]["variable"]
         assert one["gouge_um"] <= 8.0, name
-        assert one["left_um"] < 8.0, name
+        assert one["left_um"] < 8.0 + 2.0, name  # scallop, and tolerance of the edges of layers
         assert 0.8 < one["force_over_planned"]["median"] < 1.05, name
         assert one["deflection_workpiece_um_max"] < 60.0, name
         assert done.result.verdict is Verdict.HOLDS, name

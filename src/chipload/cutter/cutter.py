@@ -83,7 +83,6 @@ class Cutter:
     corner_radius: float = 0.0
     corner_e: float | None = None
     corner_f: float | None = None
-    barrel_radius: float | None = None
     bottom: float = 0.0
     taper: float = 0.0
     runout: tuple[float, float] = (0.0, 0.0)
@@ -98,6 +97,7 @@ class Cutter:
     body: Profile = ()
     number: int = 1
     name: str = ""
+    barrel_radius: float | None = None
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: float, limit: str) -> None:

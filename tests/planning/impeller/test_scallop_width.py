@@ -12,7 +12,7 @@ from chipload.planning.impeller.scallop_width import reaches
 from chipload.stock.dexels._kernels import pierce
 
 R, r = 6.0, 2.0
-SHAPE = np.array([r, R - r, r, 0.0, 0.0, r, R, 0.0, 60.0, R])
+SHAPE = np.array([r, R - r, r, 0.0, 0.0, r, R, 0.0, 60.0, R, 0.0, R - r, r, r])
 
 
 def left_at(points, normals, tips, axes):

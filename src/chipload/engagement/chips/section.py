@@ -109,7 +109,7 @@ def distance(cutter: Cutter, rho: Floats, w: Floats) -> Floats:
     It is the distance from the surface but where the nearest point is a sharp edge.
 
     >>> barrel = Cutter(12.0, 3, 0.5, 28.0, 50.0, 6e5, corner_radius=2.0, barrel_radius=85.0)
-    >>> distance(barrel, np.array([7.0]), np.array([26.0])).round(9).tolist()
+    >>> distance(barrel, np.array([7.0]), np.array([barrel.flank_arc.f])).round(9).tolist()
     [1.0]
     """
     d, r, e, f, alpha, beta, H = cutter.apt

@@ -213,7 +213,7 @@ def _checked(
     own = job.with_catalogue(done.partition.catalogue)
     programs, covered = _looked_at(own, done.plan, machine, paths, memory, keep)
     for fine in _FINER:
-        if not _mendable(_left_shares(programs, covered)):
+        if not _refinable(_left_shares(programs, covered)):
             break
         plan = planned(
             own, done.partition.division.patches, _changes(way), known=memory.millings, keep=keep, fine=fine
@@ -240,10 +240,10 @@ def _left_shares(programs: Sequence[Checked], covered: Sequence[Covered]) -> lis
     return [*patches, *((c.greatest[0] / c.asked, c.unreached > 0.0) for c in covered)]
 
 
-def _mendable(left: Sequence[tuple[float, bool]]) -> bool:
+def _refinable(left: Sequence[tuple[float, bool]]) -> bool:
     """Whether more is left somewhere than asked that rest passes might take: little, or all of it is within reach.
 
-    >>> _mendable([(0.9, False), (1.4, True)]), _mendable([(1.4, False)]), _mendable([(1.2, True)])
+    >>> _refinable([(0.9, False), (1.4, True)]), _refinable([(1.4, False)]), _refinable([(1.2, True)])
     (False, True, True)
     """
     return any(x > 1.0 and (x <= _NEARLY or not lost) for x, lost in left)

@@ -143,7 +143,7 @@ class Lines:
     workers: int
 
     @property
-    def mender(self) -> Refinement:
+    def refinement(self) -> Refinement:
         """Refinement of the tracks: it adds points between those of a track."""
         return Refinement(
             self.surface, self.scene, self.number, self.cutter, self.table, self.how.chord, self.how.clearance
@@ -262,7 +262,7 @@ class Lines:
         missed: list[UnreachedSpan] = []
         need = use if need is None else use & need
         covered = np.zeros(len(use), dtype=np.bool_)
-        ways = self.mender
+        refinement = self.refinement
         owner = np.full(len(use), -1)
         for k, piece in enumerate(line.sections):
             owner[piece.first : piece.last] = k
@@ -275,7 +275,7 @@ class Lines:
                 for side, here, there in ((-1, i, i - 1), (1, j - 1, j)):
                     if not (0 <= there < len(use) and use[there] and owner[there] != mine):
                         continue
-                    more = ways.furthest(line.at[here], B[0 if side < 0 else -1], line.at[there])
+                    more = refinement.furthest(line.at[here], B[0 if side < 0 else -1], line.at[there])
                     gone[here, side] = 0.0 if more is None else more[2]
                     if more is not None:
                         k = 0 if side < 0 else len(at)
@@ -283,7 +283,7 @@ class Lines:
                         B.insert(k, more[1])
                 if len(at) < 2:
                     continue
-                parts, bad = ways.refined(ways.track(np.array(at), np.array(B), number))
+                parts, bad = refinement.refined(refinement.track(np.array(at), np.array(B), number))
                 tracks += parts
                 for row in bad[:1]:
                     k = i + min(int(row), j - i - 1)

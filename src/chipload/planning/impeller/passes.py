@@ -106,12 +106,12 @@ def stayed_at(one: Pass) -> bool:
     return bool(one.labels.any())
 
 
-def surface_joint(menders: Sequence[Refinement | None]) -> Joint:
-    """Function that joins tracks of one surface; ``menders`` of each track, the same object for one surface."""
+def surface_joint(refinements: Sequence[Refinement | None]) -> Joint:
+    """Function that joins tracks of one surface; ``refinements`` of each track, the same object for one surface."""
 
     def joint(number: int, before: ToolTrack, after: ToolTrack) -> ToolTrack | None:
-        mender = menders[number]
-        if mender is None or menders[number - 1] is not mender:
+        refinement = refinements[number]
+        if refinement is None or refinements[number - 1] is not refinement:
             return None
         turn = float(after.pallet[0] - before.pallet[-1])
         turn -= math.tau * round(turn / math.tau)
@@ -120,8 +120,8 @@ def surface_joint(menders: Sequence[Refinement | None]) -> Joint:
         at = np.stack([before.at[-1], after.at[0]])
         if np.array_equal(at[0], at[1]) and turn == 0.0:
             return None
-        way = mender.track(at, np.array([before.pallet[-1], before.pallet[-1] + turn]), after.line)
-        parts, bad = mender.refined(way)
+        way = refinement.track(at, np.array([before.pallet[-1], before.pallet[-1] + turn]), after.line)
+        parts, bad = refinement.refined(way)
         return parts[0] if len(parts) == 1 and not len(bad) else None
 
     return joint

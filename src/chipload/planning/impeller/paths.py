@@ -38,10 +38,8 @@ _LINES = 5000
 #: of how far a pass stays below the scallop, how far from the border the outermost lines lie
 _INSIDE = 0.9
 _LESS = 0.6  # least share of a step that is tried where a line came out too high
-_GAIN = 0.01  # least further share of the scallop for which a line is laid out once more
 _USED = 0.9  # of what is aimed at, the mean scallop that is enough
-_STILL = 5e-3  # share by which the steps of a line may still change on the mean
-_HIGH = 0.985  # least share of a step that may still be taken off
+_STILL = 5e-3  # share by which a step may still change
 _SPLIT = math.radians(45.0)  # from station to station: further the pallet does not turn in one piece of a line
 #: stations of a line are no farther apart than this [mm]
 _STATION = 1.5
@@ -200,11 +198,9 @@ class _Stepper:
             share = float(inner.mean() / self.scallop) if len(inner) else 1.0
             over = float(np.nanmax(scallop, initial=0.0)) / most
             score = share if over <= 1.0 else 1.0 - over
-            gain = math.inf if best is None else score - best[0]
-            if gain > 0.0:
+            if best is None or score > best[0]:
                 best = score, out
-            enough = share > _USED * self.aim or (best is not None and gain < _GAIN)
-            if not np.isfinite(out.pallet).any() or (over <= 1.0 and enough):
+            if not np.isfinite(out.pallet).any() or (over <= 1.0 and share > _USED * self.aim):
                 break
             if over > 1.0:
                 # the new line has other angles than the step was laid out for
@@ -220,20 +216,16 @@ class _Stepper:
     def _step(self, line: Line, w: Floats, pallet: Floats) -> Floats:
         """The step at which the scallop is as high as aimed, if the next line is milled at these pallet angles."""
         aim = self.aim * self.scallop
-        before, power = np.ones(len(w)), np.ones(len(w))
         for _ in range(_ROUNDS):
             scallop = self._scallop(line, self._moved(line, w, 1.0), pallet)
             ratio = np.clip(np.sqrt(aim / np.clip(scallop, 0.1 * aim, None)), 0.6, 1.3)
             if not np.isfinite(ratio).any() or (np.nanmin(ratio) > 0.99 and np.nanmax(ratio) < 1.03):
                 break
-            # where steps become wider and narrower in turn, they change by less and less
-            power = np.where((ratio - 1.0) * (before - 1.0) < 0.0, 0.5 * power, power)
-            before = ratio
             new = np.minimum(
-                self._even(line, np.where(np.isfinite(ratio), w * ratio**power, np.nan)),
+                self._even(line, np.where(np.isfinite(ratio), w * ratio, np.nan)),
                 self.lines.cutter.rho + self.lines.cutter.corner_radius,
             )
-            still = np.nanmin(ratio) > _HIGH and np.abs(new - w).mean() < _STILL * w.mean()
+            still = np.abs(new - w).max() < _STILL * w.max()
             w = new
             if still:
                 break

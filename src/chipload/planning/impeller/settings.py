@@ -203,9 +203,9 @@ class FinishSettings:
         owners: Sequence[tuple[int, str, int]],
     ) -> Linked:  # fmt: skip
         motion = self.how.motion
-        menders: list[Refinement | None] = []
+        refinements: list[Refinement | None] = []
         for body, side, count in owners:
-            mender = Refinement(
+            refinement = Refinement(
                 self.surface(body, side),
                 self.scene,
                 surface_number(body, side),
@@ -214,10 +214,10 @@ class FinishSettings:
                 motion.chord,
                 motion.clearance,
             )
-            menders += [mender] * count
+            refinements += [refinement] * count
         return linked(
             tracks, self.scene, cutter, alpha, motion.feed, self.link, motion.clearance, rate=motion.rate,
-            joint=surface_joint(menders), stages=stages,
+            joint=surface_joint(refinements), stages=stages,
         )  # fmt: skip
 
     def rest_settings(self, used: tuple[Pair, ...], keep: Keep = anew) -> RestSettings:

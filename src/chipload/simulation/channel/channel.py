@@ -148,7 +148,7 @@ class Remainder:
 
 
 def tool_parts(cutter: CatalogueCutter) -> tuple[Floats, Floats, Ints]:
-    """Return heights (k,) [mm] above the tip at which parts begin, shapes (k, 10) and kinds in :data:`PARTS`."""
+    """Return heights (k,) [mm] above the tip at which parts begin, shapes (k, 14) and kinds in :data:`PARTS`."""
     top = ENDLESS if cutter.cutting_length is None else cutter.cutting_length
     end = ENDLESS if cutter.reach is None else cutter.reach
     rows = [(0.0, min(top, end), 0.5 * cutter.diameter, cutter.corner_radius, 0)]
@@ -162,7 +162,8 @@ def tool_parts(cutter: CatalogueCutter) -> tuple[Floats, Floats, Ints]:
     if cutter.reach is not None and cutter.holder_diameter is not None:
         rows.append((cutter.reach, cutter.reach + ENDLESS, 0.5 * cutter.holder_diameter, 0.0, 3))
     rows = [row for row in rows if row[1] > row[0]]
-    shapes = [[r, R - r, r, 0.0, 0.0, r, R, 0.0, high - low, R] for low, high, R, r, _ in rows]
+    # no flank arc: it ends where it begins, at z3 = z2 = r
+    shapes = [[r, R - r, r, 0.0, 0.0, r, R, 0.0, high - low, R, 0.0, R - r, r, r] for low, high, R, r, _ in rows]
     return np.array([row[0] for row in rows]), np.array(shapes), np.array([row[4] for row in rows])
 
 
