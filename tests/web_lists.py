@@ -75,6 +75,8 @@ def stop(page) -> int:
     """Stop by the key; the row at which view and panels stand then."""
     page.keyboard.press("Space")
     page.wait_for_function(f"!{VIEW}.playing")
+    # the page answers by the row at which the view stopped; until then it stands between two places of the path
+    page.wait_for_function(f"Number.isInteger({VIEW}.place)")
     row = int(page.evaluate(f"{VIEW}.row"))
     settle(page, row)
     return row
