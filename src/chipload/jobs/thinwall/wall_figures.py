@@ -23,10 +23,26 @@ BOTH = [[0.0, "#b3261e"], [0.5, "#ffffff"], [1.0, "#3457a6"]]
 
 
 def lengths(points: Floats) -> tuple[Floats, Floats]:
-    """Distance along a side at half its height, and height over the clamp, of places (n, m, 3) [mm]."""
-    middle = points[:, points.shape[1] // 2]
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(middle, axis=0), axis=1))])
-    return along, np.asarray(points[points.shape[0] // 2, :, 2])
+    """Distance along a side at half its height, and height over the clamp, of places (n, m, 3) [mm]; of a level floor
+    the distance across instead of the height.
+
+    >>> floor = np.stack(np.meshgrid([0.0, 4.0], [1.0, 3.0], [5.0], indexing="ij"), axis=-1)[:, :, 0]
+    >>> [x.tolist() for x in lengths(floor)]
+    [[0.0, 4.0], [0.0, 2.0]]
+    """
+    along = _distances(points[:, points.shape[1] // 2])
+    across = points[points.shape[0] // 2]
+    return along, _distances(across) if _level(points) else np.asarray(across[:, 2])
+
+
+def _distances(line: Floats) -> Floats:
+    """Distance of the points of a line from its first one, along it [mm]."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+
+
+def _level(points: Floats) -> bool:
+    """Whether places are those of a level floor."""
+    return bool(np.ptp(points[..., 2]) <= 1e-6)
 
 
 def maps(
@@ -82,7 +98,7 @@ def maps(
     for c in range(columns):
         out.update_xaxes(title_text="along [mm]", row=rows, col=c + 1)
     for r in range(rows):
-        out.update_yaxes(title_text="up [mm]", row=r + 1, col=1)
+        out.update_yaxes(title_text="across [mm]" if _level(points[0]) else "up [mm]", row=r + 1, col=1)
     out.update_annotations(font={"size": 12})
     out.update_layout(
         template="none", height=60 + 230 * rows, font=FONT, margin={"l": 56, "r": 20, "t": 34, "b": 46},
