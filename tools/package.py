@@ -87,7 +87,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=ROOT / "dist")
     parser.add_argument("--here", action="store_true", help="with the dependencies of this Python, without a network")
     given = parser.parse_args()
-    for archive in build(ROOT, given.out, "wheel", "sdist"):
+    for archive in build(ROOT, given.out.resolve(), "wheel", "sdist"):
         print(f"{archive.name}: {archive.stat().st_size / 1e6:.1f} MB: {tried(archive, given.here)[:60]}")
 
 
