@@ -90,3 +90,20 @@ def written(path: Path, *shapes, unit: str = "MM", rotation=None) -> Path:
     assert writer.Write(str(path)) == OCP.IFSelect.IFSelect_RetDone
     Interface_Static.SetCVal_s("write.step.unit", "MM")
     return path
+
+
+def moved(file: Path, degrees: float, away: tuple[float, float]) -> None:
+    """Turn the part of a STEP file about z and move it in x and y [mm]; the file is written again."""
+    import math
+
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
+    from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+    from OCP.STEPControl import STEPControl_Reader
+
+    reader = STEPControl_Reader()
+    reader.ReadFile(str(file))
+    reader.TransferRoots()
+    turn, shift = gp_Trsf(), gp_Trsf()
+    turn.SetRotation(gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), math.radians(degrees))
+    shift.SetTranslation(gp_Vec(*away, 0.0))
+    written(file, BRepBuilderAPI_Transform(reader.OneShape(), shift.Multiplied(turn), True).Shape())

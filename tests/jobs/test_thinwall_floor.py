@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from tests.step_files import written
+from tests.step_files import moved, written
 
 from chipload.cutting.material import material_named
 from chipload.errors import InputError
@@ -168,10 +168,48 @@ def test_refused(tmp_path, old, new, message):
     assert message in said(planned)
 
 
+#: where the part of the example lies in the tests [mm]: no number of a plan may depend on it
+AWAY = np.array([100.0, -50.0])
+
+
+def example(folder: Path, degrees: float):
+    """The job of the shipped example, its part turned about z and moved."""
+    job = copy_example("part", folder / "part") / "floor.toml"
+    moved(job.parent / "web.step", degrees, tuple(AWAY))
+    angle = np.radians(degrees)
+    x, y = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]) @ (23.0, 18.0) + AWAY
+    text = job.read_text()
+    assert "face = [23.0, 18.0, 5.0]" in text
+    job.write_text(text.replace("face = [23.0, 18.0, 5.0]", f"face = [{x}, {y}, 5.0]"))
+    return load_job(job)
+
+
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
-    """The shipped example: a floor of 40 x 30 x 1.5 mm in a frame that is open at one end, with 1 mm of stock."""
-    return run_job(load_job(copy_example("part", tmp_path_factory.mktemp("example") / "part") / "floor.toml"))
+    """The example: a floor of 40 x 30 x 1.5 mm in a frame that is open at one end, with 1 mm of stock."""
+    return run_job(example(tmp_path_factory.mktemp("example"), 0.0))
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, 217.0])
+def test_rows_of_a_turned_floor(tmp_path, degrees):
+    """Seven rows over the floor, of 44 mm each, that begin in air at the open end; the walls at three sides."""
+    inputs = read_wall(example(tmp_path, degrees).job)
+    area = inputs.floor_area(inputs.body.side_numbers[0])
+    # 39 + 22 + 39 mm: half a cutter from the walls
+    assert area.walls.length == pytest.approx(100.0, abs=1e-5)
+    # a rounded corner of 4 mm on each side at the closed end, none at the open one
+    assert area.centres.intersection(area.outline).area == pytest.approx(39.0 * 22.0, rel=1e-6)
+    places = places_of(inputs)
+    (one,) = linked(inputs, unlimited_plan(places).plan, places.grid)
+    program = one.program
+    p = np.asarray(program.p_work)
+    # one feed down for each row, and for each of six pieces of the contour: no ramps
+    down = np.flatnonzero((np.diff(p[:, 2]) < -1e-9) & (program.motion[1:] != RAPID)) + 1
+    assert len(down) == 7 + 6
+    angle = np.radians(degrees)
+    own = (p[down[:7], :2] - AWAY) @ np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    assert (own[:, 0] > 46.0 + 4.0 - 1e-6).all()
+    assert own[:, 1] == pytest.approx(np.sort(own[:, 1])[:: 1 if own[0, 1] < own[-1, 1] else -1])
 
 
 def test_the_example(done):
@@ -180,6 +218,10 @@ def test_the_example(done):
     assert tracks["variable"].verdict is Verdict.HOLDS, [c.text for c in tracks["variable"].limits]
     assert tracks["constant"].verdict is Verdict.HOLDS
     assert tracks["unconstrained"].verdict is Verdict.EXCEEDS
+    # the axial force and the lateral one of a level cut are known to a tenth
+    for name in ("constant", "unconstrained"):
+        assert done.outcome.variants[name].load_error["force_normal_n"] < 0.05
+    assert len(done.outcome.variants["variable"].plan.maps) == 3
     variants = done.outcome.variants
     assert variants["variable"].seconds < 0.8 * variants["constant"].seconds
     assert variants["unconstrained"].seconds < 0.5 * variants["variable"].seconds
@@ -204,7 +246,7 @@ def test_axial_force_in_the_middle_of_a_row(done):
     _, _, Kac, _, _, Kae = material_named("al7075-t6").coefficients
     psi = np.arccos(1.0 - 22.0 / 6.0 / 4.0)  # 7 rows over 22 mm
     expected = 3.0 / (2.0 * np.pi) * (Kac * own.feed_per_tooth * (1.0 - np.cos(psi)) + Kae * psi)
-    middle = (np.abs(c["contact_x_mm"] - 25.0) < 4.0) & (np.abs(c["contact_y_mm"] - 18.0) < 1.0)
+    middle = (np.abs(c["contact_x_mm"] - AWAY[0] - 25.0) < 4.0) & (np.abs(c["contact_y_mm"] - AWAY[1] - 18.0) < 1.0)
     assert middle.sum() >= 3
     assert np.abs(c["force_z_mean_n"][middle]) == pytest.approx(expected, rel=0.02)
 
@@ -214,7 +256,7 @@ def test_deflection_of_a_step_of_the_example(done):
     one = done.outcome.variants["constant"]
     c = one.columns
     k = int(np.argmax(c["deflection_workpiece_um"]))
-    assert c["contact_x_mm"][k] > 40.0  # near the open end
+    assert c["contact_x_mm"][k] - AWAY[0] > 40.0  # near the open end
     softness = 1e-3 * c["deflection_workpiece_um"][k] / c["force_normal_n"][k]
     assert softness == pytest.approx(6e-3 / c["force_allowable_n"][k])
     assert c["force_over_allowable"][k] == pytest.approx(c["deflection_workpiece_um"][k] / 6.0)

@@ -82,6 +82,8 @@ COMPARED = ("force_n", "torque_nm", "torque_mean_nm", "power_w", "chip_max_mm")
 WITH_FORCE = ("deflection_um", "form_error_um")
 #: columns that can be compared
 COMPARABLE = (*COMPARED, "force_normal_n")
+#: greatest size of the force along z: by layers it is compared too where a run asks for it, with a column of that name
+AXIAL = "force_axial_n"
 #: earlier steps that are removed a second time: at most this share of those of the run, or this number in a short run
 SHARE, LEAST = 0.05, 60
 #: likewise, for steps that remove more than is engaged at their middle
@@ -196,7 +198,7 @@ def resolution_error(
     columns : of the removal
     setting : of the run
     again : :func:`layers_again` or :func:`moves_again`
-    names : columns that are compared, of :data:`COMPARABLE`; the force among them
+    names : columns that are compared, of :data:`COMPARABLE` and, by layers, :data:`AXIAL`; the force among them
 
     Returns
     -------
@@ -398,7 +400,12 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
             tiles.remove(swept.met, swept.shape, swept.areas, 0.0, 0.5 * tolerance)
         tiles.finish()
     columns = remove(_parts(window.own, window.parts), stock, again)
-    return {name: float(columns[name].max()) for name in COMPARABLE}
+    return {name: float(columns[name].max()) for name in COMPARABLE} | {AXIAL: float(axial_force(columns).max())}
+
+
+def axial_force(columns: Columns) -> Floats:
+    """Return the greatest size (n,) [N] of the force along z over a revolution of each step."""
+    return np.maximum(np.abs(columns["force_z_max_n"]), np.abs(columns["force_z_min_n"]))
 
 
 def _span(stock: LayeredStock, low: float, high: float) -> tuple[int, int]:

@@ -55,10 +55,12 @@ def test_every_dense_section_is_covered_and_little_else(cases):
         polygon = c.polygon
         assert polygon.is_valid
         assert union.difference(polygon.buffer(1.5 * TOLERANCE)).area < 1e-9
-        short.append((polygon.area - union.area) / polygon.area)
+        # a sliver thinner than the rays tell apart is short by its whole area
+        short.append((polygon.area - union.area) / max(polygon.area, 0.01))
     assert len(short) > 90
     assert np.median(short) < 3e-3
     assert np.quantile(short, 0.9) < 0.02
+    assert max(short) < 0.08
 
 
 def test_points_just_inside_are_covered_at_some_time(cases):

@@ -44,10 +44,8 @@ CORNER = 6
 BEYOND = 1.0
 #: how far stock reaches into the metal [mm], and its pieces along and across
 INSIDE, PIECES = 0.05, (24, 24)
-#: between the stock and the walls [mm]
-SLIT = 1e-6
-#: points of a section so near [mm] to its straight edges are left out: they disturb its offsets
-STRAIGHT = 1e-5
+#: between the stock and the walls, and to which the area of centres is rounded [mm]
+SLIT, ROUNDED = 1e-6, 1e-6
 #: segments of a quarter of a circle around a corner of a wall: within 0.4 µm for a radius of 5 mm
 QUARTER = 64
 #: points about the axis at which the force of the teeth may act
@@ -119,8 +117,10 @@ class PartFloor:
     def area(self, cutter: Cutter, spacing: float, ramp: float) -> FloorArea:
         """Where a cutter may go; ``spacing`` [mm] of its points, ``ramp`` [rad] of its entries."""
         cover = self.face.buffer(cutter.radius + BEYOND)
-        kept = [s.buffer(_radius(cutter, h), quad_segs=QUARTER) for h, s in self.walls if not s.is_empty]
-        centres = shapely.make_valid(cover.difference(shapely.union_all(kept)) if kept else cover)
+        kept = [_grown(s, _radius(cutter, h)) for h, s in self.walls if not s.is_empty]
+        centres = cover.difference(shapely.union_all(kept)) if kept else cover
+        # sections alike but for rounding leave edges of no length
+        centres = shapely.make_valid(shapely.set_precision(centres, ROUNDED))
         centres = MultiPolygon([p for p in shapely.get_parts(centres) if p.geom_type == "Polygon" and p.area > 0.0])
         # a separate room beside the floor does not belong to it
         centres = MultiPolygon([p for p in centres.geoms if p.intersects(self.face)])
@@ -152,7 +152,7 @@ class PartFloor:
         """Outline of the stock: a section joins bodies from the largest outline to the smallest, so that stock as large
         as the pocket would be taken for it.
         """
-        return self.face.buffer(-SLIT, join_style="mitre")
+        return self.face.buffer(-SLIT)
 
     @cached_property
     def _grid_prisms(self) -> list[tuple[Polygon, tuple[float, float]]]:
@@ -207,7 +207,7 @@ def floor_of(face: Face, key: str, part: trimesh.Trimesh, wall: int, allowance: 
     top = float(part.bounds[1][2]) - level
     heights = _heights(top)
     cut = sections(part, level + heights) if len(heights) else []
-    walls = tuple((float(h), own(s.simplify(STRAIGHT))) for h, s in zip(heights, cut, strict=True))
+    walls = tuple((float(h), own(s)) for h, s in zip(heights, cut, strict=True))
     return PartFloor(f"{face.number}", wall, allowance, low, along, across, (x1 - x0, y1 - y0), mine, walls)
 
 
@@ -221,6 +221,16 @@ def _heights(top: float) -> Floats:
 def _radius(cutter: Cutter, height: float) -> float:
     """Greatest radius [mm] of the turning cutter, shank and holder apart, up to a height of the part's section."""
     return float(cutter.radius_at([min(height, cutter.flute_length)])[0])
+
+
+def _grown(shape: MultiPolygon | Polygon, radius: float) -> shapely.Geometry:
+    """What lies within a radius [mm] of an area: the area and what lies within the radius of each of its edges.
+
+    The offset of whole rings would lose or move corners where a ring has a vertex on a straight edge near a corner.
+    """
+    lines = [shapely.get_coordinates(ring) for part in shapely.get_parts(shape) for ring in shapely.get_rings(part)]
+    edges = shapely.linestrings(np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in lines]))
+    return shapely.union_all([shape, *shapely.buffer(edges, radius, quad_segs=QUARTER)])
 
 
 def _outline(face: Face, key: str, part: trimesh.Trimesh, level: float) -> Polygon:
@@ -254,7 +264,7 @@ def _box(outline: Polygon) -> tuple[Floats, Floats, Floats]:
         sizes = (x1 - x0, y1 - y0)
     else:
         c = shapely.get_coordinates(turned)[:3]
-        if shapely.LinearRing(shapely.get_coordinates(turned)).is_ccw is False:
+        if not shapely.is_ccw(shapely.get_exterior_ring(turned)):
             c = c[::-1]
         corner, e = c[0], (c[1] - c[0]) / np.linalg.norm(c[1] - c[0])
         sizes = (float(np.linalg.norm(c[1] - c[0])), float(np.linalg.norm(c[2] - c[1])))

@@ -121,14 +121,14 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
             times=own,
             progress=lambda part, what, k=k: progress((k + part) / len(legs), f"pass {k + 1} of {len(legs)}"),  # type: ignore[misc]
         )
-        simulated.append(SimulatedPass(leg.program, before, removal.columns, cutter, fine[p.operation]))
         left[p.side] = p.low
         number = inputs.body.side_numbers[p.side]
+        floor = inputs.floor(number) is not None
+        simulated.append(SimulatedPass(leg.program, before, removal.columns, cutter, fine[p.operation], floor))
         C = places.compliance(left, p.side)
         F_th = places.threshold(inputs.depths.deflection, 1.0, spare=False)(left, p.side).force.reshape(places.shape)
         thresholds.append(F_th)
         error = places.error(p.side)
-        floor = inputs.floor(number) is not None
         loads = floor_loads(places, removal, left, p.side, error) if floor and removal.cuts else None
         columns = _columns(places, removal, leg, C, F_th, error, bars, loads)
         u, v = np.clip(columns["u"], 0.0, 1.0), np.clip(columns["v"], inputs.body.foot, 1.0)

@@ -10,7 +10,8 @@ Rows run along x, b apart at most, all in the direction that the milling needs, 
 cutter touches no wall. A row is cut where some point under the cutter has stock. Rows leave cusps at walls that they do
 not follow; the contour removes these, with the wall on the right of a clockwise cutter in down milling.
 
-A stroke begins where the cutter is free: in air, or over the stroke before, from where it goes sideways to its first
+Rows go one way or, in the opposite order, the other: the way with fewer strokes that begin in stock is taken. A stroke
+begins where the cutter is free: in air, or over the stroke before, from where it goes sideways to its first
 point. Where neither is near, the cutter goes down along the stroke itself on a ramp, to and fro within a radius of its
 beginning, and returns. Links run at the clearance over the floor, or at the safe height where a wall is in the way.
 """
@@ -157,7 +158,10 @@ def floor_pass(
     area, posture = side.area, pass_motion.posture
     step = float(posture.step or 0.0)
     heights = _Heights(p, places, area, posture.cutter.radius)
-    strokes = _cut_strokes(rows_over(area, step), heights)
+    rows = rows_over(area, step)
+    # the same rows from the other side, against them: milling and order are the same, entries are not
+    ways = [_cut_strokes(some, heights) for some in (rows, [row[::-1] for row in reversed(rows)])]
+    strokes = min(ways, key=lambda one: sum(bool(heights.cuts(stroke[:1])[0]) for stroke in one))
     along = [shapely.LineString(s) for s in strokes]
     strokes += _cut_strokes(_contours(area, along, step < 0.0), heights)
     if not strokes:
@@ -178,7 +182,7 @@ def rows_over(area: FloorArea, step: float) -> list[Floats]:
     (x0, _, x1, _), (_, y0, _, y1) = area.centres.bounds, over.bounds
     count = math.ceil((y1 - y0) / abs(step) - NEAR) + 1
     out: list[Floats] = []
-    wide = area.centres.buffer(NEAR, join_style="mitre")
+    wide = area.centres.buffer(NEAR)
     for y in np.linspace(y0, y1, count) if count > 1 else [0.5 * (y0 + y1)]:
         parts = shapely.get_parts(wide.intersection(shapely.LineString([(x0 - 1.0, y), (x1 + 1.0, y)])))
         ends = sorted((float(q.bounds[0]), float(q.bounds[2])) for q in parts[shapely.intersects(parts, area.outline)])
@@ -226,7 +230,7 @@ class _FloorPath:
     def __init__(self, area: FloorArea, heights: _Heights, clearance: float, safe: float, aside: float) -> None:
         self.area, self.heights, self.clearance, self.aside = area, heights, clearance, aside
         self.safe = safe - float(area.origin[2])
-        self.inside = area.centres.buffer(NEAR, join_style="mitre")
+        self.inside = area.centres.buffer(NEAR)
         self.path = PassPath()
         self.now: Floats | None = None
         self.free: list[Floats] = []

@@ -16,6 +16,8 @@ from chipload.structure.cells.moments import alike
 
 #: [mm] what is thinner is no material that a force acts on
 FILM = 0.1
+#: [mm] corners of a section nearer to one another are one: their edge has no direction to be moved in
+SAME = 1e-6
 
 
 class StockSections:
@@ -29,7 +31,8 @@ class StockSections:
                     self.high[-1] = float(stock.bounds[i + 1])
                 continue
             whole = stock.section(i).simplify(0.1 * FILM)
-            shape = whole.buffer(-0.5 * FILM, join_style="mitre").buffer(0.5 * FILM, join_style="mitre")
+            thinner = whole.buffer(-0.5 * FILM, join_style="mitre").simplify(SAME)
+            shape = thinner.buffer(0.5 * FILM, join_style="mitre")
             if not shape.is_empty:
                 shapely.prepare(shape)
                 self.low.append(float(stock.bounds[i]))
