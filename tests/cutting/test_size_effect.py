@@ -57,7 +57,7 @@ def thick(engaged, phi):
     return max(engaged[2] * math.sin(phi) + engaged[4] * math.cos(phi) + engaged[3], 0.0)
 
 
-@pytest.mark.parametrize("engagement range", BITES)
+@pytest.mark.parametrize("engaged", BITES)
 def test_means_against_adaptive_quadrature(engaged):
     kappa = 1.1
     force, torque = mean_forces(one(engaged, kappa, 0.1), MILL, KIENZLE)
@@ -71,7 +71,7 @@ def test_means_against_adaptive_quadrature(engaged):
         assert ours == pytest.approx(value * 3.0 / math.tau, rel=1e-8, abs=3e-8 * scale)
 
 
-@pytest.mark.parametrize("engagement range", BITES)
+@pytest.mark.parametrize("engaged", BITES)
 @pytest.mark.parametrize("rate", [0.0, 1e-9, 0.05, 1.2])
 def test_over_the_turn_against_adaptive_quadrature(engaged, rate):
     kappa = 0.8
