@@ -19,7 +19,6 @@ point.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -144,19 +143,6 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
                 rings = _without_slivers(rings_of_polygons(_untangled(shapely.Polygon(edges[:, :2])), edges), tolerance)
             out.append(CoveredArea(rings, h, tolerance, True))
     return out
-
-
-def covered_polygons(
-    moves: Sequence[Move], K: Floats, heights: Sequence[Floats], tolerance: float
-) -> list[list[Shape | None]]:
-    """``CoveredArea.polygon`` of many layers of many moves: ``heights[m]`` of move m; None where it is never in the
-    layer. See :func:`covered_rings`.
-    """
-    found = covered_rings(moves, K, heights, tolerance)
-    some = (found.first[:, 1] > found.first[:, 0]).tolist()
-    shapes = [found.polygon(k) if there else None for k, there in enumerate(some)]
-    first = np.cumsum([0, *(len(h) for h in heights)]).tolist()
-    return [shapes[a:b] for a, b in itertools.pairwise(first)]
 
 
 def covered_rings(moves: Sequence[Move], K: Floats, heights: Sequence[Floats], tolerance: float) -> PlaneAreas:
@@ -431,7 +417,6 @@ __all__ = [
     "candidates",
     "covered",
     "covered_areas",
-    "covered_polygons",
     "covered_rings",
     "whole_section",
 ]
