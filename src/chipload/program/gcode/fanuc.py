@@ -5,11 +5,13 @@ cycles returns to the level where it began (G98) until told otherwise; M98 P5123
 and in G84.2 and G84.3, tapping starts the spindle itself. Fine boring (G76) is carried out without its shift in the
 bottom of the hole; back boring (G87) shifts by Q against X, which leaves it unproven, as the machine's own setting
 says where to and the cutter is round. G33 has its lead in F. Macro statements are those of
-:mod:`~chipload.program.gcode.macros`; G68 turns about Z.
+:mod:`~chipload.program.gcode.macros`; G68 turns about Z. A tilted plane (G68.2 X Y Z I J K, Haas G268) has an origin
+and Euler angles; G53.1 (G253) turns the tool along its normal (:mod:`~chipload.program.gcode.tilted_plane`).
 
-Left out, so that the result is unproven: motions in polar, scaled or mirrored coordinates (G16, G51) and in tilted
-planes (G68.2) until they end, tool vectors (G43.5), modal macros (G66), involutes and splines. Noted and left out:
-smoothing and look-ahead (G5.1, G8), tool offsets by G10 L10 to L13, retractions to where only the machine knows.
+Left out, so that the result is unproven: motions in polar, scaled or mirrored coordinates (G16, G51) and in planes that
+are tilted otherwise (G68.2 P, G68.3, G68 about another axis than Z) until they end, tool vectors (G43.5), modal macros
+(G66), involutes and splines. Noted and left out: smoothing and look-ahead (G5.1, G8), tool offsets by G10 L10 to L13,
+retractions to where only the machine knows.
 """
 
 from __future__ import annotations
@@ -26,7 +28,9 @@ from chipload.program.gcode.frames import remove, turn_about
 from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, system_variables, with_brackets
 from chipload.program.gcode.modal import GROUP_OF, shown
 from chipload.program.gcode.offsets import choose
+from chipload.program.gcode.tilted_plane import align, level, tilted
 from chipload.program.gcode.words import Block, bare, read_block
+from chipload.program.tilt import tilt_of, turned
 
 if TYPE_CHECKING:
     from chipload.program.gcode.flow import Flow
@@ -42,7 +46,6 @@ CHANGED = {
     160: "polar coordinates",
     510: "scaling",
     511: "mirrored coordinates",
-    682: "a tilted plane",
     683: "a tilted plane",
     684: "a tilted plane",
     71: "cylindrical interpolation",
@@ -58,6 +61,12 @@ NOT_READ = {
     435: "tip control by vectors",
     440: "a negative tool length",
 }
+#: tilted planes by Euler angles and the code that turns the tool along their normal, of a Fanuc and of a Haas
+TILTED, ALIGN = (682, 2680), (531, 2530)
+#: what a Haas calls G69, and what names its Euler angles (Q)
+HAAS_UNTILTED, EULER = 2690, 313.0
+#: G53.1 P: the angle of the last rotary axis from the workpiece is positive, or negative
+SIGNS = {0.0: 0, 1.0: 1, 2.0: -1}
 TURNED, UNTURNED, MACRO, SKIP, ENDS_CYLINDER = 680, 690, 650, 310, 71
 #: motions that are left out: involutes, splines
 LEFT_OUT = frozenset({61, 62})
@@ -122,6 +131,8 @@ class Fanuc(Dialect):
     def _coordinates(self, block: Block, c: Controller) -> None:
         """G68 and G69; coordinates that are not read."""
         words, g = block.words, block.g
+        if HAAS_UNTILTED in g:
+            g[g.index(HAAS_UNTILTED)] = UNTURNED
         for code in g:
             if c.left_out and code in ENDS and c.left_out.split(":")[0] in map(shown, ENDS[code] or (ENDS_CYLINDER,)):
                 go_on(c)
@@ -135,6 +146,7 @@ class Fanuc(Dialect):
             leave_out(c, f"{shown(code)}: {CHANGED[code]}")
             g.remove(code)
             words.clear()
+        self._tilted(block, c)
         if TURNED in g:
             g.remove(TURNED)
             if c.state.plane != 170 or "z" in words or words.keys() & {"i", "j", "k"}:
@@ -146,6 +158,43 @@ class Fanuc(Dialect):
             turn_about(c, x * c.state.scale, y * c.state.scale, words.pop("r", 0.0))
         elif UNTURNED in g:
             remove(c)
+            level(c)
+
+    def _tilted(self, block: Block, c: Controller) -> None:
+        """Tilted planes by Euler angles, and the tool along their normal."""
+        words, g = block.words, block.g
+        for code in [code for code in g if code in TILTED]:
+            name = shown(code)
+            euler = words.get("p", 0.0) == 0.0 and words.get("q", EULER) == EULER and "r" not in words
+            given = {x: words.pop(x, 0.0) for x in "xyzijk"}
+            g.remove(code)
+            words.clear()
+            remove(c)
+            origin = tuple(given[x] * c.state.scale for x in "xyz")
+            R = turned("zxz", (given["i"], given["j"], given["k"]))
+            if not euler:
+                level(c)
+                leave_out(c, "G68.2: a tilted plane that is not stated by an origin and Euler angles")
+            elif not tilted(c, tilt_of(R, origin)):
+                leave_out(c, f"G68.2: {name}: a tilted plane, and no machine with rotary axes")
+        for code in [code for code in g if code in ALIGN]:
+            if c.state.datum.tilt is None:
+                continue
+            g.remove(code)
+            p = words.pop("p", 0.0)
+            if p not in SIGNS:
+                raise InputError(f"{shown(code)}: P{p:g}: must be 0, 1 or 2")
+            align(c, SIGNS[p])
+        if c.state.datum.tilt is not None and not c.left_out and any(self._offsets(code, c) for code in g):
+            leave_out(c, "G68.2: the work offset or a shift changes within a tilted plane")
+            words.clear()
+
+    @staticmethod
+    def _offsets(code: int, c: Controller) -> bool:
+        """Whether a code changes what a tilted plane lies in."""
+        if code in (100, 520, 920, EXTENDED, HAAS_EXTENDED):
+            return True
+        return 540 <= code <= 593 and code % 10 in range(4) and 530 + 10 * c.state.datum.number != code
 
     def _adapt(self, block: Block, c: Controller) -> None:
         words, g = block.words, block.g

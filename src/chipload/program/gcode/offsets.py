@@ -285,10 +285,10 @@ def go_home(c: Controller, code: int, axes: Axes, end: Nine) -> None:
         )
     note_machine_coordinates(c, shown(code))
     c.straight(RAPID, end)
-    home = state.datum.from_machine(c.stored(first))
+    home = c.position(c.stored(first))
     c.straight(RAPID, put(end, {k: home[k] for k in (axes or range(9))}))
 
 
 def keep_point(c: Controller, code: int) -> None:
     """G28.1 and G30.1."""
-    c.store(5161 if code == 281 else 5181, c.state.datum.to_machine(c.state.at))
+    c.store(5161 if code == 281 else 5181, c.machine_position())

@@ -6,10 +6,11 @@ G710 mm.
 
 CYCLE81 to CYCLE86, with MCALL too, are carried out (:mod:`~chipload.program.gcode.sinumerik_cycles`).
 
-TRANS, ATRANS, ROT and AROT about Z are carried out (:mod:`~chipload.program.gcode.frames`).
+TRANS, ATRANS, ROT and AROT about Z are carried out (:mod:`~chipload.program.gcode.frames`), and CYCLE800
+(:mod:`~chipload.program.gcode.sinumerik_swivel`).
 
 Jumps and loops are in :mod:`~chipload.program.gcode.sinumerik_flow`. Left out, so that the result is unproven: motions
-in mirrored, scaled or swivelled coordinates until they end, tool vectors (A3 B3 C3), cycles that are not drilling,
+in mirrored or scaled coordinates until they end, tool vectors (A3 B3 C3), cycles that are not drilling,
 calls of other programs, curves (CIP, CT, splines), values of names that nothing defines. Noted and left out: what does
 not concern the path. G331 and G332 are G33 with the spindle one way and back.
 """
@@ -28,6 +29,7 @@ from chipload.program.gcode.frames import further, remove
 from chipload.program.gcode.offsets import choose
 from chipload.program.gcode.sinumerik_cycles import CYCLES, NORMAL, hole_blocks
 from chipload.program.gcode.sinumerik_flow import flow_step
+from chipload.program.gcode.sinumerik_swivel import swivel
 from chipload.program.gcode.state import AXES, LINEAR, ZERO, nine
 from chipload.program.gcode.words import LONGEST, Block
 from chipload.program.setup import FIRST_NAMED
@@ -312,7 +314,7 @@ def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
     elif name == "TRAORI":
         _keyword(block, c, name)
     elif name == "CYCLE800":
-        _swivel(c, arguments)
+        swivel(c, [_value(x, c) if x.strip() else 0.0 for x in re.sub(r'"[^"]*"', "", arguments).split(",")])
     elif name in FRAMES:
         leave_out(c, f"{name}: changed coordinates")
     elif name in CYCLES:
@@ -323,17 +325,6 @@ def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
         c.once("nc-ignored", f"{name}: does not affect the path; it is ignored")
     else:
         c.leave_out("nc-call", f"{name}({arguments.strip()[:60]}): cycles and calls are not read: left out")
-
-
-def _swivel(c: Controller, arguments: str) -> None:
-    """CYCLE800: only one that does not swivel or shift, or ends a swivel, is read."""
-    values = [x.strip() for x in re.sub(r'"[^"]*"', "", arguments).split(",")]
-    # X0 Y0 Z0, A B C, X1 Y1 Z1
-    if any(_value(x, c) != 0.0 for x in values[4:13] if x):
-        leave_out(c, "CYCLE800: a swivelled plane")
-        return
-    go_on(c)
-    c.once("nc-ignored", "CYCLE800: a plane that is not swivelled")
 
 
 def _define(kind: str, names: str, c: Controller) -> None:
@@ -349,10 +340,13 @@ def _define(kind: str, names: str, c: Controller) -> None:
 def _frame(block: Block, c: Controller) -> None:
     """TRANS, ROT and the like, with their axes; without any they end all of it."""
     word, words = block.frame, block.words
+    tilted = c.state.datum.tilt is not None
     given = {x: words.pop(x) for x in "xyzabcpijk" if x in words}
     if not word.startswith("A") and not given:
         go_on(c)
         remove(c)
+    elif tilted:
+        leave_out(c, f"{word}: coordinates that change within a swivelled plane")
     elif word not in PLACED:
         leave_out(c, f"{word}: mirrored, scaled or tilted coordinates")
     elif word.endswith("TRANS"):
