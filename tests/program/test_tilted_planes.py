@@ -162,6 +162,33 @@ def test_other_words_for_a_plane(words, R):
     assert not [f for f in findings if f.code == "heidenhain-plane"]
 
 
+@pytest.mark.parametrize("name", MACHINES)
+def test_planes_by_the_angles_of_the_rotary_axes(name):
+    """The tool stands along Z of the plane; X of the plane is X of a machine whose table turns."""
+    machine = machine_named(name)
+    one, two = Swivel(machine).numbered()
+    at = {one: -25.0, two: 40.0}
+    words = " ".join(f"{x}{v:+.1f}" for x, v in sorted(at.items()))
+    text = f"BEGIN PGM T MM\nTOOL CALL 1 Z S1\nL X+0 Y+0 Z+90 FMAX\nPLANE AXIAL {words} TURN FMAX\nL X+0 Y+0 Z+0 FMAX\n"
+    text += "L X+7 FMAX\nL Z+30 FMAX\nEND PGM T MM"
+    commands, findings = read(text, "heidenhain", machine)
+    program = to_work(commands, machine)[0]
+    assert not [f for f in findings if f.severity >= Severity.UNPROVEN]
+    # from 0 along X, then along Z of the plane
+    zero, x, z = program.p_work[-3:]
+    np.testing.assert_allclose(zero, 0.0, atol=1e-9)
+    np.testing.assert_allclose((z - x) / 30.0, program.axis[-1], atol=1e-9)
+    if not any(axis.head for axis in machine.chain.rotary):
+        axes = axes_of(commands, machine)[-3:]
+        np.testing.assert_allclose(axes[1] - axes[0], [7.0, *[0.0] * 8], atol=1e-9)
+        np.testing.assert_allclose(axes[2] - axes[1], [0.0, 0.0, 30.0, *[0.0] * 6], atol=1e-9)
+    values = f"0,0,0,{at[one]},{at[two]},0,0,0,0"
+    text = f'G71 G90 G54\nT1 M6\nG0 X0 Y0 Z90\nCYCLE800(0,"TC1",0,192,{values},-1,0)\nG0 X0 Y0 Z0\nX7\nZ30\nM30'
+    same = to_work(read(text, "sinumerik", machine)[0], machine)[0]
+    np.testing.assert_allclose(same.p_work[-3:], program.p_work[-3:], atol=1e-9)
+    np.testing.assert_allclose(same.axis[-3:], program.axis[-3:], atol=1e-9)
+
+
 def test_plane_within_a_plane():
     """PLANE RELATIV turns further, about the axes of the plane; cycle 7 shifts along them."""
     machine = machine_named("cradle-ac")

@@ -19,6 +19,7 @@ from chipload.errors import InputError
 from chipload.machine.axis import Axis
 from chipload.machine.kinematics import forward, inverse, with_tip
 from chipload.machine.machine import Machine
+from chipload.machine.orientation import rotated
 from chipload.program.commands import Frame
 from chipload.program.to_work import tool_length, work_zero
 
@@ -73,6 +74,21 @@ class Swivel:
         found: Floats = with_tip(self.machine, at, flat, tool_length(self.machine, frame), zero)[0] - shift
         found[3:] = rotary[3:]
         return found
+
+    def directions(self, axes: Floats) -> Floats:
+        """R (3, 3) whose columns are X, Y and Z of the machine, turned with the rotary axes, in the work offset."""
+        chain = self.machine.chain
+        out = np.eye(3)
+        for axis in reversed(chain.axes):
+            if axis.rotary:
+                out = rotated(np.array(axis.direction), np.full(3, axes[axis.column]), out)
+        found: Floats = (out @ chain.R_machine_work).T @ chain.R_machine_work
+        return found
+
+    def numbered(self) -> str:
+        """Letters of the rotary axes as a swivel data set numbers them: those of the head, then those of the table."""
+        rotary = self.machine.chain.rotary
+        return "".join(a.letter for a in (*(a for a in rotary if a.head), *(a for a in reversed(rotary) if not a.head)))
 
     def highest(self, base: Frame) -> float | None:
         """The upper end of Z's travel, in the coordinates of ``Frame.to_machine``; None: it has none [mm]."""

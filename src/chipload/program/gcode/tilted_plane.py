@@ -8,6 +8,7 @@ the tip, which the rotary axes carry along with the workpiece; the machine's axe
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Severity
-from chipload.program.commands import RAPID, Frame
+from chipload.program.commands import LETTERS, RAPID, Frame
 from chipload.program.gcode.state import Datum, Nine, nine
 from chipload.program.tilt import NEEDS_ROTARY, NO_ROTARY
 
@@ -65,6 +66,14 @@ def tilted(c: Controller, tilt: Tilt) -> bool:
 def level(c: Controller) -> None:
     """Back to the coordinates of the work offset."""
     c.rebase(replace(c.state.datum, tilt=None))
+
+
+def at_angles(c: Controller, angles: Mapping[str, float]) -> tuple[Nine, NDArray[np.float64]]:
+    """Positions m with rotary axes at angles [deg] by their letters, and R (3, 3) of the machine's X, Y and Z there."""
+    axes = _rad(c.machine_position())
+    for letter, angle in angles.items():
+        axes[LETTERS.index(letter)] = math.radians(angle)
+    return _deg(axes), np.eye(3) if c.swivel is None else c.swivel.directions(axes)
 
 
 def align(c: Controller, sign: int = 0) -> None:

@@ -1,4 +1,4 @@
-"""Tilted working planes of conversational programs: PLANE SPATIAL, EULER, VECTOR, RELATIV and RESET, cycle 19.
+"""Tilted working planes of conversational programs: PLANE SPATIAL, EULER, VECTOR, RELATIV, AXIAL and RESET, cycle 19.
 
 Notation: in a tilted plane the rows are rows of the tip, which the rotary axes carry along with the workpiece. TURN
 turns these axes with X Y Z where they are, MOVE keeps the tip where it is, STAY only tells their angles in Q120, Q121
@@ -43,11 +43,26 @@ def plane(s: ConversationalState, text: str) -> str:
     sign = 0 if found is None else 1 if found[1] == "+" else -1
     if kind == "RESET":
         R = np.eye(3)
+    elif kind == "AXIAL":
+        return _by_axes(s, values, how)
     elif kind not in _KNOWN:
-        return f"PLANE {kind}: a tilted working plane by other than spatial or Euler angles or vectors is not read"
+        return f"PLANE {kind}: a tilted working plane by projected angles or points is not read"
     else:
         R = _rotation(s, kind, values)
     return put(s, R, how, sign)
+
+
+def _by_axes(s: ConversationalState, values: dict[str, float], how: str) -> str:
+    """PLANE AXIAL: the plane that the machine's axes have with the rotary ones at the angles that it names."""
+    if s.swivel is None or not s.swivel.turns:
+        return put(s, np.diag([1.0, -1.0, -1.0]), how)
+    target = axes_of(s)
+    for k, letter in enumerate("ABC"):
+        if letter in values:
+            target[3 + k] = math.radians(values[letter])
+    _go(s, target, how)
+    enter(s, s.swivel.directions(target))
+    return ""
 
 
 def _rotation(s: ConversationalState, kind: str, values: dict[str, float]) -> Floats:
@@ -82,15 +97,19 @@ def put(s: ConversationalState, R: Floats, how: str, sign: int = 0) -> str:
         enter(s, R)
         return ""
     now = axes_of(s)
-    target = swivel.aligned(tilt.direction, now, sign)
+    _go(s, swivel.aligned(tilt.direction, now, sign), how)
+    enter(s, R)
+    return ""
+
+
+def _go(s: ConversationalState, target: NDArray[np.float64], how: str) -> None:
+    """The rotary axes of a plane: turned, or told."""
     for k in range(3):
         s.q.set(ANGLES_Q + k, math.degrees(target[3 + k]))
     if how == "MOVE":
         _turn_about_tip(s, target)
     elif how == "TURN":
         turn(s, target)
-    enter(s, R)
-    return ""
 
 
 def enter(s: ConversationalState, R: Floats) -> None:
