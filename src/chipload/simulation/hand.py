@@ -44,5 +44,7 @@ def _finding(cutter: Cutter, number: int, line: int, row: int) -> Finding:
         if cutter.left_hand
         else ("counter-clockwise (M4)", "right", "M3", "state left_hand = true in its [[cutter]]")
     )
-    text = f"tool {number} cuts while the spindle turns {turns}, but is a {hand}-hand cutter: start it by {start} or {key}"
+    text = (
+        f"tool {number} is a {hand}-hand cutter and cuts while the spindle turns {turns}: start it by {start} or {key}"
+    )
     return Finding("spindle-reversed", line, text, Severity.EXCEEDS, None, row)
