@@ -73,7 +73,9 @@ def test_a_cycle_without_holes_is_that_of_the_blocks_behind_it() -> None:
     assert np.array_equal(stated.motion, plain.motion)
 
 
-LENGTHS = "G90 G21\nT1 M6\nS900 M3\nG0 X0 Y0\nG43 H1 Z10\nG1 Z-1 F100\nG0 Z50\nT2 M6\nM3\nG0 X5\n{0}Z-1\nG1 X9\nG0 Z50\nM30\n"
+LENGTHS = (
+    "G90 G21\nT1 M6\nS900 M3\nG0 X0 Y0\nG43 H1 Z10\nG1 Z-1 F100\nG0 Z50\nT2 M6\nM3\nG0 X5\n{0}Z-1\nG1 X9\nG0 Z50\nM30\n"
+)
 
 
 @pytest.mark.parametrize("dialect", ["fanuc", "linuxcnc"])
