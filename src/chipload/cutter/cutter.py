@@ -43,7 +43,7 @@ class Cutter:
     ----------
     diameter : d > 0 [mm]
     flutes : number of teeth, >= 1
-    helix : helix angle [rad], 0 <= helix < 80 deg, right-handed
+    helix : helix angle [rad], 0 <= helix < 80 deg, of the same hand as the cutter
     flute_length : length that cuts [mm]
     overhang : length out of the holder [mm], >= flute_length
     modulus : Young's modulus of the cutter [MPa]
@@ -67,6 +67,7 @@ class Cutter:
         part, stock and fixtures, its chips are not simulated; empty: the seven numbers are its shape
     number : tool number, >= 0; 0: what is in the spindle where a program names no tool
     name : as the shop calls it
+    left_hand : cuts while the spindle turns counter-clockwise (M4); its helix is left-handed then
 
     Raises
     ------
@@ -98,6 +99,7 @@ class Cutter:
     number: int = 1
     name: str = ""
     barrel_radius: float | None = None
+    left_hand: bool = False
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: float, limit: str) -> None:

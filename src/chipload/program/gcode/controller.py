@@ -93,6 +93,8 @@ class Controller:
         #: Sinumerik: whether the spindle of the tapping block that is read turns against K; None: no such block
         self.reversed: bool | None = None
         self.named_tools: dict[str, int] = {}
+        #: tools, and numbers of offsets, that a length offset was given for
+        self.with_length: set[int] = set()
         #: turned and shifted coordinates of the program; None: those of the work offset
         self.program_frame: ProgramFrame | None = None
         #: where a retraction to where only the machine knows was left out
