@@ -76,7 +76,6 @@ class PartFloor:
     box: tuple[float, float]
     face: Polygon
     walls: tuple[tuple[float, MultiPolygon], ...]
-    foot: float = 0.0
 
     def size(self) -> tuple[float, float]:
         """Length of its box along x and along y [mm]."""

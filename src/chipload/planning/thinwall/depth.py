@@ -274,21 +274,19 @@ def _least_share(posture: Pose, depth: float) -> float:
 
 
 def _scaled(posture: Pose, diameter: float) -> Pose:
+    """The pose with a cutter of another diameter [mm] and the same shape; a barrel is scaled with its flutes."""
     cutter = posture.cutter
-    ratio = diameter / cutter.diameter
-    corner = ratio * cutter.corner_radius
-    other = replace(cutter, diameter=diameter, corner_radius=corner, corner_e=None, corner_f=None, shank_diameter=None)
-    if cutter.barrel_radius is not None:
-        other = replace(
-            cutter,
-            diameter=diameter,
-            corner_radius=corner,
-            corner_e=ratio * cutter.apt[2],
-            corner_f=None,
-            barrel_radius=ratio * cutter.barrel_radius,
-            flute_length=ratio * cutter.flute_length,
-            shank_diameter=None,
-        )
+    ratio, barrel = diameter / cutter.diameter, cutter.barrel_radius
+    other = replace(
+        cutter,
+        diameter=diameter,
+        corner_radius=ratio * cutter.corner_radius,
+        corner_e=None if barrel is None else ratio * cutter.apt[2],
+        corner_f=None,
+        barrel_radius=None if barrel is None else ratio * barrel,
+        flute_length=cutter.flute_length if barrel is None else ratio * cutter.flute_length,
+        shank_diameter=None,
+    )
     return replace(posture, cutter=other)
 
 

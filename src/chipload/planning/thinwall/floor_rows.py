@@ -45,7 +45,7 @@ CUT = 1e-3
 ABOVE = 0.2
 #: a stroke is entered sideways from a point of an earlier one that is at most so many step-overs away
 ASIDE = 1.5
-#: points under the cutter that are looked at for stock: circles, and points on each
+#: points under an upright cutter at which its stock is read: circles in radii, and points on each
 CIRCLES, ROUND = (0.0, 0.5, 1.0), 16
 #: a ramp is at least so long, in radii; a shorter stroke is entered straight down
 SHORTEST = 0.1
@@ -101,6 +101,13 @@ class FloorSide:
     area: FloorArea
 
 
+def points_under(radius: float) -> Floats:
+    """Points (k, 2) [mm] under an upright cutter at which its stock is read, from its axis: circles of points."""
+    angle = np.arange(ROUND) * (math.tau / ROUND)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.concatenate([share * radius * circle for share in CIRCLES])
+
+
 class _Heights:
     """Heights of a pass over a floor."""
 
@@ -108,9 +115,7 @@ class _Heights:
         self.size, self.radius, self.outline = np.array(area.size), radius, area.outline
         shapely.prepare(self.outline)
         self._low, self._depth = (RegularGridInterpolator(places, values) for values in (p.low, p.depth))
-        angle = np.arange(ROUND) * (math.tau / ROUND)
-        circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        self.under = np.concatenate([share * radius * circle for share in CIRCLES])
+        self.under = points_under(radius)
 
     def place(self, xy: Floats) -> Floats:
         """Parameters (..., 2) of places."""

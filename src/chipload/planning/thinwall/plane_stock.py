@@ -36,6 +36,7 @@ from chipload.cutter.slices import edge_lag
 from chipload.engagement.immersion.immersion import tool_frame
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
+from chipload.planning.thinwall.depth_range import depths_in_range
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -293,17 +294,14 @@ def engagement_of_depths(posture: CutterPose, depths: ArrayLike, nodes: int = 8)
     >>> round(5.0 * math.acos(0.9), 6)
     2.255134
     """
-    d = np.atleast_1d(np.asarray(depths, dtype=np.float64))
-    wrong = np.flatnonzero(~((d > 0.0) & (d <= posture.deepest * (1.0 + 1e-12))))
-    if len(wrong):
-        raise InputError(
-            f"depth_mm = {d[wrong[0]]:g}: must be above 0 and at most {posture.deepest:.6g}, {posture.deepest_is}: "
-            + (
-                "lean the cutter less or take a greater corner radius"
-                if posture.cutter.flank_arc is None
-                else "lean the cutter so that it touches the middle of the arc"
-            )
-        )
+    on_corner = posture.cutter.flank_arc is None
+    d = depths_in_range(
+        posture,
+        depths,
+        "lean the cutter less or take a greater corner radius"
+        if on_corner
+        else "lean the cutter so that it touches the middle of the arc",
+    )
     circles = _circles(posture, d, nodes)
     starts, lengths = _ranges(circles, d)
     cuts = _cutting(circles, d, starts, lengths)
