@@ -44,7 +44,7 @@ class EndPose:
     cutter : end mill or bull nose: flat bottom, no taper
     feed_per_tooth : f_z > 0 [mm]
     step : step-over b [mm]; the row before lies on the right of the feed (b > 0) or on its left; at most the flat of
-        the bottom, so that no cusps stay
+        the bottom, so that no scallops stay
     clockwise : sense of the spindle (M3)
 
     Raises
@@ -88,7 +88,7 @@ class EndPose:
         if not 0.0 < abs(self.step) <= flat:
             raise InputError(
                 f"step_over_mm = {abs(self.step):g}: must be from above 0 to {flat:g}, the flat of the bottom: "
-                "cusps would stay on the floor"
+                "scallops would stay on the floor"
             )
 
     @property

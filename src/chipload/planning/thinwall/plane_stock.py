@@ -148,7 +148,7 @@ class CutterPose:
 
     @property
     def below(self) -> float:
-        """Bound [mm] of how far the cutter reaches along the surface below the contact, towards the tip."""
+        """Upper bound [mm] of the reach of the cutter along the surface below the contact, towards the tip."""
         cutter, b = self.cutter, self.beta
         if cutter.flank_arc is None:
             return cutter.corner_radius
@@ -359,7 +359,7 @@ class _Circles(NamedTuple):
         return np.asarray(self.z0[..., None] + self.rho[..., None] * (np.cos(phi) * n[2] + np.sin(phi) * T[2]))
 
     def over_row_before(self, step: float, phi: Floats) -> Floats:
-        """Height over what the row before, ``step`` beside, has left; above 0: it has left nothing here."""
+        """Height [mm] over the stock that the row before, at a distance of ``step``, has left; above 0: no stock."""
         T, n, _ = self.posture.frame
         y = self.y0[..., None] + self.rho[..., None] * (np.cos(phi) * n[1] + np.sin(phi) * T[1])
         return np.asarray(self.height(phi) - np.minimum(self.posture.outline(y + step), 1e6))
@@ -377,7 +377,7 @@ def _circles(posture: CutterPose, d: Floats, nodes: int) -> _Circles:
 
 
 def _ranges(circles: _Circles, d: Floats) -> tuple[Floats, Floats]:
-    """Where the ranges of phi begin between which no border is crossed, and their lengths, (n, k, m) [rad]."""
+    """Beginnings and lengths (n, k, m) [rad] of the ranges of phi within which no border is crossed."""
     posture = circles.posture
     T, n, _ = posture.frame
     breaks = [
@@ -399,7 +399,7 @@ def _ranges(circles: _Circles, d: Floats) -> tuple[Floats, Floats]:
 
 
 def _cutting(circles: _Circles, d: Floats, starts: Floats, lengths: Floats) -> Bools:
-    """(n, k, m) bool, ranges in which the edge is in stock."""
+    """Whether the edge is in stock in each range, (n, k, m) bool."""
     posture, middle = circles.posture, starts + 0.5 * lengths
     cuts = circles.along[..., None] * np.sin(middle) + circles.offset[..., None] > 1e-9 * posture.feed_per_tooth
     cuts &= (circles.height(middle) < d[:, None, None]) & (lengths > SHORT) & (circles.weight > 0.0)[..., None]
@@ -419,7 +419,7 @@ def _roots(a: Floats, b: Floats, c: Floats) -> Floats:
 
 
 def _crossings(function: Callable[[Floats], Floats], shape: tuple[int, ...]) -> Floats:
-    """Zeros of a function of phi (..., m) -> (..., m), at most six; infinite beyond those that there are."""
+    """Zeros (..., 6) [rad] of a function of phi (..., m) -> (..., m), at most six; the others are infinite."""
     phi = np.linspace(0.0, math.tau, LOOKS + 1)
     sign = function(np.broadcast_to(phi, (*shape, LOOKS + 1))) > 0.0
     change = sign[..., 1:] != sign[..., :-1]
