@@ -1,8 +1,8 @@
 """Catalogues of cutters: dimensions, and the shank and holder above the cutting part.
 
 Notation: from the tip upwards the cutting part (diameter, corner radius, cutting length), a neck up to the neck length,
-the shank up to where the cutter leaves the holder (reach), the holder above. A part that is left out is not there: with
-no cutting length the cutting part is extended without end, with no reach there is no holder.
+the shank up to the lower end of the holder (reach), the holder above. A part that is not stated does not exist: without
+a cutting length the cutting part has no end, without a reach there is no holder.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ class CatalogueCutter:
     diameter : [mm], > 0
     corner_radius : r [mm], 0 <= r <= diameter / 2
     cutting_length : [mm], >= r; None: without end
-    neck_diameter, neck_length : of the part above, up to a height above the tip [mm]; both or none
+    neck_diameter, neck_length : of the part above, and the height of its end above the tip [mm]; both or none
     shank_diameter : of the part above that [mm]; None: as the diameter
     reach : height above the tip at which the holder begins [mm]; None: no holder
-    holder_diameter : [mm], given with the reach
+    holder_diameter : [mm], required with the reach
     name : as the shop calls it
 
     Raises
     ------
     InputError
-        A number is out of range or without the one it needs.
+        A number is out of range, or another number that it requires is missing.
     """
 
     diameter: float
@@ -201,7 +201,7 @@ def _cutter(k: int, row: Any) -> CatalogueCutter:
     barrel = next((key for key in row if key in known or row[key] == "barrel"), None)
     if barrel is not None:
         raise InputError(
-            f"cutter {k}: {barrel} = {row[barrel]!r}: the search of table angles and the gouge check know cutters by "
+            f"cutter {k}: {barrel} = {row[barrel]!r}: the search of table angles and the gouge check model cutters by "
             "cylinders and one corner circle: state flat, bull-nose or ball cutters by diameter_mm and "
             "corner_radius_mm, and simulate a program for the barrel cutter with kind = program"
         )

@@ -24,7 +24,7 @@ from chipload.tables import nearest
 
 #: endings of files with tool data
 ENDINGS = (".fctb", ".json", ".tools", ".p21", ".camotics", ".tbl")
-#: keys that a cutter cannot be without
+#: keys that every cutter requires
 NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "overhang_mm", "modulus_gpa")
 
 

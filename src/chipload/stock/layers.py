@@ -44,13 +44,13 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Shapes = NDArray[np.object_]
 
-#: what a saved stock says of itself
+#: kind of a saved stock
 KIND = "chipload layered stock 1"
 #: arrays of a saved stock and their numbers of dimensions
 SAVED = {"bounds": 1, "xs": 1, "ys": 1, "cut": 1, "room": 1, "tidied": 1, "vertices": 2, "faces": 2}
 #: shortest side of a block [mm]
 LEAST_MM = 1e-3
-#: a tile with fewer points than this is not tidied
+#: least number of points of a tile that is simplified
 ROOM = 128
 
 
