@@ -99,19 +99,19 @@ def primitive(phi, row, factor, out):
 
 @njit(cache=True, nogil=True)
 def powered(low, high, row, exponents, factor, out, one):
-    """Adds the integral of :func:`density` with exponents, times ``factor``: between crest and trough of h the variable
+    """Adds the integral of :func:`density` with exponents, times ``factor``: between peak and trough of h the variable
     is w, phi = zero +- w^3, so that a power of h at its zero is smooth enough for twelve points.
     """
     swing = math.hypot(row[8], row[9])
-    crest = math.atan2(row[8], row[9])
+    peak = math.atan2(row[8], row[9])
     reach = math.acos(-row[10] / swing) if swing > abs(row[10]) else math.pi
-    k = math.floor((low - crest) / math.pi)
+    k = math.floor((low - peak) / math.pi)
     begin = low
     while begin < high:
-        end = min(high, crest + (k + 1) * math.pi)
+        end = min(high, peak + (k + 1) * math.pi)
         if end > begin:
             falling = k % 2 == 0
-            zero = crest + k * math.pi + reach if falling else crest + (k + 1) * math.pi - reach
+            zero = peak + k * math.pi + reach if falling else peak + (k + 1) * math.pi - reach
             u = np.cbrt(max(zero - end, 0.0) if falling else max(begin - zero, 0.0))
             v = np.cbrt(max(zero - begin, 0.0) if falling else max(end - zero, 0.0))
             for g in range(12):
