@@ -26,7 +26,7 @@ from chipload.simulation.channel.channel import left_on, wall
 MACHINE = machine_named("horizontal-b")
 CUTTER = CatalogueCutter(12.0, 2.0, cutting_length=45.0, reach=60.0, holder_diameter=30.0)
 TABLE, SCALLOP, CHORD = math.radians(55.0), 0.1, 0.005
-BOX = ((0.3, 0.45), (0.5, 0.7))
+BOX = ((0.3, 0.45), (0.5, 0.71))
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +63,28 @@ def test_the_last_pass_lies_at_its_full_step_beyond_the_border(machined):
     assert farthest[-1] > high
     assert min(t.at[:, across].min() for t in tracks.tracks) > low
     assert max(farthest[:-2]) < high
+
+
+def test_lines_from_the_high_border_leave_as_little_as_those_from_the_low_one(impeller, scene):
+    motion, surface = LineMotion(CHORD, 100.0 / 60.0, pallet_rate(MACHINE), 0.5), impeller.blade.plus
+    tracks = finishing(
+        surface, "u", BOX, scene, 0, CUTTER, TABLE, PatchFinish(SCALLOP, motion), workers=2, back=True
+    )  # fmt: skip
+    low, high = BOX[1]
+    v = [[t.at[:, 1].min(), t.at[:, 1].max()] for t in tracks.tracks]
+    # the first line lies inside the high border, the last one beyond the low one, each below the one before
+    assert v[0][1] < high
+    assert v[-1][0] < low
+    assert (np.diff(np.array(v), axis=0) < 0.0).all()
+    link = Link(lift=2.0, margin=0.5, touch=0.01, near=6.0, feed=20.0, above=5.0)
+    way = linked(tracks.tracks, scene, CUTTER, TABLE, 100.0 / 60.0, link, 0.5, rate=pallet_rate(MACHINE))
+    assert not way.refused
+    u, fine = (
+        a + x * (b - a) for x, (a, b) in zip((np.linspace(0.05, 0.95, 9), np.linspace(0, 1, 401)), BOX, strict=True)
+    )
+    (left,) = left_on([wall("blade", surface, u, fine)], program_of(way.moves, 90.0, 1), CUTTER, 1.0, 1.0, workers=2)
+    assert left.deepest[0] <= 2.0 * CHORD
+    assert left.rest.max() <= SCALLOP
 
 
 def test_stations_are_as_close_as_asked(impeller):

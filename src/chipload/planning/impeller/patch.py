@@ -29,6 +29,7 @@ class Patch:
     time : predicted, of one such side, with links where programs have shown their time [s]
     area : that is milled [mm2]
     part : range of the other parameter; not 0..1 where no cutter at one table angle mills a whole strip
+    back : whether its lines follow each other from ``high`` to ``low``
     """
 
     body: int
@@ -44,3 +45,4 @@ class Patch:
     time: float
     area: float
     part: tuple[float, float] = (0.0, 1.0)
+    back: bool = False

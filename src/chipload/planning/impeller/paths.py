@@ -19,17 +19,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import binary_dilation, gaussian_filter1d, minimum_filter1d
+from scipy.ndimage import binary_dilation, minimum_filter1d
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.closed_form import axis_at
-from chipload.planning.impeller.lines import Flags, Line, LineMotion, Lines, Tracks, UnreachedSpan, stations, stretched
+from chipload.planning.impeller.lines import Line, LineMotion, Lines, Tracks, UnreachedSpan, stations, stretched
 from chipload.planning.impeller.ranges.ranges import FULL
 from chipload.planning.impeller.scallop_height import pose_distance, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
 from chipload.planning.impeller.scene import Floats, Scene
+from chipload.planning.impeller.steps import Flags, even_steps, straightened
 from chipload.planning.impeller.track import ToolTrack, posed
 from chipload.progress import Progress, silent
 
@@ -43,10 +44,6 @@ _STILL = 5e-3  # share by which a step may still change
 _SPLIT = math.radians(45.0)  # from station to station: further the pallet does not turn in one piece of a line
 #: stations of a line are no farther apart than this [mm]
 _STATION = 1.5
-#: tangent of the angle by which a line may run askew to the parameter lines; least share of a step that it keeps there
-_SKEW, _HELD = 0.6, 0.4
-#: by how much a step may grow along the line [mm/mm]
-_GROWTH = 0.2
 
 
 @dataclass(frozen=True)
@@ -64,7 +61,7 @@ class PatchFinish:
     scallop: float
     motion: LineMotion
     overrun: float = 0.0
-    aim: float = 0.95
+    aim: float = 0.97
 
     def __post_init__(self) -> None:
         if not (0.0 < self.scallop < math.inf and 0.0 < self.aim <= 1.0):
@@ -83,6 +80,7 @@ def finishing(
     pallets: tuple[tuple[float, float], ...] = FULL,
     workers: int = 1,
     progress: Progress = silent,
+    back: bool = False,
 ) -> Tracks:
     """Tracks over a part of a surface at constant scallop height.
 
@@ -94,6 +92,7 @@ def finishing(
     number : of the surface among those of the check points
     table : alpha [rad]
     pallets : (k, 2) [rad] where B may be
+    back : whether lines follow each other from the high border to the low one
     """
     if along not in ("u", "v"):
         raise InputError(f"along = {along!r}: must be u or v")
@@ -103,7 +102,11 @@ def finishing(
     count = stations(surface, along, P, Q, how.motion.chord, _STATION)
     p = stretched(surface, along, P, Q, count, how.overrun)
     need = (p >= P[0]) & (p <= P[1])
-    job = Lines(surface, along, p, scene, number, cutter, table, how.motion, pallets, workers)
+    if back:
+        Q = -Q[1], -Q[0]
+    job = Lines(
+        surface, along, p, scene, number, cutter, table, how.motion, pallets, workers, -1.0 if back else 1.0
+    )  # fmt: skip
     step = _Stepper(job, how.scallop, how.aim, need)
     tracks: list[ToolTrack] = []
     missed: list[UnreachedSpan] = []
@@ -172,7 +175,7 @@ class _Stepper:
 
         It may lie beyond the border, as the last one of a patch does, if all that is in ``use`` is reached there.
         """
-        free = self._next(line, 1.0)
+        free = self._next(line, self.lines.ends[1])
         if not (free.q[use] > border).any():
             return free
         inside = self._next(line, border)
@@ -217,7 +220,7 @@ class _Stepper:
         """The step at which the scallop is as high as aimed, if the next line is milled at these pallet angles."""
         aim = self.aim * self.scallop
         for _ in range(_ROUNDS):
-            scallop = self._scallop(line, self._moved(line, w, 1.0), pallet)
+            scallop = self._scallop(line, self._moved(line, w, self.lines.ends[1]), pallet)
             ratio = np.clip(np.sqrt(aim / np.clip(scallop, 0.1 * aim, None)), 0.6, 1.3)
             if not np.isfinite(ratio).any() or (np.nanmin(ratio) > 0.99 and np.nanmax(ratio) < 1.03):
                 break
@@ -275,8 +278,8 @@ class _Stepper:
         return self._across(line, line.q)
 
     def _across(self, line: Line, q: Floats) -> Floats:
-        u, v = (self.lines.p, q) if self.lines.along == "u" else (q, self.lines.p)
-        Sq = self.lines.surface.at(u, v, *((0, 1) if self.lines.along == "u" else (1, 0)))
+        u, v = self.lines.places(self.lines.p, q)
+        Sq = self.lines.sign * self.lines.surface.at(u, v, *((0, 1) if self.lines.along == "u" else (1, 0)))
         out: Floats = (Sq * np.cross(line.N, line.d)).sum(axis=1)
         return out
 
@@ -286,27 +289,16 @@ class _Stepper:
         if len(known) == 0:
             r, h = self.lines.cutter.corner_radius, self.scallop
             return np.full(len(w), 2.0 * math.sqrt(2.0 * max(r, h) * h))
-        near = known[np.abs(known[None] - np.arange(len(w))[:, None]).argmin(axis=1)]
-        w = w[near]
-        size = np.linalg.norm(np.diff(line.S, axis=0), axis=1)
-        far = np.concatenate([[0.0], np.cumsum(_GROWTH * size)])
-        held = (w[None] + np.abs(far[:, None] - far[None])).min(axis=1)
-        out: Floats = np.minimum(gaussian_filter1d(held, 1.0, mode="nearest"), held)
-        return out
+        return even_steps(w, np.linalg.norm(np.diff(line.S, axis=0), axis=1))
 
     def _straight(self, line: Line, q: Floats) -> Floats:
         """Places (n,) of the line after ``line``, held back where it would run askew to the parameter lines."""
-        ahead = np.maximum(np.abs(self._across(line, line.q)), 1e-12)
         size = np.linalg.norm(np.diff(line.S, axis=0), axis=1)
-        far = np.concatenate([[0.0], np.cumsum(_SKEW * size / np.minimum(ahead[1:], ahead[:-1]))])
-        soft = np.minimum(gaussian_filter1d(q, 1.0, mode="nearest"), q)
-        held = (soft[None] + np.abs(far[:, None] - far[None])).min(axis=1)
-        out: Floats = np.maximum(held, line.q + _HELD * (q - line.q))
-        return out
+        return straightened(q, line.q, self._across(line, line.q), size)
 
     def _dq(self, line: Line, w: Floats) -> Floats:
         first = w / np.abs(self._across(line, line.q))
-        middle = np.clip(line.q + 0.5 * first, 0.0, 1.0)
+        middle = np.clip(line.q + 0.5 * first, *self.lines.ends)
         out: Floats = w / np.abs(self._across(line, middle))
         return out
 
