@@ -170,7 +170,7 @@ def begun(patches: Sequence[Patch]) -> tuple[Patch, ...]:
     for p in patches:
         same = [o for o in patches if (o.body, o.side, o.order, o.part) == (p.body, p.side, p.order, p.part)]
         below, above = any(o.high == p.low for o in same), any(o.low == p.high for o in same)
-        out.append(replace(p, back=above and not below))
+        out.append(replace(p, begin="low" if below else "high" if above else "any"))
     return tuple(out)
 
 

@@ -15,7 +15,7 @@ along the border is the last.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -26,6 +26,7 @@ from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.lines import Line, LineMotion, Lines, Tracks, UnreachedSpan, stations, stretched
+from chipload.planning.impeller.patch import Begin
 from chipload.planning.impeller.ranges.ranges import FULL
 from chipload.planning.impeller.scallop_height import pose_distance, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
@@ -44,6 +45,8 @@ _STILL = 5e-3  # share by which a step may still change
 _SPLIT = math.radians(45.0)  # from station to station: further the pallet does not turn in one piece of a line
 #: stations of a line are no farther apart than this [mm]
 _STATION = 1.5
+#: widths of a part along it that differ more: lines may begin in its middle
+_NARROWS = 1.25
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ def finishing(
     pallets: tuple[tuple[float, float], ...] = FULL,
     workers: int = 1,
     progress: Progress = silent,
-    back: bool = False,
+    begin: Begin = "low",
 ) -> Tracks:
     """Tracks over a part of a surface at constant scallop height.
 
@@ -92,7 +95,8 @@ def finishing(
     number : of the surface among those of the check points
     table : alpha [rad]
     pallets : (k, 2) [rad] where B may be
-    back : whether lines follow each other from the high border to the low one
+    begin : border at which lines begin; `any`: at the low one, or in the middle where they are shorter so and the width
+        of the part between its borders differs much along it: they run half as askew
     """
     if along not in ("u", "v"):
         raise InputError(f"along = {along!r}: must be u or v")
@@ -102,31 +106,84 @@ def finishing(
     count = stations(surface, along, P, Q, how.motion.chord, _STATION)
     p = stretched(surface, along, P, Q, count, how.overrun)
     need = (p >= P[0]) & (p <= P[1])
-    if back:
-        Q = -Q[1], -Q[0]
-    job = Lines(
-        surface, along, p, scene, number, cutter, table, how.motion, pallets, workers, -1.0 if back else 1.0
-    )  # fmt: skip
-    step = _Stepper(job, how.scallop, how.aim, need)
-    tracks: list[ToolTrack] = []
-    missed: list[UnreachedSpan] = []
-    q = job.border(Q, need)
-    line = step.first(q, Q[0])
-    if (q > Q[0]).any():
-        missed.append(job.strip(q, Q[0]))
-    use = np.ones(len(p), dtype=np.bool_)
-    for number_of in range(_LINES):
-        new, gone = job.tracks(line, use, number_of, need)
-        tracks += new
-        missed += gone
-        progress(float(np.clip((line.q.min() - Q[0]) / (Q[1] - Q[0]), 0.0, 1.0)), f"{number_of + 1} lines")
-        open_ = use & ~step.done(line, Q[1])
-        if not open_[need].any():
-            return Tracks(tuple(tracks), tuple(missed), number_of + 1)
-        # where the pass of the line before has reached the border there is nothing left
-        use = binary_dilation(open_)
-        line = step.next(line, Q[1], use & need)
-    raise InputError(f"finish.scallop = {how.scallop:g} mm: more than {_LINES} lines: raise it")
+    job = Lines(surface, along, p, scene, number, cutter, table, how.motion, pallets, workers)
+    up = _March(_Stepper(job, how.scallop, how.aim, need), Q, progress)
+    down = _March(_Stepper(replace(job, sign=-1.0), how.scallop, how.aim, need), (-Q[1], -Q[0]), progress)
+    if begin == "high":
+        return down.from_border()
+    if begin == "any" and _narrows(job, Q, need):
+        middle = job.line(np.full(len(p), 0.5 * sum(Q)), np.full(len(p), np.nan))
+        if np.isfinite(middle.pallet[need]).all():
+            before, after = down.after(replace(middle, q=-middle.q), 1), up.after(middle, 1)
+            # which way lines run also decides how wide their passes are
+            return min(up.from_border(), _stacked(before, up.milled(middle), after), key=_rank)
+    return up.from_border()
+
+
+def _rank(one: Tracks) -> tuple[float, float]:
+    """Order of lines over the same part: what they miss, to 10 mm, then their length [mm]."""
+    return round(math.fsum(x.length for x in one.missed), -1), one.length
+
+
+def _narrows(job: Lines, Q: tuple[float, float], need: Flags) -> bool:
+    """Whether the width of a part between its borders differs along it by more than :data:`_NARROWS`."""
+    q = np.linspace(*Q, 9)
+    p = job.p[need]
+    S = job.surface.at(*job.places(np.repeat(p, len(q)), np.tile(q, len(p)))).reshape(len(p), len(q), 3)
+    width = np.linalg.norm(np.diff(S, axis=1), axis=2).sum(axis=1)
+    return bool(width.max() > _NARROWS * width.min())
+
+
+def _stacked(before: Tracks, middle: Tracks, after: Tracks) -> Tracks:
+    """Lines on either side of one, numbered from the first to the last; ``before`` goes away from it, from 1 on."""
+    n = before.lines
+    low = [replace(t, line=n - t.line) for t in reversed(before.tracks)]
+    gone = [replace(x, line=n - x.line) for x in before.missed]
+    high, own = ([replace(t, line=n + t.line) for t in x.tracks] for x in (after, middle))
+    missed = [replace(x, line=n + x.line) for x in (*middle.missed, *after.missed)]
+    return Tracks((*low, *own, *high), (*gone, *missed), n + 1 + after.lines)
+
+
+@dataclass(frozen=True, eq=False)
+class _March:
+    """Line after line, towards the end of a range Q of places q."""
+
+    step: _Stepper
+    Q: tuple[float, float]
+    progress: Progress
+
+    def from_border(self) -> Tracks:
+        """All lines from Q[0] on."""
+        job, need = self.step.lines, self.step.need
+        q = job.border(self.Q, need)
+        line = self.step.first(q, self.Q[0])
+        strip = (job.strip(q, self.Q[0]),) if (q > self.Q[0]).any() else ()
+        first, rest = self.milled(line), self.after(line, 1)
+        return Tracks((*first.tracks, *rest.tracks), (*strip, *first.missed, *rest.missed), 1 + rest.lines)
+
+    def milled(self, line: Line) -> Tracks:
+        """The tracks of the line number 0."""
+        new, gone = self.step.lines.tracks(line, np.ones(len(line.q), dtype=np.bool_), 0, self.step.need)
+        return Tracks(tuple(new), tuple(gone), 1)
+
+    def after(self, line: Line, number: int) -> Tracks:
+        """The lines after one, counted from ``number`` on."""
+        tracks: list[ToolTrack] = []
+        missed: list[UnreachedSpan] = []
+        use, need = np.ones(len(line.q), dtype=np.bool_), self.step.need
+        low, high = self.Q
+        for k in range(_LINES):
+            self.progress(float(np.clip((line.q.min() - low) / (high - low), 0.0, 1.0)), f"{k + 1} lines")
+            open_ = use & ~self.step.done(line, high)
+            if not open_[need].any():
+                return Tracks(tuple(tracks), tuple(missed), k)
+            # where the pass of the line before has reached the border there is nothing left
+            use = binary_dilation(open_)
+            line = self.step.next(line, high, use & need)
+            new, gone = self.step.lines.tracks(line, use, number + k, need)
+            tracks += new
+            missed += gone
+        raise InputError(f"finish.scallop = {self.step.scallop:g} mm: more than {_LINES} lines: raise it")
 
 
 @dataclass(frozen=True, eq=False)
