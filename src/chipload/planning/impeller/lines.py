@@ -379,8 +379,7 @@ class Lines:
 
     def facing(self, p: Floats, q: Floats) -> tuple[Floats, Floats]:
         """Points and normals (n, 3) of the surface."""
-        u, v = (p, q) if self.along == "u" else (q, p)
-        return self.surface.at(u, v), self.surface.normal(u, v)
+        return self.surface.facing(*((p, q) if self.along == "u" else (q, p)))
 
 
 def stations(

@@ -172,25 +172,28 @@ class _Stepper:
 
         It may lie beyond the border, as the last one of a patch does, if all that is in ``use`` is reached there.
         """
-        free = self._next(line, 1.0)
-        if not (free.q[use] > border).any():
-            return free
-        inside = self._next(line, border)
-        lost = [int((use & np.isnan(one.pallet)).sum()) for one in (free, inside)]
-        return free if (lost[0], len(free.sections)) <= (lost[1], len(inside.sections)) else inside
-
-    def _next(self, line: Line, end: float) -> Line:
-        """The next line, no farther than ``end``.
-
-        The step is first laid out for the pallet angles of this line, then for those of the new one.
-        """
         ahead, behind = self._reach(line)
-        w = self._even(line, ahead + behind)
+        w = self._step(line, self._even(line, ahead + behind), line.pallet)
+        free = self._next(line, w, 1.0)
+        lost = int((use & np.isnan(free.pallet)).sum())
+        # a line in one piece that loses nothing is not worse than any other
+        if not (free.q[use] > border).any() or (lost == 0 and len(free.sections) <= 1):
+            return free
+        inside = self._next(line, w, border)
+        less = int((use & np.isnan(inside.pallet)).sum())
+        return free if (lost, len(free.sections)) <= (less, len(inside.sections)) else inside
+
+    def _next(self, line: Line, w: Floats, end: float) -> Line:
+        """The next line, no farther than ``end``, by the step ``w`` for the pallet angles of this line.
+
+        The step is then laid out for the pallet angles of the new one.
+        """
         B, most = line.pallet, self.scallop * (0.5 + 0.5 * self.aim)
         less = np.ones(len(w))
         best: tuple[float, Line] | None = None
-        for _ in range(_MENDS):
-            w = self._step(line, w, B)
+        for turn in range(_MENDS):
+            if turn:
+                w = self._step(line, w, B)
             out = self.lines.line(self._moved(line, self._even(line, less * w), end), B)
             scallop = self._scallop(line, out.q, out.pallet)
             # what is used of the scallop where the line is not at the border; below 0: by how much it is too high
