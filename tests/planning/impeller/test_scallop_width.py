@@ -160,14 +160,14 @@ def heights_of_all(points, normals, tips, axes, wide, rho, corner, steps):
 @pytest.mark.parametrize(("rho", "corner"), [(4.0, 2.0), (0.0, 1.0), (1.0, 1.0), (5.0, 0.0)])
 @pytest.mark.parametrize("step", [0.5, 2.5])
 def test_heights_are_those_of_a_search_through_all_poses(rho, corner, step):
-    """On a bent surface, two lines whose axes turn, one with no pose in its middle; poses that are not near are left
-    out only where they cannot be the nearest.
+    """On a bent surface, two lines whose axes turn, one askew and without a pose at one place, 0.08 mm from pose to
+    pose; poses are left out only where they cannot be the nearest.
     """
     x, y = np.linspace(-6.0, 6.0, 13), np.linspace(-4.0, 4.0, 7)
     X, Y = np.meshgrid(x, y, indexing="ij")
     patch = through(np.stack([X, Y, 0.01 * X**2 - 0.02 * Y**2], axis=-1), (x + 6) / 12, (y + 4) / 8)
-    u = np.linspace(0.1, 0.9, 33)
-    q = (0.3, 0.3 + step / 8.0)
+    u = np.linspace(0.1, 0.9, 121)
+    q = (np.full(len(u), 0.3), 0.3 + step * (1.0 + 0.4 * np.sin(2.0 * np.pi * u)) / 8.0)
     tips, axes = [], []
     for v, first in zip(q, (0.2, 0.5), strict=True):
         S, N = patch.facing(u, v)
@@ -177,13 +177,13 @@ def test_heights_are_those_of_a_search_through_all_poses(rho, corner, step):
         V = (N - n * T) / np.sqrt(1.0 - n * n)
         tips.append(S + corner * N + rho * V - corner * T)
         axes.append(T)
-    tips[1][20] = axes[1][20] = np.nan
+    tips[1][70] = axes[1][70] = np.nan
     share = shares()
-    at = np.repeat(u, len(share)), np.tile(q[0] + share * (q[1] - q[0]), len(u))
+    at = np.repeat(u, len(share)), (q[0][:, None] + share * (q[1] - q[0])[:, None]).ravel()
     P, M = (a.reshape(len(u), len(share), 3) for a in patch.facing(*at))
     got = scallop_heights(P, M, tuple(tips), tuple(axes), rho, corner)
     apart = [float(np.nanmedian(np.linalg.norm(np.diff(p, axis=0), axis=1))) for p in tips]
     want = heights_of_all(P, M, tips, axes, [max(2, math.ceil(4.0 / a)) for a in apart], rho, corner, 5)
-    assert np.isnan(got[20])
-    assert np.isfinite(np.delete(got, 20)).all()
-    assert np.delete(got, 20) == pytest.approx(np.delete(want, 20), abs=1e-12)
+    assert np.isnan(got[70])
+    assert np.isfinite(np.delete(got, 70)).all()
+    assert np.delete(got, 70) == pytest.approx(np.delete(want, 70), abs=1e-12)

@@ -117,12 +117,13 @@ def finishing(
         tracks += new
         missed += gone
         progress(float(np.clip((line.q.min() - Q[0]) / (Q[1] - Q[0]), 0.0, 1.0)), f"{number_of + 1} lines")
-        open_ = use & ~step.done(line, Q[1])
+        reach = step.reach(line)
+        open_ = use & ~step.done(line, reach, Q[1])
         if not open_[need].any():
             return Tracks(tuple(tracks), tuple(missed), number_of + 1)
         # where the pass of the line before has reached the border there is nothing left
         use = binary_dilation(open_)
-        line = step.next(line, Q[1], use & need)
+        line = step.next(line, reach, Q[1], use & need)
     raise InputError(f"finish.scallop = {how.scallop:g} mm: more than {_LINES} lines: raise it")
 
 
@@ -145,21 +146,21 @@ class _Stepper:
             return line
         w = np.full(len(q), np.inf)
         for _ in range(_MENDS):
-            _, behind = self._reach(line)
+            _, behind = self.reach(line)
             w = np.minimum(w, self._even(line, _INSIDE * behind))
             inside = self.lines.line(q + self._dq(line, w), line.pallet)
             if len(inside.sections) > len(line.sections):
                 break
-            _, behind = self._reach(inside)
+            _, behind = self.reach(inside)
             known = np.isfinite(behind)
             if (behind[known] >= w[known]).all() and known.sum() >= np.isfinite(line.pallet).sum():
                 return inside
             w = np.where(known, np.minimum(w, behind), w)
         return line
 
-    def done(self, line: Line, border: float) -> Flags:
-        """(n,) stations at which the pass of a line stays below the scallop to the border."""
-        ahead, _ = self._reach(line)
+    def done(self, line: Line, reach: tuple[Floats, Floats], border: float) -> Flags:
+        """(n,) stations at which the pass of a line stays below the scallop to the border; its :meth:`reach`."""
+        ahead, _ = reach
         w = np.where(np.isfinite(ahead), _INSIDE * ahead, 0.0)
         # beyond the patch lines go on as at its ends
         inner = np.flatnonzero(self.need)
@@ -167,12 +168,12 @@ class _Stepper:
         out: Flags = (line.q + self._dq(line, w) >= border)[near]
         return out
 
-    def next(self, line: Line, border: float, use: Flags) -> Line:
-        """The next line, so that the scallop between is as high as asked.
+    def next(self, line: Line, reach: tuple[Floats, Floats], border: float, use: Flags) -> Line:
+        """The next line, so that the scallop between is as high as asked, by the :meth:`reach` of this one.
 
         It may lie beyond the border, as the last one of a patch does, if all that is in ``use`` is reached there.
         """
-        ahead, behind = self._reach(line)
+        ahead, behind = reach
         w = self._step(line, self._even(line, ahead + behind), line.pallet)
         free = self._next(line, w, 1.0)
         lost = int((use & np.isnan(free.pallet)).sum())
@@ -259,7 +260,7 @@ class _Stepper:
         tip, axis = posed(S, N, self.lines.table, np.where(known, pallet, 0.0), self.lines.cutter)
         return np.where(known[:, None], tip, np.nan), np.where(known[:, None], axis, np.nan)
 
-    def _reach(self, line: Line) -> tuple[Floats, Floats]:
+    def reach(self, line: Line) -> tuple[Floats, Floats]:
         """How far a line reaches towards a growing q and against it; nan where it has no pallet angle."""
         ahead, behind = np.full(len(line.q), np.nan), np.full(len(line.q), np.nan)
         k = np.flatnonzero(np.isfinite(line.pallet) & self.need)
