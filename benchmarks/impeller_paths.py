@@ -85,8 +85,10 @@ def main() -> None:
     points, normals = (f(*at).reshape(n, len(share), 3) for f in (patch.at, patch.normal))
     wide, out = np.array([WIDE, WIDE]), np.empty(n)
 
+    both = np.ascontiguousarray(np.concatenate([tips, axes], axis=2).transpose(0, 2, 1))
+
     def compiled():
-        _scallop.heights(points, normals, tips, axes, wide, CUTTER.rho, CUTTER.corner_radius, 0, out)
+        _scallop.heights(points, normals, both, wide, CUTTER.rho, CUTTER.corner_radius, 0, out)
         return out.copy()
 
     rows.append(("crest between two lines", timed(lambda: heights_in_numpy(points, normals, tips, axes)),

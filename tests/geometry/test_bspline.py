@@ -55,6 +55,19 @@ def test_normal_and_curvature_of_a_torus():
     np.testing.assert_allclose(K @ normal[:, :, None], 0.0, atol=1e-7)
 
 
+def test_facing_is_point_and_normal_of_a_sphere():
+    """R 20: the normal is the point over R; to the last bit as by themselves, with u or v the same in a row."""
+    a, b = np.meshgrid(np.linspace(-1.0, 1.0, 21), np.linspace(-0.6, 0.6, 17), indexing="ij")
+    grid = 20.0 * np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)], axis=-1)
+    patch = through(grid, np.linspace(0.0, 1.0, 21), np.linspace(0.0, 1.0, 17), (5, 5))
+    u, v = np.repeat(np.linspace(0.05, 0.95, 7), 5), np.tile(np.linspace(0.1, 0.9, 5), 7)
+    for at in ((u, v), (v, u)):
+        points, normals = patch.facing(*at)
+        np.testing.assert_allclose(normals, points / 20.0, atol=1e-6)
+        np.testing.assert_array_equal(points, patch.at(*at))
+        np.testing.assert_array_equal(normals, patch.normal(*at))
+
+
 def test_turned():
     patch = through(wavy(), U, V)
     p, q = patch.at(0.3, 0.6)[0], patch.turned(0.7).at(0.3, 0.6)[0]
@@ -70,3 +83,5 @@ def test_refused():
     flat = np.zeros((4, 4, 3))
     with pytest.raises(InputError, match="no normal where S_u and S_v are parallel"):
         through(flat, np.linspace(0, 1, 4), np.linspace(0, 1, 4)).normal(0.5, 0.5)
+    with pytest.raises(InputError, match="no normal where S_u and S_v are parallel"):
+        through(flat, np.linspace(0, 1, 4), np.linspace(0, 1, 4)).facing(0.5, 0.5)

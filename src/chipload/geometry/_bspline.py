@@ -6,6 +6,7 @@ steps those of a derivative.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -65,3 +66,49 @@ def points_of(
             y += N[a] * ry
             z += N[a] * rz
         out[k, 0], out[k, 1], out[k, 2] = x, y, z
+
+
+@njit(cache=True, nogil=True)
+def facing_of(
+    knots_u: Any, knots_v: Any, control: Any, side: int, p: int, q: int, u: Any, v: Any, points: Any, normals: Any
+) -> bool:
+    """Points and unit normals (k, 3) at u (k,), v (k,); False where there is none.
+
+    Basis functions that the point before has too are not computed again.
+    """
+    N, dN, M, dM = np.empty(p + 1), np.empty(p + 1), np.empty(q + 1), np.empty(q + 1)
+    i = j = 0
+    for k in range(len(u)):
+        if k == 0 or u[k] != u[k - 1]:
+            i = basis_of(knots_u, p, u[k], 0, N)
+            basis_of(knots_u, p, u[k], 1, dN)
+        if k == 0 or v[k] != v[k - 1]:
+            j = basis_of(knots_v, q, v[k], 0, M)
+            basis_of(knots_v, q, v[k], 1, dM)
+        x = y = z = a0 = a1 = a2 = b0 = b1 = b2 = 0.0
+        for a in range(p + 1):
+            rx = ry = rz = sx = sy = sz = 0.0
+            for b in range(q + 1):
+                c0, c1, c2 = control[i + a, j + b, 0], control[i + a, j + b, 1], control[i + a, j + b, 2]
+                rx += M[b] * c0
+                ry += M[b] * c1
+                rz += M[b] * c2
+                sx += dM[b] * c0
+                sy += dM[b] * c1
+                sz += dM[b] * c2
+            x += N[a] * rx
+            y += N[a] * ry
+            z += N[a] * rz
+            a0 += dN[a] * rx
+            a1 += dN[a] * ry
+            a2 += dN[a] * rz
+            b0 += N[a] * sx
+            b1 += N[a] * sy
+            b2 += N[a] * sz
+        points[k, 0], points[k, 1], points[k, 2] = x, y, z
+        x, y, z = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+        length = math.sqrt(x * x + y * y + z * z)
+        if length == 0.0:
+            return False
+        normals[k, 0], normals[k, 1], normals[k, 2] = side * x / length, side * y / length, side * z / length
+    return True

@@ -21,6 +21,8 @@ from chipload.geometry import _bspline
 
 Floats = NDArray[np.float64]
 
+_NO_NORMAL = "patch: no normal where S_u and S_v are parallel: leave that edge out"
+
 
 @dataclass(frozen=True, eq=False)
 class BSplinePatch:
@@ -85,9 +87,29 @@ class BSplinePatch:
         cross = np.cross(self.at(u, v, 1, 0), self.at(u, v, 0, 1))
         length = np.linalg.norm(cross, axis=1)
         if (length == 0.0).any():
-            raise InputError("patch: no normal where S_u and S_v are parallel: leave that edge out")
+            raise InputError(_NO_NORMAL)
         out: Floats = self.side * cross / length[:, None]
         return out
+
+    def facing(self, u: ArrayLike, v: ArrayLike) -> tuple[Floats, Floats]:
+        """Points and unit normals (k, 3): the same as :meth:`at` and :meth:`normal`, in a third of the time.
+
+        Raises
+        ------
+        InputError
+            S_u and S_v are parallel or 0 there.
+        """
+        a, b = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64))
+        p, q = self.degrees
+        x, y = a.ravel(), b.ravel()
+        _within(self.knots_u, p, x)
+        _within(self.knots_v, q, y)
+        points, normals = np.empty((len(x), 3)), np.empty((len(x), 3))
+        if not _bspline.facing_of(
+            self.knots_u, self.knots_v, self.control, self.side, p, q, x, y, points, normals
+        ):  # fmt: skip
+            raise InputError(_NO_NORMAL)
+        return points, normals
 
     def curvature(self, u: ArrayLike, v: ArrayLike) -> Floats:
         """K (k, 3, 3) [1/mm] towards :meth:`normal`."""

@@ -94,8 +94,10 @@ def checked_programs(
     coarse = walls_of(impeller, job.ahead)
     walls = [*dense, *whole]
     depth = ray_depth(impeller, EDGE, paths.gouge_mm)
-    keep.ahead([_left_task(walls, s.program, s.cutter, depth) for s in settings])
-    keep.ahead([_gouge_task(coarse, s.program, s.cutter, depth, paths.gouge_mm) for s in settings])
+    # the longest program first, so that no process waits for it at the end
+    long_first = sorted(settings, key=lambda s: -len(s.program))
+    gouges = [_gouge_task(coarse, s.program, s.cutter, depth, paths.gouge_mm) for s in long_first]
+    keep.ahead([*gouges, *(_left_task(walls, s.program, s.cutter, depth) for s in long_first)])
     found = [left_by(job, walls, s.program, s.cutter, depth, keep) for s in settings]
     # what is left is what no program takes
     rest = [replace(same[0], rest=np.min([x.rest for x in same], axis=0)) for same in zip(*found, strict=True)]

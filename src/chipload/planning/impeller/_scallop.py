@@ -16,13 +16,24 @@ from numba import njit
 _FAR = 1e9
 #: the secant counts where the distance falls by at least this share of a step along the normal
 _FALLS = 0.2
+#: so many points between two lines are searched in the poses that are near the middle one; what rounding may do
+_GROUP, _ROUNDED = 5, 1e-9
+#: poses that are computed at once
+_VECTOR = 16
+#: place of the tip where there is no pose [mm]
+NOWHERE = 1e10
 
 
 @njit(cache=True, nogil=True)
 def distance(x: float, y: float, z: float, tip: Any, axis: Any, rho: float, corner: float) -> float:
     """Distance [mm] of a point from the cutting part; below 0 inside; far where there is no pose."""
     x, y, z = x - tip[0], y - tip[1], z - tip[2]
-    high = x * axis[0] + y * axis[1] + z * axis[2]
+    return float(from_part(x, y, z, x * axis[0] + y * axis[1] + z * axis[2], rho, corner))
+
+
+@njit(cache=True, nogil=True)
+def from_part(x: float, y: float, z: float, high: float, rho: float, corner: float) -> float:
+    """Distance [mm] from the cutting part of a point at x, y, z from its tip, ``high`` along its axis."""
     if math.isnan(high):
         return _FAR
     d = math.sqrt(max(x * x + y * y + z * z - high * high, 0.0))
@@ -51,84 +62,158 @@ def along_normal(
     D = distance(x, y, z, tip, axis, rho, corner)
     if D <= 0.0:
         return away
-    D1 = distance(x + D * N[0], y + D * N[1], z + D * N[2], tip, axis, rho, corner)
+    return float(risen(away, D, distance(x + D * N[0], y + D * N[1], z + D * N[2], tip, axis, rho, corner)))
+
+
+@njit(cache=True, nogil=True)
+def risen(away: float, D: float, D1: float) -> float:
+    """What is left along the normal, by the distances D at a point and D1 at D along its normal from it."""
     return away * D / (D - D1) if D - D1 > _FALLS * D else away
 
 
 @njit(cache=True, nogil=True)
-def distances(
-    x: float, y: float, z: float, poses: Any, m: int, count: int, rho: float, corner: float, out: Any
+def keys(
+    x: float, y: float, z: float, poses: Any, m: int, first: int, last: int, rho: float, corner: float, out: Any
 ) -> None:
-    """As :func:`distance`, of the first ``count`` of the ``poses`` (2, 6, k) of a line m, tips and axes, into ``out``.
+    """(D + r)^2 with the sign of D + r, of the ``poses`` (2, 6, n) of a line m, tips and axes, from ``first`` to before
+    ``last``, into ``out`` (n,).
 
-    Both cases of the corner are computed for all, so that the loop is one of vector instructions.
+    They ascend as the distances do. Both cases of the corner are computed for all with one root, so that the loop is
+    one of vector instructions.
     """
-    for j in range(count):
+    for j in range(np.uint64(first), np.uint64(last)):
         u, v, w = x - poses[m, 0, j], y - poses[m, 1, j], z - poses[m, 2, j]
         high = u * poses[m, 3, j] + v * poses[m, 4, j] + w * poses[m, 5, j]
         off = u * u + v * v + w * w - high * high
-        d = math.sqrt(off if off > 0.0 else 0.0)
+        d = math.sqrt(off if off > 0.0 else 0.0) - rho
         h = high - corner
-        edge = math.sqrt((d - rho) * (d - rho) + h * h) - corner
-        low = edge if d > rho else -h - corner
-        D = d - rho - corner if h > 0.0 else low
-        out[j] = D if high == high else _FAR
+        beyond = d if d > 0.0 else 0.0
+        low = beyond * beyond + h * h
+        out[j] = d * abs(d) if h > 0.0 else low
+
+
+@njit(cache=True, nogil=True, fastmath={"nnan", "nsz"})
+def least_of(values: Any, first: int, last: int) -> float:
+    """The least of the values, none of which is nan, from ``first`` to before ``last``."""
+    least = math.inf
+    for j in range(np.uint64(first), np.uint64(last)):
+        least = min(values[j], least)
+    return least
+
+
+@njit(cache=True, nogil=True)
+def distance_of(key: float, corner: float) -> float:
+    """The distance of a key of :func:`keys`, to the last bit as of :func:`distance`."""
+    return math.sqrt(key) - corner if key >= 0.0 else -math.sqrt(-key) - corner
+
+
+@njit(cache=True, nogil=True)
+def reach_of(near: Any, least: float, first: int, last: int, corner: float, away: float) -> tuple[int, int]:
+    """The first pose and the one after the last that may be nearest, or beside it, to a point that is at most ``away``
+    from one whose keys are ``near`` (n,) from ``first`` to before ``last``.
+
+    No distance of the two differs by more than ``away``, as long as neither is deeper than the corner in the cutter.
+    """
+    if least <= 4.0 * away * away or corner <= 0.0:
+        return first, last
+    most = math.sqrt(least) + 2.0 * away
+    most = most * most * (1.0 + _ROUNDED)
+    low, high = first, last
+    while near[low] > most:
+        low += 1
+    while near[high - 1] > most:
+        high -= 1
+    low, high = max(low - 1, first), min(high + 1, last)
+    # a full number of vectors
+    more = -(high - low) % _VECTOR
+    high = min(high + more, last)
+    more = -(high - low) % _VECTOR
+    return max(low - more, first), high
 
 
 @njit(cache=True, nogil=True)
 def left_at(
-    x: float, y: float, z: float, N: Any, tips: Any, axes: Any, poses: Any, first: Any, count: Any, near: Any,
-    rho: float, corner: float,
+    x: float, y: float, z: float, N: Any, poses: Any, span: Any, windows: Any, g: int, near: Any, rho: float,
+    corner: float,
 ) -> float:  # fmt: skip
-    """What the ``poses`` of two lines, ``count`` from ``first`` on, leave at a point; ``near`` is room to work."""
-    best, line, pose = math.inf, 0, 0
+    """What two lines leave at a point with the normal N: ``poses`` (2, 6, n) of the ``span`` (2, 2) from first to
+    before last, of which those of the window g may be nearest; ``near`` (n,) is room to work.
+    """
+    best, D, line, pose = math.inf, 0.0, 0, 0
     for m in range(2):
-        distances(x, y, z, poses, m, count[m], rho, corner, near)
-        least = near[0]
-        for j in range(count[m]):
-            least = min(near[j], least)
-        at = 0
+        first, last = windows[g, m, 0], windows[g, m, 1]
+        keys(x, y, z, poses, m, first, last, rho, corner, near)
+        least = least_of(near, first, last)
+        at = first
         while near[at] != least:
             at += 1
-        low = near[at]
-        if 0 < at < count[m] - 1:
-            low = lowest(near[at - 1], low, near[at + 1])
+        own = low = distance_of(least, corner)
+        if span[m, 0] < at < span[m, 1] - 1:
+            low = lowest(distance_of(near[at - 1], corner), own, distance_of(near[at + 1], corner))
         if low < best:
-            best, line, pose = low, m, first[m] + at
-    return float(along_normal(best, x, y, z, N, tips[line, pose], axes[line, pose], rho, corner))
+            best, D, line, pose = low, own, m, at
+    if D <= 0.0:
+        return best
+    x, y, z = (
+        x + D * N[0] - poses[line, 0, pose], y + D * N[1] - poses[line, 1, pose], z + D * N[2] - poses[line, 2, pose]
+    )  # fmt: skip
+    high = x * poses[line, 3, pose] + y * poses[line, 4, pose] + z * poses[line, 5, pose]
+    return float(risen(best, D, from_part(x, y, z, high, rho, corner)))
 
 
 @njit(cache=True, nogil=True)
-def heights(
-    points: Any, normals: Any, tips: Any, axes: Any, wide: Any, rho: float, corner: float, steps: int, out: Any
-) -> None:
-    """Crest (n,) between two lines; tips and axes (2, n, 3), ``wide`` (2,) how many poses before and after count.
+def farthest(points: Any, i: int, middle: int, first: int, last: int) -> float:
+    """Greatest distance of the points (n, k, 3) of a place i from ``first`` to before ``last`` from the middle one."""
+    far = 0.0
+    for k in range(first, last):
+        x, y, z = (
+            points[i, k, 0] - points[i, middle, 0], points[i, k, 1] - points[i, middle, 1],
+            points[i, k, 2] - points[i, middle, 2],
+        )  # fmt: skip
+        far = max(far, x * x + y * y + z * z)
+    return math.sqrt(far)
 
-    The crest is an edge: between the shares beside the highest one it is looked for in so many ``steps`` of thirds.
+
+@njit(cache=True, nogil=True)
+def heights(points: Any, normals: Any, poses: Any, wide: Any, rho: float, corner: float, steps: int, out: Any) -> None:
+    """Scallop (n,) between two lines; ``poses`` (2, 6, n) tips, :data:`NOWHERE` where there is none, and axes, ``wide``
+    (2,) how many before and after count.
+
+    The scallop is an edge: between the shares beside the highest one it is searched in so many ``steps`` of thirds. The
+    keys of the middle one of some shares tell which poses may be nearest to the others, and to those beside them.
     """
     n, shares = points.shape[0], points.shape[1]
-    most = 2 * max(wide[0], wide[1]) + 1
-    near, N, both = np.empty(most), np.empty(3), np.empty(2)
-    poses, first, count = np.empty((2, 6, most)), np.empty(2, dtype=np.int64), np.empty(2, dtype=np.int64)
+    N, both, near = np.empty(3), np.empty(2), np.empty(n)
+    groups = (shares + _GROUP - 1) // _GROUP
+    span, windows = np.empty((2, 2), dtype=np.int64), np.empty((groups, 2, 2), dtype=np.int64)
     for i in range(n):
         out[i] = math.nan
-        if math.isnan(tips[0, i, 0]) or math.isnan(tips[1, i, 0]):
+        if poses[0, 0, i] >= _FAR or poses[1, 0, i] >= _FAR:
             continue
         for m in range(2):
-            first[m] = max(i - wide[m], 0)
-            count[m] = min(i + wide[m], n - 1) + 1 - first[m]
-            for k in range(3):
-                for j in range(count[m]):
-                    poses[m, k, j], poses[m, 3 + k, j] = tips[m, first[m] + j, k], axes[m, first[m] + j, k]
-        crest, top = -math.inf, 0
-        for k in range(shares):
-            left = left_at(
-                points[i, k, 0], points[i, k, 1], points[i, k, 2], normals[i, k], tips, axes, poses, first, count,
-                near, rho, corner,
-            )  # fmt: skip
-            if left > crest:
-                crest, top = left, k
-        low, high = float(max(top - 1, 0)), float(min(top + 1, shares - 1))
+            span[m, 0], span[m, 1] = max(i - wide[m], 0), min(i + wide[m], n - 1) + 1
+        top, where = -math.inf, 0
+        for g in range(groups):
+            first, last = g * _GROUP, min((g + 1) * _GROUP, shares)
+            middle = (first + last) // 2
+            away = farthest(points, i, middle, max(first - 1, 0), min(last + 1, shares))
+            for m in range(2):
+                keys(
+                    points[i, middle, 0], points[i, middle, 1], points[i, middle, 2], poses, m, span[m, 0], span[m, 1],
+                    rho, corner, near,
+                )  # fmt: skip
+                least = least_of(near, span[m, 0], span[m, 1])
+                windows[g, m, 0], windows[g, m, 1] = reach_of(near, least, span[m, 0], span[m, 1], corner, away)
+            for k in range(first, last):
+                for j in range(3):
+                    N[j] = normals[i, k, j]
+                left = left_at(
+                    points[i, k, 0], points[i, k, 1], points[i, k, 2], N, poses, span, windows, g, near, rho, corner
+                )
+                if left > top:
+                    top, where = left, k
+        low, high = float(max(where - 1, 0)), float(min(where + 1, shares - 1))
+        g = where // _GROUP
         for _ in range(steps):
             third = (high - low) / 3.0
             for side in range(2):
@@ -141,14 +226,14 @@ def heights(
                     (1.0 - w) * points[i, k, 0] + w * points[i, k + 1, 0],
                     (1.0 - w) * points[i, k, 1] + w * points[i, k + 1, 1],
                     (1.0 - w) * points[i, k, 2] + w * points[i, k + 1, 2],
-                    N, tips, axes, poses, first, count, near, rho, corner,
+                    N, poses, span, windows, g, near, rho, corner,
                 )  # fmt: skip
-            crest = max(crest, both[0], both[1])
+            top = max(top, both[0], both[1])
             if both[0] < both[1]:
                 low = low + third
             else:
                 high = high - third
-        out[i] = crest
+        out[i] = top
 
 
 @njit(cache=True, nogil=True)

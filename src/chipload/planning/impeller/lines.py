@@ -390,8 +390,7 @@ class Lines:
 
     def facing(self, p: Floats, q: Floats) -> tuple[Floats, Floats]:
         """Points and normals (n, 3) of the surface."""
-        u, v = self.places(p, q)
-        return self.surface.at(u, v), self.surface.normal(u, v)
+        return self.surface.facing(*self.places(p, q))
 
 
 def stations(

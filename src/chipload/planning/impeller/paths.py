@@ -174,12 +174,13 @@ class _March:
         low, high = self.Q
         for k in range(_LINES):
             self.progress(float(np.clip((line.q.min() - low) / (high - low), 0.0, 1.0)), f"{k + 1} lines")
-            open_ = use & ~self.step.done(line, high)
+            reach = self.step.reach(line)
+            open_ = use & ~self.step.done(line, reach, high)
             if not open_[need].any():
                 return Tracks(tuple(tracks), tuple(missed), k)
             # where the pass of the line before has reached the border there is nothing left
             use = binary_dilation(open_)
-            line = self.step.next(line, high, use & need)
+            line = self.step.next(line, reach, high, use & need)
             new, gone = self.step.lines.tracks(line, use, number + k, need)
             tracks += new
             missed += gone
@@ -205,21 +206,21 @@ class _Stepper:
             return line
         w = np.full(len(q), np.inf)
         for _ in range(_MENDS):
-            _, behind = self._reach(line)
+            _, behind = self.reach(line)
             w = np.minimum(w, self._even(line, _INSIDE * behind))
             inside = self.lines.line(q + self._dq(line, w), line.pallet)
             if len(inside.sections) > len(line.sections):
                 break
-            _, behind = self._reach(inside)
+            _, behind = self.reach(inside)
             known = np.isfinite(behind)
             if (behind[known] >= w[known]).all() and known.sum() >= np.isfinite(line.pallet).sum():
                 return inside
             w = np.where(known, np.minimum(w, behind), w)
         return line
 
-    def done(self, line: Line, border: float) -> Flags:
-        """(n,) stations at which the pass of a line stays below the scallop to the border."""
-        ahead, _ = self._reach(line)
+    def done(self, line: Line, reach: tuple[Floats, Floats], border: float) -> Flags:
+        """(n,) stations at which the pass of a line stays below the scallop to the border; its :meth:`reach`."""
+        ahead, _ = reach
         w = np.where(np.isfinite(ahead), _INSIDE * ahead, 0.0)
         # beyond the patch lines go on as at its ends
         inner = np.flatnonzero(self.need)
@@ -227,30 +228,33 @@ class _Stepper:
         out: Flags = (line.q + self._dq(line, w) >= border)[near]
         return out
 
-    def next(self, line: Line, border: float, use: Flags) -> Line:
-        """The next line, so that the scallop between is as high as asked.
+    def next(self, line: Line, reach: tuple[Floats, Floats], border: float, use: Flags) -> Line:
+        """The next line, so that the scallop between is as high as asked, by the :meth:`reach` of this one.
 
         It may lie beyond the border, as the last one of a patch does, if all that is in ``use`` is reached there.
         """
-        free = self._next(line, self.lines.ends[1])
-        if not (free.q[use] > border).any():
+        ahead, behind = reach
+        w = self._step(line, self._even(line, ahead + behind), line.pallet)
+        free = self._next(line, w, self.lines.ends[1])
+        lost = int((use & np.isnan(free.pallet)).sum())
+        # a line in one piece that loses nothing is not worse than any other
+        if not (free.q[use] > border).any() or (lost == 0 and len(free.sections) <= 1):
             return free
-        inside = self._next(line, border)
-        lost = [int((use & np.isnan(one.pallet)).sum()) for one in (free, inside)]
-        return free if (lost[0], len(free.sections)) <= (lost[1], len(inside.sections)) else inside
+        inside = self._next(line, w, border)
+        less = int((use & np.isnan(inside.pallet)).sum())
+        return free if (lost, len(free.sections)) <= (less, len(inside.sections)) else inside
 
-    def _next(self, line: Line, end: float) -> Line:
-        """The next line, no farther than ``end``.
+    def _next(self, line: Line, w: Floats, end: float) -> Line:
+        """The next line, no farther than ``end``, by the step ``w`` for the pallet angles of this line.
 
-        The step is first laid out for the pallet angles of this line, then for those of the new one.
+        The step is then laid out for the pallet angles of the new one.
         """
-        ahead, behind = self._reach(line)
-        w = self._even(line, ahead + behind)
         B, most = line.pallet, self.scallop * (0.5 + 0.5 * self.aim)
         less = np.ones(len(w))
         best: tuple[float, Line] | None = None
-        for _ in range(_MENDS):
-            w = self._step(line, w, B)
+        for turn in range(_MENDS):
+            if turn:
+                w = self._step(line, w, B)
             out = self.lines.line(self._moved(line, self._even(line, less * w), end), B)
             scallop = self._scallop(line, out.q, out.pallet)
             # what is used of the scallop where the line is not at the border; below 0: by how much it is too high
@@ -316,7 +320,7 @@ class _Stepper:
         tip, axis = posed(S, N, self.lines.table, np.where(known, pallet, 0.0), self.lines.cutter)
         return np.where(known[:, None], tip, np.nan), np.where(known[:, None], axis, np.nan)
 
-    def _reach(self, line: Line) -> tuple[Floats, Floats]:
+    def reach(self, line: Line) -> tuple[Floats, Floats]:
         """How far a line reaches towards a growing q and against it; nan where it has no pallet angle."""
         ahead, behind = np.full(len(line.q), np.nan), np.full(len(line.q), np.nan)
         k = np.flatnonzero(np.isfinite(line.pallet) & self.need)

@@ -129,14 +129,17 @@ def tell_millings(
     plans: Sequence[tuple[FinishSettings, Sequence[Patch]]], known: Mapping[MillingKey, Milling], keep: Keep,
     progress: Progress = silent,
 ) -> None:  # fmt: skip
-    """Announce the paths of the patches of several partitions that are not ``known``."""
+    """Announce the paths of the patches of several partitions that are not ``known``, the longest path first, so that
+    no process waits for it at the end.
+    """
     parts = {
-        key: job.milling_task(patch)
+        key: (patch.path, job.milling_task(patch))
         for job, patches in plans
         for patch in patches
         if (key := milling_key(job.catalogue, patch)) not in known
     }
-    keep.ahead([*parts.values()], lambda done, what: progress(done, f"paths of patches, {what}"))
+    tasks = [task for _, task in sorted(parts.values(), key=lambda one: -one[0])]
+    keep.ahead(tasks, lambda done, what: progress(done, f"paths of patches, {what}"))
 
 
 def _rest_passes(

@@ -35,15 +35,11 @@ def scallop_heights(
     tips, axes : of both lines, (n, 3) each; nan where there is no pose
     """
     wide = np.array([_reach_of(p) for p in tips])
+    poses = np.ascontiguousarray(np.concatenate([np.stack(tips), np.stack(axes)], axis=2).transpose(0, 2, 1))
+    none = np.isnan(poses[:, :1])
+    poses = np.where(none, np.array([_scallop.NOWHERE] * 3 + [0.0, 0.0, 1.0])[:, None], poses)
     out = np.empty(len(points))
-    _scallop.heights(
-        *(np.ascontiguousarray(x) for x in (points, normals, np.stack(tips), np.stack(axes))),
-        wide,
-        rho,
-        corner,
-        _STEPS,
-        out,
-    )
+    _scallop.heights(np.ascontiguousarray(points), np.ascontiguousarray(normals), poses, wide, rho, corner, _STEPS, out)
     return out
 
 

@@ -22,6 +22,8 @@ _STEPS = 14
 _HALF = 0.55
 #: between two instants a part comes lower than at both by less than this [mm]: for what is left, for gouges
 _LEFT, _DIP = 0.1, 0.05
+#: so many points one after the other are searched in the groups that are near any of them; what rounding may do
+_POINTS, _ROUNDED = 32, 1e-9
 
 
 @njit(cache=True, nogil=True)
@@ -73,6 +75,37 @@ def out_of_reach(group: Any, middle: Any, half: float, starts: Any, shapes: Any)
     for part in range(len(shapes)):
         nearest = min(nearest, apart(h, d, starts[part], shapes[part]))
     return bool(nearest > slack)
+
+
+@njit(cache=True, nogil=True)
+def ball_of(points: Any, first: int, last: int, middle: Any) -> float:
+    """Radius of a ball about the points ``first``..``last``; its ``middle``."""
+    for j in range(3):
+        middle[j] = 0.0
+    for i in range(first, last):
+        for j in range(3):
+            middle[j] += points[i, j] / (last - first)
+    radius = 0.0
+    for i in range(first, last):
+        x, y, z = points[i, 0] - middle[0], points[i, 1] - middle[1], points[i, 2] - middle[2]
+        radius = max(radius, x * x + y * y + z * z)
+    return math.sqrt(radius)
+
+
+@njit(cache=True, nogil=True)
+def groups_near(
+    points: Any, first: int, last: int, reach: float, groups: Any, starts: Any, shapes: Any, middle: Any, out: Any
+) -> int:
+    """The groups whose moves may meet rays that lie within ``reach`` of the points ``first``..``last``, ascending, into
+    ``out``; how many. A point passes over no other group, for whichever of them it would be left out.
+    """
+    half = (ball_of(points, first, last, middle) + reach) * (1.0 + _ROUNDED)
+    found = 0
+    for g in range(len(groups)):
+        if not out_of_reach(groups[g], middle, half, starts, shapes):
+            out[found] = g
+            found += 1
+    return found
 
 
 @njit(cache=True, nogil=True)
@@ -212,18 +245,28 @@ def left(
     """
     tip, axis, middle = np.empty(3), np.empty(3), np.empty(3)
     n, parts = len(tips), len(shapes)
+    near, found = np.empty(len(groups), dtype=np.int64), 0
     for i in range(first, last):
+        if (i - first) % _POINTS == 0:
+            found = groups_near(
+                points, i, min(i + _POINTS, last), max(depth, height), groups, starts, shapes, middle, near
+            )
         S, frame = points[i], frames[i]
         # of the ray counts what is below the least that is known
         top = max(rest[i], 0.0)
         half = along(S, frame, depth, top, middle)
-        k = 0
-        while k + 1 < n:
+        g, k, end = -1, 0, 0
+        while True:
             k += 1
-            # the moves of a group are left out together
-            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, starts, shapes):
-                k += size - 1
-                continue
+            if k >= end:
+                g += 1
+                if g == found:
+                    break
+                k, end = 1 + near[g] * size, min(1 + (near[g] + 1) * size, n)
+                # the moves of a group are left out together
+                if out_of_reach(groups[near[g]], middle, half, starts, shapes):
+                    k = end
+                    continue
             sweep, h, d = seen_from(middle, tips, axes, k, half)
             slack = _HALF * sweep + half
             for part in range(parts):
@@ -265,18 +308,28 @@ def lowest(
     met = np.zeros(3, dtype=np.bool_)
     for part in range(parts):
         met[kinds[part]] = True
+    near, found = np.empty(len(groups), dtype=np.int64), 0
     for i in range(len(points)):
+        if i % _POINTS == 0:
+            found = groups_near(
+                points, i, min(i + _POINTS, len(points)), max(depth, height), groups, starts, shapes, middle, near
+            )
         S, frame = points[i], frames[i]
         # of the ray counts what is below the least that is known of each kind
         top = highest(low[i], met)
         half = along(S, frame, depth, top, middle)
-        k = 0
-        while k + 1 < n:
+        g, k, end = -1, 0, 0
+        while True:
             k += 1
-            # the moves of a group are left out together
-            if (k - 1) % size == 0 and out_of_reach(groups[(k - 1) // size], middle, half, starts, shapes):
-                k += size - 1
-                continue
+            if k >= end:
+                g += 1
+                if g == found:
+                    break
+                k, end = 1 + near[g] * size, min(1 + (near[g] + 1) * size, n)
+                # the moves of a group are left out together
+                if out_of_reach(groups[near[g]], middle, half, starts, shapes):
+                    k = end
+                    continue
             sweep, h, d = seen_from(middle, tips, axes, k, half)
             slack = _HALF * sweep + half
             for part in range(parts):

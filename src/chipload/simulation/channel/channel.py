@@ -39,7 +39,7 @@ ENDLESS = 500.0
 #: longest piece of a row [mm] that is looked at as one
 PIECE = 4.0
 #: moves that are left out together where none of them can meet a ray
-GROUP = 12
+GROUP = 3
 _BLOCK = 512
 
 

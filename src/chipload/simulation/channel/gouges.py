@@ -55,6 +55,10 @@ _MOST = 4_000_000
 _SHARP = 0.5
 #: a bound below this share of the limit is enough
 _ENOUGH = 0.5
+#: of the depth of a ray, how far down its end is told from what is above it
+_BOTTOM = 1.0 - 1e-9
+#: what rounding may do to a height [mm]
+_ROUNDED = 1e-12
 #: least height above a wall that is looked at [mm]; how much lower a tool may come between two instants
 _LOW, _DIP = 0.1, 0.05
 _BLOCK = 512
@@ -148,9 +152,15 @@ def deepest_gouge(
         points, normals = _on(walls, number, np.asarray(once[:, 1:], dtype=np.float64))
         t, w = _reach(points[corner], normals[corner])
         grown = _GROWN * float(t.max())
+        known = _known(cutter.corner_radius, grown, t, w).any()
+        if not known and cutter.corner_radius > resolution and level < _LEVELS and 16 * len(t) <= _MOST:
+            # whatever is met, every cell is divided
+            cells = cells.divided(np.ones(len(t), dtype=np.bool_))
+            continue
         starts, shapes, kinds = _parts(cutter, grown)
         tall = _height(_sag(cutter.corner_radius, t, w), grown)
-        low = np.full((len(points), 3), tall)
+        low = _enough(corner, len(points), cutter.corner_radius, grown, t, w, max(settled, best.found), best.found)
+        low = np.clip(low, -_BOTTOM * depth, tall)
         row, part = np.full((len(points), 3), -1), np.zeros((len(points), 3), dtype=np.int64)
 
         def block(
@@ -195,6 +205,25 @@ def deepest_gouge(
             break
         cells = cells.divided(open_cells)
     return Gouge(best.found, max(settled, best.found), best.wall, best.place, best.row, best.part)
+
+
+def _known(r: float, grown: float, t: Floats, w: Floats) -> NDArray[np.bool_]:
+    """Whether cells (n,) have a bound, whatever comes near them."""
+    return np.isfinite(_sag(r, t, w)) & np.isfinite(_sag(grown, t, w))
+
+
+def _enough(
+    corner: NDArray[np.int64], count: int, r: float, grown: float, t: Floats, w: Floats, bound: float, found: float
+) -> Floats:
+    """Height (count, 3) above each point that no part of a kind need be known to keep: below it, no cell of its
+    ``corner`` (n, 4) has a higher bound than ``bound``, and nothing is deeper than what is ``found``.
+    """
+    out = np.full((count, 3), -found)
+    out[:, 2] = -np.inf
+    known = _known(r, grown, t, w)
+    for kind, least in ((0, _sag(r, t, w) - bound), (2, _sag(grown, t, w) - grown - bound)):
+        np.maximum.at(out[:, kind], corner[known].ravel(), np.repeat(least[known] + _ROUNDED, 4))
+    return out
 
 
 def _height(bend: Floats, grown: float) -> float:
