@@ -50,7 +50,7 @@ def points_names(milled: ImpellerResult) -> list[tuple[str, CheckedPoints]]:
 
 
 def _five_axis_name(kind: str, k: int, p: FiveAxisProgram) -> str:
-    return f"{kind}-{k}-{p.name.replace(' ', '-')}-D{p.cutter.diameter:g}r{p.cutter.corner_radius:g}"
+    return f"{kind}-{k}-{p.name.replace(' ', '-')}-{p.cutter.label.removesuffix(' deg').replace(' ', '')}"
 
 
 def stem_of(way: CheckedPartition) -> str:

@@ -53,7 +53,7 @@ def _five_axis_files(
     title = f"{milled.title}, {of} of {p.name}"
     head = [
         *(f"not verified: {f}" for f in p.fails[:3]),
-        f"T{number}: D {p.cutter.diameter:g} r {p.cutter.corner_radius:g} mm, tool length 0: positions of the tip",
+        f"T{number}: {p.cutter.label}{' mm' if p.cutter.straight else ''}, tool length 0: positions of the tip",
         f"five axes at once, {what}",
     ]
     turn = f"{np.degrees(milled.impeller.pitch):.6f} deg each"

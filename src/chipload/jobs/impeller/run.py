@@ -78,8 +78,8 @@ def run(
 
 
 def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, team: Team | None) -> ImpellerResult:
-    machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
-    impeller = part.impeller
+    machine, cutters, part = _machine(job), _catalogue(job), read_part(job)
+    impeller, catalogue = part.impeller, _straight(job, cutters)
     _picked(job, catalogue)
     _rougher(job, catalogue)
     _checkable(job, impeller)
@@ -128,7 +128,7 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     checked = checked_partitions(ways, partitions, how, machine, op.paths, last, keep)
     chosen = {one.name: one.partition for one in checked}
     flanks = checked_flanks(job, how, catalogue, keep=keep) if op.flank is not None else None
-    points = checked_points(job, how, catalogue, keep=keep) if op.point_milling is not None else None
+    points = checked_points(job, how, cutters, keep=keep) if op.point_milling is not None else None
     keep.write(at_once=True)
     milled = replace(milled, flanks=flanks, points=points)
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
@@ -178,8 +178,8 @@ def _named(job: ImpellerJob) -> list[tuple[str, str | Path]]:
 
 def check(job: ImpellerJob) -> tuple[list[str], bool]:
     """Contents of the files of a job; nothing is searched."""
-    machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
-    impeller = part.impeller
+    machine, cutters, part = _machine(job), _catalogue(job), read_part(job)
+    impeller, catalogue = part.impeller, _straight(job, cutters)
     _picked(job, catalogue)
     _rougher(job, catalogue)
     _checkable(job, impeller)
@@ -201,6 +201,9 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
         lines.append(f"between check points: certified within {within:g} mm for corner radii from {corner:g} mm")
     corners = ", ".join(f"{r:g}" for r in catalogue.families)
     lines.append(f"catalogue {catalogue.name}: {len(catalogue.cutters)} cutters, corner radii {corners} mm")
+    more = [c.label for c in cutters.cutters if not c.straight]
+    if more:
+        lines.append(f"tapered and barrel cutters, for point milling on five axes: {', '.join(more)}")
     line, reached = reach_line(impeller, catalogue, np.concatenate([s.scene.contact for s in surfaces]))
     return [*lines, line, _estimate(job, surfaces, catalogue)], reached
 
@@ -274,6 +277,28 @@ def _side(op: Searched, answer: Answer) -> ChannelSide:
     s = op.surface
     body = BODIES.index(s.body)
     return ChannelSide(body, s.side, s.scene, s.u, s.v, s.area, answer, op.clearance, op.table.spans)
+
+
+def _straight(job: ImpellerJob, cutters: Catalogue) -> Catalogue:
+    """The cutters that the index table, roughing and flank passes are planned with.
+
+    Raises
+    ------
+    InputError
+        There are none, or tapered or barrel cutters without point milling, which alone is planned with them.
+    """
+    other = next((c for c in cutters.cutters if not c.straight), None)
+    if other is not None and job.operation.point_milling is None:
+        raise InputError(
+            f"catalogue {cutters.name}: {other.label}: tapered and barrel cutters mill by points on five axes alone: "
+            "state operation.0.point_milling, or leave them out"
+        )
+    if all(not c.straight for c in cutters.cutters):
+        raise InputError(
+            f"catalogue {cutters.name}: no flat, bull-nose or ball cutter without taper: the index table is planned "
+            "with these: add one"
+        )
+    return cutters.straight
 
 
 def _picked(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
