@@ -252,21 +252,52 @@ def with_cutters(formula, *rows):
     changed(formula, 'name = "wu2019"', 'file = "cutters.toml"')
 
 
-@pytest.mark.parametrize(("row", "label"), [(OVAL, "D 12 r 2 barrel 85"), (CONE, "D 3.796 r 2 taper 3 deg")])
-def test_tapered_and_barrel_cutters_are_refused_without_point_milling(formula, row, label):
-    with_cutters(formula, BALL, row)
+POINTS = '[operation.point_milling]\nmachine = { name = "cradle-ac" }\n\n'
+FORCES = (
+    '[operation.forces]\nmaterial = { name = "al7075-t6" }\nflutes = 2\noverhang_mm = 70.0\ndeflection_um = 20.0\n\n'
+)
+
+
+def test_a_barrel_is_refused_without_point_milling(formula):
+    with_cutters(formula, BALL, OVAL)
     assert refused(formula) == (
-        f"catalogue own: {label}: tapered and barrel cutters mill by points on five axes alone: state "
-        "operation.0.point_milling, or leave them out"
+        "catalogue own: barrel 85 D 12 r 2: such a cutter mills by points on five axes alone: state "
+        "operation.0.point_milling, or leave it out"
     )
 
 
-def test_the_index_table_needs_a_cutter_without_taper(formula):
-    with_cutters(formula, CONE)
-    stated = '[operation.point_milling]\nmachine = { name = "cradle-ac" }\n\n'
-    formula.write_text(formula.read_text().replace("[operation.paths]", stated + "[operation.paths]"))
+def test_a_tapered_cutter_is_refused_with_forces(formula):
+    with_cutters(formula, BALL, CONE)
+    formula.write_text(formula.read_text().replace("[operation.paths]", FORCES + "[operation.paths]"))
     assert refused(formula) == (
-        "catalogue own: no flat, bull-nose or ball cutter without taper: the index table is planned with these: add one"
+        "catalogue own: taper 3 deg D 3.796 r 2: with operation.0.forces such a cutter mills by points on five axes "
+        "alone: state operation.0.point_milling, or leave it out"
+    )
+
+
+def test_the_index_table_needs_a_cutter(formula):
+    with_cutters(formula, OVAL)
+    formula.write_text(formula.read_text().replace("[operation.paths]", POINTS + "[operation.paths]"))
+    assert refused(formula) == (
+        "catalogue own: barrel 85 D 12 r 2: no other cutter for the index table, which is not planned with such "
+        "cutters: add a flat, bull-nose or ball cutter"
+    )
+
+
+def test_roughing_needs_a_straight_cutter(formula):
+    with_cutters(formula, CONE)
+    assert refused(formula) == (
+        "operation.0.rough: catalogue own has tapered cutters alone, which are not planned with here: add a "
+        "straight one"
+    )
+
+
+def test_a_steep_taper_needs_a_wide_tolerance(formula):
+    with_cutters(formula, BALL, CONE.replace("3.0", "12.0"))
+    changed(formula, "hand_picked = { diameter_mm = 14.0, corner_radius_mm = 1.5 }\n", "")
+    assert refused(formula) == (
+        "operation.0.tolerance_mm = 0.05: taper 12 deg D 3.239 r 2 stands out of the cylinders that the index table is "
+        "planned with by 0.0447 mm: must be at least 0.0894"
     )
 
 
@@ -277,15 +308,15 @@ def test_the_index_table_needs_a_cutter_without_taper(formula):
          "cutter 1: diameter_mm = 4: with taper_deg it is the diameter where flank line and bottom meet, 3.79586 of a "
          "tapered ball: leave it out"),
         ("diameter_mm = 5.0, corner_radius_mm = 2.0, taper_deg = 3.0",
-         "cutter D 5 r 2 taper 3 deg: cutting_length_mm missing: must be given with taper_deg or barrel_radius_mm: how "
+         "cutter taper 3 deg D 5 r 2: cutting_length_mm missing: must be given with taper_deg or barrel_radius_mm: how "
          "far up the cutter has that shape"),
         ("diameter_mm = 5.0, corner_radius_mm = 0.0, taper_deg = 3.0, cutting_length_mm = 20.0",
-         "cutter D 5 r 0 taper 3 deg: corner_radius_mm = 0: must be above 0 with taper_deg or barrel_radius_mm"),
+         "cutter taper 3 deg D 5 r 0: corner_radius_mm = 0: must be above 0 with taper_deg or barrel_radius_mm"),
         ("diameter_mm = 5.0, corner_radius_mm = 3.0, taper_deg = 3.0, cutting_length_mm = 20.0",
-         "cutter D 5 r 3 taper 3 deg: corner_radius_mm = 3: must be at most 2.63445, where the corner's centre is on "
+         "cutter taper 3 deg D 5 r 3: corner_radius_mm = 3: must be at most 2.63445, where the corner's centre is on "
          "the axis"),
         ("diameter_mm = 12.0, corner_radius_mm = 2.0, barrel_radius_mm = 5.0, cutting_length_mm = 20.0",
-         "cutter D 12 r 2 barrel 5: barrel_radius_mm = 5: must be above 6, the distance of the corner's centre from "
+         "cutter barrel 5 D 12 r 2: barrel_radius_mm = 5: must be above 6, the distance of the corner's centre from "
          "the flank"),
         ("corner_radius_mm = 2.0, barrel_radius_mm = 85.0, cutting_length_mm = 20.0",
          "cutter 1: diameter_mm is missing: must be given"),

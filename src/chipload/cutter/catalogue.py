@@ -11,6 +11,7 @@ of :mod:`chipload.cutter.cutter`: its diameter is that where flank line and bott
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -26,6 +27,8 @@ from chipload.cutter.table import BARREL_NAMES
 from chipload.errors import InputError
 from chipload.tables import Labelled, nearest, read_table, shipped_table
 
+#: cylinders round a cone: length of the lowest [mm], of their height by how much they are longer
+_SLICE, _GROWS = 0.4, 0.3
 #: modulus [MPa] that stands in a shape whose stiffness is not asked for
 _MODULUS = 2e5
 
@@ -111,17 +114,25 @@ class CatalogueCutter:
 
     @property
     def label(self) -> str:
-        """Its size in words.
+        """Its size in words, in mm.
 
         >>> CatalogueCutter(14.0, 1.5).label, CatalogueCutter(4.5, 2.0, 20.0, taper=math.radians(4.0)).label
-        ('D 14 r 1.5', 'D 4.5 r 2 taper 4 deg')
+        ('D 14 r 1.5', 'taper 4 deg D 4.5 r 2')
         """
-        size = f"D {self.diameter:g} r {self.corner_radius:g}"
         if self.straight:
-            return size
-        size = f"D {self.diameter:.4g} r {self.corner_radius:g}"
-        size += f" barrel {self.barrel_radius:g}" if self.barrel_radius is not None else ""
-        return size + (f" taper {math.degrees(self.taper):.6g} deg" if self.taper > 0.0 else "")
+            return f"D {self.diameter:g} r {self.corner_radius:g}"
+        kind = f"barrel {self.barrel_radius:g} " if self.barrel_radius is not None else ""
+        kind += f"taper {math.degrees(self.taper):.6g} deg " if self.taper > 0.0 else ""
+        return f"{kind}D {self.diameter:.4g} r {self.corner_radius:g}"
+
+    @property
+    def stem(self) -> str:
+        """Its size in the name of a file.
+
+        >>> CatalogueCutter(14.0, 1.5).stem, CatalogueCutter(4.5, 2.0, 20.0, taper=math.radians(4.0)).stem
+        ('D14r1.5', 'taper4D4.5r2')
+        """
+        return self.label.replace(" deg", "").replace(" ", "")
 
     @cached_property
     def shape(self) -> Cutter:
@@ -135,8 +146,12 @@ class CatalogueCutter:
 
     @property
     def rho(self) -> float:
-        """Distance e of the corner's centre from the axis [mm], R - r of a straight cutter."""
-        return 0.5 * self.diameter - self.corner_radius if self.straight else self.shape.apt[2]
+        """Distance e of the corner's centre from the axis [mm], R - r of a straight cutter; 0 of a tapered ball."""
+        if self.straight:
+            return 0.5 * self.diameter - self.corner_radius
+        e = self.shape.apt[2]
+        # what rounding leaves of a ball: the exact arcs of B are those of a ball or of a corner well off the axis
+        return e if e > 1e-7 * self.diameter else 0.0
 
     @property
     def contact_arc(self) -> tuple[float, float, float]:
@@ -176,6 +191,34 @@ class CatalogueCutter:
             rows.append((self.reach - self.corner_radius, 0.5 * self.holder_diameter + clearance))
         return np.array(rows)
 
+    @property
+    def not_enclosed(self) -> float:
+        """By how much a tapered cutter stands out of its cylinders at most [mm]: r (1 / cos(taper) - 1)."""
+        return self.corner_radius * (1.0 / math.cos(self.taper) - 1.0)
+
+    def enclosing(self, clearance: float) -> NDArray[np.float64]:
+        """As :meth:`stages`, the cone of a tapered cutter by cylinders round it: first its corner and what is as wide.
+
+        Each cylinder is as wide as the cone at its upper end, :data:`_SLICE` and :data:`_GROWS` of its height above the
+        corner's centre long: its lower rim stands out of the cone by so much times tan(taper). Below the corner's
+        centre the cone stands out of the corner, by at most :attr:`not_enclosed`.
+
+        >>> CatalogueCutter(8.0, 4.0, 12.0).enclosing(0.5).tolist()
+        [[0.0, 4.0], [8.0, 4.5]]
+        """
+        upper = self.stages(clearance)
+        if self.straight:
+            return upper
+        if self.barrel_radius is not None:
+            raise InputError(f"cutter {self.label}: a barrel is not enclosed by cylinders: mill by points with it")
+        r, cb, tb = self.corner_radius, math.cos(self.taper), math.tan(self.taper)
+        top = float(upper[1, 0])
+        ends = [0.0]
+        while ends[-1] < top:
+            ends.append(min(ends[-1] + _SLICE + _GROWS * ends[-1], top))
+        cone = [(low, self.rho + r / cb + high * tb) for low, high in pairwise(ends)]
+        return np.vstack([[[0.0, self.rho + r]], np.array(cone).reshape(-1, 2), upper[1:]])
+
 
 @dataclass(frozen=True)
 class Catalogue:
@@ -204,17 +247,13 @@ class Catalogue:
         object.__setattr__(self, "cutters", ordered)
 
     @property
-    def straight(self) -> Catalogue:
-        """Its flat, bull-nose and ball cutters alone.
+    def straight(self) -> tuple[CatalogueCutter, ...]:
+        """Its flat, bull-nose and ball cutters without taper."""
+        return tuple(c for c in self.cutters if c.straight)
 
-        Raises
-        ------
-        InputError
-            It has none.
-        """
-        return self if all(c.straight for c in self.cutters) else Catalogue(
-            self.name, tuple(c for c in self.cutters if c.straight), self.note
-        )  # fmt: skip
+    def of(self, cutters: Sequence[CatalogueCutter]) -> Catalogue:
+        """The same catalogue with these of its cutters alone."""
+        return self if len(cutters) == len(self.cutters) else Catalogue(self.name, tuple(cutters), self.note)
 
     @property
     def alike(self) -> tuple[tuple[CatalogueCutter, ...], ...]:

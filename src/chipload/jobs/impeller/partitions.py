@@ -69,7 +69,7 @@ def _compared(milled: ImpellerResult) -> str:
         if d is None:
             rows.append([name, '<span class="no">these cutters do not reach all points</span>', *[""] * 8])
             continue
-        cutters = ", ".join(f"D {way.catalogue.cutters[k].diameter:g} r {way.catalogue.cutters[k].corner_radius:g}"
+        cutters = ", ".join(f"{way.catalogue.cutters[k].label}"
                             for k in d.cutters)  # fmt: skip
         less = ["", ""]
         if base is not None and way.name != PICKED:
@@ -99,7 +99,7 @@ def _programmed(milled: ImpellerResult) -> str:
     """Table of the programs of each partition."""
     rows = [
         [
-            escape(w.name), ", ".join(f"D {c.diameter:g} r {c.corner_radius:g}" for c in w.cutters), f"{w.path:.0f}",
+            escape(w.name), ", ".join(f"{c.label}" for c in w.cutters), f"{w.path:.0f}",
             *(f"{x / 60.0:.1f}" for x in (w.cutting, w.links, w.changes, w.seconds, w.predicted)),
             "" if w.scallop is None else f"{100.0 * w.scallop:.0f}",
             '<span class="ok">verified</span>' if w.verified else '<span class="no">not verified</span>',
@@ -200,4 +200,4 @@ def patch_figure(milled: ImpellerResult, way: Partition, op: Searched) -> go.Fig
 
 def _size(way: Partition, patch: Patch) -> str:
     c = way.catalogue.cutters[patch.cutter]
-    return f"D {c.diameter:g} r {c.corner_radius:g}"
+    return f"{c.label}"
