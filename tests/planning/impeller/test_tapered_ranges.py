@@ -4,13 +4,18 @@ import math
 
 import numpy as np
 import pytest
+from tests.planning.impeller.test_covering import CLEARANCE, TABLES, TOLERANCE, dense
 from tests.planning.impeller.test_profile_cutters import BALL, BULL, gaps, tapered_ball
 
-from chipload.cutter.catalogue import CatalogueCutter
+from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.errors import InputError
+from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.axis_field import pose
+from chipload.planning.impeller.covering.covering import covering_of
+from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.ranges.ranges import on_corner, valid_ranges
 from chipload.planning.impeller.scene import Scene
+from chipload.planning.impeller.surfaces import ContactSampling, hub_range, surface_of
 
 STEEP = tapered_ball(1.5, 8.0, 20.0, shank_diameter=12.0, reach=40.0, holder_diameter=30.0)
 
@@ -128,3 +133,60 @@ def test_without_taper_the_ranges_are_those_of_the_straight_cutter():
         assert sum(len(x) for x in straight) > 0
         for a, b in zip(straight, limit, strict=True):
             assert b == pytest.approx(a, abs=1e-6)
+
+
+#: balls and bull noses in cones up to a shank, one steep
+SHOP = Catalogue(
+    "shop",
+    tuple(
+        CatalogueCutter(
+            D, 2.0, 25.0, shank_diameter=D + 6.0, reach=60.0, holder_diameter=50.0, taper=math.radians(taper)
+        )
+        for D, taper in ((6.0, 8.0), (10.0, 4.0), (14.0, 4.0), (18.0, 3.0), (24.0, 4.0))
+    ),
+)
+
+
+def deepest(points, S, N, table, B, cutter):
+    """How deep the deepest of the points lies in the profile, or in shank or holder without their clearance."""
+    T = axes_at(table, np.array([B]))
+    (tip,) = pose(S[None], N[None], T, cutter)
+    x = points - tip
+    z = x @ T[0]
+    d = np.sqrt(np.maximum((x * x).sum(axis=1) - z * z, 0.0))
+    top = cutter.cutting_length
+    inside = np.flatnonzero((z > 0.0) & (z < top) & (d < cutter.shape.radius_at(np.clip(z, 0.0, top))))
+    deep = -gaps(cutter, d[inside], z[inside], 1e-4).min() if len(inside) else 0.0
+    for low, high, R in ((top, 60.0, 0.5 * cutter.shank_diameter), (60.0, np.inf, 25.0)):
+        part = (z > low) & (z < high)
+        deep = max(deep, float((R - d[part]).max(initial=0.0)))
+    return deep
+
+
+@pytest.mark.parametrize("side", ["plus", "floor"])
+def test_no_wall_is_deeper_in_a_certified_tapered_cutter_than_the_tolerance(side):
+    impeller = impeller_of(ImpellerShape())
+    slack = max(c.not_enclosed for c in SHOP.cutters)
+    covering = covering_of(impeller, TOLERANCE, 2.0, 1, hub_range(impeller, 0.0), slack)
+    assert covering.tolerance == TOLERANCE
+    assert all(covering.proves(c, CLEARANCE) for c in SHOP.cutters)
+    # a steeper one, and one of a smaller corner, are not proved by it
+    assert not covering.proves(CatalogueCutter(10.0, 2.0, 25.0, taper=math.radians(9.0)), CLEARANCE)
+    assert not covering.proves(CatalogueCutter(10.0, 1.95, 25.0, taper=math.radians(4.0)), CLEARANCE)
+    points, rng, worst = dense(impeller), np.random.default_rng(3), {}
+    for name, cover in (("with", covering), ("without", None)):
+        up = (0.25, 0.75) if side == "floor" else (0.05, 0.98)
+        scene = surface_of(impeller, "blade", side, ContactSampling((0.03, 0.97), up, (5, 3), 3.0, 2.0), cover).scene
+        answer = largest_cutters(scene, SHOP, TABLES, CLEARANCE)
+        assert answer.certified.all() == (cover is not None)
+        where = np.flatnonzero(answer.cutter >= 0)
+        assert len(where) > 8
+        worst[name] = max(
+            deepest(
+                points, scene.contact[k], scene.normal[k], TABLES[answer.table[k]], B, SHOP.cutters[answer.cutter[k]]
+            )
+            for k in where
+            for low, high in answer.ranges[k]
+            for B in (low, high, low + (high - low) * rng.random())
+        )
+    assert worst["with"] <= TOLERANCE < worst["without"]
