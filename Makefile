@@ -27,17 +27,17 @@ $(VENV)/.ready: $(VENV)/.run requirements.lock
 	$(PIP) install --require-hashes -r requirements.lock
 	touch $@
 
-# kernels whose types are stated are compiled when they are imported: here once, not by every process
-KERNELS := chipload.engagement.bricks.front._kernels, chipload.engagement.chips.loop._kernels, \
-	chipload.engagement.chips.faces._kernels, chipload.stability._kernels, chipload.stability.several._kernels
 CHECKED := $(VENV)/checked.log
+COLLECTED := $(VENV)/collected.log
 
-# the slow checks beside the tests, so that no core waits; what they say stands at the end
+# the slow checks beside the tests, so that no core waits; what they say stands at the end. The tests are collected once
+# before their workers start: that compiles what is compiled when it is imported, kernels whose types are stated and the
+# assertions of the tests. Each worker would do it again
 test: setup
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .
 	{ $(BIN)/mypy && $(BIN)/lint-imports && $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site; } \
 	  > $(CHECKED) 2>&1 & checks=$$!; \
-	$(BIN)/python -c 'import $(KERNELS)' \
+	{ $(BIN)/pytest -p no:xdist --collect-only -qq > $(COLLECTED) 2>&1 || { cat $(COLLECTED); false; }; } \
 	&& OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal -ra; tested=$$?; \
 	wait $$checks; checked=$$?; cat $(CHECKED); \
 	exit $$((tested ? tested : checked))

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import gc
-import hashlib
-import io
 import math
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
+import cad_kernel
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
 from chipload.geometry.contour import Contour
-from chipload.geometry.isolated import Isolated, packed, unpacked
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.machine.machine import machine_named
 from chipload.planning.result import Event, OperationResult, StrategyResult
@@ -60,37 +57,17 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
-class CadAnswers:
-    """Answers of the CAD kernel by what the file holds and what was asked: 1.2 s of processor time for each process
-    less. Tests in the folders :data:`OF_CAD` ask the kernel itself.
-    """
-
-    def __init__(self) -> None:
-        self.known: dict[bytes, bytes] = {}
-        self.used = False
-        self.ask = Isolated.call
-
-    def call(self, isolated: Isolated, function: str, *values: Any) -> Any:
-        """As :meth:`Isolated.call`; each answer is read from its message again, so that nothing is shared."""
-        if not self.used:
-            return self.ask(isolated, function, *values)
-        asked = packed([isolated.reader, isolated.file.name, isolated.key, function, *values])
-        key = hashlib.sha256(isolated.file.read_bytes() + asked).digest()
-        if key not in self.known:
-            self.known[key] = packed(self.ask(isolated, function, *values))
-        return unpacked(io.BytesIO(self.known[key]))
+CAD = cad_kernel.used()
 
 
-#: first parts of the paths below tests/ whose tests are about the process of the CAD kernel
-OF_CAD = ("bad", "geometry", "test_extras.py", "test_workers.py")
-CAD = CadAnswers()
-Isolated.call = lambda *words: CAD.call(*words)  # type: ignore[method-assign]
+def pytest_unconfigure() -> None:
+    """End the process that has loaded the CAD kernel."""
+    CAD.close()
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Choose whether the CAD kernel is asked again."""
-    own = Path(__file__).parent
-    CAD.used = item.path.is_relative_to(own) and item.path.relative_to(own).parts[0] not in OF_CAD
+    """Choose whether the CAD kernel is started and asked again."""
+    CAD.used = not cad_kernel.is_about_cad(item.path)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

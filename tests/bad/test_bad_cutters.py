@@ -106,7 +106,7 @@ def test_value_is_refused():
         *(
             (
                 {"shape": "endmill.fcstd", "parameter": {"Diameter": text}},
-                f"Diameter = {text!r}: must be a length with its unit, as 6,0 mm or 1/4 in",
+                f"Diameter = {text!r}: must be a length with its unit, such as 6,0 mm or 1/4 in",
             )
             for text in ("6.0", "6 furlong", "-6 mm", "1e5 mm", "mm", "6,0,0 mm", 6.0, None, "1/0 xx")
         ),
@@ -138,8 +138,8 @@ def test_tool_bit_lacks_a_key(tmp_path):
         ("T1 P1 D10\nT1 P2 D8\n", ": tool 1 appears twice, in lines 1 and 2: keep one"),
         ("T2 P1 D10\nT7 D3", ": tool 1 is not there: must be one of 2, 7"),
         ("", ": tool 1 is not there: must be one of none"),
-        ("T2 P1 D10\nhello", " line 2: not a tool: must be words as T1 P1 D10"),
-        ("D10", " line 1: not a tool: must be words as T1 P1 D10"),
+        ("T2 P1 D10\nhello", " line 2: not a tool: must be words such as T1 P1 D10"),
+        ("D10", " line 1: not a tool: must be words such as T1 P1 D10"),
     ],
 )
 def test_tool_table_is_refused(tmp_path, text, message):

@@ -104,11 +104,11 @@ ON_PLUS = ", ".join(f"{x:.9f}" for x in IMPELLER.blade.plus.at(0.05, 0.0)[0])
     [
         ("plus = 1", "plus = 9",
          "impeller.step.plus = 9: no such face: must be from 1 to 4: chipload check impeller.step lists the faces"),
-        ("plus = 1", "plus = 0", "job.toml: impeller.step.plus = 0: must be from 1 (side that faces a growing "
-         "angle about the axis, seen against the flow)"),
+        ("plus = 1", "plus = 0", "job.toml: impeller.step.plus = 0: must be from 1 (side of a blade that faces a "
+         "growing angle about the axis, seen against the flow)"),
         ("plus = 1", "plus = [1.0, 2.0]",
          "job.toml: impeller.step.plus = [1.0, 2.0]: must be the number of a face or a point [x, y, z] on it, in mm "
-         "(side that faces a growing angle about the axis, seen against the flow)"),
+         "(side of a blade that faces a growing angle about the axis, seen against the flow)"),
         ("plus = 1", "plus = [0.0, 0.0, 25.0]",
          "impeller.step.plus = [0, 0, 25]: lies 49.51 mm off the nearest face, 2: must be within 0.01 mm of a face "
          "(mm, in the frame of the file)"),

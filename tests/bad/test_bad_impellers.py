@@ -153,7 +153,7 @@ def test_a_file_that_is_missing(hecc):
         ("scallop_mm = 0.1", "scallop_inch = 0.004",
          "job.toml: operation.0.scallop_inch: unknown key; did you mean scallop_mm?"),
         ("blades = 11", "blades = 1", "job.toml: impeller.blades = 1: must be at least 2 (number of blades, evenly "
-         "spaced, and of splitters, if there are any)"),
+         "spaced; the number of splitters, if there are any, is the same)"),
     ],
 )  # fmt: skip
 def test_a_wrong_line(formula, old, new, message):
@@ -200,8 +200,8 @@ def test_a_cutter_picked_by_hand_that_is_not_in_the_catalogue(formula):
          "hub: state a smaller one"),
         ("30.0", "impeller.fillet_mm = 30: blade plus: a fillet of 30 mm reaches above the side at u = 0.213: state "
          "a smaller one"),
-        ("0.0", "job.toml: impeller.fillet_mm = 0: must be above 0 (radius of fillets between sides and hub, which the "
-         "model does not have; sides begin above them)"),
+        ("0.0", "job.toml: impeller.fillet_mm = 0: must be above 0 (radius of fillets between sides and hub that the "
+         "model lacks; sides begin above them; none: no fillets)"),
     ],
 )  # fmt: skip
 def test_fillets_that_do_not_fit(formula, fillet, message):

@@ -53,7 +53,7 @@ def test_exit_code_and_first_lines_say_whether_it_is_verified(result):
     assert (done.exit_code == 0) == (summary["verdict"] == "holds")
     tracks = {track["name"]: track for track in summary["tracks"]}
     # the other ways are written and checked too, but released is the quickest that holds
-    assert all(track["in_use"] == (not name.startswith("way-")) for name, track in tracks.items())
+    assert all(track["in_use"] == (not name.startswith("partition-")) for name, track in tracks.items())
     texts = sorted(p for p in out.glob("[0-9]*.ngc") if not p.stem.endswith("-all"))
     assert len(texts) == len(op["programs"]) > 0
     for text, program in zip(texts, op["programs"], strict=True):
@@ -71,23 +71,24 @@ def test_exit_code_and_first_lines_say_whether_it_is_verified(result):
 def test_every_way_is_written_checked_and_timed(result):
     *_, out, summary = result
     (op,) = summary["operations"]
-    ways = {way["name"]: way for way in op["ways"]}
-    assert set(ways) == {"hand-picked", "1 cutter"}
+    partitions = {one["name"]: one for one in op["partitions"]}
+    assert set(partitions) == {"hand-picked", "1 cutter"}
     tracks = {track["name"]: track for track in summary["tracks"]}
-    for name, way in ways.items():
-        stem = "[0-9]" if way["in_use"] else f"way-{name.replace(' ', '-')}-"
+    for name, partition in partitions.items():
+        stem = "[0-9]" if partition["in_use"] else f"partition-{name.replace(' ', '-')}-"
         texts = sorted(p.stem for p in out.glob(f"{stem}*.ngc") if not p.stem.endswith("-all"))
         assert all((out / f"{text}-all.ngc").is_file() for text in texts)
         assert texts
-        assert way["time_min"] == pytest.approx(way["cutting_min"] + way["link_min"] + way["changes_min"])
+        parts = sum(partition[key] for key in ("cutting_min", "link_min", "changes_min"))
+        assert partition["time_min"] == pytest.approx(parts)
         # the tracks are of one channel; between two of eleven the pallet turns on
         one = sum(tracks[text]["time_s"] for text in texts) / 60.0
-        assert 11 * one <= way["time_min"] - way["changes_min"] <= 11 * (one + len(texts) * 2.0 / 60.0)
-        assert way["predicted_min"] == pytest.approx(way["time_min"], rel=0.1)
+        assert 11 * one <= partition["time_min"] - partition["changes_min"] <= 11 * (one + len(texts) * 2.0 / 60.0)
+        assert partition["predicted_min"] == pytest.approx(partition["time_min"], rel=0.1)
         holds = all(tracks[text]["verdict"] == "holds" for text in texts)
-        assert (way["verdict"] == "holds") <= holds
-        assert (way["verdict"] == "holds") == (way["fails"] == [])
-    (used,) = (way for way in ways.values() if way["in_use"])
+        assert (partition["verdict"] == "holds") <= holds
+        assert (partition["verdict"] == "holds") == (partition["fails"] == [])
+    (used,) = (partition for partition in partitions.values() if partition["in_use"])
     assert used["name"] == "1 cutter"
     assert op["time_min"] == used["time_min"]
     assert op["scallop"]["mean_share"] == pytest.approx(op["finished"]["scallop_mean_share"])
@@ -116,15 +117,15 @@ def test_every_number_of_the_answer_is_there(result):
     assert {*keys, *more, "patches", "path_mm", "time_min"} <= set(op)
     picked = op["hand_picked"]
     assert {*keys, *more, "patches", "path_mm", "time_min"} <= set(picked)
-    for way in (op, picked):
-        assert way["cc_points"] == 16
-        assert way["check_points"] > 100
-        assert way["certified"] is True
-        assert way["search_s"] > 0.0
-        assert sum(p["area_share"] for p in way["patches"]) == pytest.approx(1.0)
-        assert sum(p["path_mm"] for p in way["patches"]) > 0.0
-        assert all({*keys, "area_share"} <= set(p) for p in way["patches"])
-        assert min(way["path_mm"], way["time_min"]) > 0.0
+    for one in (op, picked):
+        assert one["cc_points"] == 16
+        assert one["check_points"] > 100
+        assert one["certified"] is True
+        assert one["search_s"] > 0.0
+        assert sum(p["area_share"] for p in one["patches"]) == pytest.approx(1.0)
+        assert sum(p["path_mm"] for p in one["patches"]) > 0.0
+        assert all({*keys, "area_share"} <= set(p) for p in one["patches"])
+        assert min(one["path_mm"], one["time_min"]) > 0.0
     assert (picked["diameter_mm"], picked["corner_radius_mm"]) == (14.0, 1.5)
 
 
@@ -336,8 +337,8 @@ def by_the_text(out, program):
 def test_feeds_by_force_make_the_stiff_cutter_the_fast_one(more):
     out, summary = more
     (op,) = summary["operations"]
-    ways = {way["name"]: way for way in op["ways"]}
-    slow, fast = ways["hand-picked"], ways["1 cutter"]
+    partitions = {one["name"]: one for one in op["partitions"]}
+    slow, fast = partitions["hand-picked"], partitions["1 cutter"]
     assert slow["cutters"][0]["diameter_mm"] < fast["cutters"][0]["diameter_mm"]
     # at one feed the times of cutting would be as the paths
     assert slow["cutting_min"] / slow["path_mm"] > 1.3 * fast["cutting_min"] / fast["path_mm"]
@@ -348,7 +349,7 @@ def test_feeds_by_force_make_the_stiff_cutter_the_fast_one(more):
         assert limits["deflection_cutter_um"]["worst"] == loads["deflection_cutter_um"] <= 30.0 / 1.1
         assert limits["cutter_stress_mpa"]["worst"] == loads["cutter_stress_mpa"] < 1500.0
     # what the text states: passes of the slender cutter below the greatest feed, its links above it
-    (picked,) = out.glob("way-hand-picked*.apt")
+    (picked,) = out.glob("partition-hand-picked*.apt")
     feeds = {float(f) for f in re.findall(r"FEDRAT/([0-9.]+)", picked.read_text())}
     assert min(feeds) < 200.0
     # links, some as fast as the pallet turns

@@ -51,8 +51,12 @@ def test_a_thicker_splitter_round_its_blade():
 
 @pytest.mark.parametrize("turn", [12.1, 22.5, 32.9])
 def test_apart(turn):
+    # 6 deg on either side of both, 0.1 deg apart at least: no metal in common; blades at 0 and 45 deg
     sections = elliptic((30.0, 50.0), 6.0, at_deg=turn)
     splitter_apart(loft(sections), loft(BLADE), PITCH, sections)
+    found = overlap_of(loft(sections), loft(BLADE), PITCH, np.concatenate(sections))
+    assert found.length.max() == 0.0
+    assert math.degrees(found.turn) == pytest.approx(22.5 - turn, abs=0.01)
 
 
 @pytest.mark.parametrize("turn", [11.9, 33.1])

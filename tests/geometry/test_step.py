@@ -1,6 +1,8 @@
 """Faces of STEP parts as contours."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +39,12 @@ def part(tmp_path_factory):
     path = tmp_path_factory.mktemp("step") / "part.step"
     assert writer.Write(str(path)) == OCP.IFSelect.IFSelect_RetDone
     return path
+
+
+def test_the_process_of_the_kernel_imports_little():
+    """Each file that is read starts one: the libraries of chains and biarcs would double what that takes."""
+    code = "import sys, chipload.geometry.step_roles; print(*{'numba', 'scipy', 'shapely'} & set(sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "\n"
 
 
 def test_the_face_at_a_height_has_its_holes(part):

@@ -210,7 +210,7 @@ def test_the_result_folder_is_that_of_a_run(history, tmp_path: Path) -> None:
         ({"machine": "vmx"}, "machine vmx: not known: the nearest is vmc"),
         ({"material": "al7075"}, "material al7075: not known: the nearest are al7075-carbide"),
         ({"limits": {"force": 3.0}}, "limits.force: unknown key; did you mean force_n"),
-        ({"limits": {"gouge_mm": 3.0}}, "limits.gouge_mm: needs the part that should come out: give part or leave it"),
+        ({"limits": {"gouge_mm": 3.0}}, "limits.gouge_mm: needs the finished part: give part or leave it"),
         ({"step_mm": -1.0}, "operation.0.step_mm = -1: must be above 0"),
         ({"cutter": {}}, "cutter: missing: give at least one"),
         ({"cutter": {3: MILL}}, "tool 1: no [[cutter]] has this number: state one beside 3"),

@@ -17,8 +17,8 @@ def test_steps_of_a_pocket_before_and_after_it_is_planned(tmp_path: Path) -> Non
     more = 'radial_depth_mm = 1.5\ndepth_mm = 8.0\nstrategies = ["pocket"]\n'
     path = written(tmp_path, {"0": [SQUARE]}, operation(more))
     lines, _ = checked(path)
-    # 4 to 12 s, and 0.15 to 8 ms a step
-    assert lines[-1] == "estimate: 2000 steps, 351 MB of memory, 4 to 28 s"
+    # 4 to 12 s, and 0.05 to 1.5 ms a step
+    assert lines[-1] == "estimate: 2000 steps, 351 MB of memory, 4 to 15 s"
     (strategy,), _ = done(path)
     # the bore that the cutter enters by spares passes, corners ask for more
     assert 0.6 < len(next(iter(strategy.history.values()))) / (2 * 2000) < 1.8

@@ -146,7 +146,7 @@ def said(call) -> str:
         ("step_over_mm = 4.0", "scallop_um = 4.0", "operation.0.step_over_mm: missing: state it"),
         ("step_over_mm = 4.0", "step_over_mm = 8.5", "must be from above 0 to 8, the flat of the bottom"),
         ("face = [23.0, 18.0, 5.0]", "face = [23.0, 18.0, 3.5]", "looks down, or its facets do not make one outline"),
-        ("face = [23.0, 18.0, 5.0]", "face = [23.0, 0.0, 5.0]", "is no level face"),
+        ("face = [23.0, 18.0, 5.0]", "face = [23.0, 0.0, 5.0]", "is not a level face"),
         (
             "diameter_mm = 8.0",
             "diameter_mm = 31.0\nshank_diameter_mm = 8.0",

@@ -245,7 +245,7 @@ def said(call) -> str:
 
 def test_refused(folder):
     floor = WALLS.replace("face = [6.0, 3.0, 15.0]", "face = [6.0, 12.0, 6.0]")
-    assert "lies rather than stands: its normal is 90 deg off the horizontal" in said(
+    assert "is not upright: its normal is 90 deg off the horizontal" in said(
         lambda: read_wall(job(folder, walls=floor).job)
     )
     twice = WALLS.replace("face = [6.0, 24.0, 14.0]", "face = [7.0, 3.0, 14.0]")
@@ -272,5 +272,6 @@ def test_a_misspelt_key_of_one_wall(tmp_path):
     assert said(lambda: load_job(path)) == "job.toml: wall.fot_mm: unknown key; did you mean foot_mm?"
     path.write_text(path.read_text().replace("fot_mm = 5.0", "foot_mm = -5.0"))
     assert said(lambda: load_job(path)) == (
-        "job.toml: wall.foot_mm = -5: must be above 0 (height above the clamp that keeps its stock)"
+        "job.toml: wall.foot_mm = -5: must be above 0 (height above the clamp "
+        "up to which the stock stays; below 0.8 of the wall's height)"
     )

@@ -31,7 +31,7 @@ EXAMPLES = Path(chipload.examples.__file__).parent
 #: files stay
 SHORTER: Mapping[str, tuple[str, ...]] = {
     "contour": ("operation.0.step_mm=0.2",),
-    "pocket": ("operation.0.step_mm=0.6",),
+    "pocket": ("operation.0.step_mm=0.6", "operation.0.radial_depth_mm=2.4", "limits.engagement_deg=90"),
     "chips": ("operation.0.step_mm=4",),
     "feeds": ("operation.0.step_mm=4", "stock.layer_mm=2"),
     "bracket": ("operation.0.step_mm=6", "stock.layer_mm=5", "part.spacing_mm=5"),
@@ -45,15 +45,16 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     ),
     "trunnion": (),
     "tube": ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01"),
-    "cone": ("simulation.step_mm=3.0", "simulation.layer_mm=0.25", "simulation.tolerance_mm=0.01"),
+    "cone": ("simulation.step_mm=4.0", "simulation.layer_mm=0.5", "simulation.tolerance_mm=0.01"),
     "plate": (
         "operation.0.least_error=false",
         "operation.0.scallop_um=45",
-        "wall.length_mm=12",
-        "wall.height_mm=12",
-        "wall.thickness_mm=1.8",
+        "operation.0.step_mm=3",
+        "wall.length_mm=8",
+        "wall.height_mm=9",
+        "wall.thickness_mm=1.7",
         "wall.foot_mm=4",
-        "wall.elements=[6,6]",
+        "wall.elements=[4,5]",
     ),
     "blade": (
         "operation.0.least_error=false",
@@ -69,8 +70,8 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     ),
     "impeller": (
         "operation.0.most_cutters=1",
-        "operation.0.rough.grid_mm=2.5",
-        *(f"surface.{k}.{key}" for k in range(3) for key in ("along=[0.42, 0.58]", "points=[6, 5]")),
+        "operation.0.rough.grid_mm=3.0",
+        *(f"surface.{k}.{key}" for k in range(3) for key in ("along=[0.45, 0.55]", "points=[4, 4]")),
     ),
     "hecc": (
         "operation.0.most_cutters=1",
@@ -107,9 +108,10 @@ class Example:
 
     @property
     def limits(self) -> dict[str, Any]:
-        """The limits that its job file states."""
+        """The limits that its job states."""
         values = tomllib.loads((EXAMPLES / self.name / "job.toml").read_text())
-        return dict(values.get("limits", {}))
+        own = [word.removeprefix("limits.") for word in SHORTER[self.name] if word.startswith("limits.")]
+        return {**values.get("limits", {}), **tomllib.loads("\n".join(own))}
 
     @property
     def result(self) -> Result:

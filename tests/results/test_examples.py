@@ -9,7 +9,9 @@ from html import unescape
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from typer.testing import CliRunner
 
+from chipload.cli import app
 from chipload.errors import InputError
 from chipload.machine.machine import machine_named
 from chipload.program.read import line_times, read_program, read_tools
@@ -188,7 +190,7 @@ CLOSE = 1e-3
 
 @every
 def test_one_clock(example, name):
-    """Times of result, history, report and page, and of the programs as ``chipload check`` reads them."""
+    """Times of result, history, report and page, and of the programs as ``chipload check`` reads and states them."""
     done = example(name)
     report = (done.folder / "report.html").read_text()
     heading = f"<h2>{HEADINGS[done.result.tracks[0].kind]}</h2>"
@@ -212,6 +214,18 @@ def test_one_clock(example, name):
             tools = tool_lengths(done) if name in WITH_LENGTHS else None
             read = read_program(done.folder / track.programs[0], machine, tools=tools)
             assert line_times(read, machine)[1].sum() == pytest.approx(track.time_s, rel=CLOSE), track.name
+            if track.in_use:
+                assert 60.0 * minutes_of(done, track.programs[0]) == pytest.approx(track.time_s, rel=CLOSE)
+    for operation in done.summary.operations if done.result.capability not in OVERRIDDEN else ():
+        if "program" in operation:
+            assert operation["program"]["time_s"] == pytest.approx(done.result.tracks[0].time_s, rel=CLOSE)
+
+
+def minutes_of(done, program):
+    """Time of a program as ``chipload check`` states it."""
+    words = ["check", str(done.folder / program), "--machine", str(done.loaded.job.machine)]
+    words += ["--tools", str(done.folder.parent / f"{done.name}.tbl")] if done.name in WITH_LENGTHS else []
+    return float(re.search(r" mm, ([0-9.e+-]+) min; ", CliRunner().invoke(app, words).output)[1])
 
 
 #: the override changes the time of these programs while they run

@@ -59,13 +59,16 @@ def waving(tool: int = 1) -> Program:
     return path(points, axes, tool)
 
 
-@pytest.mark.parametrize("tool", [1, 2])
-@pytest.mark.parametrize("speed", [300.0, -300.0])
-def test_loads_of_a_turned_program_are_those_of_the_upright_one(tool: int, speed: float) -> None:
-    """Body, points and axis turned by 35 degrees: sizes stay, directions turn."""
+@pytest.mark.parametrize(
+    ("tool", "speed", "degrees"),
+    [(1, 300.0, 35.0), (1, -300.0, 35.0), (2, 300.0, 35.0), (2, -300.0, 35.0), (1, 300.0, 90.0), (2, 300.0, 90.0),
+     (1, 300.0, 125.0), (2, 300.0, 180.0)],
+)  # fmt: skip
+def test_loads_of_a_turned_program_are_those_of_the_upright_one(tool: int, speed: float, degrees: float) -> None:
+    """Body, points and axis turned, until the tool lies or comes from below: sizes stay, directions turn."""
     points = [[-8.0, 8.0, -1.5], [12.0, 8.0, -1.5], [20.0, 13.0, -1.5], [20.0, 20.0, -2.5], [2.0, 15.0, -2.5]]
     upright = run(path(points, [0.0, 0.0, 1.0], tool, speed), accuracy=False).columns
-    a = math.radians(35.0)
+    a = math.radians(degrees)
     R = np.array([[math.cos(a), 0.0, math.sin(a)], [0.0, 1.0, 0.0], [-math.sin(a), 0.0, math.cos(a)]])
     box = trimesh.creation.box(bounds=[LOW, HIGH])
     body = trimesh.Trimesh(np.asarray(box.vertices) @ R.T, box.faces)

@@ -12,6 +12,7 @@ import shapely
 import trimesh
 
 from chipload.errors import InputError
+from chipload.stock import tile_grid
 from chipload.stock.layers import LayeredStock
 
 
@@ -226,6 +227,26 @@ def test_refined_layers_are_cut_from_the_mesh_again() -> None:
     assert stock.volumes()[8:12] == pytest.approx([cut / 4.0] * 4, rel=1e-12)
     assert stock.cut.tolist() == [False] * 8 + [True] * 4 + [False] * 2
     assert stock.volumes()[13] == LayeredStock.of_mesh(body, 4.0, 7.0).volumes()[4]
+
+
+def test_parts_of_a_stock_share_the_sections_of_its_mesh(monkeypatch) -> None:
+    """Cut out twice and split at the same heights, the mesh is cut once; tiles are those of a stock alone."""
+    body, heights = sphere(), [-6.5, -6.0, -5.5, 0.25]
+    stock = LayeredStock.of_mesh(body, 4.0, 7.0)
+    made = []
+    for whole in (LayeredStock.of_mesh(body, 4.0, 7.0), stock, stock, stock.copied()):
+        corner = whole.cropped((-8.0, -8.0), (1.0, 2.0))
+        corner.refine_at(heights)
+        made.append(corner)
+        known = dict(whole.sections)
+    for corner in made[1:]:
+        assert shapely.to_wkb(corner.tiles).tolist() == shapely.to_wkb(made[0].tiles).tolist()
+    assert stock.sections.keys() == known.keys()
+    assert known.keys() == set(made[0].heights[~np.isin(made[0].heights, stock.heights)])
+    # what has more points than are kept is cut again
+    monkeypatch.setattr(tile_grid, "KEPT", 10)
+    stock.cropped((-8.0, -8.0), (1.0, 2.0)).refine_at([-3.0])
+    assert stock.sections == {}
 
 
 def test_levels_become_bounds() -> None:

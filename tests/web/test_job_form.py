@@ -59,7 +59,9 @@ def test_a_key_that_takes_a_table_or_a_list_of_others(tmp_path) -> None:
     (tmp_path / "job.toml").write_text("# walls\n" + walls + text[text.index("[workpiece]") :])
     fields = {f.path: f for f in job_fields(tmp_path / "job.toml")}
     assert fields["wall.0.foot_mm"].value == 5.0
-    meaning = "height above the lower edge of each side that keeps its stock; not for a floor"
+    meaning = (
+        "height above the lower edge of a side up to which the stock stays; required for a side, refused for a floor"
+    )
     assert fields["wall.0.foot_mm"].meaning == meaning
     assert fields["wall.0.fit_mm"].value is None
     assert "wall.0.shape" not in fields

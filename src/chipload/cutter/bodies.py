@@ -59,7 +59,7 @@ def one_thread(diameter: float, neck: float, crest: float, angle: float, height:
 def dovetail(diameter: float, neck: float, cone: float, angle: float, height: float) -> Profile:
     """Return a dovetail mill: widest at its tip, narrower up to the height ``cone``, its neck up to ``height``.
 
-    ``angle`` [rad] of the flank is stated by some with the axis and by others with the bottom: the wider body counts.
+    Some sources state ``angle`` [rad] of the flank with the axis, others with the bottom: the wider body is used.
 
     >>> [(round(r, 3), z) for r, z in dovetail(20.0, 6.0, 5.0, math.radians(60.0), 15.0)]
     [(10.0, 0.0), (7.113, 5.0), (3.0, 5.0), (3.0, 15.0)]
@@ -81,7 +81,7 @@ def saw(diameter: float, blade: float, cap: tuple[float, float]) -> Profile:
 
 
 def apt_body(shape: tuple[float, float, float, float, float, float, float]) -> Profile | None:
-    """The body of the seven numbers where the corner does not touch bottom and flank, as of a barrel or a lens.
+    """The body of seven APT numbers whose corner does not touch bottom and flank, such as a barrel or a lens.
 
     Bottom line, then the arc up to the height f - r sin(beta), above it the flank from the arc's end to h.
     None: the seven numbers describe no such body.
@@ -114,7 +114,7 @@ def check_body(points: Profile, height: float) -> float:
     Raises
     ------
     InputError
-        It does not begin at the tip, goes down, is no body, or does not end at ``height``, the flute length.
+        The profile does not begin at the tip, goes down, has no radius, or does not end at ``height``.
     """
     heights = [z for _, z in points]
     wide = max((r for r, _ in points), default=0.0)

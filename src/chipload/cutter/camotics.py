@@ -1,7 +1,7 @@
 """Tools of a CAMotics project (`.camotics`): JSON with shape, diameter and length of each tool, in its own unit.
 
-CAMotics knows cylindrical, ball nose, conical, snub nose and spheroid tools; the last is refused: it is no mill. Of a
-conical tool, diameter is that of the upper end, length the height of the cone from its point.
+CAMotics has cylindrical, ball nose, conical, snub nose and spheroid tools. Spheroid tools are refused. The diameter of
+a conical tool is that of its upper end, and its length is the height of the cone from its point.
 """
 
 from __future__ import annotations

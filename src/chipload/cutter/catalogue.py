@@ -1,8 +1,8 @@
 """Catalogues of cutters: dimensions, and the shank and holder above the cutting part.
 
 Notation: from the tip upwards the cutting part (diameter, corner radius, cutting length), a neck up to the neck length,
-the shank up to where the cutter leaves the holder (reach), the holder above. A part that is left out is not there: with
-no cutting length the cutting part is extended without end, with no reach there is no holder.
+the shank up to the lower end of the holder (reach), the holder above. A part that is not stated does not exist: without
+a cutting length the cutting part has no end, without a reach there is no holder.
 
 A straight cutter is a flat, bull-nose or ball cutter. The cutting part of a tapered or a barrel cutter has the profile
 of :mod:`chipload.cutter.cutter`: its diameter is that where flank line and bottom meet. It must have an end.
@@ -42,10 +42,10 @@ class CatalogueCutter:
     diameter : [mm], > 0
     corner_radius : r [mm], 0 <= r <= diameter / 2; of a tapered or barrel cutter above 0
     cutting_length : [mm], >= r; None: without end
-    neck_diameter, neck_length : of the part above, up to a height above the tip [mm]; both or none
+    neck_diameter, neck_length : of the part above, and the height of its end above the tip [mm]; both or none
     shank_diameter : of the part above that [mm]; None: as the cutting part at its top
     reach : height above the tip at which the holder begins [mm]; None: no holder
-    holder_diameter : [mm], given with the reach
+    holder_diameter : [mm], required with the reach
     name : as the shop calls it
     taper : half angle of the flank [rad]
     barrel_radius : of the flank arc of a barrel cutter [mm], whose corner's centre is on the axis; None: no such arc
@@ -53,7 +53,7 @@ class CatalogueCutter:
     Raises
     ------
     InputError
-        A number is out of range or without the one it needs.
+        A number is out of range, or another number that it requires is missing.
     """
 
     diameter: float

@@ -27,11 +27,11 @@ from chipload.cutter.bodies import Profile, check_body
 from chipload.cutter.strength import ToolStrength, check_material
 from chipload.errors import InputError
 
-#: a cutter of which nothing is stated but its modulus
+#: strength of a cutter of which only the modulus is stated
 ORDINARY = ToolStrength()
 #: equivalent diameter of the fluted part over the cutter's diameter [Kops1990]
 FLUTED_FACTOR = 0.8
-#: of a cutter: diameters [mm], overhang [mm], teeth
+#: limits of a cutter: least and greatest diameter [mm], greatest overhang [mm], greatest number of teeth
 THINNEST, WIDEST, LONGEST, MOST_FLUTES = 0.01, 1000.0, 3000.0, 200
 
 
@@ -43,7 +43,7 @@ class Cutter:
     ----------
     diameter : d > 0 [mm]
     flutes : number of teeth, >= 1
-    helix : helix angle [rad], 0 <= helix < 80 deg, right-handed
+    helix : helix angle [rad], 0 <= helix < 80 deg, of the same hand as the cutter
     flute_length : length that cuts [mm]
     overhang : length out of the holder [mm], >= flute_length
     modulus : Young's modulus of the cutter [MPa]
@@ -53,20 +53,21 @@ class Cutter:
     barrel_radius : radius of the flank arc of a barrel cutter [mm]; None: no such arc
     bottom : alpha [rad], 0 <= alpha, alpha + beta < 90 deg
     taper : beta [rad], 0 <= beta
-    runout : (offset [mm], direction [rad] from tooth 0): the axis of the teeth beside that of the spindle
-    pitch : angle [rad] by which each tooth follows the one before it in the cut, tooth 0 first (it follows the last
-        one), together a revolution; empty: all alike
-    shank_diameter : [mm]; None: as the diameter
+    runout : offset of the cutter's axis from that of the spindle [mm], and its direction from tooth 0 [rad]
+    pitch : angle [rad] between each tooth and the tooth that cuts before it, beginning with tooth 0, which follows the
+        last one; their sum is a revolution; empty: all equal
+    shank_diameter : [mm]; None: equal to the diameter
     holder : (length, diameter) [mm] of its parts, upwards from the overhang; empty: not known
     tip_stiffness : [N/mm] of the tip across the axis under a slow force, measured in the machine; None: not known
     gullet : area between two teeth in a section across the axis [mm^2]; None: not known
     chip_ratio : volume of loose chips over the volume cut, >= 1; with ``gullet`` or not at all
     fluted_factor : equivalent diameter of the fluted part over the diameter, in bending and torsion, (0, 1]
-    strength : what its material carries
-    body : (rho, z) [mm] of the profile from the tip to ``flute_length``, of a tool of another shape: it is held against
-        part, stock and fixtures, its chips are not simulated; empty: the seven numbers are its shape
-    number : tool number, >= 0; 0: what is in the spindle where a program names no tool
-    name : as the shop calls it
+    strength : of its material
+    body : (rho, z) [mm] of the profile from the tip to ``flute_length`` of a tool of another shape, which is compared
+        with part, stock and fixtures but not simulated; empty: the seven APT numbers are its shape
+    number : tool number, >= 0; 0: the tool of a program that names no tool
+    name : name in the shop
+    left_hand : cuts while the spindle turns counter-clockwise (M4); its helix is left-handed then
 
     Raises
     ------
@@ -98,6 +99,7 @@ class Cutter:
     number: int = 1
     name: str = ""
     barrel_radius: float | None = None
+    left_hand: bool = False
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: float, limit: str) -> None:

@@ -34,7 +34,7 @@ def read_fctb(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The file cannot be read, is not such a file, the shape is another one, a length has no unit.
+        The file cannot be read, is not a tool bit, has another shape, or states a length without a unit.
     """
     path = Path(path)
     label = f"cutter.file {path}"
@@ -100,7 +100,9 @@ def _size(label: str, parameter: dict[str, Any], name: str) -> float | None:
 def _length(label: str, text: object) -> float:
     """A length with its unit in mm."""
     if len(str(text)) > _LONGEST:
-        raise InputError(f"{label}: {len(str(text))} characters: must be a length with its unit, as 6,0 mm or 1/4 in")
+        raise InputError(
+            f"{label}: {len(str(text))} characters: must be a length with its unit, such as 6,0 mm or 1/4 in"
+        )
     plain = str(text).strip().replace("\N{NO-BREAK SPACE}", " ")
     value, unit = None, ""
     if hit := _MIXED.match(plain):
@@ -108,7 +110,7 @@ def _length(label: str, text: object) -> float:
     elif hit := _LENGTH.match(plain):
         value, unit = float(hit[1].replace(",", ".")) / max(int(hit[2] or 1), 1), hit[3]
     if value is None or unit.lower() not in _MM:
-        raise InputError(f"{label} = {text!r}: must be a length with its unit, as 6,0 mm or 1/4 in")
+        raise InputError(f"{label} = {text!r}: must be a length with its unit, such as 6,0 mm or 1/4 in")
     return value * _MM[unit.lower()]
 
 

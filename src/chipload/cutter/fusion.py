@@ -45,12 +45,12 @@ def read_fusion_tool(path: str | Path, tool: int | None) -> dict[str, Any]:
 
     Parameters
     ----------
-    tool : number that its post-processor gives it; None: the only tool
+    tool : post-process number of the tool; None: the only tool
 
     Raises
     ------
     InputError
-        The file cannot be read, the tool is not there or there twice, or its shape is another one.
+        The file cannot be read, the tool is missing or appears twice, or its shape is not supported.
     """
     label = f"cutter.file {path}"
     tools = [t for t in _tools(path, label) if t.get("type") not in ("holder", "probe")]
@@ -90,7 +90,7 @@ def _numbered(tools: list[dict[str, Any]], number: int, label: str) -> dict[str,
     if len(found) == 1:
         return found[0]
     if found:
-        raise InputError(f"{label}: tool {number} stands {len(found)} times: give each its own number in the library")
+        raise InputError(f"{label}: tool {number} appears {len(found)} times: give each its own number in the library")
     known = sorted({n for _, n in own if isinstance(n, int)})
     listed = ", ".join(map(str, known[:20])) or "none"
     raise InputError(f"{label}: tool {number} is not there: must be one of {listed}")

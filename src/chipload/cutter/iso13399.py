@@ -1,7 +1,7 @@
 """Reading of ISO 13399 tool data from exchange files of ISO 10303-21 (`.p21`): the properties that a cutter needs.
 
-Read are values that carry their symbol, ``NUMERICAL_VALUE('DC', ...)``, as tool makers write them; values that are
-known by the code of a dictionary alone are left out. Lengths are mm unless the unit of the value says inch.
+The reader takes values that carry their symbol, ``NUMERICAL_VALUE('DC', ...)``, as tool makers write them. It leaves
+out values that only the code of a dictionary identifies. Lengths are in mm unless the unit of the value is inch.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 from chipload.errors import InputError
 from chipload.files import read_regular
 
-#: symbol -> key of the ``[[cutter]]``; of several the first that is there counts
+#: symbol -> key of the ``[[cutter]]``; of several symbols the first one that the file states counts
 SYMBOLS = {
     "DC": "diameter_mm", "RE": "corner_radius_mm", "LCF": "flute_length_mm", "APMX": "flute_length_mm",
     "DMM": "shank_diameter_mm", "DCONMS": "shank_diameter_mm", "FHA": "helix_deg", "ZEFF": "flutes", "NOF": "flutes",
@@ -31,7 +31,7 @@ def read_iso13399(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The file cannot be read, is no exchange file, has no diameter, or states a property twice with other values.
+        The file cannot be read, is not an exchange file, has no diameter, or states a property with two values.
     """
     path = Path(path)
     label = f"cutter.file {path}"

@@ -108,19 +108,19 @@ def slices(
 
     Parameters
     ----------
-    cutter : any
-    bottom_slices : slices of the bottom line, where there is one; one at least
-    corner_slices : slices of the corner, where there is one; one at least. Of the flank arc of a barrel as many, more
-        if they would be longer than ``flank_mm``
-    grading : the bounds of those in kappa are spaced as (j / n)^grading, from 1 (evenly) to 3; above 1 they are narrow
-        near the bottom, where shallow cuts lie
+    cutter : of any shape that is not a body
+    bottom_slices : number of slices of the bottom line, at least 1
+    corner_slices : number of slices of the corner, at least 1; the flank arc of a barrel has as many, or more so that
+        none is longer than ``flank_mm``
+    grading : exponent of the spacing of the corner's slices in kappa, (j / n)^grading, from 1 (even) to 3; above 1 the
+        slices are narrow near the bottom, where shallow cuts lie
     flank_mm : greatest length of a slice of the flank [mm], above 0; None: the flank is one slice (with a taper its rho
         is then that of its middle)
 
     Returns
     -------
     Slices
-        From the axis upwards; a part of the profile that has no length has none.
+        From the axis upwards; a part of the profile without length has no slice.
 
     Examples
     --------

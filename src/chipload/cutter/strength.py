@@ -19,7 +19,7 @@ from enum import StrEnum
 
 from chipload.errors import InputError
 
-#: a cutter with a lower modulus [MPa] is of steel where its material is not stated: steel 210 GPa, carbide 400 to 700
+#: modulus [MPa] below which a cutter without a stated material is steel: steel 210 GPa, carbide 400 to 700
 STEEL_BELOW = 3.5e5
 
 
@@ -32,7 +32,7 @@ class ToolMaterial(StrEnum):
 
 #: strength [MPa]: transverse rupture strength of carbide, yield strength of high-speed steel
 STRENGTHS = {ToolMaterial.CARBIDE: 3000.0, ToolMaterial.HSS: 3250.0}
-#: where they come from
+#: sources of these strengths
 SOURCES = {
     ToolMaterial.CARBIDE: "transverse rupture strength of fine-grained WC-Co, doi 10.1098/rsta.2017.0443, section 3a",
     ToolMaterial.HSS: "compressive yield strength of M2 at 62 to 65 HRC, trade data sheets",
@@ -46,7 +46,7 @@ class ToolStrength:
 
     Parameters
     ----------
-    material : None: by the modulus of the cutter, see :data:`STEEL_BELOW`
+    material : of the cutter; None: from its modulus, see :data:`STEEL_BELOW`
     mpa : strength [MPa]; None: that of :data:`STRENGTHS`
     safety_factor : strength over the stress that is allowed, at least 1
     concentration : K_t, stress at the root of a flute or a step over that of a smooth bar, at least 1. By default 1:

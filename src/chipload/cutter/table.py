@@ -24,7 +24,7 @@ from chipload.tables import nearest
 
 #: endings of files with tool data
 ENDINGS = (".fctb", ".json", ".tools", ".p21", ".camotics", ".tbl")
-#: keys that a cutter cannot be without
+#: keys that every cutter requires
 NEEDED = ("number", "diameter_mm", "flutes", "helix_deg", "flute_length_mm", "overhang_mm", "modulus_gpa")
 
 
@@ -52,7 +52,10 @@ class CutterTable(BaseModel):
     name: str | None = Field(None, description="name shown in the report")
     diameter_mm: float | None = Field(None, description=f"diameter, from {THINNEST:g} to {WIDEST:g}")
     flutes: int | None = Field(None, description=f"number of teeth, at most {MOST_FLUTES}")
-    helix_deg: float | None = Field(None, description="helix angle, right-handed, below 80")
+    helix_deg: float | None = Field(None, description="helix angle, of the hand of the cutter, below 80")
+    left_hand: bool | None = Field(
+        None, description="whether it cuts with the spindle counter-clockwise (M4); default false"
+    )
     flute_length_mm: float | None = Field(None, description="length of the cutting edges along the axis")
     overhang_mm: float | None = Field(None, description=f"length from the holder to the tip, at most {LONGEST:g}")
     modulus_gpa: float | None = Field(None, description="Young's modulus of the cutter: carbide 580, steel 210")
@@ -151,6 +154,7 @@ class CutterTable(BaseModel):
             body=values.get("body_mm", ()),
             number=values["number"],
             name=values.get("name", ""),
+            left_hand=values.get("left_hand", False),
         )
 
     def _from_file(self, folder: Path) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""LinuxCNC tool tables (`.tbl`): a line a tool, `T1 P1 Z+0.511 D10.0 ;10 mm end mill`.
+"""LinuxCNC tool tables (`.tbl`): one line for each tool, `T1 P1 Z+0.511 D10.0 ;10 mm end mill`.
 
 Lengths are in the machine's unit, which the file does not state: the caller states it.
 """
@@ -29,7 +29,7 @@ def read_tool_table(path: str | Path, tool: int, unit: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The file cannot be read, a line is not a tool, the tool is not there or there twice.
+        The file cannot be read, a line is not a tool, or the tool is missing or appears twice.
     """
     path = Path(path)
     label = f"cutter.file {path}"
@@ -42,7 +42,7 @@ def read_tool_table(path: str | Path, tool: int, unit: str) -> dict[str, Any]:
             continue
         words = {letter.upper(): float(number) for letter, number in _WORD.findall(body)}
         if "T" not in words or _WORD.sub("", body).strip():
-            raise InputError(f"{label} line {k}: not a tool: must be words as T1 P1 D10")
+            raise InputError(f"{label} line {k}: not a tool: must be words such as T1 P1 D10")
         if not all(abs(number) < _LARGEST_NUMBER for number in words.values()):
             raise InputError(f"{label} line {k}: a number is too large: must be below {_LARGEST_NUMBER:g}")
         number = int(words["T"])

@@ -16,7 +16,7 @@ from numba import njit
 
 PI = math.pi
 TAU = 2.0 * math.pi
-#: angle beside a break, where the smooth piece is sampled [rad]
+#: distance from a break at which the smooth piece next to it is sampled [rad]
 BESIDE = 1e-9
 GOLDEN = 0.6180339887498949
 REFINEMENTS = 14
@@ -121,7 +121,7 @@ def edge(mid, half, along, offset, across, sine, cosine, c):
 
 @njit(cache=True, nogil=True)
 def first_turn(theta, j, teeth, p, first):
-    """The least theta - 2 pi j / teeth + 2 pi i at which an edge of tooth j that lags by ``first`` is not before p."""
+    """Least theta - 2 pi j / teeth + 2 pi i at which the edge of tooth j, lagging by ``first`` [rad], has reached p."""
     turn = theta - TAU * j / teeth
     turn -= TAU * math.floor(turn / TAU)
     if turn - first < p:
@@ -131,7 +131,7 @@ def first_turn(theta, j, teeth, p, first):
 
 @njit(cache=True, nogil=True)
 def engaged_part(turn, base, rate, p, q, s1, s2):
-    """The part of the edge s1 .. s2, lagging by base + rate s, that is between p and q at ``turn``; none: s1 .. s1."""
+    """Part of the edge s1 .. s2 [mm], lagging by base + rate s, that is between p and q at ``turn``; none: s1 .. s1."""
     if rate > 0.0:
         return max(s1, (turn - base - q) / rate), min(s2, (turn - base - p) / rate)
     if turn - base >= q:
@@ -219,7 +219,7 @@ def means(start, rows, tooth, piece, slices, teeth, c, out):
 
 @njit(cache=True, nogil=True)
 def size(what, theta, rows, tooth, piece, slices, lo, hi, teeth, c):
-    """What is made greatest: 0 in-plane resultant squared, 1 torque, 2 size of the axial force."""
+    """Quantity ``what`` at a rotation: 0 square of the in-plane resultant, 1 torque, 2 size of the axial force."""
     ft, fn, fa, mt = load(theta, rows, tooth, piece, slices, lo, hi, teeth, c)
     if what == 0:
         return ft * ft + fn * fn

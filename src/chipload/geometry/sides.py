@@ -62,8 +62,8 @@ def wall_of(front: BSplinePatch, back: BSplinePatch, clamp: Callable[[Floats], f
     front = min(_orientations(front), key=lambda p: clamp(p.at(_FEW, 0.0)))
     u, v = (x.ravel() for x in np.meshgrid(_FEW, _FEW, indexing="ij"))
     p = front.at(u, v)
-    ways = [q for way in _orientations(back) for q in (way, way.reversed(True, False))]
-    back = min(ways, key=lambda q: float(np.linalg.norm(q.at(u, v) - p, axis=1).mean()))
+    orientations = [q for one in _orientations(back) for q in (one, one.reversed(True, False))]
+    back = min(orientations, key=lambda q: float(np.linalg.norm(q.at(u, v) - p, axis=1).mean()))
     along, up = (front.at(*b) - front.at(*a) for a, b in (((0.0, 0.5), (1.0, 0.5)), ((0.5, 0.0), (0.5, 1.0))))
     towards = (p - back.at(u, v)).mean(axis=0)
     if towards @ np.cross(up[0], along[0]) > 0.0:
@@ -97,9 +97,11 @@ def _distance(points: Floats, surface: Revolved) -> Floats:
 
 def _along_the_flow(patch: BSplinePatch, hub: Revolved, shroud: Revolved) -> BSplinePatch:
     """V from hub to shroud, u from the end of greater z."""
-    ways = _orientations(patch)
-    off = [float(_distance(p.at(_FEW, 0.0), hub).mean() + _distance(p.at(_FEW, 1.0), shroud).mean()) for p in ways]
-    best = ways[int(np.argmin(off))]
+    orientations = _orientations(patch)
+    off = [
+        float(_distance(p.at(_FEW, 0.0), hub).mean() + _distance(p.at(_FEW, 1.0), shroud).mean()) for p in orientations
+    ]
+    best = orientations[int(np.argmin(off))]
     ahead = best.at(0.0, _FEW)[:, 2].mean() >= best.at(1.0, _FEW)[:, 2].mean()
     return best if ahead else best.reversed(True, False)
 

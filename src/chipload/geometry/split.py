@@ -165,12 +165,12 @@ def chained_segments(raw: RawSegments, pieces: SplitSegments, d: float, tol: flo
         used[first] = True
         while True:
             node = pieces.node[chain[-1], 1]
-            ways = [m for m in leaving[node] if not used[m]]
+            following = [m for m in leaving[node] if not used[m]]
             if node == pieces.node[first, 0]:
-                ways.append(first)
-            if not ways:
+                following.append(first)
+            if not following:
                 break
-            best = ways[0] if len(ways) == 1 else max(ways, key=lambda m: sharpness(chain[-1], m))
+            best = following[0] if len(following) == 1 else max(following, key=lambda m: sharpness(chain[-1], m))
             if best == first:
                 break
             used[best] = True

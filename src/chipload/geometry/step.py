@@ -9,17 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
 from chipload.files import is_file, open_regular
-from chipload.geometry.biarc import arcs_along
-from chipload.geometry.chains import Drawing, chained
 from chipload.geometry.contour import Contour, Floats
 from chipload.geometry.isolated import Isolated
+
+# biarc and chains are imported where they are used: their libraries take as long to start as the CAD kernel, and the
+# process of the kernel seldom needs them
+if TYPE_CHECKING:
+    from chipload.geometry.chains import Drawing
 
 #: a plane is horizontal if its normal leaves Z by less [rad], and two heights are one within the same [mm]
 LEVEL = 1e-6
@@ -61,6 +64,8 @@ def read_step_face(
     if not chosen:
         named = ", ".join(f"{z:g}" for z in heights)
         raise InputError(f"part.z_mm = {level:g}: no horizontal planar face there; faces are at {named} mm")
+    from chipload.geometry.chains import Drawing, chained
+
     findings: list[Finding] = []
     contours: list[Contour] = []
     for edges in chosen:
@@ -228,6 +233,7 @@ def _edges(face: Any, tolerance_mm: float) -> Iterator[Floats]:
             centre, side = circle.Location(), np.sign(circle.Axis().Direction().Z())
             rows = np.array([[p.X(), p.Y(), q.X(), q.Y(), centre.X(), centre.Y(), side * (b - a)]])
         else:
+            from chipload.geometry.biarc import arcs_along
 
             def along(t: float, on: Any = curve) -> tuple[Floats, Floats]:
                 point, slope = gp_Pnt(), gp_Vec()

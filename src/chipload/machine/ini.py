@@ -31,7 +31,7 @@ _RAD_PER |= {"gon": math.pi / 200.0}
 #: [mm] of each unit of length of a configuration
 UNITS_MM = {"mm": 1.0, "metric": 1.0, "in": 25.4, "inch": 25.4, "imperial": 25.4, "cm": MM_PER["cm"]}
 _OWN: dict[str, Vector] = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
-_OWN |= {turn: _OWN[way] for turn, way in zip("ABCUVW", "XYZXYZ", strict=True)}
+_OWN |= {turn: _OWN[axis] for turn, axis in zip("ABCUVW", "XYZXYZ", strict=True)}
 
 
 @dataclass(frozen=True)
@@ -166,8 +166,8 @@ def _geometry(
     if module is None:
         for letter in order:
             if letter in "ABC":
-                way = "XYZ"["ABC".index(letter)]
-                text = f"{letter}: trivkins do not state its position: taken as a table about {way} through the origin"
+                axis = "XYZ"["ABC".index(letter)]
+                text = f"{letter}: trivkins do not state its position: taken as a table about {axis} through the origin"
                 findings.append(Finding("ini-kinematics", 0, text))
         return {}, {}, origin
     pins = hal_pins(ini, findings)
@@ -187,8 +187,10 @@ def _geometry(
         return {"A": far, "B": (x, y, z)}, {}, origin
     tilt = order[1]
     sign = 1.0 if pins.get(f"{name}.conventional-directions") else -1.0
-    ways = {letter: (sign * _OWN[letter][0], sign * _OWN[letter][1], sign * _OWN[letter][2]) for letter in order[:2]}
-    return {"C": (x, y, z), tilt: far}, ways, origin
+    directions = {
+        letter: (sign * _OWN[letter][0], sign * _OWN[letter][1], sign * _OWN[letter][2]) for letter in order[:2]
+    }
+    return {"C": (x, y, z), tilt: far}, directions, origin
 
 
 def _unit(ini: Ini, key: str, known: dict[str, float]) -> float:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.program.path_mode import frozen_column, mode_column
+from chipload.program.tilt import Tilt
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -43,7 +44,8 @@ def _zeros() -> Floats:
 class Frame:
     """How the coordinates of a text lie in those of the machine.
 
-    ``machine = rotate_xy(position + shift, rotation) + offset + tool``, with the rotation about Z.
+    ``machine = rotate_xy(tilt(position) + shift, rotation) + offset + tool``, with the rotation about Z. Rows in tilted
+    coordinates are rows of the tip: ``machine`` is then where the axes would stand with the rotary ones at zero.
 
     Parameters
     ----------
@@ -52,6 +54,7 @@ class Frame:
     rotation : of the work offset [rad]
     shift : (9,) float [mm, rad], of G92 and G52
     tool : (9,) float [mm, rad], length offset of the tool
+    tilt : the tilted working plane; None: none
     """
 
     number: int = 1
@@ -59,6 +62,7 @@ class Frame:
     rotation: float = 0.0
     shift: Floats = field(default_factory=_zeros)
     tool: Floats = field(default_factory=_zeros)
+    tilt: Tilt | None = None
 
     def __post_init__(self) -> None:
         for name in ("offset", "shift", "tool"):
@@ -71,6 +75,8 @@ class Frame:
     def to_machine(self, position: Floats) -> Floats:
         """(n, 9) of the machine, less nothing: of its own axes, from (n, 9) in this frame."""
         p = position + self.shift
+        if self.tilt is not None:
+            p[:, :3] = self.tilt.to_offset(position[:, :3]) + self.shift[:3]
         c, s = math.cos(self.rotation), math.sin(self.rotation)
         x, y = c * p[:, 0] - s * p[:, 1], s * p[:, 0] + c * p[:, 1]
         p[:, 0], p[:, 1] = x, y
@@ -84,7 +90,10 @@ class Frame:
         c, s = math.cos(self.rotation), math.sin(self.rotation)
         x, y = c * p[:, 0] + s * p[:, 1], -s * p[:, 0] + c * p[:, 1]
         p[:, 0], p[:, 1] = x, y
-        return p - self.shift
+        p = p - self.shift
+        if self.tilt is not None:
+            p[:, :3] = self.tilt.from_offset(p[:, :3])
+        return p
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,7 @@ from chipload.program.heidenhain.reader import heidenhain_text, read_heidenhain,
 from chipload.program.program import Program
 from chipload.program.reconcile import agree, tool_comments
 from chipload.program.setup import Setup
+from chipload.program.swivel import Swivel
 from chipload.program.time import row_times
 from chipload.program.to_axes import LIMITS, to_axes
 from chipload.program.to_work import TOLERANCE_MM, axes_of, to_work, work_frame
@@ -123,6 +124,7 @@ def read_program(
     path, setup = Path(path), setup or Setup()
     kind = dialect_of(path, machine, dialect)
     values, origins, placed = setup.values(kind), setup.origins(kind), setup.placed(kind)
+    swivel = Swivel(machine, placed)
     if kind == "apt":
         lengths = tools.lengths() if tools is not None else {}
         text = apt_text(path) if text is None else text
@@ -142,6 +144,7 @@ def read_program(
             commands, findings = read_heidenhain(
                 text, name=path.name, folder=path.parent, parameters={int(k): v for k, v in values.items()},
                 radii={n: 0.5 * diameter for n, diameter in known.items()}, feed=feed,
+                swivel=swivel,
             )  # fmt: skip
         else:
             text = gcode_text(path) if text is None else text
@@ -150,7 +153,7 @@ def read_program(
             commands, findings = read_gcode(
                 text, name=path.name, folder=path.parent, dialect=kind, tools=tools, parameters=values,
                 origins=origins, diameters=setup.diameters(), feed=None if feed is None else mm_min_from_mm_s(feed),
-                lenient=not strict, progress=progress,
+                lenient=not strict, swivel=swivel, progress=progress,
             )  # fmt: skip
         if len(commands) == 0:
             left_out = next((f": {f}" for f in findings if f.severity >= Severity.UNPROVEN), "")

@@ -8,13 +8,14 @@ control leaves the straight line: the row is cut into pieces. So is an arc whose
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.errors import Finding, InputError
+from chipload.errors import Finding, InputError, Severity
 from chipload.machine.kinematics import forward, with_tip
 from chipload.machine.linearise import traced
 from chipload.machine.machine import Machine
@@ -44,6 +45,8 @@ Ints = NDArray[np.int64]
 TOLERANCE_MM = 1e-3
 #: rows that are taken to the workpiece at once
 ROWS = 1 << 15
+#: the tool stands along the normal of a tilted plane [rad]
+ALONG = 1e-4
 _ROTARY = slice(3, 6)
 _STILL = 1e-12  # [rad] a rotary axis that moves less stands
 
@@ -62,12 +65,12 @@ def work_frame(commands: Commands, number: int | None = None) -> Frame:
     """
     used: list[Frame] = [commands.frames[k] for k in dict.fromkeys(commands.frame.tolist())]
     if number is None:
-        return next((f for f in used if f.number > 0), Frame())
+        return replace(next((f for f in used if f.number > 0), Frame()), tilt=None)
     found = next((f for f in used if f.number == number), None)
     if found is None:
         known = ", ".join(dict.fromkeys(_offset_name(f.number) for f in used if f.number > 0)) or "none"
         raise InputError(f"program.placed_in: no motion is in {_offset_name(number)}: must be one of {known}")
-    return found
+    return replace(found, tilt=None)
 
 
 def _offset_name(number: int) -> str:
@@ -81,7 +84,7 @@ def axes_of(commands: Commands, machine: Machine, placed: int | None = None) -> 
     :func:`to_work`.
     """
     base = work_frame(commands, placed)
-    zero, shift = _work_zero(machine, base, bool(base.offset.any()))
+    zero, shift = work_zero(machine, base, bool(base.offset.any()))
     axes = commands.machine() + shift
     if not (machine.chain.rotary and commands.tcp.any()):
         return axes
@@ -111,7 +114,7 @@ def to_work(
     findings = _strangers(commands, machine)
     base = work_frame(commands, placed)
     known = bool(base.offset.any())
-    zero, shift = _work_zero(machine, base, known)
+    zero, shift = work_zero(machine, base, known)
     commands = chorded(commands, _turning(commands) | spirals(commands, 0.999 * ARC_SKEW_MM), tolerance)
     turning = _turning(commands)
     # only rows that turn and arcs of a machine with rotary axes are traced by the axes
@@ -143,6 +146,7 @@ def to_work(
     columns["motion"] = np.where(commands.motion == ARC, arcs, columns["motion"])
     program = Program(**columns, feed=commands.feed, labels=commands.labels)
     cut = turning & ~commands.tcp & (commands.motion != DWELL)
+    findings += _off_normal(commands, axis)
     program = _timed(program, commands, cut)
     if cut.any():
         program = _traced(program, machine, axes, tool, zero, cut, tolerance)
@@ -161,6 +165,24 @@ def _strangers(commands: Commands, machine: Machine) -> tuple[Finding, ...]:
     probes = np.flatnonzero(commands.motion == PROBE)
     text = "{} probing moves are taken to their ends"
     return (Finding("program-probe", int(commands.line[probes[0]]), text.format(len(probes))),) if len(probes) else ()
+
+
+def _off_normal(commands: Commands, axis: Floats) -> tuple[Finding, ...]:
+    """Cuts in a tilted plane with the tool not along its normal: said once, with the first line and the worst angle."""
+    off = np.zeros(len(commands))
+    for k, frame in enumerate(commands.frames):
+        if frame.tilt is not None:
+            rows = (commands.frame == k) & np.isin(commands.motion, (LINE, ARC))
+            across = np.linalg.norm(np.cross(axis[rows], frame.tilt.direction), axis=1)
+            off[rows] = np.arctan2(across, axis[rows] @ frame.tilt.direction)
+    beside = np.flatnonzero(off > ALONG)
+    if not len(beside):
+        return ()
+    text = (
+        f"{len(beside)} cuts in a tilted plane with the tool up to {math.degrees(off.max()):.3g} deg off its normal: "
+        "turn the rotary axes there before (G53.1, PLANE ... TURN, DIR of CYCLE800)"
+    )
+    return (Finding("program-tilted-plane", int(commands.line[beside[0]]), text, Severity.UNPROVEN),)
 
 
 def _turning(commands: Commands) -> NDArray[np.bool_]:
@@ -187,7 +209,7 @@ def tool_length(machine: Machine, frame: Frame) -> float:
     return float(frame.tool[:3] @ unit / (unit @ unit))
 
 
-def _work_zero(machine: Machine, base: Frame, known: bool) -> tuple[Floats, Floats]:
+def work_zero(machine: Machine, base: Frame, known: bool) -> tuple[Floats, Floats]:
     """(3,) the work's zero in the machine's frame [mm]; (9,) what to add to the axes where the offset is not known."""
     if known:
         zero = np.array(base.offset)

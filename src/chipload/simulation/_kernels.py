@@ -205,7 +205,7 @@ def uncut(px, py, k, w, reach, own, apart, mot, grid, rows, hint):
     motion before ``own`` within ``reach + apart``. The stock's own boundary is displaced by ``apart`` as well: above 0
     inwards, below 0 outwards.
 
-    ``hint[0]`` is the motion that cut the point asked last; it is tried first.
+    ``hint[0]`` is the motion that cut the last tested point; it is tested first.
     """
     gx, gy, h, nx, ny, start, items, cover = grid
     i = math.floor((px - gx) / h)
@@ -248,7 +248,7 @@ def rim(k, w, centre, heading, radius, reach, own, apart, sample, precision, mot
         phi):  # fmt: skip
     """Fill ``angle``, ``count`` and ``phi`` of the queries first..last.
 
-    The rim at ``radius`` about ``centre`` is asked at the immersions ``sample`` (rising from 0 to pi); each change is
+    The rim at ``radius`` about ``centre`` is tested at the immersions ``sample`` (rising from 0 to pi); each change is
     halved down to ``precision`` [rad]. ``own`` and ``apart`` as of :func:`uncut`.
     """
     hint = np.full(1, -1, dtype=np.int64)
@@ -377,7 +377,7 @@ def signed_distance(points, wall, loose, side, out):
 def locate(points, z, mot, z0, z1, tolerance, z_tolerance, k, w):
     """Moments of the points (m, 2) at the heights z, each sought forward from the one before it.
 
-    Returns the number found: m, or the index of the first point that lies nowhere on what is left of the path.
+    Returns the number found: m, or the index of the first point that does not lie on the rest of the path.
     """
     motion = 0
     share = 0.0

@@ -214,7 +214,7 @@ def samples(step: float) -> Floats:
 
 
 def rim_engagement(
-    trail: CentrePath,
+    centres: CentrePath,
     motion: ArrayLike,
     share: ArrayLike,
     *,
@@ -242,16 +242,16 @@ def rim_engagement(
     The ends of the front half lie exactly on the wall just made: there the rim counts as uncut within ``TOUCH_MM``.
     So a rim that runs along a wall already finished shows a piece of acos(1 - TOUCH_MM / R), 0.001 deg at R = 5.
     """
-    k, w = trail._moments(motion, share)
+    k, w = centres._moments(motion, share)
     m = len(k)
-    centre, heading = trail.places(k, w)
+    centre, heading = centres.places(k, w)
     angle, count, phi = np.zeros(m), np.zeros(m, dtype=np.int64), np.zeros((m, PIECES, 2))
     asked = samples(math.radians(step_deg))
-    mot, grid, rows, radius = trail.motions, trail.grid, trail.rows, trail.radius
+    mot, grid, rows, radius = centres.motions, centres.grid, centres.rows, centres.radius
     cut = np.linspace(0, m, max(workers, 1) + 1).astype(int)
-    begins = np.concatenate([[0.0], np.cumsum(trail.lengths)])
-    behind = begins[k] + w * trail.lengths[k] - OWN_MM
-    away = np.maximum.accumulate(np.where(np.asarray(trail.active), 0, np.arange(len(trail.segments))))
+    begins = np.concatenate([[0.0], np.cumsum(centres.lengths)])
+    behind = begins[k] + w * centres.lengths[k] - OWN_MM
+    away = np.maximum.accumulate(np.where(np.asarray(centres.active), 0, np.arange(len(centres.segments))))
     own = np.maximum(np.searchsorted(begins, behind, side="right") - 1, away[k])
 
     def run(i: int) -> Any:

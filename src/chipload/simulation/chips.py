@@ -60,7 +60,7 @@ from chipload.simulation.removal import (
 )
 from chipload.simulation.steps import BLOCK, StepBlocks, Steps, moving_rows, number_of_steps, steps_in_blocks
 from chipload.simulation.strips import strips_for
-from chipload.simulation.swept_area import Interpolation
+from chipload.simulation.swept_area import Interpolation, require_upright
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_min_from_mm_s
 from chipload.workers import Workers
@@ -152,7 +152,7 @@ def remove(
                     kept.setdefault(engaged.tool, []).append(engaged)
             break
         except HandOver as why:
-            setting, handed = by_layers(engine, setting, why)
+            setting, handed = by_layers(engine, setting, why, program, stock)
     progress(1.0, "removed")
     cut = tuple(joined(kept[number]) for number in sorted(kept))
     if setting.moves is not None:
@@ -207,15 +207,28 @@ def with_engine(
             setting.interpolation,
         )  # fmt: skip
     except HandOver as found:
-        return by_layers(engine, setting, found)
+        return by_layers(engine, setting, found, program, stock)
     return replace(setting, moves=run), None
 
 
-def by_layers(engine: Engine, setting: RunSettings, found: HandOver) -> tuple[RunSettings, tuple[int, str]]:
-    """Return the settings of the run from its start by layers."""
+def by_layers(
+    engine: Engine, setting: RunSettings, found: HandOver, program: Program, stock: LayeredStock
+) -> tuple[RunSettings, tuple[int, str]]:
+    """Return the settings of the run from its start by layers.
+
+    Raises
+    ------
+    InputError
+        The moves were asked for, or the axis of the tool lies or looks up somewhere, which layers cannot simulate.
+    """
+    place = f"line {found.line}" if found.line else "stock"
     if engine == "moves":
-        place = f"line {found.line}" if found.line else "stock"
         raise InputError(f'{place}: {found.why}: state engine = "layers" or "auto"')
+    fine = setting.resolution
+    try:
+        require_upright(program, fine.step_mm, fine.tolerance, stock, setting.cutters, setting.interpolation)
+    except InputError as err:
+        raise InputError(f"{place}: {found.why}, which is simulated by layers only, and {err}") from None
     return replace(setting, moves=None), (found.line, found.why)
 
 

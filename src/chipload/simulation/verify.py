@@ -291,8 +291,8 @@ def _rapids(program: Program, level: _Level, step: float) -> tuple[list[Place], 
     asked = 0
     if not len(at):
         return hits, asked
-    trail, path = level.centre_path, CentrePath(flat_motions(program), level.centre_path.radius)
-    reach = trail.radius - RAPID_MM
+    centres, path = level.centre_path, CentrePath(flat_motions(program), level.centre_path.radius)
+    reach = centres.radius - RAPID_MM
     front = np.linspace(0.0, np.pi, 181)
     around = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
     ring = np.column_stack([np.cos(around), np.sin(around)])
@@ -312,7 +312,7 @@ def _rapids(program: Program, level: _Level, step: float) -> tuple[list[Place], 
             points = np.vstack([o[0] + disc, points])
             owner = np.concatenate([np.zeros(len(disc), dtype=np.int64), owner])
         asked += len(points)
-        still = trail.uncut(points, np.full(len(points), k - 1), np.ones(len(points)))
+        still = centres.uncut(points, np.full(len(points), k - 1), np.ones(len(points)))
         if still.any():
             x, y = o[owner[int(still.argmax())]]
             hits.append((float(x), float(y)))
@@ -394,17 +394,17 @@ def _compare(
 
 
 def _degrees(
-    trail: CentrePath, k: Ints, w: Floats, step_deg: float, workers: int, displacement_mm: float = 0.0
+    centres: CentrePath, k: Ints, w: Floats, step_deg: float, workers: int, displacement_mm: float = 0.0
 ) -> Floats:
-    rim = rim_engagement(trail, k, w, step_deg=step_deg, workers=workers, displacement_mm=displacement_mm)
+    rim = rim_engagement(centres, k, w, step_deg=step_deg, workers=workers, displacement_mm=displacement_mm)
     return np.degrees(rim.angle)
 
 
-def _difference(trail: CentrePath, k: Ints, w: Floats, planned: Floats, tolerance: float, workers: int) -> Floats:
+def _difference(centres: CentrePath, k: Ints, w: Floats, planned: Floats, tolerance: float, workers: int) -> Floats:
     """(m,) |found - planned| [deg]; where a displacement by at most ``MATCH_MM`` makes an engagement within
     ``tolerance`` of the planned one, only what is between them.
     """
-    found, low, high = (_degrees(trail, k, w, FINE_DEG, workers, d) for d in (0.0, MATCH_MM, -MATCH_MM))
+    found, low, high = (_degrees(centres, k, w, FINE_DEG, workers, d) for d in (0.0, MATCH_MM, -MATCH_MM))
     apart = np.maximum(np.maximum(low - planned, planned - high), 0.0)
     return np.where(apart <= tolerance, np.minimum(apart, np.abs(found - planned)), np.abs(found - planned))
 

@@ -36,7 +36,7 @@ class GreatestDistance:
     samples: int
 
 
-def gouge(trail: CentrePath, wall: Sequence[Contour], material: str, step_mm: float = 0.05) -> GreatestDistance:
+def gouge(centres: CentrePath, wall: Sequence[Contour], material: str, step_mm: float = 0.05) -> GreatestDistance:
     """Return the greatest depth R - d of the cutter in the part (0 if it does not enter), and the wall's point there.
 
     Parameters
@@ -62,12 +62,12 @@ def gouge(trail: CentrePath, wall: Sequence[Contour], material: str, step_mm: fl
     if not step_mm > 0.0:
         raise InputError(f"gouge: step_mm = {step_mm:g}: must be above 0")
     rows, loose, side = _wall(wall, material)
-    k, w = _stations(trail, step_mm)
+    k, w = _stations(centres, step_mm)
 
     def depth(k: Ints, w: Floats) -> Floats:
         out = np.empty(len(k))
-        _kernels.signed_distance(trail.places(k, w)[0], rows, loose, side, out)
-        return trail.radius - out
+        _kernels.signed_distance(centres.places(k, w)[0], rows, loose, side, out)
+        return centres.radius - out
 
     g = depth(k, w)
     high = np.flatnonzero((g >= np.r_[-np.inf, g[:-1]]) & (g >= np.r_[g[1:], -np.inf]) & (g > -step_mm))
@@ -87,13 +87,13 @@ def gouge(trail: CentrePath, wall: Sequence[Contour], material: str, step_mm: fl
         j = int(found.argmax())
         if found[j] > best_g:
             best_k, best_w, best_g = k[high][j], float(middle[j]), float(found[j])
-    o = trail.places([best_k], [best_w])[0][0]
+    o = centres.places([best_k], [best_w])[0][0]
     near = min((*_kernels.nearest(rows, i, 0.0, 1.0, o[0], o[1]), i) for i in range(len(rows)))
     x, y, _, _ = _kernels.place(rows, near[2], near[1])
     return GreatestDistance(max(best_g, 0.0), (float(x), float(y)), len(k))
 
 
-def excess(trail: CentrePath, wall: Sequence[Contour], step_mm: float = 0.05) -> GreatestDistance:
+def excess(centres: CentrePath, wall: Sequence[Contour], step_mm: float = 0.05) -> GreatestDistance:
     """Return the greatest excess on the wall, max(0, distance from the wall's point to the path - R), and that point.
 
     The wall is sampled at most every ``step_mm`` [mm] and at its joints; each distance is exact.
@@ -112,7 +112,7 @@ def excess(trail: CentrePath, wall: Sequence[Contour], step_mm: float = 0.05) ->
             for c in wall
         ]
     )
-    left = np.maximum(trail.distance(points) - trail.radius, 0.0)
+    left = np.maximum(centres.distance(points) - centres.radius, 0.0)
     k = int(left.argmax())
     return GreatestDistance(float(left[k]), (float(points[k, 0]), float(points[k, 1])), len(points))
 
@@ -132,10 +132,10 @@ def _wall(wall: Sequence[Contour], material: str) -> tuple[Floats, Ints, float]:
     return rows, np.concatenate(loose), 1.0 if material == "left" else -1.0
 
 
-def _stations(trail: CentrePath, step: float) -> tuple[Ints, Floats]:
+def _stations(centres: CentrePath, step: float) -> tuple[Ints, Floats]:
     """Moments of all motions that cut, both ends among them, no more than ``step`` apart."""
-    k = np.flatnonzero(np.asarray(trail.active))
-    n = np.maximum(np.ceil(trail.lengths[k] / step).astype(np.int64), 1)
+    k = np.flatnonzero(np.asarray(centres.active))
+    n = np.maximum(np.ceil(centres.lengths[k] / step).astype(np.int64), 1)
     owner = np.repeat(np.arange(len(k)), n + 1)
     within = np.arange(len(owner)) - np.repeat(np.cumsum(n + 1) - (n + 1), n + 1)
     return k[owner], within / n[owner]

@@ -26,15 +26,15 @@ TAU = 2.0 * math.pi
 HERMITE = np.array([[2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, -2 * t**3 + 3 * t**2, t**3 - t**2] for t in G3])
 #: and their slopes, over the length of the cell
 SLOPES = np.array([[6 * t**2 - 6 * t, 3 * t**2 - 4 * t + 1, 6 * t - 6 * t**2, 3 * t**2 - 2 * t] for t in G3])
-#: fewest cells of a period
+#: least number of cells of a period
 FEWEST = 12
 #: multiplier below which its logarithm does not matter
 TINY = 1e-9
-#: factors on the force at which a stable, and an unstable step is looked at first
+#: factors on the force at which a stable and an unstable step are tested first
 ABOVE = np.array([1.25, 1.5, 2.0, 3.0])
 BELOW = 0.7
 DOWN = 16
-#: evaluations that close in on the limit, and how near to 0 log|mu| comes there
+#: greatest number of evaluations near the limit, and tolerance of log|mu| there
 CLOSING = 14
 CLOSE = 3e-4
 
@@ -269,7 +269,7 @@ def scaled(U, w, h, m, scale):
 @njit(cache=True, nogil=True, fastmath=True)
 def arnoldi(ends, forces, cuts, free, push, U, w, h, m, most, tol, V, H, room, x, y, q, v, scale):
     """Modulus and angle of the greatest multiplier, and the dimension of the Krylov space, kept in ``V`` (rows) and
-    ``H``. It ends where the modulus moved by less than ``tol`` over two dimensions, 6 at least, ``most`` at most.
+    ``H``. It ends when the modulus changes by less than ``tol`` over two dimensions, with 6 to ``most`` dimensions.
     """
     n = 4 * m + 2 * len(w)
     most = min(most, n - 1)
@@ -391,8 +391,8 @@ def margins(first, last, start, rows, damped, exponents, tau, pitch, w, z, U, pe
     """Of the cuts first .. last - 1: the factor on the force at which the greatest multiplier has the modulus 1, the
     frequency there [Hz], the mode from 0, log|mu| at the factor 1, and evaluations: out (n, 5).
 
-    A stable cut is looked at at the factors ``ABOVE``; where it is stable at each the factor is the last of them, the
-    frequency 0 and the mode -1. The factor is -1 where eigenvalues were not found.
+    A stable cut is tested at the factors ``ABOVE``; if it is stable at all of them, the factor is the last one, the
+    frequency 0 and the mode -1. The factor is -1 if the eigenvalues were not found.
     """
     modes = len(z)
     for k in range(first, last):

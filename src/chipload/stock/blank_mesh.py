@@ -10,9 +10,9 @@ from chipload.stock.layers import LayeredStock
 from chipload.stock.solid import prisms
 from chipload.stock.tile_grid import polygons
 
-#: prisms at most, where sections differ from layer to layer
+#: greatest number of prisms, if sections differ from layer to layer
 PRISMS = 64
-#: by how much a prism reaches into the next [mm]: far over what rays tell apart, far below what is seen
+#: overlap of neighbouring prisms [mm]: far above the resolution of rays, far below what is visible
 OVERLAP_MM = 2e-3
 
 

@@ -34,7 +34,7 @@ Ints = NDArray[np.int64]
 
 #: most rays in one direction
 RAY_LIMIT = 50_000_000
-#: how often rays that run along an edge of a mesh are set aside, and by how much of the pitch
+#: attempts to move rays that run along an edge of a mesh aside, and the step of each as a share of the pitch
 TRIES, ASIDE = 8, 1e-4
 
 
@@ -255,7 +255,7 @@ def _grids(low: Floats, high: Floats, pitch: float, directions: str) -> list[tup
 
 
 def _loaded(mesh: trimesh.Trimesh, caster: RayMeshIntersector, k: int, grid: Floats) -> Rays:
-    """Rays through a mesh; one that does not enter as often as it leaves runs along an edge, and is set aside."""
+    """Rays through a mesh. A ray that does not enter as often as it leaves runs along an edge, and is moved aside."""
     u, v = Rays(k, grid, np.zeros((0, 1, 2)), np.zeros(0, dtype=np.int64)).places()
     n = len(u)
     low, high = mesh.bounds[:, k]

@@ -44,13 +44,13 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Shapes = NDArray[np.object_]
 
-#: what a saved stock says of itself
+#: kind of a saved stock
 KIND = "chipload layered stock 1"
 #: arrays of a saved stock and their numbers of dimensions
 SAVED = {"bounds": 1, "xs": 1, "ys": 1, "cut": 1, "room": 1, "tidied": 1, "vertices": 2, "faces": 2}
 #: shortest side of a block [mm]
 LEAST_MM = 1e-3
-#: a tile with fewer points than this is not tidied
+#: least number of points of a tile that is simplified
 ROOM = 128
 
 
@@ -71,7 +71,8 @@ class LayeredStock:
     -----
     Besides these it keeps ``tidied`` [mm^3], what it has gained by edges that were made simpler, and for every tile the
     number of points (``room``) beyond which that is done next. ``by_geos`` is the number of tiles that
-    :class:`chipload.stock.tile_rings.TileRings` left to GEOS, since the stock was made or loaded.
+    :class:`chipload.stock.tile_rings.TileRings` left to GEOS, since the stock was made or loaded. ``sections`` of the
+    part by height [mm] are shared by copies and parts of a stock, which are split at the same heights again and again.
 
     Examples
     --------
@@ -93,6 +94,7 @@ class LayeredStock:
         self.room: Ints = np.full(tiles.shape, ROOM, dtype=np.int64)
         self.tidied = 0.0
         self.by_geos = 0
+        self.sections: dict[float, MultiPolygon] = {}
 
     @classmethod
     def block(cls, low: ArrayLike, high: ArrayLike, bounds_or_layer_mm: ArrayLike, tile_mm: float) -> LayeredStock:
@@ -153,7 +155,7 @@ class LayeredStock:
             )
         xs, ys = borders_of(x0, x1, tile_mm), borders_of(y0, y1, tile_mm)
         boxes = boxes_of(xs, ys, len(bounds) - 1)
-        return cls(bounds, xs, ys, cut_up(part, 0.5 * (bounds[:-1] + bounds[1:]), boxes), part)
+        return cls(bounds, xs, ys, cut_up(part, 0.5 * (bounds[:-1] + bounds[1:]), boxes, {}), part)
 
     @property
     def layers(self) -> int:
@@ -303,12 +305,13 @@ class LayeredStock:
         self.bounds, self.cut, self.room = bounds, self.cut[parents], self.room[parents]
         self.tiles = self.tiles[parents]
         if self.part is not None:
-            self.tiles[again] = cut_up(self.part, heights[again], boxes)
+            self.tiles[again] = cut_up(self.part, heights[again], boxes, self.sections)
 
     def copied(self) -> LayeredStock:
         """Return a copy of the present stock; polygons are shared."""
         out = LayeredStock(self.bounds, self.xs, self.ys, self.tiles.copy(), self.part)
         out.cut, out.room, out.tidied = self.cut.copy(), self.room.copy(), self.tidied
+        out.sections = self.sections
         return out
 
     def cropped(self, low: ArrayLike, high: ArrayLike) -> LayeredStock | None:
@@ -327,6 +330,7 @@ class LayeredStock:
         tiles[:, 0, 0] = [MultiPolygon(polygons(shape)) for shape in flat.tolist()]
         out = LayeredStock(self.bounds, np.array([x0, x1]), np.array([y0, y1]), tiles, self.part)
         out.cut = self.cut.copy()
+        out.sections = self.sections
         return out
 
     def body(self) -> trimesh.Trimesh:

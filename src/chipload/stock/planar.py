@@ -19,13 +19,13 @@ from chipload.stock import _kernels
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: pieces that half a rim is looked at in
+#: number of pieces in which half a rim is examined
 PIECES = 48
 #: cells along a cutter radius
 CELLS = 8
 #: most cells of a grid
 CELL_LIMIT = 8_000_000
-#: relative step of the rim inside the disc: touches less deep than this part of R are none
+#: least depth of a contact of rim and material, as a share of R
 TOUCH = 1e-9
 #: status of a cell that is wholly cleared
 EMPTY = _kernels.EMPTY
@@ -37,7 +37,7 @@ class PlanarStock:
     Parameters
     ----------
     bounds : (xmin, ymin, xmax, ymax) [mm]
-        Where the rim of the cutter comes.
+        Rectangle that holds every rim of the cutter.
     radius : R [mm], > 0
 
     Examples

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 #: corners of a quarter circle
 QUARTER = 128
-#: tiles nearer than twice this touch [mm]
+#: half the distance below which tiles touch [mm]
 TOUCH = 1e-6
 #: room around the stock [mm]
 ROOM = 1.0
@@ -32,7 +32,7 @@ ROOM = 1.0
 
 @dataclass(frozen=True)
 class Boss:
-    """Stock that stands out by ``radial`` [mm] from the angle ``begin`` to ``end`` [rad], begin < end."""
+    """Boss of height ``radial`` [mm] from the angle ``begin`` to ``end`` [rad], begin < end."""
 
     begin: float
     end: float

@@ -1,7 +1,7 @@
 """Arrays and plane geometries in one ``.npz`` file that executes nothing when it is read.
 
 Notation: geometries are well-known binary (WKB, little-endian), one after the other in ``wkb`` as bytes; geometry i is
-``wkb[ends[i - 1]:ends[i]]``. ``kind`` says what the file is. Coordinates come back bit for bit.
+``wkb[ends[i - 1]:ends[i]]``. ``kind`` names the kind of the file. Coordinates are kept bit for bit.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.files import is_file, open_regular
 
-#: of a file, and of what it holds unpacked [bytes]
+#: greatest size of a file, and of its content unpacked [bytes]
 LARGEST_FILE = LARGEST = 1 << 30
-#: what a damaged archive, array or its header makes the readers raise
+#: exceptions of the readers for a damaged archive, array or header
 UNREADABLE = (
     *(ValueError, TypeError, KeyError, AttributeError, EOFError, OSError, RuntimeError, SyntaxError),
     *(ArithmeticError, MemoryError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error),
@@ -47,7 +47,7 @@ def shape_bytes(kind: str, arrays: dict[str, NDArray[Any]], shapes: NDArray[np.o
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    """An array of numbers of an archive; its head must say as many bytes as follow."""
+    """An array of numbers of an archive; the size in its header must equal the number of bytes that follow."""
     data = archive.read(f"{name}.npy")
     stream = io.BytesIO(data)
     if np.lib.format.read_magic(stream) != (1, 0):

@@ -23,7 +23,7 @@ Points = NDArray[np.uint16]
 
 #: steps of a stored coordinate from one side of the box to the other
 STEPS = 65_535
-#: the frame up to which a quad is seen that never goes
+#: last frame of a quad that is never removed
 NEVER = 65_535
 
 

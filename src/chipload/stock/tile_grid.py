@@ -27,6 +27,8 @@ Shapes = NDArray[np.object_]
 LAYER_LIMIT = 200_000
 #: most tiles times layers
 TILE_LIMIT = 20_000_000
+#: most points of the sections of a mesh that are kept
+KEPT = 200_000
 #: type numbers of GEOS
 POLYGON, MULTIPOLYGON = 3, 6
 
@@ -50,11 +52,18 @@ def areas_alone(shapes: Shapes) -> Shapes:
     return out
 
 
-def cut_up(part: trimesh.Trimesh, heights: Floats, boxes: Shapes) -> Shapes:
-    """(n, rows, columns) tiles of the sections of a mesh."""
+def cut_up(part: trimesh.Trimesh, heights: Floats, boxes: Shapes, known: dict[float, MultiPolygon]) -> Shapes:
+    """(n, rows, columns) tiles of the sections of a mesh; ``known`` are sections by height [mm], and become more."""
+    found = {h: known.get(h) for h in heights.tolist()}
+    fresh = [h for h, section in found.items() if section is None]
+    made = dict(zip(fresh, sections(part, fresh), strict=True))
+    points = [int(shapely.get_num_coordinates(list(of.values())).sum()) for of in (known, made)]
+    if sum(points) > KEPT:
+        known.clear()
+    if points[1] <= KEPT:
+        known.update(made)
     whole = np.empty((len(heights), 1, 1), dtype=object)
-    whole[:, 0, 0] = sections(part, heights)
-    shapely.prepare(whole)
+    whole[:, 0, 0] = [made[h] if h in made else found[h] for h in heights.tolist()]
     tiles = shapely.intersection(boxes, whole)
     return areas_alone(np.asarray(tiles).ravel()).reshape(tiles.shape)
 

@@ -171,7 +171,7 @@ def test_no_wall_is_deeper_in_a_certified_tapered_cutter_than_the_tolerance(side
     assert covering.tolerance == TOLERANCE
     assert all(covering.proves(c, CLEARANCE) for c in SHOP.cutters)
     # a steeper one, and one of a smaller corner, are not proved by it
-    assert not covering.proves(CatalogueCutter(10.0, 2.0, 25.0, taper=math.radians(9.0)), CLEARANCE)
+    assert not covering.proves(CatalogueCutter(10.0, 4.0, 25.0, taper=math.radians(9.0)), CLEARANCE)
     assert not covering.proves(CatalogueCutter(10.0, 1.95, 25.0, taper=math.radians(4.0)), CLEARANCE)
     points, rng, worst = dense(impeller), np.random.default_rng(3), {}
     for name, cover in (("with", covering), ("without", None)):

@@ -90,5 +90,7 @@ def test_the_flat_of_the_bottom():
         EndPose(BULL, 0.05, 7.0)
     with pytest.raises(InputError, match=r"corner_radius_mm = 4: must be below 4 on a floor"):
         EndPose(Cutter(8.0, 3, 0.5, 16.0, 30.0, 6e5, corner_radius=4.0), 0.05, 2.0)
+    with pytest.raises(InputError, match=r"^depth_mm = 17: must be above 0 and at most 16, the length of the flutes$"):
+        EndPose(BULL, 0.05, 2.0).engagement([1.0, 17.0])
     assert EndPose(BULL, 0.05, -2.0).down
     assert not EndPose(BULL, 0.05, 2.0).down

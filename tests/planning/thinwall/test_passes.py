@@ -151,7 +151,7 @@ def test_places_that_bear_nothing_are_listed():
     plan = variable([line(0.2)], bears, STRAIGHT, 1.0)
     assert plan.infeasible == ((0, 7, 1),)
     assert not plan.holds
-    with pytest.raises(InputError, match=r"3 on each side cover 0\.03 mm only"):
+    with pytest.raises(InputError, match=r"3 on each side remove only 0\.03 mm"):
         variable([line(0.2)], bears, STRAIGHT, 1.0, most=3)
 
 

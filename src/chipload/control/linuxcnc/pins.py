@@ -45,11 +45,11 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     asked = json.loads(sys.stdin.readline())
     types = {"float": hal.HAL_FLOAT, "bit": hal.HAL_BIT, "s32": hal.HAL_S32}
-    ways = {"in": hal.HAL_IN, "out": hal.HAL_OUT}
+    directions = {"in": hal.HAL_IN, "out": hal.HAL_OUT}
     component = hal.component(asked["name"])
     try:
-        for name, kind, way in asked["pins"]:
-            component.newpin(name, types[kind], ways[way])
+        for name, kind, direction in asked["pins"]:
+            component.newpin(name, types[kind], directions[direction])
         component.ready()
         there = {x["NAME"] for x in hal.get_info_signals()}
         for name, sig in asked["signals"].items():
@@ -60,13 +60,13 @@ def main() -> None:
         pins, sources = asked["pins"], asked["sources"]
         readers = [
             partial(hal.get_value, sources[name]) if name in sources else partial(component.__getitem__, name)
-            for name, _, way in pins
-            if way == "in"
+            for name, _, direction in pins
+            if direction == "in"
         ]
         for read in readers:
             read()
         print("ready", flush=True)
-        serve(component, [name for name, _, way in pins if way == "out"], readers)
+        serve(component, [name for name, _, direction in pins if direction == "out"], readers)
     except BrokenPipeError:
         pass
     finally:

@@ -13,7 +13,7 @@ import math
 from numba import njit, types
 
 TAU = 2.0 * math.pi
-#: an edge that lags by less than this over an engagement range counts as one that does not [rad]
+#: lag over an engagement range below which an edge counts as straight [rad]
 STRAIGHT = 1e-5
 
 _RI = types.Array(types.int64, 1, "C", readonly=True)
@@ -24,7 +24,7 @@ _F3 = types.float64[:, :, ::1]
 
 @njit(cache=True, nogil=True)
 def add(out, i, d, s, c, ss, sc, cc, along, offset, across, sine, cosine, arm):
-    """Add what an engagement range gives to ``out[i]``: integrals of 1, sin, cos, sin^2, sin cos, cos^2."""
+    """Add an engagement range to ``out[i]`` (4, 6), from its integrals of 1, sin, cos, sin^2, sin cos, cos^2."""
     h = along * s + across * c + offset * d
     hs = along * ss + across * sc + offset * s
     hc = along * sc + across * cc + offset * c

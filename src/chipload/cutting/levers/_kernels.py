@@ -105,7 +105,7 @@ def between(sums, m0, m1, v, c, s):
 
 @njit(cache=True, nogil=True)
 def summed(sums, table, v, acc):
-    """Add what cuts whole at each rotation to ``acc`` (4 + 2 f, m); ``table`` (2, .) of cosines and sines."""
+    """Add the edges that cut whole at each rotation to ``acc`` (4 + 2 f, m); ``table`` (2, .) of cosines and sines."""
     last = len(v)
     v[:] = 0.0
     n = 0.0

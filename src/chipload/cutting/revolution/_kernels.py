@@ -16,12 +16,12 @@ import numpy as np
 from numba import njit, types
 
 TAU = 2.0 * math.pi
-#: an edge that lags by less than this over an engagement range counts as one that does not [rad]
+#: lag over an engagement range below which an edge counts as straight [rad]
 STRAIGHT = 1e-5
-#: loads that differ by no more than this share are alike: rounding does not say which rotation has the greatest
+#: relative difference up to which loads are equal: rounding does not decide which rotation has the greatest
 ALIKE = 1e-7
-#: entries whose angles [rad] and places [mm] differ by no more than this, and whose chips by no more than this share,
-#: have the same loads: those of the first of them
+#: greatest difference of angles [rad] and places [mm], and greatest relative difference of chips, of two entries with
+#: the same loads
 SAME = 1e-8
 
 _F2 = types.float64[:, ::1]
@@ -173,7 +173,7 @@ def add_part(acc, m0, k0, k1, m1, at, step, back, table, first, last, p, q, w, a
 
 @njit(cache=True, nogil=True)
 def same(i, j, start, rows, tooth, piece, slices, frame, left):
-    """Whether two entries cut alike, as the steps along a straight row do."""
+    """Whether entries i and j have the same engagement, as the steps along a straight row have."""
     count = start[i + 1] - start[i]
     if start[j + 1] - start[j] != count:
         return False
@@ -253,7 +253,7 @@ def greatest(acc, frame, left, i, out):
 def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, alike, c, left, out):
     """Loads of each entry over a period of ``count`` rotations, the pitch where all teeth are ``alike``.
 
-    ``table`` (2, .): cosines and sines of the rotations of a revolution that are looked at.
+    ``table`` (2, .): cosines and sines of the rotations of a revolution.
     ``out`` (n, 17): mean, greatest and least x, y, z of the force in the frame of the work, its greatest size, mean and
     greatest torque [N mm], 0, thickest chip, greatest force against ``left``, numbers of the rotations at which force
     and torque are greatest. The means are left to the caller.

@@ -1,16 +1,16 @@
-"""Compiled loops of what a cutter sweeps whose axis leans or turns; arrays and scalars only.
+"""Compiled loops of the volume that a cutter with a leaning or turning axis sweeps; arrays and scalars only.
 
-Notation: a move is a row: tip p0 at the start, what it goes u [mm], axis a0 at the start, direction b across it to
-which the axis turns, by which angle theta [rad], the length of u, n = a0 x b, and how a point goes in the cutter's
-frame; at the time t in 0..1 the tip is p0 + t u and the axis A = a0 cos(t theta) + b sin(t theta). A cutter is a row of
-:func:`chipload.engagement.bricks.stock.cutter_row`; rho, w [mm] are the distance of a point from the axis and its
-height above the tip. The cutter is convex and closed at the end of its flutes; f(t) is the distance of a point out of
-it, negative within.
+Notation: a move is a row: tip p0 at the start [mm], its motion u [mm], axis a0 at the start, direction b across it to
+which the axis turns, the angle theta of the turn [rad], the length of u, n = a0 x b, and the motion of the first tip in
+the cutter's frame; at the time t in 0..1 the tip is p0 + t u and the axis A = a0 cos(t theta) + b sin(t theta). A
+cutter is a row of :func:`chipload.engagement.bricks.stock.cutter_row`; rho, w [mm] are the distance of a point from
+the axis and its height above the tip. The cutter is convex and closed at the end of its flutes; f(t) [mm] is the
+distance of a point from its surface, negative within.
 
-In the frame of the cutter the point goes along a path whose second derivative is at most
+In the frame of the cutter the point moves on a path whose second derivative is at most
 M = theta^2 |x - p| + 2 theta |u|, and the distance from a convex body is convex and changes no faster than the point
 moves. So f + M t^2 / 2 is convex, and f is bounded from below by a parabola through each of its values and rates; with
-a fixed axis M = 0. The least f is found by intervals whose two parabolas cross below what is asked.
+a fixed axis M = 0. The search for the least f divides the intervals whose two parabolas cross below the wanted bound.
 Oracle: least f over many times, in tests/engagement/bricks.
 """
 
@@ -24,22 +24,22 @@ from chipload.engagement.moves._kernels import CORNER, EPS, FLAT, FLUTE, KIND, T
 
 #: columns of a move: u from, a0 from, b from, theta, length of u, n from
 U, A0, B, THETA, LENGTH, N = 3, 6, 9, 12, 13, 14
-#: what a point at the first tip goes in the frame of the cutter along n, b and a, cosine of theta less 1, its sine, and
+#: motion of a point at the first tip in the frame of the cutter along n, b and a, cosine of theta less 1, its sine, and
 #: the part of M that does not depend on the point, over theta
 ALONG_X, ALONG_Y, ALONG_W, TURNED, SINE, BEND = range(17, 23)
 #: further columns of a cutter: sine and cosine of the angles of bottom and flank
 SIN_A, COS_A, SIN_B, COS_B = range(12, 16)
-#: a least distance that lies between bounds this near to each other is known [mm]
+#: difference of the bounds of a least distance at which the search ends [mm]
 KNOWN = 1e-11
-#: most intervals that wait
+#: greatest number of intervals that are still to be divided
 WAIT = 64
-#: share of a ball's radius to which its distance is found
+#: tolerance of the distance of a ball, as a share of its radius
 NEAR = 0.1
 
 
 @njit(cache=True, nogil=True)
 def from_profile(c, rho, w):
-    """Distance of a point out of the cutter, negative within, and the normal there: across and along the axis."""
+    """Distance [mm] of a point (rho, w) from the cutter, negative within, and the normal: across, along the axis."""
     vr = rho - c[E]
     vw = w - c[F]
     r = c[CORNER]
@@ -78,7 +78,7 @@ def turn(m, t):
 
 @njit(cache=True, nogil=True)
 def outside(m, c, t, x, y, z):
-    """F at a time, and its rate."""
+    """Distance f [mm] of the point (x, y, z) at the time t, and its rate."""
     cosine, sine = turn(m, t)
     ax = m[6] * cosine + m[9] * sine
     ay = m[7] * cosine + m[10] * sine
@@ -104,15 +104,17 @@ def outside(m, c, t, x, y, z):
 
 @njit(cache=True, nogil=True)
 def least(m, c, x, y, z, above, below, near, wait):
-    """:func:`least_from` the time at which the point is nearest to the axis, if it goes along its chord."""
+    """:func:`least_from` with the time at which the point on its chord is nearest to the axis as the start."""
     x0, y0, _, dx, dy, _, _ = chord(m, x, y, z)
     return least_from(m, c, x, y, z, nearest_time(x0, y0, dx, dy), above, below, near, wait)
 
 
 @njit(cache=True, nogil=True)
 def least_from(m, c, x, y, z, start, above, below, near, wait):
-    """Bounds (low, high) of the least f over the move. They end where low >= above, where high < below, or where they
-    are ``near`` to each other; ``start`` is the time that is looked at first, ``wait`` (WAIT, 6) is room.
+    """Bounds (low, high) [mm] of the least f over the move.
+
+    The search ends where low >= above, where high < below, or where both differ by at most ``near`` [mm]. ``start`` is
+    the first time that is evaluated, ``wait`` (WAIT, 6) a working array.
     """
     f, s = outside(m, c, start, x, y, z)
     if f < below:
@@ -196,8 +198,8 @@ def least_from(m, c, x, y, z, start, above, below, near, wait):
 
 @njit(cache=True, nogil=True, inline="always")
 def chord(m, x, y, z):
-    """A point in the frame of the cutter: where it begins, across (along n and b) and along the axis, how far it goes
-    along each until the end, and by how much its way may be off the line between.
+    """Chord of the path of a point in the frame of the cutter: its beginning along n, b and the axis, its motion along
+    each until the end, and the greatest deviation of the path from the chord, all in mm.
     """
     qx = x - m[0]
     qy = y - m[1]
@@ -215,7 +217,7 @@ def chord(m, x, y, z):
 
 @njit(cache=True, nogil=True, inline="always")
 def nearest_time(x, y, dx, dy):
-    """Time in 0..1 at which a point that goes from (x, y) by (dx, dy) is nearest to the axis."""
+    """Time in 0..1 at which a point that moves from (x, y) by (dx, dy) is nearest to the axis."""
     along = -(x * dx + y * dy)
     if along <= 0.0:
         return 0.0
@@ -225,7 +227,7 @@ def nearest_time(x, y, dx, dy):
 
 @njit(cache=True, nogil=True)
 def nearest(x, y, dx, dy, first, last):
-    """Square of the least distance from the axis of a point that goes from (x, y) by (dx, dy) at times first..last."""
+    """Square of the least distance [mm^2] from the axis of a point that moves from (x, y) by (dx, dy)."""
     size = dx * dx + dy * dy
     t = -(x * dx + y * dy) / size if size > 0.0 else 0.0
     t = min(max(t, first), last)
@@ -234,7 +236,7 @@ def nearest(x, y, dx, dy, first, last):
 
 @njit(cache=True, nogil=True)
 def in_cylinder(x, y, w, dx, dy, dw, wide, low, high):
-    """Whether a point on its way is somewhere within a cylinder: nearer to the axis than ``wide``, low < w < high."""
+    """Whether a moving point enters a cylinder: nearer to the axis than ``wide`` [mm], low < w < high."""
     first = 0.0
     last = 1.0
     if dw == 0.0:
@@ -254,7 +256,7 @@ def in_cylinder(x, y, w, dx, dy, dw, wide, low, high):
 
 @njit(cache=True, nogil=True)
 def from_axis(m, t, x0, y0, w0):
-    """Of a point at a time: the square of its distance from the axis, the rate of that, and its height above the tip;
+    """Square of the distance of a point from the axis at the time t [mm^2], its rate, and its height over the tip [mm];
     (x0, y0, w0) as of :func:`chord`.
     """
     cosine, sine = turn(m, t)
@@ -298,10 +300,10 @@ def swept_by_flank(m, c, t, x0, y0, w0, dx, dy, off):
 def swept(m, c, x, y, z, wait):
     """Whether a point is in the volume that a move sweeps.
 
-    Where the axis is fixed the point goes along a line in the frame of the cutter; where it turns it is never farther
-    than M / 8 from the line between its first and its last place there. What a cylinder as much wider or narrower says
-    settles most points; for a flat mill with a fixed axis that is all. For a flank alone a step of Newton settles most
-    others, see :func:`swept_by_flank`.
+    With a fixed axis the point moves along a line in the frame of the cutter; with a turning axis it is never farther
+    than M / 8 from its chord. A test with a cylinder that is wider or narrower by this decides most points; for a flat
+    mill with a fixed axis it decides all. For a flank alone a Newton step decides most others, see
+    :func:`swept_by_flank`.
     """
     x0, y0, w0, dx, dy, dw, bow = chord(m, x, y, z)
     t = nearest_time(x0, y0, dx, dy)
@@ -343,8 +345,8 @@ def swept(m, c, x, y, z, wait):
 
 @njit(cache=True, nogil=True)
 def estimated_least(m, c, x, y, z):
-    """About the least f of a point over a move, for the search of where it is 0: f near the time at which the point is
-    nearest to the axis, and where the corner or the bottom decide after two steps along its rate.
+    """Estimate of the least f [mm] of a point over a move, for the search of its zero: f near the time at which the
+    point is nearest to the axis; near the corner or the bottom after two further steps along its rate.
     """
     x0, y0, w0, dx, dy, dw, _ = chord(m, x, y, z)
     t = nearest_time(x0, y0, dx, dy)
@@ -374,9 +376,7 @@ def estimated_least(m, c, x, y, z):
 
 @njit(cache=True, nogil=True)
 def around(m, c, x, y, z, r, wait):
-    """Of a ball of radius r about a point: 1: the move sweeps all of it, 0: none, -1: some of it, or that is not
-    known.
-    """
+    """Part of a ball of radius r [mm] about a point that the move sweeps: 1 all, 0 none, -1 a part, or unknown."""
     x0, y0, w0, dx, dy, dw, off = chord(m, x, y, z)
     t = nearest_time(x0, y0, dx, dy)
     far = (x0 + t * dx) ** 2 + (y0 + t * dy) ** 2

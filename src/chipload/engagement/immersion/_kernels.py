@@ -16,11 +16,11 @@ from numba import njit
 TAU = 2.0 * math.pi
 #: shortest interval of immersion that is kept [rad]
 SHORT = 1e-9
-#: an edge that moves along its own face but for this share of its way does not cut
+#: share of its motion across its own face below which an edge does not cut
 ALONG = 1e-9
-#: a slice is level where its heights differ by less than this [mm]
+#: difference of its heights below which a slice is level [mm]
 LEVEL = 1e-9
-#: the axis is upright where its part in the plane is less than this
+#: part of the axis in the plane below which it is upright
 UPRIGHT = 1e-12
 #: samples of immersion in a revolution, and halvings between two of them, where the axis leans
 SAMPLES = 96

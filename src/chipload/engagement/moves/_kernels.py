@@ -17,17 +17,17 @@ import math
 import numpy as np
 from numba import njit
 
-#: a point this near to a swept volume counts as swept [mm]: rounding, so that a second pass removes nothing
+#: tolerance within which a point counts as swept [mm]: a second pass along the same path removes nothing
 EPS = 1e-8
 #: columns of a cutter: kind, corner radius r, e, f, tan(alpha), tan(beta), end of bottom (rho, z), end of corner
 #: (rho, z), greatest radius, flute length
 KIND, CORNER, E, F, TA, TB, RHO1, Z1, RHO2, Z2, WIDE, FLUTE = range(12)
 BALL, FLAT = 0.0, 1.0
-#: what a point is in beside the number of a move that swept it
+#: results for a point that no move swept: in material, in air
 MATERIAL, AIR = -2, -1
-#: a list is gone through for moves that no longer count when it is this much longer than after the last time
+#: a list is thinned when it is longer by this than twice its length after it was last thinned
 SLACK = 8
-#: steps of a height in which the reach of moves is kept, 2 bytes; rounding of a height in steps
+#: steps of a height in which the reach of moves is stored, 2 bytes; tolerance of a height in steps
 HEIGHTS, ROUNDED = 65535, 1e-2
 
 _F2, _I2 = "float64[:,::1]", "int64[:,::1]"
@@ -59,8 +59,9 @@ def slope(c, rho):
 
 @njit(cache=True, nogil=True)
 def within(qx, qy, ux, uy, h2, along, radius):
-    """Part of 0..1 in which the axis is nearer than ``radius`` to a point: its ends, the first above the second where
-    it never is.
+    """Times first, last in 0..1 between which the axis is nearer to a point than ``radius``; none: first > last.
+
+    (qx, qy) the point from the start of the move, (ux, uy) the motion, h2 its square, along their product [mm, mm^2].
     """
     c = qx * qx + qy * qy - radius * radius
     if h2 == 0.0:
@@ -74,7 +75,7 @@ def within(qx, qy, ux, uy, h2, along, radius):
 
 @njit(cache=True, nogil=True)
 def clamped(a, b):
-    """The part a / b of a motion, within 0..1; 0 where it does not move."""
+    """Quotient a / b within 0..1; 0 if a is not above 0."""
     if a <= 0.0:
         return 0.0
     return a / b if a < b else 1.0
@@ -82,8 +83,8 @@ def clamped(a, b):
 
 @njit(cache=True, nogil=True)
 def from_ball(m, r, x, y, z):
-    """Square of the distance of a point from the nearest centre of a ball of radius r that makes a move, or from the
-    axis above it: the volume is swept where this is below r^2.
+    """Square of the distance [mm^2] of a point from the nearest centre of a ball of radius r on a move m (6,), or from
+    the axis above it: the point was swept if this is below r^2.
 
     The square is convex in the time and smooth, so that its least value is where the point is below the nearest centre,
     if it is, and else where the axis is nearest.
@@ -108,7 +109,7 @@ def from_ball(m, r, x, y, z):
 
 @njit(cache=True, nogil=True, inline="always")
 def off_ball(moves, e, r, x, y, z):
-    """:func:`from_ball` of a move of the index, without a division and with one branch."""
+    """:func:`from_ball` of move e of the index (8 columns), without a division and with one branch."""
     qx = x - moves[e, 0]
     qy = y - moves[e, 1]
     w = z - moves[e, 2] - r
@@ -142,8 +143,8 @@ def radius_at(c, w):
 
 @njit(cache=True, nogil=True)
 def section(m, c, z):
-    """What a move sweeps at a height, where that is what a disc sweeps: from and to of its times, its radius squared
-    (below 0 where nothing is swept), and whether it is so: not for balls, nor for a corner or a taper on a ramp.
+    """Disc that sweeps the section of a move at the height z [mm]: first and last time in 0..1, square of its radius
+    [mm^2] (below 0: nothing is swept), and whether there is one: not for balls, nor for a corner or taper on a ramp.
     """
     uz = m[5]
     w = z - m[2] + EPS
@@ -168,7 +169,7 @@ def section(m, c, z):
 
 @njit(cache=True, nogil=True)
 def from_track(m, first, last, x, y):
-    """Square of the distance in the plan of a point from the axis at its nearest time of first..last of a move."""
+    """Square of the least distance [mm^2], in the plan, of a point (x, y) from the axis at the times first..last."""
     qx = x - m[0]
     qy = y - m[1]
     t = min(max(clamped(qx * m[3] + qy * m[4], m[3] * m[3] + m[4] * m[4]), first), last)
@@ -179,7 +180,7 @@ def from_track(m, first, last, x, y):
 
 @njit(cache=True, nogil=True)
 def swept(m, c, x, y, z):
-    """Whether a point is in the volume that a move sweeps."""
+    """Whether the point (x, y, z) is in the volume that a move m (6,) of a cutter c (12,) sweeps."""
     if c[KIND] == BALL:
         return from_ball(m, c[CORNER], x, y, z) < (c[CORNER] + EPS) ** 2
     first, last, far2, disc = section(m, c, z)
@@ -201,7 +202,10 @@ def swept(m, c, x, y, z):
 
 @njit(cache=True, nogil=True)
 def below(c, qx, qy, w, ux, uy, uz, h2, along, first, last):
-    """Whether the convex F is below 0 somewhere between two times: tangents from both ends bound it from below."""
+    """Whether the convex F is below 0 at a time first..last: tangents at both ends bound it from below.
+
+    w is the height of the point over the tip at the start; the other arguments are those of :func:`within`.
+    """
     value = np.empty(2)
     rate = np.empty(2)
     ends = (first, last)
@@ -247,7 +251,11 @@ def below(c, qx, qy, w, ux, uy, uz, h2, along, first, last):
 
 @njit(cache=True, nogil=True)
 def in_solid(x, y, z, low, high, first, ids, faces, cell):
-    """Whether a point is in the initial stock: the block, or the mesh by what a ray along +z meets in its cell."""
+    """Whether a point is in the initial stock: within the block, or by the faces of the mesh that a ray along +z meets.
+
+    low, high : (3,) corners of the block [mm]; faces (f, 12) corners and normal; those of a cell are the rows
+    ids[first[cell]] .. ids[first[cell + 1] - 1].
+    """
     if len(faces) == 0:
         return low[0] <= x <= high[0] and low[1] <= y <= high[1] and low[2] <= z < high[2]
     odd = False
@@ -270,7 +278,7 @@ def in_solid(x, y, z, low, high, first, ids, faces, cell):
 
 @njit(cache=True, nogil=True)
 def place(x, y, grid, shape):
-    """The cell of a point, -1 outside the index."""
+    """Number of the cell of a point (x, y); -1: outside the index."""
     i = math.floor((x - grid[0]) / grid[2])
     j = math.floor((y - grid[1]) / grid[3])
     # a point on the far border is in the last cell
@@ -285,7 +293,7 @@ def place(x, y, grid, shape):
 
 @njit(cache=True, nogil=True, inline="always")
 def swept_by(e, x, y, z, index):
-    """Whether a point is in the volume that a move of the index swept."""
+    """Whether the point (x, y, z) is in the volume that move e of the index swept."""
     moves = index[6]
     of = index[7]
     cutters = index[8]
@@ -298,7 +306,7 @@ def swept_by(e, x, y, z, index):
 
 @njit(cache=True, nogil=True, inline="always")
 def above(z, grid):
-    """A height in steps of the grid that is above the reach, rounded down, of every move that comes below ``z``.
+    """Height z in steps of the grid, rounded so that it is above the stored reach of every move that comes below z.
 
     Moves that come below the initial body have the reach 0, and are below every height.
     """
@@ -307,11 +315,12 @@ def above(z, grid):
 
 @njit(cache=True, nogil=True, inline="always")
 def what_is(x, y, z, index, hint):
-    """MATERIAL, AIR, or the number of a move that swept the point; ``hint`` is asked first.
+    """MATERIAL, AIR, or the number of a move that swept the point (x, y, z); move ``hint`` is tested first.
 
-    ``index``: grid (corner and sides of the cells in the plan, height from which the reach of moves is counted, steps
-    in a mm of it), shape, level, list_at, kept, reach, moves, cutter of each, cutters, and of the initial stock low,
-    high, first, ids, faces. Its arrays are many numbers to a call: this function, which is called most, has none.
+    ``index`` is a tuple: grid (6,) corner and sides of the cells in the plan [mm], height from which the reach counts
+    [mm], steps per mm; shape (2,) number of cells; level (cells, 3) floor, ceil, base [mm]; list_at (cells, 4) begin,
+    length and room of a cell's list, its length when last thinned; kept, reach (k,) moves of the lists, their least
+    heights in steps; moves (m, 8), cutter of each, cutters (c, 12); low, high, first, ids, faces: :func:`in_solid`.
     """
     grid = index[0]
     level = index[2]
@@ -335,9 +344,47 @@ def what_is(x, y, z, index, hint):
     return MATERIAL if in_solid(x, y, z, index[9], index[10], index[11], index[12], index[13], cell) else AIR
 
 
+@njit(cache=True, nogil=True, inline="always")
+def cells_near(m, qx, far, first, last, grid):
+    """The first and the last cell of a row of cells along y to which a move comes near; none: the first is greater.
+
+    qx is x of the row's middle less that of the start of the move m (6,), far the greatest distance from the axis of
+    the middle of a cell that the move may shape [mm]; the whole move comes near the cells first..last.
+    """
+    ux = m[3]
+    uy = m[4]
+    aside = max(min(ux, 0.0) - qx, qx - max(ux, 0.0), 0.0)
+    if aside >= far:
+        return 0, -1
+    room = math.sqrt(far * far - aside * aside)
+    a = max(first, math.floor((m[1] + min(uy, 0.0) - room - grid[1]) / grid[3]))
+    b = min(last, math.floor((m[1] + max(uy, 0.0) + room - grid[1]) / grid[3]))
+    if ux != 0.0:
+        # the part of the move near this row of cells
+        t0 = (qx - far) / ux
+        t1 = (qx + far) / ux
+        if t0 > t1:
+            t0, t1 = t1, t0
+        t0 = min(max(t0, 0.0), 1.0)
+        t1 = min(max(t1, 0.0), 1.0)
+        y0 = m[1] + min(t0 * uy, t1 * uy) - room
+        y1 = m[1] + max(t0 * uy, t1 * uy) + room
+        a = max(a, math.floor((y0 - grid[1]) / grid[3]))
+        b = min(b, math.floor((y1 - grid[1]) / grid[3]))
+    return a, b
+
+
 @njit(cache=True, nogil=True)
 def keep(q, m, c, grid, shape, level, list_at, kept, reach, used):
-    """Enter a move into the cells that it may shape; False where ``kept`` has no room: then call again."""
+    """Enter a move into the lists of the cells that it may shape; False where ``kept`` has no room: then call again.
+
+    Parameters
+    ----------
+    q : number of the move
+    m : (8,) of the move; c : (12,) of its cutter
+    grid, shape, level, list_at, kept, reach : of the index, see :func:`what_is`
+    used : (1,) room taken of ``kept`` and ``reach``
+    """
     gx = grid[2]
     gy = grid[3]
     half = 0.5 * math.hypot(gx, gy)
@@ -356,24 +403,7 @@ def keep(q, m, c, grid, shape, level, list_at, kept, reach, used):
     spread = far / length if length > 0.0 else 1.0
     for i in range(i0, i1 + 1):
         qx = grid[0] + (i + 0.5) * gx - m[0]
-        aside = max(min(ux, 0.0) - qx, qx - max(ux, 0.0), 0.0)
-        if aside >= far:
-            continue
-        room = math.sqrt(far * far - aside * aside)
-        a = max(j0, math.floor((m[1] + min(uy, 0.0) - room - grid[1]) / gy))
-        b = min(j1, math.floor((m[1] + max(uy, 0.0) + room - grid[1]) / gy))
-        if ux != 0.0:
-            # the part of the move near this row of cells
-            t0 = (qx - far) / ux
-            t1 = (qx + far) / ux
-            if t0 > t1:
-                t0, t1 = t1, t0
-            t0 = min(max(t0, 0.0), 1.0)
-            t1 = min(max(t1, 0.0), 1.0)
-            y0 = m[1] + min(t0 * uy, t1 * uy) - room
-            y1 = m[1] + max(t0 * uy, t1 * uy) + room
-            a = max(a, math.floor((y0 - grid[1]) / gy))
-            b = min(b, math.floor((y1 - grid[1]) / gy))
+        a, b = cells_near(m, qx, far, j0, j1, grid)
         for j in range(a, b + 1):
             cell = i * shape[1] + j
             if level[cell, 1] <= lowest:
@@ -433,7 +463,7 @@ def keep(q, m, c, grid, shape, level, list_at, kept, reach, used):
 
 @njit(cache=True, nogil=True)
 def thinned(at, count, ceil, kept, reach):
-    """Drop the moves of a list that do not come below ``ceil``, in steps of the grid; how many stay."""
+    """Drop the moves of the list at ``at`` that do not come below ``ceil``, in steps; how many of ``count`` stay."""
     to = at
     for k in range(at, at + count):
         if reach[k] < ceil:
@@ -445,8 +475,9 @@ def thinned(at, count, ceil, kept, reach):
 
 @njit(f"int64(int64[::1], float64[::1], {_I2}, int32[::1], uint16[::1], {_F2})", cache=True, nogil=True)
 def packed(order, grid, list_at, kept, reach, level):
-    """Move the lists close together in their own arrays; the room that they take. ``order``: the cells by the place of
-    their lists, so that no list is moved over one that still waits.
+    """Close the gaps between the lists in their own arrays; return the room that they take.
+
+    ``order``: the cells in the order of their lists, so that no list overwrites a later one.
     """
     used = 0
     for cell in order:

@@ -240,8 +240,8 @@ def require_reached(levels: Sequence[FinishProgram], walls: Sequence[Sequence[Co
             if away[at] < cutter.radius - NEAR_MM:
                 x, y = points[at].tolist()
                 raise InputError(
-                    f"part.file = {level.file.name}: at {level.floor:g} mm the cutter comes {away[at]:.4g} mm near to "
-                    f"the wall at {above.floor:g} mm, at ({x:.4g}, {y:.4g}): must be its radius, {cutter.radius:g}: "
+                    f"part.file = {level.file.name}: at {level.floor:g} mm the cutter comes within {away[at]:.4g} mm "
+                    f"of the wall at {above.floor:g} mm, at ({x:.4g}, {y:.4g}): must be its radius, {cutter.radius:g}: "
                     "state the lines of one wall as part.lines"
                 )
 

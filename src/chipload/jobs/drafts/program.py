@@ -25,6 +25,7 @@ from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import ENDINGS, ProgramReading, read_program, read_tools
 from chipload.program.reconcile import unit_mm
 from chipload.program.setup import Setup
+from chipload.program.tilt import NO_ROTARY
 from chipload.units import mm_s_from_mm_min, rpm_from_rad_s
 
 #: machines that a program is read for where none is stated: the first that has its axes
@@ -175,12 +176,18 @@ def _read(path: Path, known: Known, cutters: Mapping[int, Cutter] | None = None)
         groups = (("linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"),)
     setup = Setup(cutters=cutters or {})
     refused: list[tuple[Machine, InputError]] = []
+    without: _Chosen | None = None
     for name in MACHINES if known.machine is None else (known.machine,):
         machine = read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
         for dialects in groups:
             chosen = _best(path, known, machine, dialects, setup, refused)
-            if chosen is not None:
+            if chosen is not None and any(f.code == NO_ROTARY for f in chosen.reading.findings):
+                # its tilted planes need another machine
+                without = without or chosen
+            elif chosen is not None:
                 return chosen
+    if without is not None:
+        return without
     raise _refusal(path, refused, known.machine is None)
 
 

@@ -15,7 +15,7 @@ from chipload.planning.impeller.rest_machining import corner_step
 POINT, METRE, START = (0.03, 0.4), (4.0, 15.0), 6.0
 
 
-def estimate(points: int, areas: Sequence[float], scallop: float, corner: float, ways: int) -> str:
+def estimate(points: int, areas: Sequence[float], scallop: float, corner: float, partitions: int) -> str:
     """Contact points, passes and processor time of a run, in a sentence.
 
     Parameters
@@ -24,7 +24,7 @@ def estimate(points: int, areas: Sequence[float], scallop: float, corner: float,
     areas : of the surfaces [mm2], one channel; empty: there are no programs
     scallop : asked for [mm]
     corner : least corner radius of the cutters [mm]
-    ways : that are compared
+    partitions : that are compared
 
     Examples
     --------
@@ -35,10 +35,10 @@ def estimate(points: int, areas: Sequence[float], scallop: float, corner: float,
     """
     step = max(corner_step(corner, scallop), scallop)
     metres = sum(areas) / step / 1e3
-    low, high = (START + a * points + b * ways * metres for a, b in zip(POINT, METRE, strict=True))
+    low, high = (START + a * points + b * partitions * metres for a, b in zip(POINT, METRE, strict=True))
     unit, name = (60.0, "min") if high > 300.0 else (1.0, "s")
     passes = f", each with {metres:.3g} m of passes a channel" if areas else ""
     return (
-        f"estimate: {points} contact points, {ways} partitions{passes}; {low / unit:.2g} to {high / unit:.2g} "
+        f"estimate: {points} contact points, {partitions} partitions{passes}; {low / unit:.2g} to {high / unit:.2g} "
         f"{name} of processor time"
     )

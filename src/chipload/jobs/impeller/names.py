@@ -26,10 +26,10 @@ def finish_names(milled: ImpellerResult) -> list[tuple[str, Checked]]:
     """File names of the finishing programs without endings: of the partition that is milled, then of all others."""
     used = milled.used_checked
     out = [(program_name(milled, k), p) for k, p in enumerate(milled.programs or (), 1)]
-    for way in milled.checked or ():
-        if way is not used:
-            stem = stem_of(way)
-            out += [(f"{stem}-{_finish_name(milled, k, p)}", p) for k, p in enumerate(way.programs, 1)]
+    for partition in milled.checked or ():
+        if partition is not used:
+            stem = stem_of(partition)
+            out += [(f"{stem}-{_finish_name(milled, k, p)}", p) for k, p in enumerate(partition.programs, 1)]
     return out
 
 
@@ -53,9 +53,9 @@ def _five_axis_name(kind: str, k: int, p: FiveAxisProgram) -> str:
     return f"{kind}-{k}-{p.name.replace(' ', '-')}-{p.cutter.stem}"
 
 
-def stem_of(way: CheckedPartition) -> str:
+def stem_of(partition: CheckedPartition) -> str:
     """Start of the file names of a partition that is not milled."""
-    return f"way-{way.name.replace(' ', '-')}"
+    return f"partition-{partition.name.replace(' ', '-')}"
 
 
 def _finish_name(milled: ImpellerResult, k: int, p: Checked) -> str:

@@ -33,7 +33,7 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         "certified_within_mm": milled.tolerance,
         **(checked_of(milled, used) if used is not None else {}),
         "hand_picked": None if picked is None else _picked(milled, picked),
-        "ways": [checked_of(milled, way) for way in milled.partitions],
+        "partitions": [checked_of(milled, partition) for partition in milled.partitions],
         "scallop": {"mean_share": None if milled.used_checked is None else milled.used_checked.scallop},
         "programs": None
         if milled.programs is None
@@ -47,14 +47,14 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
     }
 
 
-def partition_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
+def partition_of(milled: ImpellerResult, partition: Partition) -> dict[str, Any]:
     """Numbers of a partition of all surfaces; path and time are of all channels."""
-    d = way.divided
-    head = {"name": way.name, "reached_share": way.share}
+    d = partition.divided
+    head = {"name": partition.name, "reached_share": partition.share}
     if d is None:
         return head | {"patches": None, "path_mm": None, "time_min": None}
     return head | {
-        "cutters": [_size(way.catalogue.cutters[k]) for k in d.cutters],
+        "cutters": [_size(partition.catalogue.cutters[k]) for k in d.cutters],
         "path_mm": d.path,
         "time_min": d.total / 60.0,
         "milling_min": d.milling / 60.0,
@@ -63,18 +63,18 @@ def partition_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
         "least_time_min": d.bound / 60.0,
         "least_time_any_shape_min": d.bound_any_shape / 60.0,
         "above_bound": d.above_bound,
-        "patches": [_patch(milled, way, p) for p in d.patches],
+        "patches": [_patch(milled, partition, p) for p in d.patches],
     }
 
 
-def checked_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
+def checked_of(milled: ImpellerResult, partition: Partition) -> dict[str, Any]:
     """Numbers of a partition with checked programs; path and times are of all channels, without roughing.
 
     Without programs they are those that the contact points predict, and there is no verdict.
     """
-    out = partition_of(milled, way)
-    checked = next((w for w in milled.checked or () if w.partition is way), None)
-    head = {"in_use": way is milled.used, "predicted_min": out["time_min"], "cutting_min": None, "link_min": None}
+    out = partition_of(milled, partition)
+    checked = next((w for w in milled.checked or () if w.partition is partition), None)
+    head = {"in_use": partition is milled.used, "predicted_min": out["time_min"], "cutting_min": None, "link_min": None}
     if checked is None:
         return {**out, **head, "changes_min": None, "scallop_mean_share": None, "verdict": None, "fails": []}
     return {
@@ -93,10 +93,10 @@ def checked_of(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
     }
 
 
-def _patch(milled: ImpellerResult, way: Partition, patch: Patch) -> dict[str, Any]:
+def _patch(milled: ImpellerResult, partition: Partition, patch: Patch) -> dict[str, Any]:
     return {
         "surface": milled.searched(patch).surface.name,
-        **_size(way.catalogue.cutters[patch.cutter]),
+        **_size(partition.catalogue.cutters[patch.cutter]),
         "table_deg": _degrees(patch.table),
         "across": patch.order,
         "from": patch.low,
@@ -205,8 +205,8 @@ def _finished(milled: ImpellerResult) -> dict[str, Any]:
     """What all programs leave together."""
     programs, covered = milled.programs or (), milled.covered or ()
     scallops = [x for p in programs for x in p.scallops]
-    crests = sum(x.count for x in scallops)
-    mean = sum(x.mean * x.count for x in scallops) / crests if crests else None
+    count = sum(x.count for x in scallops)
+    mean = sum(x.mean * x.count for x in scallops) / count if count else None
     return {
         "path_mm": float(sum(p.setting.length for p in programs)),
         "time_min": sum(p.seconds for p in programs) / 60.0,
@@ -228,19 +228,19 @@ def _finished(milled: ImpellerResult) -> dict[str, Any]:
     }
 
 
-def _picked(milled: ImpellerResult, way: Partition) -> dict[str, Any]:
-    first = way.divided.patches[0].table if way.divided is not None and way.divided.patches else None
-    tables = {p.table for p in way.divided.patches} if way.divided is not None else set()
+def _picked(milled: ImpellerResult, partition: Partition) -> dict[str, Any]:
+    first = partition.divided.patches[0].table if partition.divided is not None and partition.divided.patches else None
+    tables = {p.table for p in partition.divided.patches} if partition.divided is not None else set()
     return {
-        **_size(way.catalogue.cutters[0]),
+        **_size(partition.catalogue.cutters[0]),
         "table_deg": _degrees(first) if first is not None and len(tables) == 1 else None,
         "tables_deg": sorted(_degrees(t) for t in tables),
         "cc_points": sum(len(op.place) for op in milled.surfaces),
         "check_points": sum(len(op.surface.scene.check) for op in milled.surfaces),
-        "unreachable": way.unreachable,
-        "search_s": way.search_s,
-        "certified": way.certified,
-        **partition_of(milled, way),
+        "unreachable": partition.unreachable,
+        "search_s": partition.search_s,
+        "certified": partition.certified,
+        **partition_of(milled, partition),
     }
 
 

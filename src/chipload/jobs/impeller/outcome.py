@@ -361,7 +361,7 @@ class ImpellerResult:
     surfaces : in their order
     one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
     partitions : the cutter picked by hand where one is stated, then one cutter, two, ...
-    checked : each way with its programs, checked; None: the job asks for none
+    checked : each partition with its programs, checked; None: the job asks for none
     roughs : roughing programs, before the others; None: the job asks for none
     provenance : where the numbers come from
     flanks, points : flank passes and point milling on five axes, beside the programs; None: the job asks for none
@@ -393,7 +393,7 @@ class ImpellerResult:
     @property
     def picked(self) -> Partition | None:
         """Partition with the hand-picked cutter."""
-        return next((way for way in self.partitions if way.name == PICKED), None)
+        return next((partition for partition in self.partitions if partition.name == PICKED), None)
 
     @property
     def used_checked(self) -> CheckedPartition | None:
@@ -409,8 +409,10 @@ class ImpellerResult:
         """
         if self.used_checked is not None:
             return self.used_checked.partition
-        able = [way for way in self.partitions if way.name != PICKED and way.divided is not None]
-        return min(able, key=lambda way: way.divided.total if way.divided else math.inf, default=None)
+        able = [
+            partition for partition in self.partitions if partition.name != PICKED and partition.divided is not None
+        ]
+        return min(able, key=lambda one: one.divided.total if one.divided else math.inf, default=None)
 
     @property
     def programs(self) -> tuple[Checked, ...] | None:

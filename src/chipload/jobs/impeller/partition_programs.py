@@ -62,7 +62,7 @@ class _Memory:
 
 
 def checked_partitions(
-    ways: Sequence[CutterChoice],
+    choices: Sequence[CutterChoice],
     first: Sequence[Partition],
     job: FinishSettings,
     machine: Machine,
@@ -74,8 +74,8 @@ def checked_partitions(
 
     Parameters
     ----------
-    first : the ways divided by what their contact points predict
-    job : what programs are planned with; the catalogue is that of each way
+    first : the partitions by what their contact points predict
+    job : what programs are planned with; the catalogue is that of each choice
     """
     memory = _Memory()
     best: dict[str, _Planned] = {}
@@ -83,36 +83,36 @@ def checked_partitions(
     partitions: Sequence[Partition] = first
     for turn in range(_ROUNDS):
         new = [
-            k for k, (way, partition) in enumerate(zip(ways, partitions, strict=True))
-            if partition.divided is not None and not (turn and _same(partition, best[way.name].partition))
+            k for k, (choice, partition) in enumerate(zip(choices, partitions, strict=True))
+            if partition.divided is not None and not (turn and _same(partition, best[choice.name].partition))
         ]  # fmt: skip
         patches = [(job.with_catalogue(partitions[k].catalogue), partitions[k].division.patches) for k in new]
         tell_millings(patches, memory.millings, keep, _from(progress, 0.8 * turn / _ROUNDS))
         for k in new:
-            way, partition = ways[k], partitions[k]
-            done = (turn + k / len(ways)) / _ROUNDS
-            plan = _planned(way, partition, job, machine, memory, _from(progress, 0.8 * done), keep)
-            for number, row in _measured(way.costs, plan, machine):
-                rows.setdefault(id(way.costs), []).append((number, row))
-            if way.name not in best or plan.seconds < best[way.name].seconds:
-                best[way.name] = plan
+            choice, partition = choices[k], partitions[k]
+            done = (turn + k / len(choices)) / _ROUNDS
+            plan = _planned(choice, partition, job, machine, memory, _from(progress, 0.8 * done), keep)
+            for number, row in _measured(choice.costs, plan, machine):
+                rows.setdefault(id(choice.costs), []).append((number, row))
+            if choice.name not in best or plan.seconds < best[choice.name].seconds:
+                best[choice.name] = plan
         if not new:
             break
-        for way in ways:
-            for number, costs in enumerate(way.costs):
-                costs.measured([row for n, row in rows.get(id(way.costs), []) if n == number])
+        for choice in choices:
+            for number, costs in enumerate(choice.costs):
+                costs.measured([row for n, row in rows.get(id(choice.costs), []) if n == number])
         # what was planned is now known by its programs
-        for way in ways:
-            if way.name in best:
-                kept = best[way.name]
-                best[way.name] = replace(kept, predicted=_predicted(way, kept.partition))
+        for choice in choices:
+            if choice.name in best:
+                kept = best[choice.name]
+                best[choice.name] = replace(kept, predicted=_predicted(choice, kept.partition))
         if turn + 1 < _ROUNDS:
-            partitions = [way.partition(job.workers, keep=keep) for way in ways]
+            partitions = [choice.partition(job.workers, keep=keep) for choice in choices]
     out = []
-    for k, way in enumerate(ways):
-        if way.name in best:
-            out.append(_checked(way, best[way.name], job, machine, paths, memory, keep))
-        progress(0.8 + 0.2 * (k + 1) / len(ways), f"check of the programs of {way.name}")
+    for k, choice in enumerate(choices):
+        if choice.name in best:
+            out.append(_checked(choice, best[choice.name], job, machine, paths, memory, keep))
+        progress(0.8 + 0.2 * (k + 1) / len(choices), f"check of the programs of {choice.name}")
     return tuple(out)
 
 
@@ -121,21 +121,21 @@ def _from(progress: Progress, done: float) -> Progress:
     return lambda _, what: progress(done, what)
 
 
-def _changes(way: CutterChoice) -> Changes:
-    terms = way.costs[0].terms
+def _changes(choice: CutterChoice) -> Changes:
+    terms = choice.costs[0].terms
     return Changes(terms.cutter_change, terms.table_change)
 
 
-def _predicted(way: CutterChoice, partition: Partition) -> float:
+def _predicted(choice: CutterChoice, partition: Partition) -> float:
     """Time of all channels by the costs as they stand, with one program for each cutter at each table angle [s]."""
     patches = partition.division.patches
     pairs = list(dict.fromkeys((p.cutter, p.table) for p in patches))
     milling = 0.0
     for p in patches:
-        costs, order, table, bare = _place(way.costs, p)
+        costs, order, table, bare = _place(choice.costs, p)
         milling += bare * float(costs.factor[order, p.cutter, table])
-    repeats = way.costs[0].terms.repeats
-    return repeats * milling + change_time(setting_order(pairs, _changes(way)), _changes(way))
+    repeats = choice.costs[0].terms.repeats
+    return repeats * milling + change_time(setting_order(pairs, _changes(choice)), _changes(choice))
 
 
 def _place(costs: Sequence[Costs], p: Patch) -> tuple[Costs, int, int, float]:
@@ -146,19 +146,21 @@ def _place(costs: Sequence[Costs], p: Patch) -> tuple[Costs, int, int, float]:
 
 
 def _planned(
-    way: CutterChoice, partition: Partition, job: FinishSettings, machine: Machine, memory: _Memory,
+    choice: CutterChoice, partition: Partition, job: FinishSettings, machine: Machine, memory: _Memory,
     progress: Progress, keep: Keep,
 ) -> _Planned:  # fmt: skip
     own = job.with_catalogue(partition.catalogue)
-    plan = planned(own, partition.division.patches, _changes(way), progress=progress, known=memory.millings, keep=keep)
+    plan = planned(
+        own, partition.division.patches, _changes(choice), progress=progress, known=memory.millings, keep=keep
+    )
     each = [float(times_on(s.program, machine).sum()) for s in plan.settings]
-    seconds = way.costs[0].terms.repeats * sum(each) + _change_time(plan.settings, way)
-    return _Planned(partition, _predicted(way, partition), plan, seconds)
+    seconds = choice.costs[0].terms.repeats * sum(each) + _change_time(plan.settings, choice)
+    return _Planned(partition, _predicted(choice, partition), plan, seconds)
 
 
-def _change_time(settings: Sequence[CutterSetting], way: CutterChoice) -> float:
+def _change_time(settings: Sequence[CutterSetting], choice: CutterChoice) -> float:
     cutters = list(dict.fromkeys(s.cutter for s in settings))
-    return change_time([(cutters.index(s.cutter), s.table) for s in settings], _changes(way))
+    return change_time([(cutters.index(s.cutter), s.table) for s in settings], _changes(choice))
 
 
 def _same(a: Partition, b: Partition) -> bool:
@@ -207,7 +209,7 @@ def _patch_of_rest(
 
 
 def _checked(
-    way: CutterChoice, done: _Planned, job: FinishSettings, machine: Machine, paths: PathsTable, memory: _Memory,
+    choice: CutterChoice, done: _Planned, job: FinishSettings, machine: Machine, paths: PathsTable, memory: _Memory,
     keep: Keep,
 ) -> CheckedPartition:  # fmt: skip
     own = job.with_catalogue(done.partition.catalogue)
@@ -216,14 +218,14 @@ def _checked(
         if not _refinable(_left_shares(programs, covered)):
             break
         plan = planned(
-            own, done.partition.division.patches, _changes(way), known=memory.millings, keep=keep, fine=fine
+            own, done.partition.division.patches, _changes(choice), known=memory.millings, keep=keep, fine=fine
         )  # fmt: skip
         again = _looked_at(own, plan, machine, paths, memory, keep)
         kept, new = ((_left_shares(*x), sum(p.seconds for p in x[0])) for x in ((programs, covered), again))
         if _rank(*new) < _rank(*kept):
             programs, covered = again
-    repeats = way.costs[0].terms.repeats
-    changes = _change_time([p.setting for p in programs], way)
+    repeats = choice.costs[0].terms.repeats
+    changes = _change_time([p.setting for p in programs], choice)
     return CheckedPartition(done.partition, programs, covered, repeats, done.predicted, changes)
 
 

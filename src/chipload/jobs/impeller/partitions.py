@@ -62,21 +62,20 @@ def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
 def _compared(milled: ImpellerResult) -> str:
     rows, used = [], []
     base = milled.picked.divided if milled.picked is not None else None
-    for way in milled.partitions:
-        d = way.divided
-        name = escape(way.name)
-        used.append(way is milled.used)
+    for partition in milled.partitions:
+        d = partition.divided
+        name = escape(partition.name)
+        used.append(partition is milled.used)
         if d is None:
             rows.append([name, '<span class="no">these cutters do not reach all points</span>', *[""] * 8])
             continue
-        cutters = ", ".join(f"{way.catalogue.cutters[k].label}"
-                            for k in d.cutters)  # fmt: skip
+        cutters = ", ".join(partition.catalogue.cutters[k].label for k in d.cutters)
         less = ["", ""]
-        if base is not None and way.name != PICKED:
+        if base is not None and partition.name != PICKED:
             less = [f"{100.0 * (a / b - 1.0):+.1f}" for a, b in ((d.path, base.path), (d.total, base.total))]
         rows.append(
             [
-                name, cutters, f"{100.0 * way.share:.4g}", f"{d.path:.0f}", less[0],
+                name, cutters, f"{100.0 * partition.share:.4g}", f"{d.path:.0f}", less[0],
                 f"{d.total / 60.0:.1f}", less[1], f"{d.cutter_changes} + {d.table_changes}", f"{d.bound / 60.0:.1f}",
                 f"{100.0 * d.above_bound:.1f}",
             ]
@@ -114,8 +113,8 @@ def _programmed(milled: ImpellerResult) -> str:
 
 def partitions_figure(milled: ImpellerResult) -> go.Figure:
     """Time of each partition: milling, changes; its least time as a line."""
-    able = [(way, way.divided) for way in milled.partitions if way.divided is not None]
-    names = [way.name for way, _ in able]
+    able = [(partition, partition.divided) for partition in milled.partitions if partition.divided is not None]
+    names = [partition.name for partition, _ in able]
     out = go.Figure()
     for label, values, colour in (
         ("milling", [d.milling / 60.0 for _, d in able], COLOURS[0]),
@@ -141,10 +140,10 @@ def partitions_figure(milled: ImpellerResult) -> go.Figure:
     return out
 
 
-def patch_grid(milled: ImpellerResult, way: Partition, op: Searched) -> Ints:
+def patch_grid(milled: ImpellerResult, partition: Partition, op: Searched) -> Ints:
     """Number of the patch of each contact point of a surface, (a, b); -1: none."""
     out = np.full(op.surface.shape, -1, dtype=np.int64)
-    for n, p in enumerate(way.divided.patches if way.divided is not None else ()):
+    for n, p in enumerate(partition.divided.patches if partition.divided is not None else ()):
         if milled.searched(p) is op:
             i = np.abs(op.surface.u[:, None] - p.at[None, :, 0]).argmin(axis=0)
             j = np.abs(op.surface.v[:, None] - p.at[None, :, 1]).argmin(axis=0)
@@ -153,9 +152,9 @@ def patch_grid(milled: ImpellerResult, way: Partition, op: Searched) -> Ints:
     return out
 
 
-def shade_of(way: Partition, patch: Patch) -> tuple[int, int, int]:
+def shade_of(partition: Partition, patch: Patch) -> tuple[int, int, int]:
     """A colour by cutter, its shade by table angle."""
-    d = way.division
+    d = partition.division
     base = COLOURS[d.cutters.index(patch.cutter) % len(COLOURS)]
     rgb = np.array([int(base[k : k + 2], 16) for k in (1, 3, 5)], dtype=np.float64)
     angles = sorted({p.table for p in d.patches if p.cutter == patch.cutter})
@@ -164,17 +163,19 @@ def shade_of(way: Partition, patch: Patch) -> tuple[int, int, int]:
     return r, g, b
 
 
-def patch_figure(milled: ImpellerResult, way: Partition, op: Searched) -> go.Figure:
+def patch_figure(milled: ImpellerResult, partition: Partition, op: Searched) -> go.Figure:
     """Patches of a surface, unrolled; a colour a cutter, its shade a table angle."""
-    grid = patch_grid(milled, way, op)
+    grid = patch_grid(milled, partition, op)
     numbers = [int(n) for n in np.unique(grid) if n >= 0]
-    d = way.division
+    d = partition.division
     order = {n: k for k, n in enumerate(numbers)}
     z = np.vectorize(lambda n: order.get(n, np.nan), otypes=[float])(grid)
-    colours = [f"rgb{shade_of(way, d.patches[n])}" for n in numbers] or ["#ffffff"]
+    colours = [f"rgb{shade_of(partition, d.patches[n])}" for n in numbers] or ["#ffffff"]
     count = len(colours)
     scale = [(e, c) for k, c in enumerate(colours) for e in (k / count, (k + 1) / count)]
-    label = {n: f"{n + 1}: {_size(way, d.patches[n])} at {np.degrees(d.patches[n].table):.6g} deg" for n in numbers}
+    label = {
+        n: f"{n + 1}: {_size(partition, d.patches[n])} at {np.degrees(d.patches[n].table):.6g} deg" for n in numbers
+    }
     text = np.vectorize(lambda n: label.get(n, "not reached"), otypes=[object])(grid)
     out = go.Figure(
         go.Heatmap(
@@ -198,6 +199,5 @@ def patch_figure(milled: ImpellerResult, way: Partition, op: Searched) -> go.Fig
     return out
 
 
-def _size(way: Partition, patch: Patch) -> str:
-    c = way.catalogue.cutters[patch.cutter]
-    return f"{c.label}"
+def _size(partition: Partition, patch: Patch) -> str:
+    return partition.catalogue.cutters[patch.cutter].label

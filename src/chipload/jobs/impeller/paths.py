@@ -99,11 +99,11 @@ def checked_programs(
     found = [left_by(job, walls, s.program, s.cutter, depth, keep) for s in settings]
     # what is left is what no program takes
     rest = [replace(same[0], rest=np.min([x.rest for x in same], axis=0)) for same in zip(*found, strict=True)]
-    crests = iter(rest)
+    others = iter(rest)
     out = []
     for setting in settings:
         program = setting.program
-        scallops = tuple(_scallop(m, next(crests), asked) for m in setting.millings)
+        scallops = tuple(_scallop(m, next(others), asked) for m in setting.millings)
         _, findings = to_axes(program, machine)
         said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
         gouge = gouge_by(job, coarse, program, setting.cutter, depth, paths.gouge_mm, keep)

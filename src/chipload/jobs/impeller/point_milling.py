@@ -180,5 +180,5 @@ def _scallop(found: PlannedPoints, left: Remainder) -> float | None:
     """Mean height [mm] of the scallops between two lines; None: there are none."""
     w = left.wall
     within = between_lines(found.points.each_line, found.along, np.column_stack([w.u, w.v]))
-    crests = left.scallops("v" if found.along == "u" else "u", within)
-    return scallop_numbers(crests, 1.0)["mean_mm"] if len(crests) else None
+    heights = left.scallops("v" if found.along == "u" else "u", within)
+    return scallop_numbers(heights, 1.0)["mean_mm"] if len(heights) else None

@@ -109,8 +109,8 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     whole = keep(("one cutter",), lambda: one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS))
     one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
     feeds = cutter_feeds(job, catalogue, forces)
-    ways = _choices(job, done, catalogue, impeller, feeds, part_of(second, 0, 2), keep)
-    partitions = tuple(way.partition(WORKERS, part_of(second, 1, 2), keep) for way in ways)
+    choices = _choices(job, done, catalogue, impeller, feeds, part_of(second, 0, 2), keep)
+    partitions = tuple(choice.partition(WORKERS, part_of(second, 1, 2), keep) for choice in choices)
     stated = StatedJob(title_of(job.path), _settings(op), job.table.impeller.outer_diameter_mm, _ahead(job))
     milled = ImpellerResult(
         stated, impeller, catalogue, machine, tuple(done), one, partitions, None, None, provenance,
@@ -127,7 +127,7 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
         impeller, machine, table, catalogue, op, op.paths, _ahead(job), len(roughs or ()), WORKERS, covering, forces
     )
     keep.share(replace(how, workers=1))
-    checked = checked_partitions(ways, partitions, how, machine, op.paths, last, keep)
+    checked = checked_partitions(choices, partitions, how, machine, op.paths, last, keep)
     chosen = {one.name: one.partition for one in checked}
     flanks = checked_flanks(job, how, cutters.of(cutters.straight), keep=keep) if op.flank is not None else None
     points = checked_points(job, how, cutters, keep=keep) if op.point_milling is not None else None
@@ -214,8 +214,8 @@ def _estimate(job: ImpellerJob, surfaces: Sequence[ContactSurface], catalogue: C
     """What the run will need."""
     op = job.operation
     areas = [float(s.area.sum()) for s in surfaces] if op.paths is not None else []
-    ways = op.most_cutters + (op.hand_picked is not None)
-    return estimate(sum(len(s.scene.contact) for s in surfaces), areas, op.scallop_mm, min(catalogue.families), ways)
+    choices = op.most_cutters + (op.hand_picked is not None)
+    return estimate(sum(len(s.scene.contact) for s in surfaces), areas, op.scallop_mm, min(catalogue.families), choices)
 
 
 def _stages(op: ImpellerOperationTable, progress: Progress) -> list[Progress]:

@@ -57,22 +57,22 @@ def scene_bytes(milled: ImpellerResult) -> bytes:
     return glb
 
 
-def _patches(milled: ImpellerResult, way: Partition, op: Searched) -> NDArray[np.uint8]:
+def _patches(milled: ImpellerResult, partition: Partition, op: Searched) -> NDArray[np.uint8]:
     """(c, 4) colours of the contact points by patch."""
-    grid = patch_grid(milled, way, op).ravel()
+    grid = patch_grid(milled, partition, op).ravel()
     out = np.tile(np.array(MISSED, dtype=np.uint8), (len(grid), 1))
-    for n, p in enumerate(way.divided.patches if way.divided is not None else ()):
-        out[grid == n, :3] = shade_of(way, p)
+    for n, p in enumerate(partition.divided.patches if partition.divided is not None else ()):
+        out[grid == n, :3] = shade_of(partition, p)
     return out
 
 
-def _patch_legend(milled: ImpellerResult, way: Partition, op: Searched) -> dict[str, Any]:
+def _patch_legend(milled: ImpellerResult, partition: Partition, op: Searched) -> dict[str, Any]:
     """Cutter and table angle of each patch of a surface."""
-    numbers = [int(n) for n in np.unique(patch_grid(milled, way, op)) if n >= 0]
-    patches = way.divided.patches if way.divided is not None else ()
+    numbers = [int(n) for n in np.unique(patch_grid(milled, partition, op)) if n >= 0]
+    patches = partition.divided.patches if partition.divided is not None else ()
     cutters = op.answer.catalogue.cutters
     words = {
-        f"{cutters[p.cutter].label} mm at {np.degrees(p.table):.6g} deg": shade_of(way, p)
+        f"{cutters[p.cutter].label} mm at {np.degrees(p.table):.6g} deg": shade_of(partition, p)
         for p in (patches[n] for n in numbers)
     }
     return legend("patch: cutter, table angle", [], list(words.items()))

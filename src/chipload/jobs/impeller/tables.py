@@ -1,4 +1,8 @@
-"""Job tables of an impeller job: its blades, the cutters, the machine with its index table, the operation."""
+"""Job tables of an impeller job: its blades, the cutters, the machine with its index table, the operation.
+
+A value outside the range of its key is refused when the file is read; the message names key, value and limit. Keys that
+depend on one another are checked in :mod:`chipload.jobs.impeller.job`.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +30,9 @@ Span = tuple[Share, Share]
 class ShapeTable(Table):
     """An impeller by formula, see ``planning/impeller/parametric.py``."""
 
-    channel_mm: Positive = Field(ge=0.1, description="narrowest width of a channel, round the axis at the inlet")
+    channel_mm: Positive = Field(
+        ge=0.1, description="narrowest width of a channel, along the circumference at the inlet"
+    )
     hub_radius_mm: Positive = Field(ge=0.1, description="radius of the hub at the inlet")
     height_mm: Positive = Field(ge=0.1, description="height of the hub from outlet to inlet")
     blade_height_mm: Positive = Field(ge=0.1, description="height of the blades at the inlet")
@@ -39,51 +45,65 @@ class SectionsTable(Table):
     """Blades by points: closed profiles from hub to shroud, and the curves of hub and shroud."""
 
     blade: tuple[Text, ...] = Field(min_length=1, description="files with the sections of a blade, from hub to shroud")
-    splitter: tuple[Text, ...] = Field((), description="likewise of a splitter; none: no splitters")
-    hub: Text = Field(description="file of points, or a table of all sections, whose first one lies on the hub")
-    shroud: Text = Field(description="likewise; of a table of all sections the last one")
+    splitter: tuple[Text, ...] = Field(
+        (), description="files with the sections of a splitter, from hub to shroud; none: no splitters"
+    )
+    hub: Text = Field(
+        description="file of points of the hub, or a table of all sections, whose first section lies on it"
+    )
+    shroud: Text = Field(
+        description="file of points of the shroud, or a table of all sections, whose last section lies on it"
+    )
     unit: Unit = Field(description="unit of the files, which do not state it")
     columns: Literal["X R*THETA R", "X R THETA_DEG", "X Y Z"] | None = Field(
         None, description="columns of files that do not name them"
     )
-    flow_along_x: bool = Field(description="true: the flow comes along +X of the files, and the part is turned over")
-    hub_ahead_mm: NotNegative = Field(description="length of the hub ahead of the leading edge")
+    flow_along_x: bool = Field(description="true: the flow comes along +X of the files; the part is then turned over")
+    hub_ahead_mm: NotNegative = Field(description="length of the hub upstream of the leading edge")
 
 
 class StepTable(Table):
-    """Blades by faces of a STEP file; a face is named by its number or by a point [mm] on it, in the file's frame.
+    """Blades by faces of a STEP file. A face is named by its number or by a point [mm] on it, in the file's frame.
 
-    A side may be a list of faces; three numbers are one point.
+    A side may be a list of faces. A list of three numbers is one point.
     """
 
-    file: Text = Field(description="`chipload check FILE` lists its faces")
+    file: Text = Field(description="STEP file; `chipload check FILE` lists its faces")
     flow: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
         description="direction of the incoming flow along the axis of rotation, which contains the origin"
     )
-    plus: SideFaces = Field(description="side that faces a growing angle about the axis, seen against the flow")
-    minus: SideFaces = Field(description="side that faces a falling angle, of the same blade or of another")
-    splitter_plus: SideFaces | None = Field(None, description="likewise of a splitter; none: no splitters")
-    splitter_minus: SideFaces | None = None
-    hub: tuple[FaceName, ...] | Text = Field(description="faces of revolution, or a file of points as of sections")
-    shroud: tuple[FaceName, ...] | Text = Field(description="likewise; faces of the tip of one blade will do")
-    unit: Unit | None = Field(None, description="unit of hub and shroud where they are files of points")
+    plus: SideFaces = Field(
+        description="side of a blade that faces a growing angle about the axis, seen against the flow"
+    )
+    minus: SideFaces = Field(description="side that faces a falling angle, of the same blade or of another one")
+    splitter_plus: SideFaces | None = Field(None, description="plus side of a splitter; none: no splitters")
+    splitter_minus: SideFaces | None = Field(None, description="minus side of a splitter; required with splitter_plus")
+    hub: tuple[FaceName, ...] | Text = Field(description="faces of revolution of the hub, or a file of its points")
+    shroud: tuple[FaceName, ...] | Text = Field(
+        description="faces of revolution of the shroud, or a file of its points; faces of the tip of one "
+        "blade are enough"
+    )
+    unit: Unit | None = Field(None, description="unit of hub and shroud; required if they are files of points")
     fit_mm: Positive = Field(0.001, le=0.1, description="greatest deviation of a fitted patch from its face")
-    hub_ahead_mm: NotNegative = Field(description="length of the hub ahead of the leading edge")
+    hub_ahead_mm: NotNegative = Field(description="length of the hub upstream of the leading edge")
 
 
 class ImpellerTable(Table):
-    """The part."""
+    """The part: shape, sections or step states its blades."""
 
     blades: Annotated[Count, Field(ge=2)] = Field(
-        description="number of blades, evenly spaced, and of splitters, if there are any"
+        description="number of blades, evenly spaced; the number of splitters, if there are any, is the same"
     )
-    outer_diameter_mm: Positive = Field(description="outer diameter over the blades, as the drawing states it")
+    outer_diameter_mm: Positive = Field(
+        description="outer diameter over the blades, from the drawing; sections and step must agree with it"
+    )
     shape: ShapeTable | None = None
     sections: SectionsTable | None = None
     step: StepTable | None = None
     fillet_mm: Positive | None = Field(
         None,
-        description="radius of fillets between sides and hub, which the model does not have; sides begin above them",
+        description="radius of fillets between sides and hub that the model lacks; sides begin above them; "
+        "none: no fillets",
     )
 
     @property
@@ -94,11 +114,12 @@ class ImpellerTable(Table):
 
 
 class SurfaceTable(Table):
-    """One surface that is milled, and where on it."""
+    """One surface that is milled, and its milled range."""
 
-    body: Literal["blade", "splitter"]
+    body: Literal["blade", "splitter"] = Field(description="body that the surface belongs to")
     side: Literal["plus", "minus", "floor", "plus fillet", "minus fillet"] = Field(
-        description="plus faces a growing angle; floor: the hub beyond it; fillet: between the side and the hub"
+        description="plus: faces a growing angle about the axis; minus: a falling one; floor: the hub between this "
+        "body and the next; fillet: between the side and the hub"
     )
     along: Span = Field(description="range along the surface, 0 to 1")
     up: Span = Field(description="range from the hub up, or across a floor, 0 to 1")
@@ -106,43 +127,44 @@ class SurfaceTable(Table):
 
 
 class PickedTable(Table):
-    """A cutter of the catalogue that a programmer would take."""
+    """A cutter of the catalogue that a programmer would choose."""
 
-    diameter_mm: Positive
-    corner_radius_mm: NotNegative
+    diameter_mm: Positive = Field(description="diameter")
+    corner_radius_mm: NotNegative = Field(description="corner radius")
 
 
 class PathsTable(Table):
-    """Finishing programs of the patches in the least time, checked by simulation."""
+    """Finishing programs of the patches, planned for the least time and checked by simulation."""
 
     check_mm: Positive = Field(ge=0.01, description="greatest distance between check points of the paths")
     chord_mm: Positive = Field(le=1.0, description="greatest deviation of the tip between two rows")
     overrun_mm: NotNegative = Field(
-        1.0, description="length of lines beyond the ends of their patch, where there is room"
+        1.0, description="length by which lines continue beyond the ends of their patch, if there is room"
     )
     lift_mm: Positive = Field(description="length of the lift off the surface at the ends of a line")
     lead_mm: Positive | None = Field(
         None,
-        description="part of a lift that is moved at the feed of the cut, at most lift_mm; none: 1 mm, or the "
-        "allowance of roughing where that is more, or lift_mm where that is less",
+        description="length of the part of a lift at the feed of the cut, at most lift_mm; none: the greater of "
+        "1 mm and the allowance of roughing, at most lift_mm",
     )
     margin_mm: Positive = Field(
-        description="least distance of links from the part, and of rapids from the allowances on it"
+        description="least distance of links from the part, and of rapids from the allowances on it; between "
+        "touch_mm and lift_mm"
     )
-    touch_mm: NotNegative = Field(description="greatest depth of a check point in the tool during a lift")
-    near_mm: NotNegative = Field(description="longest direct link")
+    touch_mm: NotNegative = Field(description="greatest depth of a check point of the part in the tool during a lift")
+    near_mm: NotNegative = Field(description="greatest length of a direct link; longer links go over the part")
     above_mm: Positive = Field(description="height above the part at which the cutter moves safely")
     link_feed_mm_min: Positive = Field(le=1e5, description="feed of lifts and links")
-    gouge_mm: Positive = Field(le=1.0, description="greatest gouge that the check of a program allows")
+    gouge_mm: Positive = Field(le=1.0, description="greatest gouge allowed in a program")
 
 
 class RoughTable(Table):
-    """Roughing programs of the channels by layers, before the finishing ones; links are those of the paths."""
+    """Roughing programs of the channels in layers, before the finishing programs. Links follow the keys of `paths`."""
 
     diameter_mm: Positive | None = Field(
         None, description="diameter of a cutter of the catalogue; none: the largest that fits"
     )
-    corner_radius_mm: NotNegative | None = Field(None, description="corner radius of that cutter")
+    corner_radius_mm: NotNegative | None = Field(None, description="corner radius of the cutter with diameter_mm")
     share: Annotated[Number, Field(gt=0.0, le=1.0)] = Field(
         0.9, description="share of the points of the channels at which the largest cutter must fit"
     )
@@ -150,12 +172,12 @@ class RoughTable(Table):
     step_mm: Positive = Field(description="greatest distance between rows")
     blades_mm: NotNegative = Field(description="allowance on blades and splitters")
     hub_mm: NotNegative = Field(description="allowance on the hub")
-    over_mm: NotNegative = Field(description="height of the blank over the shroud")
+    over_mm: NotNegative = Field(description="height of the blank above the shroud")
     feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
     check_mm: Positive = Field(ge=0.01, description="greatest distance between check points")
     coarser: Annotated[Number, Field(ge=1.0, le=100.0)] = Field(
-        10.0, description="factor on paths.chord_mm for roughing"
+        10.0, description="factor by which roughing multiplies paths.chord_mm"
     )
     grid_mm: Positive = Field(description="distance between the lines of the simulated blank")
     touch_mm3: NotNegative = Field(
@@ -164,31 +186,33 @@ class RoughTable(Table):
 
 
 class ForcesTable(Table):
-    """Feeds of the finishing passes by the force of their chips, at most `feed_mm_min`."""
+    """Feeds of the finishing passes from the cutting force, at most `feed_mm_min`."""
 
-    material: SourceTable = Field(description="force coefficients, in all directions")
+    material: SourceTable = Field(description="material with force coefficients in all directions")
     flutes: Annotated[Count, Field(le=20)] = Field(description="number of teeth of every cutter")
     helix_deg: Annotated[Number, Field(ge=0.0, lt=80.0)] = Field(30.0, description="helix angle of every cutter")
     modulus_gpa: Annotated[Number, Field(ge=10.0, le=1000.0)] = Field(
         580.0, description="Young's modulus of the cutters"
     )
-    overhang_mm: Positive | None = Field(None, description="overhang of cutters without a reach in the catalogue")
+    overhang_mm: Positive | None = Field(
+        None, description="overhang of cutters whose reach the catalogue does not state"
+    )
     allowance_mm: Positive | None = Field(
-        None, description="allowance on the surfaces; none: the greater one of roughing"
+        None, description="allowance on the surfaces before finishing; none: the greatest allowance of roughing"
     )
     deflection_um: Positive = Field(description="greatest deflection of a cutter at its contact")
     safety_factor: Annotated[Number, Field(ge=1.0, le=100.0)] = Field(
-        2.0, description="strength of the cutters over the allowable stress"
+        2.0, description="strength of the cutters over their allowable stress"
     )
 
 
 class FlankTable(Table):
-    """Flank passes (swarf milling) of the sides on a machine with five simultaneous axes, beside the other programs."""
+    """Flank passes (swarf milling) of the sides on a machine with five simultaneous axes, as further programs."""
 
     machine: SourceTable = Field(description="machine with two rotary axes that move in the cut")
     excess_mm: Positive = Field(le=1.0, description="greatest excess that a pass may leave on its side")
     most_passes: Annotated[Count, Field(le=20)] = Field(
-        1, description="greatest number of passes up a side; the fewest that keep excess_mm and gouge_mm are taken"
+        1, description="greatest number of passes up a side; the plan has the fewest that keep excess_mm and gouge_mm"
     )
     feed_mm_min: Positive | None = Field(
         None, le=1e5, description="feed of the tip; none: that of the operation, if it has no `forces`"
@@ -197,7 +221,7 @@ class FlankTable(Table):
 
 
 class PointMillingTable(Table):
-    """Point milling of the surfaces on a machine with five simultaneous axes, beside the other programs."""
+    """Point milling of the surfaces on a machine with five simultaneous axes, as further programs."""
 
     machine: SourceTable = Field(description="machine with two rotary axes that move in the cut")
     lean_deg: Annotated[Number, Field(ge=0.5, le=80.0)] = Field(
@@ -210,39 +234,47 @@ class PointMillingTable(Table):
 
 
 class ImpellerOperationTable(Table):
-    """The search for the largest cutters of all surfaces."""
+    """Choice of the largest cutters for all surfaces, and the programs with them."""
 
-    kind: Literal["impeller"]
+    kind: Literal["impeller"] = Field(description="kind of the operation")
     check_mm: Positive = Field(ge=0.01, description="greatest distance between check points")
-    near_mm: Positive = Field(description="within this distance the curvature of the surface replaces check points")
+    near_mm: Positive = Field(
+        description="distance from a contact within which the curvature of the surface replaces check points"
+    )
     tolerance_mm: Positive = Field(
-        0.05, le=1.0, description="greatest depth of a wall in a certified cutter between check points"
+        0.05, le=1.0, description="greatest depth of a wall in a certified cutter between two check points"
     )
     around: Annotated[int, Field(ge=0, le=20)] = Field(
-        1, description="number of bodies beyond the channel, on either side, that are checked"
+        1,
+        description="number of blades and splitters beyond the channel, on each side, from which the "
+        "clearance is checked",
     )
     table_deg: tuple[Number, ...] | None = Field(
-        None, min_length=1, description="table angles that are searched; none: all"
+        None, min_length=1, description="table angles to choose from; none: all"
     )
-    clearance_mm: NotNegative = Field(description="clearance of neck, shank and holder")
+    clearance_mm: NotNegative = Field(description="least clearance of neck, shank and holder")
     scallop_mm: Positive = Field(le=5.0, description="greatest scallop height between two passes")
-    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip; the greatest one with `forces`")
+    feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's tip; with `forces` the greatest feed")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
     most_cutters: Annotated[Count, Field(le=6)] = Field(
-        description="greatest number of different cutters; fewer are compared too"
+        description="greatest number of different cutters; plans with fewer are compared too"
     )
     cutter_change_s: NotNegative = Field(description="time of a cutter change")
-    table_change_s: NotNegative = Field(description="time of setting the index table to another angle")
-    paths: PathsTable | None = Field(None, description="finishing programs; none: the search and the patches alone")
-    rough: RoughTable | None = Field(None, description="roughing programs; none: the programs finish only")
+    table_change_s: NotNegative = Field(description="time to turn the index table to another angle")
+    paths: PathsTable | None = Field(
+        None, description="finishing programs; none: only the cutters and the patches are planned"
+    )
+    rough: RoughTable | None = Field(None, description="roughing programs; none: finishing only")
     flank: FlankTable | None = Field(None, description="flank passes; none: not planned")
     point_milling: PointMillingTable | None = Field(None, description="point milling on five axes; none: not planned")
-    forces: ForcesTable | None = Field(None, description="feeds by the force; none: every pass has the same feed")
-    hand_picked: PickedTable | None = Field(None, description="cutter that the plan is compared with")
+    forces: ForcesTable | None = Field(
+        None, description="feeds from the cutting force; none: every pass has the same feed"
+    )
+    hand_picked: PickedTable | None = Field(None, description="cutter of a programmer, with which the plan is compared")
 
 
 class ImpellerJobTable(Table):
-    """The whole file."""
+    """The whole file of an impeller job."""
 
     impeller: ImpellerTable
     surface: tuple[SurfaceTable, ...] = Field(min_length=1)

@@ -173,7 +173,7 @@ def _require_sources(made: ProgramJobTable) -> None:
     """Refuse limits whose inputs are not stated, and new speeds, which only a program text can have."""
     for key in ("form_error_um", "gouge_mm", "excess_mm"):
         if made.part is None and getattr(made.limits, key) is not None:
-            raise InputError(f"limits.{key}: needs the part that should come out: give part or leave it out")
+            raise InputError(f"limits.{key}: needs the finished part: give part or leave it out")
     for key in ("stability_margin", "stable_probability", "sle_um"):
         if made.dynamics is None and getattr(made.limits, key) is not None:
             raise InputError(f"limits.{key}: needs modes of vibration: give dynamics or leave it out")

@@ -79,7 +79,8 @@ def bodies_of(
     program, times = timed(reading, job, machine)
     fine = resolution_of(job, program)
     count = counted(program, job.cutters, fine)
-    require_upright(program, op.step_mm, op.tolerance_mm, stock, job.cutters, op.interpolation)
+    if op.engine == "layers":
+        require_upright(program, op.step_mm, op.tolerance_mm, stock, job.cutters, op.interpolation)
     points = stock_points(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
     part = part_body(job)
     if part is not None and job.table.part is not None:

@@ -38,6 +38,7 @@ from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
 from chipload.simulation.engagement_samples import EngagementRecorder
 from chipload.simulation.estimate import LEANING, QUICK, SLOW, UPRIGHT, estimate, slowest_step
+from chipload.simulation.hand import reversed_cuts
 from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.loads import Cuts
 from chipload.simulation.moves import leans
@@ -219,13 +220,12 @@ def simulated(
         )  # fmt: skip
     removal = with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS))
     errors = with_compliance_error(removal.resolution_error, removal.columns, compliance)
-    removal = replace(removal, resolution_error=errors, samples=recorder.samples())
+    findings = (*removal.findings, *reversed_cuts(steps, removal.columns, job.cutters))
+    removal = replace(removal, resolution_error=errors, samples=recorder.samples(), findings=findings)
     if stability_watch is not None:
         removal = with_columns(removal, stability_watch.columns)
-    touched = collisions(
-        steps, job.cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]),
-        progress=passing(0.8 + SHARE, "collisions"), kept=kept,
-    )  # fmt: skip
+    watching, above = passing(0.8 + SHARE, "collisions"), frozenset(["part"])
+    touched = collisions(steps, job.cutters, solids, op.tolerance_mm, above_only=above, progress=watching, kept=kept)
     if points is not None:
         touched += in_stock(
             steps, job.cutters, points, op.tolerance_mm, passing(0.8 + 2.0 * SHARE, "holders in the stock"), kept

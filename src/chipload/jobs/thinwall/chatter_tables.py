@@ -8,7 +8,7 @@ from chipload.jobs.tables import Count, Positive, Table
 
 
 class WallModeTable(Table):
-    """A mode of the cutter with holder and spindle, alike in all directions across its axis."""
+    """A mode of the cutter with holder and spindle, equal in all directions across its axis."""
 
     frequency_hz: Positive = Field(description="natural frequency")
     damping_ratio: Positive = Field(lt=1.0, description="damping ratio; there is no default")
@@ -16,13 +16,17 @@ class WallModeTable(Table):
 
 
 class WallDynamicsTable(Table):
-    """Vibration of wall and cutter: passes are no deeper than chatter allows, each at a spindle speed of its own."""
+    """Vibration of wall and cutter. It limits the depth of each pass, and sets the spindle speed of each."""
 
     damping_ratio: Positive = Field(lt=1.0, description="damping ratio of the wall's modes; there is no default")
     modes: Count = Field(4, le=12, description="number of lowest modes of the wall in each state of removal")
     mode: tuple[WallModeTable, ...] = Field(
-        (), description="modes of the cutter; none: rigid, and the margin is unproven"
+        (), description="modes of the cutter; none: the cutter is rigid, and the stability margin is unproven"
     )
     margin: Positive = Field(1.0, ge=1.0, description="least stability margin that every pass must have")
-    least_rpm: Positive | None = Field(None, description="least spindle speed of a pass; none: speed_rpm")
-    most_rpm: Positive | None = Field(None, description="greatest spindle speed of a pass; none: speed_rpm")
+    least_rpm: Positive | None = Field(
+        None, description="least spindle speed of a pass; none: speed_rpm of the operation"
+    )
+    most_rpm: Positive | None = Field(
+        None, description="greatest spindle speed of a pass; none: speed_rpm of the operation"
+    )

@@ -27,10 +27,10 @@ Floats = NDArray[np.float64]
 APART, BESIDE = 0.5, 0.02
 
 
-def floor_shape(places: Places, stock: LayeredStock, legs: Sequence[PassProgram]) -> Shape:
+def floor_shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProgram]) -> Shape:
     """Path and stock beside the finished part."""
     inputs = places.inputs
-    gap, at = _nearest(inputs, legs)
+    gap, at = _nearest(inputs, pass_programs)
     corner = max(o.cut.cutter.corner_radius for o in inputs.operations)
     found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + corner)
     return Shape(
@@ -39,11 +39,11 @@ def floor_shape(places: Places, stock: LayeredStock, legs: Sequence[PassProgram]
         found.at if found.gouge > -gap else at,
         found.points,
         gap,
-        part_collisions(inputs, places.uncut, legs),
+        part_collisions(inputs, places.uncut, pass_programs),
     )
 
 
-def _nearest(inputs: WallInputs, legs: Sequence[PassProgram]) -> tuple[float, tuple[float, float, float]]:
+def _nearest(inputs: WallInputs, pass_programs: Sequence[PassProgram]) -> tuple[float, tuple[float, float, float]]:
     """Least distance [mm] of the cutter to the part at its own height, across the axis, and where; below 0: into it.
 
     Right below the cutter the distance to a level floor counts, which the tip may touch.
@@ -54,9 +54,9 @@ def _nearest(inputs: WallInputs, legs: Sequence[PassProgram]) -> tuple[float, tu
     levels = np.unique(np.concatenate([levels, *([z - BESIDE * APART, z + BESIDE * APART] for z in floors)]))
     material = sections(part, levels)
     best, where = np.inf, (0.0, 0.0, 0.0)
-    for leg in legs:
-        cutter = inputs.operations[leg.operation].cut.cutter
-        p = np.asarray(leg.program.p_work)
+    for pass_program in pass_programs:
+        cutter = inputs.operations[pass_program.operation].cut.cutter
+        p = np.asarray(pass_program.program.p_work)
         low = np.minimum(p[1:, 2], p[:-1, 2])
         lines = shapely.linestrings(np.stack([p[:-1, :2], p[1:, :2]], axis=1))
         for z, there in zip(levels.tolist(), material, strict=True):

@@ -23,7 +23,7 @@ from chipload.stock.layers import LayeredStock
 SPACING = 1.0
 
 
-def wall_collisions(inputs: WallInputs, legs: Sequence[PassProgram]) -> tuple[Collision, ...]:
+def wall_collisions(inputs: WallInputs, pass_programs: Sequence[PassProgram]) -> tuple[Collision, ...]:
     """Collisions of shank and holder with one finished wall, and of the whole tool with its neighbours.
 
     Raises
@@ -33,7 +33,7 @@ def wall_collisions(inputs: WallInputs, legs: Sequence[PassProgram]) -> tuple[Co
     """
     op, shape = inputs.job.operation, inputs.body.shape
     cutters = {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
-    steps = steps_of(Program.join([leg.program for leg in legs]), op.step_mm, op.tolerance_mm)
+    steps = steps_of(Program.join([one.program for one in pass_programs]), op.step_mm, op.tolerance_mm)
     length, height, _ = shape.size()
     parameters = (np.linspace(0.0, 1.0, math.ceil(size / SPACING) + 1) for size in (length, height))
     u, v = np.meshgrid(*parameters, indexing="ij")
@@ -43,7 +43,9 @@ def wall_collisions(inputs: WallInputs, legs: Sequence[PassProgram]) -> tuple[Co
     )
 
 
-def part_collisions(inputs: WallInputs, uncut: LayeredStock, legs: Sequence[PassProgram]) -> tuple[Collision, ...]:
+def part_collisions(
+    inputs: WallInputs, uncut: LayeredStock, pass_programs: Sequence[PassProgram]
+) -> tuple[Collision, ...]:
     """Collisions of shank and holder with the finished part, or with its remaining stock.
 
     Parameters
@@ -57,7 +59,7 @@ def part_collisions(inputs: WallInputs, uncut: LayeredStock, legs: Sequence[Pass
     """
     op, table = inputs.job.operation, stated(inputs.job.table.part, "part")
     cutters = {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
-    steps = steps_of(Program.join([leg.program for leg in legs]), op.step_mm, op.tolerance_mm)
+    steps = steps_of(Program.join([one.program for one in pass_programs]), op.step_mm, op.tolerance_mm)
     solids = {"part": fine(inputs.finished_mesh(), table.spacing_mm, "part")[0]}
     touched = collisions(steps, cutters, solids, op.tolerance_mm, above_only=frozenset(["part"]))
     return touched + in_stock(steps, cutters, stock_points(uncut, table.spacing_mm), op.tolerance_mm)

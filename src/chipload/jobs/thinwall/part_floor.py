@@ -76,7 +76,6 @@ class PartFloor:
     box: tuple[float, float]
     face: Polygon
     walls: tuple[tuple[float, MultiPolygon], ...]
-    foot: float = 0.0
 
     def size(self) -> tuple[float, float]:
         """Length of its box along x and along y [mm]."""
@@ -191,7 +190,7 @@ def floor_of(face: Face, key: str, part: trimesh.Trimesh, wall: int, allowance: 
     level = float(face.high[2])
     if face.kind != "plane" or level - float(face.low[2]) > FLAT:
         raise InputError(
-            f"{key}: face {face.number} is no level face ({face.kind}, z from {face.low[2]:.6g} to {level:.6g} mm): "
+            f"{key}: face {face.number} is not a level face ({face.kind}, z from {face.low[2]:.6g} to {level:.6g} mm): "
             "contact = end cuts floors: state a level face, z up, or contact = corner for the side of a wall"
         )
     outline = _outline(face, key, part, level)

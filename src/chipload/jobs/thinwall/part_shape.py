@@ -210,10 +210,10 @@ def _standing(patch: BSplinePatch, key: str, face: Face) -> BSplinePatch:
     flat = float(np.abs(patch.normal(a, b)[:, 2]).max())
     if flat > STEEPEST:
         raise InputError(
-            f"{key}: face {face.number} lies rather than stands: its normal is {np.degrees(np.arcsin(flat)):.3g} deg "
+            f"{key}: face {face.number} is not upright: its normal is {np.degrees(np.arcsin(flat)):.3g} deg "
             f"off the horizontal, at most {np.degrees(np.arcsin(STEEPEST)):g}: state the side of a wall, z up, or "
             "contact = end, which plans a level floor"
         )
-    ways = [q for p in (patch, patch.swapped()) for q in (p, p.reversed(False, True))]
-    patch = max(ways, key=lambda q: float((q.at(FEW, 1.0) - q.at(FEW, 0.0))[:, 2].mean()))
+    orientations = [q for p in (patch, patch.swapped()) for q in (p, p.reversed(False, True))]
+    patch = max(orientations, key=lambda q: float((q.at(FEW, 1.0) - q.at(FEW, 0.0))[:, 2].mean()))
     return patch if patch.side > 0 else patch.reversed(True, False)

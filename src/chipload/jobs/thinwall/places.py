@@ -8,7 +8,6 @@ by cubics, as in the simulation. A state of the wall is solved once, for all who
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,6 +24,7 @@ from chipload.jobs.thinwall.mesh_error import error_at, mesh_error
 from chipload.jobs.thinwall.part_floor import PartFloor
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.planning.thinwall.blank import ContactLine, FinishSurface
+from chipload.planning.thinwall.floor_rows import points_under
 from chipload.planning.thinwall.passes import ThresholdOf
 from chipload.planning.thinwall.threshold import Threshold, modelled
 from chipload.stock.layers import LayeredStock
@@ -35,8 +35,6 @@ Floats = NDArray[np.float64]
 TILE = 1.0
 #: layers below the reach of the cutter are so many times as thick
 COARSE = 8.0
-#: circles under an upright cutter on which the least stock is sought, in radii, and points on each
-CIRCLES, ROUND = (0.0, 0.5, 1.0), 16
 
 
 def wall_stock(inputs: WallInputs) -> LayeredStock:
@@ -84,7 +82,7 @@ class Places:
     keep: KeptRecords | None = None
     _solved: dict[tuple[bytes, int, ContactLine | None], Floats] = field(default_factory=dict)
     _errors: dict[int, Floats] = field(default_factory=dict)
-    _moved: dict[tuple[bytes, int, None], Floats] = field(default_factory=dict)
+    _moved: dict[tuple[bytes, int], Floats] = field(default_factory=dict)
     _reached: dict[int, Floats] = field(default_factory=dict)
 
     @cached_property
@@ -115,9 +113,7 @@ class Places:
     def _under_cutter(self, floor: PartFloor, left: Floats) -> Floats:
         """Least stock of a floor within the radius of the greatest cutter, at the places of the elements."""
         radius = max(o.cut.cutter.radius for o in self.inputs.operations)
-        angle = np.arange(ROUND) * (math.tau / ROUND)
-        circle = np.column_stack([np.cos(angle), np.sin(angle)])
-        under = np.concatenate([share * radius * circle for share in CIRCLES]) / floor.box
+        under = points_under(radius) / floor.box
         at = np.stack(np.meshgrid(*self.inputs.body.places, indexing="ij"), axis=-1)
         near = np.clip(at[:, :, None] + under, 0.0, 1.0)
         return np.asarray(RegularGridInterpolator(self.grid, left)(near).min(axis=2))
@@ -147,7 +143,7 @@ class Places:
     def motion(self, left: Sequence[Floats], side: int) -> Floats:
         """Displacement (n, m, 3) [mm/N] of the elements' places of a part's side under a normal force of 1 N."""
         states, part = self.inputs.both(self.coarse(left)), stated(self.inputs.body.part, "part")
-        key = (b"".join(D.tobytes() for D in states), side, None)
+        key = (b"".join(D.tobytes() for D in states), side)
         if key not in self._moved:
             number = self.inputs.body.side_numbers[side]
             found = (self.keep or KeptRecords(None, "", ()))(

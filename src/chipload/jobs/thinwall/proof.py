@@ -80,15 +80,18 @@ class Proof:
     find_load_error: Callable[[], Mapping[str, float]]
 
 
-def resolution_of(inputs: WallInputs, legs: Sequence[PassProgram], operation: int = -1) -> Resolution:
+def resolution_of(inputs: WallInputs, pass_programs: Sequence[PassProgram], operation: int = -1) -> Resolution:
     """Resolution of the simulation of an operation: one row of the passes is one step."""
     own = inputs.operations[operation]
     op = own.table
-    longest = max(float(np.linalg.norm(np.diff(leg.program.p_work, axis=0), axis=1).max()) for leg in legs)
+    longest = max(
+        float(np.linalg.norm(np.diff(pass_program.program.p_work, axis=0), axis=1).max())
+        for pass_program in pass_programs
+    )
     return Resolution(max(longest, op.step_mm), op.tolerance_mm, op.corner_slices, 0.5 * own.cut.cutter.radius)
 
 
-def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats, progress: Progress) -> Proof:
+def prove(places: Places, plan: Plan, pass_programs: Sequence[PassProgram], times: Floats, progress: Progress) -> Proof:
     """Simulate the passes of a plan at these places in the stock.
 
     Parameters
@@ -97,21 +100,23 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
     """
     inputs = places.inputs
     stock = places.uncut.copied()
-    fine = [resolution_of(inputs, legs, k) for k in range(len(inputs.operations))]
+    fine = [resolution_of(inputs, pass_programs, k) for k in range(len(inputs.operations))]
     bars = {o.cut.cutter.number: tool_bars(o.cut.cutter) for o in inputs.operations}
     left = [np.full(places.shape, inputs.body.allowance[s]) for s in inputs.body.side_numbers]
     parts: list[dict[str, NDArray[Any]]] = []
     simulated: list[SimulatedPass] = []
     thresholds: list[Floats] = []
     finish: dict[int, Finish] = {}
-    time = way = stress = 0.0
+    time = path = stress = 0.0
     last = {p.side: k for k, p in enumerate(plan.passes)}
-    ends = np.cumsum([len(leg.program) for leg in legs])
-    for k, (p, leg, own) in enumerate(zip(plan.passes, legs, np.split(times, ends[:-1]), strict=True)):
+    ends, count = np.cumsum([len(one.program) for one in pass_programs]), len(pass_programs)
+    for k, (p, pass_program, own) in enumerate(
+        zip(plan.passes, pass_programs, np.split(times, ends[:-1]), strict=True)
+    ):
         before, own_operation = stock.copied(), inputs.operations[p.operation]
         cutter, rules = own_operation.cut.cutter, own_operation.depths
         removal = remove(
-            leg.program,
+            pass_program.program,
             stock,
             {cutter.number: cutter},
             inputs.cut.material,
@@ -119,28 +124,28 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
             keep=True,
             accuracy=False,
             times=own,
-            progress=lambda part, what, k=k: progress((k + part) / len(legs), f"pass {k + 1} of {len(legs)}"),  # type: ignore[misc]
+            progress=lambda part, what, k=k: progress((k + part) / count, f"pass {k + 1} of {count}"),  # type: ignore[misc]
         )
         left[p.side] = p.low
         number = inputs.body.side_numbers[p.side]
         floor = inputs.floor(number) is not None
-        simulated.append(SimulatedPass(leg.program, before, removal.columns, cutter, fine[p.operation], floor))
+        simulated.append(SimulatedPass(pass_program.program, before, removal.columns, cutter, fine[p.operation], floor))
         C = places.compliance(left, p.side)
         F_th = places.threshold(inputs.depths.deflection, 1.0, spare=False)(left, p.side).force.reshape(places.shape)
         thresholds.append(F_th)
         error = places.error(p.side)
         loads = floor_loads(places, removal, left, p.side, error) if floor and removal.cuts else None
-        columns = _columns(places, removal, leg, C, F_th, error, bars, loads)
+        columns = _columns(places, removal, pass_program, C, F_th, error, bars, loads)
         u, v = np.clip(columns["u"], 0.0, 1.0), np.clip(columns["v"], inputs.body.foot, 1.0)
         share = RegularGridInterpolator(places.grid, p.correction)(np.column_stack([u, v]))
         law = rules.even_law if plan.name in EVEN else rules.law
         columns["force_normal_planned_n"] = share * law.force(columns["depth_mm"])
         columns["t_s"] = columns["t_s"] + time
-        columns["s_mm"] = columns["s_mm"] + way
-        time, way = float(columns["t_s"][-1]), float(columns["s_mm"][-1])
+        columns["s_mm"] = columns["s_mm"] + path
+        time, path = float(columns["t_s"][-1]), float(columns["s_mm"][-1])
         if places.chatter is not None:
             columns |= places.chatter.columns(places, removal, p, left, columns)
-        columns["pass"] = np.full(len(columns["t_s"]), leg.program.labels[0], dtype=object)
+        columns["pass"] = np.full(len(columns["t_s"]), pass_program.program.labels[0], dtype=object)
         parts.append(columns)
         stress = max(stress, _stress(inputs, places.coarse(left), number, columns))
         if k == last[p.side]:
@@ -151,7 +156,7 @@ def prove(places: Places, plan: Plan, legs: Sequence[PassProgram], times: Floats
             )
     whole = stacked(parts)  # a pass that cuts films alone has no bands
     find = partial(load_error, simulated, inputs.cut.material)
-    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(places, stock, legs), stress, find)
+    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(places, stock, pass_programs), stress, find)
 
 
 def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Mapping[str, NDArray[Any]]) -> float:
@@ -195,7 +200,7 @@ def _rows(inputs: WallInputs, v: float) -> float:
 def _columns(
     places: Places,
     removal: Removal,
-    leg: PassProgram,
+    pass_program: PassProgram,
     C: Floats,
     F_th: Floats,
     error: Floats,
@@ -213,9 +218,17 @@ def _columns(
     columns = dict(removal.columns)
     columns.pop("label")
     n = len(columns["line"])
-    known = np.column_stack([leg.place, leg.depth])
+    known = np.column_stack([pass_program.place, pass_program.depth])
     spots = [
-        touched(removal, int(leg.program.line[0]), leg.contact, leg.points, leg.normals, known, within)
+        touched(
+            removal,
+            int(pass_program.program.line[0]),
+            pass_program.contact,
+            pass_program.points,
+            pass_program.normals,
+            known,
+            within,
+        )
         for within in JUDGED
     ]
     uv = [(np.clip(x[:, 0], 0.0, 1.0), np.clip(x[:, 1], inputs.body.foot, 1.0)) for _, x in spots]
@@ -262,8 +275,8 @@ def _columns(
     ratio = np.zeros(n)
     ratio[at] = found["force_normal_n"][at] / threshold
     columns["force_over_allowable"] = ratio
-    columns["side"] = np.full(n, leg.side)
-    columns["operation"] = np.full(n, leg.operation)
+    columns["side"] = np.full(n, pass_program.side)
+    columns["operation"] = np.full(n, pass_program.operation)
     return columns
 
 
@@ -323,11 +336,11 @@ def _finish(
     )
 
 
-def _shape(places: Places, stock: LayeredStock, legs: Sequence[PassProgram]) -> Shape:
+def _shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProgram]) -> Shape:
     """Path and stock beside the finished wall, the tool beside its neighbours or the part."""
     inputs = places.inputs
     if isinstance(inputs.body.shape, PartShape) and inputs.body.shape.floors:
-        return floor_shape(places, stock, legs)
+        return floor_shape(places, stock, pass_programs)
     length, height, _ = inputs.body.shape.size()
     u, v = np.meshgrid(
         np.linspace(0.0, 1.0, round(length / CLOUD) + 1),
@@ -336,11 +349,19 @@ def _shape(places: Places, stock: LayeredStock, legs: Sequence[PassProgram]) -> 
     )
     cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.body.shape.sides(u, v)])
     gaps = [
-        nearest(Program.join([leg.program for leg in legs if leg.operation == k]), o.cut.cutter, cloud)
+        nearest(
+            Program.join([one.program for one in pass_programs if one.operation == k]),
+            o.cut.cutter,
+            cloud,
+        )
         for k, o in enumerate(inputs.operations)
     ]
     gap = min(gaps, key=lambda one: one.distance)
     found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.below)
     at = found.at if found.gouge > -gap.distance else gap.at
-    touched = wall_collisions(inputs, legs) if inputs.body.part is None else part_collisions(inputs, places.uncut, legs)
+    touched = (
+        wall_collisions(inputs, pass_programs)
+        if inputs.body.part is None
+        else part_collisions(inputs, places.uncut, pass_programs)
+    )
     return Shape(found.gouge, found.left, at, found.points, gap.distance, touched)

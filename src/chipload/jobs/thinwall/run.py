@@ -155,14 +155,14 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
     inputs = read_wall(job)
     _thick_enough(inputs)
     places = places_of(inputs)
-    legs = linked(inputs, unlimited_plan(places).plan, places.grid)
-    program = Program.join([leg.program for leg in legs])
+    pass_programs = linked(inputs, unlimited_plan(places).plan, places.grid)
+    program = Program.join([one.program for one in pass_programs])
     on_machine(inputs, program)
     wall_stock(inputs)
     count = 0
     for k, o in enumerate(inputs.operations):
-        own = Program.join([leg.program for leg in legs if leg.operation == k])
-        count += counted(own, {o.cut.cutter.number: o.cut.cutter}, resolution_of(inputs, legs, k))
+        own = Program.join([one.program for one in pass_programs if one.operation == k])
+        count += counted(own, {o.cut.cutter.number: o.cut.cutter}, resolution_of(inputs, pass_programs, k))
     length, height, thickness = inputs.body.shape.size()
     part = inputs.body.part
     if part is None:

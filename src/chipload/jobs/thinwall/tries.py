@@ -62,14 +62,18 @@ class Tried:
         name, low = planned.plan.name, self.done
         width = share * (1.0 - low)
         self.variable += name == "variable"
-        legs = linked(self.places.inputs, planned.plan, self.places.grid)
-        program = Program.join([leg.program for leg in legs])
+        pass_programs = linked(self.places.inputs, planned.plan, self.places.grid)
+        program = Program.join([one.program for one in pass_programs])
         run = on_machine(self.places.inputs, program)
         proof = kept_proof(
             self.keep,
             planned.plan,
             lambda: prove(
-                self.places, planned.plan, legs, run.times, lambda p, w: self.progress(low + width * p, f"{name}: {w}")
+                self.places,
+                planned.plan,
+                pass_programs,
+                run.times,
+                lambda p, w: self.progress(low + width * p, f"{name}: {w}"),
             ),
         )
         self.done = low + width
@@ -220,8 +224,8 @@ def compared_variants(tried: Tried, variable: Variant, constant: Variant) -> dic
 
 def program_seconds(places: Places, planned: Planned) -> float:
     """Time of a plan on the machine."""
-    legs = linked(places.inputs, planned.plan, places.grid)
-    return float(on_machine(places.inputs, Program.join([leg.program for leg in legs])).times.sum())
+    pass_programs = linked(places.inputs, planned.plan, places.grid)
+    return float(on_machine(places.inputs, Program.join([one.program for one in pass_programs])).times.sum())
 
 
 def _greater(one: Corrections, other: Corrections) -> Corrections:

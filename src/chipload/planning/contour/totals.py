@@ -38,8 +38,8 @@ def cleared_percent(
     part = rough_stock(walls, walls.extended, behind).flatten(CHORD)
     beside = shapely.union_all([shapely.buffer(line(w), 1.01 * depth, cap_style="flat") for w in walls.walls])
     asked = shapely.intersection(shapely.difference(stock.flatten(CHORD), part), beside)
-    ways = [way for p in passes for way in (p.lead_in, p.path, p.lead_out) if way is not None]
-    swept = shapely.union_all([shapely.buffer(line(way), radius, quad_segs=OF_RADIUS) for way in ways])
+    lines = [contour for p in passes for contour in (p.lead_in, p.path, p.lead_out) if contour is not None]
+    swept = shapely.union_all([shapely.buffer(line(contour), radius, quad_segs=OF_RADIUS) for contour in lines])
     return float(100.0 * shapely.intersection(asked, swept).area / asked.area)
 
 

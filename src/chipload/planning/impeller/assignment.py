@@ -163,7 +163,7 @@ def _solved(sides: Sequence[tuple[Floats, Floats]], chosen: NDArray[np.int64], c
 
 
 def _side(number: int, orders: list[Floats]) -> _Node:
-    ways: list[_Node] = []
+    options: list[_Node] = []
     for order, cost in enumerate(orders):
         strips: list[_Node] = []
         for k, cells in enumerate(cost):
@@ -173,8 +173,8 @@ def _side(number: int, orders: list[Floats]) -> _Node:
             else:
                 row = tuple(_Leaf((number, order, k, j), cell) for j, cell in enumerate(cells))
                 strips.append(_Either((_AssignmentRow(row), _AssignmentRow(row[::-1]))))
-        ways += [_AssignmentRow(tuple(strips)), _AssignmentRow(tuple(strips[::-1]))]
-    return _Either(tuple(ways))
+        options += [_AssignmentRow(tuple(strips)), _AssignmentRow(tuple(strips[::-1]))]
+    return _Either(tuple(options))
 
 
 def _forward(node: _Node, before: Floats, changes: Changes) -> tuple[Floats, object]:
@@ -200,13 +200,13 @@ def _backward(
     if isinstance(node, _Leaf):
         assert isinstance(record, np.ndarray)
         steps.append(Step(*node.where, k, t))
-        ways: list[tuple[float, tuple[int, int]]] = [
+        options: list[tuple[float, tuple[int, int]]] = [
             (record[k, t], (k, t)),
             (record[k].min() + changes.table, (k, int(record[k].argmin()))),
             (record[:, t].min() + changes.cutter, (int(record[:, t].argmin()), t)),
             (record.min() + changes.cutter + changes.table, divmod(int(record.argmin()), record.shape[1])),
         ]
-        return min(ways, key=lambda way: float(way[0]))[1]
+        return min(options, key=lambda direction: float(direction[0]))[1]
     assert isinstance(record, list)
     if isinstance(node, _AssignmentRow):
         for part, one in zip(reversed(node.parts), reversed(record), strict=True):
@@ -247,7 +247,7 @@ def _bounds(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64]) -> 
     """(n,) strips without changes."""
     out = np.zeros(len(sets))
     for side in sides:
-        ways = []
+        options = []
         for cost in side:
             strips, cells = cost.sum(axis=1).min(axis=2), cost.min(axis=3)
             low = np.zeros(len(sets))
@@ -257,8 +257,8 @@ def _bounds(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64]) -> 
                 if split.any():
                     best[split] = cell[:, sets[split]].min(axis=2).sum(axis=0)
                 low += best
-            ways.append(low)
-        out += np.minimum(*ways)
+            options.append(low)
+        out += np.minimum(*options)
     return out
 
 
@@ -266,7 +266,7 @@ def _totals(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64], cha
     """Least times (n,) of many sets, as :func:`_solved` without the steps; inf: cells are left."""
     state = np.zeros((*sets.shape, sides[0][0].shape[3]))
     for side in sides:
-        ways = []
+        options = []
         for cost in side:
             of_sets = cost[:, :, sets]
             for forth in (1, -1):
@@ -277,15 +277,15 @@ def _totals(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64], cha
                     split = ~np.isfinite(whole).any(axis=(1, 2))
                     if split.any():
                         both = []
-                        for way in (1, -1):
+                        for direction in (1, -1):
                             part = after[split]
-                            for cell in cells[::way, split]:
+                            for cell in cells[::direction, split]:
                                 part = _entered(part, changes) + cell
                             both.append(part)
                         through[split] = np.minimum(*both)
                     after = through
-                ways.append(after)
-        state = np.minimum.reduce(ways)
+                options.append(after)
+        state = np.minimum.reduce(options)
     out: Floats = state.min(axis=(1, 2))
     return out
 

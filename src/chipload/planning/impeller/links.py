@@ -266,9 +266,9 @@ class _LinkJob:
         share = np.arange(1, _SMALL + 1)[:, None] / _SMALL
         found: _Pose | None = None
         for size in _LIFTS:
-            for way in (N + T, T, N, N + 2.0 * T, 2.0 * N + T):
+            for direction in (N + T, T, N, N + 2.0 * T, 2.0 * N + T):
                 length = self.how.lift * size
-                step = length * way / np.linalg.norm(way)
+                step = length * direction / np.linalg.norm(direction)
                 tips = p + share * step
                 got, _ = clearance(
                     self.scene, self.cutter, tips, np.tile(T, (_SMALL, 1)), self.how.lift + 1.0, self.clear_of

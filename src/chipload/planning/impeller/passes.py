@@ -81,18 +81,18 @@ def joined(tracks: Sequence[ToolTrack], joint: Joint, longest: float, label: str
         if last is not None:
             ends = [float(np.linalg.norm(given.contact[k] - last.contact[-1])) for k in (0, -1)]
             track = given if ends[0] <= ends[1] else given.back()
-            way = joint(number, last, track) if min(ends) <= longest else None
-            if way is None and len(out[-1].numbers) == 1 and not stayed_at(out[-1]):
+            between = joint(number, last, track) if min(ends) <= longest else None
+            if between is None and len(out[-1].numbers) == 1 and not stayed_at(out[-1]):
                 # the first track of a pass may be milled either way
                 turned = last.back()
                 other = [float(np.linalg.norm(given.contact[k] - turned.contact[-1])) for k in (0, -1)]
                 if min(other) <= longest:
                     track = given if other[0] <= other[1] else given.back()
-                    way = joint(number, turned, track)
-                    if way is not None:
+                    between = joint(number, turned, track)
+                    if between is not None:
                         out[-1] = single(out[-1].numbers[0], turned, label)
-            if way is not None:
-                out[-1] = _grown(out[-1], way, number, track)
+            if between is not None:
+                out[-1] = _grown(out[-1], between, number, track)
                 stayed += 1
                 last = track
                 continue
@@ -120,20 +120,20 @@ def surface_joint(refinements: Sequence[Refinement | None]) -> Joint:
         at = np.stack([before.at[-1], after.at[0]])
         if np.array_equal(at[0], at[1]) and turn == 0.0:
             return None
-        way = refinement.track(at, np.array([before.pallet[-1], before.pallet[-1] + turn]), after.line)
-        parts, bad = refinement.refined(way)
+        between = refinement.track(at, np.array([before.pallet[-1], before.pallet[-1] + turn]), after.line)
+        parts, bad = refinement.refined(between)
         return parts[0] if len(parts) == 1 and not len(bad) else None
 
     return joint
 
 
-def _grown(one: Pass, way: ToolTrack, number: int, track: ToolTrack) -> Pass:
+def _grown(one: Pass, between: ToolTrack, number: int, track: ToolTrack) -> Pass:
     """A pass that goes on through a link to a further track."""
     # the way begins where the pass ends and ends where the track begins
-    inner = slice(1, len(way.tip) - 1)
-    link = len(way.tip) - 2
+    inner = slice(1, len(between.tip) - 1)
+    link = len(between.tip) - 2
     tip, axis, normal = (
-        np.concatenate([getattr(one, key), getattr(way, key)[inner], getattr(track, key)])
+        np.concatenate([getattr(one, key), getattr(between, key)[inner], getattr(track, key)])
         for key in ("tip", "axis", "normal")
     )
     of = np.concatenate([one.of, np.full(link + len(track.tip), number)])

@@ -126,13 +126,13 @@ def planned(
 
 
 def tell_millings(
-    ways: Sequence[tuple[FinishSettings, Sequence[Patch]]], known: Mapping[MillingKey, Milling], keep: Keep,
+    plans: Sequence[tuple[FinishSettings, Sequence[Patch]]], known: Mapping[MillingKey, Milling], keep: Keep,
     progress: Progress = silent,
 ) -> None:  # fmt: skip
     """Announce the paths of the patches of several partitions that are not ``known``."""
     parts = {
         key: job.milling_task(patch)
-        for job, patches in ways
+        for job, patches in plans
         for patch in patches
         if (key := milling_key(job.catalogue, patch)) not in known
     }

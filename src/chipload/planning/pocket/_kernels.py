@@ -15,13 +15,13 @@ from numba import njit
 from chipload.engagement.moves.borrowed._kernels import borrowed
 from chipload.stock._kernels import uncut, uncut_between
 
-#: a turn to the left [rad] that is tried again with half the step
+#: turn to the left [rad] from which on a step is halved
 SHARP = 0.2
-#: an arc's end is found when E is so much below the limit at most [rad]
+#: tolerance of E below its limit at the end of an arc [rad]
 CLOSE = 4e-4
-#: an arc does not end nearer to a wall than this part of R
+#: least distance of the end of an arc from a wall, as a share of R
 FILM = 1e-3
-#: an edge of the centre region is at least so many cells away from a place in a cell that is flagged as inside
+#: least distance, in cells, of an edge of the centre region from a place in a cell that is flagged as inside
 AWAY = 0.7
 #: length of an arc over that of a straight step; greatest turn of an arc to the left over that to the right
 LONGER, SMOOTH = 2.0, 1.5
@@ -43,7 +43,7 @@ def allowed(x, y, grid, flag, edges, rows, row_edges):
 
 @njit(cache=True, nogil=True)
 def room(x, y, grid, flag):
-    """Distance [mm] around O that is in the centre region for certain, 0 where an edge may be near.
+    """Radius [mm] about (x, y) that is certainly within the centre region; 0 if an edge may be near.
 
     ``mark`` flags the 3 x 3 cells about places of an edge that are half a cell apart: no edge comes nearer to a cell
     flagged 1 than three quarters of one.
@@ -128,7 +128,7 @@ def worst_of_step(ox, oy, th, phi, l, full, r, R, grid, head, link, axis, arcs):
 def step_allowed(ox, oy, th, phi, l, slack, grid, flag, edges, rows, row_edges):
     """Whether the step stays in the centre region: its end, and within ``slack`` all of it.
 
-    Asked at every eighth: a wall that bends around the step is no tighter than R, so that between two of them it comes
+    Tested at every eighth: a wall that bends around the step is no tighter than R, so that between two of them it comes
     no nearer than (l / 8)^2 / (8 R), 7e-6 R.
     """
     tx, ty = math.cos(th + phi), math.sin(th + phi)
@@ -340,7 +340,7 @@ def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, arcs, fla
     """Whether a straight link between two freed centres meets no material, nor leaves the centre region.
 
     Discs are tested a spacing d apart, each larger by d^2 / (8 R), so that together they cover the capsule; d is fine
-    near the ends, where the cutter may touch what it came from. The centre is asked for every 0.01 R.
+    near the ends, where the cutter may touch the material that it has just cut. The centre is tested every 0.01 R.
     """
     grid, head, link, axis, arcs = borrowed((grid, head, link, axis, arcs))
     flag, edges, rows, row_edges = borrowed((flag, edges, rows, row_edges))
@@ -375,7 +375,7 @@ def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, arcs, fla
 @njit(cache=True, nogil=True)
 def open_sides(points, normals, which, eps, least, R, touch, grid, head, link, axis, arcs, flag, edges, rows, row_edges,
                out):  # fmt: skip
-    """If material can be cut beside each of some points: O moved by eps along its normal is allowed and meets some."""
+    """Whether material can be cut next to each point (n, 2): O moved by eps [mm] along its normal may be there."""
     grid, head, link, axis, arcs = borrowed((grid, head, link, axis, arcs))
     flag, edges, rows, row_edges = borrowed((flag, edges, rows, row_edges))
     r = R * (1.0 - touch)

@@ -39,8 +39,8 @@ def swept(points: Floats, breaks: NDArray[np.bool_], radius: float) -> shapely.G
     A buffer of a line that turns much costs the square of its vertices, many short lines cost the ends of their
     buffers: a line is buffered in parts that turn by at most ``TURNS``.
     """
-    leg = np.diff(points, axis=0, prepend=points[:1])
-    turn = np.diff(np.arctan2(leg[:, 1], leg[:, 0]), prepend=0.0)
+    edge = np.diff(points, axis=0, prepend=points[:1])
+    turn = np.diff(np.arctan2(edge[:, 1], edge[:, 0]), prepend=0.0)
     turned = np.cumsum(np.abs(turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))))
     parts = np.floor(turned / TURNS)
     begins = np.flatnonzero(breaks | np.append(True, parts[1:] != parts[:-1]))
@@ -81,8 +81,8 @@ def near_partly_cleared(
     w = 2 * n + 1
     near = total[w:, w:] - total[:-w, w:] - total[w:, :-w] + total[:-w, :-w] > 0
     before = np.where(breaks[:, None], points, np.vstack([points[:1], points[:-1]]))
-    leg = np.hypot(*(points - before).T)
-    parts = np.maximum(1, np.ceil(leg / h).astype(np.int64))
+    edge = np.hypot(*(points - before).T)
+    parts = np.maximum(1, np.ceil(edge / h).astype(np.int64))
     k = np.repeat(np.arange(len(points)), parts)
     share = (np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts) + 1) / parts[k]
     at = before[k] + share[:, None] * (points - before)[k]

@@ -255,7 +255,7 @@ def bore_turns(radius: float, depth: float) -> int:
     return max(1, math.ceil(depth / (math.tau * radius * math.tan(HELIX))))
 
 
-def ramp_legs(length: float, depth: float) -> int:
+def ramp_strokes(length: float, depth: float) -> int:
     """Legs of a ramp to and fro ``depth`` [mm] deep along a line of ``length`` [mm]: an even number of them."""
     return 2 * max(1, math.ceil(depth / (2.0 * length * math.tan(HELIX)) - 1e-9))
 
@@ -267,7 +267,7 @@ def entry_depth(motions: Motions, depth: float) -> float:
     radii = np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])
     straight = np.hypot(seg[:, 2] - seg[:, 0], seg[:, 3] - seg[:, 1])
     return max(
-        depth / bore_turns(r, depth) if sweep else 2.0 * depth / ramp_legs(line, depth)
+        depth / bore_turns(r, depth) if sweep else 2.0 * depth / ramp_strokes(line, depth)
         for r, line, sweep in zip(radii.tolist(), straight.tolist(), seg[:, 6].tolist(), strict=True)
     )
 
@@ -283,11 +283,11 @@ def _bore(at: Floats, seg: Floats, heights: tuple[float, float], feed: float, sp
 
 def _ramp(at: Floats, seg: Floats, heights: tuple[float, float], feed: float, spindle: float, tool: int) -> Program:
     """Legs to and fro along a line ``seg`` (7,), from one height evenly down to the other, the last back to ``at``."""
-    legs = ramp_legs(float(np.hypot(*(seg[2:4] - at))), heights[0] - heights[1])
-    z = np.linspace(*heights, legs + 1)[1:]
-    to = np.where((np.arange(legs) % 2 == 0)[:, None], seg[2:4], at)
-    line = np.full(legs, LINE)
-    return rows(line, np.column_stack([to, z]), np.zeros((legs, 2)), np.full(legs, feed), spindle, tool, "entry")
+    strokes = ramp_strokes(float(np.hypot(*(seg[2:4] - at))), heights[0] - heights[1])
+    z = np.linspace(*heights, strokes + 1)[1:]
+    to = np.where((np.arange(strokes) % 2 == 0)[:, None], seg[2:4], at)
+    line = np.full(strokes, LINE)
+    return rows(line, np.column_stack([to, z]), np.zeros((strokes, 2)), np.full(strokes, feed), spindle, tool, "entry")
 
 
 def programs_of(

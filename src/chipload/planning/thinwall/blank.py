@@ -35,7 +35,7 @@ SIDES: tuple[Side, Side] = ("k-", "k+")
 LINE_POINTS = 3
 #: right-hand sides at once
 TOGETHER = 64
-#: in the row above the foot
+#: places on the upper border of the foot are moved up by this [rows of elements], into the row above it
 ABOVE = 1e-9
 
 
@@ -76,12 +76,12 @@ class FinishSurface:
 
 @dataclass(frozen=True)
 class ContactLine:
-    """Part of a contact line up a wall over which the force acts at one instant, from a place on its lower end.
+    """Part of a contact line over which the force acts at one instant. The contact line goes up the wall from a place.
 
     Parameters
     ----------
-    reach : of its upper end above the place; at most to the free edge
-    length : of it, downwards from there; both as shares of the height above the foot
+    reach : height of its upper end above the place, at most to the free edge
+    length : its length downwards from that end; both as shares of the wall's height above the foot
     """
 
     reach: float
@@ -118,7 +118,7 @@ class WallBlank:
     Raises
     ------
     InputError
-        More than one layer, the stock is as thick as the wall, or nothing but the foot is there.
+        There is more than one layer of elements, the stock leaves no wall, or all rows belong to the foot.
     """
 
     solid: SolidWorkpiece

@@ -28,9 +28,9 @@ from chipload.stability.modes import Modes
 
 Floats = NDArray[np.float64]
 
-#: depths that are tested, bisections between the last stable and the first other, and nodes of the chip's profile
+#: tested depths, bisections between the last stable depth and the next one, nodes of the chip's profile
 LOOKS, HALVINGS, NODES = 8, 4, 4
-#: places by which a speed is chosen, at most: those at which a mode moves most
+#: greatest number of places by which a speed is chosen: those at which a mode moves most
 WORST = 4
 
 

@@ -31,7 +31,7 @@ GRID, TURNS, SMALL = (65, 33), 40, 1e-10
 SLOPE, FARTHEST = 1e-4, 0.05
 #: step of the differences that tangents are made from, in u and v
 STEP = 1e-6
-#: the cutter touches the side if at most this [mm] of M - S lies along it: so far beyond an edge it may be
+#: greatest part of M - S along the side [mm] at which the cutter touches it: the allowed distance beyond an edge
 ALONG = 0.02
 
 
@@ -70,7 +70,7 @@ class ContactFinder:
         Parameters
         ----------
         tip, axis : (n, 3) float [mm], unit vectors
-        far : [mm]; where the clearance is certainly greater it is infinite
+        far : [mm]; a clearance that is certainly greater is returned as infinite
         """
         r, e, height = self.cutter.finishing_arc
         C = tip + height * axis
@@ -93,8 +93,8 @@ def _nearest(
     def along_side(a: Floats, b: Floats) -> Floats:
         """(n, 2) parts of M - S along the tangents, times their lengths."""
         point, normal = side(a, b)
-        way = _corner_centre(C, axis, normal, e) - point
-        return np.stack([(t * way).sum(axis=1) for t in tangents(side, a, b)], axis=1)
+        offset = _corner_centre(C, axis, normal, e) - point
+        return np.stack([(t * offset).sum(axis=1) for t in tangents(side, a, b)], axis=1)
 
     for _ in range(TURNS):
         g = along_side(u, v)
@@ -107,9 +107,9 @@ def _nearest(
         if max(float(np.abs(x - y).max()) for x, y in zip((u, v), before, strict=True)) < SMALL:
             break
     point, normal = side(u, v)
-    way = _corner_centre(C, axis, normal, e) - point
-    over = (way * normal).sum(axis=1)
-    beside = np.linalg.norm(way - over[:, None] * normal, axis=1)
+    offset = _corner_centre(C, axis, normal, e) - point
+    over = (offset * normal).sum(axis=1)
+    beside = np.linalg.norm(offset - over[:, None] * normal, axis=1)
     return u, v, np.where(beside <= ALONG, over - r, np.inf)
 
 

@@ -37,11 +37,11 @@ Measure = Literal["greatest", "mean"]
 THRESHOLD, DEEPEST, INFEASIBLE = 0, 1, 2
 #: depths at which the force is calculated before the equation is solved
 LOOKS = 49
-#: share of the feed at which the force is the edge force alone
+#: ratio to the feed per tooth of a feed at which only the edge force is left
 NO_FEED = 1e-6
 #: rotations between which the greatest force is searched; the engagement of a flank or an end begins and ends abruptly
 STEP_DEG, FLANK_STEP_DEG = 1.0, 0.25
-#: so many times as many nodes on the flank arc of a barrel, of which a row touches a small part: 0.7 % of the mean
+#: factor on the number of nodes on the flank arc of a barrel, of which a row touches a small part (0.7 % of the mean)
 BARREL_NODES = 4
 #: depths whose tooth engagement is in memory at once
 BLOCK = 256
@@ -49,7 +49,7 @@ BLOCK = 256
 
 @dataclass(frozen=True)
 class DepthRange:
-    """Smallest and greatest depth [mm], and how near the solution must come [mm]."""
+    """Smallest and greatest depth [mm], and the tolerance of the solution [mm]."""
 
     smallest: float
     greatest: float
@@ -243,7 +243,13 @@ def _below(
 def _helps(
     posture: Pose, material: Material, threshold: float, depth: float, measure: Measure
 ) -> tuple[float, float | None, float | None]:
-    """Force of the edge alone, feed per tooth and diameter that bring the force of ``depth`` to the threshold."""
+    """What makes an infeasible place feasible.
+
+    Returns
+    -------
+    Force [N] of the edge alone at ``depth`` [mm]; feed per tooth [mm] at which the force is the threshold [N], None:
+    none; diameter [mm] of a cutter of the same shape at which it is, None: none, or a feed is enough
+    """
 
     def at_feed(feed: float) -> float:
         return float(normal_force(replace(posture, feed_per_tooth=feed), material, [depth], measure=measure)[0])
@@ -264,7 +270,7 @@ def _helps(
 
 
 def _least_share(posture: Pose, depth: float) -> float:
-    """Least diameter of a cutter of the same shape for this depth and step-over, over its own."""
+    """Ratio of the least diameter of a cutter of this shape that can cut the depth and step-over [mm] to its own."""
     if isinstance(posture, FlankPose):
         return depth / posture.deepest
     step, cutter = abs(posture.step or 0.0), posture.cutter
@@ -274,21 +280,19 @@ def _least_share(posture: Pose, depth: float) -> float:
 
 
 def _scaled(posture: Pose, diameter: float) -> Pose:
+    """The pose with a cutter of another diameter [mm] and the same shape; a barrel is scaled with its flutes."""
     cutter = posture.cutter
-    ratio = diameter / cutter.diameter
-    corner = ratio * cutter.corner_radius
-    other = replace(cutter, diameter=diameter, corner_radius=corner, corner_e=None, corner_f=None, shank_diameter=None)
-    if cutter.barrel_radius is not None:
-        other = replace(
-            cutter,
-            diameter=diameter,
-            corner_radius=corner,
-            corner_e=ratio * cutter.apt[2],
-            corner_f=None,
-            barrel_radius=ratio * cutter.barrel_radius,
-            flute_length=ratio * cutter.flute_length,
-            shank_diameter=None,
-        )
+    ratio, barrel = diameter / cutter.diameter, cutter.barrel_radius
+    other = replace(
+        cutter,
+        diameter=diameter,
+        corner_radius=ratio * cutter.corner_radius,
+        corner_e=None if barrel is None else ratio * cutter.apt[2],
+        corner_f=None,
+        barrel_radius=None if barrel is None else ratio * barrel,
+        flute_length=cutter.flute_length if barrel is None else ratio * cutter.flute_length,
+        shank_diameter=None,
+    )
     return replace(posture, cutter=other)
 
 

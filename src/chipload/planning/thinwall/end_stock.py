@@ -25,6 +25,7 @@ from chipload.cutter.slices import slices
 from chipload.engagement.immersion.immersion import tool_frame
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
+from chipload.planning.thinwall.depth_range import depths_in_range
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ class EndPose:
     cutter : end mill or bull nose: flat bottom, no taper
     feed_per_tooth : f_z > 0 [mm]
     step : step-over b [mm]; the row before lies on the right of the feed (b > 0) or on its left; at most the flat of
-        the bottom, so that no cusps stay
+        the bottom, so that no scallops stay
     clockwise : sense of the spindle (M3)
 
     Raises
@@ -87,7 +88,7 @@ class EndPose:
         if not 0.0 < abs(self.step) <= flat:
             raise InputError(
                 f"step_over_mm = {abs(self.step):g}: must be from above 0 to {flat:g}, the flat of the bottom: "
-                "cusps would stay on the floor"
+                "scallops would stay on the floor"
             )
 
     @property
@@ -156,12 +157,7 @@ class EndPose:
         >>> np.degrees(rows[0, :2]).round(6).tolist(), rows[0, 2:5].round(6).tolist()
         ([120.0, 180.0], [0.0, 1.5, 0.05])
         """
-        d = np.atleast_1d(np.asarray(depths, dtype=np.float64))
-        wrong = np.flatnonzero(~((d > 0.0) & (d <= self.deepest * (1.0 + 1e-12))))
-        if len(wrong):
-            raise InputError(
-                f"depth_mm = {d[wrong[0]]:g}: must be above 0 and at most {self.deepest:g}, {self.deepest_is}"
-            )
+        d = depths_in_range(self, depths)
         own = slices(self.cutter, bottom_slices=1, corner_slices=nodes, grading=GRADING)
         r = self.cutter.corner_radius
         # length of the profile from the end of the flat up to the depth

@@ -5,8 +5,8 @@ Notation: p, q places [mm]; d(q) [mm] allowable depth of cut there; L greatest s
     d~(p) = min over q of d(q) + L |p - q|
 
 is the greatest function at or below d whose slope is at most L in any direction. An average would lie above d where d
-is least, and exceed the threshold there. |p - q| is the straight distance, at most that along the surface: d~ is never
-too deep.
+is least, and exceed the threshold there. |p - q| is the straight distance, which is at most that along the surface, so
+that d~ is on the safe side.
 
 Places are gathered in boxes of about sqrt(n); for those of one box the others are taken in the order of min d +
 L (distance of the boxes), until that passes the greatest d~ left in it. Exact; O(n^1.5) where d needs little lowering.

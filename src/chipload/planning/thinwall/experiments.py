@@ -38,9 +38,9 @@ from chipload.progress import Progress, silent
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: candidates among which sites are exchanged at first, neighbours of a site among which it is moved then
+#: number of candidates in the first exchange of sites, and of neighbours among which each site is moved afterwards
 COARSE, NEIGHBOURS = 40, 9
-#: depths nearer than this share are the same cut
+#: relative difference below which two depths are the same cut
 SAME = 1e-6
 
 
@@ -50,13 +50,13 @@ class Proposal:
 
     Attributes
     ----------
-    sites : (m,) int, numbers of the places where is cut
+    sites : (m,) int, numbers of the places that are cut
     place : (m, 2) float, u, v; point : (m, 3) float [mm]
     threshold : (m,) float [N], as modelled
     site, repeat : (c,) int of each cut: row of ``sites``; 0, or 1 where the series is repeated
     depth, force : (c,) float [mm], [N]; rising within a series: stop when it is too much
-    bias, noise : root mean square over the places of what the interpolation misses of log F_th, and of the scatter
-        that the experiments bring in
+    bias, noise : root mean square over the places of the interpolation error of log F_th, and of the scatter of the
+        experiments in it
     findings : series that do not bracket the modelled threshold
     """
 
@@ -122,7 +122,7 @@ def propose_sites(
     modelled : (p,) float [N], above 0
     count : m >= 3
     scatter : s >= 0, standard deviation of log F in one experiment, as it is expected
-    candidates : (c,) int, places where may be cut; None: all
+    candidates : (c,) int, places that may be cut; None: all
 
     Notes
     -----
@@ -187,7 +187,7 @@ def _checked(
     if len(allowed) and not (allowed[0] >= 0 and allowed[-1] < len(x)):
         raise InputError(f"experiments: a candidate outside 0 .. {len(x) - 1}")
     if not 3 <= count <= len(allowed):
-        raise InputError(f"experiments.count = {count}: must be from 3 to {len(allowed)}, the places where may be cut")
+        raise InputError(f"experiments.count = {count}: must be from 3 to {len(allowed)}, the places that may be cut")
     if not 0.0 <= scatter < math.inf:
         raise InputError(f"experiments.scatter = {scatter:g}: must be at least 0 (0.1 is 10 %)")
     return x, np.log(F), allowed
@@ -294,7 +294,7 @@ def propose_cuts(
 
 
 def _influence(sites: Ints, x: Floats) -> Floats:
-    """For how many places each site stands, (m,)."""
+    """Number of places that each site represents, (m,) float: the sum of its weights."""
     ahead = Delaunay(x[sites])
     where = ahead.find_simplex(x)
     inside = np.flatnonzero(where >= 0)

@@ -26,7 +26,7 @@ from chipload.planning.thinwall.paths import Rows
 
 Floats = NDArray[np.float64]
 
-#: step of the differences that normals are made from, in u and v
+#: step in u and v of the differences from which normals are calculated
 STEP = 1e-5
 
 
@@ -36,7 +36,7 @@ class FinishRow:
 
     Attributes
     ----------
-    u, v : (s,) float; u goes one way
+    u, v : (s,) float; u rises or falls throughout
     axis : (s, 3) float, unit vectors
     line : first line of the program in it
     """
@@ -65,7 +65,7 @@ class FinishSide:
     def laid(self, p: WallPass, places: tuple[Floats, Floats], posture: Pose) -> tuple[Rows, Floats, Floats]:
         """Rows of a pass, and the parameters (r, s, 2) and the planned depth (r, s) [mm] of their contact points.
 
-        ``posture`` is not asked: the axes are those of the program.
+        ``posture`` is not used: the axes are those of the program.
         """
         count = np.array([len(row.u) for row in self.rows])
         at = np.minimum(np.arange(count.max()), count[:, None] - 1)
@@ -120,9 +120,9 @@ def _feeds(contact: Floats, normal: Floats, count: NDArray[np.int64]) -> Floats:
     number = np.arange(contact.shape[1])
     here = np.minimum(number, count[:, None] - 1)
     low, high = np.maximum(here - 1, 0), np.minimum(here + 1, count[:, None] - 1)
-    way = np.take_along_axis(contact, high[..., None], axis=1) - np.take_along_axis(contact, low[..., None], axis=1)
-    way -= (way * normal).sum(axis=2, keepdims=True) * normal
-    return np.asarray(way / np.linalg.norm(way, axis=2, keepdims=True))
+    along = np.take_along_axis(contact, high[..., None], axis=1) - np.take_along_axis(contact, low[..., None], axis=1)
+    along -= (along * normal).sum(axis=2, keepdims=True) * normal
+    return np.asarray(along / np.linalg.norm(along, axis=2, keepdims=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,8 +168,8 @@ def _sign(side: FinishSide, middles: Floats, k: int, point: Floats, left: Floats
     near = side.rows[int(np.abs(middles[:k] - middles[k]).argmin())]
     at = len(point) // 2
     other = int(np.abs(near.u - side.rows[k].u[at]).argmin())
-    way = side.at(near.u[other : other + 1], near.v[other : other + 1])[0][0] - point[at]
-    return -1 if float(way @ left[at]) > 0.0 else 1
+    along = side.at(near.u[other : other + 1], near.v[other : other + 1])[0][0] - point[at]
+    return -1 if float(along @ left[at]) > 0.0 else 1
 
 
 def heights_of(rows: Sequence[FinishRow], u: Floats) -> Floats:

@@ -28,6 +28,7 @@ from chipload.cutter.slices import edge_lag, slices
 from chipload.engagement.immersion.immersion import tool_frame
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
+from chipload.planning.thinwall.depth_range import depths_in_range
 from chipload.planning.thinwall.end_stock import EndPose
 from chipload.planning.thinwall.plane_stock import CutterPose
 
@@ -169,12 +170,7 @@ class FlankPose:
         >>> np.degrees(rows[0, :2]).round(6).tolist(), rows[0, 2:5].round(6).tolist()
         ([120.0, 180.0], [0.0, 2.0, 0.05])
         """
-        d = np.atleast_1d(np.asarray(depths, dtype=np.float64))
-        wrong = np.flatnonzero(~((d > 0.0) & (d <= self.deepest * (1.0 + 1e-12))))
-        if len(wrong):
-            raise InputError(
-                f"depth_mm = {d[wrong[0]]:g}: must be above 0 and at most {self.deepest:.6g}, the radius of the cutter"
-            )
+        d = depths_in_range(self, depths)
         piece, s_from, s_to, rho, sine, left, table = self._profile(nodes)
         inner = np.minimum(d[:, None], left)
         cosine = (self.cutter.radius - inner) / rho

@@ -6,14 +6,15 @@ floor's box; D [mm] stock that a pass leaves at a place, H what it finds; R radi
 The tip follows z = D(x, y) at its own x, y: the stock that it leaves, the least of D within R, is nowhere above D. A
 cutter at a place thus cuts at most H - D of that place, whatever the slope.
 
-Rows run along x, b apart at most, all in the direction that the milling needs, within the centres' area: there the
-cutter touches no wall. A row is cut where some point under the cutter has stock. Rows leave cusps at walls that they do
-not follow; the contour removes these, with the wall on the right of a clockwise cutter in down milling.
+Rows run along x, at most b apart, all in the direction that the milling requires, within the area of centres in which
+the cutter touches no wall. A row is cut where some point under the cutter has stock; such a part of a row is a stroke.
+Rows leave stock at walls that they do not follow; the contour removes it, with the wall on the right of a clockwise
+cutter in down milling.
 
-Rows go one way or, in the opposite order, the other: the way with fewer strokes that begin in stock is taken. A stroke
-begins where the cutter is free: in air, or over the stroke before, from where it goes sideways to its first
-point. Where neither is near, the cutter goes down along the stroke itself on a ramp, to and fro within a radius of its
-beginning, and returns. Links run at the clearance over the floor, or at the safe height where a wall is in the way.
+The rows are also planned in the opposite order and direction; the plan with fewer strokes that begin in stock is used.
+A stroke begins where the cutter is free: in air, or over an earlier stroke, from which the cutter moves sideways to the
+first point. Where neither is near, the cutter ramps down along the stroke, to and fro within a radius of its beginning,
+and returns to it. Links run at the clearance over the floor, or at the safe height where a wall lies between.
 """
 
 from __future__ import annotations
@@ -37,24 +38,24 @@ from chipload.planning.thinwall.paths import PassMotion
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-#: lines and points of an area count as within it if they are so near [mm]
+#: lines and points count as within an area up to this distance from it [mm]
 NEAR = 1e-6
-#: contours along rows already cut are left out within this [mm], and those that are not longer than ten times that
+#: parts of contours within this distance of a row [mm] are left out, and parts up to ten times as long
 CUT = 1e-3
-#: the feed begins so far above the surface that is left [mm]
+#: height above the surface that is left at which the feed begins [mm]
 ABOVE = 0.2
-#: a stroke is entered sideways from a point of an earlier one that is at most so many step-overs away
+#: greatest distance of a point of an earlier stroke from which a stroke is entered sideways, in step-overs
 ASIDE = 1.5
-#: points under the cutter that are looked at for stock: circles, and points on each
+#: points under an upright cutter at which its stock is read: circles in radii, and points on each
 CIRCLES, ROUND = (0.0, 0.5, 1.0), 16
-#: a ramp is at least so long, in radii; a shorter stroke is entered straight down
+#: shortest ramp, in radii; a shorter stroke is entered straight down
 SHORTEST = 0.1
 UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
 class FloorArea:
-    """Where the axis of a cutter may go over a floor, in the frame of the floor.
+    """Area of the cutter's axis over a floor, in the frame of the floor.
 
     Attributes
     ----------
@@ -92,7 +93,7 @@ class FloorSide:
     ----------
     surface : (n, m) points over its box
     u, v : (n,), (m,) float, its parameters; v a step-over apart
-    area : where the cutter goes
+    area : of the cutter's axis
     """
 
     surface: FinishSurface
@@ -101,37 +102,42 @@ class FloorSide:
     area: FloorArea
 
 
+def points_under(radius: float) -> Floats:
+    """Points (k, 2) [mm] under an upright cutter at which its stock is read, from its axis: circles of points."""
+    angle = np.arange(ROUND) * (math.tau / ROUND)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.concatenate([share * radius * circle for share in CIRCLES])
+
+
 class _Heights:
-    """Heights of a pass over a floor."""
+    """Stock before and after a pass over a floor, at the places x, y [mm] of its frame."""
 
     def __init__(self, p: WallPass, places: tuple[Floats, Floats], area: FloorArea, radius: float) -> None:
         self.size, self.radius, self.outline = np.array(area.size), radius, area.outline
         shapely.prepare(self.outline)
         self._low, self._depth = (RegularGridInterpolator(places, values) for values in (p.low, p.depth))
-        angle = np.arange(ROUND) * (math.tau / ROUND)
-        circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        self.under = np.concatenate([share * radius * circle for share in CIRCLES])
+        self.under = points_under(radius)
 
     def place(self, xy: Floats) -> Floats:
-        """Parameters (..., 2) of places."""
+        """Parameters (..., 2) of places (..., 2) [mm]."""
         return np.asarray(np.clip(xy / self.size, 0.0, 1.0))
 
     def low(self, xy: Floats) -> Floats:
-        """D of places (..., 2)."""
+        """Stock D (...) [mm] after the pass at places (..., 2) [mm]."""
         return np.asarray(self._low(self.place(xy).reshape(-1, 2)).reshape(xy.shape[:-1]))
 
     def depth(self, xy: Floats) -> Floats:
-        """H - D of places (..., 2)."""
+        """Depth of cut H - D (...) [mm] at places (..., 2) [mm]."""
         return np.asarray(self._depth(self.place(xy).reshape(-1, 2)).reshape(xy.shape[:-1]))
 
     def cuts(self, xy: Floats) -> Bools:
-        """Whether the cutter finds stock at places (n, 2)."""
+        """Whether the cutter finds stock at places (n, 2) [mm] of its axis, (n,) bool."""
         under = xy[:, None] + self.under
         there = shapely.intersects_xy(self.outline, under[..., 0], under[..., 1])
         return np.asarray((there & (self.depth(under) > NOTHING)).any(axis=1))
 
     def top(self, xy: Floats) -> Floats:
-        """Greatest H under the cutter at places (n, 2)."""
+        """Greatest stock H (n,) [mm] under the cutter at places (n, 2) [mm] of its axis."""
         under = xy[:, None] + self.under
         return np.asarray((self.low(under) + self.depth(under)).max(axis=1))
 
@@ -148,7 +154,12 @@ def floor_pass(
 
     Parameters
     ----------
+    p : the pass
+    side : the floor, with the area of the cutter's axis
     places : u (n,) and v (m,) of the pass
+    pass_motion : cutter, feed, speed and clearance
+    margins : safe height of links
+    label : name of the pass
 
     Raises
     ------
@@ -160,8 +171,8 @@ def floor_pass(
     heights = _Heights(p, places, area, posture.cutter.radius)
     rows = rows_over(area, step)
     # the same rows from the other side, against them: milling and order are the same, entries are not
-    ways = [_cut_strokes(some, heights) for some in (rows, [row[::-1] for row in reversed(rows)])]
-    strokes = min(ways, key=lambda one: sum(bool(heights.cuts(stroke[:1])[0]) for stroke in one))
+    orders = [_cut_strokes(some, heights) for some in (rows, [row[::-1] for row in reversed(rows)])]
+    strokes = min(orders, key=lambda one: sum(bool(heights.cuts(stroke[:1])[0]) for stroke in one))
     along = [shapely.LineString(s) for s in strokes]
     strokes += _cut_strokes(_contours(area, along, step < 0.0), heights)
     if not strokes:
@@ -174,9 +185,9 @@ def floor_pass(
 
 
 def rows_over(area: FloorArea, step: float) -> list[Floats]:
-    """Rows (k, 2) from the side of the floor with the least y on, at most ``step`` apart, in the direction of the feed.
+    """Rows (k, 2) [mm], beginning with the least y, at most ``step`` [mm] apart, in the direction of the feed.
 
-    The next row lies on the left of the feed where the step is above 0: the feed is then along x, else against it.
+    If the step is above 0, the next row lies on the left of the feed, which is along x; otherwise it is against x.
     """
     over = area.centres.intersection(area.outline)
     (x0, _, x1, _), (_, y0, _, y1) = area.centres.bounds, over.bounds
@@ -192,7 +203,7 @@ def rows_over(area: FloorArea, step: float) -> list[Floats]:
 
 
 def _contours(area: FloorArea, rows: list[shapely.LineString], down: bool) -> list[Floats]:
-    """Lines along the walls, without those that rows follow."""
+    """Lines (k, 2) [mm] along the walls, without the parts that rows follow; ``down``: for down milling."""
     if area.walls.is_empty:
         return []
     left = area.walls.difference(shapely.union_all(rows).buffer(CUT)) if rows else area.walls
@@ -203,7 +214,7 @@ def _contours(area: FloorArea, rows: list[shapely.LineString], down: bool) -> li
 
 
 def _sampled(line: Floats, spacing: float) -> Floats:
-    """A line (k, 2) with points at most ``spacing`` apart."""
+    """The line (k, 2) [mm] with points at most ``spacing`` [mm] apart."""
     out = [line[:1]]
     for a, b in pairwise(line):
         n = max(math.ceil(float(np.linalg.norm(b - a)) / spacing), 1)
@@ -225,7 +236,7 @@ def _cut_strokes(lines: list[Floats], heights: _Heights) -> list[Floats]:
 
 
 class _FloorPath:
-    """The path of a pass as it is laid."""
+    """Path of a pass over a floor under construction, stroke after stroke."""
 
     def __init__(self, area: FloorArea, heights: _Heights, clearance: float, safe: float, aside: float) -> None:
         self.area, self.heights, self.clearance, self.aside = area, heights, clearance, aside
@@ -236,7 +247,7 @@ class _FloorPath:
         self.free: list[Floats] = []
 
     def cut(self, stroke: Floats) -> None:
-        """Enter a stroke and cut it."""
+        """Add the entry into a stroke (k, 2) [mm] and the stroke."""
         start, cuts = stroke[0], bool(self.heights.cuts(stroke[:1])[0])
         entry = start if not cuts else self._sideways_entry(start)
         if entry is None:
@@ -252,12 +263,12 @@ class _FloorPath:
         self.now = stroke[-1]
 
     def retract(self) -> None:
-        """To the safe height."""
+        """Add a rapid to the safe height."""
         if self.now is not None:
             self._rapid(self.now, self.safe)
 
     def _sideways_entry(self, start: Floats) -> Floats | None:
-        """Nearest point of the strokes before from which the cutter reaches ``start`` sideways."""
+        """Nearest point (2,) [mm] of earlier strokes from which the cutter reaches ``start`` sideways; None: none."""
         near = [p for line in self.free for p in line[np.linalg.norm(line - start, axis=1) <= self.aside]]
         for p in sorted(near, key=lambda q: float(np.linalg.norm(q - start))):
             if np.array_equal(p, start) or self.inside.covers(shapely.LineString([p, start])):
@@ -265,7 +276,7 @@ class _FloorPath:
         return None
 
     def _go(self, to: Floats, z: float) -> None:
-        """Rapid to a place, over what is in the way, down to z."""
+        """Add rapids to a place (2,) [mm] and down to z [mm], at the safe height if a wall lies between."""
         if self.now is None:
             self._rapid(to, self.safe)
         else:
@@ -276,21 +287,21 @@ class _FloorPath:
         self._rapid(to, z)
 
     def _ramp(self, stroke: Floats) -> None:
-        """Down along a stroke, to and fro, and back to its beginning."""
-        way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(stroke, axis=0), axis=1))])
+        """Add a ramp to and fro along a stroke (k, 2) [mm], down to its depth, and the return to its beginning."""
+        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(stroke, axis=0), axis=1))])
         tangent = math.tan(self.area.ramp)
         z, k, turn = float(self.heights.top(stroke[:1])[0]) + ABOVE, 0, 1
         low = self.heights.low(stroke)
         # near the wall, where the floor is stiff: the bottom presses on it all the way down
-        last = max(int(np.searchsorted(way, self.heights.radius, "right")) - 1, 1)
+        last = max(int(np.searchsorted(length, self.heights.radius, "right")) - 1, 1)
         z = min(z, self.clearance)
-        if way[last] < SHORTEST * self.heights.radius:  # too short to go to and fro
+        if length[last] < SHORTEST * self.heights.radius:  # too short to go to and fro
             self._feed(stroke[0], float(low[0]), entry=True)
             return
         while z > low[k] + NOTHING:
             if not 0 <= k + turn <= last:
                 turn = -turn
-            z = max(z - tangent * abs(float(way[k + turn] - way[k])), float(low[k + turn]))
+            z = max(z - tangent * abs(float(length[k + turn] - length[k])), float(low[k + turn]))
             k += turn
             self._feed(stroke[k], z, entry=True)
         self._feed_along(stroke[:k][::-1])

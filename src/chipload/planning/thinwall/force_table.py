@@ -38,7 +38,7 @@ class ForceTable:
     forces: Floats
 
     def force(self, depth: ArrayLike) -> Floats:
-        """Normal force F_n (...) [N]; below the smallest depth linear to 0, which is rather too small."""
+        """Normal force F_n (...) [N]; below the smallest depth linear to 0, which is a little too small."""
         d = np.concatenate([[0.0], self.depths])
         return np.asarray(np.interp(np.asarray(depth, dtype=np.float64), d, np.concatenate([[0.0], self.forces])))
 
@@ -68,7 +68,7 @@ def law_on_stock(
     """Table of F_n on uneven stock: deeper beside the contact point, with scallops of the pass before.
 
     Stock whose slope is at most L and whose scallops are at most c high is nowhere deeper than d + c + L sqrt(2 r (d +
-    c)) within the reach sqrt(2 r (d + c)) of the cutter. The force is that of this depth, which is rather too great.
+    c)) within the reach sqrt(2 r (d + c)) of the cutter. The force is that of this depth, an upper bound.
 
     Parameters
     ----------

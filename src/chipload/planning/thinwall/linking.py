@@ -130,12 +130,12 @@ def link_passes(
         label = f"pass {number + 1} side {p.side + 1}"
         side = own.sides[p.side]
         if isinstance(side, FloorSide):
-            leg = floor_pass(p, side, places, own.pass_motion, own.margins, label)
+            pass_program = floor_pass(p, side, places, own.pass_motion, own.margins, label)
         else:
-            leg = _pass_program(p, side, places, own.pass_motion, own.margins, label)
-        count = len(leg.program)
-        program = replace(leg.program, line=np.arange(line, line + count))
-        out.append(replace(leg, program=program, operation=p.operation))
+            pass_program = _pass_program(p, side, places, own.pass_motion, own.margins, label)
+        count = len(pass_program.program)
+        program = replace(pass_program.program, line=np.arange(line, line + count))
+        out.append(replace(pass_program, program=program, operation=p.operation))
         line += count
     return tuple(out)
 
@@ -195,7 +195,7 @@ def _pass_program(
 def _return_points(rows: Rows, end: Floats, lifted: Floats, number: int, first: int) -> NDArray[np.int64]:
     """Numbers of the points of a row that a link passes: from where the row before ended to the first one.
 
-    Rows of one's own program may run to and fro, with points of their own: the way begins at the nearest one.
+    The rows of a user's program may run to and fro and have different points: the link begins at the nearest one.
     """
     if rows.axis is not None:
         number = int(np.linalg.norm(lifted - end, axis=1).argmin())

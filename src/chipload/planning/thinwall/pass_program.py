@@ -21,7 +21,7 @@ class PassProgram:
 
     Attributes
     ----------
-    program : from the safe height to the safe height; ``line`` counts the rows of the whole tour from 1
+    program : from the safe height to the safe height; ``line`` counts the rows of the whole program from 1
     side : number of the side
     contact : (k,) bool, rows that end at a contact point
     points, normals : (k, 3) float [mm], q and n of those rows; 0 elsewhere
@@ -42,8 +42,18 @@ class PassProgram:
 
 @dataclass(frozen=True)
 class Margins:
-    """Distances [mm] of links: beyond the edges of the wall, the safe height of the tip, and the tolerance of a link's
-    distance to the surface.
+    """Distances of links.
+
+    Parameters
+    ----------
+    beyond : length by which rows run on beyond the edges of the wall [mm]
+    safe : safe height z of the tip [mm]
+    sag : greatest deviation of a link from its distance to the surface [mm]
+
+    Raises
+    ------
+    InputError
+        A distance is not above 0.
     """
 
     beyond: float
@@ -53,11 +63,19 @@ class Margins:
     def __post_init__(self) -> None:
         for key in ("beyond", "safe", "sag"):
             if not 0.0 < getattr(self, key) < math.inf:
-                raise InputError(f"tour.{key}_mm = {getattr(self, key):g}: must be above 0")
+                raise InputError(f"margins.{key}_mm = {getattr(self, key):g}: must be above 0")
 
 
 class PassPath:
-    """Rows of a leg as they come."""
+    """Path of a pass under construction: a list of motions, to which each method adds.
+
+    Attributes
+    ----------
+    points, axes : tip (3,) [mm] and unit axis (3,) of each motion
+    motion : RAPID or LINE
+    ratio : speed of the tip over that of the corner's centre; 0 of rapids
+    at : number of a motion that ends at a contact point -> point (3,) [mm], normal (3,), u and v (2,), depth [mm]
+    """
 
     def __init__(self) -> None:
         self.points: list[Floats] = []
@@ -67,19 +85,26 @@ class PassPath:
         self.at: dict[int, tuple[Floats, Floats, Floats, float]] = {}
 
     def rapid(self, tip: Floats, axis: Floats) -> None:
-        """Rapid to a tip and axis."""
+        """Add a rapid to a tip (3,) [mm] and axis (3,); none if the tool is there."""
         if self.points and np.allclose(tip, self.points[-1], atol=1e-9) and np.allclose(axis, self.axes[-1], atol=1e-9):
             return
         self._add(tip, axis, RAPID, 0.0)
 
     def line(self, tip: Floats, axis: Floats, centre: Floats, before: Floats) -> None:
-        """``before`` is the centre at the point before."""
-        way = float(np.linalg.norm(centre - before))
+        """Add a feed motion to a tip and axis.
+
+        Parameters
+        ----------
+        tip, axis : (3,) [mm], (3,)
+        centre, before : (3,) of the corner's centre [mm] at the end and at the beginning of the motion, whose speed is
+            the feed
+        """
+        length = float(np.linalg.norm(centre - before))
         own = float(np.linalg.norm(tip - self.points[-1]))
-        self._add(tip, axis, LINE, own / way if self.motion[-1] == LINE and way > 0.0 else 1.0)
+        self._add(tip, axis, LINE, own / length if self.motion[-1] == LINE and length > 0.0 else 1.0)
 
     def known(self, point: Floats, normal: Floats, place: Floats, depth: float) -> None:
-        """What the last row ends at."""
+        """Record contact point (3,) [mm], normal (3,), u and v (2,), and depth [mm] at the end of the last motion."""
         self.at[len(self.points) - 1] = (point, normal, place, depth)
 
     def _add(self, tip: Floats, axis: Floats, motion: int, ratio: float) -> None:
@@ -89,7 +114,7 @@ class PassPath:
         self.ratio.append(ratio)
 
     def pass_program(self, side: int, pass_motion: PassMotion, label: str) -> PassProgram:
-        """The program of what was laid."""
+        """Return the program of the motions so far."""
         count = len(self.points)
         zero, none = np.zeros((count, 3)), np.zeros(count, dtype=np.int64)
         program = Program(

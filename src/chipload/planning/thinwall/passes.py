@@ -274,7 +274,7 @@ def variable(
             )
     worst = min(float(d.min()) for d in D)
     raise InputError(
-        f"passes: {most} on each side cover {worst:.3g} mm only: allow more deflection, less feed or a smaller "
+        f"passes: {most} on each side remove only {worst:.3g} mm: allow more deflection, less feed or a smaller "
         "step-over"
     )
 

@@ -42,7 +42,7 @@ class PassMotion:
     feed : [mm/s]
     rapid : [mm/s], for the time
     spindle : [rad/s]
-    clearance : [mm] along the normal, between pieces
+    clearance : [mm] along the normal, of links between the parts of a row
     """
 
     posture: Pose
@@ -183,7 +183,7 @@ def program_of(rows: Rows, pass_motion: PassMotion, label: str) -> Program:
 
 
 def seconds(program: Program, rapid: float) -> float:
-    """Time [s]: length over feed, and over the rapid rate [mm/s]; acceleration and rotary axes are left out."""
+    """Time [s] from length and feed, or the rapid rate [mm/s]; acceleration and rotary axes are not considered."""
     length = np.linalg.norm(np.diff(program.p_work, axis=0), axis=1)
     cuts = program.motion[1:] == LINE
     return float((length[cuts] / program.feed[1:][cuts]).sum() + length[~cuts].sum() / rapid)

@@ -36,6 +36,7 @@ from chipload.cutter.slices import edge_lag
 from chipload.engagement.immersion.immersion import tool_frame
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
+from chipload.planning.thinwall.depth_range import depths_in_range
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -147,7 +148,7 @@ class CutterPose:
 
     @property
     def below(self) -> float:
-        """Bound [mm] of how far the cutter reaches along the surface below the contact, towards the tip."""
+        """Upper bound [mm] of the reach of the cutter along the surface below the contact, towards the tip."""
         cutter, b = self.cutter, self.beta
         if cutter.flank_arc is None:
             return cutter.corner_radius
@@ -293,17 +294,14 @@ def engagement_of_depths(posture: CutterPose, depths: ArrayLike, nodes: int = 8)
     >>> round(5.0 * math.acos(0.9), 6)
     2.255134
     """
-    d = np.atleast_1d(np.asarray(depths, dtype=np.float64))
-    wrong = np.flatnonzero(~((d > 0.0) & (d <= posture.deepest * (1.0 + 1e-12))))
-    if len(wrong):
-        raise InputError(
-            f"depth_mm = {d[wrong[0]]:g}: must be above 0 and at most {posture.deepest:.6g}, {posture.deepest_is}: "
-            + (
-                "lean the cutter less or take a greater corner radius"
-                if posture.cutter.flank_arc is None
-                else "lean the cutter so that it touches the middle of the arc"
-            )
-        )
+    on_corner = posture.cutter.flank_arc is None
+    d = depths_in_range(
+        posture,
+        depths,
+        "lean the cutter less or take a greater corner radius"
+        if on_corner
+        else "lean the cutter so that it touches the middle of the arc",
+    )
     circles = _circles(posture, d, nodes)
     starts, lengths = _ranges(circles, d)
     cuts = _cutting(circles, d, starts, lengths)
@@ -361,7 +359,7 @@ class _Circles(NamedTuple):
         return np.asarray(self.z0[..., None] + self.rho[..., None] * (np.cos(phi) * n[2] + np.sin(phi) * T[2]))
 
     def over_row_before(self, step: float, phi: Floats) -> Floats:
-        """Height over what the row before, ``step`` beside, has left; above 0: it has left nothing here."""
+        """Height [mm] over the stock that the row before, at a distance of ``step``, has left; above 0: no stock."""
         T, n, _ = self.posture.frame
         y = self.y0[..., None] + self.rho[..., None] * (np.cos(phi) * n[1] + np.sin(phi) * T[1])
         return np.asarray(self.height(phi) - np.minimum(self.posture.outline(y + step), 1e6))
@@ -379,7 +377,7 @@ def _circles(posture: CutterPose, d: Floats, nodes: int) -> _Circles:
 
 
 def _ranges(circles: _Circles, d: Floats) -> tuple[Floats, Floats]:
-    """Where the ranges of phi begin between which no border is crossed, and their lengths, (n, k, m) [rad]."""
+    """Beginnings and lengths (n, k, m) [rad] of the ranges of phi within which no border is crossed."""
     posture = circles.posture
     T, n, _ = posture.frame
     breaks = [
@@ -401,7 +399,7 @@ def _ranges(circles: _Circles, d: Floats) -> tuple[Floats, Floats]:
 
 
 def _cutting(circles: _Circles, d: Floats, starts: Floats, lengths: Floats) -> Bools:
-    """(n, k, m) bool, ranges in which the edge is in stock."""
+    """Whether the edge is in stock in each range, (n, k, m) bool."""
     posture, middle = circles.posture, starts + 0.5 * lengths
     cuts = circles.along[..., None] * np.sin(middle) + circles.offset[..., None] > 1e-9 * posture.feed_per_tooth
     cuts &= (circles.height(middle) < d[:, None, None]) & (lengths > SHORT) & (circles.weight > 0.0)[..., None]
@@ -421,7 +419,7 @@ def _roots(a: Floats, b: Floats, c: Floats) -> Floats:
 
 
 def _crossings(function: Callable[[Floats], Floats], shape: tuple[int, ...]) -> Floats:
-    """Zeros of a function of phi (..., m) -> (..., m), at most six; infinite beyond those that there are."""
+    """Zeros (..., 6) [rad] of a function of phi (..., m) -> (..., m), at most six; the others are infinite."""
     phi = np.linspace(0.0, math.tau, LOOKS + 1)
     sign = function(np.broadcast_to(phi, (*shape, LOOKS + 1))) > 0.0
     change = sign[..., 1:] != sign[..., :-1]

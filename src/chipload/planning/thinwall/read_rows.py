@@ -25,22 +25,22 @@ from chipload.program.program import LINE, Program
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: the cutter may be so far from the finished side [mm], or within it
+#: greatest distance of the cutter from the finished side [mm], on either side of it, at which it touches
 NEAR = 0.02
 #: greatest clearance that is reported [mm]
 NEAR_ENOUGH = 1.0
-#: chords of arcs leave them by at most this [mm]
+#: greatest deviation of chords from arcs [mm]
 CHORD = 0.001
 #: halvings between two places of the path; one that is nearer to the edge [mm] is moved there
 HALVINGS, SAME = 30, 0.1
-#: a piece of a path is part of a row where it rises by less than this of its length along the side
+#: greatest rise along the side, per length, of a piece of a path that is part of a row
 STEEP = math.sin(math.radians(45.0))
-#: rows are compared at so many places along a side
+#: number of places along a side at which rows are compared
 LOOKS = 33
-#: rows nearer to each other than this share of the greatest distance lie on one another; a distance greater than this
-#: many medians is a gap
+#: rows lie on one another if their distance is below this share of the greatest one; a row is missing where the
+#: distance is above this many medians
 DOUBLE, GAP = 0.1, 1.5
-#: what is compared may be off by this share
+#: relative tolerance of comparisons
 SLACK = 1e-6
 
 
@@ -56,7 +56,7 @@ class _FeedMotions:
 
 @dataclass(frozen=True, eq=False)
 class _Edge:
-    """Where a path leaves a side: place, axis, and how far [mm] that is off the nearest place of the path."""
+    """Point at which a path leaves a side: place, axis, and distance [mm] from the nearest place of the path."""
 
     u: float
     v: float
@@ -166,14 +166,14 @@ def _touches(found: SideContacts) -> NDArray[np.bool_]:
 
 
 def _edges(
-    path: _FeedMotions, found: SideContacts, finder: ContactFinder, inside: Sequence[int], way: int
+    path: _FeedMotions, found: SideContacts, finder: ContactFinder, inside: Sequence[int], sense: int
 ) -> list[_Edge | None]:
-    """Where a path leaves the side beside places ``inside`` that touch, one way (-1) or the other (1).
+    """Points at which a path leaves the side next to places ``inside`` that touch, backwards (-1) or forwards (1).
 
     None where the path ends there.
     """
     here = np.array(inside)
-    there = np.clip(here + way, 0, len(path.tip) - 1)
+    there = np.clip(here + sense, 0, len(path.tip) - 1)
     goes_on = (path.piece[there] == path.piece[here]) & (there != here)
     there = np.where(goes_on, there, here)
     low, high = np.zeros(len(here)), np.ones(len(here))

@@ -29,7 +29,7 @@ from chipload.tables import LARGEST_FILE
 #: columns of the table; the last three are filled in at the machine
 GIVEN = ("cut", "site", "repeat", "u", "v", "x_mm", "y_mm", "z_mm", "depth_mm", "expected_normal_force_n")
 FILLED = ("normal_force_n", "deflection_um", "too_much")
-#: how the last column is answered
+#: values of the last column
 ANSWERS = {"yes": True, "y": True, "1": True, "true": True, "no": False, "n": False, "0": False, "false": False}
 
 
@@ -67,9 +67,9 @@ class _Row:
 def read_cuts(path: str | Path, deflection: float) -> tuple[Experiments, tuple[Finding, ...]]:
     """Read a table that was filled in at the machine.
 
-    A row counts where ``deflection_um`` or ``too_much`` (yes, no) is filled in; ``normal_force_n`` may be left empty,
-    then the expected one stands, which is said. Columns may be in any order, more may be added; commas, or semicolons
-    with decimal commas.
+    A row counts if ``deflection_um`` or ``too_much`` (yes, no) is filled in. If ``normal_force_n`` is empty, the
+    expected force is used and a finding states it. Columns may stand in any order, and others may be added. The
+    separator is a comma, or a semicolon with decimal commas.
 
     Parameters
     ----------
@@ -77,7 +77,8 @@ def read_cuts(path: str | Path, deflection: float) -> tuple[Experiments, tuple[F
 
     Returns
     -------
-    Experiments: one a cut with a deflection, one a series with answers; findings ``cut-not-made``, ``force-expected``,
+    Experiments: one for each cut with a deflection and one for each series with answers; findings ``cut-not-made``,
+    ``force-expected``,
     ``series-never-too-much``, ``series-overlaps``.
 
     Raises

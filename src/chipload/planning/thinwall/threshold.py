@@ -14,7 +14,7 @@ s is the pooled deviation of repeats, or what it is when each experiment is pred
 greater of the two where both are known. Beyond the experiments the allowable force may be less than in any of them.
 Such places are listed in ``outside`` and take the least force of all, with the reserve.
 
-Reference: [Yan2018] for thresholds by place, calibrated; Differs from source: may be modelled, and says which.
+Reference: [Yan2018] for calibrated thresholds by place. Differs from source: a threshold may also be modelled.
 """
 
 from __future__ import annotations
@@ -211,7 +211,7 @@ def calibrated(experiments: Experiments, places: ArrayLike, deviations: float) -
     Parameters
     ----------
     places : (p, 2) float, u, v
-    deviations : k >= 0, how many standard deviations are kept as reserve
+    deviations : k >= 0, number of standard deviations that are kept as reserve
 
     Raises
     ------

@@ -53,9 +53,11 @@ def read_cutters(text: str, *, units: Literal["mm", "inch"] = "mm") -> tuple[dic
     for record in records(text):
         if record.word in ("UNITS", "UNIT"):
             mm = MM_PER[length_unit(record)]
-        elif record.word == "CUTTER":
-            settle()
-            pending = (shape(record, mm), record)
+        elif record.word in ("CUTTER", "TLDATA"):
+            said = nx_shape(record, mm) if record.word == "TLDATA" else shape(record, mm)
+            if said is not None:
+                settle()
+                pending = (said, record)
         elif record.word in LOADS:
             tool = tool_number(record)
         elif record.word in ("GOTO", "FROM", "GODLTA"):
@@ -74,6 +76,20 @@ def shape(record: AptRecord, mm: float) -> Shape:
     e, f = (v[2] * mm if len(v) > 2 else 0.5 * d - r), (v[3] * mm if len(v) > 3 else r)
     alpha, beta, h = (*v[4:], 0.0, 0.0, 0.0)[:3]
     return (d, r, e, f, math.radians(alpha), math.radians(beta), h * mm)
+
+
+def nx_shape(record: AptRecord, mm: float) -> Shape | None:
+    """The seven numbers of a TLDATA/MILL of NX: d, r, length, taper, tip angle; None: another kind of tool.
+
+    A taper or a tip is not taken: where the diameter of such a tool is measured is not stated.
+    """
+    if record.args[:1] != ("MILL",):
+        return None
+    v = [record.number(k) for k in range(1, len(record.args))]
+    if not 2 <= len(v) <= 5 or any(v[3:]):
+        return None
+    d, r = v[0] * mm, v[1] * mm
+    return (d, r, 0.5 * d - r, r, 0.0, 0.0, v[2] * mm if len(v) > 2 else 0.0)
 
 
 def length_unit(record: AptRecord) -> str:

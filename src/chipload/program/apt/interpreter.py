@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import Finding
 from chipload.program.apt.arcs import SWEEP, Circle, read_circle, read_tlon, sweep_of
-from chipload.program.apt.cutters import Shape, length_unit, shape, tool_number
+from chipload.program.apt.cutters import Shape, length_unit, nx_shape, shape, tool_number
 from chipload.program.apt.cycles import FEEDS, Cycle, read_cycle
 from chipload.program.apt.frames import Coordinates, unit
 from chipload.program.apt.records import NOTE, AptRecord
@@ -34,13 +34,16 @@ RADIUS_MM = 1e-2
 REFUSED = re.compile("TRACUT|COPY|INDEX|TRANS|CALL|MACRO|TERMAC|LOOPST|LOOPND|JUMPTO|IF|MIRROR|TMARK")
 #: records that move the tool in a way that is not read: they are left out, and the program is unproven
 LEFT_OUT = re.compile(
-    "ARC|GOHOME|RETRCT|THREAD|POCKET|INDIRP|TLLFT|TLRGT|TLON|GOLFT|GORGT|GOFWD|GOBACK|GOUP|GODOWN|GO|PSIS|PROBE"
+    "ARC|GOHOME|RETRCT|THREAD|POCKET|INDIRP|TLLFT|TLRGT|TLON|GOLFT|GORGT|GOFWD|GOBACK|GOUP|GODOWN|GO|PSIS|PROBE|"
+    "ROTATE|ROTHED|PATTERN|CALSUB|NURBS|SPLINE"
 )
 #: records that a Program does not hold
 UNUSED = re.compile(
     "COOLNT|STOP|OPSTOP|SELECT|SELCTL|OPSKIP|SEQNO|MACHIN|CUTCOM|INTOL|OUTTOL|TOLER|PREFUN|AUXFUN|CLAMP|MODE|DISPLY|"
-    "TPRINT|REMARK|LETTER|OPFEATEND|REWIND|CLEARP|AUTOPS"
+    "TPRINT|REMARK|LETTER|OPFEATEND|REWIND|CLEARP|AUTOPS|TOOLPATH|PAINT|MSYS"
 )
+#: ends an operation of NX, whose texts have no FINI
+END_OF_PATH = "END-OF-PATH"
 _SILENT = frozenset({"PARTNO"})
 
 
@@ -49,7 +52,8 @@ class AptInterpreter:
 
     def __init__(self, track: AptRows, mm: float, coordinates: Coordinates) -> None:
         self.track, self.mm, self.ended = track, mm, ""
-        self._units_said = False
+        self._units_said = self._path_ended = False
+        self._msys: tuple[str, ...] | None = None  # of NX: each of its operations states it
         self._in = coordinates
         self._resolved: tuple[Floats, Floats, Floats] | None = None
         self._axis: Point | None = None  # of the text, None: that of the coordinates
@@ -93,6 +97,7 @@ class AptInterpreter:
             "ROTABL": self._coordinates,
             "TLAXIS": self._coordinates,
             "CUTTER": self._cutter,
+            "TLDATA": self._cutter,
             "PPRINT": self._label,
             "INSERT": self._label,
             "OPFEATSTART": self._label,
@@ -101,11 +106,12 @@ class AptInterpreter:
     def read(self, record: AptRecord) -> None:
         """One record."""
         word, track = record.word, self.track
+        self._path_ended = word == END_OF_PATH or (self._path_ended and word == NOTE)
         if word in self._do:
             self._do[word](record)
         elif word in ("FINI", "END"):
             self.ended = word
-        elif REFUSED.fullmatch(word) or (word == "MSYS" and track.at is not None):
+        elif REFUSED.fullmatch(word) or (word == "MSYS" and track.at is not None and record.args != self._msys):
             raise record.error(
                 "changes the coordinates or the order of the records and is not read: write plain GOTO instead"
             )
@@ -113,16 +119,19 @@ class AptInterpreter:
             track.leave_out("apt-left-out", record.line, f"{record}: moves the tool and is not read: left out")
         elif word == "CUTCOM" and record.args != ("OFF",):
             track.note_once("apt-cutcom", record.line, f"{record}: points are taken as positions of the tool tip")
+        elif word == "MODE" and "INCR" in record.args:
+            track.leave_out("apt-left-out", record.line, f"{record}: points are taken as positions, not as steps")
         elif UNUSED.fullmatch(word):
+            self._msys = record.args if word == "MSYS" else self._msys
             track.note("apt-unused", record.line, str(record))
-        elif word not in _SILENT:
+        elif word not in (*_SILENT, END_OF_PATH):
             track.note("apt-comment" if word == NOTE else "apt-unknown", record.line, str(record))
 
     def done(self) -> tuple[Program, tuple[Finding, ...]]:
         """The program."""
         if self._circle is not None:
             self.track.note("apt-circle", self._circle.record.line, "CIRCLE without a GOTO after it is left out")
-        if not self.ended:
+        if not self.ended and not self._path_ended:
             self.track.leave_out("apt-end", 0, "the text does not end with FINI: it may have been cut off")
         return self.track.program()
 
@@ -367,8 +376,10 @@ class AptInterpreter:
             self._in = self._in.tool_axis(record)
 
     def _cutter(self, record: AptRecord) -> None:
-        said = shape(record, self.mm)
-        if said != self._shape:
+        said = nx_shape(record, self.mm) if record.word == "TLDATA" else shape(record, self.mm)
+        if said is None:
+            self.track.note("apt-unused", record.line, str(record))
+        elif said != self._shape:
             self._shape, self._changed = said, record
 
     def _label(self, record: AptRecord) -> None:

@@ -57,6 +57,8 @@ class _Written:
 
 
 def _written(commands: Commands, decimals: int) -> _Written:
+    if any(f.tilt is not None for f in commands.frames):
+        raise InputError("commands: rows in a tilted plane are not written: convert the program to rows of the axes")
     unit = 10.0**-decimals
     shift = np.array([f.shift for f in commands.frames]).reshape(-1, 9)[commands.frame]
     exact = commands.position + shift

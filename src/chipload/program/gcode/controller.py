@@ -16,6 +16,7 @@ from chipload.program.gcode import arcs
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.parameters import Parameters
 from chipload.program.gcode.state import AXES, LINEAR, NO_MOTION, ZERO, Datum, Nine, State, nine
+from chipload.program.gcode.tilted_plane import machine_of, position_of
 from chipload.program.gcode.tools import Tool, ToolTable
 from chipload.program.gcode.track import Context, Findings, MotionRows
 from chipload.program.path_mode import PathControl
@@ -23,6 +24,7 @@ from chipload.units import MM_PER
 
 if TYPE_CHECKING:
     from chipload.program.gcode.frames import ProgramFrame
+    from chipload.program.swivel import Swivel
 
 PLANES = {170: XY, 180: ZX, 190: YZ, 171: XY, 181: ZX, 191: YZ}
 #: from the centre of a turning tool's nose to its tip, in radii along X and Z, by orientation
@@ -50,6 +52,7 @@ class Controller:
     origins : (9,) [mm, deg] and rotation [deg] of work offsets, by number
     diameters : [mm] of the cutters by tool, for compensation where the table states none
     feed : [mm/min] of cuts before the text states one; None: such a cut is refused
+    swivel : the machine, for tilted working planes; None: they are not read
     """
 
     def __init__(
@@ -66,9 +69,10 @@ class Controller:
         origins: Mapping[int, tuple[Nine, float]] | None = None,
         diameters: Mapping[int, float] | None = None,
         feed: float | None = None,
+        swivel: Swivel | None = None,
     ):
         self.state = State(scale=MM_PER[units])
-        self.dialect, self.feed = dialect, feed
+        self.dialect, self.feed, self.swivel = dialect, feed, swivel
         self.origins, self.diameters = dict(origins or {}), dict(diameters or {})
         self.machine_scale = MM_PER[machine_units]
         self.tools: dict[int, Tool] | None = None if tools is None else dict(tools.tools)
@@ -89,6 +93,8 @@ class Controller:
         #: Sinumerik: whether the spindle of the tapping block that is read turns against K; None: no such block
         self.reversed: bool | None = None
         self.named_tools: dict[str, int] = {}
+        #: tools, and numbers of offsets, that a length offset was given for
+        self.with_length: set[int] = set()
         #: turned and shifted coordinates of the program; None: those of the work offset
         self.program_frame: ProgramFrame | None = None
         #: where a retraction to where only the machine knows was left out
@@ -171,9 +177,20 @@ class Controller:
         """Other coordinates, the machine where it is."""
         state = self.state
         if datum != state.datum:
-            state.at = datum.from_machine(state.datum.to_machine(state.at))
+            before = state.at
+            state.at = position_of(self, datum, machine_of(self, state.datum, state.at))
             state.datum = datum
+            if self.retracted == before:
+                self.retracted = state.at
             self.changed()
+
+    def machine_position(self) -> Nine:
+        """Where the machine's axes stand [mm, deg]."""
+        return machine_of(self, self.state.datum, self.state.at)
+
+    def position(self, machine: Nine) -> Nine:
+        """The text's position where the machine's axes stand at ``machine`` [mm, deg]."""
+        return position_of(self, self.state.datum, machine)
 
     # -- tools -----------------------------------------------------------------------------------------------------
 
@@ -317,7 +334,8 @@ class Controller:
             self._framed, self._frame = state.datum, self.track.frame(state.datum)
         frame = self._frame
         mode = (float(PathControl.UNPLACED), 0.0, 0.0) if self.unplaced and feed == 0.0 else state.path_mode
-        return feed, spindle, state.tool, state.tcp, frame, PLANES[state.plane], self.label, mode
+        tip = state.tcp or (state.datum.tilt is not None and self.swivel is not None and self.swivel.turns)
+        return feed, spindle, state.tool, tip, frame, PLANES[state.plane], self.label, mode
 
     def _feed(self, kind: int) -> float:
         if kind == 0:

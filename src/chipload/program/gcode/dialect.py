@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.modal import COVET, GROUP_OF, M_GROUP_OF, USER_M, has_axes, shown
@@ -58,7 +58,10 @@ class Dialect:
         """The block of a line; None where there is nothing to carry out."""
         text, comments = bare(raw)
         if not self.strict and text.startswith("$"):
-            c.once("nc-ignored", f"{text[:20].upper()}: a command to the controller, no block: left out")
+            said = f"{text[:20].upper()}: a command to the controller, no block: left out"
+            # homing and jogging of GRBL move the machine, which matters behind the first motion
+            moves = bool(c.placed) and text.startswith(("$h", "$j"))
+            c.once("nc-ignored", said, Severity.UNPROVEN if moves else Severity.NOTE)
             return None
         block = read_block(text, comments, c.parameters)
         if self.strict:

@@ -67,8 +67,13 @@ class Drilling:
         scale, old = state.scale, self.series
         series = self._sticky(block, code, old, "xyz"[along], state.at[along] / scale)
         repeats = integer_of(words.get("l", 1.0), "L")
-        if not 1 <= repeats <= MOST_REPEATS:
-            raise InputError(f"L{repeats}: repeats of a cycle must be from 1 to {MOST_REPEATS}")
+        # L0 or K0 of a Fanuc states a cycle and drills no hole
+        least = 0 if c.dialect == "fanuc" else 1
+        if not least <= repeats <= MOST_REPEATS:
+            raise InputError(f"L{repeats}: repeats of a cycle must be from {least} to {MOST_REPEATS}")
+        if repeats == 0:
+            self.series = series
+            return
         r, bottom, level = series.r, series.bottom, series.level
         if not state.absolute:
             r += level

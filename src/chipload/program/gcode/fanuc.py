@@ -5,11 +5,13 @@ cycles returns to the level where it began (G98) until told otherwise; M98 P5123
 and in G84.2 and G84.3, tapping starts the spindle itself. Fine boring (G76) is carried out without its shift in the
 bottom of the hole; back boring (G87) shifts by Q against X, which leaves it unproven, as the machine's own setting
 says where to and the cutter is round. G33 has its lead in F. Macro statements are those of
-:mod:`~chipload.program.gcode.macros`; G68 turns about Z.
+:mod:`~chipload.program.gcode.macros`; G68 turns about Z. A tilted plane (G68.2 X Y Z I J K, Haas G268) has an origin
+and Euler angles; G53.1 (G253) turns the tool along its normal (:mod:`~chipload.program.gcode.tilted_plane`).
 
-Left out, so that the result is unproven: motions in polar, scaled or mirrored coordinates (G16, G51) and in tilted
-planes (G68.2) until they end, tool vectors (G43.5), modal macros (G66), involutes and splines. Noted and left out:
-smoothing and look-ahead (G5.1, G8), tool offsets by G10 L10 to L13, retractions to where only the machine knows.
+Left out, so that the result is unproven: motions in polar, scaled or mirrored coordinates (G16, G51) and in planes that
+are tilted otherwise (G68.2 P, G68.3, G68 about another axis than Z) until they end, tool vectors (G43.5), modal macros
+(G66), involutes and splines. Noted and left out: smoothing and look-ahead (G5.1, G8), tool offsets by G10 L10 to L13,
+retractions to where only the machine knows.
 """
 
 from __future__ import annotations
@@ -26,7 +28,9 @@ from chipload.program.gcode.frames import remove, turn_about
 from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, system_variables, with_brackets
 from chipload.program.gcode.modal import GROUP_OF, shown
 from chipload.program.gcode.offsets import choose
+from chipload.program.gcode.tilted_plane import align, level, tilted
 from chipload.program.gcode.words import Block, bare, read_block
+from chipload.program.tilt import tilt_of, turned
 
 if TYPE_CHECKING:
     from chipload.program.gcode.flow import Flow
@@ -35,6 +39,8 @@ _COLON = re.compile(r"^([ \t]*):(?=[0-9])", re.MULTILINE)
 _SKIP = re.compile(r"^/[1-9]")
 #: a whole number that is not 0: with 0 the point makes no difference
 _NO_POINT = re.compile(r"[XYZIJKR][ \t]*[-+]?0*[1-9][0-9]*(?![0-9.])(?=[^\n(]*)", re.IGNORECASE)
+#: rounding or chamfer of the corner behind a motion, and an angle or what else stands behind a comma
+_CORNER = re.compile(r",([rc])([-+]?[0-9.]+|#[0-9]+|\[[^\]]*\])")
 _COMMENT = re.compile(r"\([^()\n]*\)")
 
 #: coordinates in which motions are left out until a code ends them
@@ -42,7 +48,6 @@ CHANGED = {
     160: "polar coordinates",
     510: "scaling",
     511: "mirrored coordinates",
-    682: "a tilted plane",
     683: "a tilted plane",
     684: "a tilted plane",
     71: "cylindrical interpolation",
@@ -53,12 +58,30 @@ CHANGED = {
 ENDS = {150: (160,), 500: (510,), 501: (511,), 690: (682, 683, 684), 130: (), 131: (121,), 1130: (1120,)}
 #: blocks that are left out
 NOT_READ = {
+    401: "normal direction control",
+    411: "normal direction control",
+    421: "normal direction control",
     660: "a modal macro",
     661: "a modal macro",
     435: "tip control by vectors",
     440: "a negative tool length",
 }
+#: tilted planes by Euler angles and the code that turns the tool along their normal, of a Fanuc and of a Haas
+TILTED, ALIGN = (682, 2680), (531, 2530)
+#: what a Haas calls G69, and what names its Euler angles (Q)
+HAAS_UNTILTED, EULER = 2690, 313.0
+#: G53.1 P: the angle of the last rotary axis from the workpiece is positive, or negative
+SIGNS = {0.0: 0, 1.0: 1, 2.0: -1}
 TURNED, UNTURNED, MACRO, SKIP, ENDS_CYLINDER = 680, 690, 650, 310, 71
+#: blocks that are left out if they have such words: what they do with them
+NOT_READ_WITH = {
+    130: ("i", "circular pocket milling of a Haas"),
+    270: ("xyzabc", "a motion to a position of the machine"),
+    600: ("xyzabc", "positioning from one direction"),
+    70: ("xyzabc", "a hypothetical axis"),
+}
+#: codes whose axes are no positions: the area of a stored limit, axes that are smoothed
+NO_POSITIONS = {220: "xyzijk", 51: "xyzabc"}
 #: motions that are left out: involutes, splines
 LEFT_OUT = frozenset({61, 62})
 #: tapping: LinuxCNC's code and the M code that starts its spindle
@@ -99,16 +122,21 @@ class Fanuc(Dialect):
         if OUTPUTS.match(text):
             c.once("nc-output", f"{text[:20].upper()}: its output is not written")
             return None
-        block = read_block(with_brackets(text), comments, c.parameters)
+        block = read_block(with_brackets(_sharp(text, c)), comments, c.parameters)
         for code in block.g:
             if code in NOT_READ:
                 raise NotReadError(f"{shown(code)}: {NOT_READ[code]}")
+            letters, what = NOT_READ_WITH.get(code, ("", ""))
+            if not block.words.keys().isdisjoint(letters):
+                raise NotReadError(f"{shown(code)}: {what}")
         if any(key == ALARM for key, _ in block.sets):
             c.leave_out("nc-alarm", f"#{ALARM}: an alarm ends the program here")
             block.sets, block.m = [], [30]
         self._coordinates(block, c)
         if MACRO in block.g:
             block.macro, block.words, block.g = {"p": -1.0, **block.words}, {}, []
+        if 198 in block.m:
+            raise NotReadError("M198: calls a program of another device")
         if 97 in block.m:
             block.m.remove(97)
             block.block_call = {"p": -1.0, **{x: block.words.pop(x) for x in "pl" if x in block.words}}
@@ -122,6 +150,8 @@ class Fanuc(Dialect):
     def _coordinates(self, block: Block, c: Controller) -> None:
         """G68 and G69; coordinates that are not read."""
         words, g = block.words, block.g
+        if HAAS_UNTILTED in g:
+            g[g.index(HAAS_UNTILTED)] = UNTURNED
         for code in g:
             if c.left_out and code in ENDS and c.left_out.split(":")[0] in map(shown, ENDS[code] or (ENDS_CYLINDER,)):
                 go_on(c)
@@ -135,6 +165,7 @@ class Fanuc(Dialect):
             leave_out(c, f"{shown(code)}: {CHANGED[code]}")
             g.remove(code)
             words.clear()
+        self._tilted(block, c)
         if TURNED in g:
             g.remove(TURNED)
             if c.state.plane != 170 or "z" in words or words.keys() & {"i", "j", "k"}:
@@ -146,6 +177,43 @@ class Fanuc(Dialect):
             turn_about(c, x * c.state.scale, y * c.state.scale, words.pop("r", 0.0))
         elif UNTURNED in g:
             remove(c)
+            level(c)
+
+    def _tilted(self, block: Block, c: Controller) -> None:
+        """Tilted planes by Euler angles, and the tool along their normal."""
+        words, g = block.words, block.g
+        for code in [code for code in g if code in TILTED]:
+            name = shown(code)
+            euler = words.get("p", 0.0) == 0.0 and words.get("q", EULER) == EULER and "r" not in words
+            given = {x: words.pop(x, 0.0) for x in "xyzijk"}
+            g.remove(code)
+            words.clear()
+            remove(c)
+            origin = tuple(given[x] * c.state.scale for x in "xyz")
+            R = turned("zxz", (given["i"], given["j"], given["k"]))
+            if not euler:
+                level(c)
+                leave_out(c, "G68.2: a tilted plane that is not stated by an origin and Euler angles")
+            elif not tilted(c, tilt_of(R, origin)):
+                leave_out(c, f"G68.2: {name}: a tilted plane, and no machine with rotary axes")
+        for code in [code for code in g if code in ALIGN]:
+            if c.state.datum.tilt is None:
+                continue
+            g.remove(code)
+            p = words.pop("p", 0.0)
+            if p not in SIGNS:
+                raise InputError(f"{shown(code)}: P{p:g}: must be 0, 1 or 2")
+            align(c, SIGNS[p])
+        if c.state.datum.tilt is not None and not c.left_out and any(self._offsets(code, c) for code in g):
+            leave_out(c, "G68.2: the work offset or a shift changes within a tilted plane")
+            words.clear()
+
+    @staticmethod
+    def _offsets(code: int, c: Controller) -> bool:
+        """Whether a code changes what a tilted plane lies in."""
+        if code in (100, 520, 920, EXTENDED, HAAS_EXTENDED):
+            return True
+        return 540 <= code <= 593 and code % 10 in range(4) and 530 + 10 * c.state.datum.number != code
 
     def _adapt(self, block: Block, c: Controller) -> None:
         words, g = block.words, block.g
@@ -154,6 +222,8 @@ class Fanuc(Dialect):
         if 50 in idle and not (words.get("p", 0.0) >= 1000.0 or "x" not in words):
             raise NotReadError("G5: splines")
         for code in idle:
+            for letter in NO_POSITIONS.get(code, ""):
+                words.pop(letter, None)
             if code in (51, 50, 80, 81):
                 c.once("nc-ignored", f"{shown(code)}: look-ahead and smoothing do not change the path")
             g.remove(code)
@@ -181,7 +251,7 @@ class Fanuc(Dialect):
                 c.set_origin(9 + int(number), {k: words.pop(x) for k, x in enumerate("xyzabc") if x in words})
                 g.remove(100)
                 return
-            c.note("nc-ignored", "G10: offsets of tools that the program sets are left out")
+            self._tool_offset(words, c)
             g.remove(100)
             for letter in "lprqxyz":
                 words.pop(letter, None)
@@ -196,6 +266,18 @@ class Fanuc(Dialect):
                 words["l"] = words.pop("k")
             if "p" in words and 40 not in g and 98 not in block.m:
                 words["p"] /= 1000.0
+
+    @staticmethod
+    def _tool_offset(words: dict[str, float], c: Controller) -> None:
+        """G10 without L2 and L20: lengths of tools count as 0 (L10), the rest changes the path or the controller."""
+        which, value = words.get("l"), words.get("r", 0.0)
+        if which == 10.0 or (value == 0.0 and which in (None, 11.0, 12.0, 13.0)):
+            c.note("nc-ignored", "G10: offsets of tools that the program sets are left out")
+            return
+        kinds = {None: "a tool offset", 11.0: "a wear of length", 12.0: "a radius", 13.0: "a wear of radius"}
+        what = kinds.get(which, "data of the controller")
+        said = f" R{value:g}" if "r" in words else ""
+        c.leave_out("nc-offset-left-out", f"G10{'' if which is None else f' L{which:g}'}{said}: {what} is left out")
 
     def _holes(self, block: Block, c: Controller) -> None:
         """Tapping, fine and back boring in LinuxCNC's words."""
@@ -247,3 +329,21 @@ class Fanuc(Dialect):
             times, p = divmod(int(p), 10_000)
             words = {"p": float(p), "l": float(times)}
         return super().call(words)
+
+
+def _sharp(text: str, c: Controller) -> str:
+    """A block without the roundings and chamfers (,R and ,C) behind it: the corner stays sharp.
+
+    Raises
+    ------
+    NotReadError
+        Something else stands behind a comma, as the angle of a line (,A).
+    """
+    if "," not in text or OUTPUTS.match(text):
+        return text
+    for found in _CORNER.finditer(text):
+        c.leave_out("nc-corner", f"{found[0].upper()}: the corner stays sharp: its rounding or chamfer is left out")
+    left = _CORNER.sub("", text)
+    if "," in left:
+        raise NotReadError(f"{left[left.index(',') :][:12].upper()!r}: what stands behind a comma is not read")
+    return left

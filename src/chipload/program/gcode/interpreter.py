@@ -31,6 +31,8 @@ _OTHER = re.compile(
 )
 _READ = re.compile(r"#(?:([0-9]{1,6})|<([^<>]*)>)")
 _FORMAT = re.compile(r"%(?:d|f|\.[0-9]f)")
+#: words that change a cut on some controllers: roundings, spirals, whole turns
+CONTOUR = "ijklpqr"
 #: characters of a comment that are kept
 LONGEST = 1000
 #: states saved by M70 and M73
@@ -85,7 +87,10 @@ class BlockInterpreter:
             said = f"{letter.upper()}{block.words[letter]:g}: no code of the block uses it"
             if c.strict:
                 raise InputError(f"{said}: remove it")
-            c.refused("nc-unused-word", said)
+            if motion in (10, 20, 30) and letter in CONTOUR:
+                c.leave_out("nc-unused-word", f"{said}, and it may change the motion")
+            else:
+                c.refused("nc-unused-word", said)
             del block.words[letter]
         if codes.get("once") == 40 and motion in (20, 30) and "p" in block.words:
             raise InputError(f"G4 with {shown(motion)}: both use P: write two blocks")

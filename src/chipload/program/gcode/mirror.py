@@ -22,7 +22,7 @@ def mirror(c: Controller) -> None:
         return state.at[k] / (state.scale if k in LINEAR else 1.0)
 
     def absolute(k: int) -> float:
-        return state.datum.to_machine(state.at)[k] / (state.scale if k in LINEAR else 1.0)
+        return c.machine_position()[k] / (state.scale if k in LINEAR else 1.0)
 
     def loaded() -> Tool:
         return (c.tools or {}).get(state.tool, Tool(state.tool))

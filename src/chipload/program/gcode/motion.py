@@ -19,9 +19,10 @@ from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.modal import shown
 from chipload.program.gcode.offsets import in_machine_unknown, note_machine_coordinates
 from chipload.program.gcode.splines import Splines
-from chipload.program.gcode.state import LINEAR, NO_MOTION, put
+from chipload.program.gcode.state import LINEAR, NO_MOTION, Nine, put
 from chipload.program.gcode.synchronised import synchronised
 from chipload.program.gcode.targets import axes, end, rate
+from chipload.program.gcode.tilted_plane import turn
 from chipload.program.gcode.words import Block
 
 #: a touch is sought over at least this [mm]
@@ -80,11 +81,23 @@ class ControllerMotion:
             if in_machine_unknown(c, "G53", axes(self.c, block)):
                 return
             note_machine_coordinates(c, "G53")
-            target = put(state.datum.to_machine(state.at), axes(self.c, block))
-            to = state.datum.from_machine(target)
+            to = c.position(put(c.machine_position(), axes(self.c, block)))
         else:
-            to = end(self.c, block)
+            goal = end(self.c, block)
+            to = self._turned(goal)
+            if to != goal and to == state.at:
+                return
         c.straight(LINE if code == 10 else RAPID, to, pace)
+
+    def _turned(self, to: Nine) -> Nine:
+        """An end in a tilted plane once the rotary axes that it moves have turned: what it gives of X Y Z, the rest
+        where that has brought the tip.
+        """
+        c, at = self.c, self.c.state.at
+        if c.state.datum.tilt is None or to[3:6] == at[3:6]:
+            return to
+        turn(c, c.state.datum.to_machine((*at[:3], *to[3:])))
+        return put(c.state.at, {k: to[k] for k in (*range(3), *range(6, 9)) if to[k] != at[k]})
 
     def _arc(self, block: Block, code: int) -> None:
         c, state, words = self.c, self.c.state, block.words

@@ -12,8 +12,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from chipload.errors import InputError, Severity
-from chipload.program.commands import RAPID
+from chipload.program.commands import ARC, LINE, RAPID, Commands
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.frames import without_frame
@@ -55,6 +57,18 @@ def note_unset_offsets(c: Controller) -> None:
     for line, name in c.unset_offsets.values():
         said = "its origin is not known and is taken as the machine's: state it in program.work_offsets"
         c.findings.once("nc-offset-unset", line, f"{name}: {said}", severity)
+
+
+def note_missing_lengths(c: Controller, commands: Commands) -> None:
+    """Findings on tools that cut without a length offset in a text that gives one to another tool."""
+    if not c.with_length or c.dialect == "sinumerik":
+        return
+    cuts = (commands.motion == LINE) | (commands.motion == ARC)
+    for number in np.unique(commands.tool[cuts]).tolist():
+        if number > 0 and number not in c.with_length:
+            line = int(commands.line[cuts & (commands.tool == number)][0])
+            said = "no length offset (G43) is given for it: the machine would move it with that of another tool"
+            c.findings.once("nc-length-missing", line, f"tool {number} cuts and {said}", Severity.UNPROVEN)
 
 
 def note_machine_coordinates(c: Controller, name: str) -> None:
@@ -181,6 +195,7 @@ def length_offset(c: Controller, block: Block, code: int, axes: Axes) -> None:
         if number == 0 and code == 430:
             number = state.tool
         tool = c.find_tool(number, "H")
+        c.with_length |= {number, state.tool}
         _check_length(c, code, number)
         length = nine([math.degrees(x) if 3 <= k < 6 else x for k, x in enumerate(tool.offset)])
         new = nine([a + b for a, b in zip(old, length, strict=True)]) if code == 432 else length
@@ -285,10 +300,10 @@ def go_home(c: Controller, code: int, axes: Axes, end: Nine) -> None:
         )
     note_machine_coordinates(c, shown(code))
     c.straight(RAPID, end)
-    home = state.datum.from_machine(c.stored(first))
+    home = c.position(c.stored(first))
     c.straight(RAPID, put(end, {k: home[k] for k in (axes or range(9))}))
 
 
 def keep_point(c: Controller, code: int) -> None:
     """G28.1 and G30.1."""
-    c.store(5161 if code == 281 else 5181, c.state.datum.to_machine(c.state.at))
+    c.store(5161 if code == 281 else 5181, c.machine_position())

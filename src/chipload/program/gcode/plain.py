@@ -34,7 +34,7 @@ def run_plain(c: Controller, motion: ControllerMotion, lines: list[str], line: i
     state, match, append, arc = c.state, _match, c.track.rows.append, c.track.arc
     scale, inch, flat, inverse = state.scale, state.scale != 1.0, state.plane == 170, state.feed_mode == 930
     x, y, z, a, b, cc, u, v, w = state.at
-    code, first, count = state.motion, line, min(len(lines), line + PIECE)
+    code, first, count, tilted = state.motion, line, min(len(lines), line + PIECE), state.datum.tilt is not None
     rapid = feed = -1
     while line < count:
         found = match(lines[line])
@@ -45,7 +45,7 @@ def run_plain(c: Controller, motion: ControllerMotion, lines: list[str], line: i
         linear = not (sx is None and sy is None and sz is None)
         turning = not (sa is None and sb is None and sc is None)
         # without axes it is an F, a G or an arc by its centre alone
-        if not (linear or turning) or new == 800 or not _centred(new, g, si, sj, sk, flat):
+        if not (linear or turning) or (turning and tilted) or new == 800 or not _centred(new, g, si, sj, sk, flat):
             break
         if inverse:
             if (sf is None or new != 10) if new else sf is not None:

@@ -19,11 +19,12 @@ from chipload.program.gcode.dialect import Dialect
 from chipload.program.gcode.fanuc import Fanuc
 from chipload.program.gcode.flow import Flow
 from chipload.program.gcode.interpreter import BlockInterpreter
-from chipload.program.gcode.offsets import note_unset_offsets
+from chipload.program.gcode.offsets import note_missing_lengths, note_unset_offsets
 from chipload.program.gcode.sinumerik import Sinumerik
 from chipload.program.gcode.source import Source, lines_of, read_source
 from chipload.program.gcode.state import nine
 from chipload.program.gcode.tools import ToolTable
+from chipload.program.swivel import Swivel
 from chipload.progress import Progress, silent
 
 #: largest program [bytes]
@@ -50,6 +51,7 @@ def read_gcode(
     feed: float | None = None,
     most_blocks: int | None = None,
     lenient: bool = False,
+    swivel: Swivel | None = None,
     progress: Progress = silent,
 ) -> tuple[Commands, tuple[Finding, ...]]:
     r"""The motions that a text asks for, and what was noticed.
@@ -71,6 +73,7 @@ def read_gcode(
     most_blocks : blocks that may be carried out, repeated ones each time; None: ``MOST_REPEATED`` more than the text
         has lines
     lenient : in the dialect of LinuxCNC, what is not read or refused is a finding as far as the rest can be read
+    swivel : the machine, for tilted working planes; None: they are not read
     progress : called with the part that is done
 
     Raises
@@ -109,6 +112,7 @@ def read_gcode(
         origins={number: (nine(list(map(float, at))), turn) for number, (at, turn) in (origins or {}).items()},
         diameters=diameters,
         feed=feed,
+        swivel=swivel,
     )
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     text = rule.prepare(text)
@@ -117,7 +121,9 @@ def read_gcode(
     source = Source(name, lines_of(text, name)) if dialect == "sinumerik" else read_source(text, name)
     Flow(BlockInterpreter(controller), source, rule, folder, most_blocks, progress).run()
     note_unset_offsets(controller)
-    return controller.track.commands(), controller.findings.all()
+    commands = controller.track.commands()
+    note_missing_lengths(controller, commands)
+    return commands, controller.findings.all()
 
 
 def read_gcode_file(path: Path, **options: object) -> tuple[Commands, tuple[Finding, ...]]:

@@ -6,10 +6,11 @@ G710 mm.
 
 CYCLE81 to CYCLE86, with MCALL too, are carried out (:mod:`~chipload.program.gcode.sinumerik_cycles`).
 
-TRANS, ATRANS, ROT and AROT about Z are carried out (:mod:`~chipload.program.gcode.frames`).
+TRANS, ATRANS, ROT and AROT about Z are carried out (:mod:`~chipload.program.gcode.frames`), and CYCLE800
+(:mod:`~chipload.program.gcode.sinumerik_swivel`).
 
 Jumps and loops are in :mod:`~chipload.program.gcode.sinumerik_flow`. Left out, so that the result is unproven: motions
-in mirrored, scaled or swivelled coordinates until they end, tool vectors (A3 B3 C3), cycles that are not drilling,
+in mirrored or scaled coordinates until they end, tool vectors (A3 B3 C3), cycles that are not drilling,
 calls of other programs, curves (CIP, CT, splines), values of names that nothing defines. Noted and left out: what does
 not concern the path. G331 and G332 are G33 with the spindle one way and back.
 """
@@ -28,6 +29,19 @@ from chipload.program.gcode.frames import further, remove
 from chipload.program.gcode.offsets import choose
 from chipload.program.gcode.sinumerik_cycles import CYCLES, NORMAL, hole_blocks
 from chipload.program.gcode.sinumerik_flow import flow_step
+from chipload.program.gcode.sinumerik_swivel import swivel
+from chipload.program.gcode.sinumerik_words import (
+    ALONG_TOOL,
+    CURVES,
+    END_ALONG_TOOL,
+    FRAMES,
+    FUNCTIONS,
+    IDLE,
+    JUMPS,
+    PLACED,
+    leaves_out,
+    unread,
+)
 from chipload.program.gcode.state import AXES, LINEAR, ZERO, nine
 from chipload.program.gcode.words import LONGEST, Block
 from chipload.program.setup import FIRST_NAMED
@@ -49,35 +63,6 @@ _R = re.compile(r"R([0-9]+)(?![0-9A-Z_])")
 _LABEL = re.compile(r"^(N[0-9]+\s*)?[A-Z_][A-Z0-9_]*\s*:(?!=)\s*")
 _NAMED = re.compile(r"[A-Z_$][A-Z0-9_$]*")
 _DEFINITION = re.compile(r"DEF\s+(?:CHAN\s+|NCK\s+)?(REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b(.*)")
-FUNCTIONS = ("SIN", "COS", "TAN", "ASIN", "ACOS", "SQRT", "ABS", "EXP", "LN")
-#: words of the program's coordinates; those that are not read unless they end something
-PLACED = ("TRANS", "ATRANS", "ROT", "AROT")
-
-FRAMES = frozenset(
-    """
-    AMIRROR AROT AROTS ASCALE ATRANS CROT CTRANS MIRROR ROT ROTS SCALE TOFRAME TOROT TRANS
-    """.split()  # noqa: SIM905
-)
-JUMPS = frozenset(
-    """
-    CALL CASE DEF DEFINE ELSE ENDFOR ENDIF ENDLOOP ENDWHILE EXTCALL FOR GOTO GOTOB GOTOC GOTOF GOTOS IF LOOP
-    REPEAT REPEATB UNTIL WHILE
-    """.split()  # noqa: SIM905
-)
-CURVES = frozenset(
-    """
-    AP ASPLINE BSPLINE CIP CSPLINE CT INVCCW INVCW OMA POLY RP TCARR TRAANG TRACYL TRANSMIT
-    """.split()  # noqa: SIM905
-)
-IDLE = frozenset(
-    """
-    ADIS ADISPOS BRISK CFC CFIN CFTCP COARSEA COMPCAD COMPCURV COMPOF COMPON COMPSURF CUT2D CUT2DF CUT3DC
-    CUT3DF CUT3DFF CYCLE832 DIAM90 DIAMOF DISPLOF DRIVE EXTERN FFWOF FFWON FINEA FLIN FNORM FRC FRCM GFRAME0
-    GROUP_ADDEND GROUP_BEGIN GROUP_END KONT LIMS NORM ORIAXES ORIEULER ORIMACHAX ORIMKS ORIRESET ORIRPY
-    ORIRPY2 ORISOF ORISON ORIVECT ORIWKS OVR OVRRAP PROC RTLIOF RTLION SAVE SBLOF SBLON SD SOFT SPATH SPOS
-    SPOSA STOPRE UPATH UPL WALIMOF WALIMON WORKPIECE
-    """.split()  # noqa: SIM905
-)
 #: codes of G as LinuxCNC has them, in tenths
 SAME = {60: 610, 64: 640, 641: 640, 642: 640, 643: 640, 644: 640, 645: 640, 70: 200, 700: 200, 71: 210, 710: 210,
         153: 530, 53: 530, 9: 0}  # fmt: skip
@@ -270,7 +255,12 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
     if name in CURVES:
         _left_out(block, c, name)
         return
-    if text.startswith('"') or name.startswith("$") or name in IDLE:
+    if left_out := unread(name, text):
+        c.leave_out("nc-unknown-word", left_out)
+        if leaves_out(name) and NOTED not in block.g:
+            block.g.append(NOTED)
+        return
+    if text.startswith('"') or name.startswith("$") or name in IDLE or name in ("OVR", "OVRRAP"):
         c.once("nc-ignored", f"{name}: does not affect the path; it is ignored")
         return
     if re.fullmatch(r"R[0-9]{1,4}", name):
@@ -312,7 +302,7 @@ def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
     elif name == "TRAORI":
         _keyword(block, c, name)
     elif name == "CYCLE800":
-        _swivel(c, arguments)
+        swivel(c, [_value(x, c) if x.strip() else 0.0 for x in re.sub(r'"[^"]*"', "", arguments).split(",")])
     elif name in FRAMES:
         leave_out(c, f"{name}: changed coordinates")
     elif name in CYCLES:
@@ -323,17 +313,6 @@ def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
         c.once("nc-ignored", f"{name}: does not affect the path; it is ignored")
     else:
         c.leave_out("nc-call", f"{name}({arguments.strip()[:60]}): cycles and calls are not read: left out")
-
-
-def _swivel(c: Controller, arguments: str) -> None:
-    """CYCLE800: only one that does not swivel or shift, or ends a swivel, is read."""
-    values = [x.strip() for x in re.sub(r'"[^"]*"', "", arguments).split(",")]
-    # X0 Y0 Z0, A B C, X1 Y1 Z1
-    if any(_value(x, c) != 0.0 for x in values[4:13] if x):
-        leave_out(c, "CYCLE800: a swivelled plane")
-        return
-    go_on(c)
-    c.once("nc-ignored", "CYCLE800: a plane that is not swivelled")
 
 
 def _define(kind: str, names: str, c: Controller) -> None:
@@ -349,10 +328,20 @@ def _define(kind: str, names: str, c: Controller) -> None:
 def _frame(block: Block, c: Controller) -> None:
     """TRANS, ROT and the like, with their axes; without any they end all of it."""
     word, words = block.frame, block.words
+    tilted = c.state.datum.tilt is not None
     given = {x: words.pop(x) for x in "xyzabcpijk" if x in words}
+    if word in ALONG_TOOL:
+        leave_out(c, f"{word}: coordinates along the tool's axis")
+        return
+    if word == END_ALONG_TOOL:
+        if c.left_out.startswith(("TOFRAME", "TOROT")):
+            go_on(c)
+        return
     if not word.startswith("A") and not given:
         go_on(c)
         remove(c)
+    elif tilted:
+        leave_out(c, f"{word}: coordinates that change within a swivelled plane")
     elif word not in PLACED:
         leave_out(c, f"{word}: mirrored, scaled or tilted coordinates")
     elif word.endswith("TRANS"):
@@ -391,4 +380,4 @@ def _keyword(block: Block, c: Controller, word: str, body: str = "") -> None:
     elif re.fullmatch(rf"(?:N[0-9]+\s*)?{re.escape(word)}\s*", body):
         c.leave_out("nc-call", f"{word[:40]}: calls a program that is not here: left out")
     else:
-        c.note("nc-unknown-word", f"{word[:40]}: is not known")
+        c.leave_out("nc-unknown-word", f"{word[:40]}: is not known: its effect is left out")

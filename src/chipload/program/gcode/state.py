@@ -1,8 +1,8 @@
 """What a controller remembers between blocks: modes, numbers, and how coordinates lie in the machine.
 
-Notation: positions are nine numbers X Y Z A B C U V W in mm and degrees. ``machine = rotate_xy(position + shift,
-rotation) + offset + length``: ``shift`` of G92 and G52, ``rotation`` and ``offset`` of the work offset, ``length`` of
-the tool.
+Notation: positions are nine numbers X Y Z A B C U V W in mm and degrees. ``machine = rotate_xy(tilt(position) + shift,
+rotation) + offset + length``: ``tilt`` of a tilted working plane, ``shift`` of G92 and G52, ``rotation`` and ``offset``
+of the work offset, ``length`` of the tool.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from chipload.program.commands import Floats, Frame
 from chipload.program.path_mode import FREE, PathMode
+from chipload.program.tilt import Tilt
 
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 ZERO: Nine = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -47,9 +48,13 @@ class Datum:
     rotation: float = 0.0
     shift: Nine = ZERO
     length: Nine = ZERO
+    tilt: Tilt | None = None
 
     def to_machine(self, p: Nine) -> Nine:
-        """Position of the machine's axes."""
+        """Position of the machine's axes; in tilted coordinates, that with the rotary axes at zero."""
+        if self.tilt is not None:
+            x, y, z = self.tilt.to_offset(np.array([p[:3]]))[0].tolist()
+            p = (x, y, z, *p[3:])
         q = [a + b for a, b in zip(p, self.shift, strict=True)]
         if self.rotation:
             q[0], q[1] = rotated(q[0], q[1], self.rotation)
@@ -60,7 +65,11 @@ class Datum:
         q = [a - b - c for a, b, c in zip(m, self.offset, self.length, strict=True)]
         if self.rotation:
             q[0], q[1] = rotated(q[0], q[1], -self.rotation)
-        return nine([a - b for a, b in zip(q, self.shift, strict=True)])
+        p = nine([a - b for a, b in zip(q, self.shift, strict=True)])
+        if self.tilt is not None:
+            x, y, z = self.tilt.from_offset(np.array([p[:3]]))[0].tolist()
+            p = (x, y, z, *p[3:])
+        return p
 
     def frame(self) -> Frame:
         """The same in rad, as Commands keep it."""
@@ -70,6 +79,7 @@ class Datum:
             rotation=math.radians(self.rotation),
             shift=_rad(self.shift),
             tool=_rad(self.length),
+            tilt=self.tilt,
         )
 
 

@@ -3,9 +3,9 @@
 Notation of cycle 1 (pecking): the tool stands the set-up clearance DIST above the surface; DEPTH of the hole and PLNGNG
 of each plunge are counted from the surface down; before each plunge it stops ``advanced_stop`` above what is drilled.
 
-Cycles 7 (datum shift), 9 (dwell) and 220, 221 (patterns) act where they are defined. Turned, mirrored and scaled
-coordinates (8, 10, 11, 26) and a tilted plane (19) are not read: motions are left out until they end. A cycle that is
-not read is left out where it is called.
+Cycles 7 (datum shift), 9 (dwell), 19 (working plane, by spatial angles) and 220, 221 (patterns) act where they are
+defined. Turned, mirrored and scaled coordinates (8, 10, 11, 26) are not read: motions are left out until they end. A
+cycle that is not read is left out where it is called.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from chipload.program.heidenhain import bore_cycles, q_cycles, words
 from chipload.program.heidenhain.formula import NotKnownError, q_number
 from chipload.program.heidenhain.state import ConversationalState
 from chipload.program.heidenhain.switches import datum_shift, leave_out
+from chipload.program.heidenhain.tilted_plane import put
+from chipload.program.tilt import spatial
 from chipload.units import mm_s_from_mm_min
 
 #: plunges of one hole, holes of one pattern
@@ -27,9 +29,10 @@ MOST_PLUNGES, MOST_HOLES = 10_000, 10_000
 #: cycles that move nothing and set nothing that concerns the path
 SILENT = (13, 14, 20, 32)
 #: by what the coordinates are changed, and the value that leaves them as they are
-CHANGES = {8: ("mirrored", 0.0), 10: ("turned", 0.0), 11: ("scaled", 1.0), 19: ("tilted", 0.0), 26: ("scaled", 1.0)}
-PRESET, PATTERNS = 247, (220, 221)
+CHANGES = {8: ("mirrored", 0.0), 10: ("turned", 0.0), 11: ("scaled", 1.0), 26: ("scaled", 1.0)}
+PRESET, PATTERNS, WORKING_PLANE = 247, (220, 221), 19
 _VALUE = re.compile(r"([A-Z ]*?)\s*([-+]?\d*\.?\d+)\s*$")
+_SPATIAL = re.compile(rf"\b([ABC])\s*([-+]?)\s*({words.VALUE})")
 _CHANGED = re.compile(rf"(?:\b|(?<=\s))[A-Z]*\s*([-+]?)\s*({words.VALUE})")
 
 
@@ -73,6 +76,9 @@ class Cycles:
             else:
                 value = self._value(number, body)
                 self.values[part] = value if part == 4 else value * s.scale
+        elif number == WORKING_PLANE:
+            if part > 0:
+                self._tilt(text, body)
         elif number in CHANGES:
             self._change(text, number, part, body)
         elif number == PRESET:
@@ -111,6 +117,15 @@ class Cycles:
         if changes:
             leave_out(self.s, f"{text[:60]}: {how} coordinates are not read: motions are left out until they end")
         elif how in self.s.left_out:
+            self.s.left_out = ""
+
+    def _tilt(self, text: str, body: str) -> None:
+        """Cycle 19: the working plane; the rotary axes stay until a motion names them."""
+        given = {letter: self.s.signed(sign, value) for letter, sign, value in _SPATIAL.findall(body)}
+        why = put(self.s, spatial(*(given.get(x, 0.0) for x in "ABC")), "STAY")
+        if why:
+            leave_out(self.s, f"{text[:60]}: {why}: motions are left out until it ends")
+        elif "tilted" in self.s.left_out:
             self.s.left_out = ""
 
     def _choose_preset(self, text: str) -> None:

@@ -16,7 +16,7 @@ import re
 
 from chipload.errors import InputError
 from chipload.program.commands import LINE, RAPID
-from chipload.program.heidenhain import words
+from chipload.program.heidenhain import tilted_plane, words
 from chipload.program.heidenhain.corners import Corner
 from chipload.program.heidenhain.formula import NotKnownError
 from chipload.program.heidenhain.state import FARTHEST, ConversationalState
@@ -67,16 +67,29 @@ def _straight(
         if 92 in codes:
             raise InputError("M92: coordinates of the machine builder's point are not known here")
         s.select(_side(s, text), named)
+        if s.tilt is not None and named & {3, 4, 5}:
+            _turn(s, end, named, RAPID if fast else LINE)
+            named &= {0, 1, 2}
+            end = [x if k in named else s.at[k] for k, x in enumerate(end)]
         s.unknown -= named
-        s.straight(RAPID if fast else LINE, end)
+        if named:
+            s.straight(RAPID if fast else LINE, end)
     else:
         s.select(_side(s, text), named)
     _retract(s, text)
     after(s, codes)
 
 
+def _turn(s: ConversationalState, end: list[float], named: set[int], motion: int) -> None:
+    """Rotary axes that a block names in a tilted plane: they turn first, X Y Z of the machine where they are."""
+    target = tilted_plane.axes_of(s)
+    for k in named & {3, 4, 5}:
+        target[k] = end[k] + s.shift[k]
+    tilted_plane.turn(s, target, motion)
+
+
 def _retract(s: ConversationalState, text: str) -> None:
-    """M140: back along the tool, which stands upright here."""
+    """M140: back along Z of the working plane, in which the tool stands."""
     found = words.RETRACT.search(text)
     if found is None:
         return

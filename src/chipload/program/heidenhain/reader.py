@@ -5,6 +5,7 @@ Notation: a block is a line; X Y Z [mm], A B C [rad].
 | subject | blocks |
 |---|---|
 | motions (:mod:`~chipload.program.heidenhain.motions`) | L, LP, CC, C, CR, CT, CP, RND, CHF, RL, RR; APPR as a line |
+| planes (:mod:`~chipload.program.heidenhain.tilted_plane`) | PLANE SPATIAL, EULER, VECTOR, RELATIV, RESET; cycle 19 |
 | cycles (:mod:`~chipload.program.heidenhain.cycles`) | 1, 7, 9, 200 to 203, 205 to 209, 220, 221, 240, 262 |
 | switches (:mod:`~chipload.program.heidenhain.switches`) | TOOL DEF, TOOL CALL, M functions, FUNCTION TCPM |
 | order (:mod:`~chipload.program.heidenhain.flow`) | labels, REP, FN, Q parameters, CALL PGM of a file beside it |
@@ -29,6 +30,7 @@ from chipload.program.heidenhain.formula import NotKnownError, q_number
 from chipload.program.heidenhain.q_cycles import MAX
 from chipload.program.heidenhain.state import KEPT, ConversationalState
 from chipload.program.reconcile import StatedDiameter
+from chipload.program.swivel import Swivel
 from chipload.units import MM_PER
 
 __all__ = ["KEPT", "read_heidenhain", "read_heidenhain_file", "tool_definitions"]
@@ -60,6 +62,7 @@ def read_heidenhain(
     parameters: Mapping[int, float] | None = None,
     radii: Mapping[int, float] | None = None,
     feed: float | None = None,
+    swivel: Swivel | None = None,
 ) -> tuple[Commands, tuple[Finding, ...]]:
     r"""The motions that a conversational program asks for, and what was noticed.
 
@@ -71,6 +74,7 @@ def read_heidenhain(
     parameters : Q parameters by number that are known before: what SYSREAD would read too
     radii : [mm] of the tools, where TOOL DEF states none
     feed : [mm/s] of cuts before the program states one; None: such a cut is refused
+    swivel : the machine, for tilted working planes; None: they are not read
 
     Raises
     ------
@@ -83,7 +87,7 @@ def read_heidenhain(
     """
     if len(text) > LONGEST_TEXT:
         raise InputError(f"{name}: {len(text)} characters: must be at most {LONGEST_TEXT}")
-    state = ConversationalState(name, parameters or {}, radii or {}, feed)
+    state = ConversationalState(name, parameters or {}, radii or {}, feed, swivel)
     run = _Blocks(state, HeidenhainFlow(state, text_of(text), folder))
     try:
         run.go()

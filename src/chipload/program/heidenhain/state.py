@@ -17,6 +17,8 @@ from chipload.program.compensation import CentreMove, Compensation
 from chipload.program.heidenhain.corners import Corner, Piece, joined
 from chipload.program.heidenhain.formula import NotKnownError, QParameters, q_number
 from chipload.program.heidenhain.words import AXIS, FEED, RETRACT, SETTINGS, TURN_FEED, number, rest_of
+from chipload.program.swivel import Swivel
+from chipload.program.tilt import Tilt
 from chipload.units import mm_s_from_mm_min
 
 #: findings that are kept
@@ -37,10 +39,16 @@ class ConversationalState:
     parameters : Q parameters by number that are known before
     radii : [mm] of the tools by number, where the program states none
     feed : [mm/s] of cuts before the program states one; None: such a cut is refused
+    swivel : the machine, for tilted working planes; None: they are not read
     """
 
     def __init__(
-        self, name: str, parameters: Mapping[int, float], radii: Mapping[int, float], feed: float | None
+        self,
+        name: str,
+        parameters: Mapping[int, float],
+        radii: Mapping[int, float],
+        feed: float | None,
+        swivel: Swivel | None = None,
     ) -> None:
         self.line = 0
         self.q = QParameters(parameters)
@@ -60,6 +68,9 @@ class ConversationalState:
         self.tool, self.lengths = 0, dict[int, float]()
         self.radii, self.stated_radii, self.extra_radius = dict(radii), dict[int, float](), 0.0
         self.tcp = False
+        self.swivel = swivel
+        #: the tilted working plane in the datum's coordinates; None: none
+        self.tilt: Tilt | None = None
         self.ended = False
         #: why motions are left out until further notice; empty: they are not
         self.left_out = ""
@@ -152,7 +163,7 @@ class ConversationalState:
         self.end_contour()
         tool, shift = [0.0] * 9, list(self.shift)
         tool[2] = self.lengths.get(self.tool, 0.0) + extra_length
-        self.frames.append(Frame(shift=shift, tool=tool))  # type: ignore[arg-type]
+        self.frames.append(Frame(shift=shift, tool=tool, tilt=self.tilt))  # type: ignore[arg-type]
 
     # -- rows -------------------------------------------------------------------------------------------------
     def select(self, side: int, moves: set[int]) -> None:
@@ -286,7 +297,8 @@ class ConversationalState:
 
     def _tail(self) -> tuple[object, ...]:
         spindle = self.speed * self.sense
-        return (spindle, self.tool, self.tcp, len(self.frames) - 1, self.line, len(self.labels) - 1)
+        tip = self.tcp or (self.tilt is not None and self.swivel is not None and self.swivel.turns)
+        return (spindle, self.tool, tip, len(self.frames) - 1, self.line, len(self.labels) - 1)
 
     def plunge(self, motion: int, z: float, value: float) -> None:
         """RAPID or LINE along Z, or DWELL: ``value`` the feed [mm/s] or the time [s]."""

@@ -1,6 +1,6 @@
 """What conversational blocks switch: M functions, tools, the working plane, tip control, the datum.
 
-A tilted working plane and turned, mirrored or scaled coordinates are not read: motions are left out until they end.
+Turned, mirrored and scaled coordinates are not read: motions are left out until they end.
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ import math
 import re
 
 from chipload.errors import InputError
-from chipload.program.heidenhain import words
+from chipload.program.heidenhain import tilted_plane, words
 from chipload.program.heidenhain.state import AXES, RADIUS_Q, ConversationalState
 from chipload.program.setup import FIRST_NAMED
+from chipload.program.tilt import Tilt, tilt_of
 from chipload.units import MM_PER, rad_s_from_rpm
 
 TOOL_DIGITS = 9
@@ -89,15 +90,12 @@ def function_word(s: ConversationalState, text: str) -> bool:
 
 
 def plane(s: ConversationalState, text: str) -> None:
-    """PLANE: the working plane; only one that is not tilted is read."""
-    angles = re.findall(rf"\b(?:SP|PRO|EUL|RO)?[ABCPRN][ABCRTUO]*\s*([-+]?)\s*({words.VALUE})", text)
-    level = not any(s.signed(sign, value) != 0.0 for sign, value in angles)
-    if text.startswith("PLANE RESET") or (text.startswith(("PLANE SPATIAL", "PLANE AXIAL")) and angles and level):
-        s.left_out = ""
-        if re.search(r"\b(?:TURN|MOVE)\b", text) and any(s.at[3:6]):
-            s.unproven("heidenhain-plane", f"{text[:60]}: turns rotary axes back: left out")
+    """PLANE: the working plane."""
+    why = tilted_plane.plane(s, text)
+    if why:
+        leave_out(s, f"{text[:60]}: {why}: motions are left out until PLANE RESET")
     else:
-        leave_out(s, f"{text[:60]}: a tilted working plane is not read: motions are left out until PLANE RESET")
+        s.left_out = ""
 
 
 def leave_out(s: ConversationalState, reason: str) -> None:
@@ -185,8 +183,24 @@ def datum_shift(s: ConversationalState, text: str, body: str) -> None:
         raise InputError(f"{text!r}: must be an axis and its shift")
     k = AXES.index(hit[2])
     value = s.q.formula(hit[3]) * (s.scale if k < 3 else math.pi / 180.0)
+    if s.tilt is not None and k < 3:
+        _shift_tilted(s, s.tilt, text, k, value, bool(hit[1]))
+        return
     value = value + s.shift[k] if hit[1] else value
     s.end_contour()
     s.at[k] += s.shift[k] - value
     s.shift[k] = value
+    s.frame()
+
+
+def _shift_tilted(s: ConversationalState, tilt: Tilt, text: str, k: int, value: float, further: bool) -> None:
+    """A shift of the datum along an axis of the tilted plane."""
+    if any(s.shift[:3]) and not further:
+        s.unproven("heidenhain-datum", f"{text[:40]}: is added to the shift from before the plane was tilted")
+    s.end_contour()
+    local = (tilt.matrix.T @ tilt.origin).tolist()
+    new = local[k] + value if further else value
+    s.at[k] += local[k] - new
+    local[k] = new
+    s.tilt = tilt_of(tilt.matrix, tuple(tilt.matrix @ local))
     s.frame()

@@ -35,9 +35,9 @@ from chipload.stability.directional._kernels import (
 from chipload.stability.spectrum._kernels import first_vector, next_vector, settled
 
 TAU = 2.0 * math.pi
-#: fewest cells between two teeth
+#: least number of cells between two teeth
 FEWEST = 12
-#: a delayed time this near to a node is there, in cells
+#: tolerance in cells within which a delayed time is that of a node
 NODE = 1e-9
 
 
@@ -258,12 +258,54 @@ def systems(A, end, inverse, slopes, cuts):
             inverse[i] = np.linalg.inv(B)
 
 
+@njit(cache=True, nogil=True, fastmath=True, inline="always")
+def delayed(history, at, b, d):
+    """Coordinate b of the state at ``at`` and one cell later: first, h first', last, h last'.
+
+    Parameters
+    ----------
+    history : (nodes, 2 d) r and h r' at the nodes
+    at : in cells from the first node; between nodes the cubic Hermite
+    """
+    k = math.floor(at + NODE)
+    t = at - k
+    p0 = history[k, b]
+    s0 = history[k, d + b]
+    p1 = history[k + 1, b]
+    s1 = history[k + 1, d + b]
+    if t < NODE:
+        return p0, s0, p1, s1
+    t2 = t * t
+    t3 = t2 * t
+    p2 = history[k + 2, b]
+    s2 = history[k + 2, d + b]
+    h0 = 2 * t3 - 3 * t2 + 1
+    h1 = t3 - 2 * t2 + t
+    h2 = 3 * t2 - 2 * t3
+    h3 = t3 - t2
+    g0 = 6 * (t2 - t)
+    g1 = 3 * t2 - 4 * t + 1
+    g3 = 3 * t2 - 2 * t
+    return (
+        h0 * p0 + h1 * s0 + h2 * p1 + h3 * s1,
+        g0 * (p0 - p1) + g1 * s0 + g3 * s1,
+        h0 * p1 + h1 * s1 + h2 * p2 + h3 * s2,
+        g0 * (p1 - p2) + g1 * s1 + g3 * s2,
+    )
+
+
 @njit(cache=True, nogil=True, fastmath=True)
 def advanced(x, A, delay, nodes, U, free, push, end, inverse, slopes, cuts, h, history, q, v, known, new, y):
     """The state y a period after the state x: (r, h r') at the nodes of the longest delay, q, q'.
 
-    ``A`` (D, m, 3, d d), ``delay`` (D,) in cells; ``history`` (nodes + m + 1, 2 d), ``q``, ``v`` (M,), ``known`` (3 d,)
-    and ``new`` (2 d,) are room to work in.
+    Parameters
+    ----------
+    x, y : (2 d nodes + 2 M,) state at the beginning, and at the end, which is written
+    A : (D, m, 3, d d) force over displacement [N/mm] of each delay at the Gauss points of the m cells
+    delay : (D,) in cells
+    U : (d, M) of the modes; free, push, end : of :func:`motion`; inverse, slopes, cuts : of :func:`systems`
+    h : length of a cell [s]
+    history, q, v, known, new : (nodes + m + 1, 2 d), (M,), (M,), (3 d,), (2 d,) working arrays
     """
     delays, cells = cuts.shape
     d, modes = U.shape
@@ -300,35 +342,8 @@ def advanced(x, A, delay, nodes, U, free, push, end, inverse, slopes, cuts, h, h
             if not cutting:
                 known[:] = 0.0
                 cutting = True
-            at = nodes + i - delay[j]
-            k = math.floor(at + NODE)
-            t = at - k
             for b in range(d):
-                if t < NODE:
-                    first = history[k, b]
-                    first_slope = history[k, d + b]
-                    last = history[k + 1, b]
-                    last_slope = history[k + 1, d + b]
-                else:
-                    t2 = t * t
-                    t3 = t2 * t
-                    p0 = history[k, b]
-                    s0 = history[k, d + b]
-                    p1 = history[k + 1, b]
-                    s1 = history[k + 1, d + b]
-                    p2 = history[k + 2, b]
-                    s2 = history[k + 2, d + b]
-                    h0 = 2 * t3 - 3 * t2 + 1
-                    h1 = t3 - 2 * t2 + t
-                    h2 = 3 * t2 - 2 * t3
-                    h3 = t3 - t2
-                    g0 = 6 * (t2 - t)
-                    g1 = 3 * t2 - 4 * t + 1
-                    g3 = 3 * t2 - 2 * t
-                    first = h0 * p0 + h1 * s0 + h2 * p1 + h3 * s1
-                    first_slope = g0 * (p0 - p1) + g1 * s0 + g3 * s1
-                    last = h0 * p1 + h1 * s1 + h2 * p2 + h3 * s2
-                    last_slope = g0 * (p1 - p2) + g1 * s1 + g3 * s2
+                first, first_slope, last, last_slope = delayed(history, nodes + i - delay[j], b, d)
                 now = history[nodes + i, b] - first
                 now_slope = history[nodes + i, d + b] - first_slope
                 for g in range(3):

@@ -1,7 +1,7 @@
 """Compiled loop that joins steps of one line into one move; arrays and scalars only.
 
-A line of a program is cut into steps, the tip going straight and the axis turning evenly all along. What they sweep
-together is what one move from the first to the last sweeps, so that lists of the index have one number for all of them.
+A line of a program is divided into steps; along it the tip moves straight and the axis turns evenly. The steps sweep
+the same volume as one move from the first to the last, so that the lists of the index hold one number for all of them.
 Notation: as in :mod:`chipload.engagement.bricks._kernels`.
 Oracle: the same program without joining, in tests/engagement/bricks.
 """
@@ -28,15 +28,15 @@ from chipload.engagement.bricks._kernels import (
 )
 from chipload.engagement.moves._kernels import FLUTE, WIDE
 
-#: where the joined move is at the time between two steps it may differ by this from them [mm]
+#: greatest difference of the joined move from the end of a step [mm]
 EXACT = 1e-10
-#: most that a joined move turns [rad], and most by which a point goes off its chord, over the greatest radius
+#: greatest turn of a joined move [rad]; greatest deviation of a point from its chord, over the greatest radius
 TURN, OFF = 0.1, 0.004
 
 
 @njit(cache=True, nogil=True)
 def joined(m, s, c):
-    """Whether the move ``m`` goes on as the step ``s``: it then ends where that ends."""
+    """Whether the step s (row) of a cutter c continues the move m (row), which is then extended to its end."""
     theta = m[THETA]
     fixed = theta == 0.0
     if fixed != (s[THETA] == 0.0) or s[LENGTH] + s[THETA] == 0.0 or m[LENGTH] + theta == 0.0:

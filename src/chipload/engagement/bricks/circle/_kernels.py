@@ -1,8 +1,8 @@
 """Compiled search for the material on a circle of a cutter in any direction; arrays and scalars only.
 
 Notation: ``ring`` holds the centre of the circle and its two radii across each other [mm]; the direction psi is the
-point centre + cos(psi) first + sin(psi) second. A border is that of one move, unless what is left beside it was swept
-by another: then the search goes on from there, as in :mod:`chipload.engagement.moves.border._kernels`.
+point centre + cos(psi) first + sin(psi) second. A border belongs to one move. If another move swept the material next
+to it, the search continues with that move, as in :mod:`chipload.engagement.moves.border._kernels`.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from chipload.engagement.moves._kernels import AIR, MATERIAL
 from chipload.engagement.moves.border._kernels import BESIDE, NARROW, TURNS
 
 PI = math.pi
-#: beside the end of the front, where the contact is judged [rad]
+#: distance from the end of the front at which the contact is tested [rad]
 ASIDE = 1e-4
-#: most values of a distance that are asked for its zero
+#: greatest number of secant steps
 SECANTS = 12
 
 
 @njit(cache=True, nogil=True, inline="always")
 def asked(ring, c, s, index, hint, wait):
-    """What is at a direction of the circle."""
+    """MATERIAL, AIR or the move that swept the direction (c, s) of the circle; ``hint`` is tested first."""
     return what_is(
         ring[0] + c * ring[3] + s * ring[6], ring[1] + c * ring[4] + s * ring[7], ring[2] + c * ring[5] + s * ring[8],
         index, hint, wait,
@@ -43,7 +43,7 @@ def swept_at(ring, c, s, e, index, wait):
 
 @njit(cache=True, nogil=True, inline="always")
 def estimated_least_at(ring, c, s, e, index):
-    """About the distance of a direction of the circle out of what the move e swept."""
+    """Estimate of the distance [mm] of the direction (c, s) from the volume that move e swept, negative within."""
     return estimated_least(
         index[6][e], index[8][index[7][e]], ring[0] + c * ring[3] + s * ring[6], ring[1] + c * ring[4] + s * ring[7],
         ring[2] + c * ring[5] + s * ring[8],
@@ -70,11 +70,10 @@ def between(cu, su, cs, ss, part):
 
 @njit(cache=True, nogil=True)
 def crossing(ring, cu, su, cs, ss, e, index, wait):
-    """Direction at which what the move ``e`` swept begins between u, not swept by it, and s, swept, and a direction
-    just before it, not swept; for AIR, where the initial body ends.
+    """Direction at which the volume that move e swept begins, between u, not swept by it, and s, swept; and a direction
+    just before it, not swept. With AIR as e: the end of the initial body.
 
-    The zero of the distance by secants is asked whether it is the border; else, and where there is no distance, by
-    halving.
+    The border is the zero of the distance, by secants; if that fails, or there is no distance, it is found by halving.
     """
     low = 0.0
     high = 1.0
@@ -151,8 +150,8 @@ def border(ring, cm, sm, ca, sa, e, index, wait):
 
 @njit(cache=True, nogil=True)
 def ridge(ring, ca, sa, cb, sb, ea, eb, index, wait):
-    """Whether there is material between two directions in air, a swept by the move ``ea``, b by ``eb``, and a direction
-    in it: from the border of one move on to that of the next until b is reached.
+    """Whether there is material between two directions in air, a swept by move ``ea`` and b by move ``eb``, and a
+    direction in it. The search goes from the border of one move to that of the next until it reaches b.
     """
     if ea < 0:
         ca, sa, cb, sb, ea, eb = cb, sb, ca, sa, eb, ea
@@ -200,8 +199,10 @@ def unwound(psi, near):
 
 @njit(cache=True, nogil=True)
 def intervals(ring, end, apart, index, wait, out):
-    """Parts of -end .. end in material: rows (from, to) of ``out``; their number. Where the front ends, -end and end,
-    the contact is judged just beside; samples are ``apart`` [rad] at most.
+    """Find the ranges of -end .. end [rad] in material; return their number.
+
+    They are the rows (from, to) of ``out``. At the ends of the front the contact is tested just inside; samples are at
+    most ``apart`` [rad] from one another.
     """
     first = min(ASIDE - end, 0.0) if end < PI else -end
     last = max(end - ASIDE, 0.0) if end < PI else end

@@ -48,17 +48,17 @@ from chipload.engagement.moves.front._kernels import APART, JUMP, STEADY, turns
 
 __all__ = ["APART", "BRICKS", "SLICES", "run"]
 
-#: an area of less than this share of the engaged surface is a film, as moves that turn leave along a rim
+#: share of the engaged surface below which an area is a film, such as turning moves leave along a rim
 FILM = 1e-3
-#: slices whose ends are no farther apart than this follow one another [mm]
+#: greatest distance of the ends of consecutive slices [mm]
 BESIDE = 1e-9
-#: a step that goes no farther to both sides of its middle, over the greatest radius, has one search for what is near
+#: greatest motion to both sides of a step's middle, over the greatest radius, for which one search of moves is enough
 NEAR = 0.4
 
 
 @njit(cache=True, nogil=True)
 def instant(m, t, height, at):
-    """Where the cutter is at a time and how it moves: ``at`` (18,)."""
+    """Pose and motion of the cutter at the time t, into ``at`` (18,): tip, T, N, A, W, u."""
     cosine, sine = turn(m, t)
     for d in range(3):
         at[TIP + d] = m[d] + t * m[3 + d]

@@ -1,10 +1,10 @@
 """Compiled loops of the index of moves in bricks; arrays and scalars only.
 
-Notation: a brick is a cell of the initial body's box; 8 x 8 x 8 of them are a block. Of a block that no move has
-reached nothing is kept, of one that a move has swept all of its number; of the others each brick has the number of the
-move that swept all of it, -1 less that in place of a length, or a list of the moves that sweep a part of it. A brick is
-swept whole where the distance of its centre into the cutter is at least half its diagonal, and is not touched where the
-distance out of it is. Lists have no limit.
+Notation: a brick is a cell of the initial body's box; 8 x 8 x 8 of them are a block. A block that no move has reached
+has no bricks. A block that one move has swept completely has only the number of that move. In any other block a brick
+has either the number e of the move that swept it completely, stored as the length -1 - e, or a list of the moves that
+swept a part of it. A move sweeps a brick completely if the brick's centre lies within the cutter by at least half the
+diagonal, and does not touch it if the centre lies outside by as much. Lists have no limit.
 
 ``index``: grid (sides from, sides of a brick), shape (bricks, blocks), blocks, bricks (where the list begins, its
 length, its room), kept moves, bricks of each block that are no air, moves, cutter of each, cutters, and of the initial
@@ -81,7 +81,7 @@ def brick_of(x, y, z, grid, shape, blocks):
 
 @njit(cache=True, nogil=True, inline="always")
 def what_is(x, y, z, index, hint, wait):
-    """MATERIAL, the number of a move that swept the point, AIR outside the body; ``hint`` is asked first."""
+    """MATERIAL, AIR outside the body, or a move that swept the point (x, y, z); ``hint`` is tested first."""
     row = brick_of(x, y, z, index[0], index[1], index[2])
     if row == OUTSIDE:
         return AIR

@@ -19,14 +19,14 @@ from chipload.engagement.moves.front._kernels import ALONG, APART
 PI = math.pi
 TAU = 2.0 * PI
 BOTTOM, ARC, FLANK = 0, 1, 2
-#: samples of a circle lie at most so many bricks apart, and closer where a corner is cut into more slices than this
+#: greatest distance of samples of a circle in bricks; it is smaller if a corner has more slices than the second number
 BRICKS, SLICES = 2.5, 12.0
-#: circles of a part that are looked at first, and how often a place where the contact changes is halved
+#: number of circles of a part that are tested first, and of halvings at a place where the contact changes
 LOOKS, HALVINGS = 8, 7
-#: angles in contact of two circles beside each other that differ by more than this [rad] may stand for a jump, and do
-#: if one half has this share of it
+#: a difference of the angles in contact of neighbouring circles above this [rad] may be a jump; it is one if a half of
+#: the interval has this share of it
 LEAP, SHARE = 0.25, 0.6
-#: contact whose angles differ by no more than this is the same all along [rad]
+#: greatest difference of the angles of constant contact [rad]
 ALIKE = 1e-3
 #: columns of ``at``: tip, T, N, A, W, u
 TIP, ALONG_T, ALONG_N, AXIS, RATE, WAY = 0, 3, 6, 9, 12, 15

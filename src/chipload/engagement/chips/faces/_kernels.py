@@ -151,7 +151,7 @@ def link(one, other, K, tol, quiet, buf, n):
 
 @njit(cache=True, nogil=True)
 def _match(R0, s0, R1, s1, n, tol):
-    """Least sum of distances of roots in cyclic order and its shift; inf where an edge would miss by more than tol."""
+    """Least sum of distances [mm] of roots in cyclic order, and its shift; inf: an edge would miss by more than tol."""
     best, shift = math.inf, 0
     if n == 0:
         return 0.0, 0

@@ -1,7 +1,7 @@
-"""Compiled loops that bound what a cutter with a fixed axis covers of layers on straight ways.
+"""Compiled loops of the area of a layer that a cutter with a fixed axis covers on a straight move.
 
 Notation: arrays ``K`` and profile (rho, w) as in :mod:`chipload.engagement.chips._kernels`; A the axis, a its part in
-the layer, v the way. The cutter is convex, hence what it sweeps, and hence the section of that with a layer. So the
+the layer, v the motion. The cutter is convex, hence what it sweeps, and hence the section of that with a layer. So the
 boundary is known by its point in each direction u of the layer. It has a normal N = (u, n_z) in space. The **support**
 of the cutter in the direction N is the point of its profile with the normal g, where N = sin(g) e_r - cos(g) A.
 
@@ -24,13 +24,13 @@ from numba import njit
 from chipload.engagement.chips._kernels import extent
 
 NOTHING, FULL = -1, -3
-#: directions to begin with
+#: initial number of directions
 FIRST = 8
-#: directions nearer than this are one [rad]
+#: angle below which two directions are one [rad]
 LEAST = 1e-6
-#: points nearer than this share of the tolerance are one
+#: distance below which two points are one, as a share of the tolerance
 SAME = 1e-3
-#: a chord whose triangle of tangents is higher than so many tolerances is divided at once
+#: height of a chord's triangle of tangents, in tolerances, above which the chord is divided without a test
 HIGH = 2.5
 
 
@@ -57,7 +57,7 @@ def support(K, A, nx, ny, nz, out):
 
 @njit("boolean(float64, float64, float64[::1], float64, float64, float64, float64[::1])", cache=True, nogil=True)
 def on_rim(rho, w, A, z, ux, uy, out):
-    """The point of a rim at the height z that is farther in the direction u; False: the rim does not come there."""
+    """Point of a rim at the height z that is farther in the direction u, into ``out``; False: there is none."""
     s = math.sqrt(A[0] * A[0] + A[1] * A[1])
     if rho <= 0.0 or s <= 0.0:
         return False

@@ -60,7 +60,7 @@ def _crossing(cp, ca, K, h, a, b, rising, cut, m, S):
 
 @njit(types.int64(_R2, _R2, _R1, types.float64, _F2, _F2), cache=True, nogil=True)
 def spans(cp, ca, K, h, ends, out):
-    """Times during which the layer cuts the cutter, into ``out`` (m, 2); their count. ``ends`` as of ``levels``."""
+    """Time ranges in which the layer cuts the cutter, into ``out`` (m, 2); their number. ``ends`` of :func:`levels`."""
     S = np.empty(27)
     n = ends.shape[0] - 1
     cut = np.empty(4 * n + 8)

@@ -1,7 +1,8 @@
 """Compiled search for the borders of the material on a circle of the cutter; arrays and scalars only.
 
-Notation: as in :mod:`chipload.engagement.moves.front._kernels`; directions are (cos, sin) of psi. A border is that of
-one move, unless what is left beside it was swept by another: then the search goes on from there.
+Notation: as in :mod:`chipload.engagement.moves.front._kernels`; directions are (cos, sin) of psi; (px, py) the axis and
+z, rho the height and radius of the circle [mm], T the direction psi = 0. A border belongs to one move. If another move
+swept the material next to it, the search continues with that move.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from chipload.engagement.moves._kernels import (
     what_is,
 )
 
-#: square of the angle [rad^2] to which a border is found, and most moves that are asked for it
+#: square of the tolerance of a border [rad^2], and greatest number of moves that are tested for it
 NARROW, TURNS = 1e-8, 200
-#: angle beside a border, at which what is there is asked [rad]
+#: angle from a border at which the neighbouring material is tested [rad]
 BESIDE = 5e-5
-#: most arcs that are asked for a border, and change of its direction at which it is found
+#: greatest number of arcs that are tested for a border, and tolerance of its direction
 ARCS, CLOSE = 60, 2e-6
 
 
@@ -63,8 +64,8 @@ def halved(px, py, z, rho, T, cu, su, cs, ss, m, c):
 
 @njit(cache=True, nogil=True, inline="always")
 def crossing(px, py, z, rho, T, cu, su, cs, ss, e, index):
-    """Direction at which what the move ``e`` swept begins between the directions u, not swept by it, and s, swept, and
-    a direction just before it, not swept.
+    """Direction at which the volume that move e swept begins, between the directions u, not swept by it, and s, swept;
+    and a direction just before it, not swept.
 
     Where the move sweeps a disc or is that of a ball, the cutter at any time of the move meets the circle in an arc
     whose ends are known. From s on the end of the arc at the time when the cutter is nearest is in the swept volume and
@@ -165,8 +166,8 @@ def border(px, py, z, rho, T, cm, sm, ca, sa, e, index):
 
 @njit(cache=True, nogil=True, inline="always")
 def ridge(px, py, z, rho, T, ca, sa, cb, sb, ea, eb, index):
-    """Whether there is material between two directions in air, a swept by the move ``ea``, b by ``eb``, and a direction
-    in it: from the border of one move on to that of the next until b is reached.
+    """Whether there is material between two directions in air, a swept by move ``ea`` and b by move ``eb``, and a
+    direction in it. The search goes from the border of one move to that of the next until it reaches b.
     """
     if ea < 0:
         ca, sa, cb, sb, ea, eb = cb, sb, ca, sa, eb, ea

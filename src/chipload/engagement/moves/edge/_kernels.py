@@ -14,7 +14,7 @@ from chipload.engagement.moves._kernels import CORNER, FLUTE, RHO1, RHO2, TA, TB
 PI = math.pi
 #: heights closer than this count as one [mm]
 SAME = 1e-6
-#: slices of the part of a corner that cuts all round on the way down
+#: number of slices of the part of a corner that cuts all round in a downward motion
 ROUND = 2
 
 
@@ -80,8 +80,8 @@ def direction(x, y):
 
 @njit(cache=True, nogil=True)
 def windows(near, count, half, out, slices):
-    """Range of psi in which candidates touch each slice: columns 9 and 10 of ``out``, the first above the second where
-    none does, infinite where they are all round.
+    """Range of psi [rad] in which candidates touch each slice, into columns 9 and 10 of ``out``: the first is above the
+    second if none does; both are infinite if candidates lie all round.
     """
     for k in range(slices):
         out[k, 9] = math.inf
@@ -136,7 +136,7 @@ def add_slice(out, k, s0, s1, rho, z0, sk, ck, z, rho0, rho1):
 
 @njit(cache=True, nogil=True)
 def add_corner(out, k, c, alpha, k0, k1, mid):
-    """:func:`add_slice` of the corner from the angle k0 of its normal to k1, looked at at ``mid``."""
+    """:func:`add_slice` of the corner from the angle k0 of its normal to k1 [rad], with the circle at ``mid``."""
     r = c[CORNER]
     return add_slice(
         out, k, r * (k0 - alpha), r * (k1 - alpha), c[E] + r * math.sin(mid), c[F] - r * math.cos(k0), math.sin(mid),

@@ -21,27 +21,37 @@ from chipload.engagement.moves.edge._kernels import add_slice, candidates, slice
 
 PI = math.pi
 TAU = 2.0 * math.pi
-#: beside the end of the front, where the contact is judged [rad]
+#: distance from the end of the front at which the contact is tested [rad]
 BESIDE = 1e-4
 #: greatest angle between two samples [rad]
 APART = 0.35
-#: heights of the stock that cut the flank into slices; where there are more they are evenly thick
+#: greatest number of heights of the stock at which the flank is divided; above it the slices are equally thick
 LEVELS = 16
-#: a step cuts as the one before it if its volume a length differs by no more than this share; from the second on it
-#: enters or leaves
+#: greatest relative change of the volume per length between two steps that cut alike, and least change of one that
+#: enters or leaves the material
 STEADY, JUMP = 0.03, 0.3
-#: cosine of the angle between two moves from which on they make a corner
+#: cosine of the least angle between two moves that make a corner
 CORNER = 0.985
-#: least sine of the front's end that counts
+#: least sine of the angle at which the front ends
 ALONG = 1e-9
 
 
 @njit(cache=True, nogil=True, inline="always")
 def intervals(p, T, rho, z, low, high, end, apart, index, out, begin):
-    """Parts of low .. high in material on the circle of a slice: rows (from, to) of ``out`` from ``begin`` on; their
-    number.
+    """Find the ranges of psi in material on the circle of a slice.
 
-    -end .. end is the front; where it ends the contact is judged just beside.
+    Parameters
+    ----------
+    p : (3,) tip [mm]; T : (2,) unit vector of psi = 0
+    rho, z : radius and height of the circle [mm]
+    low, high, end : range that is searched; end of the front, near which the contact is tested just inside [rad]
+    apart : greatest angle between two samples [rad]
+    index : see :func:`chipload.engagement.moves._kernels.what_is`
+    out : (m, 2) the ranges (from, to), written from row ``begin`` on
+
+    Returns
+    -------
+    Number of ranges
     """
     count = begin
     first = max(low, BESIDE - end) if end < PI else low
@@ -105,7 +115,14 @@ def intervals(p, T, rho, z, low, high, end, apart, index, out, begin):
 
 @njit(cache=True, nogil=True)
 def parts_of(spans, slice_of, first, count, room):
-    """Number of pieces of what is engaged: spans of slices that follow one another and overlap belong together."""
+    """Number of connected areas that are engaged: overlapping spans of consecutive slices are one area.
+
+    Parameters
+    ----------
+    spans : (count, 2) from and to [rad]
+    slice_of : numbers of their slices, from row ``first`` on
+    room : (count,) working array
+    """
     for i in range(count):
         room[i] = i
     pieces = count
@@ -131,11 +148,18 @@ def parts_of(spans, slice_of, first, count, room):
 
 @njit(cache=True, nogil=True)
 def engaged(p, u, c, T, parts, flank, index, near, levels, scratch, spans, mine, room, slices, rows, owner, at, out):
-    """What is engaged at the tip position p of a step u.
+    """Find the engagement at a tip position; False: no room in ``rows`` or ``slices``.
 
-    Spans (psi from, to) of ``mine`` slices go to ``rows`` from ``at[0]`` on, their slices to ``slices`` from ``at[1]``;
-    ``out``: volume of the step, pieces, least and greatest height of a slice, sum of the normals at ends of the front
-    by length (x, y, z), that length, 1 where there is material above the flutes, length of the edge. False: no room.
+    Parameters
+    ----------
+    p, u : (3,) tip, and motion of the step [mm]
+    c : (12,) cutter; T : (2,) unit vector of psi = 0
+    parts, flank : slices of a corner; longest slice of the flank [mm]
+    near, levels, scratch, spans, mine, room : working arrays, see ``WORK``
+    slices, rows, owner : slices; spans (psi from, to) [rad]; slice of each span; from ``at[1]`` and ``at[0]`` on
+    out : (10,) volume of the step [mm^3], number of areas, least and greatest height of a slice [mm], sum of the
+        normals at ends of the front times their length (x, y, z), that length [mm], 1 if there is material above the
+        flutes, length of the edge [mm]
     """
     # what a call passes counts again
     index = borrowed(index)
@@ -222,7 +246,7 @@ INDEX = types.Tuple((_F1, _I1, _F2, _I2, _S, types.uint16[::1], _F2, _I1, _F2, _
 
 @njit(cache=True, nogil=True)
 def turns(moves, q, end):
-    """Whether a move is the last of ``end`` or the next one goes another way."""
+    """Whether move q is the last before number ``end``, or makes a corner with the next one."""
     if q + 1 >= end:
         return True
     dot = 0.0
@@ -235,6 +259,105 @@ def turns(moves, q, end):
     return dot < CORNER * math.sqrt(one * two)
 
 
+@njit(cache=True, nogil=True, inline="always")
+def put_tip(m, t, p):
+    """Write the tip of a move m (6,) at a time t of 0..1 into p (3,) [mm]."""
+    for d in range(3):
+        p[d] = m[d] + t * m[3 + d]
+
+
+@njit(cache=True, nogil=True)
+def step_engaged(k, frame, instants, state, index, work, parts, flank, slices, rows, owner, entry, out):
+    """Find what step k engages at its instants, and count it in ``state``; False: no room.
+
+    Parameters: see :func:`run`.
+    """
+    # what a call passes counts again
+    index = borrowed(index)
+    near, levels, scratch, spans, mine, room, p, at = borrowed(work)
+    frame, instants, state, parts, flank = borrowed((frame, instants, state, parts, flank))
+    slices, rows, owner, entry, out = borrowed((slices, rows, owner, entry, out))
+    q = state[0] + k
+    m = index[6][q]
+    c = index[8][index[7][q]]
+    longest = flank[index[7][q]]
+    at[0] = state[2]
+    at[1] = state[3]
+    entries = state[4]
+    length = math.sqrt(m[3] * m[3] + m[4] * m[4] + m[5] * m[5])
+    count = instants[k]
+    rate = 0.0
+    least = math.inf
+    most = 0.0
+    i = 0
+    while i < count:
+        # the middle first: where a step of one instant cuts unlike the one before it, others beside the middle too
+        j = (i + count // 2) % count
+        put_tip(m, (j + 0.5) / count, p)
+        if entries == len(out):
+            return False
+        before = at[0]
+        if not engaged(
+            p, m[3:], c, frame[k], parts, longest, index, near, levels, scratch, spans, mine, room,
+            slices, rows, owner, at, out[entries],
+        ):  # fmt: skip
+            return False
+        if i == 0 and length > 0.0:
+            rate = out[entries, 0] / length
+            change = abs(rate - p[3]) / max(rate, p[3]) if rate != p[3] else 0.0
+            if instants[k] == 1 and change > STEADY:
+                count = state[5] if change < JUMP else state[6]
+                j = count // 2
+        now = out[entries, 0] / length if length > 0.0 else 0.0
+        if at[0] > before or out[entries, 8] > 0.0:
+            entry[entries, 0] = k
+            entry[entries, 1] = j
+            entry[entries, 2] = before
+            entries += 1
+        if instants[k] > 1 and count == instants[k] and length > 0.0:
+            least = min(least, now)
+            most = max(most, now)
+        last = i == count - 1 if instants[k] > 1 else i == 0
+        if last and count == instants[k] and length > 0.0 and turns(index[6], q, state[0] + len(instants)):
+            # a step that ends in a corner may meet the material at its very end
+            put_tip(m, 1.0 - 0.5 / (count * state[6]), p)
+            if entries == len(out):
+                return False
+            rows_before = at[0]
+            slices_before = at[1]
+            if not engaged(
+                p, m[3:], c, frame[k], parts, longest, index, near, levels, scratch, spans, mine,
+                room, slices, rows, owner, at, out[entries],
+            ):  # fmt: skip
+                return False
+            end = out[entries, 0] / length
+            at[0] = rows_before
+            at[1] = slices_before
+            if instants[k] > 1:
+                least = -math.inf if out[entries, 8] > 0.0 else min(least, end)
+                most = max(most, end)
+            elif abs(end - rate) > STEADY * max(end, rate) or out[entries, 8] > 0.0:
+                count = state[6]
+                if entries > state[4]:
+                    entry[entries - 1, 1] = count // 2
+        i += 1
+        if i == count == instants[k] and state[5] > 1 and most - least > STEADY * most:
+            # a long step that does not cut alike all along: again from its beginning, each part as a step
+            count *= state[5] if most - least < JUMP * most else state[6]
+            at[0] = state[2]
+            at[1] = state[3]
+            entries = state[4]
+            i = 0
+    if length > 0.0 and count > 0:
+        p[3] = rate
+    instants[k] = count
+    state[2] = at[0]
+    state[3] = at[1]
+    state[4] = entries
+    state[1] = 1
+    return True
+
+
 @njit(
     types.int64(types.int64, _F2, _I1, _I1, INDEX, WORK, _F2, _F1, _F2, _F2, _I1, _I2, _F2, _I1),
     cache=True,
@@ -245,17 +368,18 @@ def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, 
 
     Parameters
     ----------
-    frame : (n, 2) direction in the plan from which psi is counted, of each step
-    instants : (n,) at how many times a step is looked at: the middles of so many equal parts of it; steps of one that
-        do not cut as the one before them get more, and longer ones that do not cut alike all along
-    state : number of the move that is the first step; 1 where the engagement of step ``begin`` is known; rows, slices
-        and entries so far; instants of steps that get more, and of those that enter or leave: of a longer step, of
-        each of its parts
+    frame : (n, 2) unit vector in the plan from which psi is counted, of each step
+    instants : (n,) number of instants of each step: the middles of so many equal parts of it; a step of one instant
+        that does not cut as the step before it gets more, and so does a longer one whose instants differ
+    state : (7,) number of the move that is the first step; 1 where the engagement of step ``begin`` is known; rows,
+        slices and entries so far; number of instants, or of parts of each instant, where the volume a length changes
+        by more than ``STEADY``, and by more than ``JUMP``
     index : see :func:`chipload.engagement.moves._kernels.what_is`; the moves of these steps are in it
-    pieces, flank : slices of a corner, and longest slice of the flank of each cutter [mm]
+    work : working arrays, see ``WORK``
+    parts, flank : slices of a corner; longest slice of the flank of each cutter [mm]
     slices, rows, owner, out : see :func:`engaged`
     entry : (m, 3) step, instant and first row of each instant that cuts
-    used : (1,) room taken of the lists
+    used : (1,) room taken of the lists of the index
 
     Returns
     -------
@@ -263,95 +387,19 @@ def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, 
     """
     # the caller keeps all of them
     index = borrowed(index)
-    near, levels, scratch, spans, mine, room, p, at = borrowed(work)
+    work = borrowed(work)
     frame, instants, state, parts, flank = borrowed((frame, instants, state, parts, flank))
     slices, rows, owner = borrowed((slices, rows, owner))
     entry, out, used = borrowed((entry, out, used))
     n = len(instants)
     for k in range(begin, n):
+        if state[1] == 0 and not step_engaged(
+            k, frame, instants, state, index, work, parts, flank, slices, rows, owner, entry, out
+        ):
+            return k
         q = state[0] + k
-        m = index[6][q]
         c = index[8][index[7][q]]
-        if state[1] == 0:
-            at[0] = state[2]
-            at[1] = state[3]
-            entries = state[4]
-            length = math.sqrt(m[3] * m[3] + m[4] * m[4] + m[5] * m[5])
-            count = instants[k]
-            rate = 0.0
-            least = math.inf
-            most = 0.0
-            i = 0
-            while i < count:
-                # the middle first: where a step that is looked at once cuts unlike the one before it, also beside
-                j = (i + count // 2) % count
-                t = (j + 0.5) / count
-                for d in range(3):
-                    p[d] = m[d] + t * m[3 + d]
-                if entries == len(out):
-                    return k
-                before = at[0]
-                if not engaged(
-                    p, m[3:], c, frame[k], parts, flank[index[7][q]], index, near, levels, scratch, spans, mine, room,
-                    slices, rows, owner, at, out[entries],
-                ):  # fmt: skip
-                    return k
-                if i == 0 and length > 0.0:
-                    rate = out[entries, 0] / length
-                    change = abs(rate - p[3]) / max(rate, p[3]) if rate != p[3] else 0.0
-                    if instants[k] == 1 and change > STEADY:
-                        count = state[5] if change < JUMP else state[6]
-                        j = count // 2
-                now = out[entries, 0] / length if length > 0.0 else 0.0
-                if at[0] > before or out[entries, 8] > 0.0:
-                    entry[entries, 0] = k
-                    entry[entries, 1] = j
-                    entry[entries, 2] = before
-                    entries += 1
-                if instants[k] > 1 and count == instants[k] and length > 0.0:
-                    least = min(least, now)
-                    most = max(most, now)
-                last = i == count - 1 if instants[k] > 1 else i == 0
-                if last and count == instants[k] and length > 0.0 and turns(index[6], q, state[0] + n):
-                    # a step that ends in a corner may meet the material at its very end
-                    t = 1.0 - 0.5 / (count * state[6])
-                    for d in range(3):
-                        p[d] = m[d] + t * m[3 + d]
-                    if entries == len(out):
-                        return k
-                    rows_before = at[0]
-                    slices_before = at[1]
-                    if not engaged(
-                        p, m[3:], c, frame[k], parts, flank[index[7][q]], index, near, levels, scratch, spans, mine,
-                        room, slices, rows, owner, at, out[entries],
-                    ):  # fmt: skip
-                        return k
-                    end = out[entries, 0] / length
-                    at[0] = rows_before
-                    at[1] = slices_before
-                    if instants[k] > 1:
-                        least = -math.inf if out[entries, 8] > 0.0 else min(least, end)
-                        most = max(most, end)
-                    elif abs(end - rate) > STEADY * max(end, rate) or out[entries, 8] > 0.0:
-                        count = state[6]
-                        if entries > state[4]:
-                            entry[entries - 1, 1] = count // 2
-                i += 1
-                if i == count == instants[k] and state[5] > 1 and most - least > STEADY * most:
-                    # a long step that does not cut alike all along: once more from its beginning, each part as a step
-                    count *= state[5] if most - least < JUMP * most else state[6]
-                    at[0] = state[2]
-                    at[1] = state[3]
-                    entries = state[4]
-                    i = 0
-            if length > 0.0 and count > 0:
-                p[3] = rate
-            instants[k] = count
-            state[2] = at[0]
-            state[3] = at[1]
-            state[4] = entries
-            state[1] = 1
-        if not keep(q, m, c, index[0], index[1], index[2], index[3], index[4], index[5], used):
+        if not keep(q, index[6][q], c, index[0], index[1], index[2], index[3], index[4], index[5], used):
             return k
         state[1] = 0
     return n

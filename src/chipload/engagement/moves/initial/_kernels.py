@@ -13,7 +13,7 @@ from numba import njit
 
 from chipload.engagement.moves._kernels import in_solid
 
-#: how far bounds of a face in a cell are taken apart [mm]
+#: distance by which the bounds of a face in a cell are widened [mm]
 MARGIN = 1e-7
 
 
