@@ -20,7 +20,8 @@ from chipload.planning.impeller import _profile
 from chipload.planning.impeller.axis_field import AxisField, axis_field, clear_field, pose
 from chipload.planning.impeller.clearance.clearance import clearance
 from chipload.planning.impeller.point_milling import point_path
-from chipload.planning.impeller.profile import contact_band, profile_numbers, profile_scallops, support
+from chipload.planning.impeller.profile import contact_band, profile_numbers, support
+from chipload.planning.impeller.scallop_height import profile_scallops
 from chipload.planning.impeller.scallop_width import reaches
 from chipload.planning.impeller.scene import Scene
 

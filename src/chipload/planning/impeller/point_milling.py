@@ -31,8 +31,7 @@ from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.axis_field import AxisField, pose
 from chipload.planning.impeller.clearance.clearance import between
-from chipload.planning.impeller.profile import profile_scallops
-from chipload.planning.impeller.scallop_height import scallop_heights, shares
+from chipload.planning.impeller.scallop_height import profile_scallops, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
 from chipload.planning.impeller.scene import Floats
 

@@ -17,8 +17,6 @@ import math
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.planning.impeller import _profile
-from chipload.planning.impeller.scallop_height import STEPS, reach_of
 from chipload.planning.impeller.scene import Floats
 
 #: how far a contact stays from the ends of its arc where an axis is chosen [rad]; at most this share of the arc
@@ -82,16 +80,3 @@ def support(cutter: CatalogueCutter, uN: Floats, uV: Floats, uT: Floats) -> Floa
     rim = top * uT + 0.5 * cutter.top_diameter * s
     H = np.where(kappa <= body.corner_end, high * uT + corner + off * s, F * uT + R + E * s)
     return np.asarray(own + np.where(kappa <= last, H, rim))
-
-
-def profile_scallops(
-    points: Floats, normals: Floats, tips: tuple[Floats, Floats], axes: tuple[Floats, Floats], cutter: CatalogueCutter
-) -> Floats:
-    """As :func:`~chipload.planning.impeller.scallop_height.scallop_heights`, of a tapered or barrel cutter."""
-    wide = np.array([reach_of(p) for p in tips])
-    out = np.empty(len(points))
-    _profile.heights(
-        *(np.ascontiguousarray(x) for x in (points, normals, np.stack(tips), np.stack(axes))),
-        wide, profile_numbers(cutter), STEPS, out,
-    )  # fmt: skip
-    return out

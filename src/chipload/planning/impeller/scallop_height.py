@@ -12,12 +12,14 @@ import math
 
 import numpy as np
 
-from chipload.planning.impeller import _scallop
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.planning.impeller import _profile, _scallop
+from chipload.planning.impeller.profile import profile_numbers
 from chipload.planning.impeller.scene import Floats
 
 _SHARES = (np.arange(15) + 0.5) / 15
 #: steps of the ternary search for the top of the scallop between two shares
-STEPS = 5
+_STEPS = 5
 _NEAR = 4.0  # [mm] along the line: poses that are farther do not count
 #: distance of poses between which a scallop is searched [mm]; of a small corner its share of the radius, and what is
 #: small [mm]: with 1.5 mm a D 12 r 2 came out a third too high, with 0.5 mm a D 12 r 1 took 1.7 times as long
@@ -34,20 +36,20 @@ def scallop_heights(
     points, normals : (n, k, 3) of the surface between the lines, k shares of the way
     tips, axes : of both lines, (n, 3) each; nan where there is no pose
     """
-    wide = np.array([reach_of(p) for p in tips])
+    wide = np.array([_reach_of(p) for p in tips])
     out = np.empty(len(points))
     _scallop.heights(
         *(np.ascontiguousarray(x) for x in (points, normals, np.stack(tips), np.stack(axes))),
         wide,
         rho,
         corner,
-        STEPS,
+        _STEPS,
         out,
     )
     return out
 
 
-def reach_of(tips: Floats) -> int:
+def _reach_of(tips: Floats) -> int:
     """How many poses before and after a place lie within :data:`_NEAR` of it."""
     length = np.linalg.norm(np.diff(tips, axis=0), axis=1)
     usual = float(np.nanmedian(length)) if np.isfinite(length).any() else 1.0
@@ -80,3 +82,16 @@ def pose_distance(corner: float) -> float:
 def shares() -> Floats:
     """Shares of the distance from line to line at which the surface is evaluated."""
     return _SHARES
+
+
+def profile_scallops(
+    points: Floats, normals: Floats, tips: tuple[Floats, Floats], axes: tuple[Floats, Floats], cutter: CatalogueCutter
+) -> Floats:
+    """As :func:`scallop_heights`, of a tapered or barrel cutter."""
+    wide = np.array([_reach_of(p) for p in tips])
+    out = np.empty(len(points))
+    _profile.heights(
+        *(np.ascontiguousarray(x) for x in (points, normals, np.stack(tips), np.stack(axes))),
+        wide, profile_numbers(cutter), _STEPS, out,
+    )  # fmt: skip
+    return out
