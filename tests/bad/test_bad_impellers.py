@@ -242,25 +242,95 @@ def test_point_milling_needs_five_axes_and_links(formula):
     )
 
 
-def test_a_barrel_cutter_is_refused(formula):
-    row = "{ diameter_mm = 12.0, corner_radius_mm = 2.0, barrel_radius_mm = 85.0 }"
-    formula.with_name("cutters.toml").write_text(f'name = "own"\ncutter = [{row}]\n')
+BALL = "{ diameter_mm = 12.0, corner_radius_mm = 6.0 }"
+OVAL = "{ diameter_mm = 12.0, corner_radius_mm = 2.0, cutting_length_mm = 25.0, barrel_radius_mm = 85.0 }"
+CONE = "{ corner_radius_mm = 2.0, cutting_length_mm = 20.0, taper_deg = 3.0 }"
+
+
+def with_cutters(formula, *rows):
+    formula.with_name("cutters.toml").write_text(f'name = "own"\ncutter = [{", ".join(rows)}]\n')
     changed(formula, 'name = "wu2019"', 'file = "cutters.toml"')
-    assert refused(formula).endswith(
-        "cutter 1: barrel_radius_mm = 85.0: the search of table angles and the gouge check model cutters by "
-        "cylinders and one corner circle: state flat, bull-nose or ball cutters by diameter_mm and corner_radius_mm, "
-        "and simulate a program for the barrel cutter with kind = program"
+
+
+POINTS = '[operation.point_milling]\nmachine = { name = "cradle-ac" }\n\n'
+FORCES = (
+    '[operation.forces]\nmaterial = { name = "al7075-t6" }\nflutes = 2\noverhang_mm = 70.0\ndeflection_um = 20.0\n\n'
+)
+
+
+def test_a_barrel_is_refused_without_point_milling(formula):
+    with_cutters(formula, BALL, OVAL)
+    assert refused(formula) == (
+        "catalogue own: barrel 85 D 12 r 2: such a cutter mills by points on five axes alone: state "
+        "operation.0.point_milling, or leave it out"
     )
 
 
-def test_a_tapered_cutter_is_refused(formula):
-    row = "{ diameter_mm = 6.0, corner_radius_mm = 2.0, taper_deg = 3.0 }"
-    formula.with_name("cutters.toml").write_text(f'name = "own"\ncutter = [{row}]\n')
-    changed(formula, 'name = "wu2019"', 'file = "cutters.toml"')
-    assert refused(formula).endswith(
-        "cutter 1: taper_deg = 3.0: tapered cutters are not planned with: state the straight one that fits into it by "
-        "diameter_mm and corner_radius_mm, and its thicker part by shank_diameter_mm"
+def test_a_tapered_cutter_is_refused_with_forces(formula):
+    with_cutters(formula, BALL, CONE)
+    formula.write_text(formula.read_text().replace("[operation.paths]", FORCES + "[operation.paths]"))
+    assert refused(formula) == (
+        "catalogue own: taper 3 deg D 3.796 r 2: with operation.0.forces such a cutter mills by points on five axes "
+        "alone: state operation.0.point_milling, or leave it out"
     )
+
+
+def test_the_index_table_needs_a_cutter(formula):
+    with_cutters(formula, OVAL)
+    formula.write_text(formula.read_text().replace("[operation.paths]", POINTS + "[operation.paths]"))
+    assert refused(formula) == (
+        "catalogue own: barrel 85 D 12 r 2: no other cutter for the index table, which is not planned with such "
+        "cutters: add a flat, bull-nose or ball cutter"
+    )
+
+
+def test_roughing_needs_a_straight_cutter(formula):
+    with_cutters(formula, CONE)
+    assert refused(formula) == (
+        "operation.0.rough: catalogue own has tapered cutters alone, which are not planned with here: add a "
+        "straight one"
+    )
+
+
+def test_a_steep_taper_needs_a_wide_tolerance(formula):
+    with_cutters(formula, BALL, CONE.replace("3.0", "12.0"))
+    changed(formula, "hand_picked = { diameter_mm = 14.0, corner_radius_mm = 1.5 }\n", "")
+    assert refused(formula) == (
+        "operation.0.tolerance_mm = 0.05: taper 12 deg D 3.239 r 2 stands out of the cylinders that the index table is "
+        "planned with by 0.0447 mm: must be at least 0.0894"
+    )
+
+
+@pytest.mark.parametrize(
+    ("row", "says"),
+    [
+        ("diameter_mm = 4.0, corner_radius_mm = 2.0, taper_deg = 3.0, cutting_length_mm = 20.0",
+         "cutter 1: diameter_mm = 4: with taper_deg it is the diameter where flank line and bottom meet, 3.79586 of a "
+         "tapered ball: leave it out"),
+        ("diameter_mm = 5.0, corner_radius_mm = 2.0, taper_deg = 3.0",
+         "cutter taper 3 deg D 5 r 2: cutting_length_mm missing: must be given with taper_deg or barrel_radius_mm: how "
+         "far up the cutter has that shape"),
+        ("diameter_mm = 5.0, corner_radius_mm = 0.0, taper_deg = 3.0, cutting_length_mm = 20.0",
+         "cutter taper 3 deg D 5 r 0: corner_radius_mm = 0: must be above 0 with taper_deg or barrel_radius_mm"),
+        ("diameter_mm = 5.0, corner_radius_mm = 3.0, taper_deg = 3.0, cutting_length_mm = 20.0",
+         "cutter taper 3 deg D 5 r 3: corner_radius_mm = 3: must be at most 2.63445, where the corner's centre is on "
+         "the axis"),
+        ("diameter_mm = 12.0, corner_radius_mm = 2.0, barrel_radius_mm = 5.0, cutting_length_mm = 20.0",
+         "cutter barrel 5 D 12 r 2: barrel_radius_mm = 5: must be above 6, the distance of the corner's centre from "
+         "the flank"),
+        ("corner_radius_mm = 2.0, barrel_radius_mm = 85.0, cutting_length_mm = 20.0",
+         "cutter 1: diameter_mm is missing: must be given"),
+        ("diameter_mm = 5.0, corner_radius_mm = 1.0, taper_deg = 70.0, cutting_length_mm = 20.0",
+         "cutter 1: taper_deg = 70.0: must be from 0 to below 60"),
+        ("diameter_mm = 5.0, corner_radius_mm = 1.0, half_angle_deg = 3.0", "cutter 1: half_angle_deg: unknown key: "
+         "state taper_deg"),
+        ("diameter_mm = 12.0, corner_radius_mm = 1.0, segment_radius_mm = 85.0", "cutter 1: segment_radius_mm: unknown "
+         "key: state barrel_radius_mm"),
+    ],
+)  # fmt: skip
+def test_numbers_of_tapered_and_barrel_cutters(formula, row, says):
+    with_cutters(formula, f"{{ {row} }}")
+    assert refused(formula).endswith(says)
 
 
 @pytest.mark.parametrize("other", ["flank", "point_milling"])

@@ -12,7 +12,7 @@ import trimesh
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.stock.dexel import TriDexel, _shape
+from chipload.stock.dexel import TriDexel, cutter_shape
 from chipload.stock.dexels import _kernels
 
 FLAT = Cutter(10.0, 4, 0.5, 30.0, 40.0, 6e5)
@@ -45,7 +45,7 @@ def inside(s: np.ndarray, ray: np.ndarray, k: int, tip: np.ndarray, axis: np.nda
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_ray_is_in_the_cutter_where_its_profile_says(name: str) -> None:
     cutter = SHAPES[name]
-    shape = _shape(cutter.apt)
+    shape = cutter_shape(cutter.apt)
     rng = np.random.default_rng(4)
     met = 0
     for a in axes(rng, 400):
@@ -180,7 +180,7 @@ def test_few_instants_take_what_many_moments_cover(name: str, direction: str) ->
     turns /= np.linalg.norm(turns, axis=1)[:, None]
     stock = TriDexel.block((0.0, 0.0, 0.0), (30.0, 30.0, 30.0), 1.3, direction)
     stock.remove_poses(tips, turns, cutter.apt, tol=1e-7)
-    shape = _shape(cutter.apt)
+    shape = cutter_shape(cutter.apt)
     moments = []
     for m in np.linspace(0.0, 4.0, 2001):
         i = min(int(m), 3)

@@ -163,7 +163,7 @@ class TriDexel:
         if t0.shape != (3,) or t1.shape != (3,) or not np.isfinite([t0, t1]).all():
             raise InputError(f"stock: tips {t0.tolist()} and {t1.tolist()}: must be three finite numbers each")
         a0, a1 = _unit(axis0), _unit(axis1)
-        shape = _shape(apt)
+        shape = cutter_shape(apt)
         if (samples is None) == (error_mm is None):
             raise InputError("stock: state either samples or error_mm")
         angle = math.atan2(float(np.linalg.norm(np.cross(a0, a1))), float(a0 @ a1))
@@ -203,7 +203,7 @@ class TriDexel:
             raise InputError(
                 f"stock: poses of shapes {p.shape} and {a.shape}: must be (n, 3), n at least 2, and finite"
             )
-        self._remove(p, a, _shape(apt), tol)
+        self._remove(p, a, cutter_shape(apt), tol)
 
     def _remove(self, tips: Floats, axes: Floats, shape: Floats, tol: float) -> None:
         for rays in self.rays:
@@ -219,8 +219,8 @@ def _unit(axis: ArrayLike) -> Floats:
     return a / length
 
 
-def _shape(apt: Sequence[float]) -> Floats:
-    """Return the shape of a cutter for the kernels."""
+def cutter_shape(apt: Sequence[float]) -> Floats:
+    """Return the shape (14,) of a cutter for the kernels, from the seven numbers of APT or the eleven of a barrel."""
     d, r, e, f, alpha, beta, h = (float(x) for x in apt[:7])
     E, F, R, end = (float(x) for x in apt[7:]) if len(apt) == 11 else (e, f, 0.0, 0.5 * math.pi - beta)
     good = all(math.isfinite(x) for x in (d, r, e, f, alpha, beta, h)) and d > 0.0 and h > 0.0 and r >= 0.0

@@ -58,6 +58,8 @@ def _blank(
 
 def cutting_part(cutter: CatalogueCutter, end: float) -> Cutter:
     """The part that cuts, ``end`` [mm] long where it has no end."""
+    if not cutter.straight:
+        return cutter.shape
     length = end if cutter.cutting_length is None else cutter.cutting_length
     return Cutter(cutter.diameter, 1, 0.0, length, length, MODULUS, corner_radius=cutter.corner_radius)
 
@@ -78,7 +80,7 @@ def drawn_parts(cutter: CatalogueCutter, end: float) -> list[tuple[str, Floats]]
         if cutter.neck_length is not None and cutter.neck_diameter is not None and cutter.neck_length > top:
             out.append(("shank", _cylinder(0.5 * cutter.neck_diameter, top, cutter.neck_length)))
             top = cutter.neck_length
-        shank = cutter.diameter if cutter.shank_diameter is None else cutter.shank_diameter
+        shank = cutter.top_diameter if cutter.shank_diameter is None else cutter.shank_diameter
         if (end if reach is None else reach) > top:
             out.append(("shank", _cylinder(0.5 * shank, top, end if reach is None else reach)))
     if reach is not None and cutter.holder_diameter is not None:

@@ -144,7 +144,7 @@ _FIVE_AXIS = ("machine", "cutter [mm]", "path [mm]", "time [min]", "most left [m
 def _five_axis_cells(p: CheckedFlank | CheckedPoints) -> list[str]:
     return [
         p.machine.name,
-        f"D {p.cutter.diameter:g} r {p.cutter.corner_radius:g}",
+        p.cutter.label,
         f"{p.length:.1f}",
         f"{p.seconds / 60.0:.2f}",
         f"{p.excess:.4f}",

@@ -48,7 +48,7 @@ def _overview(milled: ImpellerResult) -> str:
         rows.append(
             [
                 str(k), escape(op.surface.name),
-                f"D {one.cutter.diameter:g} r {one.cutter.corner_radius:g}" if one else "none",
+                f"{one.cutter.label}" if one else "none",
                 f"{np.degrees(op.table.angle[one.table]):.6g}" if one else "",
                 f"{d.min():g} to {d.max():g}", str(n), str(len(op.surface.scene.check)),
                 _bad(len(op.answer.unreachable)), _bad(n - int(op.answer.certified.sum())), f"{op.search_s:.2f}",
@@ -102,7 +102,7 @@ def _ranges_note(op: Searched) -> str:
     if op.one is None:
         return "Of each contact point's own largest cutter at its own table angle."
     c, alpha = op.one.cutter, np.degrees(op.table.angle[op.one.table])
-    name = f"D {c.diameter:g} r {c.corner_radius:g} mm"
+    name = f"{c.label} mm"
     return f"Where {name} is clear at the table angle {alpha:.6g} deg, exact at both ends."
 
 

@@ -177,6 +177,8 @@ def _head(one: FiveAxisProgram, file: str) -> dict[str, Any]:
         "surface": one.name,
         "diameter_mm": one.cutter.diameter,
         "corner_radius_mm": one.cutter.corner_radius,
+        "taper_deg": math.degrees(one.cutter.taper),
+        "barrel_radius_mm": one.cutter.barrel_radius,
         "machine": one.machine.name,
         "program": file,
         "rows": len(one.program),

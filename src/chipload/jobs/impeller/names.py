@@ -50,7 +50,7 @@ def points_names(milled: ImpellerResult) -> list[tuple[str, CheckedPoints]]:
 
 
 def _five_axis_name(kind: str, k: int, p: FiveAxisProgram) -> str:
-    return f"{kind}-{k}-{p.name.replace(' ', '-')}-D{p.cutter.diameter:g}r{p.cutter.corner_radius:g}"
+    return f"{kind}-{k}-{p.name.replace(' ', '-')}-{p.cutter.stem}"
 
 
 def stem_of(partition: CheckedPartition) -> str:
@@ -63,4 +63,4 @@ def _finish_name(milled: ImpellerResult, k: int, p: Checked) -> str:
 
 
 def _size(cutter: CatalogueCutter, table: float) -> str:
-    return f"D{cutter.diameter:g}r{cutter.corner_radius:g}-{np.degrees(table):.6g}deg"
+    return f"{cutter.stem}-{np.degrees(table):.6g}deg"

@@ -194,7 +194,7 @@ class Checked:
     def name(self) -> str:
         """`D 12 r 2 mm at 45 deg`."""
         c = self.setting.cutter
-        return f"D {c.diameter:g} r {c.corner_radius:g} mm at {np.degrees(self.setting.table):.6g} deg"
+        return f"{c.label} mm at {np.degrees(self.setting.table):.6g} deg"
 
     @property
     def fails(self) -> tuple[str, ...]:
@@ -487,7 +487,7 @@ def for_all(milled: ImpellerResult) -> str:
     """`one cutter for all: D 16 r 2 mm at 40 deg`."""
     if milled.one is not None:
         c, alpha = milled.one[0], np.degrees(milled.surfaces[0].table.angle[milled.one[1]])
-        return f"the largest single cutter for all: D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:.6g} deg"
+        return f"the largest single cutter for all: {c.label} mm at {alpha:.6g} deg"
     return "no single cutter mills all of it at one table angle"
 
 
@@ -495,6 +495,6 @@ def largest(op: Searched) -> str:
     """`D 20 r 2 at 45 deg for all`, or the range of diameters."""
     if op.one is not None:
         c, alpha = op.one.cutter, np.degrees(op.table.angle[op.one.table])
-        return f"D {c.diameter:g} r {c.corner_radius:g} mm at {alpha:.6g} deg for all of it"
+        return f"{c.label} mm at {alpha:.6g} deg for all of it"
     d = op.answer.diameter[op.answer.cutter >= 0]
     return f"no single cutter mills all of it at one table angle, D {d.min():g} to {d.max():g} mm point by point"

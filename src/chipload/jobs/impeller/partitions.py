@@ -69,8 +69,7 @@ def _compared(milled: ImpellerResult) -> str:
         if d is None:
             rows.append([name, '<span class="no">these cutters do not reach all points</span>', *[""] * 8])
             continue
-        taken = [partition.catalogue.cutters[k] for k in d.cutters]
-        cutters = ", ".join(f"D {c.diameter:g} r {c.corner_radius:g}" for c in taken)
+        cutters = ", ".join(partition.catalogue.cutters[k].label for k in d.cutters)
         less = ["", ""]
         if base is not None and partition.name != PICKED:
             less = [f"{100.0 * (a / b - 1.0):+.1f}" for a, b in ((d.path, base.path), (d.total, base.total))]
@@ -99,7 +98,7 @@ def _programmed(milled: ImpellerResult) -> str:
     """Table of the programs of each partition."""
     rows = [
         [
-            escape(w.name), ", ".join(f"D {c.diameter:g} r {c.corner_radius:g}" for c in w.cutters), f"{w.path:.0f}",
+            escape(w.name), ", ".join(f"{c.label}" for c in w.cutters), f"{w.path:.0f}",
             *(f"{x / 60.0:.1f}" for x in (w.cutting, w.links, w.changes, w.seconds, w.predicted)),
             "" if w.scallop is None else f"{100.0 * w.scallop:.0f}",
             '<span class="ok">verified</span>' if w.verified else '<span class="no">not verified</span>',
@@ -201,5 +200,4 @@ def patch_figure(milled: ImpellerResult, partition: Partition, op: Searched) -> 
 
 
 def _size(partition: Partition, patch: Patch) -> str:
-    c = partition.catalogue.cutters[patch.cutter]
-    return f"D {c.diameter:g} r {c.corner_radius:g}"
+    return partition.catalogue.cutters[patch.cutter].label

@@ -43,6 +43,8 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 _SHARE = 0.2
 #: cutters of each corner radius whose paths are laid out where they go
 _PATHS = 2
+#: of how far a barrel cuts to a side, by how much its lines run on
+_ASKEW = 0.5
 #: distance of the points on which scallops are measured [mm]
 _FINE = 0.25
 
@@ -103,24 +105,23 @@ def _planned(
     name = f"{side.body} {side.side}"
     surface = how.surface(BODIES.index(side.body), side.side)
     u, v = side.along, side.up
-    box = tuple(
-        (float(x[0]), float(x[-1]))
-        for x in (
-            stretched(surface, "u", u, v, 2, paths.overrun_mm), stretched(surface, "v", v, u, 2, paths.overrun_mm)
-        )
-    )  # fmt: skip
     best: PlannedPoints | None = None
     why: list[str] = []
-    for corner in catalogue.families:
+    for family in catalogue.alike:
         laid = 0
-        for cutter in reversed(catalogue.family(corner)):
+        for cutter in reversed(family):
+            over = _overrun(cutter, paths.overrun_mm, limits.scallop)
+            box = tuple(
+                (float(x[0]), float(x[-1]))
+                for x in (stretched(surface, "u", u, v, 2, over), stretched(surface, "v", v, u, 2, over))
+            )
             field = clear_field(surface, (box[0], box[1]), how.scene, cutter, reachable, limits)
             if isinstance(field, str):
-                why.append(f"D {cutter.diameter:g} r {corner:g}: {field}")
+                why.append(f"{cutter.label}: {field}")
                 continue
             found = _path(how, surface, (u, v), field, cutter, limits, paths, outline)
             if isinstance(found, str):
-                why.append(f"D {cutter.diameter:g} r {corner:g}: {found}")
+                why.append(f"{cutter.label}: {found}")
             elif best is None or found.points.length < best.points.length:
                 best = found
             laid += 1
@@ -133,6 +134,17 @@ def _planned(
         f"{name}: no point milling: none of {len(catalogue.cutters)} cutters reaches all of it with one smooth axis: "
         f"{why[-1]}: state a smaller part of it, a lean_deg below {table.lean_deg:g}, or add smaller or longer cutters",
     )
+
+
+def _overrun(cutter: CatalogueCutter, stated: float, scallop: float) -> float:
+    """How far lines run beyond their surface [mm], the stated way; of a barrel some more.
+
+    A barrel cuts along its flank arc, up to sqrt(2 R h) to either side of its contact. Where the path is askew of it,
+    the arc is as much as half of that behind the contact.
+    """
+    if cutter.barrel_radius is None:
+        return stated
+    return stated + _ASKEW * math.sqrt(2.0 * cutter.barrel_radius * scallop)
 
 
 def _path(

@@ -53,7 +53,7 @@ def _five_axis_files(
     title = f"{milled.title}, {of} of {p.name}"
     head = [
         *(f"not verified: {f}" for f in p.fails[:3]),
-        f"T{number}: D {p.cutter.diameter:g} r {p.cutter.corner_radius:g} mm, tool length 0: positions of the tip",
+        f"T{number}: {p.cutter.label} mm, tool length 0: positions of the tip",
         f"five axes at once, {what}",
     ]
     turn = f"{np.degrees(milled.impeller.pitch):.6f} deg each"
@@ -96,7 +96,7 @@ def _comments(
     table = milled.surfaces[0].table
     position = float(table.position[np.abs(table.angle - alpha).argmin()])
     out = [f"not verified: {f}" for f in checked.fails[:3]]
-    out.append(f"T{number}: D {c.diameter:g} r {c.corner_radius:g} mm, tool length 0: positions of the tip")
+    out.append(f"T{number}: {c.label} mm, tool length 0: positions of the tip")
     out.append(
         f"index table {table.index} {np.degrees(position):.6g} deg before the start, table angle of {checked.name}"
     )

@@ -54,7 +54,7 @@ class CheckedRough:
         """`roughing D 12 r 2 mm at 45 deg`."""
         c = self.rough.cutter
         of = " beside the splitter" if self.rough.index else ""
-        return f"roughing{of}: D {c.diameter:g} r {c.corner_radius:g} mm at {np.degrees(self.rough.table):.6g} deg"
+        return f"roughing{of}: {c.label} mm at {np.degrees(self.rough.table):.6g} deg"
 
     @property
     def verified(self) -> bool:

@@ -50,6 +50,8 @@ from chipload.workers import Team, Workers
 
 #: of the time of a run what search, division, roughing and finishing take, with paths and without
 _WITH_PATHS, _SEARCH_ALONE = (5.0, 10.0, 10.0, 75.0), (50.0, 50.0, 0.0, 0.0)
+#: of the tolerance, by how much tapered cutters may stand out of the cylinders that are planned with
+_OUTSIDE = 0.5
 #: threads of the search; its answer does not depend on them
 WORKERS = len(os.sched_getaffinity(0))
 
@@ -78,10 +80,10 @@ def run(
 
 
 def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, team: Team | None) -> ImpellerResult:
-    machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
-    impeller = part.impeller
+    machine, cutters, part = _machine(job), _catalogue(job), read_part(job)
+    impeller, catalogue = part.impeller, _indexed(job, cutters)
     _picked(job, catalogue)
-    _rougher(job, catalogue)
+    _rougher(job, cutters)
     _checkable(job, impeller)
     forces = force_terms(job, catalogue)
     _five_axis_machines(job)
@@ -118,7 +120,7 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     roughs = None
     if op.rough is not None:
         roughs = checked_roughing(
-            impeller, machine, table, catalogue, _rougher(job, catalogue), op, op.paths, op.rough,
+            impeller, machine, table, cutters.of(cutters.straight), _rougher(job, cutters), op, op.paths, op.rough,
             walls_of(impeller, _ahead(job)), _ahead(job), WORKERS, third, keep,
         )  # fmt: skip
     how = finish_settings(
@@ -127,8 +129,8 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     keep.share(replace(how, workers=1))
     checked = checked_partitions(choices, partitions, how, machine, op.paths, last, keep)
     chosen = {one.name: one.partition for one in checked}
-    flanks = checked_flanks(job, how, catalogue, keep=keep) if op.flank is not None else None
-    points = checked_points(job, how, catalogue, keep=keep) if op.point_milling is not None else None
+    flanks = checked_flanks(job, how, cutters.of(cutters.straight), keep=keep) if op.flank is not None else None
+    points = checked_points(job, how, cutters, keep=keep) if op.point_milling is not None else None
     keep.write(at_once=True)
     milled = replace(milled, flanks=flanks, points=points)
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
@@ -178,10 +180,10 @@ def _named(job: ImpellerJob) -> list[tuple[str, str | Path]]:
 
 def check(job: ImpellerJob) -> tuple[list[str], bool]:
     """Contents of the files of a job; nothing is searched."""
-    machine, catalogue, part = _machine(job), _catalogue(job), read_part(job)
-    impeller = part.impeller
+    machine, cutters, part = _machine(job), _catalogue(job), read_part(job)
+    impeller, catalogue = part.impeller, _indexed(job, cutters)
     _picked(job, catalogue)
-    _rougher(job, catalogue)
+    _rougher(job, cutters)
     _checkable(job, impeller)
     force_terms(job, catalogue)
     _five_axis_machines(job)
@@ -201,6 +203,9 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
         lines.append(f"between check points: certified within {within:g} mm for corner radii from {corner:g} mm")
     corners = ", ".join(f"{r:g}" for r in catalogue.families)
     lines.append(f"catalogue {catalogue.name}: {len(catalogue.cutters)} cutters, corner radii {corners} mm")
+    more = [c.label for c in cutters.cutters if c not in catalogue.cutters]
+    if more:
+        lines.append(f"for point milling on five axes alone: {', '.join(more)}")
     line, reached = reach_line(impeller, catalogue, np.concatenate([s.scene.contact for s in surfaces]))
     return [*lines, line, _estimate(job, surfaces, catalogue)], reached
 
@@ -276,6 +281,38 @@ def _side(op: Searched, answer: Answer) -> ChannelSide:
     return ChannelSide(body, s.side, s.scene, s.u, s.v, s.area, answer, op.clearance, op.table.spans)
 
 
+def _indexed(job: ImpellerJob, cutters: Catalogue) -> Catalogue:
+    """The cutters that the index table is planned with: no barrels, and with feeds by the force no tapered ones.
+
+    Raises
+    ------
+    InputError
+        There are none; others without point milling, which alone is planned with them; roughing or flank passes without
+        a straight cutter.
+    """
+    op = job.operation
+    able = tuple(c for c in cutters.cutters if c.barrel_radius is None and (c.straight or op.forces is None))
+    other = next((c for c in cutters.cutters if c not in able), None)
+    if other is not None and op.point_milling is None:
+        by = "with operation.0.forces " if other.barrel_radius is None else ""
+        raise InputError(
+            f"catalogue {cutters.name}: {other.label}: {by}such a cutter mills by points on five axes alone: state "
+            "operation.0.point_milling, or leave it out"
+        )
+    if not able:
+        raise InputError(
+            f"catalogue {cutters.name}: {cutters.cutters[0].label}: no other cutter for the index table, which is not "
+            "planned with such cutters: add a flat, bull-nose or ball cutter"
+        )
+    for key, stated in (("rough", op.rough), ("flank", op.flank)):
+        if stated is not None and not cutters.straight:
+            raise InputError(
+                f"operation.0.{key}: catalogue {cutters.name} has tapered cutters alone, which are not planned with "
+                "here: add a straight one"
+            )
+    return cutters.of(able)
+
+
 def _picked(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
     """The cutter of the catalogue that is picked by hand."""
     picked = job.operation.hand_picked
@@ -293,13 +330,12 @@ def _rougher(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
 
 
 def _of_catalogue(catalogue: Catalogue, d: float, r: float, key: str) -> CatalogueCutter:
-    for cutter in catalogue.cutters:
+    for cutter in catalogue.straight:
         if (cutter.diameter, cutter.corner_radius) == (d, r):
             return cutter
-    near = min(catalogue.cutters, key=lambda c: abs(c.diameter - d) + abs(c.corner_radius - r))
+    near = min(catalogue.straight or catalogue.cutters, key=lambda c: abs(c.diameter - d) + abs(c.corner_radius - r))
     raise InputError(
-        f"operation.0.{key}: D {d:g} r {r:g} mm is not in catalogue {catalogue.name}: the nearest is "
-        f"D {near.diameter:g} r {near.corner_radius:g} mm"
+        f"operation.0.{key}: D {d:g} r {r:g} mm is not in catalogue {catalogue.name}: the nearest is {near.label} mm"
     )
 
 
@@ -330,15 +366,23 @@ def _covering(job: ImpellerJob, impeller: Impeller, catalogue: Catalogue) -> Cov
     op, corner = job.operation, _least_corner(job, impeller, catalogue)
     if corner is None:
         return None
-    return covering_of(impeller, op.tolerance_mm, corner, op.around, hub_range(impeller, _ahead(job)))
+    slack = max(c.not_enclosed for c in catalogue.cutters)
+    return covering_of(impeller, op.tolerance_mm, corner, op.around, hub_range(impeller, _ahead(job)), slack)
 
 
 def _least_corner(job: ImpellerJob, impeller: Impeller, catalogue: Catalogue) -> float | None:
     """The least corner radius above 0, for which the walls can be covered; None: there is none."""
     op, corner = job.operation, min((r for r in catalogue.families if r > 0.0), default=None)
     if corner is not None:
+        widest = max(catalogue.cutters, key=lambda c: c.not_enclosed)
+        slack = widest.not_enclosed
+        if slack > _OUTSIDE * op.tolerance_mm:
+            raise InputError(
+                f"operation.0.tolerance_mm = {op.tolerance_mm:g}: {widest.label} stands out of the cylinders that the "
+                f"index table is planned with by {slack:.3g} mm: must be at least {slack / _OUTSIDE:.3g}"
+            )
         try:
-            first_edge(impeller, op.tolerance_mm, corner, op.around)
+            first_edge(impeller, op.tolerance_mm - slack, corner - slack, op.around)
         except InputError as err:
             raise InputError(f"operation.0.tolerance_mm = {op.tolerance_mm:g}: {err}") from None
     return corner

@@ -72,8 +72,7 @@ def _patch_legend(milled: ImpellerResult, partition: Partition, op: Searched) ->
     patches = partition.divided.patches if partition.divided is not None else ()
     cutters = op.answer.catalogue.cutters
     words = {
-        f"D {cutters[p.cutter].diameter:g} r {cutters[p.cutter].corner_radius:g} mm at "
-        f"{np.degrees(p.table):.6g} deg": shade_of(partition, p)
+        f"{cutters[p.cutter].label} mm at {np.degrees(p.table):.6g} deg": shade_of(partition, p)
         for p in (patches[n] for n in numbers)
     }
     return legend("patch: cutter, table angle", [], list(words.items()))

@@ -161,7 +161,7 @@ def space_figure(op: Searched) -> go.Figure:
         out.add_trace(
             go.Mesh3d(
                 **_xyz(mesh), **_ijk(tris), color="#b9c2cc", opacity=0.55, hoverinfo="skip", showlegend=True,
-                name=f"D {cutter.diameter:g} r {cutter.corner_radius:g} at contact point {k}",
+                name=f"{cutter.label} at contact point {k}",
             )
         )  # fmt: skip
         at = s.check[[i for i in who if i >= 0]].astype(np.float32)
@@ -196,7 +196,7 @@ def cutter_mesh(
     r, rho = cutter.corner_radius, cutter.rho
     t = np.linspace(-0.5 * math.pi, 0.0, 9)
     profile = [(0.0, -r), *zip(rho + r * np.cos(t), r * np.sin(t), strict=True)]
-    stages = cutter.stages(0.0)
+    stages = cutter.enclosing(0.0) if cutter.barrel_radius is None else cutter.stages(0.0)
     for k, (low, radius) in enumerate(stages):
         high = stages[k + 1, 0] if k + 1 < len(stages) else max(80.0, low + 25.0)
         profile += [(radius, max(low, 0.0)), (radius, high)]
@@ -220,7 +220,7 @@ def _hover(op: Searched, k: int, cutter: CatalogueCutter | None) -> str:
         return f"{at}<br>not reached"
     alpha, wide = np.degrees(op.table.angle[op.answer.table[k]]), np.degrees(op.answer.ranges[k])
     spans = ", ".join(f"{low:.1f} to {high:.1f}" for low, high in wide[:3])
-    return f"{at}<br>D {cutter.diameter:g} r {cutter.corner_radius:g} at {alpha:.4g} deg<br>B {spans} deg"
+    return f"{at}<br>{cutter.label} at {alpha:.4g} deg<br>B {spans} deg"
 
 
 def _points(p: NDArray[np.float32], marker: dict[str, Any], name: str) -> go.Scatter3d:

@@ -29,6 +29,7 @@ from chipload.geometry.bspline import BSplinePatch
 from chipload.machine.kinematics import inverse
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.clearance.clearance import clearance
+from chipload.planning.impeller.profile import contact_band
 from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.step_over import step_over
 
@@ -112,8 +113,8 @@ def pose(contact: Floats, normal: Floats, axis: Floats, cutter: CatalogueCutter)
     """
     n = (normal * axis).sum(axis=-1)[..., None]
     V = (normal - n * axis) / np.sqrt(np.clip(1.0 - n * n, 1e-300, None))
-    r = cutter.corner_radius
-    out: Floats = contact + r * normal + cutter.rho * V - r * axis
+    r, e, f = cutter.contact_arc
+    out: Floats = contact + r * normal + e * V - f * axis
     return out
 
 
@@ -156,7 +157,7 @@ def clear_field(
     box : (low, high) of u, of v
     reachable : of :func:`directions`
     """
-    least = math.inf
+    least, why = math.inf, ""
     for count in _COUNTS:
         field = axis_field(surface, box, count, scene, cutter, reachable, limits)
         if isinstance(field, float):
@@ -169,11 +170,17 @@ def clear_field(
         )
         S, N, T = surface.at(U, V), surface.normal(U, V), field.at(U, V)
         got, _ = clearance(scene, cutter, pose(S, N, T, cutter), T, 0.5, limits.above)
-        lean = float(np.arccos(np.clip((N * T).sum(axis=1).max(), -1.0, 1.0)))
-        if got.min() >= -limits.touch and lean > 0.5 * limits.lean:
+        n = (N * T).sum(axis=1)
+        low, high = contact_band(cutter, 0.5 * limits.lean, chosen=False)
+        on_arc = cutter.straight or (n.min() >= low and n.max() <= high)
+        if got.min() >= -limits.touch and n.max() < math.cos(0.5 * limits.lean) and on_arc:
             return field
+        if not on_arc:
+            turned = math.degrees(max(math.asin(low) - math.asin(n.min()), math.asin(n.max()) - math.asin(high)))
+            why = f"with a smooth axis its contact leaves its arc by {turned:.3g} deg"
+            continue
         least = min(least, -float(got.min()))
-    return f"with a smooth axis it cuts {least:.3g} mm into a wall"
+    return f"with a smooth axis it cuts {least:.3g} mm into a wall" if math.isfinite(least) else why
 
 
 def axis_field(
@@ -225,7 +232,8 @@ class _Nodes:
     def clear(self, T: Floats, able: Flags) -> Flags:
         """(m, k) whether the cutter may stand at a node in a direction (k, 3)."""
         n = self.normal @ T.T
-        some = able & (n > 0.0) & (n < math.cos(self.limits.lean))
+        low, high = contact_band(self.cutter, self.limits.lean)
+        some = able & (n > low) & (n < high)
         node, way = np.nonzero(some)
         out = np.zeros(some.shape, dtype=np.bool_)
         out[node, way] = self._free(node, T[way])
@@ -239,10 +247,8 @@ class _Nodes:
     def width(self, T: Floats, along: Floats, node: NDArray[np.intp] | None = None) -> Floats:
         """(k,) step-over [mm]; 0 where the cutter does not fit the curvature."""
         at = slice(None) if node is None else node
-        return step_over(
-            self.normal[at], T, along[at], self.curvature[at], self.cutter.rho, self.cutter.corner_radius,
-            self.limits.scallop,
-        )  # fmt: skip
+        r, e, _ = self.cutter.contact_arc
+        return step_over(self.normal[at], T, along[at], self.curvature[at], e, r, self.limits.scallop)
 
     def costs(self, T: Floats, clear: Flags, used: NDArray[np.intp], along: Floats) -> tuple[Floats, Floats]:
         """(m, k) cost of each direction ``used`` at each node, inf where it is not clear; its depth [rad]."""
@@ -263,6 +269,7 @@ class _Nodes:
         """Axes (m, 3) drawn towards the mean of their neighbours where they stay clear and deep."""
         out = start
         least = np.minimum(_KEEP * depth, _KEEP * _WANTED)
+        low, high = contact_band(self.cutter, self.limits.lean)
         for _ in range(_ROUNDS):
             padded = np.pad(out.reshape(*count, 3), ((1, 1), (1, 1), (0, 0)), mode="reflect", reflect_type="odd")
             mean = 0.25 * (padded[:-2, 1:-1] + padded[2:, 1:-1] + padded[1:-1, :-2] + padded[1:-1, 2:])
@@ -270,7 +277,7 @@ class _Nodes:
             new /= np.linalg.norm(new, axis=1)[:, None]
             n = (self.normal * new).sum(axis=1)
             deep = np.where(clear, -1.0, new @ T.T).max(axis=1)
-            ok = (n > 0.0) & (n < math.cos(self.limits.lean)) & (np.arccos(np.clip(deep, -1.0, 1.0)) >= least)
+            ok = (n > low) & (n < high) & (np.arccos(np.clip(deep, -1.0, 1.0)) >= least)
             rows = np.flatnonzero(ok)
             ok[rows] = self._free(rows, new[rows])
             if not ok.any():

@@ -92,7 +92,7 @@ class ForceTerms:
             Its overhang is not known, or shorter than its cutting length.
         """
         overhang = self.overhang if size.reach is None else size.reach
-        name = f"D {size.diameter:g} r {size.corner_radius:g} mm"
+        name = f"{size.label} mm"
         if overhang is None:
             raise InputError(
                 f"operation.0.forces.overhang_mm: missing: the catalogue states no reach of {name}: state the overhang"

@@ -30,7 +30,7 @@ from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.axis_field import AxisField, pose
 from chipload.planning.impeller.clearance.clearance import between
 from chipload.planning.impeller.pass_order import pass_order
-from chipload.planning.impeller.scallop_height import scallop_heights, shares
+from chipload.planning.impeller.scallop_height import profile_scallops, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
 from chipload.planning.impeller.scene import Floats
 from chipload.planning.impeller.steps import Flags, even_steps, runs, straightened
@@ -202,9 +202,10 @@ class _Lines:
         """How far (n,), (n,) [mm] the pass of a line stays below the scallop towards a growing q, and against it."""
         u, v = self.places(self.p, q)
         N, d, sign = self.across(q)
+        r, e, _ = self.cutter.contact_arc
         a, b = reaches(
-            N, self.field.at(u, v), d, self.surface.curvature(u, v), self.cutter.rho, self.cutter.corner_radius,
-            _AIM * self.scallop,
+            N, self.field.at(u, v), d, self.surface.curvature(u, v), e, r, _AIM * self.scallop,
+            None if self.cutter.straight else self.cutter,
         )  # fmt: skip
         return np.where(sign > 0.0, a, b), np.where(sign > 0.0, b, a)
 
@@ -333,10 +334,11 @@ class _Lines:
         u, v = self.places(P, Q)
         shape = (len(self.p), len(share), 3)
         one, two = self.poses(self.p, line), self.poses(self.p, other)
-        return scallop_heights(
-            self.surface.at(u, v).reshape(shape), self.surface.normal(u, v).reshape(shape), (one[0], two[0]),
-            (one[1], two[1]), self.cutter.rho, self.cutter.corner_radius,
-        )  # fmt: skip
+        places = self.surface.at(u, v).reshape(shape), self.surface.normal(u, v).reshape(shape)
+        tips, axes = (one[0], two[0]), (one[1], two[1])
+        if not self.cutter.straight:
+            return profile_scallops(*places, tips, axes, self.cutter)
+        return scallop_heights(*places, tips, axes, self.cutter.rho, self.cutter.corner_radius)
 
 
 def _spread(lines: list[Floats], last: Floats) -> Floats:
@@ -377,7 +379,8 @@ def _joined(job: _Lines, laid: tuple[_LinePiece, ...], chord: float) -> PointPat
         half = 0.5 * (P[1:] + P[:-1]), 0.5 * (Q[1:] + Q[:-1])
         there, turned, _ = job.poses(*half)
         even = between(axis[:-1], axis[1:], np.full(len(half[0]), 0.5))
-        lever = 2.0 * (job.cutter.rho + job.cutter.corner_radius)
+        r, e, f = job.cutter.contact_arc
+        lever = 2.0 * max(e + r, f)
         off = np.linalg.norm(there - 0.5 * (tip[1:] + tip[:-1]), axis=1)
         off += lever * np.linalg.norm(turned - even, axis=1)
         more = np.flatnonzero(off > chord)

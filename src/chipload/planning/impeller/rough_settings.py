@@ -119,7 +119,7 @@ def roughed(
         goes = keep(("rough tables", index, cutter), partial(_reached_at, scene, cutter, how, table, workers))
         if not goes.any():
             raise InputError(
-                f"operation.0.rough: D {cutter.diameter:g} r {cutter.corner_radius:g} mm fits nowhere in the channel "
+                f"operation.0.rough: {cutter.label} mm fits nowhere in the channel "
                 f"on the plus side of the {'splitter' if index else 'blade'}: state a smaller one"
             )
         done = np.zeros(goes.shape[1], dtype=np.bool_)

@@ -12,7 +12,9 @@ import math
 
 import numpy as np
 
-from chipload.planning.impeller import _scallop
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.planning.impeller import _profile, _scallop
+from chipload.planning.impeller.profile import profile_numbers
 from chipload.planning.impeller.scene import Floats
 
 _SHARES = (np.arange(15) + 0.5) / 15
@@ -76,3 +78,16 @@ def pose_distance(corner: float) -> float:
 def shares() -> Floats:
     """Shares of the distance from line to line at which the surface is evaluated."""
     return _SHARES
+
+
+def profile_scallops(
+    points: Floats, normals: Floats, tips: tuple[Floats, Floats], axes: tuple[Floats, Floats], cutter: CatalogueCutter
+) -> Floats:
+    """As :func:`scallop_heights`, of a tapered or barrel cutter."""
+    wide = np.array([_reach_of(p) for p in tips])
+    out = np.empty(len(points))
+    _profile.heights(
+        *(np.ascontiguousarray(x) for x in (points, normals, np.stack(tips), np.stack(axes))),
+        wide, profile_numbers(cutter), _STEPS, out,
+    )  # fmt: skip
+    return out

@@ -8,13 +8,16 @@ In the plane of e and N its lower outline is, at the distance x, y(x) = the larg
 (x sin phi - H(phi)) / cos phi, H the support of the hull in the direction u = -N cos phi + e sin phi,
 H = u.(r N + rho V) + r + rho sqrt(1 - (u.T)^2), for all u.T <= 0. Near the path y is the circle of the corner
 (``step_over.py``: q its curvature beyond the surface's), beyond the end of the corner it is the straight flank. Two
-neighbouring passes meet at h where the one reaches it on its right side and the other on its left.
+neighbouring passes meet at h where the one reaches it on its right side and the other on its left. Of a tapered or
+barrel cutter H is the support of its profile (``profile.py``), as far up as its flank line has one.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from chipload.cutter.catalogue import CatalogueCutter
+from chipload.planning.impeller.profile import support
 from chipload.planning.impeller.scene import Floats
 from chipload.planning.impeller.step_over import contact_of, trace_curvature
 
@@ -22,11 +25,13 @@ _PHI = np.radians(np.concatenate([-np.geomspace(80.0, 0.2, 60), [0.0], np.geomsp
 
 
 def reaches(
-    normal: Floats, axis: Floats, along: Floats, curvature: Floats, rho: float, corner: float, scallop: float
-) -> tuple[Floats, Floats]:
+    normal: Floats, axis: Floats, along: Floats, curvature: Floats, rho: float, corner: float, scallop: float,
+    profiled: CatalogueCutter | None = None,
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Distances (c,), (c,) float [mm] from the path, towards e and against it, where the pass is ``scallop`` high.
 
-    At most R; 0 where the cutter does not fit the curvature of the surface.
+    At most R; 0 where the cutter does not fit the curvature of the surface. ``profiled``: the cutter where it is
+    tapered or a barrel; rho and corner are then of the arc of its contact.
     """
     N, T = normal, axis
     q = trace_curvature(contact_of(N, T, along, curvature), rho, corner)
@@ -42,14 +47,16 @@ def reaches(
     R = rho + corner
     x = np.concatenate([[0.0], np.geomspace(1e-3 * R, R, 80)])
     eT = (e * T).sum(axis=1)
-    # beside the fixed slopes that of the flank, u.T = 0
-    flank = np.clip(np.arctan2(n, np.abs(eT)), 0.0, _PHI[-1]) * np.where(eT < 0.0, -1.0, 1.0)
+    # beside the fixed slopes that of the flank, u.T = -sin(taper)
+    taper = 0.0 if profiled is None else profiled.taper
+    steep = np.arctan2(n, np.abs(eT)) - np.arcsin(np.clip(np.sin(taper) / np.hypot(n, eT), 0.0, 1.0))
+    flank = np.clip(steep, 0.0, _PHI[-1]) * np.where(eT < 0.0, -1.0, 1.0)
     phi = np.column_stack([np.tile(_PHI, (len(N), 1)), flank])
     cos, sin = np.cos(phi), np.sin(phi)
     uT = -n[:, None] * cos + eT[:, None] * sin
     uV = -s[:, None] * cos + (e * V).sum(axis=1)[:, None] * sin
     H = corner * (1.0 - cos) + rho * (uV + np.sqrt(np.clip(1.0 - uT**2, 0.0, None)))
-    H = np.where(uT <= 1e-9, H, np.inf)
+    H = np.where(uT <= 1e-9, H, np.inf) if profiled is None else support(profiled, -cos, uV, uT)
     # coupled with the curvature along the path: as the circle of the corner is
     with np.errstate(divide="ignore", invalid="ignore"):
         bare = np.where(flat > 0.0, 1.0 / np.where(flat > 0.0, flat, 1.0), np.inf) - k

@@ -85,7 +85,7 @@ def trace_curvature(contact: Contact, rho: float, corner: float) -> Floats:
 
     Parameters
     ----------
-    rho, corner : [mm], >= 0, one of them above 0
+    rho, corner : [mm], corner >= 0, their sum above 0; rho below 0: of the flank arc of a barrel
 
     Returns
     -------
@@ -101,8 +101,8 @@ def trace_curvature(contact: Contact, rho: float, corner: float) -> Floats:
     >>> 1.0 / trace_curvature(contact_of([[1, 0, 0]], [[0, 0, 1]], [[0, 0, 1]], flat), 8.0, 2.0)
     array([10.])
     """
-    if not (0.0 <= rho < math.inf and 0.0 <= corner < math.inf and rho + corner > 0.0):
-        raise InputError(f"rho {rho:g}, corner radius {corner:g} mm: must be at least 0, one of them above 0")
+    if not (math.isfinite(rho) and 0.0 <= corner < math.inf and rho + corner > 0.0):
+        raise InputError(f"rho {rho:g}, corner radius {corner:g} mm: must be finite, corner at least 0, sum above 0")
     f = contact
     # C - K, along e1 times r, so that an edge (r = 0) needs no case
     a = 1.0 - corner * f.k11
@@ -121,7 +121,7 @@ def width(contact: Contact, rho: float, corner: float, scallop: float) -> Floats
         raise InputError(f"scallop_mm = {scallop:g}: must be above 0")
     k = contact.across
     w = _between(trace_curvature(contact, rho, corner), k, scallop, 2.0 * (rho + corner))
-    if rho == 0.0:
+    if rho <= 0.0:
         return w
     # a disc of radius rho lying flat with a ball on either side is the widest
     ball = 1.0 - corner * k
@@ -164,7 +164,7 @@ def step_over(
     normal, axis : N, T (..., 3)
     along : (..., 3), any length, in the tangent plane or near it
     curvature : K (..., 3, 3) float [1/mm]
-    rho, corner : [mm], >= 0, one of them above 0
+    rho, corner : [mm], as of :func:`trace_curvature`
     scallop : h [mm], > 0
 
     Returns

@@ -1,9 +1,10 @@
 """Compiled: where the moving cutter meets rays that stand on a surface.
 
 Notation: a ray is S + s N, S a point of the surface, N its normal, s [mm] from -depth to height. A part of the tool is
-a row ``[r, e, f, m, z1, z2, c, tb, h, big]`` as in the kernels of the dexels, and the height above the tip at which it
-begins. On a move the tip goes straight, the axis along the normalised chord; while a ray is met the lower end of what
-it loses is convex in time for a straight move, so that its least is found by golden section beside the least instant.
+a row ``[r, e, f, m, z1, z2, c, tb, h, big, R, E, F, z3]`` as in the kernels of the dexels, and the height above the tip
+at which it begins. On a move the tip goes straight, the axis along the normalised chord; while a ray is met the lower
+end of what it loses is convex in time for a straight move, so that its least is found by golden section beside the
+least instant.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numba import njit
 
 from chipload.stock.dexels._kernels import pierce
 
+_HALF_ROOT = math.sqrt(0.5)
 _GOLDEN = 0.6180339887498949
 _STEPS = 14
 #: of the sweep of a move, how far its poses are from the one half-way, turns included
@@ -58,6 +60,13 @@ def groups_of(tips: Any, axes: Any, size: int, out: Any) -> None:
 def apart(h: float, d: float, start: float, shape: Any) -> float:
     """How far a point at the height h above the tip, d from the axis, is at least from a part; below 0 inside."""
     x, r, e = h - start - shape[2], shape[0], shape[1]
+    if shape[7] > 0.0 or shape[10] > 0.0:
+        # tapered or a barrel: it lies in the cone of its flank line, below its top and inside the tangent of its corner
+        # that rises by 45 deg
+        z = h - start
+        chamfer = (d - e - x) * _HALF_ROOT - r if shape[2] - shape[5] <= r * _HALF_ROOT else -z
+        cone = (d - shape[6] - shape[7] * z) / math.sqrt(1.0 + shape[7] * shape[7])
+        return float(max(-z, z - shape[8], cone, chamfer, d - shape[9]))
     if x <= 0.0:
         return float(math.sqrt((d - e) * (d - e) + x * x) - r if d > e else -x - r)
     return float(max(d - e - r, h - start - shape[8]))

@@ -28,6 +28,7 @@ from chipload.program.motions import is_arc
 from chipload.program.program import LINE, Program
 from chipload.progress import Progress, silent
 from chipload.simulation.channel import _kernels
+from chipload.stock.dexel import cutter_shape
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -157,13 +158,15 @@ def tool_parts(cutter: CatalogueCutter) -> tuple[Floats, Floats, Ints]:
         if cutter.neck_diameter is not None and cutter.neck_length is not None:
             rows.append((low, cutter.neck_length, 0.5 * cutter.neck_diameter, 0.0, 1))
             low = cutter.neck_length
-        shank = cutter.diameter if cutter.shank_diameter is None else cutter.shank_diameter
+        shank = cutter.top_diameter if cutter.shank_diameter is None else cutter.shank_diameter
         rows.append((low, end, 0.5 * shank, 0.0, 2))
     if cutter.reach is not None and cutter.holder_diameter is not None:
         rows.append((cutter.reach, cutter.reach + ENDLESS, 0.5 * cutter.holder_diameter, 0.0, 3))
     rows = [row for row in rows if row[1] > row[0]]
     # no flank arc: it ends where it begins, at z3 = z2 = r
     shapes = [[r, R - r, r, 0.0, 0.0, r, R, 0.0, high - low, R, 0.0, R - r, r, r] for low, high, R, r, _ in rows]
+    if not cutter.straight:
+        shapes[0] = cutter_shape((*cutter.shape.apt[:6], min(top, end), *cutter.shape.outline[7:])).tolist()
     return np.array([row[0] for row in rows]), np.array(shapes), np.array([row[4] for row in rows])
 
 

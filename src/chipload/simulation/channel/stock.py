@@ -115,6 +115,8 @@ def taken_from(
             continue
         for j, (start, shape) in enumerate(zip(starts, shapes, strict=True)):
             apt = (2.0 * shape[9], shape[0], shape[1], shape[2], 0.0, 0.0, shape[8])
+            if j == 0 and not cutter.straight:
+                apt = (*cutter.shape.apt[:6], shape[8], *cutter.shape.outline[7:])
             stock.remove_move(p[k - 1] + start * a[k - 1], a[k - 1], p[k] + start * a[k], a[k], apt, error_mm=0.05)
             left = stock.volume()
             lost, volume = volume - left, left

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chipload.cutter.catalogue import CatalogueCutter
+from chipload.planning.impeller import _profile
 from chipload.planning.impeller.clearance import _kernels
+from chipload.planning.impeller.profile import profile_numbers
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.tree import Tree
 
@@ -49,6 +51,10 @@ def nearest(
     p = np.ascontiguousarray(tips, dtype=np.float64).reshape(-1, 3)
     a = np.ascontiguousarray(axes, dtype=np.float64).reshape(-1, 3)
     out, which = np.empty(len(p)), np.empty(len(p), dtype=np.int64)
+    if not cutter.straight:
+        numbers = profile_numbers(cutter)
+        _profile.nearest(ordered, tree.nodes, tree.spans, tree.leaves, p, a, numbers, stages, cap, out, which)
+        return out, which
     _kernels.nearest(
         ordered, tree.nodes, tree.spans, tree.leaves, p, a, cutter.rho, cutter.corner_radius, stages, cap, out, which
     )

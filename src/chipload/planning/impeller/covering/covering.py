@@ -62,9 +62,10 @@ class Covering:
     Parameters
     ----------
     points : (m, 3) float [mm], sunk into the metal
-    tolerance : how deep a wall may lie in a cutter that is clear of the nodes [mm]
+    tolerance : how deep a wall may lie in a cutter that is clear of the nodes, a tapered one by its cylinders [mm]
     corner : least corner radius for which that holds [mm]
     reach, bend, sunk : of the nodes [mm]
+    slack : by how much a tapered cutter may stand out of its cylinders [mm]; its corner is above ``corner`` by that
     """
 
     points: Floats
@@ -73,6 +74,7 @@ class Covering:
     reach: float
     bend: float
     sunk: float
+    slack: float = 0.0
     tree: Tree = field(init=False, repr=False)
     ordered: Floats = field(init=False, repr=False)
 
@@ -85,18 +87,28 @@ class Covering:
         return depth_of(radius, self.reach, self.bend, self.sunk)
 
     def proves(self, cutter: CatalogueCutter, clearance: float) -> bool:
-        """Whether a cutter that is clear of the nodes is clear of the walls within the tolerance."""
-        if cutter.corner_radius < self.corner:
+        """Whether a cutter that is clear of the nodes is clear of the walls within the tolerance.
+
+        A tapered cutter that stands out of its cylinders by c, less c all round, lies in them, and a ball of its corner
+        radius less c rolls in it: no wall is deeper in that than the tolerance less ``slack``.
+        """
+        out = cutter.not_enclosed
+        if cutter.corner_radius - out < self.corner or out > self.slack or cutter.barrel_radius is not None:
             return False
         radii = cutter.stages(0.0)[:, 1]
         return bool((np.diff(radii) <= 0.0).all()) or math.isfinite(self.depth(clearance))
 
     def stages(self, cutter: CatalogueCutter, clearance: float) -> Floats:
         """As :meth:`CatalogueCutter.stages`, each part above the cutting part begins lower by what its rim needs."""
-        out = cutter.stages(clearance)
+        out = cutter.enclosing(clearance)
         drop = self.depth(clearance) - self.tolerance
         if len(out) > 1 and 0.0 < drop < math.inf:
-            out[1:, 0] = np.maximum(out[1:, 0] - drop, 0.0)
+            upper = cutter.stages(clearance)[1:]
+            upper[:, 0] = np.maximum(upper[:, 0] - drop, 0.0)
+            cone = out[: len(out) - len(upper)]
+            # what the lowest part above the cone reaches down to is as wide as the wider of both
+            upper[0, 1] = max(upper[0, 1], cone[-1, 1]) if len(cone) > 1 else upper[0, 1]
+            out = np.vstack([cone[:1], cone[1:][cone[1:, 0] < upper[0, 0]], upper])
         return out
 
     def met(self, cutter: CatalogueCutter, tips: Floats, axes: Floats, clearance: float) -> Floats:
@@ -147,8 +159,9 @@ def depth_of(radius: float, reach: float, bend: float, sunk: float) -> float:
 
 
 def covering_of(
-    impeller: Impeller, tolerance: float, corner: float, around: int, hub_range: tuple[float, float]
-) -> Covering:
+    impeller: Impeller, tolerance: float, corner: float, around: int, hub_range: tuple[float, float],
+    slack: float = 0.0,
+) -> Covering:  # fmt: skip
     """Covering of the walls of the channels beside the bodies of an impeller.
 
     Parameters
@@ -156,12 +169,14 @@ def covering_of(
     tolerance : [mm] > 0
     corner : least corner radius of the cutters [mm], > 0
     around, hub_range : as :meth:`Impeller.scene`
+    slack : [mm] by which tapered cutters stand out of their cylinders, below tolerance and corner
 
     Raises
     ------
     InputError
         There would be too many nodes.
     """
+    tolerance, corner = tolerance - slack, corner - slack
     sunk, edge = SUNK * tolerance, first_edge(impeller, tolerance, corner, around)
     while True:
         sides, hub = _each(impeller, around, hub_range, edge)
@@ -172,7 +187,7 @@ def covering_of(
         edge *= max(_lessened(corner, reach, bend, sunk, tolerance), _STEP)
     parts = [*_round(impeller, around, sides), hub]
     points = np.concatenate([x.points - sunk * x.normals for x in parts])
-    return Covering(points, tolerance, corner, reach, bend, sunk)
+    return Covering(points, tolerance + slack, corner, reach, bend, sunk, slack)
 
 
 def _lessened(corner: float, reach: float, bend: float, sunk: float, tolerance: float) -> float:

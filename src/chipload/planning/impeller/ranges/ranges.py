@@ -77,7 +77,7 @@ def valid_ranges(
     hints = np.full((len(which), 1), -2, dtype=np.int64)
     proof = np.full((len(which), _MOST), -1, dtype=np.int64)
     tool = np.array([cutter.rho, cutter.corner_radius])
-    stages = cutter.stages(clearance)
+    stages = cutter.enclosing(clearance)
     check, own = scene.ordered, scene.own
     width = _WIDER if (spans[:, 1] - spans[:, 0]).sum() <= _NARROW else _WIDTH
 
@@ -94,6 +94,12 @@ def valid_ranges(
     proof[tight] = -1
     proof[tight, 0] = -2
     ranges = tuple(found[k, : max(int(n), 0)].copy() for k, n in enumerate(number))
+    if cutter.taper > 0.0:
+        ranges = tuple(
+            on_corner(row, scene.normal[i], float(a), cutter.taper, least)
+            for row, i, a in zip(ranges, which, alpha, strict=True)
+        )
+        number = np.array([len(row) if n > 0 else n for row, n in zip(ranges, number, strict=True)], dtype=np.int64)
     given = np.where(proof >= 0, tree.order[np.maximum(proof, 0)] if len(check) else proof, proof)
     blockers = tuple(
         np.unique(row[(row != -1) & (row != -3)]) if n == 0 else row[:0] for row, n in zip(given, number, strict=True)
@@ -116,3 +122,29 @@ def valid_ranges(
     complete[open_rows] = told
     between[open_rows] = told & np.array([len(row) == 0 for row in kept])
     return Ranges(tuple(left.get(k, row) for k, row in enumerate(ranges)), blockers, complete, between)
+
+
+def on_corner(ranges: Floats, normal: Floats, alpha: float, taper: float, least: float) -> Floats:
+    """Parts of ranges (k, 2) at which a tapered cutter touches with its corner: N.T is at least the sine of its taper.
+
+    >>> full = np.array([[0.0, 2.0 * math.pi]])
+    >>> np.degrees(on_corner(full, np.array([1.0, 0.0, 0.0]), math.radians(90.0), math.radians(30.0), 0.0)).round(9)
+    array([[  0.,  60.],
+           [300., 360.]])
+    """
+    size = math.sin(alpha) * math.hypot(normal[0], normal[1])
+    need = math.sin(taper) - math.cos(alpha) * float(normal[2])
+    if need <= -size:
+        return ranges
+    if need > size:
+        return ranges[:0]
+    half, middle = math.acos(need / size), math.atan2(float(normal[1]), float(normal[0]))
+    out = []
+    for low, high in ranges.tolist():
+        first = math.ceil((low - middle - half) / math.tau)
+        for turn in range(first, math.floor((high - middle + half) / math.tau) + 1):
+            at = middle + math.tau * turn
+            part = max(low, at - half), min(high, at + half)
+            if part[1] - part[0] > least:
+                out.append(part)
+    return np.array(out).reshape(-1, 2)
