@@ -79,7 +79,8 @@ def test_lines_from_the_high_border_leave_as_little_as_those_from_the_low_one(im
 def test_lines_begin_in_the_middle_of_a_part_that_narrows(impeller, scene):
     # 1.4 times as wide at the foot as at the tip
     box = ((0.58, 0.75), (0.36, 0.95))
-    tracks, low = (lines_of_patch(impeller, scene, "v", box, begin) for begin in ("any", "low"))
+    tracks, low, best = (lines_of_patch(impeller, scene, "v", box, begin) for begin in ("middle", "low", "any"))
+    assert best.length == min(tracks.length, low.length)
     # numbered from the low border to the high one
     at = [float(np.interp(0.4, t.at[:, 1], t.at[:, 0])) for t in tracks.tracks if t.at[0, 1] < 0.4 < t.at[-1, 1]]
     number = [t.line for t in tracks.tracks]

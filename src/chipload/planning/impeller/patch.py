@@ -12,7 +12,7 @@ from typing import Literal
 from chipload.planning.impeller.scene import Floats
 
 #: where the lines of a patch begin
-Begin = Literal["low", "high", "any"]
+Begin = Literal["low", "high", "middle", "any"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Patch:
     time : predicted, of one such side, with links where programs have shown their time [s]
     area : that is milled [mm2]
     part : range of the other parameter; not 0..1 where no cutter at one table angle mills a whole strip
-    begin : border at which its lines begin, ``low`` or ``high``; `any`: they may also begin in the middle
+    begin : border at which its lines begin, `low` or `high`, or `middle`; `any`: where they are shorter
     """
 
     body: int

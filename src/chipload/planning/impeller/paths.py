@@ -95,8 +95,8 @@ def finishing(
     number : of the surface among those of the check points
     table : alpha [rad]
     pallets : (k, 2) [rad] where B may be
-    begin : border at which lines begin; `any`: at the low one, or in the middle where they are shorter so and the width
-        of the part between its borders differs much along it: they run half as askew
+    begin : border at which lines begin, or `middle`, where they run half as askew; the low border where the middle is
+        not reached. `any`: low or middle, where they are shorter, if the width of the part differs much along it
     """
     if along not in ("u", "v"):
         raise InputError(f"along = {along!r}: must be u or v")
@@ -111,12 +111,13 @@ def finishing(
     down = _March(_Stepper(replace(job, sign=-1.0), how.scallop, how.aim, need), (-Q[1], -Q[0]), progress)
     if begin == "high":
         return down.from_border()
-    if begin == "any" and _narrows(job, Q, need):
+    if begin == "middle" or (begin == "any" and _narrows(job, Q, need)):
         middle = job.line(np.full(len(p), 0.5 * sum(Q)), np.full(len(p), np.nan))
         if np.isfinite(middle.pallet[need]).all():
             before, after = down.after(replace(middle, q=-middle.q), 1), up.after(middle, 1)
+            found = _stacked(before, up.alone(middle), after)
             # which way lines run also decides how wide their passes are
-            return min(up.from_border(), _stacked(before, up.milled(middle), after), key=_rank)
+            return found if begin == "middle" else min(up.from_border(), found, key=_rank)
     return up.from_border()
 
 
@@ -158,10 +159,10 @@ class _March:
         q = job.border(self.Q, need)
         line = self.step.first(q, self.Q[0])
         strip = (job.strip(q, self.Q[0]),) if (q > self.Q[0]).any() else ()
-        first, rest = self.milled(line), self.after(line, 1)
+        first, rest = self.alone(line), self.after(line, 1)
         return Tracks((*first.tracks, *rest.tracks), (*strip, *first.missed, *rest.missed), 1 + rest.lines)
 
-    def milled(self, line: Line) -> Tracks:
+    def alone(self, line: Line) -> Tracks:
         """The tracks of the line number 0."""
         new, gone = self.step.lines.tracks(line, np.ones(len(line.q), dtype=np.bool_), 0, self.step.need)
         return Tracks(tuple(new), tuple(gone), 1)
