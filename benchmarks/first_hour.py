@@ -54,7 +54,7 @@ CASES = (
         "cad/nist_step/nist_ctc_01_asme1_ap203.stp", "STEP",
         (
             ("part.face_z_mm", "50.0", "face the boss"), ("stock.top_mm", "51.0", "of the boss"),
-            ("operation.0.axial_depth_mm", "1.0", "one cut"),
+            ("operation.0.axial_depth_mm", "1.0", "one cut"), ("operation.0.depth_mm", "1.0", "above the boss"),
         ),
     ),
     Case("machines_tools/better_tool_library/Shape/slittingsaw.fcstd", "FreeCAD document"),

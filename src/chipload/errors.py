@@ -49,7 +49,7 @@ class Severity(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What a reader, a planner or a check noticed and did not hide.
+    """Observation of a reader, a planner or a check.
 
     Parameters
     ----------

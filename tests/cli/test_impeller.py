@@ -184,10 +184,10 @@ def test_patches_cover_what_is_reached_and_are_clear(summary, proof):
     names = [s["surface"] for s in op["surfaces"]]
     total = sum(s["area_mm2"] for s in op["surfaces"])
     reached = sum(p["area_share"] * s["area_mm2"] for s in op["surfaces"] for p in s["pointwise"]) / total
-    for way in (w for w in op["partitions"] if w["name"] != "hand-picked"):
+    for way in (w for w in op["ways"] if w["name"] != "hand-picked"):
         assert sum(p["area_share"] for p in way["patches"]) == pytest.approx(reached, abs=1e-9)
         assert way["reached_share"] == pytest.approx(reached, abs=1e-9)
-    for way in op["partitions"]:
+    for way in op["ways"]:
         path = sum(p["path_mm"] for p in way["patches"])
         # of the job: 11 channels, 100 mm/min, 60 s and 300 s a change
         assert way["path_mm"] == pytest.approx(11 * path)
@@ -195,11 +195,11 @@ def test_patches_cover_what_is_reached_and_are_clear(summary, proof):
         assert way["time_min"] == pytest.approx(11 * path / 100.0 + changes)
         assert way["least_time_any_shape_min"] <= way["least_time_min"] + 1e-9 <= way["time_min"] + 2e-9
         assert way["above_bound"] == pytest.approx(way["time_min"] / way["least_time_min"] - 1.0)
-    times = [w["time_min"] for w in op["partitions"][1:]]
+    times = [w["time_min"] for w in op["ways"][1:]]
     assert times == sorted(times, reverse=True)
-    assert (op["time_min"], op["name"]) == (min(times), op["partitions"][1 + times.index(min(times))]["name"])
+    assert (op["time_min"], op["name"]) == (min(times), op["ways"][1 + times.index(min(times))]["name"])
     assert op["hand_picked"]["diameter_mm"] == 14.0
-    assert op["hand_picked"]["patches"] == op["partitions"][0]["patches"]
+    assert op["hand_picked"]["patches"] == op["ways"][0]["patches"]
     points = {(s["surface"], u["cc_point"]) for s in op["surfaces"] for u in s["unreachable_points"]}
     for patch in op["patches"]:
         n = names.index(patch["surface"])

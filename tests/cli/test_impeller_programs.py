@@ -53,7 +53,7 @@ def test_exit_code_and_first_lines_say_whether_it_is_verified(result):
     assert (done.exit_code == 0) == (summary["verdict"] == "holds")
     tracks = {track["name"]: track for track in summary["tracks"]}
     # the other ways are written and checked too, but released is the quickest that holds
-    assert all(track["in_use"] == (not name.startswith("partition-")) for name, track in tracks.items())
+    assert all(track["in_use"] == (not name.startswith("way-")) for name, track in tracks.items())
     texts = sorted(p for p in out.glob("[0-9]*.ngc") if not p.stem.endswith("-all"))
     assert len(texts) == len(op["programs"]) > 0
     for text, program in zip(texts, op["programs"], strict=True):
@@ -71,11 +71,11 @@ def test_exit_code_and_first_lines_say_whether_it_is_verified(result):
 def test_every_way_is_written_checked_and_timed(result):
     *_, out, summary = result
     (op,) = summary["operations"]
-    partitions = {one["name"]: one for one in op["partitions"]}
+    partitions = {one["name"]: one for one in op["ways"]}
     assert set(partitions) == {"hand-picked", "1 cutter"}
     tracks = {track["name"]: track for track in summary["tracks"]}
     for name, partition in partitions.items():
-        stem = "[0-9]" if partition["in_use"] else f"partition-{name.replace(' ', '-')}-"
+        stem = "[0-9]" if partition["in_use"] else f"way-{name.replace(' ', '-')}-"
         texts = sorted(p.stem for p in out.glob(f"{stem}*.ngc") if not p.stem.endswith("-all"))
         assert all((out / f"{text}-all.ngc").is_file() for text in texts)
         assert texts
@@ -337,7 +337,7 @@ def by_the_text(out, program):
 def test_feeds_by_force_make_the_stiff_cutter_the_fast_one(more):
     out, summary = more
     (op,) = summary["operations"]
-    partitions = {one["name"]: one for one in op["partitions"]}
+    partitions = {one["name"]: one for one in op["ways"]}
     slow, fast = partitions["hand-picked"], partitions["1 cutter"]
     assert slow["cutters"][0]["diameter_mm"] < fast["cutters"][0]["diameter_mm"]
     # at one feed the times of cutting would be as the paths
@@ -349,7 +349,7 @@ def test_feeds_by_force_make_the_stiff_cutter_the_fast_one(more):
         assert limits["deflection_cutter_um"]["worst"] == loads["deflection_cutter_um"] <= 30.0 / 1.1
         assert limits["cutter_stress_mpa"]["worst"] == loads["cutter_stress_mpa"] < 1500.0
     # what the text states: passes of the slender cutter below the greatest feed, its links above it
-    (picked,) = out.glob("partition-hand-picked*.apt")
+    (picked,) = out.glob("way-hand-picked*.apt")
     feeds = {float(f) for f in re.findall(r"FEDRAT/([0-9.]+)", picked.read_text())}
     assert min(feeds) < 200.0
     # links, some as fast as the pallet turns

@@ -136,7 +136,8 @@ def test_a_freecad_part_is_a_pocket(tmp_path: Path) -> None:
     assert (job["part"]["file"], job["part"]["face_z_mm"]) == ("part.step", 12.0)
     # an opening by D leaves (4 - pi) D^2 / 4 in the corners: 3 % of 800 mm2 is D = 10.6 mm; a depth of D / 2
     assert (job["cutter"][0]["diameter_mm"], job["operation"][0]["axial_depth_mm"]) == (10.0, 5.0)
-    assert job["stock"]["top_mm"] == 17.0
+    # the stock holds the whole block, 8 mm above the floor
+    assert (job["stock"]["top_mm"], job["operation"][0]["depth_mm"]) == (20.0, 8.0)
     lines, _ = check_job(load_job(tmp_path / "job" / "job.toml"))
     assert any("800 mm2" in line for line in lines)
     # the same document gives the same bytes

@@ -26,7 +26,7 @@ from chipload.simulation.channel.channel import left_on, wall
 MACHINE = machine_named("horizontal-b")
 CUTTER = CatalogueCutter(12.0, 2.0, cutting_length=45.0, reach=60.0, holder_diameter=30.0)
 TABLE, SCALLOP, CHORD = math.radians(55.0), 0.1, 0.005
-BOX = ((0.3, 0.45), (0.5, 0.7))
+BOX = ((0.3, 0.45), (0.5, 0.71))
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +63,58 @@ def test_the_last_pass_lies_at_its_full_step_beyond_the_border(machined):
     assert farthest[-1] > high
     assert min(t.at[:, across].min() for t in tracks.tracks) > low
     assert max(farthest[:-2]) < high
+
+
+def test_lines_from_the_high_border_leave_as_little_as_those_from_the_low_one(impeller, scene):
+    tracks = lines_of_patch(impeller, scene, "u", BOX, "high")
+    low, high = BOX[1]
+    v = [[t.at[:, 1].min(), t.at[:, 1].max()] for t in tracks.tracks]
+    # the first line lies inside the high border, the last one beyond the low one, each below the one before
+    assert v[0][1] < high
+    assert v[-1][0] < low
+    assert (np.diff(np.array(v), axis=0) < 0.0).all()
+    leave_no_more_than_asked(impeller, scene, tracks, "u", BOX)
+
+
+def test_lines_begin_in_the_middle_of_a_part_that_narrows(impeller, scene):
+    # 1.4 times as wide at the foot as at the tip
+    box = ((0.58, 0.75), (0.36, 0.95))
+    tracks, low = (lines_of_patch(impeller, scene, "v", box, begin) for begin in ("any", "low"))
+    # numbered from the low border to the high one
+    at = [float(np.interp(0.4, t.at[:, 1], t.at[:, 0])) for t in tracks.tracks if t.at[0, 1] < 0.4 < t.at[-1, 1]]
+    number = [t.line for t in tracks.tracks]
+    assert number == sorted(number)
+    assert number[-1] == tracks.lines - 1
+    assert (np.diff(at) > 0.0).all()
+    # one line runs straight along v, and no line as much askew as where all begin at a border
+
+    def askew(some):
+        return [float(np.ptp(t.at[:, 0])) for t in some.tracks]
+
+    assert min(askew(tracks)) < 1e-12
+    assert max(askew(tracks)) < 0.8 * max(askew(low))
+    leave_no_more_than_asked(impeller, scene, tracks, "v", box)
+
+
+def lines_of_patch(impeller, scene, along, box, begin):
+    """Lines of the cutter over a part of the plus side."""
+    motion = LineMotion(CHORD, 100.0 / 60.0, pallet_rate(MACHINE), 0.5)
+    finish = PatchFinish(SCALLOP, motion)
+    return finishing(impeller.blade.plus, along, box, scene, 0, CUTTER, TABLE, finish, workers=2, begin=begin)
+
+
+def leave_no_more_than_asked(impeller, scene, tracks, along, box):
+    """The check finds no gouge, and nothing above the scallop between the lines."""
+    link = Link(lift=2.0, margin=0.5, touch=0.01, near=6.0, feed=20.0, above=5.0)
+    way = linked(tracks.tracks, scene, CUTTER, TABLE, 100.0 / 60.0, link, 0.5, rate=pallet_rate(MACHINE))
+    assert not tracks.missed
+    assert not way.refused
+    share = [np.linspace(0.05, 0.95, 9), np.linspace(0.0, 1.0, 401)]
+    u, v = (a + x * (b - a) for x, (a, b) in zip(share if along == "u" else share[::-1], box, strict=True))
+    own = wall("blade", impeller.blade.plus, u, v)
+    (left,) = left_on([own], program_of(way.moves, 90.0, 1), CUTTER, 1.0, 1.0, workers=2)
+    assert left.deepest[0] <= 2.0 * CHORD
+    assert left.rest.max() <= SCALLOP
 
 
 def test_stations_are_as_close_as_asked(impeller):

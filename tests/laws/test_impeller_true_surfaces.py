@@ -120,7 +120,7 @@ def test_no_program_of_any_way_gouges_the_true_surfaces_in_any_channel(result, p
     out, summary = result
     programs = sorted(out.glob("*-all.ngc"))
     (op,) = summary["operations"]
-    assert len(programs) >= len(op["partitions"]) == 2
+    assert len(programs) >= len(op["ways"]) == 2
     for path in programs:
         diameter = float(re.search(r"D(\d+)r", path.stem)[1])
         rows, count = rows_of(path.read_text())

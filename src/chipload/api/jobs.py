@@ -44,9 +44,20 @@ def run_job(
 def check_job(
     job: str | Path | Values, overrides: Sequence[str] = (), *, folder: str | Path = "."
 ) -> tuple[list[str], bool]:
-    """Read every file that a job names, without running it; return a line for each, and whether the job can run.
+    """Read every file that a job names, without running it.
 
-    Parameters and errors are those of :func:`run_job`.
+    Parameters
+    ----------
+    job, overrides, folder : as of :func:`run_job`
+
+    Returns
+    -------
+    Lines on what was read and estimated, and whether the job can run
+
+    Raises
+    ------
+    InputError
+        The job, or a file that it names, cannot be used.
     """
     from chipload import jobs
 
@@ -54,7 +65,24 @@ def check_job(
 
 
 def write_result(job: FinishedJob, out: str | Path) -> Path:
-    """Write the result folder of ``chipload run``, completely or not at all; errors as ``FinishedJob.save``."""
+    """Write the result folder of ``chipload run``, completely or not at all.
+
+    Parameters
+    ----------
+    job : of :func:`run_job` or of a function that plans
+    out : the folder; an older result in it is replaced
+
+    Returns
+    -------
+    The folder
+
+    Raises
+    ------
+    InputError
+        The folder holds something other than an older result.
+    OutputError
+        The folder cannot be written.
+    """
     return job.save(out)
 
 

@@ -36,14 +36,18 @@ def hold_torque(
 ) -> FinishedJob:
     """Simulate the control of the cutting torque on a thin tube, a cone or a clamped workpiece.
 
-    Result, errors and parameters that are not named here are those of :func:`plan_contour`.
+    Result and errors are those of :func:`plan_contour`.
 
     Parameters
     ----------
-    torque_control, spindle, loop, simulation : keys of the table of this name
+    torque_control, spindle, loop, simulation, limits : keys of the table of this name
+    machine, material : a shipped name, a file, or keys of the table
+    cutter : one :class:`chipload.Cutter`
     program, round : a program that exists (its file or keys), or keys of ``[round]`` by which one is made
     stock, real_stock, workpiece : keys of the table of this name, in place of the shell of ``torque_control``
     surprise : keys of a ``[[surprise]]``, or several
+    checks : keys of ``[checks]``: which default checks are switched off; None: all are made
+    folder : that file names are relative to
     """
     return run_tables(
         "torque", folder, progress, torque_control=torque_control, program=program, round=round, stock=stock,
@@ -73,14 +77,19 @@ def optimise_feeds(
 ) -> FinishedJob:
     """Change the feed of each line of a program to the greatest that the load limits allow; the path does not change.
 
-    Result, errors and parameters that are not named here are those of :func:`plan_contour`.
+    Result and errors are those of :func:`plan_contour`.
 
     Parameters
     ----------
     program : the program's file, or keys of ``[program]``
     operation : keys of the ``[[operation]]`` of kind ``simulate``, with its table ``feeds``
     limits : keys of ``[limits]``; at least one limits a load
+    stock : keys of ``[stock]``
+    machine, material : a shipped name, a file, or keys of the table
+    cutter : one :class:`chipload.Cutter`, or several
     part, fixture, machine_table, stiffness, workpiece, dynamics : keys of the table of this name; None: it is left out
+    checks : keys of ``[checks]``: which default checks are switched off; None: all are made
+    folder : that file names are relative to
     """
     for k, op in enumerate(tables_of("operation", operation)):
         if op.get("feeds") is None:

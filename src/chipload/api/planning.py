@@ -114,7 +114,7 @@ def plan_impeller(
     impeller : keys of ``[impeller]``
     surface : keys of a ``[[surface]]``, or several
     catalogue : of cutters: a shipped name, a file, or keys of the table
-    machine : likewise
+    machine : a shipped name, a file, or keys of the table
     operation : keys of the ``[[operation]]``
     folder : that file names are relative to
     """
@@ -143,16 +143,22 @@ def plan_thin_wall(
 ) -> FinishedJob:
     """Plan the semi-finishing and finishing of a thin wall so that its deflection stays below a limit.
 
-    Result, errors and parameters that are not named here are those of :func:`plan_contour`.
+    Result and errors are those of :func:`plan_contour`.
 
     Parameters
     ----------
-    wall, workpiece : keys of ``[wall]`` and ``[workpiece]``; of several walls of a part those of each ``[[wall]]``
+    wall : keys of ``[wall]``, or of each ``[[wall]]`` of a part
+    workpiece : keys of ``[workpiece]``
     part : finished part that several walls belong to: a STEP file, or keys of ``[part]``
     operation : keys of the ``[[operation]]``
     threshold : measured calibration cuts: a file, or keys of ``[threshold]``; None: the threshold is calculated
     dynamics : keys of ``[dynamics]``; None: chatter is not calculated
-    neighbour : keys of each ``[[neighbour]]``, a body beside one wall that no part of a tool may touch
+    neighbour : keys of each ``[[neighbour]]``, a body next to one wall that no part of a tool may touch
+    machine, material : a shipped name, a file, or keys of the table
+    cutter : one :class:`chipload.Cutter`, or several
+    limits : keys of ``[limits]``, as ``{"deflection_workpiece_um": 54.0}``
+    checks : keys of ``[checks]``: which default checks are switched off; None: all are made
+    folder : that file names are relative to
     """
     return run_tables(
         "thinwall", folder, progress, part=part, wall=wall, workpiece=workpiece, machine=machine, material=material,

@@ -38,7 +38,12 @@ def read_machine(name: str | Path) -> Machine:
 
 
 def read_material(name: str | Path) -> Material:
-    """Read force coefficients by the name of a shipped material, or from a TOML file; errors as :func:`read_machine`.
+    """Read force coefficients by the name of a shipped material, or from a TOML file.
+
+    Raises
+    ------
+    InputError
+        There is none of this name, or the file cannot be read.
 
     Examples
     --------

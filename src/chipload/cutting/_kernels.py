@@ -37,20 +37,20 @@ def thickness_power(h, m):
 @njit(cache=True, nogil=True)
 def powers(first, last, along, offset, across, c, out):
     """Means over the immersion from ``first`` to ``last`` of h^(1 - m) times 1, sin and cos: out (3, 3), a row a
-    direction. Between crest and trough of h the variable is w, phi = zero +- w^3, so that the root of h at its zero,
+    direction. Between peak and trough of h the variable is w, phi = zero +- w^3, so that the root of h at its zero,
     or near it, is smooth in w; twelve points of Gauss, right to 1e-7 of the thickest chip's, or better.
     """
     out[:] = 0.0
     swing = math.hypot(along, across)
-    crest = math.atan2(along, across)
+    peak = math.atan2(along, across)
     reach = math.acos(-offset / swing) if swing > abs(offset) else PI
-    k = math.floor((first - crest) / PI)
+    k = math.floor((first - peak) / PI)
     low = first
     while low < last:
-        high = min(last, crest + (k + 1) * PI)
+        high = min(last, peak + (k + 1) * PI)
         if high > low:
             falling = k % 2 == 0
-            zero = crest + k * PI + reach if falling else crest + (k + 1) * PI - reach
+            zero = peak + k * PI + reach if falling else peak + (k + 1) * PI - reach
             u = np.cbrt(max(zero - high, 0.0) if falling else max(low - zero, 0.0))
             v = np.cbrt(max(zero - low, 0.0) if falling else max(high - zero, 0.0))
             for g in range(len(NODES)):

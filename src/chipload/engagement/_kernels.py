@@ -290,7 +290,7 @@ def runout_engagement(whole, every, sine, radii, turns, sizes, rows, tooth, fill
             continue
         offset = whole[i, 5]
         swing = math.hypot(whole[i, 4], whole[i, 6])
-        crest = math.atan2(whole[i, 4], whole[i, 6])
+        peak = math.atan2(whole[i, 4], whole[i, 6])
         top = offset + swing
         for j in range(teeth):
             line = teeth
@@ -318,8 +318,8 @@ def runout_engagement(whole, every, sine, radii, turns, sizes, rows, tooth, fill
                         inner = PI if end <= offset - swing else math.acos((end - offset) / swing)
                     for turn in range(-1, 3):
                         for part in range(1 if inner == 0.0 else 2):
-                            p = crest - outer if part == 0 else crest + inner
-                            q = crest - inner if part == 0 and inner > 0.0 else crest + outer
+                            p = peak - outer if part == 0 else peak + inner
+                            q = peak - inner if part == 0 and inner > 0.0 else peak + outer
                             p = max(p + TAU * turn, whole[i, 0])
                             q = min(q + TAU * turn, whole[i, 1])
                             if q > p:

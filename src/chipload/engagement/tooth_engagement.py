@@ -146,10 +146,10 @@ class ToothEngagement:
     def chip_max(self) -> Floats:
         """Return the greatest chip thickness (n,) [mm] of each step; 0 where nothing is cut."""
         low, high, _, _, along, offset, across = self.rows.T
-        crest = np.arctan2(along, across)
-        crest = crest + math.tau * np.ceil((low - crest) / math.tau)
+        peak = np.arctan2(along, across)
+        peak = peak + math.tau * np.ceil((low - peak) / math.tau)
         ends = np.maximum(along * np.sin(low) + across * np.cos(low), along * np.sin(high) + across * np.cos(high))
-        h = np.where(crest <= high, np.hypot(along, across), ends) + offset
+        h = np.where(peak <= high, np.hypot(along, across), ends) + offset
         out = np.zeros(len(self))
         np.maximum.at(out, np.repeat(np.arange(len(self)), np.diff(self.start)), h)
         return out

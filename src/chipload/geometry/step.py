@@ -8,6 +8,7 @@ biarcs. The CAD kernel converts the file's unit to mm; it runs in a process of i
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,6 +52,22 @@ def read_step_face(
     InputError
         The file is missing or no STEP file, or has no horizontal planar face (at ``z_mm``); the heights are named.
     """
+    return read_step_level(path, z_mm=z_mm, join_mm=join_mm, tolerance_mm=tolerance_mm).drawing
+
+
+@dataclass(frozen=True, eq=False)
+class StepLevel:
+    """The drawing of the horizontal faces at one height of a part, that height, and the greatest of the part [mm]."""
+
+    drawing: Drawing
+    level: float
+    top: float
+
+
+def read_step_level(
+    path: str | Path, *, z_mm: float | None = None, join_mm: float = 0.001, tolerance_mm: float = 0.001
+) -> StepLevel:
+    """As :func:`read_step_face`, with the heights of the face and of the part."""
     file = Path(path)
     if z_mm is not None and not np.isfinite(z_mm):
         raise InputError(f"part.z_mm = {z_mm:g}: must be a finite number")
@@ -61,6 +78,7 @@ def read_step_face(
         heights = sorted({round(z, 3) + 0.0 for z in found})
         level = max(found) if z_mm is None else z_mm
         chosen: list[list[Floats]] = part.call("step.edges_at", level, tolerance_mm)
+        top: float = part.call("step.highest")
     if not chosen:
         named = ", ".join(f"{z:g}" for z in heights)
         raise InputError(f"part.z_mm = {level:g}: no horizontal planar face there; faces are at {named} mm")
@@ -75,7 +93,8 @@ def read_step_face(
     if z_mm is None and len(heights) > 1:
         named = ", ".join(f"{z:g}" for z in heights)
         findings.append(Finding("step-topmost", 0, f"the topmost face, z = {level:g}, of those at {named} mm is read"))
-    return Drawing(tuple(contours), (f"z={level:g}",) * len(contours), "mm", tuple(findings))
+    drawing = Drawing(tuple(contours), (f"z={level:g}",) * len(contours), "mm", tuple(findings))
+    return StepLevel(drawing, level, top)
 
 
 def step_triangles(
@@ -187,6 +206,16 @@ def triangles(part: Part, chord_mm: float, angle: float) -> tuple[Floats, NDArra
 def levels(part: Part) -> list[float]:
     """Height [mm] of every horizontal planar face."""
     return [z for z, _ in _level_faces(part)]
+
+
+def highest(part: Part) -> float:
+    """Greatest height [mm] of a part."""
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+
+    box = Bnd_Box()
+    BRepBndLib.AddOptimal_s(part.shape, box, False, False)
+    return float(box.CornerMax().Z())
 
 
 def edges_at(part: Part, level: float, tolerance_mm: float) -> list[list[Floats]]:

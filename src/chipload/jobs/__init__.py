@@ -113,9 +113,9 @@ class FinishedJob:
         Raises
         ------
         InputError
-            The folder holds something else than an older result.
+            The folder holds something other than an older result.
         OutputError
-            It cannot be written.
+            The folder cannot be written.
         """
         from chipload.report.folder import write_result
 

@@ -1,16 +1,16 @@
 """Division of a layered stock into strips, whose removal runs as tasks in other processes or on a cluster.
 
 Notation: a strip is a range of neighbouring columns (or rows) of the tiles of the stock; it **owns** the steps whose
-box has its middle in them. Its **halo** is the further columns that its own steps reach into. A tile depends on nothing
-but the removals from it, in their order. So a task that has the tiles of strip and halo, and makes all steps that
-reach into them, has the tiles under its own steps as one process has them, bit for bit: what it finds of its own
-steps, chip and tooth engagement, has the same bits too. Where the axis leans, how an area is found depends on material
-beyond it (:mod:`chipload.simulation.flute_end`); the halo then also holds what the steps of the halo ask for.
+box has its middle in the range. Its **halo** is the further columns into which its own steps reach. The state of a tile
+depends only on the removals from it, in their order. A task that has the tiles of strip and halo, and removes all steps
+that reach into them, therefore has the same tiles under its own steps as one process, bit for bit; the chips and the
+tooth engagement of its own steps are the same too. Where the axis leans, the calculation of an area depends on material
+beyond it (:mod:`chipload.simulation.flute_end`); the halo then also holds the tiles that the steps of the halo need.
 
-A **round** is some blocks of steps, one task a strip; the tiles of a strip go into its task and come back with what it
-found. So a task that a killed worker had is done again from the same tiles. While the caller computes loads of one
-round, the next one is removed. The strips lie along x or along y, as the steps are shared more evenly; where the
-halos leave no gain there are none.
+A **round** is several blocks of steps, with one task for each strip. The task receives the tiles of the strip and
+returns them with its results, so that the task of a killed worker is repeated from the same tiles. While the caller
+calculates the loads of one round, the next round is removed. The strips lie along x or along y, whichever divides the
+steps more evenly. There are no strips where the halos leave no gain.
 """
 
 from __future__ import annotations
@@ -38,19 +38,26 @@ from chipload.workers import Team, Workers
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: blocks of steps of a round; the first is one block, so that the caller does not wait for all strips at the start
+#: number of blocks of a round; the first round has one, so that the caller does not wait for all strips at the start
 ROUND = 8
-#: of a step that is only removed, over one whose chip and tooth engagement are found too: its time, an estimate
+#: estimated ratio of the time of a step that is only removed to that of one whose chip and tooth engagement are found
 HALO = 0.8
-#: strips are used where the longest is expected to take at most this share of the time of one process
+#: greatest expected time of the longest strip, as a share of the time of one process, with which strips are used
 GAIN = 0.85
-#: what a box of a step is enlarged by: share of the cutter's radius
+#: enlargement of the box of a step, as a share of the cutter's radius
 MARGIN = 0.02
 
 
 @dataclass(frozen=True)
 class Strip:
-    """Columns (axis 0) or rows (axis 1) of tiles: its own, and with its halo; each first and last."""
+    """Columns or rows of tiles.
+
+    Attributes
+    ----------
+    axis : 0: columns, 1: rows
+    own : first and last of its own
+    whole : first and last with its halo
+    """
 
     axis: int
     own: tuple[int, int]
@@ -71,7 +78,7 @@ class _Shared:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """A strip between two rounds: its part of the stock, the chip of most pieces before step ``first``."""
+    """A strip between two rounds: its part of the stock, and the chip of most pieces before step number ``first``."""
 
     strip: Strip
     stock: LayeredStock
@@ -81,8 +88,13 @@ class _State:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What a strip found in a block: which of its steps it owns, what they took, and the tool and the chip of most
-    pieces where it is one of them.
+    """Result of a strip in a block.
+
+    Attributes
+    ----------
+    own : (k,) numbers of its own steps in the block
+    taken : their removal
+    piece : number of the tool, and the chip of most pieces, if one of its steps made it; None: none did
     """
 
     own: Ints
@@ -90,7 +102,7 @@ class _Found:
     piece: tuple[int, ChipAreas] | None
 
 
-#: what a strip found in a block, or the error that ended it there
+#: result of a strip in a block, or the error that ended the strip there
 Block = _Found | ChiploadError
 
 
@@ -101,7 +113,9 @@ def strips_of(
 
     Parameters
     ----------
+    cutters : by tool number
     step_mm, tolerance : of the simulation [mm]
+    count : number of strips
     """
     plan = plan_of(stock)
     found = [
@@ -124,8 +138,13 @@ def strips_of(
 def _columns_of(
     steps: Steps, stock: LayeredStock, plan: Plan, cutters: Mapping[int, Cutter], tolerance: float
 ) -> tuple[Ints, Ints, Ints, NDArray[np.bool_], NDArray[np.bool_]]:
-    """(2, n) first, middle and last column and row of tiles that each step asks for; whether it comes near the stock;
-    whether its axis leans.
+    """Tiles that each of n steps needs.
+
+    Returns
+    -------
+    low, middle, high : (2, n) int, first, middle and last column, and row
+    near : (n,) bool, whether the step comes near the stock
+    leans : (n,) bool, whether its axis leans
     """
     low, high, near = near_stock(steps, plan, cutters)
     middle = 0.5 * (low[:, :2] + high[:, :2])
@@ -134,7 +153,7 @@ def _columns_of(
     top = float(stock.bounds[-1])
     for tool in np.unique(steps.tool[near]).tolist():
         c, k = cutters[tool], np.flatnonzero(near & (steps.tool == tool))
-        # the shank is asked for too, and where the axis leans longer flutes
+        # the shank is tested too, and longer flutes where the axis leans
         tall = c.flute_length + MOST * max(float(c.radius_at([c.flute_length])[0]), 1.0)
         wide = max(c.radius, 0.5 * (c.shank_diameter or 0.0), float(c.radius_at([tall if leans[k].any() else 0.0])[0]))
         wide = (1.0 + MARGIN) * wide + tolerance
@@ -170,7 +189,10 @@ def _divided(
     axis: int, columns: int, low: Ints, middle: Ints, high: Ints, near: NDArray[np.bool_], leans: NDArray[np.bool_],
     count: int,
 ) -> list[Strip]:  # fmt: skip
-    """Strips with as many own steps each as the columns allow, each with at least one column."""
+    """Strips with numbers of own steps as equal as the columns allow; none if there are fewer columns than strips.
+
+    low, middle, high, near, leans : (n,) of the steps, see :func:`_columns_of`
+    """
     if columns < count or not near.any():
         return []
     before = np.cumsum(np.bincount(middle[near], minlength=columns))
@@ -193,7 +215,7 @@ def _divided(
 
 
 def _cost(strips: list[Strip], low: Ints, middle: Ints, high: Ints, near: NDArray[np.bool_]) -> float:
-    """Steps that the busiest strip makes, summed over what strips may be ahead; those of the halo count less."""
+    """Number of steps of the busiest strip, summed over rounds; a step of the halo counts ``HALO``."""
     each = []
     for strip in strips:
         own = near & (middle >= strip.own[0]) & (middle <= strip.own[1])
@@ -210,8 +232,9 @@ class Strips:
     ----------
     strips : of :func:`strips_of`, at least one
     beside : executor of one thread, which waits for the team
-    stock : as it is before step ``first``
-    size : steps of a block
+    stock : before step ``first``
+    size : number of steps of a block
+    first : number of the first step
     piece : the chip of most pieces before it
 
     Attributes
@@ -233,7 +256,7 @@ class Strips:
         self._coming = beside.submit(self._round, 1)
 
     def _round(self, blocks: int) -> list[tuple[list[Block], _State]]:
-        """The next blocks of all strips; what is found and the states after them."""
+        """Remove the next blocks of all strips; return their results and the states after them, strip by strip."""
         done = dict(self._team.completed_shared(removed_in_strip, [(state, blocks) for state in self._states]))
         return [done[k] for k in range(len(done))]
 
@@ -267,7 +290,7 @@ class Strips:
         return TakenByLayers(removed, gained, sorted(engagement, key=lambda b: b.step), piece)
 
     def _put(self, state: _State) -> None:
-        """The tiles of a strip into the stock of the caller."""
+        """Write the tiles of a strip into the stock of the caller."""
         strip, part = state.strip, state.stock
         to = _slice(strip.axis, strip.own)
         at = _slice(strip.axis, (strip.own[0] - strip.whole[0], strip.own[1] - strip.whole[0]))
@@ -284,7 +307,7 @@ def strips_for(
     first: int = 0,
     piece: ChipAreas | None = None,
 ) -> Iterator[Strips | None]:
-    """The strips of a run from step ``first`` on; None where it runs by moves, in one process, or they gain nothing."""
+    """The strips of a run from step ``first`` on; None if it runs by moves, in one process, or without gain."""
     if setting.moves is not None or setting.processes.alone:
         yield None
         return

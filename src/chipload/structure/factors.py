@@ -26,7 +26,7 @@ _kernels = LateModule("chipload.structure._kernels")
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: right-hand sides abreast
+#: number of right-hand sides that are solved together
 ABREAST = 64
 
 
@@ -94,7 +94,7 @@ def factor(matrix: csc_array, smallest: float = SMALLEST_PIVOT) -> Factors:
     Raises
     ------
     InputError
-        The matrix is singular: a piece is loose, or hangs on a line of nodes as on a hinge.
+        The matrix is singular: a piece is loose, or only a line of nodes connects it, like a hinge.
 
     Examples
     --------

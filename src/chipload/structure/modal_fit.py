@@ -24,12 +24,12 @@ from chipload.structure.receptance import Receptance
 
 #: most modes of a receptance; a mode is added while more than this share of the peak is left and it takes a third of it
 MOST_MODES, ENOUGH, GAIN = 8, 0.005, 0.67
-#: share of the peak that a fit may leave, at the frequencies but for the worst hundredth
+#: greatest residual of a fit as a share of the peak, without the worst hundredth of the frequencies
 LEFT = 0.05
 QUANTILE = 0.99
-#: modal stiffness that is believed of a tool's tip [N/mm], and damping ratios
+#: plausible range of the modal stiffness of a tool's tip [N/mm], and of damping ratios
 STIFFNESS, DAMPING = (100.0, 1e6), (5e-4, 0.3)
-#: coherence that a mode needs about its frequency
+#: least coherence near the frequency of a mode
 COHERENT = 0.8
 
 

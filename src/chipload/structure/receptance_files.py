@@ -23,12 +23,12 @@ from chipload.structure.receptance import Receptance
 
 Complex = NDArray[np.complex128]
 
-#: mm/N in a unit, and how often it is to be integrated
+#: unit -> its size in mm/N, and the number of integrations over time
 UNITS = {
     "m/N": (1000.0, 0), "mm/N": (1.0, 0), "um/N": (1e-3, 0), "m/s/N": (1000.0, 1), "m/s2/N": (1000.0, 2),
 }  # fmt: skip
 LARGEST_FILE = 200_000_000
-#: size of a number that is believed
+#: greatest plausible number
 LARGEST = 1e30
 #: directions of dataset 58
 _DIRECTIONS = {1: "x", 2: "y", 3: "z"}

@@ -178,7 +178,7 @@ def compliance(
     ----------
     modes : from :func:`ritz`
     s_force : float [mm], (k,) or a number, where the force acts, at theta = 0
-    s_point : float [mm], where the displacement is asked; None: at the force
+    s_point : float [mm], place of the displacement; None: at the force
     theta : float [rad], angle from the force to the point
     length, width : the force is spread evenly over so much along s and round [mm]; 0: a point. The displacement is that
         of the middle of the patch, or of s_point.

@@ -26,9 +26,9 @@ from chipload.structure.grid import Grid, Indices
 from chipload.structure.hexa import Array, mass, stiffness
 from chipload.structure.places import MeshPlaces, weights
 
-#: Young's modulus that a workpiece may have [MPa]
+#: range of Young's modulus of a workpiece [MPa]
 MODULUS_RANGE = (100.0, 2e6)
-#: density that a workpiece may have [tonne/mm^3]
+#: range of the density of a workpiece [tonne/mm^3]
 DENSITY_RANGE = (1e-10, 3e-8)
 RIGID_MOTIONS = ("along x", "along y", "along z", "about x", "about y", "about z")
 

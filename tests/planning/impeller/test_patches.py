@@ -13,7 +13,8 @@ from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.compare import clear_somewhere, cutter_choices, gouges
 from chipload.planning.impeller.costs import STEP, ChannelSide, Costs, MeasuredCost, Terms
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
-from chipload.planning.impeller.patches import costs_of, divided
+from chipload.planning.impeller.patch import Patch
+from chipload.planning.impeller.patches import begun, costs_of, divided
 from chipload.planning.impeller.scene import Scene
 from chipload.planning.impeller.step_over import step_over
 
@@ -236,3 +237,15 @@ def test_what_programs_take_leads_the_next_division():
     assert costs.factor[0, 1, 0] == 1.5
     assert costs.factor[0, 2, 1] == 5.0
     assert costs.factor[0, 0, 0] == costs.factor[1, 1, 0] == 110.0 / 50.0
+
+
+def test_lines_begin_at_a_border_with_another_patch():
+    def patch(side, low, high, order="u"):
+        return Patch(0, side, order, low, high, 0, 1.0, np.zeros((0, 2)), (), 0.0, 0.0, 0.0)
+
+    given = (
+        patch("plus", 0.0, 0.4), patch("plus", 0.4, 0.7), patch("plus", 0.7, 1.0), patch("minus", 0.0, 1.0),
+        patch("floor", 0.0, 0.4), patch("floor", 0.4, 1.0, "v"),
+    )  # fmt: skip
+    # the first of three begins at its end; a patch alone, and one whose neighbour lies across it, where they may
+    assert [p.begin for p in begun(given)] == ["high", "low", "low", "any", "any", "any"]

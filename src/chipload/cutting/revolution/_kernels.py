@@ -204,12 +204,12 @@ def thickest(p, q, along, across):
     sp = math.sin(p)
     cq = math.cos(q)
     sq = math.sin(q)
-    # it rises at p and falls at q: over less than half a turn the crest lies between them
-    crest = along * cp >= across * sp and along * cq <= across * sq
+    # it rises at p and falls at q: over less than half a turn the peak lies between them
+    peak = along * cp >= across * sp and along * cq <= across * sq
     if q - p >= 0.5 * TAU:
         top = math.atan2(along, across)
-        crest = top + TAU * math.ceil((p - top) / TAU) <= q
-    return math.hypot(along, across) if crest else max(along * sp + across * cp, along * sq + across * cq)
+        peak = top + TAU * math.ceil((p - top) / TAU) <= q
+    return math.hypot(along, across) if peak else max(along * sp + across * cp, along * sq + across * cq)
 
 
 @njit(cache=True, nogil=True)

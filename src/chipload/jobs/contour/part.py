@@ -12,9 +12,12 @@ from chipload.geometry.chains import Drawing
 from chipload.geometry.contour import Contour
 from chipload.geometry.dxf import read_dxf
 from chipload.geometry.even_odd import even_odd
-from chipload.geometry.step import read_step_face
+from chipload.geometry.step import StepLevel, read_step_level
 from chipload.jobs.contour.job import ContourJob
 from chipload.machine.machine import Machine
+
+#: heights of a model that are one [mm]
+HEIGHT_MM = 1e-3
 
 
 def read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Contour, ...], tuple[Finding, ...]]:
@@ -39,9 +42,9 @@ def read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Contour, ...]
             tolerance_mm=part.tolerance_mm,
         )
     elif ending in (".step", ".stp"):
-        drawing = read_step_face(
-            job.part_file, z_mm=part.face_z_mm, join_mm=part.join_mm, tolerance_mm=part.tolerance_mm
-        )
+        face = read_step_level(job.part_file, z_mm=part.face_z_mm, join_mm=part.join_mm, tolerance_mm=part.tolerance_mm)
+        require_heights(job, face)
+        drawing = face.drawing
     else:
         raise InputError(f"part.file = {part.file}: must end in .dxf, .step or .stp, or be a program")
     outline, contours = _stock_outline(part.stock_layers, drawing) if part.stock_layers else ((), drawing.contours)
@@ -49,6 +52,30 @@ def read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Contour, ...]
     kept, left_out = closed_alone(contours) if part.open_chains == "dropped" else (contours, ())
     used, met = clear_of_each_other(kept)
     return used, outline, tuple(replace(f, text=f"part: {f.text}") for f in (*drawing.findings, *left_out, *met))
+
+
+def require_heights(job: ContourJob, face: StepLevel) -> None:
+    """Refuse pockets that end below the face of a model, and rapids below its top.
+
+    Raises
+    ------
+    InputError
+        One does; the message states the depth, or the clearance, with which it does not.
+    """
+    top, file = job.table.stock.top_mm, job.table.part.file
+    for k, op in enumerate(job.operations):
+        key, depth = ("axial_depth_mm", op.axial_depth_mm) if op.depth_mm is None else ("depth_mm", op.depth_mm)
+        if op.kind == "pocket" and top - depth < face.level - HEIGHT_MM:
+            raise InputError(
+                f"operation.{k}.{key} = {depth:g}: the pocket ends at z = {top - depth:.6g} mm, below the face at "
+                f"z = {face.level:.6g} mm of {file}: must be at most {top - face.level:.6g}, or check stock.top_mm"
+            )
+        if top + op.clearance_mm < face.top - HEIGHT_MM:
+            raise InputError(
+                f"operation.{k}.clearance_mm = {op.clearance_mm:g}: rapids go at z = {top + op.clearance_mm:.6g} mm "
+                f"above stock.top_mm = {top:g}, and {file} rises to z = {face.top:.6g} mm: must be at least "
+                f"{face.top - top:.6g}, or state the top of the stock"
+            )
 
 
 def moved(contours: Sequence[Contour], origin: tuple[float, float]) -> tuple[Contour, ...]:

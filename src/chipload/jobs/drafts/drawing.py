@@ -200,8 +200,10 @@ def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
             Entry("face_z_mm", round(level, 6), f"the largest floor; planes are at {others} mm", True),
         ),
     )
-    stock = DraftTable("stock", (Entry("top_mm", round(level + axial, 6), "one depth of cut above the face", True),))
-    tables = (part, stock, *_rest(_machine(machine), machine, size, axial, "pocket", narrow=narrow))
+    depth = top - level if top - level > axial + 1e-3 else 0.0
+    stands = "the top of the model" if top > level + 1e-3 else "one depth of cut above the face"
+    stock = DraftTable("stock", (Entry("top_mm", round(level + (depth or axial), 6), stands, True),))
+    tables = (part, stock, *_rest(_machine(machine), machine, size, axial, "pocket", narrow=narrow, depth=depth))
     notes = tuple(str(f) for f in drawing.findings[:8])
     return Draft(f"Clear the face at z = {level:g} mm of {file.name}: {region:.4g} mm2.", tables, notes)
 
@@ -304,9 +306,16 @@ def _machine(name: str | None) -> Machine:
 
 
 def _rest(
-    machine: Machine, named: str | None, d: float, axial: float, kind: str, side: str = "left", narrow: bool = False
+    machine: Machine,
+    named: str | None,
+    d: float,
+    axial: float,
+    kind: str,
+    side: str = "left",
+    narrow: bool = False,
+    depth: float = 0.0,
 ) -> tuple[DraftTable, ...]:
-    """Machine, material, cutter, operation and limits."""
+    """Machine, material, cutter, operation and limits; ``depth`` [mm] of a pocket of several levels."""
     flutes = 2 if d < 4.0 else 3
     least, most = rpm_from_rad_s(machine.spindle_min), rpm_from_rad_s(machine.spindle_max)
     wanted = 1000.0 * CUTTING_M_MIN / (math.pi * d)
@@ -327,7 +336,8 @@ def _rest(
             f"{RADIAL:g} of the diameter" if kind == "pocket" else "of the finish pass",
             True,
         ),
-        Entry("axial_depth_mm", round(axial, 4), "one depth of cut", True),
+        Entry("axial_depth_mm", round(axial, 4), "greatest of a level" if depth else "one depth of cut", True),
+        *([Entry("depth_mm", round(depth, 6), "from the top of the model to the face", True)] if depth else []),
         Entry("feed_mm_min", feed, f"{FEED * d:.3g} mm a tooth", True),
         Entry("speed_rpm", speed, cut, True),
         Entry("step_mm", max(0.02 * d, 0.05)),
@@ -362,13 +372,13 @@ def _rest(
         if kind == "pocket"
         else "a common size"
     )
-    flute = round(max(FLUTES * d, axial + 1.0), 3)
+    flute = round(max(FLUTES * d, max(axial, depth) + 1.0), 3)
     above = f"no file states it; flutes and {'one diameter' if d >= NECK else f'{NECK:g} mm'}"
     cutter = cutter_table(1, [])
     sized = tuple(
         Entry("diameter_mm", d, why, True) if e.key == "diameter_mm"
         else Entry(e.key, flutes, e.note, True) if e.key == "flutes"
-        else Entry(e.key, flute, "no file states it; a short one, for one depth of cut", True)
+        else Entry(e.key, flute, "no file states it; a short one that reaches the floor", True)
         if e.key == "flute_length_mm"
         else Entry(e.key, round(flute + max(d, NECK), 3), above, True) if e.key == "overhang_mm"
         else e

@@ -38,7 +38,7 @@ def blanks_of(milled: ImpellerResult) -> dict[str, Blank]:
     used = {id(p) for p in milled.programs or ()}
     earlier = done.get(0, [])
     for name, p in finish_names(milled):
-        cut = earlier if id(p) in used and not name.startswith("partition-") else None
+        cut = earlier if id(p) in used and not name.startswith("way-") else None
         own = None if cut is None else mesh.get(0)
         out[name] = _blank(p.setting.cutter, p.setting.program.tool, end, own, cut or [])
         if cut is not None:

@@ -55,7 +55,7 @@ def _five_axis_name(kind: str, k: int, p: FiveAxisProgram) -> str:
 
 def stem_of(partition: CheckedPartition) -> str:
     """Start of the file names of a partition that is not milled."""
-    return f"partition-{partition.name.replace(' ', '-')}"
+    return f"way-{partition.name.replace(' ', '-')}"
 
 
 def _finish_name(milled: ImpellerResult, k: int, p: Checked) -> str:

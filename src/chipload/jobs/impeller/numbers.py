@@ -33,7 +33,7 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         "certified_within_mm": milled.tolerance,
         **(checked_of(milled, used) if used is not None else {}),
         "hand_picked": None if picked is None else _picked(milled, picked),
-        "partitions": [checked_of(milled, partition) for partition in milled.partitions],
+        "ways": [checked_of(milled, partition) for partition in milled.partitions],
         "scallop": {"mean_share": None if milled.used_checked is None else milled.used_checked.scallop},
         "programs": None
         if milled.programs is None

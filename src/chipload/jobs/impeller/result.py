@@ -120,7 +120,7 @@ def _finishing(milled: ImpellerResult, walls: Walls) -> list[Track]:
     for name, p in finish_names(milled):
         findings = tuple(Finding("machine", 0, text, Severity.EXCEEDS) for text in p.findings)
         limits = (_gouge(name, p), *_scallops(name, p), *_loads(name, p))
-        in_use = id(p) in used and not name.startswith("partition-")
+        in_use = id(p) in used and not name.startswith("way-")
         out.append(
             _track(
                 milled,

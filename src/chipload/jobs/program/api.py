@@ -86,7 +86,7 @@ def simulate(
     material, machine : a value, a shipped name, or a file
     limits : by the names that ``[limits]`` of a job has, as ``{"force_n": 800.0}``; none: the default checks
     part : the finished part: mesh [mm], file, or keys of ``[part]`` (``mesh`` in place of ``file``)
-    fixtures : bodies that no tool may touch, likewise
+    fixtures : bodies that no tool may touch: meshes [mm], files, or keys of ``[[fixture]]``
     stiffness : keys of ``[stiffness]``; what is not stated leaves deflections unproven
     dynamics : keys of ``[dynamics]``, as ``{"mode": ({"frequency_hz": 812.0, ...},)}``; each step then has a margin
     workpiece : keys of ``[workpiece]``, as ``{"modulus_gpa": 70.0, "poisson": 0.33, "clamp": ({"face": "z-"},)}``;

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from chipload.cutter.catalogue import CatalogueCutter
@@ -27,6 +26,7 @@ from chipload.planning.impeller.ranges.ranges import valid_ranges
 from chipload.planning.impeller.refinement import Refinement
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.step_over import contact_of, width
+from chipload.planning.impeller.steps import Flags, runs
 from chipload.planning.impeller.track import ToolTrack, posed, written
 
 #: points of a line whose pallet angles are searched together, and greatest distance from those of the line before [rad]
@@ -37,8 +37,6 @@ _EXACT, _LEAST = math.radians(12.0), 1e-9
 _KNOTS, _BISECT = 17, 4
 #: n within this of 1: the axis stands along the normal, there is no step-over
 _FLAT = 1e-9
-
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -129,6 +127,8 @@ class Lines:
     ----------
     surface, along, scene, number, cutter, table, pallets : as :func:`finishing`
     p : (n,) the stations, of the parameter ``along``
+    sign : 1; -1: all places q are those of the surface with the sign turned, so that lines follow each other from its
+        high border to its low one
     """
 
     surface: BSplinePatch
@@ -141,6 +141,17 @@ class Lines:
     how: LineMotion
     pallets: tuple[tuple[float, float], ...]
     workers: int
+    sign: float = 1.0
+
+    def places(self, p: Floats, q: Floats) -> tuple[Floats, Floats]:
+        """Parameters u and v of the surface."""
+        q = self.sign * q
+        return (p, q) if self.along == "u" else (q, p)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Ends of the surface as places q."""
+        return min(0.0, self.sign), max(0.0, self.sign)
 
     @property
     def refinement(self) -> Refinement:
@@ -243,7 +254,7 @@ class Lines:
         return UnreachedSpan(-1, (a, b), (c, d), length, "no pallet angle")
 
     def _reached(self, stations: Ints, q: Floats) -> Flags:
-        u, v = (self.p[stations], q) if self.along == "u" else (q, self.p[stations])
+        u, v = self.places(self.p[stations], q)
         S, N, K = (f(u, v) for f in (self.surface.at, self.surface.normal, self.surface.curvature))
         scene = self.scene.at_contacts(S, N, K, self.number)
         got = self._valid(scene, np.arange(len(stations)), self.pallets)
@@ -314,9 +325,9 @@ class Lines:
 
     def on(self, q: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """S, N, K, direction of the line and (u, v) at the stations."""
-        u, v = (self.p, q) if self.along == "u" else (q, self.p)
+        u, v = self.places(self.p, q)
         Sp, Sq = (self.surface.at(u, v, *x) for x in (((1, 0), (0, 1)) if self.along == "u" else ((0, 1), (1, 0))))
-        d = Sp + np.gradient(q, self.p)[:, None] * Sq
+        d = Sp + self.sign * np.gradient(q, self.p)[:, None] * Sq
         d /= np.linalg.norm(d, axis=1)[:, None]
         return (
             self.surface.at(u, v),
@@ -379,7 +390,7 @@ class Lines:
 
     def facing(self, p: Floats, q: Floats) -> tuple[Floats, Floats]:
         """Points and normals (n, 3) of the surface."""
-        u, v = (p, q) if self.along == "u" else (q, p)
+        u, v = self.places(p, q)
         return self.surface.at(u, v), self.surface.normal(u, v)
 
 
@@ -460,12 +471,6 @@ def merged(ranges: Floats) -> Floats:
         else:
             out.append([low, high])
     return np.array(out).reshape(-1, 2)
-
-
-def runs(flags: Flags) -> list[tuple[int, int]]:
-    """(first, after the last) of each run of True."""
-    edge = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int64), [0]])))
-    return [(int(a), int(b)) for a, b in zip(edge[::2], edge[1::2], strict=True)]
 
 
 def _within(low: float, high: float, pallets: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:

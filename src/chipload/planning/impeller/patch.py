@@ -7,8 +7,12 @@ side follow each other across one of u and v; the paths of a patch run along the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from chipload.planning.impeller.scene import Floats
+
+#: where the lines of a patch begin
+Begin = Literal["low", "high", "any"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +33,7 @@ class Patch:
     time : predicted, of one such side, with links where programs have shown their time [s]
     area : that is milled [mm2]
     part : range of the other parameter; not 0..1 where no cutter at one table angle mills a whole strip
+    begin : border at which its lines begin, ``low`` or ``high``; `any`: they may also begin in the middle
     """
 
     body: int
@@ -44,3 +49,4 @@ class Patch:
     time: float
     area: float
     part: tuple[float, float] = (0.0, 1.0)
+    begin: Begin = "any"

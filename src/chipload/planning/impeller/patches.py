@@ -14,7 +14,7 @@ Reference: [Wu2019]. Differs from source: it divides one side by eye, in two, af
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -157,7 +157,21 @@ def _patches(costs: Sequence[Costs], steps: Sequence[Step]) -> tuple[Patch, ...]
             groups[-1].append(step)
         else:
             groups.append([step])
-    return tuple(_patch(costs[g[0].side], g) for g in groups)
+    return begun(tuple(_patch(costs[g[0].side], g) for g in groups))
+
+
+def begun(patches: Sequence[Patch]) -> tuple[Patch, ...]:
+    """Patches whose lines begin at a border that they share with another patch of their surface.
+
+    The first line lies as far inside its border as its pass reaches, the last one up to a step beyond: there it would
+    mill once more what the other patch does.
+    """
+    out = []
+    for p in patches:
+        same = [o for o in patches if (o.body, o.side, o.order, o.part) == (p.body, p.side, p.order, p.part)]
+        below, above = any(o.high == p.low for o in same), any(o.low == p.high for o in same)
+        out.append(replace(p, begin="low" if below else "high" if above else "any"))
+    return tuple(out)
 
 
 def _patch(costs: Costs, steps: Sequence[Step]) -> Patch:

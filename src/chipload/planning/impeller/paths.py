@@ -15,21 +15,23 @@ along the border is the last.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import binary_dilation, gaussian_filter1d, minimum_filter1d
+from scipy.ndimage import binary_dilation, minimum_filter1d
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.closed_form import axis_at
-from chipload.planning.impeller.lines import Flags, Line, LineMotion, Lines, Tracks, UnreachedSpan, stations, stretched
+from chipload.planning.impeller.lines import Line, LineMotion, Lines, Tracks, UnreachedSpan, stations, stretched
+from chipload.planning.impeller.patch import Begin
 from chipload.planning.impeller.ranges.ranges import FULL
 from chipload.planning.impeller.scallop_height import pose_distance, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
 from chipload.planning.impeller.scene import Floats, Scene
+from chipload.planning.impeller.steps import Flags, even_steps, straightened
 from chipload.planning.impeller.track import ToolTrack, posed
 from chipload.progress import Progress, silent
 
@@ -43,10 +45,8 @@ _STILL = 5e-3  # share by which a step may still change
 _SPLIT = math.radians(45.0)  # from station to station: further the pallet does not turn in one piece of a line
 #: stations of a line are no farther apart than this [mm]
 _STATION = 1.5
-#: tangent of the angle by which a line may run askew to the parameter lines; least share of a step that it keeps there
-_SKEW, _HELD = 0.6, 0.4
-#: by how much a step may grow along the line [mm/mm]
-_GROWTH = 0.2
+#: widths of a part along it that differ more: lines may begin in its middle
+_NARROWS = 1.25
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class PatchFinish:
     scallop: float
     motion: LineMotion
     overrun: float = 0.0
-    aim: float = 0.95
+    aim: float = 0.97
 
     def __post_init__(self) -> None:
         if not (0.0 < self.scallop < math.inf and 0.0 < self.aim <= 1.0):
@@ -83,6 +83,7 @@ def finishing(
     pallets: tuple[tuple[float, float], ...] = FULL,
     workers: int = 1,
     progress: Progress = silent,
+    begin: Begin = "low",
 ) -> Tracks:
     """Tracks over a part of a surface at constant scallop height.
 
@@ -94,6 +95,8 @@ def finishing(
     number : of the surface among those of the check points
     table : alpha [rad]
     pallets : (k, 2) [rad] where B may be
+    begin : border at which lines begin; `any`: at the low one, or in the middle where they are shorter so and the width
+        of the part between its borders differs much along it: they run half as askew
     """
     if along not in ("u", "v"):
         raise InputError(f"along = {along!r}: must be u or v")
@@ -104,26 +107,83 @@ def finishing(
     p = stretched(surface, along, P, Q, count, how.overrun)
     need = (p >= P[0]) & (p <= P[1])
     job = Lines(surface, along, p, scene, number, cutter, table, how.motion, pallets, workers)
-    step = _Stepper(job, how.scallop, how.aim, need)
-    tracks: list[ToolTrack] = []
-    missed: list[UnreachedSpan] = []
-    q = job.border(Q, need)
-    line = step.first(q, Q[0])
-    if (q > Q[0]).any():
-        missed.append(job.strip(q, Q[0]))
-    use = np.ones(len(p), dtype=np.bool_)
-    for number_of in range(_LINES):
-        new, gone = job.tracks(line, use, number_of, need)
-        tracks += new
-        missed += gone
-        progress(float(np.clip((line.q.min() - Q[0]) / (Q[1] - Q[0]), 0.0, 1.0)), f"{number_of + 1} lines")
-        open_ = use & ~step.done(line, Q[1])
-        if not open_[need].any():
-            return Tracks(tuple(tracks), tuple(missed), number_of + 1)
-        # where the pass of the line before has reached the border there is nothing left
-        use = binary_dilation(open_)
-        line = step.next(line, Q[1], use & need)
-    raise InputError(f"finish.scallop = {how.scallop:g} mm: more than {_LINES} lines: raise it")
+    up = _March(_Stepper(job, how.scallop, how.aim, need), Q, progress)
+    down = _March(_Stepper(replace(job, sign=-1.0), how.scallop, how.aim, need), (-Q[1], -Q[0]), progress)
+    if begin == "high":
+        return down.from_border()
+    if begin == "any" and _narrows(job, Q, need):
+        middle = job.line(np.full(len(p), 0.5 * sum(Q)), np.full(len(p), np.nan))
+        if np.isfinite(middle.pallet[need]).all():
+            before, after = down.after(replace(middle, q=-middle.q), 1), up.after(middle, 1)
+            # which way lines run also decides how wide their passes are
+            return min(up.from_border(), _stacked(before, up.milled(middle), after), key=_rank)
+    return up.from_border()
+
+
+def _rank(one: Tracks) -> tuple[float, float]:
+    """Order of lines over the same part: what they miss, to 10 mm, then their length [mm]."""
+    return round(math.fsum(x.length for x in one.missed), -1), one.length
+
+
+def _narrows(job: Lines, Q: tuple[float, float], need: Flags) -> bool:
+    """Whether the width of a part between its borders differs along it by more than :data:`_NARROWS`."""
+    q = np.linspace(*Q, 9)
+    p = job.p[need]
+    S = job.surface.at(*job.places(np.repeat(p, len(q)), np.tile(q, len(p)))).reshape(len(p), len(q), 3)
+    width = np.linalg.norm(np.diff(S, axis=1), axis=2).sum(axis=1)
+    return bool(width.max() > _NARROWS * width.min())
+
+
+def _stacked(before: Tracks, middle: Tracks, after: Tracks) -> Tracks:
+    """Lines on either side of one, numbered from the first to the last; ``before`` goes away from it, from 1 on."""
+    n = before.lines
+    low = [replace(t, line=n - t.line) for t in reversed(before.tracks)]
+    gone = [replace(x, line=n - x.line) for x in before.missed]
+    high, own = ([replace(t, line=n + t.line) for t in x.tracks] for x in (after, middle))
+    missed = [replace(x, line=n + x.line) for x in (*middle.missed, *after.missed)]
+    return Tracks((*low, *own, *high), (*gone, *missed), n + 1 + after.lines)
+
+
+@dataclass(frozen=True, eq=False)
+class _March:
+    """Line after line, towards the end of a range Q of places q."""
+
+    step: _Stepper
+    Q: tuple[float, float]
+    progress: Progress
+
+    def from_border(self) -> Tracks:
+        """All lines from Q[0] on."""
+        job, need = self.step.lines, self.step.need
+        q = job.border(self.Q, need)
+        line = self.step.first(q, self.Q[0])
+        strip = (job.strip(q, self.Q[0]),) if (q > self.Q[0]).any() else ()
+        first, rest = self.milled(line), self.after(line, 1)
+        return Tracks((*first.tracks, *rest.tracks), (*strip, *first.missed, *rest.missed), 1 + rest.lines)
+
+    def milled(self, line: Line) -> Tracks:
+        """The tracks of the line number 0."""
+        new, gone = self.step.lines.tracks(line, np.ones(len(line.q), dtype=np.bool_), 0, self.step.need)
+        return Tracks(tuple(new), tuple(gone), 1)
+
+    def after(self, line: Line, number: int) -> Tracks:
+        """The lines after one, counted from ``number`` on."""
+        tracks: list[ToolTrack] = []
+        missed: list[UnreachedSpan] = []
+        use, need = np.ones(len(line.q), dtype=np.bool_), self.step.need
+        low, high = self.Q
+        for k in range(_LINES):
+            self.progress(float(np.clip((line.q.min() - low) / (high - low), 0.0, 1.0)), f"{k + 1} lines")
+            open_ = use & ~self.step.done(line, high)
+            if not open_[need].any():
+                return Tracks(tuple(tracks), tuple(missed), k)
+            # where the pass of the line before has reached the border there is nothing left
+            use = binary_dilation(open_)
+            line = self.step.next(line, high, use & need)
+            new, gone = self.step.lines.tracks(line, use, number + k, need)
+            tracks += new
+            missed += gone
+        raise InputError(f"finish.scallop = {self.step.scallop:g} mm: more than {_LINES} lines: raise it")
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +232,7 @@ class _Stepper:
 
         It may lie beyond the border, as the last one of a patch does, if all that is in ``use`` is reached there.
         """
-        free = self._next(line, 1.0)
+        free = self._next(line, self.lines.ends[1])
         if not (free.q[use] > border).any():
             return free
         inside = self._next(line, border)
@@ -217,7 +277,7 @@ class _Stepper:
         """The step at which the scallop is as high as aimed, if the next line is milled at these pallet angles."""
         aim = self.aim * self.scallop
         for _ in range(_ROUNDS):
-            scallop = self._scallop(line, self._moved(line, w, 1.0), pallet)
+            scallop = self._scallop(line, self._moved(line, w, self.lines.ends[1]), pallet)
             ratio = np.clip(np.sqrt(aim / np.clip(scallop, 0.1 * aim, None)), 0.6, 1.3)
             if not np.isfinite(ratio).any() or (np.nanmin(ratio) > 0.99 and np.nanmax(ratio) < 1.03):
                 break
@@ -275,8 +335,8 @@ class _Stepper:
         return self._across(line, line.q)
 
     def _across(self, line: Line, q: Floats) -> Floats:
-        u, v = (self.lines.p, q) if self.lines.along == "u" else (q, self.lines.p)
-        Sq = self.lines.surface.at(u, v, *((0, 1) if self.lines.along == "u" else (1, 0)))
+        u, v = self.lines.places(self.lines.p, q)
+        Sq = self.lines.sign * self.lines.surface.at(u, v, *((0, 1) if self.lines.along == "u" else (1, 0)))
         out: Floats = (Sq * np.cross(line.N, line.d)).sum(axis=1)
         return out
 
@@ -286,27 +346,16 @@ class _Stepper:
         if len(known) == 0:
             r, h = self.lines.cutter.corner_radius, self.scallop
             return np.full(len(w), 2.0 * math.sqrt(2.0 * max(r, h) * h))
-        near = known[np.abs(known[None] - np.arange(len(w))[:, None]).argmin(axis=1)]
-        w = w[near]
-        size = np.linalg.norm(np.diff(line.S, axis=0), axis=1)
-        far = np.concatenate([[0.0], np.cumsum(_GROWTH * size)])
-        held = (w[None] + np.abs(far[:, None] - far[None])).min(axis=1)
-        out: Floats = np.minimum(gaussian_filter1d(held, 1.0, mode="nearest"), held)
-        return out
+        return even_steps(w, np.linalg.norm(np.diff(line.S, axis=0), axis=1))
 
     def _straight(self, line: Line, q: Floats) -> Floats:
         """Places (n,) of the line after ``line``, held back where it would run askew to the parameter lines."""
-        ahead = np.maximum(np.abs(self._across(line, line.q)), 1e-12)
         size = np.linalg.norm(np.diff(line.S, axis=0), axis=1)
-        far = np.concatenate([[0.0], np.cumsum(_SKEW * size / np.minimum(ahead[1:], ahead[:-1]))])
-        soft = np.minimum(gaussian_filter1d(q, 1.0, mode="nearest"), q)
-        held = (soft[None] + np.abs(far[:, None] - far[None])).min(axis=1)
-        out: Floats = np.maximum(held, line.q + _HELD * (q - line.q))
-        return out
+        return straightened(q, line.q, self._across(line, line.q), size)
 
     def _dq(self, line: Line, w: Floats) -> Floats:
         first = w / np.abs(self._across(line, line.q))
-        middle = np.clip(line.q + 0.5 * first, 0.0, 1.0)
+        middle = np.clip(line.q + 0.5 * first, *self.lines.ends)
         out: Floats = w / np.abs(self._across(line, middle))
         return out
 

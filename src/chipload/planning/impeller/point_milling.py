@@ -3,13 +3,11 @@
 Notation: lines run along one parameter p of the surface at q(p) of the other; T(u, v) the axis (``axis_field.py``),
 which is known over the whole surface before the lines are laid out. h height of the scallop, w step-over across a line.
 
-A station p needs N(p) steps from border to border, the integral of 1 / w across the lines. All stations get the same
-number M, the greatest N, each with its own share 1 / (w N) of them at every place. So lines begin and end together, and
-never become skew. Where N differs much the surface is divided into bands of stations, each with an M of its own, so
-that the path is shortest. The widths w are first those of two neighbouring passes (``scallop_width.py``). Then they are
-corrected by the scallop between the poses of every two lines (``scallop_height.py``): the distance of the lines times
-sqrt(h / scallop), repeatedly. M grows until no scallop is above h. The first and the last line lie inside the border,
-as far as their pass stays below h there.
+Line follows line from one border to the other: the next one lies at w from the one before, at each station its own.
+w is first that of two neighbouring passes (``scallop_width.py``). Then it is corrected by the scallop between the poses
+of both lines (``scallop_height.py``): w times sqrt(h / scallop), repeatedly, without jumps along the line
+(``steps.py``). A line is milled as far as the one before it does not cover the border: where the surface needs fewer
+lines, lines end. The outermost lines lie inside the border, as far as their pass stays below h there.
 
 From line to line the cutter stays on the surface. Between two rows the tip goes straight and the axis turns evenly;
 rows are added until the tip of the middle is within the chord.
@@ -24,29 +22,38 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import binary_dilation, gaussian_filter1d, minimum_filter1d
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.axis_field import AxisField, pose
 from chipload.planning.impeller.clearance.clearance import between
+from chipload.planning.impeller.pass_order import pass_order
 from chipload.planning.impeller.scallop_height import profile_scallops, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
 from chipload.planning.impeller.scene import Floats
+from chipload.planning.impeller.steps import Flags, even_steps, runs, straightened
 
 #: distance of the stations of a line [mm]
 _APART = 0.5
 #: of how far a pass reaches below the scallop, how far inside the border the outermost lines lie
 _INSIDE = 0.85
 #: share of the scallop that steps are laid out for, and that no station is above
-_AIM, _MOST = 0.95, 0.98
-#: rounds in which widths are taken anew; steps more that are tried; places across the lines; smoothness along them [mm]
-_ROUNDS, _MORE, _ACROSS, _EVEN = 6, 12, 81, 2.0
-#: lines, and halvings of a row, at most
+_AIM, _MOST = 0.945, 0.97
+#: rounds in which a step is corrected, and the share by which it may still change; rounds more while a scallop is too
+#: high, and the share of it that is aimed at from one of them to the next
+_ROUNDS, _STILL, _MORE, _LESS = 8, 0.01, 12, 0.985
+#: smoothness of borders and steps along a line [mm]
+_SMOOTH = 1.5
+#: stations beside each other of which the narrowest step counts, before steps are smoothed
+_NEAR = 5
+#: lines at most, halvings of a row
 _LINES, _HALVINGS = 5000, 6
-#: bands at most; by how much they go on into their neighbours [mm]; what a step costs beside its stations
-_EDGES, _OVERLAP, _CHANGE = 24, 1.0, 2
+#: how far a line goes on where the one before it covers the border [mm]; of a step, how far inside it that one may lie
+_BEYOND, _COVERS = 1.0, 0.05
+#: by how much a line may lie beside its rows [mm]
+_BEND = 0.01
 
 
 class PathLine(NamedTuple):
@@ -65,7 +72,7 @@ class PointPath:
     at : (n, 2) u and v
     normal : (n, 3) of the surface
     tip, axis : (n, 3) [mm], unit
-    line : (n,) number of the line, those of two bands one apart; -1: from one to the next
+    line : (n,) number of the line; -1: from one to the next
     """
 
     at: Floats
@@ -81,8 +88,11 @@ class PointPath:
 
     @property
     def each_line(self) -> tuple[PathLine, ...]:
-        """Its lines, one by one."""
-        return tuple(PathLine(self.at[self.line == k], int(k)) for k in np.unique(self.line[self.line >= 0]))
+        """Its lines, one by one; a line that is milled in two pieces twice."""
+        edges = [0, *(np.flatnonzero(np.diff(self.line)) + 1).tolist(), len(self.line)]
+        return tuple(
+            PathLine(self.at[a:b], int(self.line[a])) for a, b in itertools.pairwise(edges) if self.line[a] >= 0
+        )
 
     @property
     def length(self) -> float:
@@ -135,43 +145,18 @@ def point_path(
     job = _Lines(surface, along, np.linspace(*P, max(math.ceil(length / _APART), 8) + 1), field, cutter, scallop)
     low, high = job.border(Q[0], 1.0), job.border(Q[1], -1.0)
     inner = box[0] if along == "u" else box[1]
-    need = (job.p >= inner[0] - 1e-9) & (job.p <= inner[1] + 1e-9)
-    whole, steps = job.laid_out(low, high, need)
-    laid: list[tuple[Floats, list[Floats]]] = []
-    bands = _bands(steps, max(round(_OVERLAP / _APART), 1))
-    for first, last, inside in bands:
-        band = replace(job, p=job.p[first:last])
-        own = need[first:last] & inside
-        lines = whole if len(bands) == 1 else band.laid_out(low[first:last], high[first:last], own)[0]
-        laid.append((band.p, lines if len(laid) % 2 == 0 else lines[::-1]))
-    return _joined(job, laid, chord)
+    # between the last station inside and the next one too
+    need = binary_dilation((job.p >= inner[0] - 1e-9) & (job.p <= inner[1] + 1e-9))
+    paths = [_joined(job, laid, chord) for laid in job.laid_out(low, high, need)]
+    return min(paths, key=lambda path: path.length)
 
 
-def _bands(steps: Floats, overlap: int) -> list[tuple[int, int, NDArray[np.bool_]]]:
-    """Bands with the least path, by the steps (n,) that each station needs.
+class _LinePiece(NamedTuple):
+    """A part of a line that is milled: its number, its places p and q (n,)."""
 
-    Returns
-    -------
-    First station and last but one of each, and which of them are its own: the others are of its neighbours too.
-
-    >>> [(a, b, int(own.sum())) for a, b, own in _bands(np.repeat([10.0, 4.0], 60), 2)]
-    [(0, 62, 60), (58, 120, 60)]
-    """
-    n = len(steps)
-    edges = np.unique(np.linspace(0, n, min(_EDGES, n // (4 * overlap) + 1) + 1).astype(int))
-    best: list[tuple[float, list[int]]] = [(0.0, [0])]
-    for k in range(1, len(edges)):
-        found = []
-        for j in range(k):
-            first, last = max(edges[j] - overlap, 0), min(edges[k] + overlap, n)
-            path = (math.ceil(float(steps[edges[j] : edges[k]].max()) - 1e-6) + 1) * (last - first + _CHANGE)
-            found.append((best[j][0] + path, [*best[j][1], int(edges[k])]))
-        best.append(min(found, key=lambda x: x[0]))
-    out = []
-    for a, b in itertools.pairwise(best[-1][1]):
-        station = np.arange(max(a - overlap, 0), min(b + overlap, n))
-        out.append((int(station[0]), int(station[-1]) + 1, (station >= a) & (station < b)))
-    return out
+    line: int
+    p: Floats
+    q: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,8 +167,10 @@ class _Lines:
     field: AxisField
     cutter: CatalogueCutter
     scallop: float
+    sign: float = 1.0
 
     def places(self, p: Floats, q: Floats) -> tuple[Floats, Floats]:
+        q = self.sign * q
         return (p, q) if self.along == "u" else (q, p)
 
     def poses(self, p: Floats, q: Floats) -> tuple[Floats, Floats, Floats]:
@@ -199,10 +186,17 @@ class _Lines:
         Sp, Sq = self.surface.at(u, v, 1, 0), self.surface.at(u, v, 0, 1)
         if self.along == "v":
             Sp, Sq = Sq, Sp
+        Sq = self.sign * Sq
         slope = np.gradient(q, self.p)
         d = Sp + slope[:, None] * Sq
         d /= np.linalg.norm(d, axis=1)[:, None]
         return N, d, (Sq * np.cross(N, d)).sum(axis=1)
+
+    def across_at(self, p: Floats, q: Floats) -> Floats:
+        """S_q (n,): mm for a growth of q by 1."""
+        order = (0, 1) if self.along == "u" else (1, 0)
+        out: Floats = np.linalg.norm(self.surface.at(*self.places(p, q), *order), axis=1)
+        return out
 
     def reach(self, q: Floats) -> tuple[Floats, Floats]:
         """How far (n,), (n,) [mm] the pass of a line stays below the scallop towards a growing q, and against it."""
@@ -218,9 +212,10 @@ class _Lines:
     def moved(self, q: Floats, w: Floats) -> Floats:
         """The places a step w (n,) [mm] across from a line."""
         _, _, size = self.across(q)
-        half = np.clip(q + 0.5 * w / np.abs(size), 0.0, 1.0)
+        ends = min(0.0, self.sign), max(0.0, self.sign)
+        half = np.clip(q + 0.5 * w / np.abs(size), *ends)
         _, _, size = self.across(half)
-        return np.clip(q + w / np.abs(size), 0.0, 1.0)
+        return np.clip(q + w / np.abs(size), *ends)
 
     def border(self, q: float, sign: float) -> Floats:
         """The outermost line: inside the border q by how far its pass stays below the scallop."""
@@ -228,67 +223,108 @@ class _Lines:
         out = line
         for _ in range(3):
             ahead, behind = self.reach(out)
-            w = _INSIDE * gaussian_filter1d(behind if sign > 0.0 else ahead, self._even, mode="nearest")
+            w = _INSIDE * gaussian_filter1d(behind if sign > 0.0 else ahead, self.smooth, mode="nearest")
             out = self.moved(line, sign * w)
         return out
 
     @property
-    def _even(self) -> float:
-        return _EVEN / _APART
+    def smooth(self) -> float:
+        """Stations over which borders and steps are smoothed."""
+        return _SMOOTH / _APART
 
-    def density(self, low: Floats, high: Floats, t: Floats) -> Floats:
-        """(k, n) steps for a growth of t (k,) by 1 on the way from ``low`` to ``high``, by two passes side by side."""
-        out = np.empty((len(t), len(self.p)))
-        for k, share in enumerate(t):
-            q = low + share * (high - low)
-            ahead, behind = self.reach(q)
-            out[k] = np.abs(self.across(q)[2]) * (high - low) / np.maximum(ahead + behind, 1e-3)
-        return out
-
-    def laid_out(self, low: Floats, high: Floats, need: NDArray[np.bool_]) -> tuple[list[Floats], Floats]:
-        """Lines from ``low`` to ``high`` (n,), all of which are milled, and N (n,) that each station needs.
+    def laid_out(self, low: Floats, high: Floats, need: Flags) -> tuple[tuple[_LinePiece, ...], ...]:
+        """Pieces of lines between ``low`` and ``high`` (n,): from the middle on, from either border on.
 
         ``need`` : stations (n,) at which the scallop counts; elsewhere lines go on as at the nearest of these.
+
+        Raises
+        ------
+        InputError
+            None of the three leaves no more than the scallop.
         """
+        middle = 0.5 * (low + high)
+        if (high <= low).all():
+            return ((_LinePiece(0, self.p, middle),),)
+        low, high = np.minimum(low, middle), np.maximum(high, middle)
+        back = replace(self, sign=-1.0)
+        out: list[tuple[_LinePiece, ...]] = []
+        refused: list[InputError] = []
+        for begin in (middle, low, high):
+            try:
+                up = self.from_line(begin, high, need)
+                down = back.from_line(-begin, -low, need)
+            except InputError as err:
+                refused.append(err)
+                continue
+            n = max((k for k, *_ in down), default=0)
+            below = [_LinePiece(n - k, p, -q) for k, p, q in reversed(down)]
+            out.append((*below, _LinePiece(n, self.p, begin), *(_LinePiece(n + k, p, q) for k, p, q in up)))
+        if not out:
+            raise refused[0]
+        return tuple(out)
+
+    def from_line(self, line: Floats, high: Floats, need: Flags) -> list[_LinePiece]:
+        """Pieces of the lines after a line, up to ``high``."""
         where = np.flatnonzero(need)
         near = where[np.abs(where - np.arange(len(need))[:, None]).argmin(axis=1)]
-        if (high <= low).all():
-            return [0.5 * (low + high)], np.zeros(len(self.p))
-        high = np.maximum(high, low)
-        t = np.linspace(0.0, 1.0, _ACROSS)
-        density = self.density(low, high, t)[:, near]
-        aim, more = _AIM * self.scallop, 0
-        best: tuple[list[Floats], Floats] | None = None
-        before = 0, 0.0
+        on = np.ones(len(line), dtype=np.bool_)
+        out: list[_LinePiece] = []
+        w: Floats | None = None
+        lines, whole = [line], np.ones(len(line))
+        for number in range(1, _LINES):
+            left = np.abs(self.across(line)[2]) * (high - line)
+            on = on & (left > _COVERS * np.add(*self.reach(line)))[near]
+            if not on.any():
+                if len(lines) == len(out) + 1 and all(len(piece.p) == len(line) for piece in out):
+                    out = [_LinePiece(k, self.p, q) for k, q in enumerate(_spread(lines, whole)[1:], 1)]
+                return out
+            on = binary_dilation(on, iterations=round(_BEYOND / _APART))
+            w = self.step(line, high, on, need, w)
+            full = self.after(line, w)
+            new = np.minimum(full, high)
+            whole = (new - line) / np.where(full > line, full - line, 1.0)
+            out += [_LinePiece(number, self.p[a:b], new[a:b]) for a, b in runs(on)]
+            line = np.where(on, new, high)
+            lines.append(line)
+        raise InputError(f"scallop = {self.scallop:g} mm: more than {_LINES} lines: raise it")
+
+    def step(self, line: Floats, high: Floats, on: Flags, need: Flags, known: Floats | None) -> Floats:
+        """Step (n,) [mm] to the next line, at which the scallop between both is as high as aimed at."""
+        size = self.sizes(line)
+        use = on & need if (on & need).any() else on
+        w = self.even(np.add(*self.reach(line)), size, use) if known is None else known
+        aim, most = _AIM * self.scallop, _MOST * self.scallop
         for turn in range(_ROUNDS + _MORE):
-            even = gaussian_filter1d(density, self._even, axis=1, mode="nearest")
-            steps = np.concatenate([np.zeros((1, len(self.p))), 0.5 * (even[1:] + even[:-1]).cumsum(axis=0)]) * t[1]
-            count = max(math.ceil(float(steps[-1].max()) - 1e-6), 1) + more
-            if count > _LINES:
-                raise InputError(f"scallop = {self.scallop:g} mm: more than {_LINES} lines: raise it")
-            share = np.array([
-                np.interp(np.arange(count + 1) / count * own[-1], own, t) if own[-1] > 0.0
-                else np.linspace(0.0, 1.0, count + 1) for own in steps.T
-            ]).T  # fmt: skip
-            lines = [low + s * (high - low) for s in share]
-            crest = np.array([self.scallops(a, b) for a, b in itertools.pairwise(lines)])
-            highest = float(crest[:, need].max())
-            if highest <= _MOST * self.scallop and (best is None or count < len(best[0]) - 1):
-                best = lines, steps[-1]
-            still = abs(count - before[0]) < 1 and abs(highest - before[1]) < 0.005 * highest
-            before = count, highest
-            if turn >= _ROUNDS or still or more:
-                if best is not None:
-                    return best
-                more += 1
-                continue
-            # what the distance of two lines and the scallop between them say of the width there
-            middle, size = 0.5 * (share[1:] + share[:-1]), np.diff(share, axis=0)
-            found = np.sqrt(np.clip(crest, 0.1 * aim, None) / aim) / np.maximum(size, 1e-9)
-            density = np.array([np.interp(t, x, y) for x, y in zip(middle.T, found.T, strict=True)]).T[:, near]
-        raise InputError(
-            f"scallop = {self.scallop:g} mm: {len(lines)} lines leave {highest:.4f} mm: the cutter does not fit"
-        )
+            new = np.minimum(self.after(line, w), high)
+            crest = np.where(use, self.scallops(np.where(on, line, np.nan), np.where(on, new, np.nan)), np.nan)
+            highest = float(np.nanmax(crest))
+            free = new < high
+            ratio = np.clip(np.sqrt(aim / np.clip(crest, 0.1 * aim, None)), 0.6, 1.3)
+            # a line at the border says nothing of a wider step
+            wider = np.where(free, ratio, np.minimum(ratio, 1.0))
+            then = self.even(w * wider, size, use)
+            still = float(np.abs(then / w - 1.0)[use].max()) < _STILL
+            if highest <= most and (still or turn >= _ROUNDS):
+                return w
+            if turn >= _ROUNDS:
+                aim *= _LESS
+            w = then
+        raise InputError(f"scallop = {self.scallop:g} mm: two lines leave {highest:.4f} mm: the cutter does not fit")
+
+    def sizes(self, line: Floats) -> Floats:
+        """(n - 1,) [mm] from station to station of a line."""
+        out: Floats = np.linalg.norm(np.diff(self.surface.at(*self.places(self.p, line)), axis=0), axis=1)
+        return out
+
+    def even(self, w: Floats, size: Floats, use: Flags) -> Floats:
+        """Steps without jumps along the line, of those in ``use``."""
+        least = minimum_filter1d(np.where(use, w, np.inf), _NEAR)
+        out: Floats = gaussian_filter1d(even_steps(least, size, self.smooth), self.smooth, mode="nearest")
+        return out
+
+    def after(self, line: Floats, w: Floats) -> Floats:
+        """Places (n,) of the line w beyond another one."""
+        return straightened(self.moved(line, w), line, self.across(line)[2], self.sizes(line), self.smooth)
 
     def scallops(self, line: Floats, other: Floats) -> Floats:
         """(n,) height of the scallop between two lines [mm]."""
@@ -305,30 +341,38 @@ class _Lines:
         return scallop_heights(*places, tips, axes, self.cutter.rho, self.cutter.corner_radius)
 
 
-def _joined(job: _Lines, laid: list[tuple[Floats, list[Floats]]], chord: float) -> PointPath:
+def _spread(lines: list[Floats], last: Floats) -> Floats:
+    """Lines (m, n) that all go from end to end, with steps of one size; the last step was a share (n,) of a whole one.
+
+    >>> _spread([np.zeros(1), np.ones(1), np.full(1, 1.5)], np.full(1, 0.5)).ravel().tolist()
+    [0.0, 0.75, 1.5]
+    """
+    steps = len(lines) - 1
+    if not steps:
+        return np.array(lines)
+    at = np.concatenate([np.repeat(np.arange(steps)[:, None], len(last), axis=1), [steps - 1.0 + last]])
+    every = np.arange(steps + 1) / steps
+    return np.array([np.interp(every * x[-1], x, q) for x, q in zip(at.T, np.array(lines).T, strict=True)]).T
+
+
+def _joined(job: _Lines, laid: tuple[_LinePiece, ...], chord: float) -> PointPath:
     """All lines there and back, from one to the next on the surface, with as many rows as the chord asks for."""
     p: list[Floats] = []
     q: list[Floats] = []
     number: list[NDArray[np.int64]] = []
-    k = row = 0
-    for places, lines in laid:
-        for line in lines:
-            way = slice(None) if row % 2 == 0 else slice(None, None, -1)
-            if row:
-                share = np.linspace(0.0, 1.0, 6)[1:-1]
-                p.append(p[-1][-1] + share * (places[way][0] - p[-1][-1]))
-                q.append(q[-1][-1] + share * (line[way][0] - q[-1][-1]))
-                number.append(np.full(len(share), -1))
-            p.append(places[way])
-            q.append(line[way])
-            number.append(np.full(len(line), k))
-            k, row = k + 1, row + 1
-        # lines of two bands are no neighbours
-        k += 1
+    for k, forth in _order(job, laid):
+        piece = laid[k]
+        way = slice(None) if forth else slice(None, None, -1)
+        if p:
+            share = np.linspace(0.0, 1.0, 6)[1:-1]
+            p.append(p[-1][-1] + share * (piece.p[way][0] - p[-1][-1]))
+            q.append(q[-1][-1] + share * (piece.q[way][0] - q[-1][-1]))
+            number.append(np.full(len(share), -1))
+        p.append(piece.p[way])
+        q.append(piece.q[way])
+        number.append(np.full(len(piece.p), piece.line))
     P, Q, of = np.concatenate(p), np.concatenate(q), np.concatenate(number)
-    # rows that the chord does not need are left out, and added again where it does
-    keep = np.ones(len(P), dtype=np.bool_)
-    keep[1:-1] = (np.arange(1, len(P) - 1) % 4 == 0) | (of[1:-1] != of[2:]) | (of[1:-1] != of[:-2])
+    keep = _needed(P, Q, of, np.abs(job.across_at(P, Q)))
     P, Q, of = P[keep], Q[keep], of[keep]
     for _ in range(_HALVINGS):
         tip, axis, _ = job.poses(P, Q)
@@ -346,3 +390,32 @@ def _joined(job: _Lines, laid: list[tuple[Floats, list[Floats]]], chord: float) 
         of = np.insert(of, more + 1, np.where(of[more] == of[more + 1], of[more], -1))
     tip, axis, normal = job.poses(P, Q)
     return PointPath(np.column_stack(job.places(P, Q)), normal, tip, axis, of)
+
+
+def _needed(P: Floats, Q: Floats, of: NDArray[np.int64], size: Floats) -> Flags:
+    """Which rows (n,) of lines are needed: every fourth, and more where a line bends between them.
+
+    ``size`` (n,) [mm] across the line for a growth of q by 1. Rows are added again where the chord asks for them.
+    """
+    ends = np.ones(len(P), dtype=np.bool_)
+    ends[1:-1] = (of[1:-1] != of[2:]) | (of[1:-1] != of[:-2])
+    at = np.arange(len(P))
+    keep: Flags = ends | (at % 4 == 0)
+    for every in (2, 1):
+        kept = np.flatnonzero(keep)
+        way = np.searchsorted(kept, at, side="right") - 1
+        first, last = kept[way], kept[np.minimum(way + 1, len(kept) - 1)]
+        share = (P - P[first]) / np.where(P[last] != P[first], P[last] - P[first], 1.0)
+        off = np.abs(Q - Q[first] - share * (Q[last] - Q[first])) * size
+        bent = np.zeros(len(P), dtype=np.bool_)
+        np.maximum.at(bent, first, off > _BEND)
+        keep |= bent[first] & (at % every == 0)
+    return keep
+
+
+def _order(job: _Lines, laid: tuple[_LinePiece, ...]) -> list[tuple[int, bool]]:
+    """Pieces of lines in the order with the shortest ways between them, each with whether it is milled forth."""
+    both = [job.poses(piece.p[[0, -1]], piece.q[[0, -1]]) for piece in laid]
+    tips, axes = (np.array([x[k] for x in both]) for k in (0, 1))
+    # the cutter stays down: no way leads over the part
+    return pass_order(tips, axes, math.inf, math.inf, 1.0, 1.0)

@@ -171,8 +171,9 @@ class FinishSettings:
         along, box = lines_of(patch)
         surface, number = self.surface(patch.body, patch.side), surface_number(patch.body, patch.side)
         return finishing(
-            surface, along, box, self.scene, number, cutter, patch.table, self.how, self.spans, self.workers
-        )
+            surface, along, box, self.scene, number, cutter, patch.table, self.how, self.spans, self.workers,
+            begin=patch.begin,
+        )  # fmt: skip
 
     def surface(self, body: int, side: str) -> Surface:
         """The surface with its parameters."""
@@ -249,7 +250,7 @@ def milling_key(catalogue: Catalogue, patch: Patch) -> MillingKey:
     c = catalogue.cutters[patch.cutter]
     at = patch.at[:, 1 if patch.order == "u" else 0]
     ends = (float(at.min()), float(at.max()))
-    return (patch.body, patch.side, patch.order, patch.low, patch.high, patch.part, ends, c, patch.table)
+    return (patch.body, patch.side, patch.order, patch.low, patch.high, patch.part, ends, c, patch.table, patch.begin)
 
 
 def setting_order(pairs: Sequence[Pair], changes: Changes) -> list[Pair]:

@@ -80,20 +80,20 @@ def density(phi, row, exponents, out):
 
 @njit(cache=True, nogil=True)
 def powered(first, last, row, exponents, out, one):
-    """Integral of :func:`density` over the immersion with exponents: between crest and trough of h the variable is w,
+    """Integral of :func:`density` over the immersion with exponents: between peak and trough of h the variable is w,
     phi = zero +- w^3, so that a power of h at its zero is smooth enough for twelve points.
     """
     out[:] = 0.0
     swing = math.hypot(row[8], row[9])
-    crest = math.atan2(row[8], row[9])
+    peak = math.atan2(row[8], row[9])
     reach = math.acos(-row[10] / swing) if swing > abs(row[10]) else math.pi
-    k = math.floor((first - crest) / math.pi)
+    k = math.floor((first - peak) / math.pi)
     low = first
     while low < last:
-        high = min(last, crest + (k + 1) * math.pi)
+        high = min(last, peak + (k + 1) * math.pi)
         if high > low:
             falling = k % 2 == 0
-            zero = crest + k * math.pi + reach if falling else crest + (k + 1) * math.pi - reach
+            zero = peak + k * math.pi + reach if falling else peak + (k + 1) * math.pi - reach
             u = np.cbrt(max(zero - high, 0.0) if falling else max(low - zero, 0.0))
             v = np.cbrt(max(zero - low, 0.0) if falling else max(high - zero, 0.0))
             for g in range(12):

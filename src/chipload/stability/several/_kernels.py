@@ -99,19 +99,19 @@ def primitive(phi, row, factor, out):
 
 @njit(cache=True, nogil=True)
 def powered(low, high, row, exponents, factor, out, one):
-    """Adds the integral of :func:`density` with exponents, times ``factor``: between crest and trough of h the variable
+    """Adds the integral of :func:`density` with exponents, times ``factor``: between peak and trough of h the variable
     is w, phi = zero +- w^3, so that a power of h at its zero is smooth enough for twelve points.
     """
     swing = math.hypot(row[8], row[9])
-    crest = math.atan2(row[8], row[9])
+    peak = math.atan2(row[8], row[9])
     reach = math.acos(-row[10] / swing) if swing > abs(row[10]) else math.pi
-    k = math.floor((low - crest) / math.pi)
+    k = math.floor((low - peak) / math.pi)
     begin = low
     while begin < high:
-        end = min(high, crest + (k + 1) * math.pi)
+        end = min(high, peak + (k + 1) * math.pi)
         if end > begin:
             falling = k % 2 == 0
-            zero = crest + k * math.pi + reach if falling else crest + (k + 1) * math.pi - reach
+            zero = peak + k * math.pi + reach if falling else peak + (k + 1) * math.pi - reach
             u = np.cbrt(max(zero - end, 0.0) if falling else max(begin - zero, 0.0))
             v = np.cbrt(max(zero - begin, 0.0) if falling else max(end - zero, 0.0))
             for g in range(12):
@@ -259,16 +259,11 @@ def systems(A, end, inverse, slopes, cuts):
 
 
 @njit(cache=True, nogil=True, fastmath=True, inline="always")
-def delayed(history, at, b, d):
-    """Coordinate b of the state at ``at`` and one cell later: first, h first', last, h last'.
+def delayed(history, k, t, b, d):
+    """Coordinate b of the state a share t of a cell after node k, and one cell later: first, h first', last, h last'.
 
-    Parameters
-    ----------
-    history : (nodes, 2 d) r and h r' at the nodes
-    at : in cells from the first node; between nodes the cubic Hermite
+    ``history`` (nodes, 2 d) holds r and h r' at the nodes; between nodes the state is the cubic Hermite.
     """
-    k = math.floor(at + NODE)
-    t = at - k
     p0 = history[k, b]
     s0 = history[k, d + b]
     p1 = history[k + 1, b]
@@ -301,8 +296,7 @@ def advanced(x, A, delay, nodes, U, free, push, end, inverse, slopes, cuts, h, h
     Parameters
     ----------
     x, y : (2 d nodes + 2 M,) state at the beginning, and at the end, which is written
-    A : (D, m, 3, d d) force over displacement [N/mm] of each delay at the Gauss points of the m cells
-    delay : (D,) in cells
+    A, delay : (D, m, 3, d d) force over displacement [N/mm] at the Gauss points of the m cells; (D,) delays in cells
     U : (d, M) of the modes; free, push, end : of :func:`motion`; inverse, slopes, cuts : of :func:`systems`
     h : length of a cell [s]
     history, q, v, known, new : (nodes + m + 1, 2 d), (M,), (M,), (3 d,), (2 d,) working arrays
@@ -342,8 +336,10 @@ def advanced(x, A, delay, nodes, U, free, push, end, inverse, slopes, cuts, h, h
             if not cutting:
                 known[:] = 0.0
                 cutting = True
+            at = nodes + i - delay[j]
+            k = math.floor(at + NODE)
             for b in range(d):
-                first, first_slope, last, last_slope = delayed(history, nodes + i - delay[j], b, d)
+                first, first_slope, last, last_slope = delayed(history, k, at - k, b, d)
                 now = history[nodes + i, b] - first
                 now_slope = history[nodes + i, d + b] - first_slope
                 for g in range(3):

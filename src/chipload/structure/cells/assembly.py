@@ -26,13 +26,13 @@ from chipload.structure.cells.grid import Array, CellGrid, Indices, product_tens
 
 #: stiffness of the empty part of a cut cell over that of the material
 ALPHA = 1e-9
-#: a cell with a smaller share of material is left out
+#: share of material below which a cell is left out
 LEAST_SHARE = 1e-6
 #: cells along each side of a full block that keep the modes of their corners only
 BULK = 4
-#: a cell counts as full from this share on
+#: least share of material of a full cell
 FULL = 1.0 - 1e-9
-#: modes (three directions each) that a structure may have
+#: greatest number of modes of a structure, three directions each
 MOST_MODES = 150_000
 
 

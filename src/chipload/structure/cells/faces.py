@@ -17,15 +17,15 @@ from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.grid import Array, CellGrid, cells_between, grid_between
 from chipload.structure.cells.moments import alike
 
-#: edges off an axis by at most this share of their length lie on a face
+#: greatest deviation from an axis, as a share of its length, of an edge that lies on a face
 SQUARE = 1e-4
-#: places of faces that count as one [mm]
+#: distance below which two planes of faces are one [mm]
 ONE = 0.01
-#: a face counts from this share of the area of the box around the stock
+#: least area of a face that counts, as a share of the area of the box around the stock
 LEAST_AREA = 0.02
 #: least distance of planes over the longest side of a cell
 NEAREST = 0.1
-#: cells along an axis at most: so many times those without faces, and so many more
+#: greatest number of cells along an axis: factor on the number without faces, and addition to it
 MORE, FEW = 1.25, 2
 
 

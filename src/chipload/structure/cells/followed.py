@@ -22,7 +22,7 @@ from chipload.structure.cells.states import RemovalState, StepLines, between_row
 from chipload.structure.cells.vibration import VibrationModes, overlap, shapes_along, vibration_modes
 from chipload.structure.cells.workpiece import CellWorkpiece
 
-#: contact lines at which shapes are looked up, in each state
+#: number of contact lines at which shapes are evaluated, in each state
 PLACES = 600
 
 

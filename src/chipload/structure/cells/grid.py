@@ -59,7 +59,7 @@ class CellGrid:
     faces: Planes | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no grid."""
+        """Refuse planes and orders that make no grid."""
         for name, x in zip("xyz", self.planes, strict=True):
             if len(x) < 2 or not np.isfinite(x).all() or not (np.diff(x) > 0.0).all():
                 raise InputError(f"cells: planes along {name} at {x.tolist()} mm: two at least, each above the last")

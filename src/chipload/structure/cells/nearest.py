@@ -14,9 +14,9 @@ from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.grid import Array
 from chipload.structure.cells.moments import alike
 
-#: [mm] what is thinner is no material that a force acts on
+#: [mm] least thickness of material on which a force acts
 FILM = 0.1
-#: [mm] corners of a section nearer to one another are one: their edge has no direction to be moved in
+#: [mm] distance below which two corners of a section are one: their edge has no direction
 SAME = 1e-6
 
 

@@ -22,12 +22,12 @@ from chipload.progress import Progress, silent
 from chipload.structure.cells.grid import Array, Indices
 from chipload.structure.cells.workpiece import STATIONS, CellWorkpiece, line_compliances
 
-#: contact lines that are solved beside those of the worst steps
+#: number of contact lines that are solved in addition to those of the worst steps
 LINES = 160
 #: worst steps that are solved in the states just before and after them: so many pairs of states, and steps with at
 #: least this share of the greatest deflection
 TIGHT, NEAR = 6, 0.7
-#: worst steps that are reported
+#: number of worst steps that are reported
 WORST = 12
 
 

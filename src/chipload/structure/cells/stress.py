@@ -18,7 +18,7 @@ import shapely
 from chipload.structure.cells.grid import Array, shape_gradients
 from chipload.structure.cells.workpiece import CellWorkpiece, Elastic, line_means
 
-#: cells whose stress is found at once
+#: number of cells whose stress is calculated at once
 BLOCK = 2048
 
 

@@ -23,17 +23,17 @@ from chipload.structure.cells.faces import flat_faces, grid_on_faces
 from chipload.structure.cells.grid import CellGrid
 from chipload.structure.cells.moments import alike, stock_moments
 
-#: area over t^2 that counts as a wall
+#: least area over t^2 of a wall of thickness t
 PATCH = 2.0
 #: sides of cells over the thinnest wall: wanted, and at most
 GOOD, MOST = 1.25, 2.5
-#: sections that are searched, points across the longest side
+#: number of sections that are searched, and of points across the longest side
 SECTIONS, POINTS = 16, 48
-#: thicknesses that are tried: each so many times the one before, then halvings
+#: ratio of successive thicknesses that are tested, and number of halvings afterwards
 GROWTH, HALVINGS = 1.4, 5
-#: cells along the longest side at least
+#: least number of cells along the longest side
 LEAST_CELLS = 12
-#: modes (three directions each) up to which cells are made as small as wanted
+#: number of modes, three directions each, up to which cells have the wanted size
 WANTED_MODES = 8_000
 
 

@@ -19,7 +19,7 @@ from chipload.structure.cells.workpiece import CellWorkpiece, line_means
 
 #: relative error of w^2 at which Lanczos stops
 TOLERANCE = 1e-7
-#: iterations of Lanczos at most
+#: greatest number of iterations of Lanczos
 ITERATIONS = 400
 
 
@@ -47,7 +47,7 @@ def vibration_modes(work: CellWorkpiece, count: int) -> VibrationModes:
     Raises
     ------
     InputError
-        The workpiece has no density, or there are not so many modes.
+        The workpiece has no density, or fewer modes than asked for.
     """
     if work.mass is None:
         raise InputError("workpiece.density_kg_m3: missing: modes need the mass of the workpiece")

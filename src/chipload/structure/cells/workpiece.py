@@ -37,11 +37,11 @@ from chipload.structure.factors import Factors
 SPREAD, PER_CELL = 4, 3
 #: stations of a contact line, from its lower end (0) to its upper end (1)
 STATIONS = (0.0, 0.5, 1.0)
-#: modes that nested dissection does not cut any more
+#: number of modes from which on nested dissection stops
 LEAF = 60
-#: active cells about an empty one, of which the nearest takes a force
+#: number of active cells around an empty one, of which the nearest takes a force
 AROUND = 27
-#: lines that are solved abreast: three right-hand sides each
+#: number of lines that are solved together, with three right-hand sides each
 ABREAST = 21
 
 
@@ -61,7 +61,7 @@ class Elastic:
     density: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no elastic solid."""
+        """Refuse moduli and densities that no elastic solid has."""
         if not 0.0 < self.modulus < np.inf or not 0.0 <= self.poisson < 0.5:
             raise InputError(f"workpiece: modulus {self.modulus:g} MPa: above 0; Poisson {self.poisson:g}: 0 to 0.5")
         if self.density is not None and not 0.0 < self.density < np.inf:
@@ -81,7 +81,7 @@ class CellWorkpiece:
     order : (3 u,) int
     place : (3 u,) int, the inverse of ``order``
     volume : [mm^3] of the material that is held
-    loose : [mm^3] of material that hangs on nothing and was left out
+    loose : [mm^3] of material without a connection to a clamp, which is left out
     clamped : [mm^3] that each clamp holds
     sections : of the stock, on which forces act
     mass : (3 u, 3 u) sparse [t]; None: the density is not known

@@ -38,7 +38,7 @@ def added(at, spans, found, ring, front, to, from_s, to_s, rise_w, out):
     # half the slice along its profile
     half = 0.5 * abs(rise_w) * abs(at[AXIS + 2]) + 0.5 * ds * ck * math.hypot(at[ALONG_T + 2], at[ALONG_N + 2])
     size = math.hypot(ring[5], ring[8])
-    crest = math.atan2(ring[8], ring[5])
+    peak = math.atan2(ring[8], ring[5])
     for i in range(found):
         a = spans[i, 0]
         b = spans[i, 1]
@@ -50,9 +50,9 @@ def added(at, spans, found, ring, front, to, from_s, to_s, rise_w, out):
             ring[5] * math.cos(a) + ring[8] * math.sin(a), ring[5] * math.cos(b) + ring[8] * math.sin(b)
         )
         for k in range(-1, 2):
-            if a < crest + TAU * k < b:
+            if a < peak + TAU * k < b:
                 high = ring[2] + size
-            if a < crest + PI + TAU * k < b:
+            if a < peak + PI + TAU * k < b:
                 low = ring[2] - size
         out[2] = min(out[2], low - half)
         out[3] = max(out[3], high + half)

@@ -133,7 +133,7 @@ def crossing(px, py, z, rho, T, cu, su, cs, ss, e, index):
     return dc, ds, bc, bs
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def border(px, py, z, rho, T, cm, sm, ca, sa, e, index):
     """Psi between a direction in material (cm, sm) and one in air (ca, sa) where the material ends; ``e`` the move that
     swept the latter, or AIR.
@@ -164,7 +164,7 @@ def border(px, py, z, rho, T, cm, sm, ca, sa, e, index):
     return math.atan2(sm + sa, cm + ca)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def ridge(px, py, z, rho, T, ca, sa, cb, sb, ea, eb, index):
     """Whether there is material between two directions in air, a swept by move ``ea`` and b by move ``eb``, and a
     direction in it. The search goes from the border of one move to that of the next until it reaches b.
