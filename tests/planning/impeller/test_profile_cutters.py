@@ -263,8 +263,11 @@ def test_without_taper_the_path_is_that_of_the_straight_cutter(corner):
         if field is None or corner < 3.0:
             field = clear_field(surface, WHOLE, scene_of(surface, fence(25.0)), cutter, REACHABLE, LIMITS)
         paths.append(point_path(surface, "u", WHOLE, field, cutter, 0.1, 0.01))
-    assert paths[1].tip == pytest.approx(paths[0].tip, abs=1e-4)
-    assert paths[1].axis == pytest.approx(paths[0].axis, abs=1e-6)
+    assert paths[1].length == pytest.approx(paths[0].length, rel=1e-5)
+    if corner < 3.0:
+        # on the ball the narrowest step may as well be at the other border
+        assert paths[1].tip == pytest.approx(paths[0].tip, abs=1e-4)
+        assert paths[1].axis == pytest.approx(paths[0].axis, abs=1e-6)
     assert paths[1].lines == paths[0].lines
 
 
