@@ -72,7 +72,7 @@ def test_what_a_fusion_library_is_refused_for(library: Path, tmp_path: Path) -> 
     with pytest.raises(InputError, match=r"cutter\.tool is missing: library\.json holds 6"):
         read_fusion_tool(library, None)
     (tmp_path / "two.json").write_text(json.dumps({"data": [tool(1), tool(1)]}))
-    with pytest.raises(InputError, match="tool 1 stands 2 times"):
+    with pytest.raises(InputError, match="tool 1 appears 2 times"):
         read_fusion_tool(tmp_path / "two.json", 1)
     (tmp_path / "nan.json").write_text(json.dumps({"data": [tool(1, DC=float("nan"))]}))
     with pytest.raises(InputError, match="DC = 'nan': must be a finite number"):
