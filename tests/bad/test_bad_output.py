@@ -139,6 +139,7 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     code = (
         "import resource, signal, sys\n"
         "from importlib.util import module_from_spec, spec_from_file_location\n"
+        "sys.path.insert(0, sys.argv[1].removesuffix('conftest.py'))\n"
         "spec = spec_from_file_location('made', sys.argv[1])\n"
         "made = module_from_spec(spec)\n"
         "spec.loader.exec_module(made)\n"

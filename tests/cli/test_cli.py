@@ -220,6 +220,7 @@ def test_a_stopped_run_leaves_no_half_file(job_dir: Path, tmp_path: Path, number
         "folder._write = lambda path, data: (write(path, data), time.sleep(60))\n"
         "from chipload import jobs\n"
         "from importlib.util import module_from_spec, spec_from_file_location\n"
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parents[1])!r})\n"
         f"spec = spec_from_file_location('made', {str(Path(__file__).parents[1] / 'conftest.py')!r})\n"
         "made = module_from_spec(spec)\n"
         "spec.loader.exec_module(made)\n"
