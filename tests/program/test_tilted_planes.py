@@ -271,9 +271,15 @@ def test_what_is_refused_or_unproven():
     _, more = to_work(commands, cradle)
     assert [f.code for f in more] == ["program-tilted-plane"]
     assert "30 deg off its normal" in more[0].text
-    # another work offset within the plane
-    text = fanuc(rotation(30.0, 0.0, 0.0)).replace("G53.1", "G53.1\nG55")
-    assert any("within a tilted plane" in f.text for f in read(text, "fanuc", cradle)[1])
+    # other coordinates within the plane; the same work offset is none
+    for word in ("G55", "G52 X1.", "G92 X1. Y0. Z0.", "G68 X0. Y0. R30.", "G10 L2 P1 X5."):
+        text = fanuc(rotation(30.0, 0.0, 0.0)).replace("G53.1", f"G53.1\n{word}")
+        commands, findings = read(text, "fanuc", cradle)
+        assert any(f"{word.split()[0]} within a tilted plane" in f.text for f in findings)
+        assert not (commands.motion == ARC).any()
+    assert (
+        read(fanuc(rotation(30.0, 0.0, 0.0)).replace("G53.1", "G53.1\nG54"), "fanuc", cradle)[0].motion == ARC
+    ).any()
     text = fanuc(rotation(30.0, 0.0, 0.0)).replace("G68.2", "G68.2 P1")
     assert any("Euler angles" in f.text for f in read(text, "fanuc", cradle)[1])
 

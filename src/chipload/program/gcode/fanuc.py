@@ -166,6 +166,7 @@ class Fanuc(Dialect):
             g.remove(code)
             words.clear()
         self._tilted(block, c)
+        g = block.g
         if TURNED in g:
             g.remove(TURNED)
             if c.state.plane != 170 or "z" in words or words.keys() & {"i", "j", "k"}:
@@ -204,14 +205,16 @@ class Fanuc(Dialect):
             if p not in SIGNS:
                 raise InputError(f"{shown(code)}: P{p:g}: must be 0, 1 or 2")
             align(c, SIGNS[p])
-        if c.state.datum.tilt is not None and not c.left_out and any(self._offsets(code, c) for code in g):
-            leave_out(c, "G68.2: the work offset or a shift changes within a tilted plane")
+        changing = [code for code in g if self._offsets(code, c)] if c.state.datum.tilt is not None else []
+        if changing:
+            leave_out(c, f"G68.2: {shown(changing[0])} within a tilted plane")
+            block.g = [code for code in g if code not in changing]
             words.clear()
 
     @staticmethod
     def _offsets(code: int, c: Controller) -> bool:
         """Whether a code changes what a tilted plane lies in."""
-        if code in (100, 520, 920, EXTENDED, HAAS_EXTENDED):
+        if code in (100, 520, 920, TURNED, EXTENDED, HAAS_EXTENDED):
             return True
         return 540 <= code <= 593 and code % 10 in range(4) and 530 + 10 * c.state.datum.number != code
 

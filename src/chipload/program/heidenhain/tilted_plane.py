@@ -55,7 +55,7 @@ def plane(s: ConversationalState, text: str) -> str:
 def _by_axes(s: ConversationalState, values: dict[str, float], how: str) -> str:
     """PLANE AXIAL: the plane that the machine's axes have with the rotary ones at the angles that it names."""
     if s.swivel is None or not s.swivel.turns:
-        return put(s, np.diag([1.0, -1.0, -1.0]), how)
+        return _without_rotary(s)
     target = axes_of(s)
     for k, letter in enumerate("ABC"):
         if letter in values:
@@ -91,15 +91,20 @@ def put(s: ConversationalState, R: Floats, how: str, sign: int = 0) -> str:
     swivel = s.swivel
     if swivel is None or not swivel.turns:
         if not tilt.upright:
-            if swivel is not None:
-                s.unproven(NO_ROTARY, NEEDS_ROTARY)
-            return "a tilted working plane, and no machine with rotary axes"
+            return _without_rotary(s)
         enter(s, R)
         return ""
     now = axes_of(s)
     _go(s, swivel.aligned(tilt.direction, now, sign), how)
     enter(s, R)
     return ""
+
+
+def _without_rotary(s: ConversationalState) -> str:
+    """Why a plane is left out where no machine with rotary axes is given."""
+    if s.swivel is not None:
+        s.unproven(NO_ROTARY, NEEDS_ROTARY)
+    return "a tilted working plane, and no machine with rotary axes"
 
 
 def _go(s: ConversationalState, target: NDArray[np.float64], how: str) -> None:
