@@ -91,10 +91,6 @@ class Tilt:
         out: Floats = (q - np.array(self.origin)) @ self.matrix
         return out
 
-    def shifted(self, x: float, y: float, z: float) -> Tilt:
-        """The same directions with the origin moved along the tilted axes [mm]."""
-        return tilt_of(self.matrix, tuple(self.to_offset(np.array([[x, y, z]]))[0]))
-
 
 def tilt_of(rotation: Floats, origin: tuple[float, ...]) -> Tilt:
     """A tilt of R (3, 3) and o."""
