@@ -36,6 +36,8 @@ MOST_PROCESSES = 1024
 RETRIES = 2
 #: how long a cluster may be without any worker [s]
 PATIENCE_S = 30.0
+#: how long a scheduler may take to answer first [s]
+ANSWER_S = 10.0
 #: how often the cluster is asked [s]
 POLL_S = 0.02
 
@@ -308,7 +310,7 @@ def _client(address: str) -> Iterator[Any]:
     from distributed import Client
 
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=ANSWER_S)
     except (OSError, ValueError) as err:
         raise InputError(f"--dask {address}: no scheduler answers: {err}") from None
     # tiles of a stock go with their task, so that a worker that ends takes none with it

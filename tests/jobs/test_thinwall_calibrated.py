@@ -8,6 +8,7 @@ from chipload.jobs import load_job, run_job
 from chipload.jobs.thinwall.result import result_of
 
 SMALL = (
+    "operation.0.refine=false",
     "wall.length_mm=8.0",
     "wall.height_mm=9.0",
     "wall.thickness_mm=1.7",

@@ -32,6 +32,7 @@ stiffness_n_um = 40.0
 
 
 STIFF = (
+    "operation.0.refine=false",
     "wall.allowance_mm=[0.2, 0.0]",
     "wall.thickness_mm=2.4",
     "wall.elements=[3, 4]",

@@ -20,6 +20,7 @@ from chipload.structure.places import normals_of, on_cut, on_side, weights
 from chipload.structure.solid import displacement, factorise
 
 SMALL = (
+    "operation.0.refine=false",
     "wall.length_mm=10.0",
     "wall.height_mm=9.0",
     "wall.thickness_mm=2.4",

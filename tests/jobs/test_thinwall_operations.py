@@ -68,7 +68,7 @@ FINISH = {
     "layer_mm = 0.4": "layer_mm = 0.25",
     "corner_slices = 100": "corner_slices = 60",
     "reserve = 0.04": "reserve = 0.1",
-    "least_error = true\n": "",
+    "least_error = true\n": "refine = false\n",
     "compensate_um = 60.0\n": "",
 }
 
@@ -198,6 +198,9 @@ def test_refused(folder):
     )
     assert "operation.1.leave_mm = 0.1: the last operation finishes: leave it out" in said(
         lambda: job(folder, ("operation.1.leave_mm=0.1",))
+    )
+    assert "operation.0.refine: belongs to the last operation" in said(
+        lambda: job(folder, ("operation.0.refine=false",))
     )
     assert "operation.0.least_error: belongs to the last operation" in said(
         lambda: job(folder, ("operation.0.least_error=true",))

@@ -51,6 +51,7 @@ COARSE = (
     "operation.0.layer_mm=0.5",
     "operation.0.corner_slices=40",
     "operation.0.least_error=false",
+    "operation.0.refine=false",
     "limits.deflection_workpiece_um=26.0",
 )
 
@@ -183,7 +184,8 @@ def test_the_shank_beside_the_neighbour(folder, shank):
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
     """The shipped example, which has the walls and the values of :func:`job`."""
-    return run_job(load_job(copy_example("part", tmp_path_factory.mktemp("example") / "part") / "walls.toml"))
+    folder = copy_example("part", tmp_path_factory.mktemp("example") / "part")
+    return run_job(load_job(folder / "walls.toml", ["operation.0.refine=false"]))
 
 
 def test_two_walls_in_one_job(done):

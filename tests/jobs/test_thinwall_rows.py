@@ -38,6 +38,7 @@ SMALL = (
     "operation.0.layer_mm=0.3",
     "operation.0.corner_slices=60",
     "operation.0.least_error=false",
+    "operation.0.refine=false",
     "operation.0.reserve=0.15",
 )
 GIVEN = ("milling", "lean_deg", "lead_deg", "scallop_um", "compensate_um")

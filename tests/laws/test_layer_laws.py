@@ -119,9 +119,9 @@ def test_points_of_a_program_however_near_cost_the_same() -> None:
 @pytest.mark.parametrize("slope", [-0.02, -0.15, 0.1])
 def test_a_ramp(cutter: Cutter, slope: float) -> None:
     """Down and up, in material that nothing has cut: what lies below the top and goes outward cuts."""
-    begin, end = (0.2, 0.2 + 25.0 * slope) if slope < 0.0 else (-3.0, -3.0 + 25.0 * slope)
-    history = run(path([[2.0, 0.0, begin], [27.0, 0.0, end]]), cutter, step_mm=0.5)
-    found = at(history, 22.0)
+    begin, end = (-0.2, -0.2 + 12.0 * slope) if slope < 0.0 else (-3.0, -3.0 + 12.0 * slope)
+    history = run(path([[2.0, 0.0, begin], [14.0, 0.0, end]]), cutter, step_mm=0.5)
+    found = at(history, 13.0)
     tip = (found["x_mm"] - 0.25, 0.0, begin + slope * (found["x_mm"] - 0.25 - 2.0))
     exact = edge_sum(cutter, tip, (0, 0, 1), per_tooth(cutter, (1, 0, slope)), lambda p: p[..., 2] < 0.0, AL)
     assert off(found, exact, history.resolution_error) == {}

@@ -53,7 +53,7 @@ def test_pocket(name):
     assert path.cleared_share >= 0.995
     assert path.engagement_max[path.kind == CUT].max() <= wanted + 1e-4
     trail = CentrePath(path.segments, radius, None, path.kind < 3)
-    cut = np.flatnonzero(path.kind == CUT)[::10]
+    cut = np.flatnonzero(path.kind == CUT)[::40]
     rim = rim_engagement(trail, cut, np.full(len(cut), 0.5), workers=2)
     assert np.degrees(rim.angle).max() <= math.degrees(wanted) + 0.06
 

@@ -48,6 +48,7 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     "cone": ("simulation.step_mm=4.0", "simulation.layer_mm=0.5", "simulation.tolerance_mm=0.01"),
     "plate": (
         "operation.0.least_error=false",
+        "operation.0.refine=false",
         "operation.0.scallop_um=45",
         "operation.0.step_mm=3",
         "wall.length_mm=8",
@@ -58,6 +59,7 @@ SHORTER: Mapping[str, tuple[str, ...]] = {
     ),
     "blade": (
         "operation.0.least_error=false",
+        "operation.0.refine=false",
         "operation.0.layer_mm=0.5",
         "operation.0.step_mm=2.7",
         "operation.0.scallop_um=68",

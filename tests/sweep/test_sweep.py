@@ -17,6 +17,7 @@ import pytest
 from scipy.stats import norm
 from typer.testing import CliRunner
 
+from chipload import workers
 from chipload.cli import app
 from chipload.cutting.material import material_named, material_names, material_text, read_material
 from chipload.errors import InputError
@@ -202,7 +203,8 @@ def test_the_pareto_front_by_brute_force():
     assert front == {p for p in points if not any(q != p and q[0] <= p[0] and q[1] <= p[1] for q in points)}
 
 
-def test_numbers_out_of_range_are_refused(job, tmp_path):
+def test_numbers_out_of_range_are_refused(job, tmp_path, monkeypatch):
+    monkeypatch.setattr(workers, "ANSWER_S", 0.5)
     for given in ({"workers": 0}, {"confidence": 0.0}, {"dask": "tcp://127.0.0.1:1"}):
         with pytest.raises(InputError, match=r"workers|confidence|no scheduler answers"):
             run_sweep(job, OVER, tmp_path, **given)

@@ -96,9 +96,8 @@ def test_a_long_report_stays_small() -> None:
     }
     result = replace(one, tracks=(replace(own, limits=(), findings=(), blocks=lambda: iter([table])),))
     blanks = {"program": Blank(STOCK, {1: MILL})}
-    view = view_section(
-        result, drawn_bodies(result, _empty(), removal_meshes(result, blanks)), removal_meshes(result, blanks), blanks
-    )
+    stocks = removal_meshes(result, blanks)
+    view = view_section(result, drawn_bodies(result, _empty(), stocks), stocks, blanks)
     report = page_bytes(result, Presentation(lambda _: [], _empty), view)
     assert len(report) < 6_000_000 - 2_000_000  # figures bring plotly, 2 MB
     assert base64.b64decode(view[3].split(">")[1].split("<")[0])

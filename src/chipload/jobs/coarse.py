@@ -1,8 +1,8 @@
 """A first answer in a fraction of the time: a job with coarser steps, layers and tolerances.
 
 The geometry, limits and checks stay; only the resolution of the calculation changes, by overrides that the result lists
-as those of ``--set``. Plans of a thin wall that are not cut, with the least error and compensated, are left out. What
-such a run says is not proven: its result has an UNPROVEN finding.
+as those of ``--set``. Of a thin wall the first plan that holds is taken; plans that are not cut, with the least error
+and compensated, are left out. What such a run says is not proven: its result has an UNPROVEN finding.
 """
 
 from __future__ import annotations
@@ -85,6 +85,7 @@ def coarser(loaded: LoadedJob) -> tuple[str, ...]:
     if factors is SIMULATION:
         out += _of_program(loaded)
     for k, op in enumerate(table.operation) if loaded.capability.name == "thinwall" else ():
+        out += [f"operation.{k}.refine=false"] if op is table.operation[-1] and op.refine else []
         # comparisons, of which none is cut
         out += [f"operation.{k}.least_error=false"] if op.least_error else []
         out += [f"operation.{k}.compensate_um=0.0"] if op.compensate_um else []

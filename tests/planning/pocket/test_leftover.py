@@ -42,7 +42,7 @@ def chambers() -> Region:
 def test_a_plan_leaves_what_the_discs_along_its_path_do_not_reach() -> None:
     """The union of buffers asks no stock; chords of both leave arcs by 2e-5 R."""
     region = chambers()
-    path = clear_region(region, R, math.radians(36.0))
+    path = clear_region(region, R, math.radians(60.0))
     raised = path.kind >= LIFT
     raised[0] = True
     points, breaks = polyline(

@@ -276,6 +276,8 @@ def _of_several(table: ThinWallJobTable, least: float) -> Iterator[str]:
             for key in ("least_error", "compensate_um"):
                 if getattr(op, key):
                     yield f"{where}.{key}: belongs to the last operation, which makes the form error: move it there"
+            if not op.refine:
+                yield f"{where}.refine: belongs to the last operation and holds for all of them: move it there"
             found = op.leave_mm
     if table.dynamics is not None and any(op.rows is not None for op in table.operation):
         yield "dynamics: for planned rows only: leave it out, or operation.rows"

@@ -261,6 +261,11 @@ class WallOperationTable(Table):
         le=200.0,
         description="greatest shift of the last passes that corrects their form error; 0: no plan with shifted passes",
     )
+    refine: bool = Field(
+        True,
+        description="true: plan and simulate again until a plan uses 95 % of the limit; false: take the first plan "
+        "that holds",
+    )
     layer_mm: Positive = Field(le=1.0, description="thickness of the layers of the simulation")
     tolerance_mm: Positive = Field(
         0.001, ge=1e-6, le=0.05, description="greatest deviation of chords from the edges of chips"

@@ -162,7 +162,7 @@ def _smallest(places: Places, planned: Planned) -> bool:
 
 def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Variant:
     """Variable depths within the limit: planned, simulated, and corrected by the simulation. The result is the fastest
-    plan that holds; where none holds, the one that exceeds least.
+    plan that holds, or the first where the job does not ask for more; where none holds, the one that exceeds least.
 
     Parameters
     ----------
@@ -172,6 +172,7 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
     places = tried.places
     inputs = places.inputs
     modelled, held = inputs.depths.experiments is None, inputs.depths.deflection
+    refine = inputs.job.operation.refine
     best: Variant | None = None
     least: list[tuple[float, Variant]] = []  # of those that exceed, the one that exceeds least
     assumed, share = _room(like)
@@ -184,6 +185,8 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
         over, good = _over(one, modelled, assumed)
         if good and (best is None or one.seconds < best.seconds):
             best, tried.planned["variable"], tried.corrections, tried.share = one, planned, corrections, share
+            if not refine:
+                break
         elif not good:
             least = [min([*least, (over, one)], key=lambda pair: pair[0])]
         used = best is not None and (not modelled or best.over_with_error(modelled) >= USED_SHARE)
@@ -192,7 +195,7 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
         measured = _measured(places, one, corrections, even_stock=False)
         if not good:
             measured = _greater(corrections, measured)
-            share *= HOLD / over if turn >= ROUNDS - 1 and math.isfinite(over) else 1.0
+            share *= HOLD / over if (turn >= ROUNDS - 1 or not refine) and math.isfinite(over) else 1.0
         # what is left of the limit is used
         raised = good and not used and over > 0.0
         share *= FULL / over if raised else 1.0
