@@ -33,7 +33,7 @@ def test_a_table_of_numbers_is_no_program(tmp_path: Path) -> None:
     assert code == 2
     assert said == (
         "chipload: points.txt: neither NC text nor CL data nor a table with a heading of its columns: "
-        "line 1: character '5': begins no word\n"
+        "line 1: character '5': does not begin a word\n"
     )
 
 

@@ -87,7 +87,7 @@ def run(
                     raise
                 raise Cancelled(
                     f"{kept.what_is_kept()} in {kept.folder.name}: the same command continues from there; with "
-                    "--fresh it begins again"
+                    "--fresh it starts from the beginning"
                 ) from None
             kept.discard()
         show(done.result.message)

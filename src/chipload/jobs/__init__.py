@@ -271,10 +271,10 @@ def run_job(
 
 
 def resume_note(loaded: LoadedJob) -> str:
-    """What of a job is not kept while it runs, so that it begins again where it is stopped; empty: all is kept."""
+    """The parts of a job that are not kept, so that it starts again if it is stopped; empty: all is kept."""
     capability = loaded.capability
     if not capability.resumes:
-        return f"{_article(capability.name)} job does not resume: if it is stopped, it begins again"
+        return f"{_article(capability.name)} job does not resume: if it is stopped, it starts again"
     return str(capability.module("job").resume_note(loaded.job))
 
 

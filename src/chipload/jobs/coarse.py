@@ -1,4 +1,4 @@
-"""A first answer in a fraction of the time: a job with coarser steps, layers and tolerances.
+"""A first result in a fraction of the time: a job with coarser steps, layers and tolerances.
 
 The geometry, limits and checks stay; only the resolution of the calculation changes, by overrides that the result lists
 as those of ``--set``. Plans of a thin wall that are not cut, with the least error and compensated, are left out. What

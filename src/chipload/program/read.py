@@ -1,4 +1,4 @@
-"""Any program file: who reads it, what it does on a machine, what is wrong with it there.
+"""Program files of all dialects: the reader, the motions on a machine, the violations of its limits.
 
 Notation: a **source** is a text of axes (RS-274, conversational: Commands) or of the tip (APT: Program). With a machine
 each leads to the other, so that a :class:`ProgramReading` always has both.
@@ -67,7 +67,7 @@ class ProgramReading:
     machine : on which it was read
     placed : number of the work offset whose coordinates are those of the workpiece; None: the first that is used
     findings : by the reader
-    violations : what the program asks of the machine that it does not give
+    violations : violations of the machine's limits
     """
 
     commands: Commands

@@ -98,8 +98,8 @@ def _segment_times(s: Segments, joints: Joints, planner: TrajectoryPlanner) -> F
     whole = joints.length[j] + np.where(eaten[j], length[j], 0.0)
     speeds[arcs] = np.minimum(speeds[arcs], whole / (planner.cycle * LEAST_CYCLES))
     most[arcs] = TANGENTIAL * joints.acceleration[j]
-    gone = np.flatnonzero(eaten)
-    speeds[place[gone]], most[place[gone]] = speeds[place[gone] + 1], most[place[gone] + 1]
+    absorbed = np.flatnonzero(eaten)
+    speeds[place[absorbed]], most[place[absorbed]] = speeds[place[absorbed] + 1], most[place[absorbed] + 1]
     limit = np.zeros(count + 1)
     limit[1:-1] = np.minimum(speeds[:-1], speeds[1:])
     at = place + 1
@@ -107,7 +107,7 @@ def _segment_times(s: Segments, joints: Joints, planner: TrajectoryPlanner) -> F
     slow = np.flatnonzero(smooth)
     limit[at[slow]] = np.minimum(limit[at[slow]], joints.speed[slow])
     there = np.ones(count, dtype=bool)
-    there[place[gone]] = False
+    there[place[absorbed]] = False
     limit = _looked_ahead(limit, lengths, most, there, planner.lookahead)
     v, _ = limited_speed(np.concatenate([[0.0], np.cumsum(lengths)]), limit, most)
     seconds = _passed(lengths, speeds, most, v, limit, rapid, planner)

@@ -203,7 +203,7 @@ def _refusal(path: Path, refused: Sequence[tuple[Machine, InputError]], shipped:
             "name a machine that has (--on)"
         )
     why = reasons[0]
-    if "begins no word" in why:
+    if "does not begin a word" in why:
         return InputError(f"{path.name}: neither NC text nor CL data nor a table with a heading of its columns: {why}")
     return refused[0][1]
 

@@ -61,17 +61,17 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         "program",
         "surface",
         "lines",
-        "asked [mm]",
-        "most between passes [mm]",
+        "limit [mm]",
+        "greatest between passes [mm]",
         "mean scallop height [mm]",
-        "of asked [%]",
+        "of the limit [%]",
     ]
     scallop += ["scallops", "of the patch within [%]"]
     turn = np.degrees(milled.impeller.pitch)
     left = [
         [
             c.name, str(len(c.left.rest)), f"{c.asked:g}", f"{c.greatest[0]:.4f}", f"{100.0 * c.share:.2f}",
-            '<span class="no">left higher</span>' if c.fails else '<span class="ok">as asked</span>',
+            '<span class="no">above the limit</span>' if c.fails else '<span class="ok">within the limit</span>',
         ]
         for c in milled.covered or ()
     ]  # fmt: skip
@@ -89,11 +89,13 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         figure("paths", paths_figure(milled), figures),
         *_flank_section(milled),
         *_points_section(milled),
-        "<h2>What all programs leave</h2>",
+        "<h2>Material left by all programs</h2>",
         f'<p class="note">Measured along rays on points of every surface, at most {spacing:g} mm apart, as far as its '
         "patches go: the least that any of the programs leaves. Where lines miss, rest passes or a neighbour may have "
-        "milled; what is left higher than asked is red.</p>",
-        table(["surface", "points", "asked [mm]", "most left [mm]", "area within [%]", ""], left, numbers=(1, 2, 3, 4)),
+        "milled. Values above the limit are red.</p>",
+        table(
+            ["surface", "points", "limit [mm]", "greatest left [mm]", "area within [%]", ""], left, numbers=(1, 2, 3, 4)
+        ),
         *(figure(f"left{k}", left_figure(c), figures) for k, c in enumerate(milled.covered or ())),
     ]
 
@@ -127,7 +129,7 @@ def _points_section(milled: ImpellerResult) -> list[str]:
         ]
         for name, p in points_names(milled)
     ]  # fmt: skip
-    head = ["program", "lines", *_FIVE_AXIS, "mean scallop of asked [%]", "greatest turn of the axis [deg/mm]"]
+    head = ["program", "lines", *_FIVE_AXIS, "mean scallop of the limit [%]", "greatest turn of the axis [deg/mm]"]
     return [
         "<h2>Point milling on five axes</h2>",
         '<p class="note">Each surface in one path with a smooth axis, beside the programs above; path and time of one '
@@ -138,7 +140,7 @@ def _points_section(milled: ImpellerResult) -> list[str]:
 
 
 #: columns of every program on five axes, after its name and its passes
-_FIVE_AXIS = ("machine", "cutter [mm]", "path [mm]", "time [min]", "most left [mm]", "deepest gouge [mm]", "check")
+_FIVE_AXIS = ("machine", "cutter [mm]", "path [mm]", "time [min]", "greatest left [mm]", "deepest gouge [mm]", "check")
 
 
 def _five_axis_cells(p: CheckedFlank | CheckedPoints) -> list[str]:

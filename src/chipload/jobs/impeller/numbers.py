@@ -202,7 +202,7 @@ def _roughing(milled: ImpellerResult) -> dict[str, Any]:
 
 
 def _finished(milled: ImpellerResult) -> dict[str, Any]:
-    """What all programs leave together."""
+    """Material that all programs together leave."""
     programs, covered = milled.programs or (), milled.covered or ()
     scallops = [x for p in programs for x in p.scallops]
     count = sum(x.count for x in scallops)

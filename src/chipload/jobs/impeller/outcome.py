@@ -35,9 +35,9 @@ PICKED = "hand-picked"
 REASONS: Mapping[str, str] = {
     "turned away": "no table angle faces it",
     "curvature": "every corner radius of the catalogue is larger than its radius of curvature",
-    "cutting part": "the smallest cutters of the catalogue meet other walls",
-    "above": "neck, shank or holder meet other walls",
-    "between": "every cutter that is clear of the check points meets a wall between them",
+    "cutting part": "the smallest cutters of the catalogue collide with other walls",
+    "above": "neck, shank or holder collide with other walls",
+    "between": "every cutter that is clear of the check points collides with a wall between them",
 }
 
 
@@ -162,7 +162,7 @@ class Checked:
     gouge : deepest that any part of the tool comes below a surface, between bounds
     allowed : what of it is allowed [mm]
     scallops : of each patch
-    findings : what the program asks of the machine that it does not give
+    findings : violations of the machine's limits
     seconds : time of one channel, as the text takes it on the machine [s]
     cutting : of that in tracks; the rest is leads, links and rapids [s]
     between : from the end of one channel to the beginning of the next [s]
@@ -205,7 +205,9 @@ class Checked:
         for m, s in zip(self.setting.millings, self.scallops, strict=True):
             if not s.holds:
                 where = f"{BODIES[m.patch.body]} {m.patch.side}"
-                out.append(f"{self.name}, {where}: {s.greatest:.4f} mm are left between passes: asked {s.asked:g}")
+                out.append(
+                    f"{self.name}, {where}: {s.greatest:.4f} mm left between passes: scallop_mm = {s.asked:g} allowed"
+                )
         loads = self.setting.loads
         if loads is not None and len(loads.feed):
             for what, values, most, unit in loads.columns:
@@ -261,10 +263,12 @@ class Covered:
         x, y, z = wall.points[k].tolist()
         over = float(wall.area[self.left.rest > self.asked].sum())
         least = f"{most:.3f} mm" if most < self.left.height else f"{most:g} mm or more"
-        lost = f", on {self.unreached:.1f} mm2 of it no cutter was found to go" if self.unreached > 0.0 else ""
+        unreached_note = (
+            f", on {self.unreached:.1f} mm2 of it no cutter was found to go" if self.unreached > 0.0 else ""
+        )
         return (
             f"{self.name}: on {over:.1f} mm2, {100.0 * (1.0 - self.share):.2g} % of what is milled, more than "
-            f"{self.asked:g} mm is left: {least} at ({x:.2f}, {y:.2f}, {z:.2f}){lost}",
+            f"{self.asked:g} mm is left: {least} at ({x:.2f}, {y:.2f}, {z:.2f}){unreached_note}",
         )
 
 
@@ -454,10 +458,10 @@ def unmilled(milled: ImpellerResult) -> tuple[str, ...]:
     if milled.used is None:
         return (f"{milled.partitions[-1].name} of the catalogue do not mill all that can be reached",)
     divided = milled.used.divided
-    untold = divided.untold if divided else 0
+    undecided = divided.untold if divided else 0
     return (
-        (f"{untold} ranges of pallet angles had too many arcs to be decided: they are taken as blocked",)
-        if untold
+        (f"{undecided} ranges of pallet angles had too many arcs to be decided: they are taken as blocked",)
+        if undecided
         else ()
     )
 

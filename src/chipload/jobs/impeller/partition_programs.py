@@ -117,7 +117,7 @@ def checked_partitions(
 
 
 def _from(progress: Progress, done: float) -> Progress:
-    """Tells what is done, at the same share of all."""
+    """Forward the share that is done, scaled to the whole."""
     return lambda _, what: progress(done, what)
 
 
@@ -175,8 +175,8 @@ def _same(a: Partition, b: Partition) -> bool:
 
 
 def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[tuple[int, MeasuredCost]]:
-    """For each patch the number of its side, and what its program takes; rest passes count to the patch they mend."""
-    taken: dict[int, float] = {}
+    """For each patch the number of its side and the cost of its program; rest passes count to the patch they finish."""
+    rest_time: dict[int, float] = {}
     millings = [m for s in done.plan.settings for m in s.millings]
     for s in done.plan.settings:
         seconds = times_on(s.program, machine)
@@ -185,12 +185,12 @@ def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[
         for number, time in zip(s.linked.track.tolist(), seconds.tolist(), strict=True):
             if number >= 0:
                 owner = id(owners[number].patch)
-                taken[owner] = taken.get(owner, 0.0) + time
+                rest_time[owner] = rest_time.get(owner, 0.0) + time
     out = []
     for m in millings:
         own, order, table, bare = _place(costs, m.patch)
         number = next(k for k, c in enumerate(costs) if c is own)
-        row = MeasuredCost(order, m.patch.cutter, table, bare, taken.get(id(m.patch), 0.0))
+        row = MeasuredCost(order, m.patch.cutter, table, bare, rest_time.get(id(m.patch), 0.0))
         out.append((number, row))
     return out
 
@@ -233,9 +233,9 @@ def _left_shares(programs: Sequence[Checked], covered: Sequence[Covered]) -> lis
     """The most that is left in each patch and on each surface, as a share of what is asked, and whether some of the
     surface is known to be out of reach.
     """
-    lost = {(c.body, c.side): c.unreached > 0.0 for c in covered}
+    out_of_reach = {(c.body, c.side): c.unreached > 0.0 for c in covered}
     patches = [
-        (x.greatest / x.asked, lost[m.patch.body, m.patch.side])
+        (x.greatest / x.asked, out_of_reach[m.patch.body, m.patch.side])
         for p in programs
         for x, m in zip(p.scallops, p.setting.millings, strict=True)
     ]
@@ -248,7 +248,7 @@ def _refinable(left: Sequence[tuple[float, bool]]) -> bool:
     >>> _refinable([(0.9, False), (1.4, True)]), _refinable([(1.4, False)]), _refinable([(1.2, True)])
     (False, True, True)
     """
-    return any(x > 1.0 and (x <= _NEARLY or not lost) for x, lost in left)
+    return any(x > 1.0 and (x <= _NEARLY or not out_of_reach) for x, out_of_reach in left)
 
 
 def _rank(left: Sequence[tuple[float, bool]], seconds: float) -> tuple[int, float, float]:

@@ -96,7 +96,7 @@ def load(path: Path, table: ThinWallJobTable, overrides: Sequence[str]) -> ThinW
 
 def resume_note(job: ThinWallJob) -> str:
     """Note on the part of the work that is not kept while the job runs: the plan that is being simulated."""
-    return "plans that were simulated are kept; the simulation of a plan does not resume: stopped, it begins again"
+    return "simulated plans are kept; the simulation of a plan does not resume: if it is stopped, it starts again"
 
 
 def missing(values: Mapping[str, Any]) -> list[str]:

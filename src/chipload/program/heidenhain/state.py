@@ -1,4 +1,4 @@
-"""What holds while a conversational program is carried out, and the rows that it makes.
+"""State of a conversational program while it is executed, and the rows that it produces.
 
 Notation: ``at`` (9) is the programmed position [mm, rad]; beside a contour (RL, RR) the tool's centre stands elsewhere,
 and ``lag`` (2) [mm] is by how much it still does after R0, until X or Y is given. Axes in ``unknown`` stand where the
@@ -31,7 +31,7 @@ RADIUS_Q = 108
 
 
 class ConversationalState:
-    """State and outlets of one reading.
+    """State and output of one reading.
 
     Parameters
     ----------
@@ -239,11 +239,11 @@ class ConversationalState:
             self._carry(piece)
 
     def sharp(self, text: str) -> None:
-        """Say that a corner stays sharp; ``text`` asked for another."""
+        """Report that a corner stays sharp; ``text`` is the block that requests another."""
         self.unproven("heidenhain-corner", f"{text[:40]}: the corner stays sharp: its rounding or chamfer is left out")
 
     def _flush(self) -> None:
-        """Carry out what waits for a corner that does not come."""
+        """Execute the motion that waits for a corner block."""
         waiting, corner = self._waiting, self._corner
         self._waiting = self._corner = None
         if waiting is not None:

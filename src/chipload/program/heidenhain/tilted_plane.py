@@ -159,10 +159,10 @@ def _turn_about_tip(s: ConversationalState, target: NDArray[np.float64]) -> None
     s.end_contour()
     if np.abs(target[3:6] - np.array(s.at[3:6])).max() < STILL:
         return
-    held, s.tcp = s.tcp, True
+    tcp_before, s.tcp = s.tcp, True
     s.at = [*s.at[:3], *target[3:6].tolist(), *s.at[6:]]
     s.row(RAPID, s.at)
-    s.tcp = held
+    s.tcp = tcp_before
 
 
 def axes_of(s: ConversationalState) -> NDArray[np.float64]:
