@@ -30,7 +30,7 @@ def finding_lines(reading: ProgramReading) -> list[str]:
     rest = sorted((*(f for f in reading.findings if f not in gaps), *reading.violations), key=lambda f: f.line)
     return [
         *(f"{text} [unproven]" for _, text in grouped(gaps)),
-        *(f"{text}{' [does not hold]' if id(f) in broken else ''}" for f, text in grouped(rest)),
+        *(f"{text}{' [exceeds]' if id(f) in broken else ''}" for f, text in grouped(rest)),
     ]
 
 

@@ -61,7 +61,9 @@ def hal(
     ] = "/usr/bin/python3",
     panel: Annotated[
         Path | None,
-        typer.Option("--panel", metavar="FILE", help="only write the panel (PyVCP, .xml), and its .hal file beside it"),
+        typer.Option(
+            "--panel", metavar="FILE", help="only write the panel (PyVCP, .xml), and its .hal file next to it"
+        ),
     ] = None,
     debug: Debug = False,
 ) -> None:

@@ -4,7 +4,7 @@ Notation: y samples of torque or current at f_s [Hz]; n speed of the spindle [re
 mean, under a Hann window; P power of a line of its spectrum. A steady cut repeats itself with each revolution, so that
 its lines stand at k n; those within two lines of a harmonic are left out. The root mean square of what is left is
 ``level``, its share of the whole alternating power ``share``, the frequency of its greatest line ``hertz``. Chatter
-has a frequency of its own beside the harmonics. Harmonics above f_s / 2 fold back into the spectrum: as many as are
+has a frequency of its own between the harmonics. Harmonics above f_s / 2 fold back into the spectrum: as many as are
 stated are left out there too, and a frequency above f_s / 2 is told folded; the signal should have a filter before it
 is sampled.
 
@@ -108,7 +108,7 @@ class ListeningRules:
 
 @dataclass(frozen=True)
 class HeardWindow:
-    """Content of a window of the signal beside the harmonics of the spindle speed.
+    """Content of a window of the signal outside the harmonics of the spindle speed.
 
     ``level`` is in units of the signal, ``hertz`` the frequency of its greatest line [Hz].
     """
@@ -134,7 +134,7 @@ def listen(signal: ArrayLike, speed: ArrayLike, rules: ListeningRules) -> HeardW
 
     Examples
     --------
-    A line at 333 Hz beside the harmonics of 50 rev/s:
+    A line at 333 Hz between the harmonics of 50 rev/s:
 
     >>> t = np.arange(500) / 2000.0
     >>> rules = ListeningRules(2000.0, 0.05)
@@ -226,7 +226,7 @@ class ChatterGuard:
         self._loud = 0
         self._bad.append(float(np.mean(np.asarray(speed, dtype=np.float64))))
         found = self._quiet() if self._changes < self.rules.changes else None
-        said = f"chatter at {heard.hertz:.4g} Hz, {heard.level:.3g} beside the harmonics"
+        said = f"chatter at {heard.hertz:.4g} Hz, level {heard.level:.3g} outside the harmonics"
         if found is None:
             why = "no quiet speed within the override" if self._changes < self.rules.changes else "after all changes"
             self.override = 0.0

@@ -220,7 +220,7 @@ def fit_average(cuts: Sequence[MeasuredCut], cutter: Cutter) -> Fit:
     feeds = len({round(cut.feed_per_tooth(cutter.flutes), 9) for cut in cuts})
     notes: list[str] = []
     if feeds == 2:
-        notes.append("two feeds: whether force is a straight line in feed cannot be seen; intervals count turns only")
+        notes.append("two feeds do not show whether the force is linear in the feed; intervals count turns only")
     linear, identified, spread = np.zeros(6), np.zeros(6, dtype=bool), np.zeros((6, 6))
     residual, r2, freedom = np.full(3, np.nan), np.full(3, np.nan), 10**9
     for channels, which in (((0, 1), PLANE), ((2,), AXIS)):

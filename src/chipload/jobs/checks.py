@@ -94,7 +94,7 @@ def default_checks(
     Raises
     ------
     InputError
-        More than the mean is asked of a material that does not say how sure its coefficients are.
+        More than the mean is requested of a material that does not state the uncertainty of its coefficients.
     """
     sigma = NormalDist().inv_cdf(confidence)
     if sigma > 0.0 and not material.has_band:

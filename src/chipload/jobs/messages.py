@@ -183,4 +183,4 @@ def nearest_key(key: str, known: Sequence[str]) -> str:
     """The known key with the same first word (so that a wrong unit finds its key), else the nearest in spelling."""
     word = key.split("_")[0]
     same = [k for k in known if k.split("_")[0] == word]
-    return (difflib.get_close_matches(key, same or list(known), 1, 0.0) or ["none: this is no table"])[0]
+    return (difflib.get_close_matches(key, same or list(known), 1, 0.0) or ["none: not a table"])[0]

@@ -60,7 +60,7 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
             raise InputError(f"--out {out}: is not a folder: name a folder that is new, empty or holds an older result")
         if target.exists() and any(target.iterdir()) and not (ours or _ours)(target):
             raise InputError(
-                f"--out {out}: holds files that are no {what} of chipload: name a folder that is new, empty or "
+                f"--out {out}: holds files that are not a {what} of chipload: name a folder that is new, empty or "
                 f"holds an older {what}"
             )
         above = next(p for p in target.parents if p.exists())

@@ -443,7 +443,7 @@ def _kept(removal: Removal) -> tuple[Cuts, ...]:
             raise InputError("deflection: the program cuts nothing")
         if not removal.columns["chip_areas"].any():
             return ()  # films, narrower than a few tolerances, have no loads
-        raise InputError("deflection: the removal did not keep what the teeth cut: remove(..., keep=True)")
+        raise InputError("deflection: the removal did not keep the tooth engagement: remove(..., keep=True)")
     return removal.cuts
 
 

@@ -1,7 +1,7 @@
 """Quiet speeds: the least margin of several cuts over spindle speed, its windows, and the best speed.
 
 Notation: margin as in :mod:`chipload.stability.margin`; at each speed the least over all cuts is used. A window is a
-range of the calculated speeds in which it is at least the wanted margin. The advised speed has the greatest least
+range of the calculated speeds in which it is at least the required margin. The advised speed has the greatest least
 margin. If many speeds have it (the greatest margin that is calculated), it is the one farthest from where the margin
 falls, then the nearest to the present speed.
 """
@@ -53,7 +53,7 @@ class QuietSpeeds:
 
     @property
     def windows(self) -> tuple[SpeedWindow, ...]:
-        """Windows with the wanted margin, by speed."""
+        """Windows with the required margin, by speed."""
         return speed_windows(self.speed, self.margin, self.wanted)
 
     def advised(self, present: float) -> tuple[float, float]:

@@ -2,7 +2,7 @@
 
 Notation: margin (p, s) of p passes in their order at s speeds, the least over the cuts of a pass. Between two passes
 the cutter is out of the material, so that its speed can change there. The required margin of a pass is its greatest
-over the speeds, but at most the greater of the wanted margin and the greatest margin of the worst pass. A zone is the
+over the speeds, but at most the greater of the required margin and the greatest margin of the worst pass. A zone is the
 longest run of passes for which one speed gives the required margin. Taken from the first pass on, this gives the fewest
 zones.
 """

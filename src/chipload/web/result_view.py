@@ -86,7 +86,7 @@ class ResultView:
             )
             self.speed.on("popup-hide", js_handler=RELEASE)
             with self.speed:
-                ui.tooltip("the whole in 30 s, or times as fast as the machine")
+                ui.tooltip("the whole track in 30 s, or a multiple of the machine's speed")
             self.slider = (
                 ui.slider(min=0.0, max=1.0, step=0.001, value=0.0).props('dense aria-label="step"').classes("cl-slider")
             )

@@ -44,8 +44,8 @@ PINS: tuple[tuple[str, str, str], ...] = (
 
 
 class PinValues(NamedTuple):
-    """What the in pins read: time [s], position [mm], velocity on the path [mm/s], torque [N m], override in force,
-    current of the spindle [A] and its speed [rev/s], as LinuxCNC's `spindle.0.speed-in`, spindle override in force.
+    """What the in pins read: time [s], position [mm], velocity on the path [mm/s], torque [N m], override in effect,
+    current of the spindle [A] and its speed [rev/s], as LinuxCNC's `spindle.0.speed-in`, spindle override in effect.
     """
 
     time: float

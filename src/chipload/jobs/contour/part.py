@@ -110,7 +110,7 @@ def require_within_travel(contours: Sequence[Contour], machine: Machine, radius:
             remedy = (
                 f"move it by part.origin_mm, {axis} by {middle:.6g}"
                 if high - low - 2.0 * radius <= most - least
-                else "name a machine with more travel, or see whether part.units is right"
+                else "name a machine with more travel, or check part.units"
             )
             raise InputError(
                 f"part: {axis} from {low:.6g} to {high:.6g} mm: machine {machine.name} travels from {least:g} to "

@@ -231,7 +231,7 @@ def _above_limit(job: ContourJob, k: int, op: OperationTable, cutter: Cutter) ->
         return []
     most = cutter.radius * (1.0 - math.cos(math.radians(limit)))
     return [
-        f"limits.engagement_deg = {limit:g} cannot be held: operation {k} asks for {asked:.4g} deg along a straight "
+        f"limits.engagement_deg = {limit:g} cannot be held: operation {k} needs {asked:.4g} deg along a straight "
         f"wall: state a radial depth of at most {most:.4g} mm, or a greater limit"
     ]
 
@@ -405,7 +405,7 @@ def verify(
     """
     before = strategy.drawn.get("stock before", ())
     if not before and op.kind != "pocket":
-        return PlanVerification(Verdict.UNPROVEN, "the planner does not say what stock the program starts from")
+        return PlanVerification(Verdict.UNPROVEN, "the planner does not state the stock from which the program starts")
     # eased joints may leave the drawn wall to either side, a cutter may leave stock in a corner; the path of a pocket
     # lies within a tolerance of its region, and what it leaves over is judged by its area, which the planner reports
     leave = op.tolerance_mm or 0.0

@@ -84,7 +84,7 @@ def draft_blade_model(file: Path, folder: Path, model: Model, machine: str | Non
             patch_of(face, "its patch", FIT_MM)
     except InputError as err:
         raise InputError(
-            f"{file.name}: the largest curved faces, {front.number} and {back.number}, are no sides of a thin wall: "
+            f"{file.name}: the largest curved faces, {front.number} and {back.number}, are not sides of a thin wall: "
             f"{err}; chipload check {file.name} lists all faces: write the job with those of one blade"
         ) from None
     rest: list[Face] = [f for f in model.faces if f not in (front, back)]

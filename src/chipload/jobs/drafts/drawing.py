@@ -133,8 +133,8 @@ def _origin(contours: Sequence[Contour], machine: Machine) -> list[Entry]:
         if high[k] - low[k] > most[k] - least[k]:
             raise InputError(
                 f"the drawing is {high[k] - low[k]:.6g} mm wide in {axis}, machine {machine.name} travels "
-                f"{most[k] - least[k]:g} mm: name a larger one (--on of init, --machine of simulate), or see whether "
-                "the unit is right"
+                f"{most[k] - least[k]:g} mm: name a larger one (--on of init, --machine of simulate), or check "
+                "the unit"
             )
     middle = [round(float(v), 3) for v in 0.5 * (low + high) - 0.5 * (least + most)]
     return [Entry("origin_mm", middle, f"the middle: the drawing lies beyond the travel of {machine.name}", True)]

@@ -193,12 +193,12 @@ def _stock(document: Document, job: DocumentObject, name: str) -> tuple[Box, str
             mesh = read_mesh(step, unit=None, key="stock", chord_mm=CHORD_MM)
     except InputError:
         return None
-    # a stock that is no box has more room in its box than material: a guess
+    # a stock that is not a box has more room in its box than material: a guess
     box = abs(float(mesh.volume) / float(np.prod(np.ptp(mesh.bounds, axis=0))) - 1.0) < 1e-6
     return (
         _corner(mesh.bounds[0]),
         _corner(mesh.bounds[1]),
-    ), where if box else f"the box around the {where}, which is no box"
+    ), where if box else f"the box around the {where}, which is not a box"
 
 
 def _corner(values: Iterable[float]) -> tuple[float, float, float]:

@@ -362,7 +362,7 @@ def _material_table(header: Header) -> DraftTable:
         entry = Entry("name", name, f"by the comment ({where}); chipload materials lists all", True)
     else:
         own = header.unknown_material
-        why = f"none that is shipped is like {own}" if own else "the file names no material"
+        why = f"no shipped material is like {own}" if own else "the file names no material"
         entry = Entry("name", "al7075-t6", f"{why}; chipload materials lists all", True)
     return DraftTable("material", (entry,))
 

@@ -56,7 +56,7 @@ def _program(project: dict[str, Any], file: Path) -> Path:
         else "put it beside the project"
     )
     raise InputError(
-        f"{file.name}: none of its files is an NC text that is there ({', '.join(names)[:200] or 'it names none'}): "
+        f"{file.name}: none of its files is an NC text that exists ({', '.join(names)[:200] or 'it names none'}): "
         f"{remedy}"
     )
 

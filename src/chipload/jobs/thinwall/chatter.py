@@ -55,7 +55,7 @@ class WallChatter:
     Parameters
     ----------
     inputs : of the job
-    cutting : cutter, damping and wanted margin
+    cutting : cutter, damping and required margin
     count : modes of the wall
     speeds : (s,) float [rad/s] that a pass may have, rising
     """

@@ -247,7 +247,7 @@ def _of_flanks(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator
     if cutter.overhang <= beside:
         yield (
             f"cutter.{op.cutter}.overhang_mm = {cutter.overhang:g}: must be above {beside:g}: the cutter stands along "
-            "the wall, and its holder would run into it"
+            "the wall, and its holder would collide with it"
         )
     thinner = cutter.shank_diameter is not None and cutter.shank_diameter < cutter.diameter
     if cutter.flute_length < beside and not thinner:

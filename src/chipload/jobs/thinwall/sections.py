@@ -234,7 +234,7 @@ def _checked(walled: ThinWallResult) -> str:
     texts = [
         f"Path of {USED} against the finished wall: the cutter comes no nearer than {1000.0 * s.nearest:.3g} µm "
         f"(below 0 it would gouge; {walled.settings['gouge_tolerance_mm']:g} mm is allowed for chords).",
-        f"What is left of the stock against the finished wall: at most {1000.0 * s.gouge:.3g} µm into it, "
+        f"Remaining stock against the finished wall: at most {1000.0 * s.gouge:.3g} µm into it, "
         f"{1000.0 * s.left:.3g} µm over it above the foot ({s.points} points of its sections).",
     ]
     return items(texts)

@@ -106,7 +106,7 @@ def forward_pass(old: Contour, radius: float, a: float, step: float) -> ForwardP
     for i in range(n + 1):
         o = q + radius * np.array([-t[1], t[0]])
         if centres and float((o - centres[-1]) @ t) <= 0.0:
-            event = _stop("forward-stops", o, "the centre stops or turns back: no pass of this cutter goes on")
+            event = _stop("forward-stops", o, "the centre stops or turns back: no pass of this cutter continues")
             break
         centres.append(o)
         headings.append(t)

@@ -411,7 +411,7 @@ def _events(job: _Job, runs: list[ContourPass], history: Columns, name: str) -> 
 
 
 def _overshoots(job: _Job, runs: list[ContourPass]) -> list[Event]:
-    """Joints of the finish path where the cutter cannot make the surface that constant engagement asks for."""
+    """Joints of the finish path where the cutter cannot make the surface that constant engagement needs."""
     out = []
     wanted = job.setting.engagement(job.radius)
     surface = np.vstack([r.stock.segments for r in runs if r.name == "finish"])
@@ -438,7 +438,7 @@ def _overshoots(job: _Job, runs: list[ContourPass]) -> list[Event]:
 def _semifinish_overshoots(job: _Job, histories: list[Columns]) -> list[Event]:
     """The greatest engagement of every semi-finish pass but the first that rises above a*, one event a pass.
 
-    Each pass back raises the curvature of O*, until a cutter of radius R cannot make the surface it asks for. The
+    Each pass back raises the curvature of O*, until a cutter of radius R cannot make that surface. The
     finish pass has its own events.
     """
     wanted = math.degrees(job.setting.engagement(job.radius))
@@ -452,8 +452,8 @@ def _semifinish_overshoots(job: _Job, histories: list[Columns]) -> list[Event]:
         if highest > wanted + OVERSHOOT_DEG:
             text = (
                 f"semi-finish pass {number} of {len(histories) - len(job.finish)}: the engagement rises to "
-                f"{highest:.4g} deg here, {wanted:.4g} deg are wanted: the cutter cannot make the surface that "
-                "constant engagement asks of the pass before"
+                f"{highest:.4g} deg here, {wanted:.4g} deg are required: the cutter cannot make the surface that "
+                "constant engagement requires of the preceding pass"
             )
             out.append(Event("semifinish-overshoot", float(h["x_mm"][k]), float(h["y_mm"][k]), text))
     return out
@@ -492,7 +492,7 @@ def _thin_stock(job: _Job, runs: list[ContourPass]) -> list[Event]:
         Event(
             "stock-thin",
             *place,
-            f"constant engagement asks for {worst:.4g} mm of stock on the wall here, roughing leaves {rough:.4g} mm: "
+            f"constant engagement needs {worst:.4g} mm of stock on the wall here, roughing leaves {rough:.4g} mm: "
             f"raise semifinish_depth_mm by {worst - rough:.4g}",
             failure=True,
         )

@@ -234,7 +234,7 @@ class _Run:
         self.add(line, ENTRY, math.pi)
         self.stock.remove_segments(np.column_stack([ends[:1], ends[1:], np.zeros((1, 3))]))
         long = float(np.hypot(*(ends[1] - ends[0])))
-        self.events.append(Event("pocket-entry", x, y, f"ramp of {long:.4g} mm to and fro: a full slot by its nature"))
+        self.events.append(Event("pocket-entry", x, y, f"ramp of {long:.4g} mm to and fro: cuts a full slot"))
         n = max(2, math.ceil(long / self.step))
         for p, q in (ends, line):
             points = p + np.linspace(0.0, 1.0, n + 1)[:, None] * (q - p)
@@ -252,7 +252,7 @@ class _Run:
         self.add(half, ENTRY, math.pi, circle)
         self.stock.remove_segments(np.column_stack([half[::-1], half, circle]))
         self.events.append(
-            Event("pocket-entry", x, y, f"helical bore of diameter {2.0 * (R + rh):.4g} mm: a full slot by its nature")
+            Event("pocket-entry", x, y, f"helical bore of diameter {2.0 * (R + rh):.4g} mm: cuts a full slot")
         )
         self.starts.add(np.column_stack([x + rh * np.cos(a), y + rh * np.sin(a)]), a + 0.5 * math.pi)
 

@@ -272,7 +272,7 @@ def misses(
     most = np.where(on_front, history["engagement_max_deg"], 0.0)
     k = int(np.argmax(most))
     if most[k] > math.degrees(wanted) + ABOVE_DEG:
-        text = f"engagement {most[k]:.4f} deg, wanted at most {math.degrees(wanted):.4f} deg"
+        text = f"engagement {most[k]:.4f} deg: must be at most {math.degrees(wanted):.4f} deg"
         at = float(history["x_mm"][k]), float(history["y_mm"][k])
         out.append(Event("pocket-engagement", *at, text, failure=bool(most[k] > limit_deg)))
     for stage in _planned(stages):

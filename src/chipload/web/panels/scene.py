@@ -76,7 +76,7 @@ class ScenePanel:
                 ).classes("cl-colour").mark("map")  # fmt: skip
                 self.map.on("popup-hide", js_handler=RELEASE)
                 self.bent = ui.slider(min=0.0, max=1.0, step=0.01, value=0.0, on_change=self._map).props(
-                    'dense aria-label="how far the map is bent"'
+                    'dense aria-label="scale of the deflection"'
                 )
                 self.bent.on("change", js_handler=RELEASE)
                 self.factor = ui.label("").classes("cl-note").mark("factor")
@@ -181,7 +181,7 @@ class ScenePanel:
             return
         self.scene = scene
         self._offer_maps(scene)
-        few = f"The path is drawn by some {POINTS} of its {len(track)} steps." if len(track) > POINTS else ""
+        few = f"The drawn path has about {POINTS} of its {len(track)} steps." if len(track) > POINTS else ""
         self.notice.set_text(" ".join(t for t in (scene.notice, few) if t))
         url = self.assets.put(scene.document)
         self._boxes(scene)
@@ -318,7 +318,7 @@ class ScenePanel:
             return
         with contextlib.suppress(TimeoutError):
             found = await ui.run_javascript(call, timeout=30.0)
-            self.factor.set_text(f"bent {float(found or 0.0):.3g} times" if self.bent.value else "not bent")
+            self.factor.set_text(f"deflection x {float(found or 0.0):.3g}" if self.bent.value else "no deflection")
 
     def _measure(self) -> None:
         self.measures = not self.measures
