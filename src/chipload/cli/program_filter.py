@@ -30,8 +30,8 @@ def filter_program(
     """Check a program before LinuxCNC loads it: write it to stdout, or write nothing and end with exit code 3.
 
     Name this command in [FILTER] of the machine's .ini. It writes findings to stderr, which the screen shows. The
-    default machine is the one that LinuxCNC runs. If a job of the same name stands beside the program, such as
-    part.toml beside part.ngc, the command runs it too: the program is not loaded if a limit of the job does not hold,
+    default machine is the one that LinuxCNC runs. If the folder holds a job of the same name, such as
+    part.toml for part.ngc, the command runs it too: the program is not loaded if a limit of the job does not hold,
     and the report is in part-checked.
     """
 
@@ -91,7 +91,7 @@ def _read(file: Path, name: str, tools: Path | None) -> Severity:
 
 
 def _run(file: Path) -> Severity:
-    """Run the job beside the program, write its result and its verdict."""
+    """Run the job of the same name, write its result and its verdict."""
     from chipload.jobs import load_job, run_job
     from chipload.report.folder import check_target, write_finished
     from chipload.result import Verdict

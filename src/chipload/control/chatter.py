@@ -14,7 +14,7 @@ simulation (``stability.windows`` of its summary) which the override reaches, ne
 which chatter was heard; where there is none, or after so many changes, a stop. Nothing is judged on the way to it; a
 spindle that does not come there is stopped.
 
-Reference: [Altintas2012] ch. 4 for chatter beside the tooth passing frequency.
+Reference: [Altintas2012] ch. 4 for chatter next to the tooth passing frequency.
 """
 
 from __future__ import annotations
@@ -226,14 +226,14 @@ class ChatterGuard:
         self._loud = 0
         self._bad.append(float(np.mean(np.asarray(speed, dtype=np.float64))))
         found = self._quiet() if self._changes < self.rules.changes else None
-        said = f"chatter at {heard.hertz:.4g} Hz, level {heard.level:.3g} outside the harmonics"
+        message = f"chatter at {heard.hertz:.4g} Hz, level {heard.level:.3g} outside the harmonics"
         if found is None:
             why = "no quiet speed within the override" if self._changes < self.rules.changes else "after all changes"
             self.override = 0.0
-            return SpeedAnswer(ChatterAnswer.STOP, 0.0, heard, f"{said}: stopped, {why}")
+            return SpeedAnswer(ChatterAnswer.STOP, 0.0, heard, f"{message}: stopped, {why}")
         self._changes += 1
         self.override = found / self.programmed
-        return SpeedAnswer(ChatterAnswer.SPEED, self.override, heard, f"{said}: {60.0 * found:.0f} rpm")
+        return SpeedAnswer(ChatterAnswer.SPEED, self.override, heard, f"{message}: {60.0 * found:.0f} rpm")
 
     def _quiet(self) -> float | None:
         """Return the quiet speed to take [rev/s]; None if there is none."""

@@ -63,7 +63,7 @@ class HalJob:
     spindle : what the estimator takes the spindle for; its lags hold for a torque of a pin too
     acceleration : of the axes [mm/s^2]
     period : between steps [s]
-    latency : until an override acts [s], beside the period
+    latency : until an override acts [s], in addition to the period
     modelled : the model of the path is used (feed-forward)
     window : the machine is looked for so far from its last place [mm], on the whole path while it is off it
     away : farther from the path it is not on it [mm]
@@ -192,8 +192,8 @@ class _Cut:
         """Return the torque for the controller [N mm]; NaN if there is none."""
         if self.source == "pin":
             return 1e3 * seen.torque
-        lost = self.source in MEASURED and not (math.isfinite(seen.current) and math.isfinite(seen.speed))
-        return math.nan if lost else self.state.filtered
+        unread = self.source in MEASURED and not (math.isfinite(seen.current) and math.isfinite(seen.speed))
+        return math.nan if unread else self.state.filtered
 
     def speed(self, seen: PinValues) -> float:
         """Of the spindle [rad/s]."""
@@ -221,18 +221,18 @@ def control(
     notice : called once when the controller stops the machine, with the reason and the place on the path [mm]
     """
     path, config = job.path, job.override
-    told = path.over_relief
-    model = (told.s, told.feed, told.edge, told.cut)
+    model_profile = path.over_relief
+    model = (model_profile.s, model_profile.feed, model_profile.edge, model_profile.cut)
     noise = np.random.default_rng(seed).normal(0.0, job.spindle.noise, 65_536)
     real = job.deviation.applied(job.spindle)
     state = begin(config, job.modelled)
     cut = _Cut(job.spindle, real, job.deviation.drift(job.spindle), job.source, at_speed(real))
     s, row, beat, on, due = float(path.model.s[0]), 0, False, False, clock()
     sent, status, ended = 0.0, Status.RUN, Ended.ASKED
-    told_torque, limit = 0.0, 1e-3 * config.torque_ref * float(path.relief[0])
+    shown_torque, limit = 0.0, 1e-3 * config.torque_ref * float(path.relief[0])
     rows: list[tuple[float, ...]] = []
     while not stop():
-        seen = machine.exchange(sent, beat, told_torque, STATUS.index(status), s, limit)
+        seen = machine.exchange(sent, beat, shown_torque, STATUS.index(status), s, limit)
         beat = not beat
         if seen is None:
             ended = Ended.GONE
@@ -263,7 +263,7 @@ def control(
             expected = cut.state.expected / relief
             reading = Reading(torque / relief, seconds, trusted, actual, expected, most_allowed, not on)
             sent, status, state = step(config, job.table, state, reading)
-            told_torque, limit = 1e-3 * torque if math.isfinite(torque) else 0.0, 1e-3 * config.torque_ref * relief
+            shown_torque, limit = 1e-3 * torque if math.isfinite(torque) else 0.0, 1e-3 * config.torque_ref * relief
             rows.append((seen.time, s, seen.velocity, sent, seen.feed, true.edge + true.cut, torque,
                          STATUS.index(status), away, relief, cut.current, speed))  # fmt: skip
             if s >= path.model.s[-1] - 1e-3 and seen.velocity == 0.0 and status not in STOPS:

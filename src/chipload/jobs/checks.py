@@ -52,7 +52,7 @@ WITH_FORCE = ("cutter_stress_mpa", "deflection_um", "deflection_workpiece_um")
 
 @dataclass(frozen=True, eq=False)
 class DefaultChecks:
-    """What is checked beside the limits that the job states.
+    """Checks in addition to the limits that the job states.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class DefaultChecks:
 def default_checks(
     table: ChecksTable, cutters: Mapping[int, Cutter], material: Material, confidence: float
 ) -> DefaultChecks:
-    """What is checked beside the stated limits.
+    """Checks in addition to the stated limits.
 
     Parameters
     ----------

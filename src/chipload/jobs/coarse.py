@@ -73,8 +73,8 @@ def coarser(loaded: LoadedJob) -> tuple[str, ...]:
     out = []
     for key, (factor, most) in factors.items():
         first, *rest = key.split(".")
-        held = getattr(table, first, None)
-        for number, entry in enumerate(held) if isinstance(held, tuple) else ((None, held),):
+        entries = getattr(table, first, None)
+        for number, entry in enumerate(entries) if isinstance(entries, tuple) else ((None, entries),):
             path = [first, *([] if number is None else [str(number)]), *rest]
             value = _at(entry, rest)
             if value is not None:

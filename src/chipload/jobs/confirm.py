@@ -34,10 +34,10 @@ def take_confirm(raw: dict[str, Any]) -> tuple[str, ...]:
 
     def visit(value: Any, name: str) -> None:
         if isinstance(value, dict):
-            asked = value.pop("confirm", False) if name else False
-            if not isinstance(asked, bool):
-                raise InputError(f"{name}.confirm = {str(asked)[:40]!r}: must be true or false")
-            if asked:
+            confirm = value.pop("confirm", False) if name else False
+            if not isinstance(confirm, bool):
+                raise InputError(f"{name}.confirm = {str(confirm)[:40]!r}: must be true or false")
+            if confirm:
                 out.append(name)
         if isinstance(value, (dict, list)):
             entries = value.items() if isinstance(value, dict) else enumerate(value)

@@ -1,7 +1,7 @@
 """Finished parts of a run in its checkpoint, so that a run that was stopped goes on after the last one.
 
 Notation: a part is a value of arrays, numbers, texts, tuples, lists, dicts and of some kinds of records; its key says
-which part it is and what it depends on. A part is written as a JSON tree beside its arrays and comes back bit for bit;
+which part it is and what it depends on. A part is written as a JSON tree with its arrays and comes back bit for bit;
 a part that is made is given on as it would come back, so that a run that was stopped has the bytes of one that was not.
 """
 
@@ -42,7 +42,7 @@ class KeptRecords:
     ----------
     checkpoint : where they are kept; None: nowhere
     key : of all that the run depends on
-    records : kinds of records that a part may be made of beside arrays and plain values
+    records : kinds of records that a part may be made of besides arrays and plain values
     team : makes parts that are told ahead; None: each is made when it is asked for
     """
 

@@ -68,7 +68,7 @@ class SceneBody:
 
 
 def scene_bodies(glb: bytes, most: int = TRIANGLES, without: Collection[str] = ()) -> tuple[SceneBody, ...]:
-    """The bodies of a scene.glb beside path and cutter, none with more than ``most`` triangles.
+    """The bodies of a scene.glb besides path and cutter, none with more than ``most`` triangles.
 
     Parameters
     ----------

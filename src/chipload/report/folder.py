@@ -1,6 +1,6 @@
 """The result folder, which is written completely or not at all.
 
-Everything is written into a new folder beside the target and then renamed. A result of ours that is already there is
+Everything is written into a new folder next to the target and then renamed. A result of ours that is already there is
 replaced at that moment; anything else that is there is left alone and refused.
 """
 
@@ -73,7 +73,7 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
 
 
 def checkpoint_folder(out: str | Path) -> Path:
-    """Return the checkpoint folder of a run, beside the folder of its result.
+    """Return the checkpoint folder of a run, next to the folder of its result.
 
     Raises
     ------

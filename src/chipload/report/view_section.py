@@ -73,10 +73,10 @@ def view_section(
     if left:
         notes.append(f"Not in this file, to keep it small: {', '.join(left)}.")
     names, note = ", ".join(documents), " ".join(filter(None, notes))
-    said = f"{escape(names)}. Drag to turn, scroll to zoom, drag with the right button to pan. {escape(note)}"
+    caption = f"{escape(names)}. Drag to turn, scroll to zoom, drag with the right button to pan. {escape(note)}"
     return [
         "<h2>In space</h2>",
-        f'<p class="note">{said}</p>',
+        f'<p class="note">{caption}</p>',
         f'<div id="{VIEW}" class="view3d"><p class="note">The view needs a browser with scripts and WebGL.</p></div>',
         *(
             f'<script class="{DATA}" data-name="{escape(name)}" type="text/plain">{data}</script>'

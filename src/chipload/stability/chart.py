@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 COARSE = 4
 #: a cell is certain where its least |growth| is so many spreads of its corners
 CERTAIN = 1.5
-#: dimensions of the Krylov space beside two a mode, and how still |mu| is then
+#: dimensions of the Krylov space besides two for each mode, and how still |mu| is then
 SPARE, STILL = 10, 1e-3
 #: least growth that counts
 TINY = 1e-9

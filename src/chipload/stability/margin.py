@@ -32,7 +32,7 @@ MOST_MARGIN = 3.0
 PER_WAVE, PER_WAVE_EXACT = 9.0, 40.0
 #: cells in a wave where the first did not do
 FINER = (15.0, 25.0)
-#: dimensions of the Krylov space beside two a mode, and how still |mu| is then
+#: dimensions of the Krylov space besides two for each mode, and how still |mu| is then
 SPARE, STILL = 24, 1e-4
 #: the same where values are printed
 SPARE_EXACT, STILL_EXACT = 60, 1e-10
@@ -120,10 +120,10 @@ def stability_margins(cuts: DynamicCuts) -> StabilityMargins:
         return _several_margins(cuts)
     out = np.full((len(cuts), 5), -1.0)
     for per_wave in (PER_WAVE, *FINER):
-        lost = np.flatnonzero(~(out[:, 0] >= 0.0))
-        if not len(lost):
+        failed = np.flatnonzero(~(out[:, 0] >= 0.0))
+        if not len(failed):
             break
-        out[lost] = _margins(cuts if len(lost) == len(cuts) else cuts.chosen(lost), per_wave)
+        out[failed] = _margins(cuts if len(failed) == len(cuts) else cuts.chosen(failed), per_wave)
     if not (out[:, 0] >= 0.0).all():
         raise InputError("stability: a multiplier was not found: check frequency and damping of the modes")
     return StabilityMargins(out[:, 0], out[:, 1], out[:, 2].astype(np.int64), out[:, 3])

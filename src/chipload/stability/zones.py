@@ -59,8 +59,8 @@ def speed_zones(speed: ArrayLike, margin: ArrayLike, wanted: float, present: Arr
             "for each pass at each speed"
         )
     greatest = margins.max(axis=1)
-    asked = np.minimum(greatest, max(float(greatest.min()), wanted)) * (1.0 - ALIKE)
-    good = margins >= asked[:, None]
+    least_margin = np.minimum(greatest, max(float(greatest.min()), wanted)) * (1.0 - ALIKE)
+    good = margins >= least_margin[:, None]
     out, first = [], 0
     while first < len(margins):
         common, last = good[first].copy(), first

@@ -1,6 +1,6 @@
 """The shape of each cutter of a track, by tool number.
 
-The result holds it beside its stock (removal.npz). Else it is that of the job where the opened folder has the job that
+The result holds it with its stock (removal.npz). Else it is that of the job where the opened folder has the job that
 the result was made from (by its hash), else the CUTTER of CL data: the result's own, or the program where the folder
 has it. Where none says it, the page shows a pointer and says that the shape is not known.
 """
@@ -76,7 +76,7 @@ def _numbers(result: PageResult, track: PageTrack) -> set[int]:
 
 
 def _kept(result: PageResult, track: PageTrack) -> dict[int, Parts]:
-    """Parts that the result itself holds beside its stock."""
+    """Parts that the result itself holds with its stock."""
     try:
         return read_cutter_parts(result.file(REMOVAL), result.result.tracks.index(track.own))
     except (InputError, ValueError):

@@ -2,7 +2,7 @@
 
 A page of another site may make a browser send requests to 127.0.0.1, also under a host name of its own that resolves to
 this computer. So every request must name this host and this port, a websocket must come from this page, nothing but GET
-and HEAD is accepted beside the websocket, and what is shown may ask no other host for anything.
+and HEAD is accepted besides the websocket, and what is shown may ask no other host for anything.
 
 Another user of this computer can connect to the port. So the address that is printed carries a random token; the first
 visit turns it into a cookie, and a request without this cookie is refused.

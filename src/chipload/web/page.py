@@ -255,7 +255,7 @@ class Page:
 
     # -- running ------------------------------------------------------------------------------------------------
     def _ask(self, job: str, overrides: Sequence[str] = ()) -> None:
-        """Where the result goes; one with changed values goes beside the last one and is compared with it."""
+        """Where the result goes; one with changed values goes next to the last one and is compared with it."""
         self.opening.close()
         stem, folder = PurePosixPath(job).stem, PurePosixPath(job).parent
         last = (folder / ("result" if stem == "job" else f"result-{stem}")).as_posix()
@@ -268,15 +268,15 @@ class Page:
             for text in overrides:
                 ui.label(text).classes("cl-note cl-changed")
             message = ui.label("").classes("cl-no")
-            beside = last if overrides and known else None
+            compared = last if overrides and known else None
             with ui.element("div").classes("cl-entry"):
                 _button(
-                    "Run", lambda: self._run(job, str(where.value), message, overrides, beside), "play_arrow"
+                    "Run", lambda: self._run(job, str(where.value), message, overrides, compared), "play_arrow"
                 ).props("unelevated color=primary").props(remove="flat").mark("start")
                 _button("Cancel", self.running.close)
         self.running.open()
 
-    def _run(self, job: str, out: str, message: Any, overrides: Sequence[str], beside: str | None) -> None:
+    def _run(self, job: str, out: str, message: Any, overrides: Sequence[str], compared: str | None) -> None:
         """Start a run, unless one runs or its folder cannot be written."""
         root = self.opened.root
         try:
@@ -291,7 +291,7 @@ class Page:
             message.set_text(str(err).replace(f"--out {root}/", ""))
             return
         self.running.close()
-        self.runs.now = now = JobRun(job, target.relative_to(root).as_posix(), overrides, beside)
+        self.runs.now = now = JobRun(job, target.relative_to(root).as_posix(), overrides, compared)
         self.seen, self.own = None, now
         self.bar.set_visibility(True)
         background_tasks.create(now.work(path, target))
@@ -317,8 +317,8 @@ class Page:
             self.seen = now
             if now.state == "done" and now is self.own:
                 await self.show(now.out)
-                if now.beside is not None and now.beside != now.out:
-                    self.others.set_value([f"result {now.beside}"])
+                if now.compared is not None and now.compared != now.out:
+                    self.others.set_value([f"result {now.compared}"])
                 self.bar.set_visibility(False)
 
     # -- keys ---------------------------------------------------------------------------------------------------
@@ -364,7 +364,7 @@ class Page:
     async def _key(self, event: Any) -> None:
         if not event.action.keydown or event.modifiers.ctrl or event.modifiers.meta or event.modifiers.alt:
             return
-        key, many = event.key, 20 if event.modifiers.shift else 1
+        key, steps = event.key, 20 if event.modifiers.shift else 1
         if key.name == "?":
             self.help.open()
         elif key.name == "o" and not event.action.repeat:
@@ -372,7 +372,7 @@ class Page:
         elif self.result is None or self.help.value or self.opening.value or self.running.value:
             return
         elif key.arrow_left or key.arrow_right:
-            self.view.move(many if key.arrow_right else -many)
+            self.view.move(steps if key.arrow_right else -steps)
         elif key.arrow_up or key.arrow_down:
             self.view.line(1 if key.arrow_down else -1)
         elif key.home:

@@ -34,7 +34,7 @@ SPEEDS = {0: "30 s", 1: "\u00d71", 10: "\u00d710", 100: "\u00d7100"}
 VERDICTS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
 #: steps of the slider
 STEPS = 4000
-#: tables and pictures beside the 3D view
+#: tables and pictures next to the 3D view
 TABLES = {"limits": "limits", "cut": "cut", "tools": "tools", "lines": "lines", "compare": "compare"}
 
 
@@ -46,11 +46,11 @@ class ResultView:
         self.track: PageTrack | None = None
         self.row = 0
         self.playing = False
-        #: the view was asked to stop where it is, and has not told its row yet
+        #: the view was told to stop and has not reported its row yet
         self.stopping = False
         self.turn = asyncio.Lock()
         self.sides: tuple[Side, ...] = ()
-        #: told when another program of the sequence is shown
+        #: called when another program of the sequence is shown
         self.moved_on: Callable[[int], None] = lambda _: None
         with ui.element("div").classes("cl-verdict") as self.verdict:
             self.word = ui.label("").classes("cl-word").mark("verdict")
@@ -114,7 +114,7 @@ class ResultView:
             await self._tracked(self.result, self.track)
 
     async def compare(self, others: Sequence[tuple[PageResult, PageTrack, str]]) -> None:
-        """Show other tracks beside and over the own one; empty: it alone."""
+        """Show other tracks next to the own one and over it; empty: it alone."""
         async with self.turn:
             if self.result is None or self.track is None:
                 return
@@ -146,7 +146,7 @@ class ResultView:
             self.scene.show(0)
 
     def find(self, row: int) -> None:
-        """A limit or a finding asks for its row: what touches there is shown."""
+        """A limit or a finding requests its row; the bodies that touch there are shown."""
         self.pause()
         self.go(row)
         found = [k for k, m in enumerate(self.scene.marks) if m.row == row]
@@ -155,7 +155,7 @@ class ResultView:
             self.scene.show((touching or found)[0])
 
     def pick(self, row: int) -> None:
-        """A panel asks for a row; below 0: to be told again where it is."""
+        """A panel requests a row; below 0: it requests the current one."""
         self.go(row if row >= 0 else self.row)
 
     def go(self, row: int) -> None:
@@ -253,7 +253,7 @@ class ResultView:
             self.tools.at(self.row)
 
     async def _found(self, number: int, row: int) -> None:
-        """A table asks for a row, of another track where it names one."""
+        """A table requests a row, of another track where it names one."""
         if self.result is None or self.track is None:
             return
         if 0 <= number < len(self.result.tracks) and self.result.tracks[number] is not self.track:

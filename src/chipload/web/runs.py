@@ -32,11 +32,11 @@ class JobRun:
     ----------
     job, out : names in the opened folder
     overrides : values in the place of those of the job, as `--set` takes them
-    beside : name of the result that it is compared with; None: none
+    compared : name of the result that it is compared with; None: none
     """
 
-    def __init__(self, job: str, out: str, overrides: Sequence[str] = (), beside: str | None = None) -> None:
-        self.job, self.out, self.overrides, self.beside = job, out, tuple(overrides), beside
+    def __init__(self, job: str, out: str, overrides: Sequence[str] = (), compared: str | None = None) -> None:
+        self.job, self.out, self.overrides, self.compared = job, out, tuple(overrides), compared
         self.state: State = "running"
         self.done, self.what = 0.0, "starting"
         self.code: int | None = None
@@ -60,12 +60,12 @@ class JobRun:
             self.state, self.code, self.message = "failed", 1, f"no process could be started: {err.strerror}"
             return
         self._process = process
-        told, warned = process.stdout, process.stderr
-        if told is None or warned is None:
+        output, warned = process.stdout, process.stderr
+        if output is None or warned is None:
             self.state, self.code, self.message = "failed", 1, "the process has no input or output"
             return
         faults = asyncio.create_task(_tail(warned))
-        async for line in told:
+        async for line in output:
             self._take(line)
         code = await process.wait()
         fault = await faults

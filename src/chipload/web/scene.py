@@ -46,7 +46,7 @@ class PageScene:
 
 
 def bodies(result: PageResult) -> tuple[tuple[SceneBody, ...], str]:
-    """The bodies of scene.glb beside path and cutter, and a sentence where there are none or they are simplified."""
+    """The bodies of scene.glb besides path and cutter, and a sentence where there are none or they are simplified."""
     try:
         path = result.file(SCENE)
     except InputError:

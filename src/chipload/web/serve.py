@@ -39,9 +39,9 @@ def serve(path: str | Path, port: int | None, show: bool, show_line: Callable[[s
     """
     require_extra("web")
     opened = open_path(path)
-    listener, taken = listen(port)
+    listener, in_use = listen(port)
     own = int(listener.getsockname()[1])
-    if taken:
+    if in_use:
         show_line(f"port {PORT} is taken: using {own}")
     token = secrets.token_urlsafe(24)
     address = f"http://{HOST}:{own}/?token={token}"

@@ -24,7 +24,7 @@ ASKED = threading.Event()
 
 def work(job: str, out: str, *overrides: str) -> dict[str, Any]:
     """Run the job, with overrides, and write its result; the exit code that `chipload run` has, and what it says."""
-    held = ""
+    kept_text = ""
     try:
         from chipload.jobs import load_job, resume_note, run_job
         from chipload.report.folder import check_target, checkpoint_folder, write_finished
@@ -40,7 +40,7 @@ def work(job: str, out: str, *overrides: str) -> dict[str, Any]:
                 done = run_job(read, lambda part, what: tell(0.85 * part, what), kept)
                 write_finished(done.result, done.presentation, out, lambda part, what: tell(0.85 + 0.15 * part, what))
             finally:
-                held = kept.what_is_kept()
+                kept_text = kept.what_is_kept()
             kept.discard()
         return {"code": done.result.verdict.exit_code, "message": done.result.message}
     except InputError as err:
@@ -51,7 +51,7 @@ def work(job: str, out: str, *overrides: str) -> dict[str, Any]:
         known = is_full(err)
         return {"code": 4 if known else 1, "message": str(cannot_write("the disk", err)) if known else _fault(err)}
     except (KeyboardInterrupt, Cancelled):
-        why = f"{held}: the next run continues from there" if held else "nothing was written"
+        why = f"{kept_text}: the next run continues from there" if kept_text else "nothing was written"
         return {"code": 130, "message": f"stopped: {why}"}
     except Exception as err:
         return {"code": 1, "message": _fault(err)}

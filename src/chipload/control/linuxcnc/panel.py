@@ -1,7 +1,7 @@
 """A panel of the controller for LinuxCNC: the XML that PyVCP draws, and the lines of HAL that connect it.
 
 It shows the torque, in N m and in percent of the limit that is held at the place, the feed override that is sent and
-the one in force, the spindle override that an answer to chatter has set (1: none), and why: a lamp beside each status
+the one in effect, the spindle override that an answer to chatter has set (1: none), and why: a lamp next to each status
 of the controller, in words. The panel reads pins only.
 """
 

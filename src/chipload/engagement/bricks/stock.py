@@ -75,9 +75,11 @@ def move_rows(p0: Floats, p1: Floats, a0: Floats, a1: Floats) -> Floats:
     cosine, sine = np.cos(theta)[:, None], np.sin(theta)[:, None]
     u, n = p1 - p0, np.cross(a0, b)
     length = np.linalg.norm(u, axis=1)
-    way = (-(u * v).sum(axis=1) for v in (n, b * cosine - a0 * sine, a0 * cosine + b * sine))
+    products = (-(u * v).sum(axis=1) for v in (n, b * cosine - a0 * sine, a0 * cosine + b * sine))
     bend = (theta + 2.0) * length
-    return np.column_stack([p0, u, a0, b, theta, length, n, *way, -2.0 * np.sin(0.5 * theta) ** 2, np.sin(theta), bend])
+    return np.column_stack(
+        [p0, u, a0, b, theta, length, n, *products, -2.0 * np.sin(0.5 * theta) ** 2, np.sin(theta), bend]
+    )
 
 
 class BrickStock:
@@ -236,9 +238,13 @@ class BrickStock:
         begin, pieces = self.count, max(pieces, FEW)
         self._enter(moves, tool)
         flank = np.array([flank_mm[n] for n in self.tools])
-        many = 16 * max(int(instants.sum()), 1) + 256
-        slices, rows, owner = np.empty((many, 9)), np.empty((2 * many, 2)), np.empty(2 * many, dtype=np.int64)
-        entry, out = np.empty((many, 3), dtype=np.int64), np.empty((many, 19))
+        capacity = 16 * max(int(instants.sum()), 1) + 256
+        slices, rows, owner = (
+            np.empty((capacity, 9)),
+            np.empty((2 * capacity, 2)),
+            np.empty(2 * capacity, dtype=np.int64),
+        )
+        entry, out = np.empty((capacity, 3), dtype=np.int64), np.empty((capacity, 19))
         state = np.array([begin, 0, 0, 0, 0, *self.more])
         nodes = np.zeros((pieces + 1, pieces, 3))
         for count in range(1, pieces + 1):

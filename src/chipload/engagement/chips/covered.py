@@ -219,10 +219,10 @@ def _turning(
     first = np.cumsum([0, *(len(h) for h in heights)])
     which = np.flatnonzero(some).tolist()
     own = [moves[m] for m in which]
-    asked = np.cumsum([0, *(len(heights[m]) for m in which)])
+    starts = np.cumsum([0, *(len(heights[m]) for m in which)])
     levels = np.concatenate([np.empty(0), *(heights[m] for m in which)])
     at = np.flatnonzero(np.repeat(some, np.diff(first))).tolist()
-    buffer, count, knots, whole = _loops(own, K, levels, asked, tolerance)
+    buffer, count, knots, whole = _loops(own, K, levels, starts, tolerance)
     rings, shapes = dict[int, tuple[int, int]](), dict[int, Shape | None]()
     simple = np.flatnonzero(count >= 0)
     end = np.cumsum(count[simple])
@@ -232,7 +232,7 @@ def _turning(
         else:
             shapes[at[i]] = _thick(_untangled(shapely.Polygon(buffer[a : a + n, :2])), tolerance)
     for i in np.flatnonzero(count == trace.GENERAL).tolist():
-        move, h = own[int(np.searchsorted(asked, i, "right")) - 1], float(levels[i])
+        move, h = own[int(np.searchsorted(starts, i, "right")) - 1], float(levels[i])
         edges = _candidates(move, K, h, tolerance, max(_KNOTS, 4 * int(knots[i])))
         found = _noded_shape(edges, move, K, h, tolerance)
         shapes[at[i]] = None if found is None else _thick(found, tolerance)

@@ -241,10 +241,10 @@ class MoveStock:
             self.moves = np.concatenate([self.moves, np.empty_like(self.moves)])
             self.of = np.concatenate([self.of, np.empty_like(self.of)])
         end = self.count + len(p0)
-        way = p1 - p0
-        square = np.column_stack([(way[:, :2] ** 2).sum(axis=1), (way**2).sum(axis=1)])
+        vector = p1 - p0
+        square = np.column_stack([(vector[:, :2] ** 2).sum(axis=1), (vector**2).sum(axis=1)])
         over = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
-        self.moves[self.count : end] = np.hstack([p0, way, over])
+        self.moves[self.count : end] = np.hstack([p0, vector, over])
         numbers, at = np.unique(tool, return_inverse=True)
         self.of[self.count : end] = np.array([self.tools[n] for n in numbers.tolist()], dtype=np.int64)[at.ravel()]
         self.count = end
@@ -300,9 +300,13 @@ class MoveStock:
         frame = np.where(upright[:, None], [[1.0, 0.0]], u[:, :2] / np.where(upright, 1.0, size)[:, None])
         frame = np.ascontiguousarray(frame)
         flank = np.array([flank_mm[n] for n in self.tools])
-        many = 16 * max(int(instants.sum()), 1) + 256
-        slices, rows, owner = np.empty((many, 6)), np.empty((2 * many, 2)), np.empty(2 * many, dtype=np.int64)
-        entry, out = np.empty((many, 3), dtype=np.int64), np.empty((many, 10))
+        capacity = 16 * max(int(instants.sum()), 1) + 256
+        slices, rows, owner = (
+            np.empty((capacity, 6)),
+            np.empty((2 * capacity, 2)),
+            np.empty(2 * capacity, dtype=np.int64),
+        )
+        entry, out = np.empty((capacity, 3), dtype=np.int64), np.empty((capacity, 10))
         state = np.array([begin, 0, 0, 0, 0, *self.more])
         parts = corner_parts(pieces)
         at, work = 0, work_room(self.grid, self.cutters, pieces, flank)

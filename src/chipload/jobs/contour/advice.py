@@ -116,11 +116,13 @@ def _exceeded(
     begin = np.linspace(0.0, math.pi - angle, PLACES)
     phi = np.zeros((PLACES, PIECES, 2))
     phi[:, 0, 0], phi[:, 0, 1] = begin, begin + angle
-    met = Engagement(np.full(PLACES, angle), np.ones(PLACES, dtype=np.int64), phi)
+    engagement = Engagement(np.full(PLACES, angle), np.ones(PLACES, dtype=np.int64), phi)
     zero, ahead = np.zeros(PLACES), np.tile([1.0, 0.0], (PLACES, 1))
     wall = np.arange(PLACES) == (PLACES - 1 if cut.milling == "down" else 0)
     zone = np.full(PLACES, "pocket", dtype=object)
-    columns = dict(cost(cut, zone, zero, zero, np.zeros((PLACES, 2)), ahead, 0.0, met, np.full(PLACES, feed), wall))
+    columns = dict(
+        cost(cut, zone, zero, zero, np.zeros((PLACES, 2)), ahead, 0.0, engagement, np.full(PLACES, feed), wall)
+    )
     columns["tool"] = np.full(PLACES, cut.cutter.number)
     found = [check_limit(name, limit, columns) for name, limit in limits.items() if name != "engagement_deg"]
     found += default_limits(checks, machine, columns, "", {})

@@ -43,7 +43,7 @@ class Operation:
     verifications : by strategy
     machine_findings : by strategy, what its program asks of the machine that it does not give
     limits : of the job, by name
-    checks : what is checked beside the limits; None: nothing
+    checks : checks in addition to the limits; None: nothing
     inserted : name and text of the program that the finish path came from, with the semi-finish passes; else ""
     """
 

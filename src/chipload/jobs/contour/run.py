@@ -226,12 +226,12 @@ def _above_limit(job: ContourJob, k: int, op: OperationTable, cutter: Cutter) ->
     limit, depth = job.limits.get("engagement_deg"), op.radial_depth_mm
     if limit is None or depth is None or not 0.0 < depth < cutter.diameter:
         return []
-    asked = math.degrees(math.acos(1.0 - depth / cutter.radius))
-    if asked <= limit * (1.0 + 1e-9):
+    needed = math.degrees(math.acos(1.0 - depth / cutter.radius))
+    if needed <= limit * (1.0 + 1e-9):
         return []
     most = cutter.radius * (1.0 - math.cos(math.radians(limit)))
     return [
-        f"limits.engagement_deg = {limit:g} cannot be held: operation {k} needs {asked:.4g} deg along a straight "
+        f"limits.engagement_deg = {limit:g} cannot be held: operation {k} needs {needed:.4g} deg along a straight "
         f"wall: state a radial depth of at most {most:.4g} mm, or a greater limit"
     ]
 
@@ -416,7 +416,7 @@ def verify(
     height = top - (op.depth_mm or op.axial_depth_mm) + (op.tabs.height_mm if op.tabs is not None else 0.0)
     names = np.asarray(strategy.history["pass"]).astype(str)
     left_out = int(np.isin(names, NOT_LEVEL).sum())
-    told = verify_contour(
+    verification = verify_contour(
         strategy.program,
         cutter.radius,
         strategy.history,
@@ -433,17 +433,17 @@ def verify(
         progress=progress,
     )
     return PlanVerification(
-        VERDICTS[told.verdict],
-        "; ".join((*told.reasons, told.text)),
+        VERDICTS[verification.verdict],
+        "; ".join((*verification.reasons, verification.text)),
         {
-            "engagement_difference_deg": told.engagement_difference_deg,
-            "engagement_at_mm": list(told.engagement_at),
-            "gouge_mm": told.gouge_mm,
-            "gouge_at_mm": list(told.gouge_at),
-            "excess_mm": told.excess_mm,
-            "excess_at_mm": list(told.excess_at),
-            "rapids_through_stock": [list(p) for p in told.rapids],
-            "rows_compared": told.compared,
+            "engagement_difference_deg": verification.engagement_difference_deg,
+            "engagement_at_mm": list(verification.engagement_at),
+            "gouge_mm": verification.gouge_mm,
+            "gouge_at_mm": list(verification.gouge_at),
+            "excess_mm": verification.excess_mm,
+            "excess_at_mm": list(verification.excess_at),
+            "rapids_through_stock": [list(p) for p in verification.rapids],
+            "rows_compared": verification.compared,
             "rows_not_compared": left_out,
         },
     )

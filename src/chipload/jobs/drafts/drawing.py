@@ -287,8 +287,8 @@ def _opened(area: Any, d: float) -> Any:
 def _narrow(area: Any, d: float) -> bool:
     """Return whether an area has channels that are too narrow for a cutter of diameter d [mm]."""
     wide = ROOM * d
-    lost = shapely.get_parts(_opened(area, d).difference(_opened(area, wide)))
-    if max((float(piece.area) for piece in lost), default=0.0) > CHANNEL * d * d:
+    unreached = shapely.get_parts(_opened(area, d).difference(_opened(area, wide)))
+    if max((float(piece.area) for piece in unreached), default=0.0) > CHANNEL * d * d:
         return True
     centres, apart = area.buffer(-0.5 * d), area.buffer(-0.5 * wide)
     return len(shapely.get_parts(apart)) > len(shapely.get_parts(centres))

@@ -128,8 +128,8 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     found = [f for f in chosen.reading.findings if f.severity >= Severity.UNPROVEN]
     rest = [f for f in chosen.reading.findings if f not in found and not f.code.endswith(PLAIN)]
     # a speed is guessed where the spindle rests
-    asked = [f for f in chosen.reading.violations if f.code != "machine-spindle-off"]
-    notes = [text for _, text in grouped((*found, *asked, *rest))][:LISTED]
+    violations = [f for f in chosen.reading.violations if f.code != "machine-spindle-off"]
+    notes = [text for _, text in grouped((*found, *violations, *rest))][:LISTED]
     origin = known.origin or path.name
     return Draft(
         f"Simulate {origin}: chips, forces, torque and collisions of the program in its stock.",

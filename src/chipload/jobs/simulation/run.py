@@ -48,7 +48,7 @@ from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 from chipload.workers import Workers
 
-#: of a simulation, what one pass over its steps beside the removal takes
+#: share of a simulation that one pass over its steps besides the removal takes
 SHARE = 0.2 / 3.0
 
 

@@ -326,6 +326,6 @@ def stability_of(job: ProgramJob, watch: StabilityWatch, machine: Machine) -> St
     """Return the stability result of a watch that has seen every step."""
     wanted = max(job.limits.get("stability_margin", DEFAULT_MARGIN), DEFAULT_MARGIN)
     radii = {n: c.radius for n, c in job.cutters.items()}
-    asked = job.table.operation[0].speeds
-    speeds = (None, None) if asked is None else (asked.least_rpm, asked.most_rpm)
+    speed_table = job.table.operation[0].speeds
+    speeds = (None, None) if speed_table is None else (speed_table.least_rpm, speed_table.most_rpm)
     return StabilityResult(watch, machine, wanted, radii, speeds)

@@ -66,7 +66,7 @@ def stability_sections(
         table(["", ""], rows),
     ]
     if speeds is not None:
-        told = [
+        speed_rows = [
             [
                 str(t.tool), f"{t.lines[0]} to {t.lines[1]}", ", ".join(f"{x:.6g}" for x in t.before), f"{t.rpm:.6g}",
                 f"{t.margin:.3g}",
@@ -74,7 +74,7 @@ def stability_sections(
             for t in speeds.tools
         ]  # fmt: skip
         head = ["tool", "lines", "before [rpm]", "new [rpm]", "margin expected"]
-        body += ["<h3>New speeds</h3>", table(head, told)]
+        body += ["<h3>New speeds</h3>", table(head, speed_rows)]
     if what["windows"]:
         cells = [[f"{w['low_rpm']:.5g}", f"{w['high_rpm']:.5g}", f"{w['margin']:.3g}"] for w in what["windows"]]
         head = ["from [rpm]", "to [rpm]", "greatest margin"]

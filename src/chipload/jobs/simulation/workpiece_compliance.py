@@ -161,7 +161,7 @@ def workpiece_compliance(
         return None
     op = job.table.operation[0]
     elastic, clamps = elastic_of(table), clamps_of(table, stock)
-    held = clamped_volumes(table, stock)
+    clamped_parts = clamped_volumes(table, stock)
     ahead = cut_ahead(
         program, stock.copied(), job.cutters, material, resolution, op.interpolation,
         lambda done, what: progress(0.4 * done, what),
@@ -170,7 +170,7 @@ def workpiece_compliance(
     most = [0]
 
     def build(then: LayeredStock, cells: CellGrid) -> CellWorkpiece:
-        made = cell_workpiece(then, cells, elastic, clamps, held)
+        made = cell_workpiece(then, cells, elastic, clamps, clamped_parts)
         most[0] = max(most[0], 3 * len(made.modes))
         return made
 

@@ -1,4 +1,4 @@
-"""Chatter of a thin wall's passes: stable depths beside the deflection limit, a speed for each pass, the stability
+"""Chatter of a thin wall's passes: stable depths with the deflection limit, a speed for each pass, the stability
 margin.
 
 A pass is checked in two states: with the stock that it leaves, and with the stock before it, thicker by at most the

@@ -28,7 +28,7 @@ APART, BESIDE = 0.5, 0.02
 
 
 def floor_shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProgram]) -> Shape:
-    """Path and stock beside the finished part."""
+    """Path and stock against the finished part."""
     inputs = places.inputs
     gap, at = _nearest(inputs, pass_programs)
     corner = max(o.cut.cutter.corner_radius for o in inputs.operations)

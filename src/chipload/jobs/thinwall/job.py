@@ -143,8 +143,8 @@ def _of_operation(
         )
     yield from _of_rows(op, where)
     if op.rows is None and op.contact == "corner" and (op.step_over_mm is None) == (op.scallop_um is None):
-        said = "none is" if op.step_over_mm is None else "both are"
-        yield f"{where}: {said} stated: state either step_over_mm or scallop_um"
+        state = "none is" if op.step_over_mm is None else "both are"
+        yield f"{where}: {state} stated: state either step_over_mm or scallop_um"
     for key, foot in feet:
         barrel = op.cutter in tools and tools[op.cutter].barrel_radius is not None
         if op.cutter in tools and not barrel and foot < tools[op.cutter].corner_radius:
@@ -243,16 +243,16 @@ def _of_flanks(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator
     if op.cutter not in tools or height is None:
         return
     cutter = tools[op.cutter]
-    beside = height - wall.foot_mm + cutter.corner_radius
-    if cutter.overhang <= beside:
+    needed = height - wall.foot_mm + cutter.corner_radius
+    if cutter.overhang <= needed:
         yield (
-            f"cutter.{op.cutter}.overhang_mm = {cutter.overhang:g}: must be above {beside:g}: the cutter stands along "
+            f"cutter.{op.cutter}.overhang_mm = {cutter.overhang:g}: must be above {needed:g}: the cutter stands along "
             "the wall, and its holder would collide with it"
         )
     thinner = cutter.shank_diameter is not None and cutter.shank_diameter < cutter.diameter
-    if cutter.flute_length < beside and not thinner:
+    if cutter.flute_length < needed and not thinner:
         yield (
-            f"cutter.{op.cutter}.flute_length_mm = {cutter.flute_length:g}: must be at least {beside:g}, from the last "
+            f"cutter.{op.cutter}.flute_length_mm = {cutter.flute_length:g}: must be at least {needed:g}, from the last "
             "row to the free edge, or shank_diameter_mm below the diameter: the shank would rub on the wall"
         )
 
@@ -297,7 +297,7 @@ def _of_parts_only(table: ThinWallJobTable) -> Iterator[str]:
 def _part_contradictions(table: ThinWallJobTable, walls: Sequence[FaceWallTable]) -> Iterator[str]:
     """What the walls of a part lack, and keys that they do not use."""
     if table.neighbour:
-        yield "neighbour: for one [wall] only: leave it out; what stands beside a [[wall]] belongs to the part"
+        yield "neighbour: for one [wall] only: leave it out; what stands next to a [[wall]] belongs to the part"
     if not walls:
         yield "wall: has no entry: state at least one [[wall]]"
     if table.part is None:

@@ -3,7 +3,7 @@
 Notation: x, y [mm] along the sides of the smallest box around the floor, from its corner, z over it; u, v = x, y over
 the size of the box; D [mm] stock that is left. The normal is +z, that of the part's frame.
 
-Places of the box that lie beside the floor stand for the nearest place on it. The walls around it are what the part
+Places of the box that lie outside the floor stand for the nearest place on it. The walls around it are what the part
 has above the floor, by its sections at several heights: the centre of the cutter keeps its radius at that height from
 each. At edges without a wall rows run on beyond the edge.
 """
@@ -121,7 +121,7 @@ class PartFloor:
         # sections alike but for rounding leave edges of no length
         centres = shapely.make_valid(shapely.set_precision(centres, ROUNDED))
         centres = MultiPolygon([p for p in shapely.get_parts(centres) if p.geom_type == "Polygon" and p.area > 0.0])
-        # a separate room beside the floor does not belong to it
+        # a separate room next to the floor does not belong to it
         centres = MultiPolygon([p for p in centres.geoms if p.intersects(self.face)])
         if centres.intersection(self.face).is_empty:
             raise InputError(

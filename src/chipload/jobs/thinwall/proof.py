@@ -337,7 +337,7 @@ def _finish(
 
 
 def _shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProgram]) -> Shape:
-    """Path and stock beside the finished wall, the tool beside its neighbours or the part."""
+    """Path and stock against the finished wall, the tool against its neighbours or the part."""
     inputs = places.inputs
     if isinstance(inputs.body.shape, PartShape) and inputs.body.shape.floors:
         return floor_shape(places, stock, pass_programs)

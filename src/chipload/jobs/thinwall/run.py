@@ -231,13 +231,13 @@ def propose(
 
 def _findings(inputs: WallInputs) -> tuple[Finding, ...]:
     """What asks more of the coefficients than they were measured for, and what the experiments' reader noticed."""
-    asked: list[str] = []
+    texts: list[str] = []
     for one in inputs.operations:
         cut = one.cut
         lean = math.sin(cut.posture.beta) if isinstance(cut.posture, CutterPose) else 1.0
         speed = cut.pass_motion.spindle * cut.cutter.radius * lean
-        asked += beyond(cut.material, cut.posture.feed_per_tooth, speed)
-    beyond_range = (Finding("chip-beyond-coefficients", 0, text, Severity.UNPROVEN) for text in dict.fromkeys(asked))
+        texts += beyond(cut.material, cut.posture.feed_per_tooth, speed)
+    beyond_range = (Finding("chip-beyond-coefficients", 0, text, Severity.UNPROVEN) for text in dict.fromkeys(texts))
     return (*beyond_range, *inputs.findings)
 
 

@@ -145,8 +145,8 @@ def constant_within(tried: Tried, free: Variant) -> tuple[Variant, Corrections]:
     at_most = _measured(places, free, tuple(ones for _ in inputs.operations), even_stock=True)
     corrections = at_most
     for turn in range(CONSTANTS):
-        held = share * inputs.depths.deflection if modelled else inputs.depths.deflection
-        planned = even(places.surfaces, _depth_operations(places, share, corrections, True), held)
+        deflection = share * inputs.depths.deflection if modelled else inputs.depths.deflection
+        planned = even(places.surfaces, _depth_operations(places, share, corrections, True), deflection)
         constant = tried.prove(planned, 0.4)
         if turn == CONSTANTS - 1 or _smallest(places, planned) or _over(constant, modelled, assumed)[1]:
             break
@@ -171,13 +171,13 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
     """
     places = tried.places
     inputs = places.inputs
-    modelled, held = inputs.depths.experiments is None, inputs.depths.deflection
+    modelled, deflection = inputs.depths.experiments is None, inputs.depths.deflection
     best: Variant | None = None
     least: list[tuple[float, Variant]] = []  # of those that exceed, the one that exceeds least
     assumed, share = _room(like)
     raised = False
     for turn in range(TRIES):
-        planned = limited_to(places.surfaces, _depth_operations(places, share, corrections, False), share * held)
+        planned = limited_to(places.surfaces, _depth_operations(places, share, corrections, False), share * deflection)
         if best is not None and not raised and program_seconds(places, planned) > FASTER * best.seconds:
             break
         one = tried.prove(planned, 0.4)
@@ -204,7 +204,7 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
 
 
 def compared_variants(tried: Tried, variable: Variant, constant: Variant) -> dict[str, Variant]:
-    """Variants that the job asks for beside the three."""
+    """Variants that the job states in addition to the three."""
     places, op, out = tried.places, tried.places.inputs.job.operation, {}
     if op.least_error:
         out["least_error"] = least_error(
@@ -298,16 +298,16 @@ def _variant(places: Places, planned: Planned, program: Program, run: OnMachine,
     )
 
 
-def _infeasible(places: Places, plan: Plan, held: float) -> tuple[Help, ...]:
+def _infeasible(places: Places, plan: Plan, deflection: float) -> tuple[Help, ...]:
     """Places where even the smallest depth of some pass exceeds the limit itself, with changes that would help."""
     out: list[Help] = []
     for number in range(len(places.inputs.operations)):
-        out += _infeasible_in(places, [p for p in plan.passes if p.operation == number], plan.infeasible, held)
+        out += _infeasible_in(places, [p for p in plan.passes if p.operation == number], plan.infeasible, deflection)
     return tuple(out)
 
 
 def _infeasible_in(
-    places: Places, passes: Sequence[WallPass], infeasible: Sequence[tuple[int, int, int]], held: float
+    places: Places, passes: Sequence[WallPass], infeasible: Sequence[tuple[int, int, int]], deflection: float
 ) -> list[Help]:
     """Those of one operation, by its passes."""
     inputs = places.inputs
@@ -329,9 +329,9 @@ def _infeasible_in(
     plane = float(normal_force(own.cut.posture, own.cut.material, [limits.smallest], measure=own.cut.measure)[0])
     share = plane / float(law.forces[0])  # what helps is asked of plane stock
     if own.depths.experiments is None:  # the plan may be held to less than the limit
-        least = {key: force * own.depths.deflection / held for key, force in least.items()}
+        least = {key: force * own.depths.deflection / deflection for key, force in least.items()}
     shares = [share / correction[key] for key in keys]
-    asked = largest_depths(
+    largest = largest_depths(
         own.cut.posture,
         own.cut.material,
         [s * least[k] for s, k in zip(shares, keys, strict=True)],
@@ -339,7 +339,7 @@ def _infeasible_in(
         measure=own.cut.measure,
     )
     out = []
-    for one in asked.infeasible:
+    for one in largest.infeasible:
         side, i, j = keys[one.place]
         x, y, z = places.surfaces[side].points[i, j].tolist()
         s = shares[one.place]

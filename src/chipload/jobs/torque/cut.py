@@ -72,7 +72,7 @@ class Place:
         return min(self.table.clamp_z_mm, other), max(self.table.clamp_z_mm, other)
 
     def along(self, z: Floats) -> Floats:
-        """Distance s along the wall of heights [mm]; outside 0 .. length beside the wall."""
+        """Distance s along the wall of heights [mm]; outside 0 .. length beyond the wall."""
         return np.asarray(self._up * (z - self.table.clamp_z_mm) / math.cos(self.angle))
 
     def outer(self, z: Floats) -> Floats:

@@ -21,7 +21,7 @@ ONE_PROGRAM = "state a [program] with a file, or a [round] to generate one"
 ONE_WALL = "state [torque_control.shell] of a wall, or [stock] and [workpiece] of any part"
 #: tables that go with a workpiece and not with a shell
 OF_WORKPIECE = ("stock", "real_stock", "workpiece")
-#: keys that each kind of surprise needs beside `share`
+#: keys that each kind of surprise needs besides `share`
 SURPRISES: Mapping[str, tuple[str, ...]] = {
     "thicker-side": ("at_deg",),
     "hard-spot": ("at_deg", "width_mm", "ramp_mm"),

@@ -86,8 +86,8 @@ def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[Limi
         for name, limit in outcome.job.limits.items()
     )
     checks = outcome.job.checks
-    held = (with_peaks(check, checks, columns) for check in stated)
-    found = (*held, *default_limits(checks, outcome.job.machine, columns, track, errors))
+    stated_checks = (with_peaks(check, checks, columns) for check in stated)
+    found = (*stated_checks, *default_limits(checks, outcome.job.machine, columns, track, errors))
     return tuple(over_allowable(x, columns, errors["torque_nm"]) if x.name == OVER else x for x in found)
 
 
@@ -170,7 +170,7 @@ def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
 
 
 def _run_findings(case: ControllerCase, run: ControllerRun) -> tuple[Finding, ...]:
-    """What was found in a run beside its limits."""
+    """Findings of a run in addition to its limits."""
     out, o, plain = [], run.outcome, case.runs[PLAIN].outcome
     if not o.finished:
         text = f"the controller stopped at {o.s[-1]:.4g} mm of the path: {o.ended}"

@@ -1,7 +1,7 @@
 """The 3D view: bodies, stock at the row, path coloured by a column, cutter, marks.
 
 The view itself runs in the browser (viewer/src, built into report/viewer/viewer.js): it moves by itself while a track
-is played and tells the row. Here are its controls, and what it is told.
+is played and reports the row. This module holds its controls and the calls to it.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ SECTIONS = {"": "no section", "x": "section X", "y": "section Y", "z": "section 
 
 
 class Standing(StrEnum):
-    """Why the view tells its row."""
+    """Why the view reports its row."""
 
     PLAYING = "playing"
     STOPPED = "stopped"
@@ -49,12 +49,12 @@ class Standing(StrEnum):
 class ScenePanel:
     """The 3D view of a result."""
 
-    def __init__(self, assets: AssetCache, told: Callable[[int, Standing], Awaitable[None]]) -> None:
-        self.assets, self.told = assets, told
+    def __init__(self, assets: AssetCache, report_row: Callable[[int, Standing], Awaitable[None]]) -> None:
+        self.assets, self.report_row = assets, report_row
         self.result: PageResult | None = None
         self.track: PageTrack | None = None
         self.scene: PageScene | None = None
-        self.beside: PageScene | None = None
+        self.second_scene: PageScene | None = None
         self.found: Any = ((), "")
         self.seen: dict[str, bool] = {}
         self.sides: tuple[Side, ...] = ()
@@ -129,8 +129,8 @@ class ScenePanel:
             self._first(f"lead({second}, '{what}', {here}, {there})")
 
     async def compare(self, sides: tuple[Side, ...], found: Any) -> None:
-        """Show the first two sides beside each other; empty: the own track alone. ``found``: bodies of the second."""
-        self.sides, self.beside = sides, None
+        """Show the first two sides next to each other; empty: the own track alone. ``found``: bodies of the second."""
+        self.sides, self.second_scene = sides, None
         self.frame.classes(**{"add" if sides else "remove": "cl-two"})
         self.second.set_visibility(bool(sides))
         for k, title in enumerate(self.titles):
@@ -153,7 +153,7 @@ class ScenePanel:
         )
         if sides is not self.sides:
             return
-        self.beside = scene
+        self.second_scene = scene
         here, there = (json.dumps(v.tolist()) for v in knots(sides[0], other, self.counted))
         url, second = self.assets.put(scene.document), f"c{self.second.id}"
         ui.run_javascript(
@@ -210,7 +210,7 @@ class ScenePanel:
 
     # -- parts --------------------------------------------------------------------------------------------------
     def _first(self, what: str) -> None:
-        """Call the own view; a view beside it follows."""
+        """Call the own view; a second view follows."""
         if self.track is not None:
             ui.run_javascript(f"window.chiploadViewer && chiploadViewer.of('{self.view_id}').{what}")
 
@@ -226,12 +226,12 @@ class ScenePanel:
         if self.sides and isinstance(detail, dict) and isinstance(detail.get("row"), int):
             row = min(max(detail["row"], 0), len(self.sides[1].track) - 1)
             if detail.get("why") == Standing.CLICKED:
-                await self.told(matching_row(self.sides[1], self.sides[0], self.counted, row), Standing.CLICKED)
+                await self.report_row(matching_row(self.sides[1], self.sides[0], self.counted, row), Standing.CLICKED)
 
     async def _moved(self, event: Any) -> None:
         detail = event.args
         if isinstance(detail, dict) and isinstance(detail.get("row"), int) and detail.get("why") in set(Standing):
-            await self.told(detail["row"], Standing(detail["why"]))
+            await self.report_row(detail["row"], Standing(detail["why"]))
 
     async def _recoloured(self, views: int = 2) -> None:
         """Colour the path by the column that is chosen, in the first views."""
@@ -240,8 +240,8 @@ class ScenePanel:
             return
 
         shown = [(self.view_id, Side(result, track, "", ""), scene)]
-        if self.sides and self.beside is not None and column in self.sides[1].result.columns:
-            shown.append((f"c{self.second.id}", self.sides[1], self.beside))
+        if self.sides and self.second_scene is not None and column in self.sides[1].result.columns:
+            shown.append((f"c{self.second.id}", self.sides[1], self.second_scene))
         span = common_span([side for _, side, _ in shown], column) if len(shown) > 1 else None
 
         def document(side: Side, own: PageScene) -> bytes:
