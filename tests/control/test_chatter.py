@@ -120,7 +120,7 @@ def test_the_guard_finds_a_quiet_speed_and_the_chatter_ends():
     guard, machine, told = ChatterGuard(RULES, rpm / 60.0, windows), Cut(depth), []
     for _ in range(14):
         speed = guard.override * rpm / 60.0
-        told.append(guard.hear(machine.sampled(RULES.window, 60.0 * speed), speed))
+        told.append(guard.answer(machine.sampled(RULES.window, 60.0 * speed), speed))
     kinds = [x.kind for x in told]
     assert kinds.count(ChatterAnswer.SPEED) == 1
     k = kinds.index(ChatterAnswer.SPEED)
@@ -136,7 +136,7 @@ def test_without_a_quiet_speed_in_reach_it_stops():
     rpm, machine = 9000.0, Cut(3.0)
     guard, answer = ChatterGuard(RULES, rpm / 60.0, [(400.0, 500.0)]), None
     for _ in range(10):
-        answer = guard.hear(machine.sampled(RULES.window, rpm), rpm / 60.0)
+        answer = guard.answer(machine.sampled(RULES.window, rpm), rpm / 60.0)
         if answer.kind is ChatterAnswer.STOP:
             break
     assert answer is not None

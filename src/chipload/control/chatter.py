@@ -205,7 +205,7 @@ class ChatterGuard:
         if not all(0.0 < a <= b for a, b in self.windows):
             raise InputError("chatter: a quiet window must rise from above 0")
 
-    def hear(self, signal: ArrayLike, speed: ArrayLike) -> SpeedAnswer:
+    def answer(self, signal: ArrayLike, speed: ArrayLike) -> SpeedAnswer:
         """Return the answer to one window of samples; parameters as for :func:`listen`."""
         heard = listen(signal, speed, self.rules)
         wanted = self.override * self.programmed

@@ -78,9 +78,9 @@ def answers(
         if len(pending) < count:
             continue
         signal, speed = np.array(pending).T
-        answer = guard.hear(signal, np.abs(speed))
+        answer = guard.answer(signal, np.abs(speed))
         pending = pending[count // 2 :] if answer.kind is ChatterAnswer.KEEP else []
-        yield from _told(answer, halui)
+        yield from _halcmd_lines(answer, halui)
         if answer.kind is ChatterAnswer.STOP:
             return
 
@@ -95,7 +95,7 @@ def _sample(line: str) -> tuple[float, float] | None:
     return (values[0], values[1]) if len(values) == 2 and all(map(math.isfinite, values)) else None
 
 
-def _told(answer: SpeedAnswer, halui: bool) -> Iterator[str]:
+def _halcmd_lines(answer: SpeedAnswer, halui: bool) -> Iterator[str]:
     if answer.kind is ChatterAnswer.KEEP:
         return
     if not halui:

@@ -238,7 +238,7 @@ def control(
             ended = Ended.GONE
             break
         before = status
-        if _wrong(seen, cut):
+        if _implausible(seen, cut):
             state = stopped(state, Status.MACHINE_DATA) if status not in STOPS else state
             sent, status = 0.0, Status.MACHINE_DATA if status not in STOPS else status
             unknown = (math.nan, math.nan, float(STATUS.index(status)), math.nan, math.nan, math.nan, math.nan)
@@ -284,7 +284,7 @@ def control(
     )
 
 
-def _wrong(seen: PinValues, cut: _Cut) -> bool:
+def _implausible(seen: PinValues, cut: _Cut) -> bool:
     """Return whether time, place or velocity is not a number, or the time runs backwards."""
     numbers = (seen.time, seen.x, seen.y, seen.z, seen.velocity)
     return not all(map(math.isfinite, numbers)) or (cut.last is not None and seen.time < cut.last[0])

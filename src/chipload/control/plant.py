@@ -136,7 +136,9 @@ class Surprise:
             raise InputError(f"surprise.ramp = {self.ramp:g} mm: must be at least 0")
 
 
-def surprised(profile: TorqueProfile, surprises: tuple[Surprise, ...], spacing: float | None = None) -> TorqueProfile:
+def with_surprises(
+    profile: TorqueProfile, surprises: tuple[Surprise, ...], spacing: float | None = None
+) -> TorqueProfile:
     """Return the true columns: the profile with surprises, sampled every ``spacing`` [mm] (None: the present rows)."""
     s = profile.s
     if spacing is not None:

@@ -89,7 +89,7 @@ class KeptRecords:
             return
         names = [*open_yet]
         tasks = [(part.make, self.records, part.arguments) for part in open_yet.values()]
-        for number, (k, data) in enumerate(self.team.completed_shared(_made, tasks), 1):
+        for number, (k, data) in enumerate(self.team.completed_shared(_part_as_bytes, tasks), 1):
             self._parts[names[k]] = self._new[names[k]] = data
             self.write()
             progress(number / len(names), f"{number} of {len(names)} parts")
@@ -111,7 +111,7 @@ class KeptRecords:
         self._cost = self._since - begin
 
 
-def _made(shared: Any, make: Callable[..., Any], records: Kinds, arguments: tuple[Any, ...]) -> bytes:
+def _part_as_bytes(shared: Any, make: Callable[..., Any], records: Kinds, arguments: tuple[Any, ...]) -> bytes:
     """A part as bytes; this is what a worker executes."""
     return part_bytes(make(shared, *arguments), records)
 

@@ -150,7 +150,7 @@ def _model_at(loc: Iterable[int | str], root: type[BaseModel]) -> type[BaseModel
     for key in loc:
         if isinstance(key, int):
             continue
-        if field is not None and (chosen := _tagged(field.annotation, key)) is not None:
+        if field is not None and (chosen := _table_of_tag(field.annotation, key)) is not None:
             model = chosen
             continue
         field = model.model_fields.get(key) if model is not None else None
@@ -158,11 +158,11 @@ def _model_at(loc: Iterable[int | str], root: type[BaseModel]) -> type[BaseModel
     return model
 
 
-def _tagged(annotation: Any, tag: str) -> type[BaseModel] | None:
+def _table_of_tag(annotation: Any, tag: str) -> type[BaseModel] | None:
     """The table of a tag, where a key takes either of several kinds of tables."""
     if any(isinstance(m, Tag) and m.tag == tag for m in getattr(annotation, "__metadata__", ())):
         return _model_in(annotation)
-    found = (_tagged(a, tag) for a in typing.get_args(annotation))
+    found = (_table_of_tag(a, tag) for a in typing.get_args(annotation))
     return next((m for m in found if m is not None), None)
 
 

@@ -147,7 +147,7 @@ def line_feeds(line: ArrayLike, touch: ArrayLike, least: ArrayLike, most: ArrayL
     return LineFeeds(lines, does, np.where(film, 1.0, floor), np.where(film, 1.0, allowed), np.where(film, KEPT, holds))
 
 
-def calmed(allowed: ArrayLike, useful: ArrayLike, least: ArrayLike, old: ArrayLike, share: float) -> Floats:
+def steady_feeds(allowed: ArrayLike, useful: ArrayLike, least: ArrayLike, old: ArrayLike, share: float) -> Floats:
     """Feeds of lines in their order that do not flicker: a feed stays that of the line before, or the programmed one,
     as long as it is allowed, not below the least, and short of what is useful by at most ``share`` of it.
 
@@ -159,7 +159,7 @@ def calmed(allowed: ArrayLike, useful: ArrayLike, least: ArrayLike, old: ArrayLi
     old : (m,) float, programmed
     share : 0 to below 1
 
-    >>> calmed([5.0, 5.2, 9.0, 5.1], [5.0, 5.2, 9.0, 5.1], [1.0] * 4, [4.0] * 4, 0.1).tolist()
+    >>> steady_feeds([5.0, 5.2, 9.0, 5.1], [5.0, 5.2, 9.0, 5.1], [1.0] * 4, [4.0] * 4, 0.1).tolist()
     [5.0, 5.0, 9.0, 5.1]
     """
     if not 0.0 <= share < 1.0:

@@ -39,7 +39,7 @@ def export_result(
 ) -> tuple[str, ...]:
     """Write a result folder as other files into a new or empty folder; whole or not at all.
 
-    ``csv``: history.csv, a row a step, units in the names of the columns. ``vtk``: the path of each track with all its
+    ``csv``: history.csv, one row for each step, units in the column names. ``vtk``: the path of each track with all its
     numbers (.vtp), its undeformed chips (.vtu), surface maps with displacements by finite elements (.vtu), the stock
     that is left (.vtu and .stl). ``glb``: the undeformed chips of each track, a body a chip. ``sheet``: setup.html, one
     page, and as setup.pdf where ``chipload[export]`` is installed.

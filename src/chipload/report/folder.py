@@ -58,7 +58,7 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
     try:
         if target.is_symlink() or (target.exists() and not target.is_dir()):
             raise InputError(f"--out {out}: is not a folder: name a folder that is new, empty or holds an older result")
-        if target.exists() and any(target.iterdir()) and not (ours or _ours)(target):
+        if target.exists() and any(target.iterdir()) and not (ours or _is_result)(target):
             raise InputError(
                 f"--out {out}: holds files that are not a {what} of chipload: name a folder that is new, empty or "
                 f"holds an older {what}"
@@ -187,7 +187,7 @@ def write_files(
     return target
 
 
-def _ours(folder: Path) -> bool:
+def _is_result(folder: Path) -> bool:
     """Return whether a folder contains a result of chipload and no other files."""
     try:
         holds = json.loads(read_regular(folder / SUMMARY, SUMMARY, LARGEST_SUMMARY))

@@ -255,7 +255,7 @@ def moved(
         left, spindle = _left(found, entries), np.abs(steps.spindle[step])
         each, at, mean = loads_of_instants(engagement, cutter, material, rotation, left, spindle, steps.seconds[step])
         weight = 1.0 / found.instants[entries]
-        _together(loads, step, each, weight)
+        _merge_instants(loads, step, each, weight)
         if material.has_band:
             some = turned_basis(mean, engagement.frames)
             basis = basis + np.tensordot(steps.seconds[step] * weight, some, 1)
@@ -396,7 +396,7 @@ def _left(found: Engaged, entries: Ints) -> Floats:
     return np.asarray(np.where(one[:, None], total / np.where(one, size, 1.0)[:, None], 0.0))
 
 
-def _together(loads: Floats, step: Ints, each: Floats, weight: Floats) -> None:
+def _merge_instants(loads: Floats, step: Ints, each: Floats, weight: Floats) -> None:
     """Replace the loads of instants by those of their steps: means, greatest, least."""
     fresh = np.unique(step)
     loads[np.ix_(fresh, LEAST)] = math.inf

@@ -66,7 +66,7 @@ class Placement:
         return self.depth_mm > self.flute_mm
 
     @property
-    def apart(self) -> tuple[int, ...]:
+    def outside_axes(self) -> tuple[int, ...]:
         """Axes along which the middle of the motions at feed lies outside the stock by more than a radius."""
         middle = 0.5 * (self.low + self.high)
         outside = np.maximum(self.stock_low - middle, middle - self.stock_high)
@@ -119,14 +119,14 @@ def stock_placement(
     :func:`placement_of`.
     """
     at = placement_of(columns, bounds, cutters)
-    if at.in_air + at.too_deep + bool(at.apart) < 2 and not (at.first is None and at.apart):
+    if at.in_air + at.too_deep + bool(at.outside_axes) < 2 and not (at.first is None and at.outside_axes):
         return None
     parts = [f"{at.air_s:.4g} of {at.feed_s:.4g} s at feed are in air"]
     if at.too_deep:
         line = int(columns["line"][at.first]) if "line" in columns else 0
         where = f" (line {line})" if line else ""
         parts.append(f"the first cut{where} is up to {at.depth_mm:.4g} mm deep, the flutes are {at.flute_mm:g} mm long")
-    shown = sorted({*at.apart, *((2,) if at.too_deep else ())})
+    shown = sorted({*at.outside_axes, *((2,) if at.too_deep else ())})
     boxes = (
         f"the motions at feed lie in {'XYZ'[k]} {at.low[k]:.4g} to {at.high[k]:.4g} mm, the stock in "
         f"{at.stock_low[k]:.4g} to {at.stock_high[k]:.4g} mm"

@@ -286,10 +286,10 @@ class Strips:
             self.stock.tidied += more
         self.complete = not self._blocks
         for state in self._states if self.complete else ():
-            self._put(state)
+            self._write_back(state)
         return TakenByLayers(removed, gained, sorted(engagement, key=lambda b: b.step), piece)
 
-    def _put(self, state: _State) -> None:
+    def _write_back(self, state: _State) -> None:
         """Write the tiles of a strip into the stock of the caller."""
         strip, part = state.strip, state.stock
         to = _slice(strip.axis, strip.own)

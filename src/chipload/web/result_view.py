@@ -59,11 +59,11 @@ class ResultView:
                 self.tip = ui.tooltip("").classes("cl-tip")
         with ui.element("div").classes("cl-body"):
             with ui.element("div").classes("cl-left"):
-                self.scene = ScenePanel(assets, self._viewed)
+                self.scene = ScenePanel(assets, self._row_reported)
                 self.plots = PlotPanel(self.pick, self._turned)
             with ui.element("div").classes("cl-right"):
                 with ui.element("div").classes("cl-panel cl-tables"):
-                    self.table = ui.toggle(TABLES, value="limits", on_change=self._tabled).props(
+                    self.table = ui.toggle(TABLES, value="limits", on_change=self._show_table).props(
                         "dense no-caps size=sm unelevated toggle-color=blue-grey-7"
                     ).classes("cl-tabs").mark("tables")  # fmt: skip
                     self.limits = LimitPanel(self.find)
@@ -71,7 +71,7 @@ class ResultView:
                     self.tools = ToolPanel(self._found)
                     self.lines = LinePanel(self._found)
                     self.compared = ComparisonPanel()
-                self._tabled()
+                self._show_table()
                 self.source = SourcePanel(self.pick)
         with ui.element("div").classes("cl-foot"):
             self._button("first_page", "to the beginning (Home)", lambda: self.go(0))
@@ -91,7 +91,7 @@ class ResultView:
                 ui.slider(min=0.0, max=1.0, step=0.001, value=0.0).props('dense aria-label="step"').classes("cl-slider")
             )
             self.slider.mark("slider")
-            self.slider.on("update:model-value", self._slid, throttle=0.05)
+            self.slider.on("update:model-value", self._slider_moved, throttle=0.05)
             # the 3D view follows at once, the other panels when the server has answered
             self.slider.on("update:model-value", js_handler=self.scene.slide)
             self.slider.on("change", js_handler=RELEASE)
@@ -108,7 +108,7 @@ class ResultView:
             if self.result is None or not 0 <= k < len(self.result.tracks) or self.track is self.result.tracks[k]:
                 return
             self.pause()
-            await self._alone()
+            await self._stop_comparing()
             self.track = self.result.tracks[k]
             await self.scene.follow(self.result, self.track)
             await self._tracked(self.result, self.track)
@@ -120,7 +120,7 @@ class ResultView:
                 return
             self.pause()
             if not others:
-                await self._alone()
+                await self._stop_comparing()
                 return
             every = [(self.result, self.track, self.track.title), *others][:MOST]
             self.sides = tuple(Side(*side, COLOURS[k]) for k, side in enumerate(every))
@@ -131,7 +131,7 @@ class ResultView:
             self.compared.show(self.sides, self.plots.against.value)
             self.go(self.row)
 
-    async def _alone(self) -> None:
+    async def _stop_comparing(self) -> None:
         """Compare no longer."""
         if self.sides:
             self.sides = ()
@@ -203,7 +203,7 @@ class ResultView:
     # -- parts --------------------------------------------------------------------------------------------------
     async def _open(self, result: PageResult) -> None:
         self.pause()
-        await self._alone()
+        await self._stop_comparing()
         track = result.tracks[0]
         self.result, self.track = result, track
         verdict, message = result.result.verdict, result.result.message
@@ -241,7 +241,7 @@ class ResultView:
         self.slider.update()
         self.slider.set_value(float(x[self.row]) if self.row < len(x) else low)
 
-    def _tabled(self) -> None:
+    def _show_table(self) -> None:
         """Show the table that is chosen."""
         chosen = self.table.value
         self.limits.box.set_visibility(chosen == "limits")
@@ -274,7 +274,7 @@ class ResultView:
             self.go(0)
             self.toggle()
 
-    def _slid(self, event: Any) -> None:
+    def _slider_moved(self, event: Any) -> None:
         if self.track is None or not isinstance(event.args, (int, float)):
             return
         self.pause()
@@ -282,7 +282,7 @@ class ResultView:
         self.row = nearest(abscissa(self.track, self.plots.against.value), float(event.args))
         self._shown(self.track)
 
-    async def _viewed(self, row: int, why: Standing) -> None:
+    async def _row_reported(self, row: int, why: Standing) -> None:
         """The 3D view stands at a row: it plays or was stopped, or its path was clicked."""
         if self.track is None:
             return

@@ -44,7 +44,7 @@ class JobRun:
         self._process: asyncio.subprocess.Process | None = None
 
     @property
-    def over(self) -> bool:
+    def ended(self) -> bool:
         """Whether it has ended."""
         return self.state in ("done", "stopped", "failed")
 
@@ -81,7 +81,7 @@ class JobRun:
     async def stop(self) -> None:
         """Ask it to stop, and end it where it does not."""
         process = self._process
-        if process is None or self.over or process.returncode is not None:
+        if process is None or self.ended or process.returncode is not None:
             return
         self.state = "stopping"
         _signal(process.pid, signal.SIGTERM)

@@ -177,7 +177,7 @@ def covered_rings(moves: Sequence[Move], K: Floats, heights: Sequence[Floats], t
         [np.cumsum(count[count > 0]) - count[count > 0], [len(points) + a for a, _ in ends.values()]]
     )
     table = np.column_stack([begin, size]).astype(np.int64)
-    return _together(np.concatenate([points, loops]), table, which, shapes, len(levels))
+    return _plane_areas(np.concatenate([points, loops]), table, which, shapes, len(levels))
 
 
 def _is_straight(move: Move, K: Floats) -> bool:
@@ -239,7 +239,7 @@ def _turning(
     return buffer[: int(end[-1]) if len(end) else 0, :2], rings, shapes
 
 
-def _together(points: Floats, table: Ints, which: Ints, shapes: dict[int, Shape | None], count: int) -> PlaneAreas:
+def _plane_areas(points: Floats, table: Ints, which: Ints, shapes: dict[int, Shape | None], count: int) -> PlaneAreas:
     """Areas of ``count`` layers: those of ``which`` have the rings ``table``, some a shape, the others none."""
     first = np.zeros((count, 2), dtype=np.int64)
     first[which] = np.arange(len(which))[:, None] + np.array([0, 1])

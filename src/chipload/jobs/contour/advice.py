@@ -78,7 +78,7 @@ def greatest_engagement(
             break
         by, high = found, low
     else:
-        why = "" if by is None else f": {_told(by)}"
+        why = "" if by is None else f": {_limit_text(by)}"
         raise InputError(
             f"operation.engagement_deg = 'limit': no engagement from {LEAST_DEG:g} deg keeps the limits{why}: lower "
             "feed_mm_min or axial_depth_mm"
@@ -95,10 +95,10 @@ def greatest_engagement(
             low = middle
         else:
             high, by = middle, found
-    return EngagementAdvice(math.radians(low), f"engagement {low:.4g} deg, by {_told(by)}")
+    return EngagementAdvice(math.radians(low), f"engagement {low:.4g} deg, by {_limit_text(by)}")
 
 
-def _told(check: LimitCheck) -> str:
+def _limit_text(check: LimitCheck) -> str:
     """A limit that does not hold, with its value."""
     value = "" if check.worst is None else f" {check.worst:.4g} of {check.limit:.4g}"
     return f"{check.name}{value}{f', {check.reason}' if check.reason else ''}"

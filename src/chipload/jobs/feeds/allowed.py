@@ -26,7 +26,7 @@ from chipload.jobs.feeds.tables import FeedsTable
 from chipload.jobs.feeds.verify import require_same, rubbing_lines, speeds_of, tooth_feeds
 from chipload.machine.feed import row_time_limited
 from chipload.machine.machine import Machine
-from chipload.planning.feeds import KEPT, SLOWEST, LineFeeds, StepContact, calmed, greatest_factor, line_feeds
+from chipload.planning.feeds import KEPT, SLOWEST, LineFeeds, StepContact, greatest_factor, line_feeds, steady_feeds
 from chipload.program.gcode.feed_words import DIGITS, with_feeds
 from chipload.program.program import DWELL, RAPID
 from chipload.program.read import ProgramReading
@@ -214,7 +214,7 @@ def with_new_feeds(
         most, by = np.where(cuts, allowed[_FACTOR], most), np.where(cuts, allowed[_BY].astype(np.int64), by)
     lines = line_feeds(*(x[feeds] for x in (steps.line, touch, least, most, by)))
     lines = _in_air(lines, steps, feeds, request.table, machine)
-    factor, useful = _wanted(lines, reading, machine, request.table)
+    factor, useful = _feed_factors(lines, reading, machine, request.table)
     new = with_feeds(text, dict(zip(lines.line.tolist(), factor.tolist(), strict=True)))
     after = read(new)
     require_same(reading.program, after.program, lines.line, factor)
@@ -266,7 +266,9 @@ def _in_air(lines: LineFeeds, steps: Steps, feeds: NDArray[np.bool_], table: Fee
     return replace(lines, least=np.where(air, 1.0, lines.least), allowed=allowed, by=by)
 
 
-def _wanted(lines: LineFeeds, reading: ProgramReading, machine: Machine, table: FeedsTable) -> tuple[Floats, Floats]:
+def _feed_factors(
+    lines: LineFeeds, reading: ProgramReading, machine: Machine, table: FeedsTable
+) -> tuple[Floats, Floats]:
     """Return factors (m,) to write, and those above which the machine is no faster (at least 1 or the allowed)."""
     program = reading.program
     row = np.flatnonzero(np.isin(program.line, lines.line) & (program.motion != RAPID) & (program.motion != DWELL))
@@ -288,7 +290,7 @@ def _wanted(lines: LineFeeds, reading: ProgramReading, machine: Machine, table: 
     out = useful.copy()
     was = fast[one]
     most, enough, least = (was * x[one] for x in (lines.allowed, useful, lines.least))
-    out[one] = calmed(most, enough, least, was, 0.01 * table.change_least_percent) / was
+    out[one] = steady_feeds(most, enough, least, was, 0.01 * table.change_least_percent) / was
     # rounding must not pass for a change
     return np.where(np.abs(out - 1.0) < 10.0 ** -(DIGITS + 4), 1.0, out), useful
 

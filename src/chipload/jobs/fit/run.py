@@ -172,7 +172,7 @@ def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple
         what = (
             "measure them or state [axial]" if set(unidentified) <= {"Kac", "Kae"} else "measure more feeds or channels"
         )
-        return None, (_lost(f"no material is written: {', '.join(unidentified)} not identified: {what}"),)
+        return None, (_no_material(f"no material is written: {', '.join(unidentified)} not identified: {what}"),)
     chip = max(cut.feed_per_tooth(job.cutter.flutes) for cut in fit.cuts) + 2.0 * fit.cutter.runout[0]
     cutter = job.cutter
     cutter_text = f"{cutter.name or 'end mill'}, D {cutter.diameter:g} mm, {cutter.flutes} teeth, helix "
@@ -200,9 +200,9 @@ def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple
             covariance=covariance, peak_excess=excess or 0.0, **numbers,
         )  # fmt: skip
     except InputError as err:
-        return None, (_lost(f"no material is written: {err}"),)
+        return None, (_no_material(f"no material is written: {err}"),)
     return made, found
 
 
-def _lost(text: str) -> Finding:
+def _no_material(text: str) -> Finding:
     return Finding("fit-no-material", 0, text, Severity.UNPROVEN)

@@ -83,10 +83,10 @@ def passes_of(stability: StabilityResult, program: Program, columns: Columns, to
         speed = float(np.abs(program.spindle[rows]).max()) if rows.any() else 0.0
         change = int(between[0]) if len(between) else first
         out.append(ProgramPass(tool, (first, last), change, np.unique(numbers[inside]), speed))
-    return _together(out)
+    return _merged_passes(out)
 
 
-def _together(passes: Sequence[ProgramPass]) -> tuple[ProgramPass, ...]:
+def _merged_passes(passes: Sequence[ProgramPass]) -> tuple[ProgramPass, ...]:
     """Join neighbouring passes so that at most :data:`MOST_PASSES` remain."""
     if len(passes) <= MOST_PASSES:
         return tuple(passes)

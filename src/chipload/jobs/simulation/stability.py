@@ -92,7 +92,7 @@ class StabilityResult:
         return out
 
     @cached_property
-    def sure(self) -> Mapping[int, Floats]:
+    def stable_share(self) -> Mapping[int, Floats]:
         """Probability of stability over the speeds of :attr:`quiet`, by tool, of the cut with the least margin at each.
 
         Empty if spreads of the modes are not stated.
@@ -279,11 +279,11 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
             {"low_rpm": rpm_from_rad_s(w.low), "high_rpm": rpm_from_rad_s(w.high), "margin": w.margin}
             for w in quiet.windows
         ]
-        if tool in stability.sure:
+        if tool in stability.stable_share:
             for share in SURE:
                 out[f"windows_{share}_percent"] = [
                     {"low_rpm": rpm_from_rad_s(w.low), "high_rpm": rpm_from_rad_s(w.high), "probability": w.margin}
-                    for w in speed_windows(quiet.speed, stability.sure[tool], 0.01 * share)
+                    for w in speed_windows(quiet.speed, stability.stable_share[tool], 0.01 * share)
                 ]
     return out
 

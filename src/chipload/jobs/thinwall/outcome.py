@@ -313,7 +313,7 @@ class ThinWallResult:
     provenance: Provenance
 
 
-def helps(place: Help) -> str:
+def remedy_text(place: Help) -> str:
     """Changes that would make a place feasible, in words."""
     if place.feed_per_tooth_mm is not None:
         return f"a feed of at most {place.feed_per_tooth_mm:.4g} mm a tooth would do"

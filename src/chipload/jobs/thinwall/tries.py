@@ -16,7 +16,7 @@ from chipload.jobs.thinwall.places import Places, rows_up
 from chipload.jobs.thinwall.proof import Proof, prove
 from chipload.jobs.thinwall.wall_operation import DepthRules
 from chipload.jobs.thinwall.wall_program import OnMachine, linked, on_machine
-from chipload.planning.thinwall.correction import found
+from chipload.planning.thinwall.correction import greatest_ratios
 from chipload.planning.thinwall.depth import largest_depths, normal_force
 from chipload.planning.thinwall.passes import Plan, ThresholdOf, WallPass
 from chipload.planning.thinwall.variants import DepthOperation, even, limited_to, unlimited
@@ -121,7 +121,7 @@ def _room(one: Variant) -> tuple[float, float]:
     return error, 1.0 / (1.0 + error)
 
 
-def _over(one: Variant, modelled: bool, assumed: float) -> tuple[float, bool]:
+def _overload(one: Variant, modelled: bool, assumed: float) -> tuple[float, bool]:
     """Greatest F_n over F_th with the errors that the limit is checked with, and whether the limit holds; the error of
     the loads is ``assumed`` where the limit does not hold with that.
     """
@@ -148,7 +148,7 @@ def constant_within(tried: Tried, free: Variant) -> tuple[Variant, Corrections]:
         deflection = share * inputs.depths.deflection if modelled else inputs.depths.deflection
         planned = even(places.surfaces, _depth_operations(places, share, corrections, True), deflection)
         constant = tried.prove(planned, 0.4)
-        if turn == CONSTANTS - 1 or _smallest(places, planned) or _over(constant, modelled, assumed)[1]:
+        if turn == CONSTANTS - 1 or _smallest(places, planned) or _overload(constant, modelled, assumed)[1]:
             break
         corrections = _greater(corrections, _measured(places, constant, corrections, even_stock=True))
     return constant, at_most
@@ -181,7 +181,7 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
         if best is not None and not raised and program_seconds(places, planned) > FASTER * best.seconds:
             break
         one = tried.prove(planned, 0.4)
-        over, good = _over(one, modelled, assumed)
+        over, good = _overload(one, modelled, assumed)
         if good and (best is None or one.seconds < best.seconds):
             best, tried.planned["variable"], tried.corrections, tried.share = one, planned, corrections, share
         elif not good:
@@ -248,7 +248,7 @@ def _measured(places: Places, one: Variant, before: Corrections, *, even_stock: 
         for side, old in enumerate(own):
             k = np.flatnonzero(cut & (c["side"] == side))
             ratio = c["force_normal_n"][k] / law.force(c["depth_mm"][k])
-            new = found((places.u, v), c["u"][k], c["v"][k], ratio)
+            new = greatest_ratios((places.u, v), c["u"][k], c["v"][k], ratio)
             if operation.table.contact == "flank":  # no row is on the free edge: the one below reaches up to it
                 new[:, -1] = new[:, -2]
             if len(v) != len(places.v):

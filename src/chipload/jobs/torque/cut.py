@@ -320,7 +320,7 @@ def cut(
     makes, soft = np.zeros(len(feed), dtype=np.bool_), np.zeros(len(feed))
     for number in np.unique(tools).tolist():
         rows = np.flatnonzero((tools == number) & (height > 0.0))
-        m, t = _on_the_wall(Place(job.shell), job.cutters[number], points, rows, height)
+        m, t = _finished_surface(Place(job.shell), job.cutters[number], points, rows, height)
         makes[rows], soft[rows] = m, t
     return Cut(removal, stock, points, feed, loads, near, far, makes, soft)
 
@@ -377,7 +377,7 @@ def _depths(place: Place, bounds: Floats, points: Floats, layers: NDArray[np.int
     return np.where(cuts, near, 0.0), np.where(cuts, far, 0.0), np.where(cuts, top - low, 0.0)
 
 
-def _on_the_wall(
+def _finished_surface(
     place: Place, cutter: Cutter, points: Floats, rows: NDArray[np.int64], height: Floats
 ) -> tuple[Bools, Floats]:
     """Whether the flank makes the finished surface, and the cutter's compliance, in the middle of the depth of cut."""

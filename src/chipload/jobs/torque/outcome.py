@@ -110,7 +110,7 @@ class SolidComparison:
     nodes: int
 
     @property
-    def apart(self) -> float:
+    def greatest_difference(self) -> float:
         """Greatest relative difference."""
         return max(abs(x.solid / x.shell - 1.0) for x in self.places)
 

@@ -37,7 +37,7 @@ class HardestPlace:
 
 def remedies(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) -> list[str]:
     """Changes each of which alone would do; ``shell``: the wall for which the limit is calculated."""
-    places = _hardest(planned, limit)
+    places = _hardest_places(planned, limit)
     k = limit.step
     depth, tolerance, modes = float(planned.far[k] - planned.near[k]), job.shell.wall_tolerance_mm, ritz(shell)
 
@@ -79,7 +79,7 @@ def remedies(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) -> li
     return out
 
 
-def _hardest(planned: Cut, limit: PathLimit) -> list[HardestPlace]:
+def _hardest_places(planned: Cut, limit: PathLimit) -> list[HardestPlace]:
     """The step of the limit, and those with the greatest edge force, alone and times the compliance of the cutter."""
     edge = planned.loads.force_edge * (planned.far > planned.near)
     rows = {limit.step, int(np.argmax(edge)), int(np.argmax(edge * planned.tool)), int(np.argmax(edge * planned.far))}

@@ -70,7 +70,7 @@ def result_of(outcome: TorqueResult) -> Result:
 
 def track_name(case: ControllerCase, controller: str) -> str:
     """Name of the track of a controller: with its latency, if the loop has one."""
-    return f"{controller}, {1e3 * case.loop.latency:g} ms" if _real(case) else controller
+    return f"{controller}, {1e3 * case.loop.latency:g} ms" if _is_machine_loop(case) else controller
 
 
 def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
@@ -110,7 +110,7 @@ def over_allowable(check: LimitCheck, columns: Columns, error: float) -> LimitCh
     return replace(check, state=state, reason=why, resolution_error=error if math.isfinite(error) else 0.0)
 
 
-def _real(case: ControllerCase) -> bool:
+def _is_machine_loop(case: ControllerCase) -> bool:
     """Whether the loop has latency or steps, as on a machine."""
     return bool(case.loop.latency or case.quantum)
 

@@ -274,7 +274,7 @@ def allowable_on_workpiece(
     real = planned
     if ask.real_stock is not None:
         real = workpiece_cut(job, ask.real_stock, program, material, machine.rapid, part_of(progress, 0.5, 1.0))
-    factors = surprise_factors(len(real.feed), lambda x: _away(real, x), ask.surprise)
+    factors = surprise_factors(len(real.feed), lambda x: _spot_distance(real, x), ask.surprise)
     e, c = factors
     loads = Loads(
         real.loads.torque_edge * e, real.loads.torque_cut * c, real.loads.force_edge * e, real.loads.force_cut * c
@@ -293,7 +293,7 @@ def real_stock_body(job: TorqueJob, program: Program) -> LayeredStock:
     return stock_body(simulation_of(job, job.table.real_stock or stated(job.table.stock, "stock")), program)
 
 
-def _away(cut: WorkpieceCut, x: SurpriseTable) -> Floats:
+def _spot_distance(cut: WorkpieceCut, x: SurpriseTable) -> Floats:
     """(n,) distance of the steps from the middle of a hard spot [mm]."""
     middle = 0.5 * (cut.points[1:] + cut.points[:-1])
     return np.asarray(np.linalg.norm(middle - np.array(stated(x.at_mm, "surprise.at_mm")), axis=1))

@@ -227,20 +227,20 @@ def _depth(job: _Job) -> float:
 def _stock(job: _Job) -> Region:
     """What the first motion meets, in the work frame."""
     rough = _rough(job) if job.finish else job.walls.extended
-    return Region(tuple(_back(c, job.flip) for c in rough_stock(job.walls, rough, _behind(job)).contours))
+    return Region(tuple(_back(c, job.flip) for c in rough_stock(job.walls, rough, _stock_depth_in_part(job)).contours))
 
 
-def _behind(job: _Job) -> float:
+def _stock_depth_in_part(job: _Job) -> float:
     """Depth of the considered stock inside the part [mm]."""
     return 0.5 * job.radius + (0.0 if job.finish else job.setting.passes * job.setting.radial_depth)
 
 
-def _cleared(job: _Job, planar: list[ContourPass]) -> dict[str, float]:
+def _clearing_totals(job: _Job, planar: list[ContourPass]) -> dict[str, float]:
     """What the passes clear; nothing of those into the material, which make a wall of their own."""
     if not job.finish:
         return {}
-    stock, depth = rough_stock(job.walls, _rough(job), _behind(job)), _depth(job)
-    return {"cleared_percent": cleared_percent(stock, job.walls, _behind(job), depth, planar, job.radius)}
+    stock, depth = rough_stock(job.walls, _rough(job), _stock_depth_in_part(job)), _depth(job)
+    return {"cleared_percent": cleared_percent(stock, job.walls, _stock_depth_in_part(job), depth, planar, job.radius)}
 
 
 def _passes(job: _Job, a: float | None) -> list[ContourPass]:
@@ -323,7 +323,7 @@ def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> tuple[Strategy
         "finish path": tuple(r.path for r in runs if r.name != "semifinish"),
         "stock": tuple(Contour(c.segments) for r in runs if r.name != "semifinish" for c in _chains(r.stock.segments)),
     }
-    summary = {**_summary(job, name, history, on_wall), **counts(len(runs), history), **_cleared(job, planar)}
+    summary = {**_summary(job, name, history, on_wall), **counts(len(runs), history), **_clearing_totals(job, planar)}
     finish = [steps for run, (steps, _) in zip(runs, clocks, strict=True) if run.name == "finish"]
     done = StrategyResult(name, program, history, summary, events, on_wall, drawn)
     return done, FinishPasses(tuple(finish), wanted if name == "feed" else None)

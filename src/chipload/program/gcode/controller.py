@@ -80,7 +80,7 @@ class Controller:
         self.strict_tools = dialect == "linuxcnc"
         self.findings = Findings()
         self.track = MotionRows(most_rows)
-        self.parameters = Parameters(parameters, self._noted)
+        self.parameters = Parameters(parameters, self._note_unproven)
         self.line = 0
         self.label = 0
         self.returned = (0.0, 0.0)
@@ -120,7 +120,7 @@ class Controller:
                 self.parameters.numbered[5210 + 20 * number] = turn
         self._start(start)
 
-    def _noted(self, code: str, text: str) -> None:
+    def _note_unproven(self, code: str, text: str) -> None:
         self.findings.once(code, self.line, text, Severity.UNPROVEN)
 
     def note(self, code: str, text: str) -> None:

@@ -146,7 +146,7 @@ class ConversationalState:
             raise InputError(f"F{value:g} for each turn: the spindle speed is not known: give S")
         self.feed = value * self.speed / math.tau if of_turn else mm_s_from_mm_min(value)
 
-    def need(self) -> float:
+    def cutting_feed(self) -> float:
         """The feed of a cut [mm/s]."""
         if self.feed is None:
             raise InputError("a cut has no feed: give F")
@@ -204,14 +204,14 @@ class ConversationalState:
 
     def straight(self, motion: int, end: list[float]) -> None:
         """RAPID or LINE to the programmed ``end``."""
-        feed = 0.0 if motion == RAPID else self.need()
+        feed = 0.0 if motion == RAPID else self.cutting_feed()
         self._turn_to(complex(end[0] - self.at[0], end[1] - self.at[1]))
         self._piece(Piece(motion, self.at, end, (0.0, 0.0), 0, feed, self._tail()))
         self.at = end
 
     def arc(self, end: list[float], centre: tuple[float, float], turns: int) -> None:
         """ARC to the programmed ``end``."""
-        feed = self.need()
+        feed = self.cutting_feed()
         out = complex(end[0] - centre[0], end[1] - centre[1]) * (1j if turns > 0 else -1j)
         self._turn_to(out)
         self._piece(Piece(ARC, self.at, end, centre, turns, feed, self._tail()))

@@ -147,7 +147,7 @@ def turn(s: ConversationalState, target: NDArray[np.float64], motion: int = RAPI
         s.row(RAPID, s.at)
     now[3:6] = target[3:6]
     _stand(s, now)
-    s.row(motion, s.at, 0.0 if motion == RAPID else s.need())
+    s.row(motion, s.at, 0.0 if motion == RAPID else s.cutting_feed())
     s.tilt = tilt
     if tilt is not None:
         s.frame()

@@ -270,11 +270,13 @@ class ScenePanel:
         self.boxes.clear()
         with self.boxes:
             for name, on in self.seen.items():
-                box = ui.checkbox(_plain(name), value=on, on_change=lambda e, n=name: self._see(n, bool(e.value)))
+                box = ui.checkbox(
+                    _plain(name), value=on, on_change=lambda e, n=name: self._set_visible(n, bool(e.value))
+                )
                 box.props(f'dense size=xs aria-label="{html.escape(_plain(name))}"')
                 box.on("update:model-value", js_handler=RELEASE)
 
-    def _see(self, name: str, wanted: bool) -> None:
+    def _set_visible(self, name: str, wanted: bool) -> None:
         self.seen[name] = wanted
         if self.track is not None:
             ui.run_javascript(self._layer(name, wanted))
