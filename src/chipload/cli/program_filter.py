@@ -67,7 +67,7 @@ def _read(file: Path, name: str, tools: Path | None) -> Severity:
     """Read the program for its machine with the work offsets that LinuxCNC saved, and write the findings.
 
     Leaving the travel of a machine without rotary axes is reported but does not block the program: it depends on the
-    work offset, and the screen asks before the cycle starts.
+    work offset, and the screen warns before the cycle starts.
     """
     from chipload.cli.inputs import machine_of
     from chipload.cli.program_check import TOLERANCE_MM, finding_lines

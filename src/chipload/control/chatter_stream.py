@@ -57,7 +57,7 @@ def answers(
     halui: bool = False,
 ) -> Iterator[str]:
     """Yield the answers to a stream of lines ``signal speed``, windows half over one another; empty lines, and others
-    than two numbers, as halsampler writes where samples were lost, begin a window anew.
+    than two numbers, as halsampler writes where samples were lost, start a new window.
 
     Parameters
     ----------

@@ -6,10 +6,10 @@ The torque is estimated from the spindle's current and speed: those of pins, or 
 follow the machine's real place and velocity; or it is that of a pin. The
 pin `beat` changes with every step; HAL watches it and takes the feed away from a controller that does not beat
 (examples/tube/linuxcnc). The time is that of the machine's pins, so a step that comes late is a long step, and one
-longer than `timeout_s` is a start: spindle and controller begin anew.
+longer than `timeout_s` is a start: spindle and controller restart.
 
 The torque of the model is always predicted, with feed-forward or without, and readings are compared with it. A
-controller that has stopped continues to send 0 and to beat until it is told to end; it then returns the reason of the
+controller that has stopped continues to send 0 and to beat until it is stopped; it then returns the reason of the
 stop.
 """
 
@@ -65,7 +65,7 @@ class HalJob:
     period : between steps [s]
     latency : until an override acts [s], in addition to the period
     modelled : the model of the path is used (feed-forward)
-    window : the machine is looked for so far from its last place [mm], on the whole path while it is off it
+    window : the machine is searched so far from its last place [mm], on the whole path while it is off it
     away : farther from the path it is not on it [mm]
     deviation : of the simulated spindle from ``spindle``
     identified_from : ``current`` or ``power``, what ``spindle`` was identified from; of power its currents
@@ -111,7 +111,7 @@ class Record:
     Parameters
     ----------
     rows : (n, 12) float, ``COLUMNS``, a row a step
-    ended : ``path``: its end was reached; the reason of a stop; ``gone``: HAL has left; ``asked``: it was asked to end
+    ended : ``path``: its end was reached; the reason of a stop; ``gone``: HAL has left; ``asked``: stopped on request
     torque_max : greatest torque: of a simulated cut the true one, between steps too, else the measured one [N mm]
     """
 

@@ -261,7 +261,7 @@ def run(
     fault : of the sensor
     every_row : keep every so many steps of the controller
     relief : (n,) float, above 0, at the rows of ``truth``: what is allowed there over what is held; the
-        controller is told the torque over it; None: 1 everywhere
+        controller receives the torque over it; None: 1 everywhere
     monitor : model that readings are held against where there is no feed-forward; None: ``model``
     deviation : of the real spindle
 

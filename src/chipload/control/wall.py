@@ -189,12 +189,12 @@ def limit_by_responses(loads: Loads, responses: Sequence[LimitedResponse]) -> Pa
 
     Parameters
     ----------
-    loads : of the steps; the force is only told of
+    loads : of the steps; the force is only for information
     responses : of the same steps
 
     Examples
     --------
-    A block of 0.1 um/N under an edge force of 50 N that may give way by 15 um: 150 N, so twice the 50 N of the feed.
+    A block of 0.1 um/N under an edge force of 50 N that may deflect by 15 um: 150 N, so twice the 50 N of the feed.
 
     >>> one = np.array([1.0])
     >>> loads = Loads(100.0 * one, 400.0 * one, 50.0 * one, 50.0 * one)

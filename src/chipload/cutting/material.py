@@ -54,7 +54,7 @@ class Material:
         at a chip thickness of 1 mm
     Kte, Kre, Kae : edge coefficients [N/mm]
     source : where the numbers were published or measured; never empty
-    conditions : cutter and lubrication they were measured with, or only the latter where ``cutter`` says the former
+    conditions : cutter and lubrication they were measured with, or only the latter where ``cutter`` states the former
     workpiece : alloy and temper
     chip : (smallest, greatest) chip thickness they hold for [mm]; None: the source does not state it
     spread : relative standard deviation of the coefficients, each by itself; None: the source does not state it

@@ -264,7 +264,7 @@ def _over_feed(columns: Columns, tool: Ints, cutters: Mapping[int, Cutter]) -> F
     """The deflection over the feed per tooth; inf where that is not known, or the axis turns.
 
     The share of the model's range is the greater of this and of the deflection over the radial depth: of a film, whose
-    depth is next to nothing, it says nothing of the feed.
+    depth is nearly zero, it says nothing about the feed.
     """
     out = np.full(len(tool), math.inf)
     bent = next((c for c in ("deflection_um", "deflection_cutter_um") if c in columns), "")
@@ -358,12 +358,12 @@ def with_peaks(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> Li
 
 
 def upper_loads(columns: Columns, sigma: float) -> Columns:
-    """The columns with ``sigma`` standard deviations added to those that have a band, when they are asked for."""
+    """The columns with ``sigma`` standard deviations added to those that have a band, on request."""
     return columns if sigma == 0.0 else _UpperLoads(columns, sigma)
 
 
 class _UpperLoads(Mapping[str, NDArray[np.float64]]):
-    """Columns that are read, and have their bands added, when they are asked for."""
+    """Columns that are read, and have their bands added, on request."""
 
     def __init__(self, columns: Columns, sigma: float) -> None:
         self._columns, self._sigma = columns, sigma

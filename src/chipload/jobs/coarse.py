@@ -2,7 +2,7 @@
 
 The geometry, limits and checks stay; only the resolution of the calculation changes, by overrides that the result lists
 as those of ``--set``. Plans of a thin wall that are not cut, with the least error and compensated, are left out. What
-such a run says is not proven: its result has an UNPROVEN finding.
+such a run finds is not proven: its result has an UNPROVEN finding.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ def guesses_of(tables: Collection[str], text: str, stated: Collection[str] = ())
     ----------
     tables : dotted names, of :func:`take_confirm`
     text : the job file
-    stated : keys that an option states anew, which are guesses no more
+    stated : keys that an option states, which are then no longer guesses
 
     >>> guesses_of(["cutter.0"], "[[cutter]]\nconfirm = true\nflutes = 3  # guess: no file states them\nnumber = 1")
     ('cutter.0.flutes = 3: no file states them (line 3)',)

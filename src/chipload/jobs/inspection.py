@@ -1,6 +1,6 @@
 """What any file that chipload reads holds: a job, or one of the files that they name; nothing is run.
 
-A TOML file is told by the tables and keys that only its kind has, another file by its ending.
+The kind of a TOML file follows from the tables and keys that only it has, that of another file from its extension.
 """
 
 from __future__ import annotations

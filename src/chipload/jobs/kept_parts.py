@@ -1,6 +1,6 @@
-"""Finished parts of a run in its checkpoint, so that a run that was stopped goes on after the last one.
+"""Finished parts of a run in its checkpoint, so that a stopped run continues after the last one.
 
-Notation: a part is a value of arrays, numbers, texts, tuples, lists, dicts and of some kinds of records; its key says
+Notation: a part is a value of arrays, numbers, texts, tuples, lists, dicts and of some kinds of records; its key states
 which part it is and what it depends on. A part is written as a JSON tree with its arrays and comes back bit for bit;
 a part that is made is given on as it would come back, so that a run that was stopped has the bytes of one that was not.
 """
@@ -43,7 +43,7 @@ class KeptRecords:
     checkpoint : where they are kept; None: nowhere
     key : of all that the run depends on
     records : kinds of records that a part may be made of besides arrays and plain values
-    team : makes parts that are told ahead; None: each is made when it is asked for
+    team : makes announced parts in parallel; None: each is made on request
     """
 
     def __init__(self, checkpoint: Checkpoint | None, key: str, records: Kinds, team: Team | None = None) -> None:
@@ -81,7 +81,7 @@ class KeptRecords:
             self.team.share(value)
 
     def ahead(self, parts: Sequence[PlanTask], progress: Progress = silent) -> None:
-        """Make the parts that are not kept side by side, where there is a team; a single one waits until asked for."""
+        """Make the parts that are not kept side by side, where there is a team; a single one is made on request."""
         if self.team is None:
             return
         open_yet = {name: part for part in parts if (name := digest(*part.key)) not in self._parts}

@@ -69,7 +69,7 @@ def table_errors(err: ValidationError, root: type[BaseModel], others: Sequence[t
     others : tables of the other kinds of jobs, whose keys are named as such
     """
     found = err.errors(include_url=False)
-    # a list whose entry is refused is also called too short: the entry says more
+    # a list whose entry is refused is also called too short: the message on the entry is more precise
     errors = [e for e in found if not any(o["loc"][: len(e["loc"])] == e["loc"] and o is not e for o in found)]
     unknown = [e for e in errors if e["type"] == "extra_forbidden"]
     top: list[str] = [str(e["loc"][0]) for e in unknown if len(e["loc"]) == 1]

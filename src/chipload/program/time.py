@@ -154,8 +154,8 @@ def peak_speed(program: Program, machine: Machine) -> Floats:
     [0.0, 30.0]
     """
     if machine.planner is not None:
-        asked = np.where(program.motion == RAPID, machine.rapid, np.minimum(program.feed, machine.feed_max))
-        return np.where((lengths(program) > 0.0) & (program.motion != DWELL), asked, 0.0)
+        commanded = np.where(program.motion == RAPID, machine.rapid, np.minimum(program.feed, machine.feed_max))
+        return np.where((lengths(program) > 0.0) & (program.motion != DWELL), commanded, 0.0)
     out = np.zeros(len(program))
     if (lengths(program) > 0.0).any():
         row, length, most, a, v = _speeds(program, machine)

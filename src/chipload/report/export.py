@@ -28,7 +28,7 @@ from chipload.result.load import HISTORY, load_result
 from chipload.simulation.removal_mesh import RemovalMesh
 from chipload.stock.layers import LayeredStock
 
-#: what can be asked for
+#: kinds of export
 KINDS = ("csv", "vtk", "glb", "sheet")
 #: rows of a history that are written at once
 ROWS = 65_536
@@ -43,7 +43,7 @@ def export_result(
     numbers (.vtp), its undeformed chips (.vtu), surface maps with displacements by finite elements (.vtu), the stock
     that is left (.vtu and .stl). ``glb``: the undeformed chips of each track, a body a chip. ``sheet``: setup.html, one
     page, and as setup.pdf where ``chipload[export]`` is installed.
-    ``monitor``: reference loads for a load monitor, ``csv`` or ``heidenhain``; ``spindle``: the file that tells the
+    ``monitor``: reference loads for a load monitor, ``csv`` or ``heidenhain``; ``spindle``: the file that states the
     motor's power.
 
     Returns

@@ -110,7 +110,7 @@ def axes_of_rows(columns: Mapping[str, NDArray[Any]], n: int) -> Floats:
 
 
 def breaks(place: Floats, s: NDArray[Any] | None) -> NDArray[np.bool_]:
-    """(n,) whether a row does not go on from the row before: the path must be longer by their distance."""
+    """(n,) whether a row does not continue from the row before: the path must be longer by their distance."""
     if s is None:
         return np.zeros(len(place), dtype=np.bool_)
     leap = np.linalg.norm(np.diff(place, axis=0, prepend=place[:1]), axis=1)

@@ -26,7 +26,7 @@ _kernels = LateModule("chipload.stability._kernels")
 
 Floats = NDArray[np.float64]
 
-#: greatest margin that is told from a greater one
+#: greatest margin that is distinguished from a greater one
 MOST_MARGIN = 3.0
 #: cells of the map in a wave of the fastest mode, and where values are printed
 PER_WAVE, PER_WAVE_EXACT = 9.0, 40.0
@@ -109,7 +109,7 @@ def largest_multipliers(
 def stability_margins(cuts: DynamicCuts) -> StabilityMargins:
     """Return the stability margins of cuts; each takes five to ten evaluations of the map.
 
-    Where a cell of the map has no solution or eigenvalues are not found, the cut is looked at again in finer cells.
+    Where a cell of the map has no solution or eigenvalues are not found, the cut is evaluated again in finer cells.
 
     Raises
     ------
@@ -143,19 +143,19 @@ def _several_margins(cuts: DynamicCuts) -> StabilityMargins:
     at_one = growth(every, np.ones(n))
     low, high = np.ones(n), np.ones(n)
     g_low, g_high = at_one.copy(), at_one.copy()
-    stable, looked = at_one < 0.0, 0
+    stable, count = at_one < 0.0, 0
     for factor in (*_kernels.ABOVE.tolist(),):
         which = np.flatnonzero(stable & (g_high < 0.0))
         if len(which):
             low[which], g_low[which] = high[which], g_high[which]
             high[which] = factor
             g_high[which] = growth(which, high[which])
-    while looked < _kernels.DOWN and (g_low >= 0.0).any():
+    while count < _kernels.DOWN and (g_low >= 0.0).any():
         which = np.flatnonzero(g_low >= 0.0)
         high[which], g_high[which] = low[which], g_low[which]
         low[which] *= _kernels.BELOW
         g_low[which] = growth(which, low[which])
-        looked += 1
+        count += 1
     open_ = (g_low < 0.0) & (g_high >= 0.0)
     for k in range(_kernels.CLOSING):
         which = np.flatnonzero(open_ & (high - low > CLOSED * high))

@@ -42,8 +42,8 @@ class QuietSpeeds:
     ----------
     speed : (s,) float [rad/s]
     margin : (s,) float, least of all cuts
-    wanted : margin that is asked for
-    cut : (s,) int, number of the cut that has it, over all that were looked at
+    wanted : required margin
+    cut : (s,) int, number of the cut that has it, over all cuts
     """
 
     speed: Floats
@@ -64,7 +64,7 @@ class QuietSpeeds:
         (3.0, 3.0)
         """
         good = self.margin >= self.margin.max() * (1.0 - ALIKE)
-        # what lies beyond the speeds that were looked at is not known: it counts as falling
+        # what lies beyond the searched speeds is not known: it counts as falling
         other = np.concatenate([[-1], np.flatnonzero(~good), [len(good)]])
         far = np.abs(np.arange(len(good))[:, None] - other[None, :]).min(axis=1)
         order = np.lexsort((np.abs(self.speed - present), -far, ~good))

@@ -37,7 +37,7 @@ def speed_zones(speed: ArrayLike, margin: ArrayLike, wanted: float, present: Arr
     ----------
     speed : (s,) float [rad/s], rising
     margin : (p, s) float
-    wanted : margin that is asked for
+    wanted : required margin
     present : (p,) float [rad/s], the speed of each pass now: of speeds that are as good the nearest is taken
 
     Raises

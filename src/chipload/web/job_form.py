@@ -92,7 +92,7 @@ def override_of(field: FormField, entered: Any) -> str | None:
             if field.value is not None and float(text) == float(field.value):
                 return None
         except ValueError:
-            pass  # not a number: the check of the job says so
+            pass  # not a number: the check of the job reports it
         return f"{field.path}={text}"
     return f"{field.path}={json.dumps(entered)}"
 

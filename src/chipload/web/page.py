@@ -215,11 +215,11 @@ class Page:
             if job is not None:
                 ui.label(self._folder_name(job)).classes("cl-dialog-title")
                 with ui.element("div").classes("cl-entry"):
-                    _button("Run", lambda: self._ask_for_folder(job), "play_arrow").mark(f"run-{job}")
+                    _button("Run", lambda: self._request_folder(job), "play_arrow").mark(f"run-{job}")
                     ui.label("plans, checks and writes a result; you can stop it").classes("cl-note")
                 with ui.element("div").classes("cl-job-two"):
                     with ui.element("div").classes("cl-scroll cl-job"):
-                        JobForm(resolve_name(self.opened.root, job), lambda values: self._ask_for_folder(job, values))
+                        JobForm(resolve_name(self.opened.root, job), lambda values: self._request_folder(job, values))
                     ui.html(self._text(job), sanitize=True).classes("cl-scroll cl-code cl-job").props("tabindex=0")
             ui.label("Results and jobs in this folder").classes("cl-dialog-title")
             self._listed(found, all_seen)
@@ -239,7 +239,7 @@ class Page:
                 else:
                     ui.label("job").classes("cl-pill")
                     _button("Look", lambda n=f.name: self._job(n))
-                    _button("Run", lambda n=f.name: self._ask_for_folder(n), "play_arrow").mark(f"run-{f.name}")
+                    _button("Run", lambda n=f.name: self._request_folder(n), "play_arrow").mark(f"run-{f.name}")
 
     async def _job(self, name: str) -> None:
         """Show a job."""
@@ -254,7 +254,7 @@ class Page:
         return "".join(f'<div class="cl-line"><i>{k}</i>{escape(t) or " "}</div>' for k, t in enumerate(lines, 1))
 
     # -- running ------------------------------------------------------------------------------------------------
-    def _ask_for_folder(self, job: str, overrides: Sequence[str] = ()) -> None:
+    def _request_folder(self, job: str, overrides: Sequence[str] = ()) -> None:
         """Where the result goes; one with changed values goes next to the last one and is compared with it."""
         self.opening.close()
         stem, folder = PurePosixPath(job).stem, PurePosixPath(job).parent

@@ -19,7 +19,7 @@ from typing import Literal
 
 #: seconds that a run has to stop by itself
 PATIENCE = 8.0
-#: characters kept of what a failed run says
+#: characters that are kept of the output of a failed run
 KEPT = 2000
 
 State = Literal["running", "stopping", "done", "stopped", "failed"]

@@ -29,7 +29,7 @@ Ints = NDArray[np.int64]
 
 #: turn of the chords [rad] that rows are followed along, and how far a row may lie from its chord [mm]
 TURN, NEAR_MM = 0.01, 0.02
-#: rows that are followed one by one, chords that are looked ahead, and the largest text [bytes]
+#: rows that are followed one by one, chords of look-ahead, and the largest text [bytes]
 FOLLOWED, AHEAD, LARGEST = 20_000, 48, 50_000_000
 #: after so many rows on no motion at all the rest of the program is no longer searched for one
 LOST = 200

@@ -21,8 +21,8 @@ ON_FRONT = np.array([False, True, True, True])  # the entry is a full slot
 
 def stages(left_mm2: float = 0.0):
     path = SimpleNamespace(leftover_mm2=left_mm2, leftover=(), x=np.array([0.0, 7.0]), y=np.array([0.0, 8.0]))
-    asked = SimpleNamespace(engagement=math.radians(WANTED_DEG))
-    return [SimpleNamespace(asked=asked, name="clearing", section=0, makes_wall=True, path=path)]
+    task = SimpleNamespace(engagement=math.radians(WANTED_DEG))
+    return [SimpleNamespace(task=task, name="clearing", section=0, makes_wall=True, path=path)]
 
 
 @pytest.mark.parametrize(("limit_deg", "failure"), [(0.0, True), (46.0, True), (46.6, False), (50.0, False)])

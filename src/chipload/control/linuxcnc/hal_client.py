@@ -66,7 +66,7 @@ class ControlledMachine(Protocol):
     def exchange(self, feed: float, beat: bool, torque: float, status: int, s: float, limit: float) -> PinValues | None:
         """Set the out pins, read the in pins; None: the machine is gone.
 
-        ``torque`` is what the controller is told, 0 without a reading, ``limit`` what it holds at this place [N m].
+        ``torque`` is what the controller receives, 0 without a reading, ``limit`` what it holds at this place [N m].
         """
 
 

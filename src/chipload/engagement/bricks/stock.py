@@ -1,7 +1,7 @@
 """The stock as the moves that cut it, for a cutter whose axis leans or turns: an index of bricks.
 
 Notation: as in :mod:`chipload.engagement.bricks._kernels`. A brick is ``BRICK`` of the smallest cutter radius wide, or
-as much wider as memory asks for; it decides which moves are asked about a point and what that costs, not the answer.
+as much wider as memory requires; it decides which moves are searched at a point and what that costs, not the answer.
 Bricks are kept in blocks of 8 x 8 x 8 where moves left a surface: memory follows the surface. A cutter ends where its
 flutes end; a step with material there is reported.
 """
@@ -45,7 +45,7 @@ TURN = 0.1
 FIXED = 1e-12
 #: slices of a range in contact, at least: bottom and flank of a leaning cutter have slices as a corner has
 FEW = 12
-#: ranges of a part of the profile that are told apart
+#: ranges of a part of the profile that are distinguished
 RANGES = 32
 
 
@@ -183,7 +183,7 @@ class BrickStock:
         self.kept = fresh
 
     def forget(self) -> None:
-        """Drop the index and the moves, which grow with the program, when nothing more is asked of the stock."""
+        """Drop the index and the moves, which grow with the program, when the stock is no longer used."""
         self.kept = self.alive = self.blocks = np.empty(0, dtype=np.int32)
         self.bricks = np.empty((0, 3), dtype=np.int32)
         self.moves, self.of = np.empty((0, 23)), np.empty(0, dtype=np.int64)

@@ -69,10 +69,10 @@ def greatest_engagement(
         return _exceeded(cut, feed, math.radians(degrees), limits, checks, machine)
 
     most = min(GREATEST_DEG, limits.get("engagement_deg", GREATEST_DEG))
-    # the rigid model asks for a radial depth that is not too small: what holds need not hold below it
-    looked = [most, *np.arange(math.ceil(most / APART_DEG) - 1, 0, -1) * APART_DEG]
+    # the rigid model needs a radial depth that is not too small: what holds need not hold below it
+    candidates = [most, *np.arange(math.ceil(most / APART_DEG) - 1, 0, -1) * APART_DEG]
     by, high = None, most
-    for low in (float(x) for x in looked if x >= LEAST_DEG):
+    for low in (float(x) for x in candidates if x >= LEAST_DEG):
         found = exceeded(low)
         if found is None:
             break

@@ -24,7 +24,7 @@ def clearing_estimate(cleared: Iterable[tuple[float, Clearing, float]]) -> list[
 
     Parameters
     ----------
-    cleared : area [mm^2], what is asked, and radius of the cutter [mm] of each pocket
+    cleared : area [mm^2], the request, and radius of the cutter [mm] of each pocket
     """
     steps = sum(
         len(request.strategies) * area / (request.radial_depth * min(request.step, STEP * radius))

@@ -32,7 +32,7 @@ class ContourJob(Limited):
     cutters : by number
     part_file : the drawing or model
     machine, material : a shipped name or a file
-    findings : what was noticed and does not stop the job
+    findings : observations that do not stop the job
     overrides : the `--set` texts that were applied
     """
 

@@ -319,7 +319,7 @@ def _larger(job: ContourJob, op: OperationTable, planned: Sequence[OperationResu
 
 
 def _standing(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[Contour, ...] | None:
-    """What stands in the depth of a pocket before it begins; None where no file says so."""
+    """Material in the depth of a pocket before it begins; None where no file states it."""
     if inputs.standing is None:
         return None
     floor = inputs.top - (op.axial_depth_mm if op.depth_mm is None else op.depth_mm)
@@ -342,7 +342,7 @@ def _wall_finish(op: OperationTable) -> WallFinish | None:
 def _setting(
     job: ContourJob, inputs: Inputs, op: OperationTable, planned: Sequence[OperationResult] = ()
 ) -> Finishing | Clearing:
-    """What an operation asks of its planner, behind those that are ``planned``."""
+    """Request of an operation to its planner, after those that are ``planned``."""
     rigid, radial = _rigid(job), op.radial_depth_mm or 0.0
     if op.kind == "pocket":
         return Clearing(
@@ -400,7 +400,7 @@ def verify(
 ) -> PlanVerification:
     """Compare the history of one strategy with a simulation of its program that is independent of the planner.
 
-    The planner says in ``drawn`` what the program starts from (`stock before`, closed contours; a front starts in the
+    ``drawn`` states the stock from which the program starts (`stock before`, closed contours; a pocket starts in the
     solid) and the `wall`, whose travel has the part on its right.
     """
     before = strategy.drawn.get("stock before", ())

@@ -62,7 +62,7 @@ _TOOL_MILL = re.compile(rf"TOOL/MILL\s*,\s*{_NUMBER}\s*,\s*{_NUMBER}\s*,", re.IG
 _CORNER = re.compile(r"\(\s*stock(Min|Max)\s*:([^()\n]*)\)", re.IGNORECASE)
 #: lines above a change of tools whose comments may describe the tool
 ABOVE = 6
-#: what says that a number is no alloy: a date, a time, the name of a file or a program
+#: signs that a number is not an alloy: a date, a time, the name of a file or a program
 _DATE = re.compile(
     r"\b(?:DATE|TIME|CREATED|OUTPUT|GENERATED|EXPORTED|POSTED|VERSION|COPYRIGHT|FILE|PROGRAM)\b|[0-9]{1,2}:[0-9]{2}|"
     r"(?:JAN|FEB|MAR|APR|MAY|JUN|JUL|AUG|SEP|OCT|NOV|DEC)[A-Z]*[ .-]|[0-9][-./][0-9]+[-./][0-9]",

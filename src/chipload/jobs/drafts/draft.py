@@ -89,7 +89,7 @@ class Draft:
     ----------
     title : what the job does and the file that it is made from
     tables : of the job
-    notes : what was noticed in the file
+    notes : findings in the file
     files : files next to the job by name, made from the file
     """
 

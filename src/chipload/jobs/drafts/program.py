@@ -44,7 +44,7 @@ STEPS = 8_000
 LAYER, LAYERS = 0.05, 60
 #: findings that are listed in the draft
 LISTED = 8
-#: ends of the codes of findings that say nothing about the motions
+#: ends of the codes of findings that do not concern the motions
 PLAIN = ("-unused", "-unknown", "-coolant")
 _LARGEST = 500_000_000
 #: the first speed of a text, outside its comments

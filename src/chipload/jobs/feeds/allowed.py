@@ -46,9 +46,9 @@ FASTEST, MACHINE, AIR, LIMITED = 0, 1, 2, 3
 STRESS = "cutter_stress_mpa"
 #: the thickest chip of a step
 CHIP = "chip_max_mm"
-#: angles kappa at which a chip with runout is looked at, and halvings of what it is without
+#: angles kappa at which a chip with runout is evaluated, and halvings of the chip without runout
 KAPPAS, HALVINGS = 41, 40
-#: columns of the removal in which a watch says what each step allows
+#: columns of the removal in which a watch states what each step allows
 _FACTOR, _BY = "feed_factor", "feed_by"
 
 

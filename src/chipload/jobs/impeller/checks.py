@@ -25,9 +25,9 @@ ROWS = 20_000
 
 
 def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> list[str]:
-    """Report sections about programs; none where the job asks for none."""
+    """Report sections about programs; none if the job has none."""
     if milled.programs is None:
-        return ["<h2>Programs</h2>", "<p>The job asks for none: state [operation.paths].</p>"]
+        return ["<h2>Programs</h2>", "<p>The job has none: state [operation.paths].</p>"]
     head = [
         "",
         "program",
@@ -51,8 +51,8 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
     ]  # fmt: skip
     patches = [
         [
-            str(k), f"{BODIES[m.patch.body]} {m.patch.side}", str(m.tracks.lines), f"{s.asked:g}", f"{s.greatest:.4f}",
-            f"{s.mean:.4f}", f"{100.0 * s.mean / s.asked:.0f}", str(s.count), f"{100.0 * s.covered:.1f}",
+            str(k), f"{BODIES[m.patch.body]} {m.patch.side}", str(m.tracks.lines), f"{s.limit:g}", f"{s.greatest:.4f}",
+            f"{s.mean:.4f}", f"{100.0 * s.mean / s.limit:.0f}", str(s.count), f"{100.0 * s.covered:.1f}",
         ]
         for k, p in enumerate(milled.programs, 1)
         for m, s in zip(p.setting.millings, p.scallops, strict=True)
@@ -70,7 +70,7 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
     turn = np.degrees(milled.impeller.pitch)
     left = [
         [
-            c.name, str(len(c.left.rest)), f"{c.asked:g}", f"{c.greatest[0]:.4f}", f"{100.0 * c.share:.2f}",
+            c.name, str(len(c.left.rest)), f"{c.limit:g}", f"{c.greatest[0]:.4f}", f"{100.0 * c.share:.2f}",
             '<span class="no">above the limit</span>' if c.fails else '<span class="ok">within the limit</span>',
         ]
         for c in milled.covered or ()
@@ -101,7 +101,7 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
 
 
 def _flank_section(milled: ImpellerResult) -> list[str]:
-    """Flank passes on five axes; none where the job asks for none."""
+    """Flank passes on five axes; none if the job has none."""
     if milled.flanks is None:
         return []
     rows = [
@@ -119,7 +119,7 @@ def _flank_section(milled: ImpellerResult) -> list[str]:
 
 
 def _points_section(milled: ImpellerResult) -> list[str]:
-    """Point milling on five axes; none where the job asks for none."""
+    """Point milling on five axes; none if the job has none."""
     if milled.points is None:
         return []
     rows = [
@@ -159,7 +159,7 @@ def left_figure(covered: Covered) -> go.Figure:
     """Excess on a surface, unrolled."""
     w = covered.left.wall
     u, v = w.u.reshape(w.shape)[:, 0], w.v.reshape(w.shape)[0]
-    over = 2.0 * covered.asked
+    over = 2.0 * covered.limit
     out = go.Figure(
         go.Heatmap(
             x=u.round(4), y=v.round(4), z=covered.left.rest.reshape(w.shape).T.round(4), zmin=0.0, zmax=over,

@@ -135,7 +135,7 @@ def _pass(
     try:
         path = flank_pass(surface, along, band, cutter, paths.chord_mm)
         for _ in range(_LONGER):
-            # the cutter may come nearest to some heights before the end of the pass: it goes on until it has at all
+            # the cutter may come nearest to some heights before the end of the pass, which continues to reach them all
             first = along[0] - max(float(path.touches[0, 1]) - wanted[0], 0.0)
             last = along[1] + max(wanted[1] - float(path.touches[-1, 0]), 0.0)
             longer = max(first, 0.0), min(last, 1.0)

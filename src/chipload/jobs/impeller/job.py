@@ -34,7 +34,7 @@ class ImpellerJob:
     path : the job file
     table : its values
     machine, catalogue : a shipped name or a file
-    material : likewise, of the force coefficients; None: forces are not asked for
+    material : likewise, of the force coefficients; None: the job has no `forces`
     flank_machine, point_machine : likewise, of flank passes and of point milling on five axes; None: there is none
     files : what the part is read from, by what it is
     overrides : the `--set` texts that were applied

@@ -23,7 +23,7 @@ from chipload.planning.impeller.compare import CutterChoice, Partition
 from chipload.planning.impeller.costs import Costs, MeasuredCost
 from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.patch import Patch
-from chipload.planning.impeller.planned_settings import PlannedSettings, planned, tell_millings
+from chipload.planning.impeller.planned_settings import PlannedSettings, announce_millings, planned
 from chipload.planning.impeller.settings import (
     CutterSetting,
     FinishSettings,
@@ -37,9 +37,9 @@ from chipload.progress import Progress
 
 #: greatest number of divisions of a partition
 _ROUNDS = 2
-#: where the check finds more than asked on a patch or surface, what is left is counted on points so many times closer
-#: together and planned again; not where it finds more than this share of what is asked on a surface that the planner
-#: knows to be out of reach in part
+#: where the check finds more than the limit on a patch or surface, the excess is measured on points so many times
+#: closer together and planned again; not where it finds more than this share of the limit on a surface that the
+#: planner knows to be out of reach in part
 _FINER, _NEARLY = (0.5, 0.25), 1.25
 
 
@@ -87,7 +87,7 @@ def checked_partitions(
             if partition.divided is not None and not (turn and _same(partition, best[choice.name].partition))
         ]  # fmt: skip
         patches = [(job.with_catalogue(partitions[k].catalogue), partitions[k].division.patches) for k in new]
-        tell_millings(patches, memory.millings, keep, _from(progress, 0.8 * turn / _ROUNDS))
+        announce_millings(patches, memory.millings, keep, _from(progress, 0.8 * turn / _ROUNDS))
         for k in new:
             choice, partition = choices[k], partitions[k]
             done = (turn + k / len(choices)) / _ROUNDS
@@ -213,14 +213,14 @@ def _checked(
     keep: Keep,
 ) -> CheckedPartition:  # fmt: skip
     own = job.with_catalogue(done.partition.catalogue)
-    programs, covered = _looked_at(own, done.plan, machine, paths, memory, keep)
+    programs, covered = _checked_plan(own, done.plan, machine, paths, memory, keep)
     for fine in _FINER:
         if not _refinable(_left_shares(programs, covered)):
             break
         plan = planned(
             own, done.partition.division.patches, _changes(choice), known=memory.millings, keep=keep, fine=fine
         )  # fmt: skip
-        again = _looked_at(own, plan, machine, paths, memory, keep)
+        again = _checked_plan(own, plan, machine, paths, memory, keep)
         kept, new = ((_left_shares(*x), sum(p.seconds for p in x[0])) for x in ((programs, covered), again))
         if _rank(*new) < _rank(*kept):
             programs, covered = again
@@ -230,20 +230,20 @@ def _checked(
 
 
 def _left_shares(programs: Sequence[Checked], covered: Sequence[Covered]) -> list[tuple[float, bool]]:
-    """The most that is left in each patch and on each surface, as a share of what is asked, and whether some of the
+    """The most that is left in each patch and on each surface, as a share of the limit, and whether some of the
     surface is known to be out of reach.
     """
     out_of_reach = {(c.body, c.side): c.unreached > 0.0 for c in covered}
     patches = [
-        (x.greatest / x.asked, out_of_reach[m.patch.body, m.patch.side])
+        (x.greatest / x.limit, out_of_reach[m.patch.body, m.patch.side])
         for p in programs
         for x, m in zip(p.scallops, p.setting.millings, strict=True)
     ]
-    return [*patches, *((c.greatest[0] / c.asked, c.unreached > 0.0) for c in covered)]
+    return [*patches, *((c.greatest[0] / c.limit, c.unreached > 0.0) for c in covered)]
 
 
 def _refinable(left: Sequence[tuple[float, bool]]) -> bool:
-    """Whether more is left somewhere than asked that rest passes might take: little, or all of it is within reach.
+    """Whether more is left somewhere than the limit that rest passes might take: little, or all of it is within reach.
 
     >>> _refinable([(0.9, False), (1.4, True)]), _refinable([(1.4, False)]), _refinable([(1.2, True)])
     (False, True, True)
@@ -252,8 +252,8 @@ def _refinable(left: Sequence[tuple[float, bool]]) -> bool:
 
 
 def _rank(left: Sequence[tuple[float, bool]], seconds: float) -> tuple[int, float, float]:
-    """Order of plans: in how many patches and surfaces more is left than asked; the most, to a hundredth of what is
-    asked, where that is too much: a corner that no cutter reaches stays; the time [s].
+    """Order of plans: in how many patches and surfaces more is left than the limit; the most, to a hundredth of what is
+    the limit, where that is too much: a corner that no cutter reaches stays; the time [s].
 
     >>> _rank([(0.9, False), (1.05, False), (5.4, True)], 9.0) > _rank([(1.0, False), (5.4, True)], 10.0)
     True
@@ -264,7 +264,7 @@ def _rank(left: Sequence[tuple[float, bool]], seconds: float) -> tuple[int, floa
     return sum(x > 1.0 for x, _ in left), round(most, 2) if most > 1.0 else 0.0, seconds
 
 
-def _looked_at(
+def _checked_plan(
     own: FinishSettings, plan: PlannedSettings, machine: Machine, paths: PathsTable, memory: _Memory, keep: Keep
 ) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:
     """The programs of a plan with what the check finds; of like programs once."""

@@ -40,7 +40,7 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 _RESOLUTION = 0.2
 #: instants of a row [mm], how far the rays go above and below a surface [mm]
 _STEP, _HEIGHT, _DEPTH = 1.0, 3.0, 0.5
-#: points of the blank's meridian; how far it goes on under the hub [mm]; how far beside the channel, in pitches
+#: points of the blank's meridian; how far it extends under the hub [mm]; how far beside the channel, in pitches
 _MERIDIAN, _UNDER, _BESIDE = 61, 1.0, 0.8
 #: how often rows are left out before a program counts as not verified
 _ROUNDS = 8
@@ -124,14 +124,14 @@ def _checked(
     program = plan.program
     allowed = paths.gouge_mm
 
-    def looked() -> tuple[Gouge, list[float]]:
+    def checked() -> tuple[Gouge, list[float]]:
         found = left_on(walls, program, plan.cutter, _HEIGHT, _DEPTH, step=_STEP, workers=workers)
         deep = deepest_gouge(
             walls, program, plan.cutter, _DEPTH, _RESOLUTION * allowed, allowed, step=_STEP, workers=workers
         )
         return deep, [float(x.rest.min()) for x in found]
 
-    gouge, rest = keep(("rough check", plan.cutter, program.motion, program.p_work, program.axis), looked)
+    gouge, rest = keep(("rough check", plan.cutter, program.motion, program.p_work, program.axis), checked)
     stands: list[float | None] = []
     for hub in (False, True):
         least = min(r for w, r in zip(walls, rest, strict=True) if w.name.startswith("floor") == hub)

@@ -115,7 +115,7 @@ class CheckedRough:
 
 
 def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) -> list[str]:
-    """Report sections about roughing; none where the job asks for none."""
+    """Report sections about roughing; none if the job has none."""
     if roughs is None:
         return []
     head = ["program", "layers", "rows", "path [mm]", "time [min]", "taken [cm3]", "left [mm]"]

@@ -1,7 +1,7 @@
 """The file scene.glb of an impeller: the surfaces coloured by their largest diameter, with the other blades and the
 hub.
 
-Lengths are mm, Z is up, as the extras say.
+Lengths are mm, Z is up, as the extras state.
 """
 
 from __future__ import annotations

@@ -37,13 +37,13 @@ STABILITY_LIMITS = ("stability_margin", PROBABILITY, "sle_um")
 DEFAULT_MARGIN = 1.0
 #: relative error of a margin by the map and by rounding what steps cut
 MARGIN_ERROR = 0.01
-#: steps with the least margins for which the error of followed frequencies is looked at
+#: steps with the least margins for which the error of followed frequencies is calculated
 UNSURE = 48
 #: probabilities of stability [%] that windows of speeds are given at, where spreads of the modes are stated
 SURE = (50, 95)
-#: waves of the fastest mode in a tooth period at the least speed that is looked at: slower ones have no pockets
+#: waves of the fastest mode in a tooth period at the least speed that is searched: slower ones have no pockets
 MOST_WAVES = 20.0
-#: speeds that are looked at, evenly spaced in their logarithm, and how a speed is rounded [1/min]
+#: speeds that are searched, evenly spaced in their logarithm, and how a speed is rounded [1/min]
 SPEEDS, ROUND_RPM = 161, 10.0
 
 

@@ -36,7 +36,7 @@ STABILITY_COLUMNS = ("stability_margin", "chatter_hz", "chatter_mode", "sle_um")
 PROBABILITY = "stable_probability"
 #: the axis of the cutter is upright where its z is at least this
 UPRIGHT = 1.0 - 1e-9
-#: cuts of a tool that speeds are looked for with: those nearest to chatter, and those with most edge in cut
+#: cuts of a tool with which speeds are searched: those nearest to chatter, and those with most edge in cut
 NEAREST, LARGEST = 12, 12
 #: the same of a cutter whose teeth are not alike, of which each takes some times as long
 UNEVEN = (4, 2)

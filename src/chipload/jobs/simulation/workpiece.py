@@ -83,7 +83,7 @@ def stock_points(stock: LayeredStock, pitch: float) -> NDArray[np.float64]:
 
 
 def insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.bool_]]:
-    """Return a function that tells which points [mm] lie in the present stock."""
+    """Return a function that returns which points [mm] lie in the present stock."""
     bounds, sections = np.asarray(stock.bounds), [stock.section(i) for i in range(stock.layers)]
 
     def contains(points: NDArray[np.float64]) -> NDArray[np.bool_]:

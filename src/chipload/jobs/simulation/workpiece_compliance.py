@@ -47,7 +47,7 @@ SPACING = 0.5
 FLOOR = 0.01
 #: change of a frequency between two states, over that of the deflection
 FREQUENCY = 0.5
-#: steps with most deflection, and with most force, whose stress is looked at
+#: steps with most deflection, and with most force, whose stress is calculated
 STRAINED = 6
 
 

@@ -154,7 +154,7 @@ class Variant:
     finish : a finished side each
     shape : the simulated stock against the finished wall
     stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
-    find_load_error : gives ``load_error``, when that is first asked for: it takes longer than the simulation
+    find_load_error : calculates ``load_error`` at its first use: it takes longer than the simulation
     shift : greatest way [mm] by which the last passes were moved against the form error
     """
 
@@ -189,7 +189,7 @@ class Variant:
         Parameters
         ----------
         modelled : whether F_th is
-        assumed : error of F_n, where its own is not asked for
+        assumed : error of F_n, where its own is not calculated
         """
         c = self.columns
         unsure = c["compliance_error"] if modelled else 0.0

@@ -246,7 +246,7 @@ def _columns(
         found = _floor_deflections(n, loads)
     elif removal.cuts:
         found = _deflections(inputs, removal, place, gives.max(axis=0), bars)
-    else:  # a pass that takes only films: its loads are not known, as its load_error says
+    else:  # a pass that takes only films: its loads are not known, as its load_error states
         found = dict.fromkeys(("work_mm", "cutter_mm", "deflection_mm", "force_normal_n"), np.zeros(n))
     weakest, each = allowable.argmin(axis=0), np.arange(len(u))
     threshold = allowable[weakest, each]

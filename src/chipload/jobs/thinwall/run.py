@@ -230,7 +230,7 @@ def propose(
 
 
 def _findings(inputs: WallInputs) -> tuple[Finding, ...]:
-    """What asks more of the coefficients than they were measured for, and what the experiments' reader noticed."""
+    """Findings on coefficients used beyond their range, and those of the reader of experiments."""
     texts: list[str] = []
     for one in inputs.operations:
         cut = one.cut

@@ -1,5 +1,5 @@
 """The file scene.glb of a thin wall: finished wall, workpiece before, neighbours, the cutter, and the contact points of
-each variant coloured by depth. Lengths are mm, Z is up, as the extras say.
+each variant coloured by depth. Lengths are mm, Z is up, as the extras state.
 """
 
 from __future__ import annotations

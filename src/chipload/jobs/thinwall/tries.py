@@ -327,7 +327,7 @@ def _infeasible_in(
     keys = sorted(least)
     limits = law.limits
     plane = float(normal_force(own.cut.posture, own.cut.material, [limits.smallest], measure=own.cut.measure)[0])
-    share = plane / float(law.forces[0])  # what helps is asked of plane stock
+    share = plane / float(law.forces[0])  # remedies are calculated for plane stock
     if own.depths.experiments is None:  # the plan may be held to less than the limit
         least = {key: force * own.depths.deflection / deflection for key, force in least.items()}
     shares = [share / correction[key] for key in keys]

@@ -130,8 +130,8 @@ def limit_of(job: TorqueJob, planned: Cut) -> tuple[Ritz, PathLimit]:
 
 def allowed(job: TorqueJob) -> tuple[float, float]:
     """Allowed deflection [mm] and stress [MPa]."""
-    ask = job.table.limits
-    return 1e-3 * ask.form_error_um, ask.strength_share * job.shell.strength_mpa
+    limits = job.table.limits
+    return 1e-3 * limits.form_error_um, limits.strength_share * job.shell.strength_mpa
 
 
 def feed_at(planned: CutSteps, limit: PathLimit, k: int) -> float:

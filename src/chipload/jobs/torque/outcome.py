@@ -127,7 +127,7 @@ class SpindleEstimate:
     lag : of sensor and filter [s]
     bandwidth : at which both leave half of the power [Hz]
     range : (least, greatest) torque that it holds for [N mm]
-    resolution : what it cannot tell from nothing [N mm]: noise, quantisation, idle map
+    resolution : torque that it cannot distinguish from zero [N mm]: noise, quantisation, idle map
     constant_error : share by which the torque constant may be wrong
     light : below it the controller trusts nothing [N mm]
     light_share : share of the time in cut below it

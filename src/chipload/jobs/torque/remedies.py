@@ -105,8 +105,8 @@ def _allowed(job: TorqueJob, modes: Ritz, place: HardestPlace) -> float:
     width = contact_width(job.shell.stock_mm, job.cutters)
     near, far, tool = (np.array([x]) for x in (place.near, place.far, place.tool))
     wall = unit_response(modes, near, far, width, tool)
-    ask = job.table.limits
-    deflection, stress = 1e-3 * ask.form_error_um, ask.strength_share * job.shell.strength_mpa
+    limits = job.table.limits
+    deflection, stress = 1e-3 * limits.form_error_um, limits.strength_share * job.shell.strength_mpa
     return float(min(deflection / wall.compliance[0], stress / wall.stress[0]))
 
 

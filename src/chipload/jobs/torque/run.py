@@ -121,7 +121,7 @@ class Followed:
 
 def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Material) -> TorqueInputs:
     """What the job states."""
-    ask = job.table.limits
+    limits = job.table.limits
     return TorqueInputs(
         title=title_of(job.path),
         program_name=job.program_file.name
@@ -129,8 +129,8 @@ def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Materi
         else "generated: a helix down the wall and one turn at the bottom",
         program=program,
         machine=machine,
-        limits=ask.stated,
-        unchecked=ask.unstated,
+        limits=limits.stated,
+        unchecked=limits.unstated,
         settings=job.table.model_dump(exclude_none=True, exclude={"cutter", "surprise"}),
         surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in job.table.surprise),
         surprise_angles=tuple((x.at_deg, x.kind) for x in job.table.surprise if x.at_deg is not None),
@@ -180,7 +180,7 @@ def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spin
     Raises
     ------
     InputError
-        A file cannot be read, the spindle does not resolve the torque, or the loop asks too much of the machine.
+        A file cannot be read, the spindle does not resolve the torque, or the loop exceeds the machine.
     """
     machine, material, table = _named(job)
     require_linear(material)
@@ -211,7 +211,7 @@ def _acceleration(job: TorqueJob, machine: Machine) -> float:
 def _named(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable]:
     machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
     material = material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
-    need_directions(material, "the wall of a shell" if job.workpiece is None else "a workpiece that gives way")
+    need_directions(material, "the wall of a shell" if job.workpiece is None else "an elastic workpiece")
     return machine, material, read_fuzzy(job.control_file) if job.control_file is not None else standard()
 
 

@@ -85,7 +85,7 @@ def eased(path: Contour, radius: float, engagement: float, tolerance_mm: float) 
     """``path`` with clothoids at both ends of every arc that stands between two lines it is tangent to.
 
     The arc's radius is chosen so that the path leaves the drawn one least; where that is still more than
-    ``tolerance_mm`` the clothoids are shortened until it is not, and an event says so: the engagement overshoots there.
+    ``tolerance_mm`` the clothoids are shortened until it is not, and an event states that the engagement overshoots.
     Other joints with a step of curvature stay as they are, and are reported. O(arcs x samples).
     """
     seg = path.segments.copy()

@@ -152,7 +152,7 @@ def plan_contour(
     Raises
     ------
     InputError
-        The contour, the cutter and the depths do not go together; the message says where and what would.
+        The contour, the cutter and the depths do not go together; the message states where, and the remedy.
     """
     job = _prepared(contours, setting, cutter, material, machine, limits)
     a = setting.engagement(cutter.radius)
@@ -340,8 +340,8 @@ def _pass_times(
     out, first = [], 0
     for program, (steps, speed) in zip(programs, clocks, strict=True):
         last = first + len(program) - 1
-        way = np.concatenate([[0.0], np.cumsum(lengths(program)[2:-1])])
-        own = np.interp(way, steps.s, speed.time)
+        travel = np.concatenate([[0.0], np.cumsum(lengths(program)[2:-1])])
+        own = np.interp(travel, steps.s, speed.time)
         clock = ends[first + 1 : last]
         out.append(np.concatenate([clock[:1], np.interp(speed.time, own, clock), ends[last : last + 1]]))
         first = last + 1
@@ -395,15 +395,15 @@ def _events(job: _Job, runs: list[ContourPass], history: Columns, name: str) -> 
         if r.lead_in is None and r.stopped is None:
             x, y = r.path.start
             out.append(Event("lead-none", x, y, f"{r.name}: no room to lead in: the cutter enters on the wall"))
-    broken = history["arcs"] < 0
-    if broken.any():
-        k = int(np.flatnonzero(broken)[0])
+    unknown = history["arcs"] < 0
+    if unknown.any():
+        k = int(np.flatnonzero(unknown)[0])
         out.append(
             Event(
                 "engagement-unknown",
                 float(history["x_mm"][k]),
                 float(history["y_mm"][k]),
-                f"the stock's boundary is broken here: engagement unknown in {int(broken.sum())} steps",
+                f"the stock's boundary is broken here: engagement unknown in {int(unknown.sum())} steps",
                 failure=True,
             )
         )

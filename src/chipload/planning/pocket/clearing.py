@@ -178,7 +178,7 @@ def require_clearing(
 
 
 class _Run:
-    """The state of one clearing: stock, path so far, places to go on from."""
+    """The state of one clearing: stock, path so far, places from which to continue."""
 
     def __init__(
         self, centres: Region, radius: float, limit: float, step: float, free: Sequence[Region], progress: Progress,
@@ -310,10 +310,10 @@ class _Run:
             return
         loops = Trochoid(self.stock, region, R, allowance, (self.limit, self.most_engaged))
         for k, line in enumerate(lines.branches(start)):
-            way = line if k or bore is None else np.vstack([bore[:2], line])
-            begins = rho if k == 0 else min(trochoid.WIDEST * R, 0.9 * loops.room(way[0]))
+            path_line = line if k or bore is None else np.vstack([bore[:2], line])
+            begins = rho if k == 0 else min(trochoid.WIDEST * R, 0.9 * loops.room(path_line[0]))
             places = []
-            for arcs, engaged in loops.circles(way, begins):
+            for arcs, engaged in loops.circles(path_line, begins):
                 first = arcs[0, 0:2]
                 clear = bool(self.rows) and self._linked(first)
                 self.add(first[None, :], LINK if clear else LIFT)

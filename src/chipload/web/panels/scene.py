@@ -308,7 +308,7 @@ class ScenePanel:
         self.factor.set_visibility(bends)
 
     async def _map(self) -> None:
-        """Show the map that is chosen, bent as the slider says."""
+        """Show the chosen map, deflected by the scale of the slider."""
         self._map_controls()
         if self.track is None or self.scene is None:
             return
