@@ -29,7 +29,7 @@ def stages(left_mm2: float = 0.0):
 def test_an_engagement_within_the_limit_of_the_job_is_told_and_is_no_failure(limit_deg, failure):
     (found,) = misses("pocket", stages(), HISTORY, ON_FRONT, [1000.0], limit_deg)
     assert (found.code, found.x, found.y, found.failure) == ("pocket-engagement", 2.0, 5.0, failure)
-    assert found.text == "engagement 46.5000 deg, must be at most 45.0000 deg"
+    assert found.text == "engagement 46.5000 deg: must be at most 45.0000 deg"
 
 
 @pytest.mark.parametrize(
