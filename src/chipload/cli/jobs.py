@@ -38,7 +38,8 @@ def run(
     coarse: Annotated[
         bool,
         typer.Option(
-            "--coarse", help="use larger steps, about a tenth of the time; the verdict is never better than unproven"
+            "--coarse",
+            help="use larger steps and thicker layers for a first result; the verdict is never better than unproven",
         ),
     ] = False,
     workers: Annotated[

@@ -163,11 +163,11 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     wrong = 1.0 + spindle.torque_constant_error
     granted = 1.0 + 1e-2 * job.table.limits.torque_over_percent - wrong * job.table.torque_control.override.hold
     least = torque_resolution(spindle, 1e-3 * job.table.loop.period_ms).total / granted if granted > 0.0 else math.inf
-    count = counted(program, job.cutters, resolution_of(job))
+    count, number = counted(program, job.cutters, resolution_of(job)), len(job.table.surprise)
     return [
         f"{job.path.name}: {what}; "
         f"{len(program)} motions on machine {machine.name}, stock of {stock.volume():.5g} mm3, material "
-        f"{material.name}, controller {table.name}, {len(job.table.surprise)} surprises",
+        f"{material.name}, controller {table.name}, {number} surprise{'' if number == 1 else 's'}",
         f"the controller can hold torque limits from {1e-3 * least:.3g} N m up",
         text,
         estimate(4 * count, len(program)),
