@@ -110,7 +110,7 @@ class Record:
 
     Parameters
     ----------
-    rows : (n, 12) float, ``COLUMNS``, a row a step
+    rows : (n, 12) float, ``COLUMNS``, one row for each step
     ended : ``path``: its end was reached; the reason of a stop; ``gone``: HAL has left; ``asked``: stopped on request
     torque_max : greatest torque: of a simulated cut the true one, between steps too, else the measured one [N mm]
     """

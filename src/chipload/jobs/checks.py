@@ -131,7 +131,7 @@ def check_columns(
     Parameters
     ----------
     cuts : one a cutter that cut
-    deflection_um : (n,) float, a row a step of the removal, by which cutter and workpiece part
+    deflection_um : (n,) float, one row for each step of the removal, by which cutter and workpiece part
 
     Returns
     -------
@@ -163,7 +163,7 @@ def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
 
     Parameters
     ----------
-    columns : of a track, a row a step; ``chip_max_mm`` among them
+    columns : of a track, one row for each step; ``chip_max_mm`` among them
     """
     material, thick = checks.material, columns["chip_max_mm"]
     chip = material.chip
@@ -209,7 +209,7 @@ def default_limits(
 
     Parameters
     ----------
-    columns : of the track, a row a step
+    columns : of the track, one row for each step
     track : its name
     errors : relative error of columns by the resolution
     """
@@ -342,7 +342,7 @@ def with_peaks(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> Li
 
     Parameters
     ----------
-    columns : of the track, a row a step; ``chip_max_mm`` among them, where it is known
+    columns : of the track, one row for each step; ``chip_max_mm`` among them, where it is known
     """
     if check.state is not Verdict.HOLDS or check.worst is None or check.column.name not in PEAKS:
         return check

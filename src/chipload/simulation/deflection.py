@@ -199,7 +199,7 @@ def step_deflections(
 
     Returns
     -------
-    columns, (n,) each, a row a step of the removal, 0 where nothing is cut or two surfaces are left
+    columns, (n,) each, one row for each step of the removal, 0 where nothing is cut or two surfaces are left
         ``work_mm``, ``cutter_mm`` float: greatest motion of work and cutter along the normal by which they part;
         ``deflection_mm`` the greatest of their sum; ``force_normal_n`` the greatest force that does it.
     """

@@ -112,7 +112,7 @@ class Removal:
 
     Parameters
     ----------
-    columns : (n,) each, a row a step, see :func:`remove`
+    columns : (n,) each, one row for each step, see :func:`remove`
     volume_before, volume_after : of the stock [mm^3]
     mean_band : (4,) standard deviation of the mean force x, y, z [N] and torque [N m] over the time in cut, from that
         of the coefficients; None: the material does not state their uncertainty

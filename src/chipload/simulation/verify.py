@@ -98,7 +98,7 @@ def verify_contour(
     ----------
     program : motions in the XY plane, at one or more heights; rapids included
     radius : R [mm]
-    history : columns `x_mm`, `y_mm`, `z_mm`, `engagement_deg`, `pass`, a row a step, in the order of the program
+    history : columns `x_mm`, `y_mm`, `z_mm`, `engagement_deg`, `pass`, one row for each step in program order
     stock : the stock before row 0 of the program, in the plane; None: solid everywhere
     stock_top_mm : motions wholly at or above this height cut nothing
     wall : the finished part's wall, empty where there is none to compare with

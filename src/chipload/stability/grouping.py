@@ -30,7 +30,7 @@ class CutGroups:
 
     Parameters
     ----------
-    engagement : rounded, a row a step, without frames
+    engagement : rounded, one row for each step, without frames
     T, n : (c, 2) float, rounded feed direction and its normal in x and y
     key : (c,) bytes, the same for steps that are alike
     """

@@ -46,7 +46,7 @@ from chipload.simulation.verify import verify_contour
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
-#: what the simulation may find and still call a program proved
+#: greatest deviations with which the simulation proves a program
 ENGAGEMENT_DEG, GOUGE_MM, CHORDS_MM = 0.05, 1e-4, 1e-3
 #: heights of a program are rounded to this [mm]
 ROUNDED_MM = 1e-6
@@ -222,7 +222,7 @@ def check(job: ContourJob) -> tuple[list[str], bool]:
 
 
 def _above_limit(job: ContourJob, k: int, op: OperationTable, cutter: Cutter) -> list[str]:
-    """That the engagement along a straight wall is above its limit: in an inside corner it is greater still."""
+    """Message if the engagement along a straight wall exceeds its limit; in an inside corner it is greater still."""
     limit, depth = job.limits.get("engagement_deg"), op.radial_depth_mm
     if limit is None or depth is None or not 0.0 < depth < cutter.diameter:
         return []
@@ -231,7 +231,7 @@ def _above_limit(job: ContourJob, k: int, op: OperationTable, cutter: Cutter) ->
         return []
     most = cutter.radius * (1.0 - math.cos(math.radians(limit)))
     return [
-        f"limits.engagement_deg = {limit:g} cannot be held: operation {k} needs {needed:.4g} deg along a straight "
+        f"limits.engagement_deg = {limit:g} cannot be kept: operation {k} needs {needed:.4g} deg along a straight "
         f"wall: state a radial depth of at most {most:.4g} mm, or a greater limit"
     ]
 

@@ -34,7 +34,7 @@ def _blanks(walled: ThinWallResult) -> dict[str, Blank]:
 
 
 def _frame(walled: ThinWallResult) -> str:
-    """What coordinates mean."""
+    """The coordinates of the program, in words."""
     if isinstance(walled.geometry.shape, PartShape):
         return "coordinates are those of the part's model"
     return "Z 0 is the clamp, X along the wall, its sides towards Y+ and Y-"

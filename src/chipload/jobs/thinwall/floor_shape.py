@@ -1,6 +1,6 @@
 """Check of floors: the path of an upright cutter against the floor and the walls around it, the stock against the part.
 
-The path is held against sections of the part at all heights that the cutter reaches; the planner keeps the area of its
+The path is compared with sections of the part at all heights that the cutter reaches; the planner keeps the area of its
 centres from sections of its own.
 """
 

@@ -110,7 +110,7 @@ def missing(values: Mapping[str, Any]) -> list[str]:
 
 
 def _contradictions(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
-    """What values of the wall, the operation and its cutter contradict."""
+    """Contradictions between wall, operation and cutter."""
     wall = table.wall
     if isinstance(wall, WallTable):
         needs, may = SHAPES[wall.shape]
@@ -133,7 +133,7 @@ def _contradictions(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Ite
 def _of_operation(
     op: WallOperationTable, number: int, tools: Mapping[int, Cutter], feet: Sequence[tuple[str, float]], most: float
 ) -> Iterator[str]:
-    """What an operation contradicts: its cutter, the feet of the walls and the greatest stock."""
+    """Contradictions of an operation with its cutter, the feet of the walls and the greatest stock."""
     where = f"operation.{number}"
     yield from unknown_cutter(f"{where}.cutter", op.cutter, tools)
     if op.cutter in tools and tools[op.cutter].body:
@@ -204,7 +204,7 @@ def _of_end_keys(op: WallOperationTable, where: str) -> Iterator[str]:
 
 
 def _of_ends(table: ThinWallJobTable) -> Iterator[str]:
-    """What end contact contradicts: the walls, and operations with other contact."""
+    """Contradictions of end contact with the walls and with operations of other contact."""
     ends = [k for k, op in enumerate(table.operation) if op.contact == "end"]
     if not ends:
         if not isinstance(table.wall, WallTable):
@@ -226,7 +226,7 @@ def _of_ends(table: ThinWallJobTable) -> Iterator[str]:
 
 
 def _of_flanks(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
-    """What flank contact contradicts: the wall, other operations, and how long cutter and flutes are."""
+    """Contradictions of flank contact with the wall, other operations, and the length of cutter and flutes."""
     flanks = [k for k, op in enumerate(table.operation) if op.contact == "flank"]
     if not flanks:
         return
@@ -258,7 +258,7 @@ def _of_flanks(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator
 
 
 def _of_several(table: ThinWallJobTable, least: float) -> Iterator[str]:
-    """What operations that follow one another contradict: the stock that they leave, and keys of the last one.
+    """Contradictions of consecutive operations: the stock that they leave, and keys of the last one.
 
     ``least`` is the least stock of a side before the first one [mm].
     """

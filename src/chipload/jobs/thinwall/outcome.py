@@ -150,7 +150,7 @@ class Variant:
     commands : on the machine
     beyond : what the machine does not give
     seconds : on the machine
-    columns : a row a step of the simulation
+    columns : one row for each step of the simulation
     finish : a finished side each
     shape : the simulated stock against the finished wall
     stress : greatest equivalent stress at the clamp [MPa] under the simulated forces

@@ -55,7 +55,7 @@ FLANK_TURN = math.radians(0.25)
 EVEN = ("constant", "unconstrained")
 #: points of a finished side, along and up
 POINTS = (33, 25)
-#: points of the finished wall that the path is held against are so far apart [mm]
+#: spacing [mm] of the points of the finished wall with which the path is compared
 CLOUD = 0.2
 
 
@@ -65,7 +65,7 @@ class Proof:
 
     Attributes
     ----------
-    columns : a row a step, all passes one after another
+    columns : one row for each step, all passes one after another
     thresholds : (n, m) [N] a pass, at the places of its side
     finish, shape : of the finished wall
     stress : greatest equivalent stress at the clamp [MPa]

@@ -28,7 +28,7 @@ DROPPED = ("u", "v", "side", "operation", "label", "compliance_error", FIRST_STA
 ENGAGED = 1.0
 #: limits that are proportional to the compliance of the wall
 OF_COMPLIANCE = ("deflection_workpiece_um", "deflection_um", "force_over_allowable")
-#: loads that a limit goes with, where it is none itself
+#: loads to which a limit is proportional, where it is not a load itself
 GOES_WITH = {
     "deflection_workpiece_um": ("force_normal_n",),
     "force_over_allowable": ("force_normal_n",),
@@ -72,7 +72,7 @@ def _not_calculated(walled: ThinWallResult) -> str:
 
 
 def _unchecked_bodies(walled: ThinWallResult) -> tuple[str, ...]:
-    """What is not held against one another."""
+    """Bodies that are not checked for collisions."""
     cutters = walled.planning.cutters
     alone = not isinstance(walled.geometry.shape, PartShape) and not walled.settings.get("neighbours")
     return (
@@ -130,7 +130,7 @@ def mesh_error_of(walled: ThinWallResult, name: str, columns: Mapping[str, NDArr
 
 
 def _growth(values: Floats, error: Floats) -> float:
-    """By how much the greatest of values may grow, each by its own relative error."""
+    """Growth of the greatest value, if each value grows by its own relative error."""
     greatest = float(values.max(initial=0.0))
     return float((values * (1.0 + error)).max()) / greatest - 1.0 if greatest > 0.0 else 0.0
 

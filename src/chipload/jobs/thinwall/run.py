@@ -183,7 +183,7 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
     weak = bearing.force < law.forces[0]
     if weak.any():
         lines.append(
-            f"the limit cannot be held at {int(weak.sum())} of {weak.size} places of the finished side: the normal "
+            f"the limit cannot be kept at {int(weak.sum())} of {weak.size} places of the finished side: the normal "
             f"force at the smallest depth, {law.forces[0]:.4g} N at {law.depths[0]:g} mm, is above their threshold"
         )
     return lines, not weak.any()

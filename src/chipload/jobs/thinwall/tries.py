@@ -34,14 +34,14 @@ PLANNING = 0.05
 ROUNDS = 3
 #: simulated at most, where none of those holds
 TRIES = 6
-#: these are held to this share of what would just do
+#: these keep this share of what would just hold
 HOLD = 0.97
 #: share of the limit that a plan is to use; one that uses less is raised to this share of it, with its error, and
 #: simulated, in so many turns at most
 USED_SHARE, FULL, RAISES = 0.95, 0.99, 4
 #: a plan is worth another simulation if it takes at most this share of the best one's time
 FASTER = 0.97
-#: constant depths that are simulated at most, until one holds
+#: greatest number of constant depths that are simulated
 CONSTANTS = 3
 
 

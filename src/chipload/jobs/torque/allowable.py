@@ -52,7 +52,7 @@ class Allowable:
     width : of the contact round the wall [mm]
     limit : of torque, from the wall alone
     torque : the limit that is kept [N mm], the least of that and the stated one; 0: not attainable
-    response : of the real wall, a row a step of the real cut
+    response : of the real wall, one row for each step of the real cut
     path : with what is planned and what is true
     """
 

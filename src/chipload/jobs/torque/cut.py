@@ -42,7 +42,7 @@ Bools = NDArray[np.bool_]
 CHORD_MM = 0.005
 #: most points of a conical helix
 MOST_POINTS = 2_000_000
-#: least cutting coefficient that is believed [MPa]: what the other simulation of the two is made with
+#: least cutting coefficient that is accepted [MPa]; the second of the two simulations uses it
 LITTLE_MPA = 10.0
 #: a flank within so much of the finished surface makes it [mm]
 MAKES_MM = 0.05

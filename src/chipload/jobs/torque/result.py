@@ -143,7 +143,7 @@ def _not_run(outcome: TorqueResult) -> Track:
 
 
 def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
-    """(n,) columns of a controller, a row a step of it."""
+    """(n,) columns of a controller, one row for each step of it."""
     o, path = run.outcome, outcome.allowable.path
     relief = np.interp(o.s, path.model.s, path.relief)
     over = 100.0 * np.maximum(o.torque / (outcome.allowable.torque * relief) - 1.0, 0.0)
@@ -188,7 +188,7 @@ def _run_findings(case: ControllerCase, run: ControllerRun) -> tuple[Finding, ..
 
 
 def _findings(outcome: TorqueResult) -> tuple[Finding, ...]:
-    """What was found in the whole result."""
+    """Findings on the whole result."""
     out = [Finding(f.code, f.line, f.text, Severity.EXCEEDS, f.place, f.row) for f in outcome.findings]
     if not outcome.attainable:
         limit, what = outcome.allowable.limit, "wall" if isinstance(outcome.wall, ShellWall) else "workpiece"

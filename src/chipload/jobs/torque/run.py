@@ -105,7 +105,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
 
 
 def _real_stock(job: TorqueJob, program: Program) -> LayeredStock:
-    """The stock as it really is, before the program."""
+    """The real stock before the program."""
     return real_stock_body(job, program) if job.workpiece is not None else real_shell_stock(job, program)
 
 

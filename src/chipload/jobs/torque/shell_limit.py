@@ -29,7 +29,7 @@ from chipload.stock.rings import surface_off
 from chipload.structure.shell import Ritz, compliance, ovalisation
 from chipload.structure.wall_solid import normal_compliance, wall_solid
 
-#: elements of the second opinion: half round, along, through
+#: elements of the solid for comparison: half round, along, through
 MESH = (24, 20, 1)
 #: a check simulates the plan if that takes at most so many coarse steps
 MOST_PREVIEWED = 3000
