@@ -61,9 +61,7 @@ def hal(
     ] = "/usr/bin/python3",
     panel: Annotated[
         Path | None,
-        typer.Option(
-            "--panel", metavar="FILE", help="only write the panel (PyVCP, .xml), and its .hal file next to it"
-        ),
+        typer.Option("--panel", metavar="FILE", help="only write the panel (PyVCP, .xml), with its .hal file"),
     ] = None,
     debug: Debug = False,
 ) -> None:

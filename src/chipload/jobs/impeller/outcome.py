@@ -204,10 +204,8 @@ class Checked:
             out.append(f"{self.name}: {self.gouge.message}: gouge_mm = {self.allowed:g} is allowed")
         for m, s in zip(self.setting.millings, self.scallops, strict=True):
             if not s.holds:
-                where = f"{BODIES[m.patch.body]} {m.patch.side}"
-                out.append(
-                    f"{self.name}, {where}: {s.greatest:.4f} mm left between passes: scallop_mm = {s.limit:g} allowed"
-                )
+                where = f"{self.name}, {BODIES[m.patch.body]} {m.patch.side}"
+                out.append(f"{where}: {s.greatest:.4f} mm are left between passes: scallop_mm = {s.limit:g} is allowed")
         loads = self.setting.loads
         if loads is not None and len(loads.feed):
             for what, values, most, unit in loads.columns:
@@ -263,12 +261,10 @@ class Covered:
         x, y, z = wall.points[k].tolist()
         over = float(wall.area[self.left.rest > self.limit].sum())
         least = f"{most:.3f} mm" if most < self.left.height else f"{most:g} mm or more"
-        unreached_note = (
-            f", on {self.unreached:.1f} mm2 of it no cutter was found to go" if self.unreached > 0.0 else ""
-        )
+        note = f", no cutter was found for {self.unreached:.1f} mm2 of it" if self.unreached > 0.0 else ""
         return (
             f"{self.name}: on {over:.1f} mm2, {100.0 * (1.0 - self.share):.2g} % of what is milled, more than "
-            f"{self.limit:g} mm is left: {least} at ({x:.2f}, {y:.2f}, {z:.2f}){unreached_note}",
+            f"{self.limit:g} mm is left: {least} at ({x:.2f}, {y:.2f}, {z:.2f}){note}",
         )
 
 
