@@ -18,7 +18,7 @@ GOOD = {
     "source": '"own dynamometer"',
 }
 NO_SOURCE = (
-    "material.source is missing: a coefficient without a source is refused; say where it was published or measured"
+    "material.source is missing: a coefficient without a source is refused; state where it was published or measured"
 )
 
 

@@ -37,7 +37,7 @@ def test_a_foreign_folder_is_refused_and_left_alone(outcome: Maker, tmp_path: Pa
     with pytest.raises(InputError) as caught:
         written(outcome(), out)
     assert told(caught) == (
-        f"--out {out}: holds files that are no result of chipload: name a folder that is new, empty or holds an "
+        f"--out {out}: holds files that are not a result of chipload: name a folder that is new, empty or holds an "
         "older result"
     )
     assert [p.name for p in out.iterdir()] == ["thesis.txt"]
@@ -47,7 +47,7 @@ def test_a_foreign_folder_is_refused_and_left_alone(outcome: Maker, tmp_path: Pa
 def test_a_result_with_something_added_is_not_ours_to_remove(outcome: Maker, tmp_path: Path) -> None:
     out = written(outcome(), tmp_path / "result")
     (out / "notes.txt").write_text("mine")
-    with pytest.raises(InputError, match="holds files that are no result of chipload"):
+    with pytest.raises(InputError, match="holds files that are not a result of chipload"):
         written(outcome(), out)
     assert (out / "notes.txt").exists()
 

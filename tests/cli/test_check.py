@@ -147,10 +147,10 @@ def test_a_limit_of_the_engagement_that_the_wall_alone_exceeds(tmp_path: Path) -
     folder = examples.copy_example("contour", tmp_path / "contour")
     whole = CliRunner().invoke(app, ["check", str(folder / "job.toml")])
     assert whole.exit_code == 0
-    assert "cannot be held" not in whole.output
+    assert "cannot be kept" not in whole.output
     done = CliRunner().invoke(app, ["check", str(folder / "job.toml"), "--set", "limits.engagement_deg=11"])
     assert done.exit_code == 3
-    wanted = "limits.engagement_deg = 11 cannot be held: operation 0 asks for 11.48 deg along a straight wall"
+    wanted = "limits.engagement_deg = 11 cannot be kept: operation 0 needs 11.48 deg along a straight wall"
     assert wanted in done.output
     assert "state a radial depth of at most 0.09186 mm" in done.output
 
@@ -161,7 +161,7 @@ def test_a_wall_that_does_not_carry_the_smallest_depth(tmp_path: Path) -> None:
     words = ["check", str(folder / "job.toml"), "--set", "wall.elements=[6,6]"]
     whole = CliRunner().invoke(app, words)
     assert whole.exit_code == 0
-    assert "cannot be held" not in whole.output
+    assert "cannot be kept" not in whole.output
     done = CliRunner().invoke(app, [*words, "--set", "limits.deflection_workpiece_um=0.05"])
     assert done.exit_code == 3
-    assert "the limit cannot be held at" in done.output
+    assert "the limit cannot be kept at" in done.output

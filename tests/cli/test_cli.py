@@ -91,7 +91,7 @@ def test_a_folder_that_is_refused_is_said_before_the_work(job_dir: Path, planned
     planned(AssertionError("the planner was called"))
     code, _, err = call("run", job_dir / "job.toml", "--out", job_dir)
     assert code == 2
-    assert "holds files that are no result of chipload" in err
+    assert "holds files that are not a result of chipload" in err
 
 
 def test_a_fault_of_ours_ends_with_1_and_says_how_to_report(

@@ -152,7 +152,7 @@ def test_each_largest_cutter_is_clear_and_the_next_is_not(result, proof, walls):
             for table in tables[::3]:
                 for T in axis_at(table, GRID):
                     if 0.0 <= T @ s["normal"][k] < 1.0 - 1e-9 and goes(s, k, larger[0], 2.0, T):
-                        # clear of the check points, it meets a wall between them
+                        # clear of the check points, it collides with a wall between them
                         assert cuts_in(walls, s, k, larger[0], 2.0, T) > 0.0
 
 

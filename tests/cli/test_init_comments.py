@@ -89,7 +89,7 @@ def test_the_material_of_a_comment(comment: str, name: str | None) -> None:
 def test_a_material_that_is_not_shipped_is_named(program: Path, tmp_path: Path) -> None:
     program.write_text(FUSION.replace("STEEL 1045", ": DELRIN"))
     _, said, _ = call("init", program, tmp_path / "job")
-    why = "none that is shipped is like DELRIN; chipload materials lists all"
+    why = "no shipped material is like DELRIN; chipload materials lists all"
     assert f'guess: material.name = "al7075-t6": {why}' in said
 
 

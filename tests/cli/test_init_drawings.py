@@ -93,7 +93,7 @@ def test_a_drawing_beyond_the_travel_is_moved_to_its_middle(tmp_path: Path) -> N
     assert (code, said) == (
         2,
         "chipload: the drawing is 600 mm wide in Y, machine vmc travels 500 mm: name a larger one (--on of init, "
-        "--machine of simulate), or see whether the unit is right\n",
+        "--machine of simulate), or check the unit\n",
     )
 
 

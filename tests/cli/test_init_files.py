@@ -33,7 +33,7 @@ def test_a_table_of_numbers_is_no_program(tmp_path: Path) -> None:
     assert code == 2
     assert said == (
         "chipload: points.txt: neither NC text nor CL data nor a table with a heading of its columns: "
-        "line 1: character '5': begins no word\n"
+        "line 1: character '5': does not begin a word\n"
     )
 
 
@@ -134,10 +134,10 @@ def test_a_camotics_project_whose_script_has_no_nc_text(tmp_path: Path) -> None:
     (tmp_path / "sign.camotics").write_text(json.dumps({"tools": {"1": tool}, "files": ["letters.tpl"]}))
     code, _, err = call("init", tmp_path / "sign.camotics", tmp_path / "job")
     assert code == 2
-    assert "export the NC text of letters.tpl from CAMotics, as sign.nc beside the project" in " ".join(err.split())
+    assert "export the NC text of letters.tpl from CAMotics, as sign.nc next to the project" in " ".join(err.split())
     (tmp_path / "sign.camotics").write_text(json.dumps({"tools": {"1": tool}, "files": ["letters.nc"]}))
     _, _, err = call("init", tmp_path / "sign.camotics", tmp_path / "job")
-    assert err.rstrip().endswith("(letters.nc): put it beside the project")
+    assert err.rstrip().endswith("(letters.nc): put it next to the project")
 
 
 def test_sections_are_a_thin_wall(tmp_path: Path) -> None:

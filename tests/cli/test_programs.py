@@ -69,7 +69,7 @@ def test_a_program_beyond_the_machine(files: Path):
     assert code == 3
     assert "line 8: row 2: X = 900 mm: machine vmc travels from -400 to 400 mm" in out
     assert "cuts with the spindle at rest" in out
-    assert out.count("[does not hold]") == 2
+    assert out.count("[exceeds]") == 2
 
 
 @pytest.mark.parametrize(

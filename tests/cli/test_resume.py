@@ -137,7 +137,7 @@ def test_a_run_with_modes_that_was_killed_goes_on_to_the_same_bytes(folder: Path
     stop(folder, "other-modes", signal.SIGKILL, file="modes.toml")
     change = ("--set", "dynamics.mode.0.stiffness_n_um=7.0")
     other = ran(folder, "other-modes", *change, file="modes.toml")
-    assert other[1] == "chipload: begins again: what was kept belongs to another input\n"
+    assert other[1] == "chipload: starts from the beginning: the checkpoint belongs to another input\n"
 
 
 def test_a_run_that_was_killed_reads_what_it_had_found_of_the_part(folder: Path) -> None:
@@ -170,17 +170,17 @@ def test_ctrl_c_says_what_is_kept_and_how_to_go_on(folder: Path, how: signal.Sig
     assert stopped.returncode == 130
     assert re.fullmatch(
         rf"chipload: stopped: \d+ steps are kept in {out}.unfinished: the same command continues from there; with "
-        r"--fresh it begins again\n",
+        r"--fresh it starts from the beginning\n",
         stopped.stderr,
     )
-    assert ran(folder, out, "--fresh") == (0, "chipload: begins again: it was asked to\n")
+    assert ran(folder, out, "--fresh") == (0, "chipload: starts from the beginning, as requested\n")
     same(folder, out)
 
 
 def test_another_input_does_not_go_on(folder: Path) -> None:
     stop(folder, "other", signal.SIGKILL)
     again = ran(folder, "other", "--set", "material.name=al6082-t6")
-    assert again[1] == "chipload: begins again: what was kept belongs to another input\n"
+    assert again[1] == "chipload: starts from the beginning: the checkpoint belongs to another input\n"
     other = (folder / "other" / "history.parquet").read_bytes()
     assert other != (folder / "whole" / "history.parquet").read_bytes()
 

@@ -100,7 +100,7 @@ def test_gouge_excess_and_collision(job: Path, tmp_path: Path) -> None:
     history = pq.read_table(out / "history.parquet")
     assert max(history["gouge_mm"].to_pylist()) == pytest.approx(op["gouge_mm"]["max"])
     page = (out / "report.html").read_text()
-    assert "What is left on the part" in page
+    assert "Gouge and excess on the part" in page
     assert "shank or holder goes 2.1 mm into fixture 0" in page
     scene = trimesh.load(out / "scene.glb", process=False)
     assert "part" in scene.geometry

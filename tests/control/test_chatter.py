@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from chipload.control.chatter import ChatterAnswer, ChatterGuard, Heard, ListeningRules, listen
+from chipload.control.chatter import ChatterAnswer, ChatterGuard, ListeningRules, WindowKind, listen
 from chipload.control.chatter_stream import answers, quiet_speeds_of
 from chipload.errors import InputError
 from chipload.stability.margin import largest_multipliers, stability_margins
@@ -100,17 +100,17 @@ def test_chatter_is_heard_where_the_map_says_that_the_cut_is_unstable(rpm, depth
     grows = abs(largest_multipliers(cut)[0]) > 1.0
     machine = Cut(depth)
     machine.sampled(1.0, rpm)
-    heard = [listen(machine.sampled(RULES.window, rpm), rpm / 60.0, RULES) for _ in range(4)]
-    assert {x.kind for x in heard} == {Heard.CHATTER if grows else Heard.QUIET}
+    windows = [listen(machine.sampled(RULES.window, rpm), rpm / 60.0, RULES) for _ in range(4)]
+    assert {x.kind for x in windows} == {WindowKind.CHATTER if grows else WindowKind.QUIET}
     if grows:
         # torque moves with the chatter at its own frequency, beside those of the teeth that it is mixed with
         expected = stability_margins(cut).frequency[0]
         tooth = TEETH * rpm / 60.0
-        off = [abs((x.hertz - expected + 0.5 * tooth) % tooth - 0.5 * tooth) for x in heard]
-        mirrored = [abs((x.hertz + expected + 0.5 * tooth) % tooth - 0.5 * tooth) for x in heard]
+        off = [abs((x.hertz - expected + 0.5 * tooth) % tooth - 0.5 * tooth) for x in windows]
+        mirrored = [abs((x.hertz + expected + 0.5 * tooth) % tooth - 0.5 * tooth) for x in windows]
         assert np.minimum(off, mirrored).max() < 30.0
     else:
-        assert max(x.level for x in heard) < 0.02
+        assert max(x.level for x in windows) < 0.02
 
 
 def test_the_guard_finds_a_quiet_speed_and_the_chatter_ends():
@@ -120,13 +120,13 @@ def test_the_guard_finds_a_quiet_speed_and_the_chatter_ends():
     guard, machine, told = ChatterGuard(RULES, rpm / 60.0, windows), Cut(depth), []
     for _ in range(14):
         speed = guard.override * rpm / 60.0
-        told.append(guard.hear(machine.sampled(RULES.window, 60.0 * speed), speed))
+        told.append(guard.answer(machine.sampled(RULES.window, 60.0 * speed), speed))
     kinds = [x.kind for x in told]
     assert kinds.count(ChatterAnswer.SPEED) == 1
     k = kinds.index(ChatterAnswer.SPEED)
     assert 1 <= k <= 6
     assert ChatterAnswer.STOP not in kinds
-    assert all(x.heard.kind is Heard.QUIET for x in told[k + 4 :])
+    assert all(x.window.kind is WindowKind.QUIET for x in told[k + 4 :])
     new = guard.override * rpm
     assert any(60.0 * a < new < 60.0 * b for a, b in windows)
     assert stability_margins(cut_of(TWO, new, depth, HALF)).margin[0] > 1.2
@@ -136,7 +136,7 @@ def test_without_a_quiet_speed_in_reach_it_stops():
     rpm, machine = 9000.0, Cut(3.0)
     guard, answer = ChatterGuard(RULES, rpm / 60.0, [(400.0, 500.0)]), None
     for _ in range(10):
-        answer = guard.hear(machine.sampled(RULES.window, rpm), rpm / 60.0)
+        answer = guard.answer(machine.sampled(RULES.window, rpm), rpm / 60.0)
         if answer.kind is ChatterAnswer.STOP:
             break
     assert answer is not None
@@ -146,9 +146,9 @@ def test_without_a_quiet_speed_in_reach_it_stops():
 
 def test_a_speed_that_moves_is_not_judged_and_too_slow_a_one_neither():
     y = np.sin(np.arange(1000) * 1.7)
-    assert listen(y, np.linspace(100.0, 110.0, 1000), RULES).kind is Heard.UNSTEADY
-    assert listen(y, 10.0, RULES).kind is Heard.UNSTEADY
-    assert listen(y, 100.0, RULES).kind is Heard.CHATTER
+    assert listen(y, np.linspace(100.0, 110.0, 1000), RULES).kind is WindowKind.UNSTEADY
+    assert listen(y, 10.0, RULES).kind is WindowKind.UNSTEADY
+    assert listen(y, 100.0, RULES).kind is WindowKind.CHATTER
 
 
 def test_a_stream_is_answered_with_commands_of_halcmd(tmp_path):

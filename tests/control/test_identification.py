@@ -143,7 +143,7 @@ def test_logs_without_what_is_needed(tmp_path):
     log = spindle_log(tmp_path / "a.csv", 3, (0.3,), names=["time_s", "speed_rpm", "current_a", "load"])
     code, _, err = call("spindle", log, "--out", tmp_path / "s.toml")
     assert code == 2
-    assert "a.csv: no column of torque, and no label that says where it cuts" in err
+    assert "a.csv: no column of torque, and no label that states where it cuts" in err
     log = spindle_log(tmp_path / "b.csv", 3, (0.3,), names=["t", "speed_rpm", "current_a", "torque_nm"])
     code, _, err = call("spindle", log, "--out", tmp_path / "s.toml")
     assert code == 2

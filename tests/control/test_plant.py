@@ -17,7 +17,7 @@ from chipload.control.plant import (
     TorqueProfile,
     comparison,
     run,
-    surprised,
+    with_surprises,
 )
 from chipload.control.spindle_model import Spindle
 from chipload.errors import InputError
@@ -140,7 +140,7 @@ def test_the_toy_path():
 @pytest.mark.parametrize("latency", [0.0, 0.1])
 def test_surprises(latency):
     """Stock 30 % thicker on one side, a hard spot, a worn cutter, a thinner wall: 20 % faster, at most 5 % over."""
-    truth = surprised(
+    truth = with_surprises(
         TOY,
         (
             Surprise(100.0, 140.0, 1.3, 1.3, ramp=15.0),
@@ -162,7 +162,7 @@ def test_surprises(latency):
 
 def test_latency_costs():
     """Stock that grows by half over 8 mm, without a model: the peak is the higher, the later the override acts."""
-    truth = surprised(profile([(150.0, 2600.0)]), (Surprise(90.0, 140.0, 1.5, 1.5, ramp=8.0),))
+    truth = with_surprises(profile([(150.0, 2600.0)]), (Surprise(90.0, 140.0, 1.5, 1.5, ramp=8.0),))
     peaks = np.array([go(RULES, truth, latency=x).torque_max for x in (0.0, 0.1, 0.3)])
     assert np.diff(peaks).min() > 0.02 * LIMIT
 
@@ -201,7 +201,7 @@ def test_a_short_loss_goes_on():
 
 
 def test_overload_stops():
-    truth = surprised(TOY, (Surprise(120.0, 125.0, 8.0, 8.0),))
+    truth = with_surprises(TOY, (Surprise(120.0, 125.0, 8.0, 8.0),))
     found = go(RULES, truth, TOY)
     assert (found.finished, found.ended) == (False, "overload")
     assert found.feed[-1] == 0.0
@@ -264,7 +264,7 @@ def test_a_step_of_the_programmed_feed():
 
 
 def test_worn_cutter_is_an_edge():
-    truth = surprised(TOY, (Surprise(0.0, 280.0, 1.0, 3.0),))
+    truth = with_surprises(TOY, (Surprise(0.0, 280.0, 1.0, 3.0),))
     np.testing.assert_allclose(truth.torque(0.0), 3.0 * TOY.torque(0.0), rtol=1e-12)
     np.testing.assert_allclose(truth.torque(1.0) - truth.torque(0.0), TOY.cut, rtol=1e-12, atol=1e-9)
 

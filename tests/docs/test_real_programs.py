@@ -77,7 +77,7 @@ def test_the_page_names_every_file_once(tool):
     ("out", "seconds"),
     [
         ("job.toml: read\nestimate: 5671 steps, 358 MB of memory, 13 to 100 s\n8 guesses", 100.0),
-        ("estimate: 200000 steps, 610 MB of memory, 5 to 57 min; a first answer: run --coarse", 3420.0),
+        ("estimate: 200000 steps, 610 MB of memory, 5 to 57 min; for a first result: run --coarse", 3420.0),
         ("operation 0: pocket, cutter 1 of 12 mm, 1600 mm2", math.inf),
     ],
 )

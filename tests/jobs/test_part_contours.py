@@ -65,7 +65,7 @@ def test_a_part_beyond_the_travel_is_refused_before_it_is_planned(tmp_path):
     with pytest.raises(InputError, match=r"X from -405 to -375 mm: .*: move it by part.origin_mm, X by -390$"):
         checked(job(tmp_path, {"0": [far]}))
     wide = [(0, 0), (30, 0), (30, 600), (0, 600)]
-    with pytest.raises(InputError, match=r"Y from 0 to 600 mm: .*: name a machine with more travel, or see whether"):
+    with pytest.raises(InputError, match=r"Y from 0 to 600 mm: .*: name a machine with more travel, or check"):
         checked(job(tmp_path, {"0": [wide]}))
 
 

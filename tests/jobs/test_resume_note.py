@@ -1,4 +1,4 @@
-"""Each job says before it starts what of it begins again where it is stopped."""
+"""Each job states before it starts which part of it does not resume."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from chipload.jobs import load_job, resume_note
     [
         ("chips", ""),
         ("trunnion", ""),
-        ("feeds", "what finds new feeds does not resume: "),
-        ("chatter", "what finds new speeds does not resume: "),
-        ("part", "what finds new feeds and the compliance of the workpiece does not resume: "),
+        ("feeds", "the calculation of new feeds does not resume: "),
+        ("chatter", "the calculation of new speeds does not resume: "),
+        ("part", "the calculation of new feeds and the compliance of the workpiece does not resume: "),
         ("contour", "a contour job does not resume: "),
         ("pocket", "a contour job does not resume: "),
         ("tube", "a torque job does not resume: "),
-        ("plate", "plans that were simulated are kept; the simulation of a plan does not resume: "),
+        ("plate", "simulated plans are kept; the simulation of a plan does not resume: "),
         ("impeller", ""),
     ],
 )

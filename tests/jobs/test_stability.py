@@ -386,7 +386,7 @@ def test_process_damping_counts_where_it_is_stated(tmp_path):
         (tmp_path / name).mkdir()
         one = done(tmp_path / name, text=slow, modes=MODES + more)
         found[name] = one.result.operations[0]["stability"]
-        assert ("process damping is counted" in page_bytes(one.result, one.presentation).decode()) == bool(more)
+        assert ("process damping is included" in page_bytes(one.result, one.presentation).decode()) == bool(more)
     assert found["bare"]["process_damping"] is None
     assert found["worn"]["process_damping"] == {"indentation": 3e4, "wear_land": 0.05, "friction": 0.3}
     cutter = Cutter(10.0, 3, 0.0, 20.0, 30.0, 5.8e5)

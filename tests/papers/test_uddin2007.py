@@ -303,7 +303,7 @@ def test_boss_asks_for_more_stock():
         if e.failure
     ]
     assert event.code == "stock-thin"
-    assert f"asks for {wanted:.4g} mm" in event.text
+    assert f"needs {wanted:.4g} mm" in event.text
 
 
 def test_stori_wright():

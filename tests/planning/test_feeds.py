@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chipload.errors import InputError
-from chipload.planning.feeds import KEPT, SLOWEST, StepContact, calmed, greatest_factor, line_feeds
+from chipload.planning.feeds import KEPT, SLOWEST, StepContact, greatest_factor, line_feeds, steady_feeds
 
 
 def rising(rng, n):
@@ -56,7 +56,7 @@ def test_a_straight_ratio_is_solved_in_one_look():
         (lambda: greatest_factor(lambda k: k, [0.0], [1.0]), "slowest and fastest must be (n,) with 0 < slowest"),
         (lambda: greatest_factor(lambda k: k, [2.0], [1.0]), "slowest and fastest must be (n,) with 0 < slowest"),
         (lambda: greatest_factor(lambda k: k, [1.0], [1.0], 1.0), "close = 1: must be between 0 and 1"),
-        (lambda: calmed([1.0], [1.0], [1.0], [1.0], 1.0), "share = 1: must be at least 0 and below 1"),
+        (lambda: steady_feeds([1.0], [1.0], [1.0], [1.0], 1.0), "share = 1: must be at least 0 and below 1"),
     ],
 )
 def test_what_is_refused(call, said):
@@ -96,7 +96,7 @@ def test_feeds_do_not_flicker_and_lose_no_more_than_they_may():
     useful = allowed * rng.choice([1.0, 1.0, 0.8], n)
     least = np.full(n, 0.05)
     old = np.full(n, 1.0)
-    found = calmed(allowed, useful, least, old, share)
+    found = steady_feeds(allowed, useful, least, old, share)
     assert (found <= allowed).all()
     assert (found >= (1.0 - share) * useful).all()
     changes = np.flatnonzero(np.diff(found) != 0.0)
@@ -105,9 +105,9 @@ def test_feeds_do_not_flicker_and_lose_no_more_than_they_may():
         before = found[k]
         assert before > allowed[k + 1] or before < (1.0 - share) * useful[k + 1]
     assert 20 < len(changes) < n // 2
-    assert (np.diff(calmed(allowed, allowed, least, old, 0.0)) != 0.0).mean() > 0.9
+    assert (np.diff(steady_feeds(allowed, allowed, least, old, 0.0)) != 0.0).mean() > 0.9
 
 
 def test_a_feed_that_calms_is_not_below_the_least():
-    assert calmed([1.0, 1.04], [1.0, 1.04], [0.5, 1.02], [3.0, 3.0], 0.1).tolist() == [1.0, 1.04]
-    assert calmed([1.0], [0.3], [0.5], [3.0], 0.1).tolist() == [0.5]
+    assert steady_feeds([1.0, 1.04], [1.0, 1.04], [0.5, 1.02], [3.0, 3.0], 0.1).tolist() == [1.0, 1.04]
+    assert steady_feeds([1.0], [0.3], [0.5], [3.0], 0.1).tolist() == [0.5]

@@ -28,8 +28,8 @@ def gaps(reading):
     [
         (MOVES + "%\nG1 X20\n", ("nc-percent", 4), "%: ends a text that begins with %"),
         (MOVES, ("nc-no-end", 4), "the text ends without M2, M30 or %"),
-        (MOVES + "G187 P2\nM2\n", ("nc-unknown-word", 4), "G187: is no code of LinuxCNC"),
-        (MOVES + "M777\nM2\n", ("nc-unknown-word", 4), "M777: is no code of LinuxCNC"),
+        (MOVES + "G187 P2\nM2\n", ("nc-unknown-word", 4), "G187: is not a code of LinuxCNC"),
+        (MOVES + "M777\nM2\n", ("nc-unknown-word", 4), "M777: is not a code of LinuxCNC"),
         (MOVES + "G1 X10 R3\nM2\n", ("nc-unused-word", 4), "R3: no code of the block uses it"),
         (MOVES + "G76 P1 Z-5 I-1 J0.1 K0.5 X3\nM2\n", ("nc-unknown-word", 4), "threading cycles of a lathe"),
         (MOVES + f"G1 X10 ({'long ' * 60})\nM2\n", ("nc-long-line", 4), "a line has at most 255"),

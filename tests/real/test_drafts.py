@@ -47,6 +47,6 @@ def test_a_draft_of_a_real_file(name: str, tmp_path: Path) -> None:
 def test_a_model_whose_largest_faces_are_no_wall_is_refused(tmp_path: Path) -> None:
     """The job of its two largest curved faces could not be run: one of them folds."""
     with pytest.raises(
-        InputError, match=r"the largest curved faces, 88 and 3, are no sides of a thin wall: .*; chipload"
+        InputError, match=r"the largest curved faces, 88 and 3, are not sides of a thin wall: .*; chipload"
     ):
         draft_of(DATA / "cad" / "impeller_kj66" / "impeller.step", tmp_path)

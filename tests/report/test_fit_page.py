@@ -99,7 +99,7 @@ def test_folder(tmp_path):
     # an older fit is replaced, anything else is refused
     done.save(out)
     (out / "mine.txt").write_text("x")
-    with pytest.raises(InputError, match="holds files that are no result of chipload"):
+    with pytest.raises(InputError, match="holds files that are not a result of chipload"):
         done.save(out)
     assert (out / "mine.txt").exists()
 

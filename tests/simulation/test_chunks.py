@@ -158,7 +158,8 @@ def test_another_run_begins_at_its_beginning(tmp_path: Path, again: Callable[[Pa
     said: list[str] = []
     again(tmp_path / "u", said)
     assert said in (
-        ["begins again: what was kept belongs to another input"], ["begins again: it was asked to"]
+        ["starts from the beginning: the checkpoint belongs to another input"],
+        ["starts from the beginning, as requested"],
     )  # fmt: skip
 
 
@@ -172,7 +173,7 @@ def test_what_is_damaged_is_simulated_again(tmp_path: Path, whole: list[bytes], 
     said: list[str] = []
     assert run(tmp_path / "u", notice=said.append)[1] == whole
     aside = tmp_path / "u.damaged-1"
-    assert said == [f"begins again: {file.name} cannot be read: what was kept is set aside in {aside}"]
+    assert said == [f"starts from the beginning: {file.name} cannot be read: the checkpoint is moved to {aside}"]
     assert (aside / file.name).read_bytes() == bytes(data)
 
 
@@ -202,13 +203,16 @@ def test_a_watched_column_that_comes_late_is_0_before(tmp_path: Path) -> None:
 
 def test_a_folder_belongs_to_one_run(tmp_path: Path) -> None:
     stopped(tmp_path / "u", 0.5)
-    with Checkpoint(tmp_path / "u"), pytest.raises(InputError, match="another run works there: wait for it or name"):
+    with (
+        Checkpoint(tmp_path / "u"),
+        pytest.raises(InputError, match="another run uses this folder: wait for it or name"),
+    ):
         Checkpoint(tmp_path / "u")
     first, second = Checkpoint(tmp_path / "v"), Checkpoint(tmp_path / "v")
     for each in (first, second):
         each.begin("key")
     first.add({"line": np.zeros(3)})
-    with pytest.raises(InputError, match="another run has begun there: name another result"):
+    with pytest.raises(InputError, match="another run has started there: name another result"):
         second.add({"line": np.zeros(3)})
     second.discard()
     assert (tmp_path / "v").exists()

@@ -234,7 +234,7 @@ def test_what_is_wrong_is_said() -> None:
     with pytest.raises(InputError, match="normals must be unit vectors"):
         form_error(removal, AL, p, 2.0 * N, work=None, bars=None, near=0.2)
     forgot, _ = ball_rows(keep=False)
-    with pytest.raises(InputError, match=r"did not keep what the teeth cut: remove\(..., keep=True\)"):
+    with pytest.raises(InputError, match=r"did not keep the tooth engagement: remove\(..., keep=True\)"):
         contacts(forgot)
     films = replace(forgot, columns={**forgot.columns, "chip_areas": np.zeros_like(forgot.columns["chip_areas"])})
     assert len(contacts(films).step) == 0  # films have no loads

@@ -372,5 +372,5 @@ def test_a_damaged_checkpoint_is_set_aside(tmp_path: Path, pattern: str, monkeyp
         found = remove_in_chunks(zigzag(), again, cutters, ALLOY, FINE, kept, engine="moves")
         assert all_bytes(found, again) == known
     assert len(said) == 1
-    assert "set aside" in said[0]
+    assert "is moved to" in said[0]
     assert (tmp_path / "run.damaged-1" / file.name).read_bytes() == bytes(data)

@@ -37,7 +37,7 @@ def test_a_stock_where_the_program_cuts():
     assert at.feed_s == pytest.approx(10.7)
     assert at.air_s == pytest.approx(10.7 - 4.5, abs=0.2)
     assert at.depth_mm == pytest.approx(2.0)
-    assert (at.too_deep, at.apart) == (False, ())
+    assert (at.too_deep, at.outside_axes) == (False, ())
     assert stock_placement(columns, bounds, {1: MILL}) is None
 
 

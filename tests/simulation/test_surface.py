@@ -206,9 +206,8 @@ def test_a_pass_that_cannot_be_read_begins_again_and_is_set_aside(tmp_path):
         )  # fmt: skip
     assert taken[0] == 0
     assert np.array_equal(found.distance, alone.distance)
-    assert told == [
-        f"begins again: pass-part.npz cannot be read: what was kept is set aside in {tmp_path / 'u.damaged-1'}"
-    ]
+    aside = tmp_path / "u.damaged-1"
+    assert told == [f"starts from the beginning: pass-part.npz cannot be read: the checkpoint is moved to {aside}"]
     assert [p.name for p in (tmp_path / "u.damaged-1").iterdir()] == ["pass-part.npz"]
     # a run that is to begin again does not read it
     taken.clear()

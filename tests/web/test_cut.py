@@ -142,14 +142,14 @@ def test_a_map_shows_its_limit_as_a_line_and_bends(cut, pixels) -> None:
     )
     assert np.median(red[:, 1]) == pytest.approx(across * rgb.shape[1], abs=3.0)
     assert width > 100
-    slider = cut.locator("[aria-label='how far the map is bent']")
+    slider = cut.locator("[aria-label='scale of the deflection']")
     slider.click(position={"x": slider.bounding_box()["width"] - 2.0, "y": 8.0})
     # at most 0.12 * 40 sqrt(2) mm over 0.01 mm
     most = 0.12 * 40.0 * np.sqrt(2.0) / 0.01
     cut.wait_for_function(f"m => {VIEW}.state().factor > 0.9 * m", arg=most)
     factor = cut.evaluate(f"{VIEW}.state()")["factor"]
     assert factor <= most * (1.0 + 1e-6)
-    cut.wait_for_function("t => document.body.textContent.includes(t)", arg=f"bent {factor:.3g} times")
+    cut.wait_for_function("t => document.body.textContent.includes(t)", arg=f"deflection x {factor:.3g}")
     assert cut.evaluate(f"{VIEW}.map('sheet', 1)") == pytest.approx(most, rel=1e-5)
     choose(cut, "surface map", "no map")
     cut.wait_for_function(f"{VIEW}.state().map == ''")

@@ -44,7 +44,7 @@ def test_a_job_is_refused_run_shown_and_stopped(window, folder) -> None:
         ("../elsewhere", "must be the name of a folder in the opened one"),
         ("/elsewhere", "must be the name of a folder in the opened one"),
         ("leaves/r", "must be the name of a folder in the opened one"),
-        ("contour", "holds files that are no result of chipload"),
+        ("contour", "holds files that are not a result of chipload"),
     ):
         start(page, "contour/job.toml", out)
         page.locator(".cl-dialog .cl-no").get_by_text(message).wait_for()

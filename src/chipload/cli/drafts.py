@@ -54,9 +54,9 @@ def init(
     """
 
     def work() -> int:
-        asked = (material, machine, catalogue, controller, fixture)
+        templates = (material, machine, catalogue, controller, fixture)
         names = ("material", "machine", "catalogue", "controller", "fixture")
-        kinds = [name for name, wanted in zip(names, asked, strict=True) if wanted]
+        kinds = [name for name, wanted in zip(names, templates, strict=True) if wanted]
         if kinds:
             if folder is not None:
                 raise InputError(f"{file}: a template takes no file: use chipload init --{kinds[0]} DIR")

@@ -37,7 +37,7 @@ def setup_of(parameters: Sequence[str], work_offsets: Sequence[str]) -> Setup:
     return Setup({name: values[0] for name, values in given.items()}, dict(pairs("work-offset", work_offsets)))
 
 
-def machine_of(name: str | None, tell: Callable[[str], None] = show) -> Machine:
+def machine_of(name: str | None, notice: Callable[[str], None] = show) -> Machine:
     """A shipped machine by name, or the machine of a file (.toml, or LinuxCNC's .ini, whose findings are shown)."""
     from chipload.machine.ini import read_ini
     from chipload.machine.machine import machine_named, machine_names, read_machine
@@ -47,7 +47,7 @@ def machine_of(name: str | None, tell: Callable[[str], None] = show) -> Machine:
     if name.lower().endswith(".ini"):
         machine, findings = read_ini(Path(name))
         for f in findings:
-            tell(f"{name}: {f}")
+            notice(f"{name}: {f}")
         return machine
     return read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
 

@@ -38,7 +38,8 @@ def run(
     coarse: Annotated[
         bool,
         typer.Option(
-            "--coarse", help="use larger steps, about a tenth of the time; the verdict is never better than unproven"
+            "--coarse",
+            help="use larger steps and thicker layers for a first result; the verdict is never better than unproven",
         ),
     ] = False,
     workers: Annotated[
@@ -87,7 +88,7 @@ def run(
                     raise
                 raise Cancelled(
                     f"{kept.what_is_kept()} in {kept.folder.name}: the same command continues from there; with "
-                    "--fresh it begins again"
+                    "--fresh it starts from the beginning"
                 ) from None
             kept.discard()
         show(done.result.message)

@@ -26,11 +26,11 @@ GENERIC = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
 def finding_lines(reading: ProgramReading) -> list[str]:
     """The findings of a program: first those that leave it unproven, then by line. Equal findings share one entry."""
     gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
-    broken = set(map(id, reading.violations))
+    violations = set(map(id, reading.violations))
     rest = sorted((*(f for f in reading.findings if f not in gaps), *reading.violations), key=lambda f: f.line)
     return [
         *(f"{text} [unproven]" for _, text in grouped(gaps)),
-        *(f"{text}{' [does not hold]' if id(f) in broken else ''}" for f, text in grouped(rest)),
+        *(f"{text}{' [exceeds]' if id(f) in violations else ''}" for f, text in grouped(rest)),
     ]
 
 

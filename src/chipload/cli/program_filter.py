@@ -30,8 +30,8 @@ def filter_program(
     """Check a program before LinuxCNC loads it: write it to stdout, or write nothing and end with exit code 3.
 
     Name this command in [FILTER] of the machine's .ini. It writes findings to stderr, which the screen shows. The
-    default machine is the one that LinuxCNC runs. If a job of the same name stands beside the program, such as
-    part.toml beside part.ngc, the command runs it too: the program is not loaded if a limit of the job does not hold,
+    default machine is the one that LinuxCNC runs. If the folder holds a job of the same name, such as
+    part.toml for part.ngc, the command runs it too: the program is not loaded if a limit of the job does not hold,
     and the report is in part-checked.
     """
 
@@ -51,7 +51,7 @@ def filter_program(
         worst = max(states)
         if worst is Severity.EXCEEDS or (worst is Severity.UNPROVEN and not allow_unproven):
             open_ = "; add `--allow-unproven` in the .ini to load it" if worst is Severity.UNPROVEN else ""
-            _tell(f"{file.name} is not loaded: {_WHY[worst]}{open_}")
+            _print_error(f"{file.name} is not loaded: {_WHY[worst]}{open_}")
             return EXCEEDED
         _progress(1.0, "checked")
         write_bytes(data)
@@ -67,7 +67,7 @@ def _read(file: Path, name: str, tools: Path | None) -> Severity:
     """Read the program for its machine with the work offsets that LinuxCNC saved, and write the findings.
 
     Leaving the travel of a machine without rotary axes is reported but does not block the program: it depends on the
-    work offset, and the screen asks before the cycle starts.
+    work offset, and the screen warns before the cycle starts.
     """
     from chipload.cli.inputs import machine_of
     from chipload.cli.program_check import TOLERANCE_MM, finding_lines
@@ -76,14 +76,14 @@ def _read(file: Path, name: str, tools: Path | None) -> Severity:
     from chipload.program.read import read_program, read_tools
     from chipload.program.setup import Setup
 
-    on = machine_of(name, _tell)
+    on = machine_of(name, _print_error)
     offsets = saved_offsets(Path(name)) if name.lower().endswith(".ini") else {}
     reading = read_program(
         file, on, dialect="linuxcnc", tools=read_tools(tools) if tools is not None else None, tolerance=TOLERANCE_MM,
         setup=Setup(work_offsets=offsets), progress=_progress,
     )  # fmt: skip
     for line in finding_lines(reading):
-        _tell(line)
+        _print_error(line)
     placed = bool(on.chain.rotary)
     if any(placed or f.code != "machine-limit" for f in reading.violations):
         return Severity.EXCEEDS
@@ -91,7 +91,7 @@ def _read(file: Path, name: str, tools: Path | None) -> Severity:
 
 
 def _run(file: Path) -> Severity:
-    """Run the job beside the program, write its result and its verdict."""
+    """Run the job of the same name, write its result and its verdict."""
     from chipload.jobs import load_job, run_job
     from chipload.report.folder import check_target, write_finished
     from chipload.result import Verdict
@@ -106,12 +106,12 @@ def _run(file: Path) -> Severity:
     check_target(out)
     done = run_job(loaded, _progress)
     target = write_finished(done.result, done.presentation, out)
-    _tell(f"{done.result.message} Report: {target / 'report.html'}")
+    _print_error(f"{done.result.message} Report: {target / 'report.html'}")
     states = {Verdict.HOLDS: Severity.NOTE, Verdict.UNPROVEN: Severity.UNPROVEN, Verdict.EXCEEDS: Severity.EXCEEDS}
     return states[done.result.verdict]
 
 
-def _tell(text: str) -> None:
+def _print_error(text: str) -> None:
     """A line on stderr."""
     print(plain(" ".join(text.split())), file=sys.stderr, flush=True)
 

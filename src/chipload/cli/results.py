@@ -90,8 +90,8 @@ def export(
     def work() -> int:
         from chipload.report.export import KINDS, export_result
 
-        asked = [kind for kind, wanted in zip(KINDS, (csv, vtk, glb, sheet), strict=True) if wanted]
-        kinds = asked if asked or load_monitor is not None else KINDS
+        chosen = [kind for kind, wanted in zip(KINDS, (csv, vtk, glb, sheet), strict=True) if wanted]
+        kinds = chosen if chosen or load_monitor is not None else KINDS
         for name in export_result(result, out, kinds, load_monitor, spindle):
             show(f"written: {out / name}")
         return 0

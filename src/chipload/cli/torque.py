@@ -61,7 +61,7 @@ def hal(
     ] = "/usr/bin/python3",
     panel: Annotated[
         Path | None,
-        typer.Option("--panel", metavar="FILE", help="only write the panel (PyVCP, .xml), and its .hal file beside it"),
+        typer.Option("--panel", metavar="FILE", help="only write the panel (PyVCP, .xml), with its .hal file"),
     ] = None,
     debug: Debug = False,
 ) -> None:
@@ -92,14 +92,14 @@ def hal(
             sources = {"current-in": measured, "speed-in": speed_pin}
         if spindle_override_pin is not None:
             sources["spindle-override-in"] = spindle_override_pin
-        asked: list[int] = []
+        stop_signals: list[int] = []
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda n, _: asked.append(n))
+            signal.signal(number, lambda n, _: stop_signals.append(n))
         with HalPins(name, python, sources=sources) as pins:
             record = control(
                 job,
                 pins,
-                stop=lambda: bool(asked),
+                stop=lambda: bool(stop_signals),
                 notice=lambda reason, s: typer.echo(
                     f"machine stopped: {reason} at {s:.4g} mm; it stays stopped until this command ends", err=True
                 ),
@@ -123,7 +123,7 @@ def _write_panel(job: HalJob, file: Path, name: str, out: Path | None) -> int:
     if out is not None:
         raise InputError("--panel, --out: --panel only writes the panel: state one of them")
     if file.suffix.lower() != ".xml":
-        raise InputError(f"--panel {file}: must end with .xml; its HAL lines are written beside it, to a .hal file")
+        raise InputError(f"--panel {file}: must end with .xml; its HAL lines are written next to it, to a .hal file")
     wires = file.with_suffix(".hal")
     write_whole(file, panel_xml(job).encode("utf-8"))
     write_whole(wires, panel_hal(name).encode("utf-8"))
@@ -250,8 +250,8 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
             text += f", of {per * answer.greatest:.4g} at most ({100.0 * answer.rms / answer.greatest:.2g} %)"
         text += f", {100.0 * answer.covered:.3g} % within the interval"
         if math.isfinite(answer.apart):
-            told = "distinguished from air" if answer.apart >= TOLD_APART else "not distinguished from air"
-            text += f"; cuts {told}: {100.0 * answer.apart:.3g} % of pairs in order (50 %: chance)"
+            resolved = "distinguished from air" if answer.apart >= TOLD_APART else "not distinguished from air"
+            text += f"; cuts {resolved}: {100.0 * answer.apart:.3g} % of pairs in order (50 %: chance)"
         out.append(text)
     if flutes is not None:
         passing = flutes * found.cut_speed / math.tau

@@ -110,7 +110,7 @@ def allowed(s, at, feed, edge, cut, torque, latency, soon, slew, cap, first):
         late = max(until - latency, 0.0) * slew
         if late >= best:
             break
-        # the torque between two rows lies between theirs: both ends are asked
+        # the torque between two rows lies between theirs: both ends are used
         if cut[i] > 0.0:
             best = min(best, (torque - edge[i]) / cut[i] + late)
         elif edge[i] > torque:

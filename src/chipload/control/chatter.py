@@ -4,8 +4,8 @@ Notation: y samples of torque or current at f_s [Hz]; n speed of the spindle [re
 mean, under a Hann window; P power of a line of its spectrum. A steady cut repeats itself with each revolution, so that
 its lines stand at k n; those within two lines of a harmonic are left out. The root mean square of what is left is
 ``level``, its share of the whole alternating power ``share``, the frequency of its greatest line ``hertz``. Chatter
-has a frequency of its own beside the harmonics. Harmonics above f_s / 2 fold back into the spectrum: as many as are
-stated are left out there too, and a frequency above f_s / 2 is told folded; the signal should have a filter before it
+has a frequency of its own between the harmonics. Harmonics above f_s / 2 fold back into the spectrum: as many as are
+stated are left out there too, and a frequency above f_s / 2 appears folded; the signal should have a filter before it
 is sampled.
 
 A window in which the speed changes is not judged. Chatter is reported after several consecutive windows in which
@@ -14,7 +14,7 @@ simulation (``stability.windows`` of its summary) which the override reaches, ne
 which chatter was heard; where there is none, or after so many changes, a stop. Nothing is judged on the way to it; a
 spindle that does not come there is stopped.
 
-Reference: [Altintas2012] ch. 4 for chatter beside the tooth passing frequency.
+Reference: [Altintas2012] ch. 4 for chatter next to the tooth passing frequency.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 BESIDE = 2
 #: a speed that moves by more than this share within a window is not steady
 STEADY = 0.01
-#: fewest revolutions of a window, so that harmonics can be told apart
+#: fewest revolutions of a window, so that harmonics can be distinguished
 FEWEST_TURNS = 8.0
 #: a speed is reached within this share, after so many windows at most
 REACHED, WAITED = 0.02, 12
@@ -43,7 +43,7 @@ REACHED, WAITED = 0.02, 12
 EDGE = 0.1
 
 
-class Heard(StrEnum):
+class WindowKind(StrEnum):
     """Judgement of a window of samples."""
 
     QUIET = "quiet"
@@ -107,19 +107,19 @@ class ListeningRules:
 
 
 @dataclass(frozen=True)
-class HeardWindow:
-    """Content of a window of the signal beside the harmonics of the spindle speed.
+class SignalWindow:
+    """Content of a window of the signal outside the harmonics of the spindle speed.
 
     ``level`` is in units of the signal, ``hertz`` the frequency of its greatest line [Hz].
     """
 
-    kind: Heard
+    kind: WindowKind
     level: float = 0.0
     share: float = 0.0
     hertz: float = 0.0
 
 
-def listen(signal: ArrayLike, speed: ArrayLike, rules: ListeningRules) -> HeardWindow:
+def listen(signal: ArrayLike, speed: ArrayLike, rules: ListeningRules) -> SignalWindow:
     """Analyse one window of a signal.
 
     Parameters
@@ -134,12 +134,12 @@ def listen(signal: ArrayLike, speed: ArrayLike, rules: ListeningRules) -> HeardW
 
     Examples
     --------
-    A line at 333 Hz beside the harmonics of 50 rev/s:
+    A line at 333 Hz between the harmonics of 50 rev/s:
 
     >>> t = np.arange(500) / 2000.0
     >>> rules = ListeningRules(2000.0, 0.05)
-    >>> heard = listen(np.sin(math.tau * 150.0 * t) + 0.6 * np.sin(math.tau * 333.0 * t), 50.0, rules)
-    >>> heard.kind.value, round(heard.hertz), round(heard.level, 2), round(heard.share, 2)
+    >>> window = listen(np.sin(math.tau * 150.0 * t) + 0.6 * np.sin(math.tau * 333.0 * t), 50.0, rules)
+    >>> window.kind.value, round(window.hertz), round(window.level, 2), round(window.share, 2)
     ('chatter', 332, 0.42, 0.26)
     """
     y = np.asarray(signal, dtype=np.float64)
@@ -148,9 +148,9 @@ def listen(signal: ArrayLike, speed: ArrayLike, rules: ListeningRules) -> HeardW
         raise InputError(f"chatter: a window of {y.size} samples: need {rules.samples} finite ones")
     mean = float(n.mean())
     if not (np.isfinite(n).all() and mean > 0.0 and float(np.ptp(n)) <= STEADY * mean):
-        return HeardWindow(Heard.UNSTEADY)
+        return SignalWindow(WindowKind.UNSTEADY)
     if mean * rules.window < FEWEST_TURNS:
-        return HeardWindow(Heard.UNSTEADY)
+        return SignalWindow(WindowKind.UNSTEADY)
     hann = np.hanning(len(y) + 1)[:-1]
     lines = np.fft.rfft((y - y.mean()) * hann)
     # one-sided power of each line, so that the sum is the mean square of the signal
@@ -166,7 +166,9 @@ def listen(signal: ArrayLike, speed: ArrayLike, rules: ListeningRules) -> HeardW
     whole, own = float(power.sum()), float(free.sum())
     level, share = math.sqrt(own), own / whole if whole > 0.0 else 0.0
     loud = level >= rules.floor and share >= rules.share
-    return HeardWindow(Heard.CHATTER if loud else Heard.QUIET, level, share, float(hertz[int(free.argmax())]))
+    return SignalWindow(
+        WindowKind.CHATTER if loud else WindowKind.QUIET, level, share, float(hertz[int(free.argmax())])
+    )
 
 
 @dataclass(frozen=True)
@@ -175,7 +177,7 @@ class SpeedAnswer:
 
     kind: ChatterAnswer
     override: float
-    heard: HeardWindow
+    window: SignalWindow
     text: str = ""
 
 
@@ -205,35 +207,35 @@ class ChatterGuard:
         if not all(0.0 < a <= b for a, b in self.windows):
             raise InputError("chatter: a quiet window must rise from above 0")
 
-    def hear(self, signal: ArrayLike, speed: ArrayLike) -> SpeedAnswer:
+    def answer(self, signal: ArrayLike, speed: ArrayLike) -> SpeedAnswer:
         """Return the answer to one window of samples; parameters as for :func:`listen`."""
-        heard = listen(signal, speed, self.rules)
+        window = listen(signal, speed, self.rules)
         wanted = self.override * self.programmed
         if self._changes and abs(float(np.mean(np.asarray(speed))) - wanted) > REACHED * wanted:
             # on the way to the speed that was answered
             self._waited += 1
             if self._waited <= WAITED:
-                return SpeedAnswer(ChatterAnswer.KEEP, self.override, heard)
+                return SpeedAnswer(ChatterAnswer.KEEP, self.override, window)
             self.override = 0.0
-            return SpeedAnswer(ChatterAnswer.STOP, 0.0, heard, "the speed does not follow the override: stopped")
+            return SpeedAnswer(ChatterAnswer.STOP, 0.0, window, "the speed does not follow the override: stopped")
         self._waited = 0
-        if heard.kind is not Heard.CHATTER:
-            self._loud = 0 if heard.kind is Heard.QUIET else self._loud
-            return SpeedAnswer(ChatterAnswer.KEEP, self.override, heard)
+        if window.kind is not WindowKind.CHATTER:
+            self._loud = 0 if window.kind is WindowKind.QUIET else self._loud
+            return SpeedAnswer(ChatterAnswer.KEEP, self.override, window)
         self._loud += 1
         if self._loud < self.rules.hold:
-            return SpeedAnswer(ChatterAnswer.KEEP, self.override, heard)
+            return SpeedAnswer(ChatterAnswer.KEEP, self.override, window)
         self._loud = 0
         self._bad.append(float(np.mean(np.asarray(speed, dtype=np.float64))))
         found = self._quiet() if self._changes < self.rules.changes else None
-        said = f"chatter at {heard.hertz:.4g} Hz, {heard.level:.3g} beside the harmonics"
+        message = f"chatter at {window.hertz:.4g} Hz, level {window.level:.3g} outside the harmonics"
         if found is None:
             why = "no quiet speed within the override" if self._changes < self.rules.changes else "after all changes"
             self.override = 0.0
-            return SpeedAnswer(ChatterAnswer.STOP, 0.0, heard, f"{said}: stopped, {why}")
+            return SpeedAnswer(ChatterAnswer.STOP, 0.0, window, f"{message}: stopped, {why}")
         self._changes += 1
         self.override = found / self.programmed
-        return SpeedAnswer(ChatterAnswer.SPEED, self.override, heard, f"{said}: {60.0 * found:.0f} rpm")
+        return SpeedAnswer(ChatterAnswer.SPEED, self.override, window, f"{message}: {60.0 * found:.0f} rpm")
 
     def _quiet(self) -> float | None:
         """Return the quiet speed to take [rev/s]; None if there is none."""

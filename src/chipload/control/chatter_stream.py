@@ -42,10 +42,10 @@ def quiet_speeds_of(path: Path, rpm: float | None = None) -> tuple[float, tuple[
         raise InputError(f"{path.name}: no JSON: {err}") from None
     operations = found.get("operations") if isinstance(found, dict) else None
     for operation in operations or ():
-        told = operation.get("stability") if isinstance(operation, dict) else None
-        if told and told.get("windows") is not None and (rpm or told.get("speed_rpm")):
-            windows = tuple((w["low_rpm"] / 60.0, w["high_rpm"] / 60.0) for w in told["windows"])
-            return float(rpm or told["speed_rpm"]) / 60.0, windows
+        stability = operation.get("stability") if isinstance(operation, dict) else None
+        if stability and stability.get("windows") is not None and (rpm or stability.get("speed_rpm")):
+            windows = tuple((w["low_rpm"] / 60.0, w["high_rpm"] / 60.0) for w in stability["windows"])
+            return float(rpm or stability["speed_rpm"]) / 60.0, windows
     raise InputError(f"{path.name}: has no stability.windows: simulate the program with [dynamics] first")
 
 
@@ -57,14 +57,14 @@ def answers(
     halui: bool = False,
 ) -> Iterator[str]:
     """Yield the answers to a stream of lines ``signal speed``, windows half over one another; empty lines, and others
-    than two numbers, as halsampler writes where samples were lost, begin a window anew.
+    than two numbers, as halsampler writes where samples were lost, start a new window.
 
     Parameters
     ----------
     halui : commands for halcmd, else sentences
     """
     guard = ChatterGuard(rules, programmed, windows)
-    count, held = rules.samples, []  # type: int, list[tuple[float, float]]
+    count, pending = rules.samples, []  # type: int, list[tuple[float, float]]
     if halui:
         yield from (f"setp {OVERRIDE}.scale {1.0 / COUNTS:g}", f"setp {OVERRIDE}.direct-value 1")
         yield f"setp {OVERRIDE}.counts {COUNTS}"
@@ -72,15 +72,15 @@ def answers(
     for line in lines:
         sample = _sample(line)
         if sample is None:
-            held = []
+            pending = []
             continue
-        held.append(sample)
-        if len(held) < count:
+        pending.append(sample)
+        if len(pending) < count:
             continue
-        signal, speed = np.array(held).T
-        answer = guard.hear(signal, np.abs(speed))
-        held = held[count // 2 :] if answer.kind is ChatterAnswer.KEEP else []
-        yield from _told(answer, halui)
+        signal, speed = np.array(pending).T
+        answer = guard.answer(signal, np.abs(speed))
+        pending = pending[count // 2 :] if answer.kind is ChatterAnswer.KEEP else []
+        yield from _halcmd_lines(answer, halui)
         if answer.kind is ChatterAnswer.STOP:
             return
 
@@ -95,7 +95,7 @@ def _sample(line: str) -> tuple[float, float] | None:
     return (values[0], values[1]) if len(values) == 2 and all(map(math.isfinite, values)) else None
 
 
-def _told(answer: SpeedAnswer, halui: bool) -> Iterator[str]:
+def _halcmd_lines(answer: SpeedAnswer, halui: bool) -> Iterator[str]:
     if answer.kind is ChatterAnswer.KEEP:
         return
     if not halui:

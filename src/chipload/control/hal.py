@@ -6,10 +6,10 @@ The torque is estimated from the spindle's current and speed: those of pins, or 
 follow the machine's real place and velocity; or it is that of a pin. The
 pin `beat` changes with every step; HAL watches it and takes the feed away from a controller that does not beat
 (examples/tube/linuxcnc). The time is that of the machine's pins, so a step that comes late is a long step, and one
-longer than `timeout_s` is a start: spindle and controller begin anew.
+longer than `timeout_s` is a start: spindle and controller restart.
 
 The torque of the model is always predicted, with feed-forward or without, and readings are compared with it. A
-controller that has stopped continues to send 0 and to beat until it is told to end; it then returns the reason of the
+controller that has stopped continues to send 0 and to beat until it is stopped; it then returns the reason of the
 stop.
 """
 
@@ -63,9 +63,9 @@ class HalJob:
     spindle : what the estimator takes the spindle for; its lags hold for a torque of a pin too
     acceleration : of the axes [mm/s^2]
     period : between steps [s]
-    latency : until an override acts [s], beside the period
+    latency : until an override acts [s], in addition to the period
     modelled : the model of the path is used (feed-forward)
-    window : the machine is looked for so far from its last place [mm], on the whole path while it is off it
+    window : the machine is searched so far from its last place [mm], on the whole path while it is off it
     away : farther from the path it is not on it [mm]
     deviation : of the simulated spindle from ``spindle``
     identified_from : ``current`` or ``power``, what ``spindle`` was identified from; of power its currents
@@ -110,8 +110,8 @@ class Record:
 
     Parameters
     ----------
-    rows : (n, 12) float, ``COLUMNS``, a row a step
-    ended : ``path``: its end was reached; the reason of a stop; ``gone``: HAL has left; ``asked``: it was asked to end
+    rows : (n, 12) float, ``COLUMNS``, one row for each step
+    ended : ``path``: its end was reached; the reason of a stop; ``gone``: HAL has left; ``asked``: stopped on request
     torque_max : greatest torque: of a simulated cut the true one, between steps too, else the measured one [N mm]
     """
 
@@ -192,8 +192,8 @@ class _Cut:
         """Return the torque for the controller [N mm]; NaN if there is none."""
         if self.source == "pin":
             return 1e3 * seen.torque
-        lost = self.source in MEASURED and not (math.isfinite(seen.current) and math.isfinite(seen.speed))
-        return math.nan if lost else self.state.filtered
+        unread = self.source in MEASURED and not (math.isfinite(seen.current) and math.isfinite(seen.speed))
+        return math.nan if unread else self.state.filtered
 
     def speed(self, seen: PinValues) -> float:
         """Of the spindle [rad/s]."""
@@ -221,24 +221,24 @@ def control(
     notice : called once when the controller stops the machine, with the reason and the place on the path [mm]
     """
     path, config = job.path, job.override
-    told = path.over_relief
-    model = (told.s, told.feed, told.edge, told.cut)
+    model_profile = path.over_relief
+    model = (model_profile.s, model_profile.feed, model_profile.edge, model_profile.cut)
     noise = np.random.default_rng(seed).normal(0.0, job.spindle.noise, 65_536)
     real = job.deviation.applied(job.spindle)
     state = begin(config, job.modelled)
     cut = _Cut(job.spindle, real, job.deviation.drift(job.spindle), job.source, at_speed(real))
     s, row, beat, on, due = float(path.model.s[0]), 0, False, False, clock()
     sent, status, ended = 0.0, Status.RUN, Ended.ASKED
-    told_torque, limit = 0.0, 1e-3 * config.torque_ref * float(path.relief[0])
+    shown_torque, limit = 0.0, 1e-3 * config.torque_ref * float(path.relief[0])
     rows: list[tuple[float, ...]] = []
     while not stop():
-        seen = machine.exchange(sent, beat, told_torque, STATUS.index(status), s, limit)
+        seen = machine.exchange(sent, beat, shown_torque, STATUS.index(status), s, limit)
         beat = not beat
         if seen is None:
             ended = Ended.GONE
             break
         before = status
-        if _wrong(seen, cut):
+        if _implausible(seen, cut):
             state = stopped(state, Status.MACHINE_DATA) if status not in STOPS else state
             sent, status = 0.0, Status.MACHINE_DATA if status not in STOPS else status
             unknown = (math.nan, math.nan, float(STATUS.index(status)), math.nan, math.nan, math.nan, math.nan)
@@ -263,7 +263,7 @@ def control(
             expected = cut.state.expected / relief
             reading = Reading(torque / relief, seconds, trusted, actual, expected, most_allowed, not on)
             sent, status, state = step(config, job.table, state, reading)
-            told_torque, limit = 1e-3 * torque if math.isfinite(torque) else 0.0, 1e-3 * config.torque_ref * relief
+            shown_torque, limit = 1e-3 * torque if math.isfinite(torque) else 0.0, 1e-3 * config.torque_ref * relief
             rows.append((seen.time, s, seen.velocity, sent, seen.feed, true.edge + true.cut, torque,
                          STATUS.index(status), away, relief, cut.current, speed))  # fmt: skip
             if s >= path.model.s[-1] - 1e-3 and seen.velocity == 0.0 and status not in STOPS:
@@ -284,7 +284,7 @@ def control(
     )
 
 
-def _wrong(seen: PinValues, cut: _Cut) -> bool:
+def _implausible(seen: PinValues, cut: _Cut) -> bool:
     """Return whether time, place or velocity is not a number, or the time runs backwards."""
     numbers = (seen.time, seen.x, seen.y, seen.z, seen.velocity)
     return not all(map(math.isfinite, numbers)) or (cut.last is not None and seen.time < cut.last[0])

@@ -61,12 +61,12 @@ def load_hal(file: str | Path) -> HalJob:
     folder = Path(file).parent
     return HalJob(
         path=read_path(folder / data["path"]),
-        override=_made(Override, f"{label}: override", data["override"]),
+        override=_from_table(Override, f"{label}: override", data["override"]),
         table=read_fuzzy(folder / data["fuzzy"]) if "fuzzy" in data else standard(),
         source=data["source"],
-        spindle=_made(Spindle, f"{label}: spindle", data["spindle"]),
+        spindle=_from_table(Spindle, f"{label}: spindle", data["spindle"]),
         identified_from=data.get("identified_from", "current"),
-        deviation=_made(SpindleDeviation, f"{label}: deviation", data.get("deviation", {})),
+        deviation=_from_table(SpindleDeviation, f"{label}: deviation", data.get("deviation", {})),
         acceleration=numbers["acceleration_mm_s2"],
         period=numbers["period_s"],
         latency=numbers["latency_s"],
@@ -109,7 +109,7 @@ def _toml(value: Any, factor: float) -> str:
     return repr(value) if isinstance(value, int) else repr(float(value) / factor)
 
 
-def _made(kind: Any, label: str, table: Any) -> Any:
+def _from_table(kind: Any, label: str, table: Any) -> Any:
     """A dataclass from a TOML table, with the units of its keys."""
     if not isinstance(table, dict):
         raise InputError(f"{label}: must be a table")

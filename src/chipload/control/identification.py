@@ -49,7 +49,7 @@ class LogPrediction:
     greatest : torque of the log [N mm]
     covered : share of its rows in the cut whose interval, with two standard deviations of the noise, holds the torque
     apart : share of pairs of a row in the cut and one in the air of which the first is estimated greater; 0.5: they are
-        not told apart; not a number: there are not both
+        not distinguished; not a number: there are not both
     """
 
     name: str
@@ -107,7 +107,7 @@ class IdentifiedSpindle:
     found : the map; of power in the units of the head of this file
     constant_known : the torque constant was stated, not identified; None: it is not known, and `found` has 1
     inertia_found : the speed changes, so that the inertia and the slope of the idle map are known
-    torque : (least, greatest) that the estimate holds for [N mm]; the greatest is inf where no cut says so
+    torque : (least, greatest) that the estimate holds for [N mm]; the greatest is inf where no cut limits it
     cut_speed : of the spindle in the cut, its median [rad/s]
     predictions : logs, each predicted from the others
     """
@@ -139,7 +139,7 @@ def run_of(log: Log, label: str, source: str, air: bool = False) -> Run:
     Raises
     ------
     InputError
-        It has no speed, or says neither what torque is cut nor where.
+        It has no speed, or states neither the torque of the cut nor where it cuts.
     """
     values = log.current if source == "current" else log.power
     if values is None:
@@ -158,7 +158,7 @@ def run_of(log: Log, label: str, source: str, air: bool = False) -> Run:
         torque = np.zeros(len(speed))
     else:
         raise InputError(
-            f"{label}: no column of torque, and no label that says where it cuts: state one, or --air for a log in "
+            f"{label}: no column of torque, and no label that states where it cuts: state one, or --air for a log in "
             "which nothing is cut"
         )
     return Run(log.time[turning], speed[turning], values[turning], torque[turning])
@@ -339,7 +339,7 @@ def _drift(runs: Sequence[Run], found: SpindleMap) -> tuple[float, float]:
     rho = min(max(float(rest[1:] @ rest[:-1]) / power, 0.0), 0.99) if power > 0.0 else 0.0
     spread = math.sqrt(power / max(len(x) - 2, 1) / total * (1.0 + rho) / (1.0 - rho))
     width = 1.96 * spread
-    # a slope that may be none is none: its interval says how far
+    # a slope that may be 0 is 0: its interval states its range
     return (slope, width) if abs(slope) > width else (0.0, width)
 
 

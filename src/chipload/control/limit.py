@@ -85,7 +85,7 @@ def wall_limit(
     if not tool_compliance >= 0.0:
         raise InputError(f"wall_limit.tool_compliance = {tool_compliance:g}: must be at least 0 mm/N")
     at = np.atleast_1d(np.asarray(s, dtype=np.float64))
-    # a point is asked for the deflection: that is what the cutter's edge leaves
+    # the deflection is taken at a point: that is what the cutter's edge leaves
     wall = compliance(modes, at)[:, 2, 2] + left_out(modes, at)
     per_newton = np.array([max(greatest_stress(modes, float(x), length, width)) for x in at])
     return WallLimit(at, wall, per_newton, deflection / (tool_compliance + wall), stress / per_newton)

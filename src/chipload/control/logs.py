@@ -117,9 +117,9 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = Non
     data = read_regular(path, label, MOST_BYTES, "cut it into parts").decode("utf-8-sig", "replace")
     try:
         names, rows = _table(data, stated is None or stated.head)
-        asked = stated or _by_name(label, names)
+        layout = stated or _by_name(label, names)
         places = {}
-        for quantity, (name, _) in asked.wanted.items():
+        for quantity, (name, _) in layout.wanted.items():
             if name not in names:
                 near = f": the nearest is {nearest(name, names)}" if names else ": the file is empty"
                 raise InputError(f"{label}: no column {name} for {quantity}{near}")
@@ -127,7 +127,7 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = Non
         kept, bad, number = _kept(rows, places)
     except csv.Error as err:
         raise InputError(f"{label}: not a CSV file: {err}") from None
-    wanted, sample = asked.wanted, asked.sample
+    wanted, sample = layout.wanted, layout.sample
     findings = []
     if bad:
         findings.append(Finding("log-row", bad[0], f"{len(bad)} rows are left out: a number is missing"))
@@ -138,8 +138,8 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = Non
         values = [row[k] for row in kept]
         if quantity == "label":
             made["label"] = np.array(values, dtype=np.str_)
-            if asked.cutting:
-                made["cutting"] = np.array([str(x).startswith(asked.cutting) for x in values])
+            if layout.cutting:
+                made["cutting"] = np.array([str(x).startswith(layout.cutting) for x in values])
         else:
             made[quantity] = np.array(values, dtype=np.float64) * UNITS[quantity][wanted[quantity][1]]
     rising = np.concatenate([[True], made["time"][1:] > np.maximum.accumulate(made["time"])[:-1]])

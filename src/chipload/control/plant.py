@@ -136,7 +136,9 @@ class Surprise:
             raise InputError(f"surprise.ramp = {self.ramp:g} mm: must be at least 0")
 
 
-def surprised(profile: TorqueProfile, surprises: tuple[Surprise, ...], spacing: float | None = None) -> TorqueProfile:
+def with_surprises(
+    profile: TorqueProfile, surprises: tuple[Surprise, ...], spacing: float | None = None
+) -> TorqueProfile:
     """Return the true columns: the profile with surprises, sampled every ``spacing`` [mm] (None: the present rows)."""
     s = profile.s
     if spacing is not None:
@@ -259,7 +261,7 @@ def run(
     fault : of the sensor
     every_row : keep every so many steps of the controller
     relief : (n,) float, above 0, at the rows of ``truth``: what is allowed there over what is held; the
-        controller is told the torque over it; None: 1 everywhere
+        controller receives the torque over it; None: 1 everywhere
     monitor : model that readings are held against where there is no feed-forward; None: ``model``
     deviation : of the real spindle
 

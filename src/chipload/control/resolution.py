@@ -106,13 +106,13 @@ def check_limit(spindle: Spindle, period: float, limit: float, hold: float, exce
         )
     if found.total > granted * limit:
         lower = (1.0 + excess - found.total / limit) / wrong
-        held = f", or hold at most {lower:.2g}" if lower > 0.5 else ""
+        alternative = f", or hold at most {lower:.2g}" if lower > 0.5 else ""
         error = f", torque constant {100.0 * (wrong - 1.0):.2g} % wrong," if wrong > 1.0 else ""
         raise InputError(
             f"spindle: it resolves {found}, the limit is {1e-3 * limit:.4g} N m: must be at most "
             f"{1e-3 * granted * limit:.3g} N m, the share of the limit that is neither held{error} nor "
             "allowed in excess: "
-            f"{_remedy(found)}{held}; this spindle holds limits from {1e-3 * found.total / granted:.3g} N m"
+            f"{_remedy(found)}{alternative}; this spindle holds limits from {1e-3 * found.total / granted:.3g} N m"
         )
 
 

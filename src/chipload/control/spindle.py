@@ -171,7 +171,7 @@ def identify_runs(
     Raises
     ------
     InputError
-        The rows are too few, or do not tell the parameters apart (one speed, one torque, no ramp).
+        The rows are too few, or do not distinguish the parameters (one speed, one torque, no ramp).
     """
     scale_w, scale_t = _scales(runs, idle_terms, torque_constant)
     settled = sensor_lag if settled is None else settled

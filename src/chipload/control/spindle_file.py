@@ -34,7 +34,7 @@ class SpindleData:
     Parameters
     ----------
     source : ``current`` or ``power``: what the controller reads
-    values : keys of a job's ``[spindle]``; of power for the speed that was asked for, the current in N m
+    values : keys of a job's ``[spindle]``; of power for the requested speed, the current in N m
     torque : (least, greatest) that the estimate holds for [N m]
     speed : (least, greatest) [rad/s]
     """

@@ -82,7 +82,7 @@ def edge_and_cut(whole: Floats, less: Floats, little: float) -> tuple[Floats, Fl
 
 @dataclass(frozen=True, eq=False)
 class UnitResponse:
-    """Deflection and stress of a wall under a unit force at n steps; 0 for steps beside the wall.
+    """Deflection and stress of a wall under a unit force at n steps; 0 for steps off the wall.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def unit_response(modes: Ritz, near: Floats, far: Floats, width: float, tool: Fl
     Parameters
     ----------
     modes : of the wall, clamped at s = 0
-    near, far : (n,) float [mm], s of the two ends of the depth of cut, near <= far; where equal the step is beside it
+    near, far : (n,) float [mm], s of the two ends of the depth of cut, near <= far; equal: the step is off the wall
     width : of the contact round the wall [mm]
     tool : (n,) float [mm/N], C_t
 
@@ -189,12 +189,12 @@ def limit_by_responses(loads: Loads, responses: Sequence[LimitedResponse]) -> Pa
 
     Parameters
     ----------
-    loads : of the steps; the force is only told of
+    loads : of the steps; the force is only for information
     responses : of the same steps
 
     Examples
     --------
-    A block of 0.1 um/N under an edge force of 50 N that may give way by 15 um: 150 N, so twice the 50 N of the feed.
+    A block of 0.1 um/N under an edge force of 50 N that may deflect by 15 um: 150 N, so twice the 50 N of the feed.
 
     >>> one = np.array([1.0])
     >>> loads = Loads(100.0 * one, 400.0 * one, 50.0 * one, 50.0 * one)
@@ -213,8 +213,8 @@ def limit_by_responses(loads: Loads, responses: Sequence[LimitedResponse]) -> Pa
     if not on.any():
         return None
     each[on] = loads.torque_edge[on] + loads.torque_cut[on] * override[on]
-    asked = override <= max(1.0, float(override.min()))
-    k = int(np.argmin(np.where(asked, each, np.inf)))
+    considered = override <= max(1.0, float(override.min()))
+    k = int(np.argmin(np.where(considered, each, np.inf)))
     unattainable = float(override.min()) <= 0.0
     if unattainable:
         k = int(np.argmin(override))

@@ -29,7 +29,7 @@ from chipload.tables import Labelled, nearest, read_table, shipped_table
 
 #: cylinders round a cone: length of the lowest [mm], of their height by how much they are longer
 _SLICE, _GROWS = 0.4, 0.3
-#: modulus [MPa] that stands in a shape whose stiffness is not asked for
+#: modulus [MPa] of a shape whose stiffness is not used
 _MODULUS = 2e5
 
 

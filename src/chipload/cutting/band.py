@@ -41,7 +41,7 @@ def mean_band(
     Raises
     ------
     InputError
-        The material says neither.
+        The material states neither.
 
     Examples
     --------
@@ -118,7 +118,7 @@ def peak_band(
     Parameters
     ----------
     engagement, cutter, material : the material with a spread or a covariance
-    at_force, at_torque : (n,) float [rad], rotation of tooth 0 at which each is asked, as where it is greatest
+    at_force, at_torque : (n,) float [rad], rotation of tooth 0 at which each is evaluated, as where it is greatest
 
     Returns
     -------

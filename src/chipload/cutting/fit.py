@@ -220,7 +220,7 @@ def fit_average(cuts: Sequence[MeasuredCut], cutter: Cutter) -> Fit:
     feeds = len({round(cut.feed_per_tooth(cutter.flutes), 9) for cut in cuts})
     notes: list[str] = []
     if feeds == 2:
-        notes.append("two feeds: whether force is a straight line in feed cannot be seen; intervals count turns only")
+        notes.append("two feeds do not show whether the force is linear in the feed; intervals count turns only")
     linear, identified, spread = np.zeros(6), np.zeros(6, dtype=bool), np.zeros((6, 6))
     residual, r2, freedom = np.full(3, np.nan), np.full(3, np.nan), 10**9
     for channels, which in (((0, 1), PLANE), ((2,), AXIS)):
@@ -303,9 +303,9 @@ def concluded(
     values = np.where(identified, linear, np.nan)
     covariance = np.where(np.outer(identified, identified), search.spread[2:, 2:], np.nan)
     half = _student(search.freedom) * np.sqrt(np.diagonal(covariance))
-    lost = [name for name, ok in zip(NAMES, identified, strict=True) if not ok]
-    if lost:
-        notes.append(f"not identified by these measurements: {', '.join(lost)}")
+    unidentified = [name for name, ok in zip(NAMES, identified, strict=True) if not ok]
+    if unidentified:
+        notes.append(f"not identified by these measurements: {', '.join(unidentified)}")
     interval = np.column_stack([values - half, values + half])
     coefficients = FittedCoefficients(values, covariance, interval, linear)
     return Fit(method, cutter, tuple(cuts), turns, coefficients, channels, search, tuple(notes))
@@ -384,7 +384,7 @@ def predict(fit: Fit, cut: MeasuredCut) -> Prediction:
 def aligned(fit: Fit, cut: MeasuredCut, turns: Turns, parts: int = 720) -> float:
     """Return theta_0 [rad] of a cut at which its harmonics are nearest to the predicted ones, of ``parts`` tried."""
     k = np.arange(len(turns.amplitude), dtype=np.float64)
-    said = (unit_harmonics(cut, fit.cutter, len(k) - 1) @ fit.coefficients.linear) * dynamometer(
+    model = (unit_harmonics(cut, fit.cutter, len(k) - 1) @ fit.coefficients.linear) * dynamometer(
         fit.channels.resonance, k * cut.speed
     )
     some = cut.measured & fit.known
@@ -392,6 +392,6 @@ def aligned(fit: Fit, cut: MeasuredCut, turns: Turns, parts: int = 720) -> float
         return 0.0
     size = np.sqrt(np.sum(np.abs(turns.amplitude[1:, some]) ** 2, axis=0))
     # the phase changes only how amplitudes lie to each other, not their size
-    overlap = np.sum(np.conj(said[1:, some]) * turns.amplitude[1:, some] / size**2, axis=1)
+    overlap = np.sum(np.conj(model[1:, some]) * turns.amplitude[1:, some] / size**2, axis=1)
     tried = np.linspace(0.0, math.tau, parts, endpoint=False)
     return float(tried[int(np.argmax((np.exp(-1j * np.outer(tried, k[1:])) @ overlap).real))])

@@ -175,9 +175,9 @@ def fit_instantaneous(
     q, converged = _searched(problem)
     if any(w is not None for w in ringing):
         for _ in range(ROUNDS):
-            problem = replace(problem, resonance=_rung(problem, q), kept={})
+            problem = replace(problem, resonance=_channel_modes(problem, q), kept={})
             q, converged = _refined(problem, q)
-    return _concluded(problem, q, converged)
+    return _final_fit(problem, q, converged)
 
 
 def turns_in_band(cuts: Sequence[MeasuredCut], band: float) -> tuple[int, tuple[Turns, ...]]:
@@ -229,7 +229,7 @@ def _refined(problem: _Problem, q: Floats) -> tuple[Floats, bool]:
     return np.asarray(done.x), bool(done.status > 0)
 
 
-def _rung(problem: _Problem, q: Floats) -> Floats:
+def _channel_modes(problem: _Problem, q: Floats) -> Floats:
     """Return w0 and zeta of each channel that rings, from all harmonics, with the other unknowns fixed."""
     f = len(problem.cuts)
     a, y = problem.rows(q)
@@ -259,7 +259,7 @@ def _ringing_left(p: Floats, parts: list[tuple[Floats, Complexes, Complexes]]) -
     return np.concatenate([part for z in e for part in (z.real, z.imag)])
 
 
-def _concluded(problem: _Problem, q: Floats, converged: bool) -> Fit:
+def _final_fit(problem: _Problem, q: Floats, converged: bool) -> Fit:
     """Return values, covariance and quality at the end of the search."""
     f, m = len(problem.cuts), problem.unknowns
     a, y = problem.rows(q)

@@ -54,13 +54,13 @@ class Material:
         at a chip thickness of 1 mm
     Kte, Kre, Kae : edge coefficients [N/mm]
     source : where the numbers were published or measured; never empty
-    conditions : cutter and lubrication they were measured with, or only the latter where ``cutter`` says the former
+    conditions : cutter and lubrication they were measured with, or only the latter where ``cutter`` states the former
     workpiece : alloy and temper
-    chip : (smallest, greatest) chip thickness they hold for [mm]; None: the source does not say
-    spread : relative standard deviation of the coefficients, each by itself; None: the source does not say
+    chip : (smallest, greatest) chip thickness they hold for [mm]; None: the source does not state it
+    spread : relative standard deviation of the coefficients, each by itself; None: the source does not state it
     exponents : (m_t, m_r, m_a) of the size effect, from 0 to below 1; 0: none, the linear law
     cutter : what they were measured with: form, diameter, teeth, helix, rake, substrate
-    speed : (lowest, highest) cutting speed they hold for [mm/s]; None: the source does not say
+    speed : (lowest, highest) cutting speed they hold for [mm/s]; None: the source does not state it
     peak_excess : how far above what these coefficients predict the peaks of a force were measured, relative, in the
         worst of the runs; 0: not measured, or not above
     tangential : only the tangential force is known; the other coefficients are 0 and mean nothing: torque and power can
@@ -102,7 +102,7 @@ class Material:
         if not self.source.strip():
             raise InputError(
                 "material.source is missing: a coefficient without a source is refused; "
-                "say where it was published or measured"
+                "state where it was published or measured"
             )
         if self.chip is not None and not 0.0 <= self.chip[0] < self.chip[1] < math.inf:
             raise InputError(

@@ -148,7 +148,7 @@ def _lines(path: Path, label: str) -> Iterator[tuple[int, str]]:
     with open_regular(path, label, LARGEST_FILE, "cut it into parts") as file:
         for number, raw in enumerate(_raw_lines(file), 1):
             if len(raw) > LINE:
-                raise InputError(f"{label}: line {number}: longer than {LINE} characters: this is no force file")
+                raise InputError(f"{label}: line {number}: longer than {LINE} characters: not a force file")
             try:
                 text = raw.decode("utf-8-sig" if number == 1 else "utf-8")
             except UnicodeDecodeError:
@@ -211,7 +211,7 @@ def _head(
             break
         before.append((number, row))
         if len(before) > HEADER:
-            raise InputError(f"{label}: line {number}: no numbers in {HEADER} lines: this is no force file")
+            raise InputError(f"{label}: line {number}: no numbers in {HEADER} lines: not a force file")
     else:
         raise InputError(f"{label}: holds no numbers: must be names, units and samples")
     if not before:

@@ -42,7 +42,7 @@ Floats = NDArray[np.float64]
 
 #: sections of a tapered flank, evenly from the end of its corner to the end of the flutes
 TAPER_SECTIONS = 9
-#: between two rotations that are looked at [rad]
+#: between two evaluated rotations [rad]
 ROTATION = math.radians(2.0)
 
 
@@ -162,7 +162,7 @@ def cutter_stress(
     at = sections_of(cutter)
     brittle = cutter.strength.material_at(cutter.modulus) is ToolMaterial.CARBIDE
     if has_lever_loads(engagement, cutter, material) and greatest_height(engagement) <= at.height[0] * (1.0 + 1e-12):
-        # all that cuts is below the sections: the force and its moment about the tip say all
+        # all that cuts is below the sections: the force and its moment about the tip are sufficient
         out = np.empty(len(engagement))
         for some, loads in lever_loads_in_blocks(engagement, cutter, material, count, np.eye(4)[:2]):
             _strength.greatest_stress(loads, at.height, at.diameter, brittle, out[some])

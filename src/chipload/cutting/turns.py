@@ -56,10 +56,10 @@ class MeasuredCut:
                 raise InputError(f"{self.name}: {key} = {value:g}: must be above 0")
         if force.ndim != 2 or force.shape[1] != 3:
             raise InputError(f"{self.name}: force of shape {force.shape}: must be (n, 3)")
-        lost = np.isnan(force)
-        if (lost.any(axis=0) & ~lost.all(axis=0)).any() or np.isinf(force).any():
+        missing = np.isnan(force)
+        if (missing.any(axis=0) & ~missing.all(axis=0)).any() or np.isinf(force).any():
             raise InputError(f"{self.name}: samples are missing within the window: choose a window without gaps")
-        if lost.all():
+        if missing.all():
             raise InputError(f"{self.name}: no channel is measured: name at least one")
         turn = self.rate * math.tau / self.speed
         if len(force) < turn or turn < 4.0:

@@ -16,7 +16,7 @@ from chipload.engagement.tooth_engagement import ToothEngagement
 
 Floats = NDArray[np.float64]
 
-#: a sine or cosine of kappa below which a surface says nothing of that part of the feed
+#: a sine or cosine of kappa below which a surface does not determine that part of the feed
 FLAT = 1e-3
 
 

@@ -84,13 +84,13 @@ class Isolated:
                 require_extra("cad")
                 self._process = _start()
                 weakref.finalize(self, _kill, self._process)
-                self._ask(self._process, [self.reader, str(self.file), self.key])
-            return self._ask(self._process, [function, *values])
+                self._request(self._process, [self.reader, str(self.file), self.key])
+            return self._request(self._process, [function, *values])
         except BaseException:
             self.close()
             raise
 
-    def _ask(self, process: subprocess.Popen[bytes], values: list[Any]) -> Any:
+    def _request(self, process: subprocess.Popen[bytes], values: list[Any]) -> Any:
         pipe_in, pipe_out = process.stdin, process.stdout
         try:
             if pipe_in is None or pipe_out is None:

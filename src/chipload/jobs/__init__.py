@@ -44,8 +44,8 @@ class Capability:
     name : of its folder and in results
     key : the table that only its job files have
     table : name of the table of the whole file, in ``tables``
-    resumes : whether a run that was stopped goes on from its checkpoint
-    inner : the table of an operation that only its job files have; empty: ``key`` alone tells them
+    resumes : whether a stopped run continues from its checkpoint
+    inner : the table of an operation that only its job files have; empty: ``key`` alone identifies them
     spreads : whether parts of a run can be computed by other processes
     """
 
@@ -214,7 +214,7 @@ def _loaded(
     except ValidationError as err:
         others = [c.root for c in CAPABILITIES if c is not capability]
         errors.texts += table_errors(err, root, others)
-        # what one table alone cannot see is looked for in those that are right by themselves
+        # tables that are valid in themselves are checked against one another
         misspelt = left_missing(err, root)
         for text in (*module.missing(raw), *source_errors(raw, root), *cutter_errors(raw, path.parent)):
             if text.split(": ")[0] not in misspelt:
@@ -237,7 +237,7 @@ def run_job(
 
     Parameters
     ----------
-    checkpoint : keeps what is finished, so that a stopped run goes on; used by the capabilities that can resume
+    checkpoint : keeps finished work, so that a stopped run continues; used by the capabilities that can resume
     guesses : what a guess of a draft is in the result: a note where its user accepts it, UNPROVEN for a first look;
         None: a job with guesses is refused
     workers : processes or a cluster that compute parts of the run; None: this process alone. What is found is the same
@@ -271,10 +271,10 @@ def run_job(
 
 
 def resume_note(loaded: LoadedJob) -> str:
-    """What of a job is not kept while it runs, so that it begins again where it is stopped; empty: all is kept."""
+    """The parts of a job that are not kept, so that it starts again if it is stopped; empty: all is kept."""
     capability = loaded.capability
     if not capability.resumes:
-        return f"{_article(capability.name)} job does not resume: if it is stopped, it begins again"
+        return f"{_article(capability.name)} job does not resume: if it is stopped, it starts again"
     return str(capability.module("job").resume_note(loaded.job))
 
 

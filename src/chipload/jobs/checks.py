@@ -52,7 +52,7 @@ WITH_FORCE = ("cutter_stress_mpa", "deflection_um", "deflection_workpiece_um")
 
 @dataclass(frozen=True, eq=False)
 class DefaultChecks:
-    """What is checked beside the limits that the job states.
+    """Checks in addition to the limits that the job states.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class DefaultChecks:
 def default_checks(
     table: ChecksTable, cutters: Mapping[int, Cutter], material: Material, confidence: float
 ) -> DefaultChecks:
-    """What is checked beside the stated limits.
+    """Checks in addition to the stated limits.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def default_checks(
     Raises
     ------
     InputError
-        More than the mean is asked of a material that does not say how sure its coefficients are.
+        More than the mean is requested of a material that does not state the uncertainty of its coefficients.
     """
     sigma = NormalDist().inv_cdf(confidence)
     if sigma > 0.0 and not material.has_band:
@@ -131,7 +131,7 @@ def check_columns(
     Parameters
     ----------
     cuts : one a cutter that cut
-    deflection_um : (n,) float, a row a step of the removal, by which cutter and workpiece part
+    deflection_um : (n,) float, one row for each step of the removal, by which cutter and workpiece part
 
     Returns
     -------
@@ -163,7 +163,7 @@ def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
 
     Parameters
     ----------
-    columns : of a track, a row a step; ``chip_max_mm`` among them
+    columns : of a track, one row for each step; ``chip_max_mm`` among them
     """
     material, thick = checks.material, columns["chip_max_mm"]
     chip = material.chip
@@ -209,7 +209,7 @@ def default_limits(
 
     Parameters
     ----------
-    columns : of the track, a row a step
+    columns : of the track, one row for each step
     track : its name
     errors : relative error of columns by the resolution
     """
@@ -264,7 +264,7 @@ def _over_feed(columns: Columns, tool: Ints, cutters: Mapping[int, Cutter]) -> F
     """The deflection over the feed per tooth; inf where that is not known, or the axis turns.
 
     The share of the model's range is the greater of this and of the deflection over the radial depth: of a film, whose
-    depth is next to nothing, it says nothing of the feed.
+    depth is nearly zero, it says nothing about the feed.
     """
     out = np.full(len(tool), math.inf)
     bent = next((c for c in ("deflection_um", "deflection_cutter_um") if c in columns), "")
@@ -342,7 +342,7 @@ def with_peaks(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> Li
 
     Parameters
     ----------
-    columns : of the track, a row a step; ``chip_max_mm`` among them, where it is known
+    columns : of the track, one row for each step; ``chip_max_mm`` among them, where it is known
     """
     if check.state is not Verdict.HOLDS or check.worst is None or check.column.name not in PEAKS:
         return check
@@ -358,12 +358,12 @@ def with_peaks(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> Li
 
 
 def upper_loads(columns: Columns, sigma: float) -> Columns:
-    """The columns with ``sigma`` standard deviations added to those that have a band, when they are asked for."""
+    """The columns with ``sigma`` standard deviations added to those that have a band, on request."""
     return columns if sigma == 0.0 else _UpperLoads(columns, sigma)
 
 
 class _UpperLoads(Mapping[str, NDArray[np.float64]]):
-    """Columns that are read, and have their bands added, when they are asked for."""
+    """Columns that are read, and have their bands added, on request."""
 
     def __init__(self, columns: Columns, sigma: float) -> None:
         self._columns, self._sigma = columns, sigma

@@ -1,8 +1,8 @@
-"""A first answer in a fraction of the time: a job with coarser steps, layers and tolerances.
+"""A first result in a fraction of the time: a job with coarser steps, layers and tolerances.
 
 The geometry, limits and checks stay; only the resolution of the calculation changes, by overrides that the result lists
 as those of ``--set``. Of a thin wall the first plan that holds is taken; plans that are not cut, with the least error
-and compensated, are left out. What such a run says is not proven: its result has an UNPROVEN finding.
+and compensated, are left out. What such a run finds is not proven: its result has an UNPROVEN finding.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ def coarser(loaded: LoadedJob) -> tuple[str, ...]:
     out = []
     for key, (factor, most) in factors.items():
         first, *rest = key.split(".")
-        held = getattr(table, first, None)
-        for number, entry in enumerate(held) if isinstance(held, tuple) else ((None, held),):
+        entries = getattr(table, first, None)
+        for number, entry in enumerate(entries) if isinstance(entries, tuple) else ((None, entries),):
             path = [first, *([] if number is None else [str(number)]), *rest]
             value = _at(entry, rest)
             if value is not None:

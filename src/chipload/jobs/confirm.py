@@ -34,10 +34,10 @@ def take_confirm(raw: dict[str, Any]) -> tuple[str, ...]:
 
     def visit(value: Any, name: str) -> None:
         if isinstance(value, dict):
-            asked = value.pop("confirm", False) if name else False
-            if not isinstance(asked, bool):
-                raise InputError(f"{name}.confirm = {str(asked)[:40]!r}: must be true or false")
-            if asked:
+            confirm = value.pop("confirm", False) if name else False
+            if not isinstance(confirm, bool):
+                raise InputError(f"{name}.confirm = {str(confirm)[:40]!r}: must be true or false")
+            if confirm:
                 out.append(name)
         if isinstance(value, (dict, list)):
             entries = value.items() if isinstance(value, dict) else enumerate(value)
@@ -55,7 +55,7 @@ def guesses_of(tables: Collection[str], text: str, stated: Collection[str] = ())
     ----------
     tables : dotted names, of :func:`take_confirm`
     text : the job file
-    stated : keys that an option states anew, which are guesses no more
+    stated : keys that an option states, which are then no longer guesses
 
     >>> guesses_of(["cutter.0"], "[[cutter]]\nconfirm = true\nflutes = 3  # guess: no file states them\nnumber = 1")
     ('cutter.0.flutes = 3: no file states them (line 3)',)

@@ -1,6 +1,6 @@
 """What any file that chipload reads holds: a job, or one of the files that they name; nothing is run.
 
-A TOML file is told by the tables and keys that only its kind has, another file by its ending.
+The kind of a TOML file follows from the tables and keys that only it has, that of another file from its extension.
 """
 
 from __future__ import annotations
@@ -121,8 +121,8 @@ def _drawing(path: Path) -> list[str]:
     closed = sum(c.closed for c in drawing.contours)
     low, high = np.array([c.bounds for c in drawing.contours]).reshape(-1, 2, 2).transpose(1, 0, 2)
     box = _box(np.array([low.min(axis=0), high.max(axis=0)]))
-    said = f"{closed} closed and {len(drawing.contours) - closed} open contours; {box}"
-    return [*(f"finding: {f}" for f in drawing.findings), f"{path.name}: {said}"]
+    contours = f"{closed} closed and {len(drawing.contours) - closed} open contours; {box}"
+    return [*(f"finding: {f}" for f in drawing.findings), f"{path.name}: {contours}"]
 
 
 def _tools(path: Path) -> list[str]:

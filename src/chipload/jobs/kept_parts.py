@@ -1,7 +1,7 @@
-"""Finished parts of a run in its checkpoint, so that a run that was stopped goes on after the last one.
+"""Finished parts of a run in its checkpoint, so that a stopped run continues after the last one.
 
-Notation: a part is a value of arrays, numbers, texts, tuples, lists, dicts and of some kinds of records; its key says
-which part it is and what it depends on. A part is written as a JSON tree beside its arrays and comes back bit for bit;
+Notation: a part is a value of arrays, numbers, texts, tuples, lists, dicts and of some kinds of records; its key states
+which part it is and what it depends on. A part is written as a JSON tree with its arrays and comes back bit for bit;
 a part that is made is given on as it would come back, so that a run that was stopped has the bytes of one that was not.
 """
 
@@ -42,8 +42,8 @@ class KeptRecords:
     ----------
     checkpoint : where they are kept; None: nowhere
     key : of all that the run depends on
-    records : kinds of records that a part may be made of beside arrays and plain values
-    team : makes parts that are told ahead; None: each is made when it is asked for
+    records : kinds of records that a part may be made of besides arrays and plain values
+    team : makes announced parts in parallel; None: each is made on request
     """
 
     def __init__(self, checkpoint: Checkpoint | None, key: str, records: Kinds, team: Team | None = None) -> None:
@@ -81,7 +81,7 @@ class KeptRecords:
             self.team.share(value)
 
     def ahead(self, parts: Sequence[PlanTask], progress: Progress = silent) -> None:
-        """Make the parts that are not kept side by side, where there is a team; a single one waits until asked for."""
+        """Make the parts that are not kept side by side, where there is a team; a single one is made on request."""
         if self.team is None:
             return
         open_yet = {name: part for part in parts if (name := digest(*part.key)) not in self._parts}
@@ -89,7 +89,7 @@ class KeptRecords:
             return
         names = [*open_yet]
         tasks = [(part.make, self.records, part.arguments) for part in open_yet.values()]
-        for number, (k, data) in enumerate(self.team.completed_shared(_made, tasks), 1):
+        for number, (k, data) in enumerate(self.team.completed_shared(_part_as_bytes, tasks), 1):
             self._parts[names[k]] = self._new[names[k]] = data
             self.write()
             progress(number / len(names), f"{number} of {len(names)} parts")
@@ -111,7 +111,7 @@ class KeptRecords:
         self._cost = self._since - begin
 
 
-def _made(shared: Any, make: Callable[..., Any], records: Kinds, arguments: tuple[Any, ...]) -> bytes:
+def _part_as_bytes(shared: Any, make: Callable[..., Any], records: Kinds, arguments: tuple[Any, ...]) -> bytes:
     """A part as bytes; this is what a worker executes."""
     return part_bytes(make(shared, *arguments), records)
 

@@ -69,7 +69,7 @@ def table_errors(err: ValidationError, root: type[BaseModel], others: Sequence[t
     others : tables of the other kinds of jobs, whose keys are named as such
     """
     found = err.errors(include_url=False)
-    # a list whose entry is refused is also called too short: the entry says more
+    # a list whose entry is refused is also called too short: the message on the entry is more precise
     errors = [e for e in found if not any(o["loc"][: len(e["loc"])] == e["loc"] and o is not e for o in found)]
     unknown = [e for e in errors if e["type"] == "extra_forbidden"]
     top: list[str] = [str(e["loc"][0]) for e in unknown if len(e["loc"]) == 1]
@@ -150,7 +150,7 @@ def _model_at(loc: Iterable[int | str], root: type[BaseModel]) -> type[BaseModel
     for key in loc:
         if isinstance(key, int):
             continue
-        if field is not None and (chosen := _tagged(field.annotation, key)) is not None:
+        if field is not None and (chosen := _table_of_tag(field.annotation, key)) is not None:
             model = chosen
             continue
         field = model.model_fields.get(key) if model is not None else None
@@ -158,11 +158,11 @@ def _model_at(loc: Iterable[int | str], root: type[BaseModel]) -> type[BaseModel
     return model
 
 
-def _tagged(annotation: Any, tag: str) -> type[BaseModel] | None:
+def _table_of_tag(annotation: Any, tag: str) -> type[BaseModel] | None:
     """The table of a tag, where a key takes either of several kinds of tables."""
     if any(isinstance(m, Tag) and m.tag == tag for m in getattr(annotation, "__metadata__", ())):
         return _model_in(annotation)
-    found = (_tagged(a, tag) for a in typing.get_args(annotation))
+    found = (_table_of_tag(a, tag) for a in typing.get_args(annotation))
     return next((m for m in found if m is not None), None)
 
 
@@ -183,4 +183,4 @@ def nearest_key(key: str, known: Sequence[str]) -> str:
     """The known key with the same first word (so that a wrong unit finds its key), else the nearest in spelling."""
     word = key.split("_")[0]
     same = [k for k in known if k.split("_")[0] == word]
-    return (difflib.get_close_matches(key, same or list(known), 1, 0.0) or ["none: this is no table"])[0]
+    return (difflib.get_close_matches(key, same or list(known), 1, 0.0) or ["none: not a table"])[0]

@@ -12,7 +12,7 @@ from chipload.jobs.tables import Table
 
 
 def override(raw: dict[str, Any], text: str, root: type[Table]) -> None:
-    """Apply one ``key.path=value`` to the table of the file, in place; ``root`` says which keys it may have."""
+    """Apply one ``key.path=value`` to the table of the file, in place; ``root`` states which keys it may have."""
     path, equals, value = text.partition("=")
     keys = [k.strip() for k in path.split(".")]
     if not equals or not all(keys):

@@ -124,15 +124,15 @@ def reference() -> str:
         if capability.inner:
             out += _variant(capability, next(c for c in CAPABILITIES if c.key == capability.key and not c.inner))
             continue
-        kinds = dict.fromkeys(many for _, many in tables_in(root.model_fields[capability.key].annotation))
-        heads = [f"`[[{capability.key}]]`" if many else f"`[{capability.key}]`" for many in kinds]
+        kinds = dict.fromkeys(repeated for _, repeated in tables_in(root.model_fields[capability.key].annotation))
+        heads = [f"`[[{capability.key}]]`" if repeated else f"`[{capability.key}]`" for repeated in kinds]
         out.append(f"Such a job has a table {' or '.join(heads)}.")
         out.append(_summary(root) + "\n")
         if any(table_in(field.annotation) is None for field in root.model_fields.values()):
             out += ["\n### Keys before the first table\n", *_rows(root, "", tables=False)]
         for name, field in root.model_fields.items():
-            for table, many in tables_in(field.annotation):
-                heading = f"[[{name}]]" if many else f"[{name}]"
+            for table, repeated in tables_in(field.annotation):
+                heading = f"[[{name}]]" if repeated else f"[{name}]"
                 out += [f"\n### `{heading}`\n", _summary(table) + "\n", *_rows(table, name)]
     return "\n".join(out) + "\n"
 
@@ -243,12 +243,12 @@ def _text_of(annotation: Any, bounds: list[str]) -> str:
     return getattr(annotation, "__name__", str(annotation))
 
 
-def tables_in(annotation: Any, many: bool = False) -> list[tuple[type[BaseModel], bool]]:
+def tables_in(annotation: Any, repeated: bool = False) -> list[tuple[type[BaseModel], bool]]:
     """The tables that a key may hold, and whether as a list: one, or either a table or a list of another."""
     if isinstance(annotation, type) and not isinstance(annotation, types.GenericAlias):
-        return [(annotation, many)] if issubclass(annotation, BaseModel) else []
-    many = many or typing.get_origin(annotation) is tuple
-    return [found for a in typing.get_args(annotation) for found in tables_in(a, many)]
+        return [(annotation, repeated)] if issubclass(annotation, BaseModel) else []
+    repeated = repeated or typing.get_origin(annotation) is tuple
+    return [found for a in typing.get_args(annotation) for found in tables_in(a, repeated)]
 
 
 def table_in(annotation: Any) -> type[BaseModel] | None:

@@ -70,7 +70,7 @@ def cost(
     z : height of the tip [mm]
     met : the exact engagement
     speed : (n,) [mm/s]
-    makes_wall : (n,) bool, where the wall error is asked for; 0 elsewhere
+    makes_wall : (n,) bool, where the wall error is needed; 0 elsewhere
     """
     f_z = cut.feed_per_tooth(speed)
     count = np.clip(met.count, 0, PIECES)
@@ -142,7 +142,7 @@ def _bent(
 
 
 def stacked(parts: Iterable[Columns]) -> Columns:
-    """One history from those of passes that follow one another; lengths and times go on."""
+    """One history from those of passes that follow one another; lengths and times continue."""
     rows = list(parts)
     out: dict[str, NDArray[Any]] = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
     for name in ("s_mm", "t_s"):

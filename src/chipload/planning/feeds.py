@@ -39,7 +39,7 @@ class StepContact(IntEnum):
     """What a step does to the stock."""
 
     AIR = 0
-    FILM = 1  # what it takes is thinner than the tolerance can tell: it touches, its loads are not known
+    FILM = 1  # it removes less than the tolerance resolves: it touches, its loads are not known
     CUT = 2
 
 
@@ -52,7 +52,7 @@ class LineFeeds:
     line : (m,) int, rising
     touch : (m,) int, the most that a step of the line does, :class:`StepContact`
     least, allowed : (m,) float, the least factor that is wanted, the greatest that every step allows
-    by : (m,) int, what holds it, as ``line_feeds`` was told; :data:`SLOWEST` where a limit asks for less than the least
+    by : (m,) int, what limits it, as passed to ``line_feeds``; :data:`SLOWEST` where a limit requires less
     """
 
     line: Ints
@@ -92,13 +92,13 @@ def greatest_factor(
     out = np.where(free & ~none, high, low)
     active = ~none & ~free & (at_low < under)
     side = np.zeros(len(low))
-    for look in range(MOST_LOOKS):
+    for trial in range(MOST_LOOKS):
         active &= high - low > NARROW * high
         if not active.any():
             break
         with np.errstate(divide="ignore", invalid="ignore"):
             aim = high - at_high * (high - low) / (at_high - at_low)
-        if look >= SECANTS:
+        if trial >= SECANTS:
             aim = 0.5 * (low + high)
         x = np.where(active, np.clip(np.where(np.isnan(aim), low, aim), low, high), out)
         y = ratio(x) - wanted
@@ -124,7 +124,7 @@ def line_feeds(line: ArrayLike, touch: ArrayLike, least: ArrayLike, most: ArrayL
     line : (n,) int, of each step that moves at a feed
     touch : (n,) int, :class:`StepContact`
     least : (n,) float, the least factor that is wanted of each
-    most : (n,) float, the greatest factor of each; nan: a limit asks for less than the least
+    most : (n,) float, the greatest factor of each; nan: a limit requires less than the least
     by : (n,) int, what holds each, at least 0
 
     >>> found = line_feeds([4, 4, 5], [2, 0, 2], [0.5] * 3, [2.0, 3.0, np.nan], [1, 0, 1])
@@ -147,7 +147,7 @@ def line_feeds(line: ArrayLike, touch: ArrayLike, least: ArrayLike, most: ArrayL
     return LineFeeds(lines, does, np.where(film, 1.0, floor), np.where(film, 1.0, allowed), np.where(film, KEPT, holds))
 
 
-def calmed(allowed: ArrayLike, useful: ArrayLike, least: ArrayLike, old: ArrayLike, share: float) -> Floats:
+def steady_feeds(allowed: ArrayLike, useful: ArrayLike, least: ArrayLike, old: ArrayLike, share: float) -> Floats:
     """Feeds of lines in their order that do not flicker: a feed stays that of the line before, or the programmed one,
     as long as it is allowed, not below the least, and short of what is useful by at most ``share`` of it.
 
@@ -159,7 +159,7 @@ def calmed(allowed: ArrayLike, useful: ArrayLike, least: ArrayLike, old: ArrayLi
     old : (m,) float, programmed
     share : 0 to below 1
 
-    >>> calmed([5.0, 5.2, 9.0, 5.1], [5.0, 5.2, 9.0, 5.1], [1.0] * 4, [4.0] * 4, 0.1).tolist()
+    >>> steady_feeds([5.0, 5.2, 9.0, 5.1], [5.0, 5.2, 9.0, 5.1], [1.0] * 4, [4.0] * 4, 0.1).tolist()
     [5.0, 5.0, 9.0, 5.1]
     """
     if not 0.0 <= share < 1.0:

@@ -1,7 +1,7 @@
 """Rows of a planned history for the motions between passes, and its time: that of the program on the machine.
 
-A history has a row a step of the cut; a link row stands before each pass (where the cutter has come down) and after it
-(where it has gone up), so that the history's time goes from 0 to the end of the program.
+A history has one row for each step of the cut; a link row stands before each pass (where the cutter has come down)
+and after it (where it has gone up), so that the history's time goes from 0 to the end of the program.
 """
 
 from __future__ import annotations

@@ -44,10 +44,10 @@ class StrategyResult:
     ----------
     name : `plain`, `backward`, `feed`, `forward` or `front`
     program : the motions, leads and links included
-    history : a row a step; at least `pass`, `x_mm`, `y_mm`, `z_mm`, `s_mm` (path length), `t_s`, `engagement_deg`,
-        `feed_mm_min`, `force_x_n`, `force_y_n`, `force_xy_n`, `torque_nm`, `form_error_um`. `pass` is `semifinish`,
-        `finish` or `front`; cutting that belongs to none of them is `lead` (run-on, run-off), `closing` (a closed
-        pass meets its own beginning), `link`, `entry`.
+    history : one row for each step; at least `pass`, `x_mm`, `y_mm`, `z_mm`, `s_mm` (path length), `t_s`,
+        `engagement_deg`, `feed_mm_min`, `force_x_n`, `force_y_n`, `force_xy_n`, `torque_nm`, `form_error_um`. `pass` is
+        `semifinish`, `finish` or `front`; cutting that belongs to none of them is `lead` (run-on, run-off), `closing`
+        (a closed pass meets its own beginning), `link`, `entry`.
     summary : JSON values, as `engagement_deg: {min, max}`; merged into summary.json
     events : in the order of the path
     wall_rows : (n,) rows that make the wall: there the limits of engagement and form error count

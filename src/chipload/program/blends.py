@@ -109,8 +109,8 @@ def _top(s: Segments, k: Ints, planner: TrajectoryPlanner) -> Floats:
 
 
 def _reach(s: Segments, k: Ints, planner: TrajectoryPlanner) -> Floats:
-    """Speed that segments may be asked for at the greatest override."""
-    return np.asarray(np.minimum(s.asked[k] * planner.override, _top(s, k, planner)))
+    """Speed that segments may reach at the greatest override."""
+    return np.asarray(np.minimum(s.commanded[k] * planner.override, _top(s, k, planner)))
 
 
 def _inscribed(normal: Floats, bound: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Commands: what a text tells the axes of a machine to do, motion after motion, in columns.
+"""Commands: the motions of the machine's axes that a program commands, in columns.
 
 Every reader of NC text ends here and every writer of it starts here; :mod:`~chipload.program.to_work` leads to a
 :class:`~chipload.program.program.Program`, which knows the workpiece and no axes, ``to_axes`` back. Positions are as
@@ -26,7 +26,7 @@ Row = tuple[Any, ...]
 
 #: the axes of ``Commands.position``, in its columns: X Y Z U V W in mm, A B C in rad
 LETTERS = "XYZABCUVW"
-#: values of ``Commands.motion``; PROBE is a straight feed that a touch may end earlier
+#: values of ``Commands.motion``; PROBE is a straight feed that a probe signal may end earlier
 RAPID, LINE, ARC, DWELL, PROBE = 0, 1, 2, 3, 4
 #: values of ``Commands.plane``: the coordinates that an arc turns in, and the one that it may rise along
 XY, ZX, YZ = 0, 1, 2
@@ -42,7 +42,7 @@ def _zeros() -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """How the coordinates of a text lie in those of the machine.
+    """Position of a program's coordinates in those of the machine.
 
     ``machine = rotate_xy(tilt(position) + shift, rotation) + offset + tool``, with the rotation about Z. Rows in tilted
     coordinates are rows of the tip: ``machine`` is then where the axes would stand with the rotary ones at zero.

@@ -155,7 +155,7 @@ class Compensation:
             chord = a - e
             slope = 2.0 * (chord * outward.conjugate()).real
             if slope == 0.0:
-                raise self._gouge("a first arc that starts beside its end", "start it farther away")
+                raise self._gouge("a first arc that starts on the tangent at its end", "start it farther away")
             o = e + outward * abs(chord) ** 2 / slope
             return self._append(_Offset(ARC, a, 0j, e, o, turns, entry=True), end, payload)
         radial = (a - o) / abs(a - o)

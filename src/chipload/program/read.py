@@ -1,4 +1,4 @@
-"""Any program file: who reads it, what it does on a machine, what is wrong with it there.
+"""Program files of all dialects: the reader, the motions on a machine, the violations of its limits.
 
 Notation: a **source** is a text of axes (RS-274, conversational: Commands) or of the tip (APT: Program). With a machine
 each leads to the other, so that a :class:`ProgramReading` always has both.
@@ -67,7 +67,7 @@ class ProgramReading:
     machine : on which it was read
     placed : number of the work offset whose coordinates are those of the workpiece; None: the first that is used
     findings : by the reader
-    violations : what the program asks of the machine that it does not give
+    violations : violations of the machine's limits
     """
 
     commands: Commands
@@ -271,7 +271,7 @@ def read_tools(path: str | Path) -> ToolTable:
     return read_tool_table(text, name=path.name)[0]
 
 
-def dialect_of(path: Path, machine: Machine, said: str | None = None) -> Dialect:
+def dialect_of(path: Path, machine: Machine, stated: str | None = None) -> Dialect:
     """The dialect of a file: as it is said, else by its ending, for NC texts that of the machine.
 
     Raises
@@ -279,10 +279,10 @@ def dialect_of(path: Path, machine: Machine, said: str | None = None) -> Dialect
     InputError
         The dialect or the ending is not known.
     """
-    if said is not None:
-        if said not in get_args(Dialect):
-            raise InputError(f"dialect = {said!r}: must be one of {', '.join(get_args(Dialect))}")
-        return cast("Dialect", said)
+    if stated is not None:
+        if stated not in get_args(Dialect):
+            raise InputError(f"dialect = {stated!r}: must be one of {', '.join(get_args(Dialect))}")
+        return cast("Dialect", stated)
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         known = " ".join(ENDINGS)

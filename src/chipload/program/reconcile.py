@@ -79,19 +79,19 @@ def _comments(text: str, own: float) -> Iterator[tuple[int, StatedDiameter]]:
         if "(" not in line and ";" not in line:
             continue
         for comment in _COMMENT.finditer(line):
-            said = (comment[1] if comment[1] is not None else comment[2]).upper()
-            hits = (pattern.search(_without_offsets(said)) for pattern in _STATED)
+            comment_text = (comment[1] if comment[1] is not None else comment[2]).upper()
+            hits = (pattern.search(_without_offsets(comment_text)) for pattern in _STATED)
             hit = next((hit for hit in hits if hit is not None), None)
             if hit is not None and (value := length_of(hit["value"], hit["unit"], own)) > 0.0:
-                shown = " ".join(said.split())[:60]
+                shown = " ".join(comment_text.split())[:60]
                 yield int(hit["tool"]), StatedDiameter(value, f"the comment ({shown})", number)
 
 
-def _without_offsets(said: str) -> str:
+def _without_offsets(comment: str) -> str:
     """A comment without the numbers of offsets, which are no diameters."""
-    tool = re.search(_TOOL, said)
-    both = _LENGTH_OFFSET.search(said) is not None
-    return _OFFSET.sub(lambda hit: "" if both or (tool and tool["tool"] == hit[1]) else hit[0], said)
+    tool = re.search(_TOOL, comment)
+    both = _LENGTH_OFFSET.search(comment) is not None
+    return _OFFSET.sub(lambda hit: "" if both or (tool and tool["tool"] == hit[1]) else hit[0], comment)
 
 
 def length_of(value: str, unit: str | None, own: float) -> float:
@@ -115,7 +115,7 @@ def agree(
     comments: Mapping[int, StatedDiameter] | None = None,
     shapes: Mapping[int, Shape] | None = None,
 ) -> tuple[Finding, ...]:
-    """Hold what is stated about each cutter against the cutter that is simulated; differences by wear are findings.
+    """Compare what is stated about each cutter with the simulated cutter; differences by wear are findings.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ class Segments:
     length : (m,) float [mm or rad]
     begin, end : (m, 3) float, unit tangents at its ends
     point : (m, 3) float [mm], where it ends
-    asked, speed : (m,) float [mm/s], what the program asks for, and what the axes allow
+    commanded, speed : (m,) float [mm/s], of the program, and what the axes allow
     acceleration : (m,) float [mm/s^2]
     radius, bend, sweep : (m,) float, radius [mm] of an arc, its effective radius of curvature [mm], its angle [rad]
     centre, normal : (m, 3) float, of an arc
@@ -55,7 +55,7 @@ class Segments:
     begin: Floats
     end: Floats
     point: Floats
-    asked: Floats
+    commanded: Floats
     speed: Floats
     acceleration: Floats
     radius: Floats
@@ -92,7 +92,7 @@ def segments_of(program: Program, machine: Machine, others: Floats | None = None
     moves[:1] = False
     speed, acceleration = _axis_limits(program, machine, step, length)
     speed = np.where(alone, speed, np.minimum(speed, machine.rapid))
-    asked = np.where(program.motion == RAPID, speed, np.minimum(speed, np.minimum(program.feed, machine.feed_max)))
+    commanded = np.where(program.motion == RAPID, speed, np.minimum(speed, np.minimum(program.feed, machine.feed_max)))
     arc = is_arc(program) & (sweeps(program) != 0.0)
     begin, end = directions(program)
     r = np.where(arc, radii(program), np.inf)
@@ -106,7 +106,7 @@ def segments_of(program: Program, machine: Machine, others: Floats | None = None
     columns = {
         "row": row, "first": first, "arc": arc, "rapid": program.motion == RAPID, "turning": turning,
         "ends": np.zeros(len(row), dtype=bool), "length": length, "begin": begin, "end": end,
-        "point": program.p_work, "asked": asked, "speed": speed, "acceleration": acceleration, "radius": r,
+        "point": program.p_work, "commanded": commanded, "speed": speed, "acceleration": acceleration, "radius": r,
         "bend": bend, "sweep": np.abs(sweeps(program)), "centre": program.centre, "normal": program.normal,
         "control": control, "tolerance": program.path_mode[:, 1],
     }  # fmt: skip

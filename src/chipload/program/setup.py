@@ -1,4 +1,4 @@
-"""What a controller knows before a program begins: parameters, work offsets, the cutters of its tools.
+"""State of a controller before a program begins: parameters, work offsets, the cutters of its tools.
 
 Notation: a parameter is named as the text names it: ``#5221``, ``#<depth>`` or ``_hal[x]`` (RS-274), ``R10``
 (Sinumerik), ``Q10`` (Heidenhain). A work offset is named by the code that selects it: ``G54`` to ``G59.3``,
@@ -27,7 +27,7 @@ Nine = tuple[float, ...]
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What a program finds when it begins.
+    """State of a controller when a program begins.
 
     Parameters
     ----------

@@ -62,14 +62,14 @@ class Swivel:
         tip, _ = forward(self.machine, at, tool_length(self.machine, frame), zero)
         p = at.copy()
         p[:, :3] = tip
-        return _bare(frame).from_machine(_own(base).to_machine(p))[0, :3]
+        return _without_tool(frame).from_machine(_work_offset(base).to_machine(p))[0, :3]
 
     def axes(self, frame: Frame, base: Frame, p: Floats, rotary: Floats) -> Floats:
         """(9,) the axes that bring the tip to p (3,), with the rotary ones and U V W as in ``rotary`` (9,)."""
         zero, shift = work_zero(self.machine, base, bool(base.offset.any()))
         whole = np.array(rotary)[None, :]
         whole[:, :3] = p
-        flat = _own(base).from_machine(_bare(frame).to_machine(whole))[:, :3]
+        flat = _work_offset(base).from_machine(_without_tool(frame).to_machine(whole))[:, :3]
         at = (np.array(rotary) + shift)[None, :]
         found: Floats = with_tip(self.machine, at, flat, tool_length(self.machine, frame), zero)[0] - shift
         found[3:] = rotary[3:]
@@ -125,15 +125,17 @@ class Swivel:
         best: Floats | None = None
         least = math.inf
         for solution in found.axes[0]:
-            for angles in itertools.product(*(_wound(axis, solution[axis.column], now) for axis in found.free)):
+            for angles in itertools.product(
+                *(_with_whole_turns(axis, solution[axis.column], now) for axis in found.free)
+            ):
                 q = np.array(now)
                 for axis, angle in zip(found.free, angles, strict=True):
                     q[axis.column] = angle
                 if sign and sign * q[self._master(found.free).column] < -SLACK:
                     continue
-                way = float(np.abs(q - now).sum())
-                if way < least - SLACK:
-                    best, least = q, way
+                travel = float(np.abs(q - now).sum())
+                if travel < least - SLACK:
+                    best, least = q, travel
         if best is None:
             raise InputError(
                 f"tilted plane: its normal {_shown(direction)} is out of the limits of the rotary axes "
@@ -153,16 +155,16 @@ class Swivel:
         return (across or list(free))[-1]
 
 
-def _bare(frame: Frame) -> Frame:
+def _without_tool(frame: Frame) -> Frame:
     """The coordinates alone."""
     return replace(frame, tool=np.zeros(9), tilt=None)
 
 
-def _own(base: Frame) -> Frame:
+def _work_offset(base: Frame) -> Frame:
     return replace(base, shift=np.zeros(9), tool=np.zeros(9), tilt=None)
 
 
-def _wound(axis: Axis, angle: float, now: Floats) -> Iterator[float]:
+def _with_whole_turns(axis: Axis, angle: float, now: Floats) -> Iterator[float]:
     """An angle with whole turns added: within the limits, nearest to where the axis stands first and beside it."""
     turn = round((now[axis.column] - angle) / math.tau)
     for k in (turn, turn - 1, turn + 1):

@@ -1,4 +1,4 @@
-"""How long a machine takes for a program, row by row: the one clock of the product.
+"""Time of each row of a program on a machine; all times of the product come from here.
 
 Notation: L [mm] length of a row, v [mm/s] its feed or the rapid rate, a [mm/s^2], u unit direction of travel, theta
 [rad] the angle between the end of a row and the start of the next, delta [mm] how far the corner between them may be
@@ -136,7 +136,7 @@ def _axis_path_times(commands: Commands, machine: Machine, planner: TrajectoryPl
 
 
 def peak_speed(program: Program, machine: Machine) -> Floats:
-    """Greatest speed that each row reaches; what its feed asks beyond that changes no time.
+    """Greatest speed that each row reaches; a higher feed does not change its time.
 
     Returns
     -------
@@ -154,8 +154,8 @@ def peak_speed(program: Program, machine: Machine) -> Floats:
     [0.0, 30.0]
     """
     if machine.planner is not None:
-        asked = np.where(program.motion == RAPID, machine.rapid, np.minimum(program.feed, machine.feed_max))
-        return np.where((lengths(program) > 0.0) & (program.motion != DWELL), asked, 0.0)
+        commanded = np.where(program.motion == RAPID, machine.rapid, np.minimum(program.feed, machine.feed_max))
+        return np.where((lengths(program) > 0.0) & (program.motion != DWELL), commanded, 0.0)
     out = np.zeros(len(program))
     if (lengths(program) > 0.0).any():
         row, length, most, a, v = _speeds(program, machine)

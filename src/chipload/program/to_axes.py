@@ -34,7 +34,7 @@ ANGLE_TOLERANCE = math.radians(0.05)
 LEAST_RADIUS = 0.0013
 #: an index table that moves less [rad] stands
 INDEX_STANDS = 1e-6
-#: codes of findings that say where the axes are
+#: codes of findings about the position of the axes
 LIMITS = ("machine-limit", "machine-index", "machine-offset")
 #: pieces that the rows of one tool may be cut into
 MOST_PIECES = 1_000_000
@@ -50,7 +50,7 @@ def to_axes(
     start: Floats | None = None,
     tolerance: float = TOLERANCE_MM,
 ) -> tuple[Commands, tuple[Finding, ...]]:
-    """What the machine's axes have to do for a program; O(n) and the search of :func:`~chipload.machine.follow.follow`.
+    """Motions of the machine's axes for a program; O(n) and the search of :func:`~chipload.machine.follow.follow`.
 
     Parameters
     ----------
@@ -146,11 +146,13 @@ def _rotary_commands(
     ends = np.flatnonzero(np.append(np.diff(program.tool) != 0, True)) + 1
     for begin, end in zip([0, *ends[:-1]], ends, strict=True):
         length = tool_lengths.get(int(program.tool[begin]), 0.0)
-        piece, q, found = _piece(_taken(program, np.arange(begin, end)), machine, length, free, tcp, stands, tolerance)
+        piece, q, found = _piece(
+            _rows_of(program, np.arange(begin, end)), machine, length, free, tcp, stands, tolerance
+        )
         parts.append(piece)
         axes.append(q)
-        said = f"tool {program.tool[begin]}: " if len(tools) > 1 else ""
-        findings += [replace(f, text=f"{said}{f.text}") for f in found if f.code not in LIMITS]
+        prefix = f"tool {program.tool[begin]}: " if len(tools) > 1 else ""
+        findings += [replace(f, text=f"{prefix}{f.text}") for f in found if f.code not in LIMITS]
         stands = q[-1]
     whole, q = Program.join(parts), np.vstack(axes)
     findings += limit_findings(machine, q, whole.line, placed=False)
@@ -165,14 +167,14 @@ def _rotary_commands(
         position = np.zeros((len(q), 9))
         for k, one in enumerate(frames):
             position[frame == k] = one.from_machine(q[frame == k])
-        centre, normal = _as_seen(whole, machine, q, frames, frame, tool_lengths, tools)
+        centre, normal = _arcs_in_machine(whole, machine, q, frames, frame, tool_lengths, tools)
     out = replace(_commands(whole, position, centre, normal, frames, frame), tcp=np.full(len(whole), tcp))
     if not tcp:
-        out = _retimed(out, whole)
+        out = _with_tip_time(out, whole)
     return out, tuple(findings)
 
 
-def _taken(program: Program, rows: NDArray[np.int64]) -> Program:
+def _rows_of(program: Program, rows: NDArray[np.int64]) -> Program:
     columns = {f.name: getattr(program, f.name)[rows] for f in fields(Program) if f.name != "labels"}
     return Program(**columns, labels=program.labels)
 
@@ -186,17 +188,17 @@ def _piece(
     if missed is not None:
         raise InputError(f"program {missed.text}: choose a machine that reaches it")
     turns = np.abs(np.diff(q[:, _ROTARY], axis=0, prepend=q[:1, _ROTARY])).max(axis=1) > 1e-9
-    normal = program.normal if tcp else _seen(machine, q, program.normal)
+    normal = program.normal if tcp else _in_machine(machine, q, program.normal)
     odd = np.where((turns & is_arc(program))[:, None], math.sqrt(1.0 / 3.0), normal)
     program = _plane_arcs(program, odd, tolerance)
     indexed = any(axis.indexed for axis in machine.chain.rotary)
     if tcp or indexed:
         q, findings = _followed(program, machine, start, length, free)
-        return (program, q, findings) if tcp else (*_swung(program, machine, q, length, tolerance), findings)
+        return (program, q, findings) if tcp else (*_linearised(program, machine, q, length, tolerance), findings)
     pieces, findings = linearise(
         machine, program.p_work, program.axis, tolerance, ANGLE_TOLERANCE, start, length, None, free
     )
-    out = _taken(program, pieces.row)
+    out = _rows_of(program, pieces.row)
     inner = (pieces.part < 1.0)[:, None]
     out = replace(out, p_work=np.where(inner, pieces.tip, out.p_work), axis=np.where(inner, pieces.axis, out.axis))
     return out, pieces.axes, findings
@@ -212,7 +214,9 @@ def _followed(
     )  # fmt: skip
 
 
-def _swung(program: Program, machine: Machine, q: Floats, length: float, tolerance: float) -> tuple[Program, Floats]:
+def _linearised(
+    program: Program, machine: Machine, q: Floats, length: float, tolerance: float
+) -> tuple[Program, Floats]:
     """Rows in pieces: rotary axes in straight proportion, the tip on its line within the tolerance.
 
     The tool's axis goes the way that the rotary axes take it, which need not be a great circle: that of a pallet is a
@@ -249,14 +253,14 @@ def _swung(program: Program, machine: Machine, q: Floats, length: float, toleran
             raise InputError(
                 f"program: more than {MOST_PIECES} pieces are needed: raise the tolerance = {tolerance:g} mm"
             )
-    out = _taken(program, row)
+    out = _rows_of(program, row)
     _, direction = forward(machine, axes, length)
     inner = (part < 1.0)[:, None]
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     return replace(out, p_work=np.where(inner, tip, out.p_work), axis=np.where(inner, direction, out.axis)), axes
 
 
-def _seen(machine: Machine, q: Floats, vector: Floats) -> Floats:
+def _in_machine(machine: Machine, q: Floats, vector: Floats) -> Floats:
     """(n, 3) work directions as X Y Z of the machine see them, its rotary axes where they are."""
     still = np.zeros((len(q), 3))
     a, b = (with_tip(machine, q, p)[:, :3] for p in (still, vector))
@@ -264,7 +268,7 @@ def _seen(machine: Machine, q: Floats, vector: Floats) -> Floats:
     return np.asarray(d / np.linalg.norm(d, axis=1)[:, None])
 
 
-def _as_seen(
+def _arcs_in_machine(
     program: Program,
     machine: Machine,
     q: Floats,
@@ -280,7 +284,7 @@ def _as_seen(
         rows = arc & (frame == k)
         at = with_tip(machine, q[rows], program.centre[rows], tool_lengths.get(tool, 0.0))
         centre[rows] = frames[k].from_machine(at)[:, :3]
-        n = _seen(machine, q[rows], program.normal[rows])
+        n = _in_machine(machine, q[rows], program.normal[rows])
         normal[rows] = np.where(np.abs(n) > 0.5, np.sign(n), 0.0)
     return centre, normal
 
@@ -298,7 +302,7 @@ def _index_stands(program: Program, machine: Machine, q: Floats) -> None:
                 )
 
 
-def _retimed(commands: Commands, program: Program) -> Commands:
+def _with_tip_time(commands: Commands, program: Program) -> Commands:
     """Feeds along the commanded coordinates that give each row the time that the tip needs at its own."""
     cuts = np.isin(commands.motion, (LINE, ARC))
     length, own = spans(program), extents(commands)

@@ -109,9 +109,9 @@ def to_work(
     Raises
     ------
     InputError
-        An axis moves that the machine has not; the work offset is turned and the machine has rotary axes.
+        An axis moves that the machine does not have; the work offset is turned and the machine has rotary axes.
     """
-    findings = _strangers(commands, machine)
+    findings = _require_axes(commands, machine)
     base = work_frame(commands, placed)
     known = bool(base.offset.any())
     zero, shift = work_zero(machine, base, known)
@@ -147,14 +147,14 @@ def to_work(
     program = Program(**columns, feed=commands.feed, labels=commands.labels)
     cut = turning & ~commands.tcp & (commands.motion != DWELL)
     findings += _off_normal(commands, axis)
-    program = _timed(program, commands, cut)
+    program = _with_controller_time(program, commands, cut)
     if cut.any():
-        program = _traced(program, machine, axes, tool, zero, cut, tolerance)
+        program = _linearised(program, machine, axes, tool, zero, cut, tolerance)
     return program, findings
 
 
-def _strangers(commands: Commands, machine: Machine) -> tuple[Finding, ...]:
-    """Axes that move and that the machine has not are refused; rows that are probes are said."""
+def _require_axes(commands: Commands, machine: Machine) -> tuple[Finding, ...]:
+    """Refuse axes that move but that the machine does not have; report probing moves."""
     letters = machine.chain.letters
     for k, letter in enumerate(LETTERS):
         if letter not in letters and len(commands) and np.ptp(commands.position[:, k]) > 0.0:
@@ -168,21 +168,21 @@ def _strangers(commands: Commands, machine: Machine) -> tuple[Finding, ...]:
 
 
 def _off_normal(commands: Commands, axis: Floats) -> tuple[Finding, ...]:
-    """Cuts in a tilted plane with the tool not along its normal: said once, with the first line and the worst angle."""
+    """Cuts in a tilted plane with the tool not along its normal: one finding, with first line and worst angle."""
     off = np.zeros(len(commands))
     for k, frame in enumerate(commands.frames):
         if frame.tilt is not None:
             rows = (commands.frame == k) & np.isin(commands.motion, (LINE, ARC))
             across = np.linalg.norm(np.cross(axis[rows], frame.tilt.direction), axis=1)
             off[rows] = np.arctan2(across, axis[rows] @ frame.tilt.direction)
-    beside = np.flatnonzero(off > ALONG)
-    if not len(beside):
+    askew = np.flatnonzero(off > ALONG)
+    if not len(askew):
         return ()
     text = (
-        f"{len(beside)} cuts in a tilted plane with the tool up to {math.degrees(off.max()):.3g} deg off its normal: "
+        f"{len(askew)} cuts in a tilted plane with the tool up to {math.degrees(off.max()):.3g} deg off its normal: "
         "turn the rotary axes there before (G53.1, PLANE ... TURN, DIR of CYCLE800)"
     )
-    return (Finding("program-tilted-plane", int(commands.line[beside[0]]), text, Severity.UNPROVEN),)
+    return (Finding("program-tilted-plane", int(commands.line[askew[0]]), text, Severity.UNPROVEN),)
 
 
 def _turning(commands: Commands) -> NDArray[np.bool_]:
@@ -274,7 +274,7 @@ def _at_rows(commands: Commands, rows: Ints, position: Floats) -> Commands:
     return Commands(**{**columns, "position": position}, frames=commands.frames, labels=commands.labels)
 
 
-def _timed(program: Program, commands: Commands, turning: NDArray[np.bool_]) -> Program:
+def _with_controller_time(program: Program, commands: Commands, turning: NDArray[np.bool_]) -> Program:
     """The feed of the tip: rows that turn a rotary axis take the time that the controller gives them."""
     cuts = turning & np.isin(commands.motion, (LINE, PROBE, ARC))
     if not cuts.any():
@@ -284,7 +284,7 @@ def _timed(program: Program, commands: Commands, turning: NDArray[np.bool_]) -> 
     return replace(program, feed=np.where(cuts & (own > 0.0), own, program.feed))
 
 
-def _traced(
+def _linearised(
     program: Program,
     machine: Machine,
     axes: Floats,

@@ -85,7 +85,7 @@ def _segment_times(s: Segments, joints: Joints, planner: TrajectoryPlanner) -> F
     ratio = np.where(bent < top, TANGENTIAL, np.sqrt(np.maximum(1.0 - (top**2 / (judged * s.bend)) ** 2, 0.0)))
     top = np.where(s.arc, np.minimum(top, bent), top)
     a = np.where(s.arc, overall * ratio, overall)
-    wanted = np.minimum(s.asked, top)
+    wanted = np.minimum(s.commanded, top)
     # the list with blend arcs in it: place of each segment, and of the arc after it
     place = np.arange(m) + np.concatenate([[0], np.cumsum(blended)[:-1]])
     arcs = place[blended] + 1
@@ -94,12 +94,12 @@ def _segment_times(s: Segments, joints: Joints, planner: TrajectoryPlanner) -> F
     lengths[place], speeds[place], most[place], rapid[place] = length, wanted, a, s.rapid
     j = np.flatnonzero(joints.kind == ARC)
     lengths[arcs] = joints.length[j]
-    speeds[arcs] = np.minimum(joints.speed[j], np.maximum(s.asked[j], s.asked[j + 1]))
+    speeds[arcs] = np.minimum(joints.speed[j], np.maximum(s.commanded[j], s.commanded[j + 1]))
     whole = joints.length[j] + np.where(eaten[j], length[j], 0.0)
     speeds[arcs] = np.minimum(speeds[arcs], whole / (planner.cycle * LEAST_CYCLES))
     most[arcs] = TANGENTIAL * joints.acceleration[j]
-    gone = np.flatnonzero(eaten)
-    speeds[place[gone]], most[place[gone]] = speeds[place[gone] + 1], most[place[gone] + 1]
+    absorbed = np.flatnonzero(eaten)
+    speeds[place[absorbed]], most[place[absorbed]] = speeds[place[absorbed] + 1], most[place[absorbed] + 1]
     limit = np.zeros(count + 1)
     limit[1:-1] = np.minimum(speeds[:-1], speeds[1:])
     at = place + 1
@@ -107,8 +107,8 @@ def _segment_times(s: Segments, joints: Joints, planner: TrajectoryPlanner) -> F
     slow = np.flatnonzero(smooth)
     limit[at[slow]] = np.minimum(limit[at[slow]], joints.speed[slow])
     there = np.ones(count, dtype=bool)
-    there[place[gone]] = False
-    limit = _looked_ahead(limit, lengths, most, there, planner.lookahead)
+    there[place[absorbed]] = False
+    limit = _stopping_speeds(limit, lengths, most, there, planner.lookahead)
     v, _ = limited_speed(np.concatenate([[0.0], np.cumsum(lengths)]), limit, most)
     seconds = _passed(lengths, speeds, most, v, limit, rapid, planner)
     total = seconds[place]
@@ -127,7 +127,7 @@ def _whole_cycles(seconds: Floats, rests: NDArray[np.bool_], cycle: float) -> Fl
     return out
 
 
-def _looked_ahead(limit: Floats, length: Floats, a: Floats, there: NDArray[np.bool_], depth: int) -> Floats:
+def _stopping_speeds(limit: Floats, length: Floats, a: Floats, there: NDArray[np.bool_], depth: int) -> Floats:
     """Speeds at the joints from which the machine comes to rest within ``depth`` segments that are ``there``."""
     room = np.concatenate([[0.0], np.cumsum(2.0 * a * length)])
     number = np.concatenate([[0], np.cumsum(there)])

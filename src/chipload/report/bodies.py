@@ -68,7 +68,7 @@ class SceneBody:
 
 
 def scene_bodies(glb: bytes, most: int = TRIANGLES, without: Collection[str] = ()) -> tuple[SceneBody, ...]:
-    """The bodies of a scene.glb beside path and cutter, none with more than ``most`` triangles.
+    """The bodies of a scene.glb besides path and cutter, none with more than ``most`` triangles.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def scene_bodies(glb: bytes, most: int = TRIANGLES, without: Collection[str] = (
         Of any kind: the file cannot be read.
     """
     names = node_names(glb)
-    wanted = [name for name in names if not _own(name) and _kind(name) not in without]
+    wanted = [name for name in names if not _drawn_by_view(name) and _kind(name) not in without]
     if not wanted:
         return ()
     # only what is read takes memory: the path of a long program is most of its scene
@@ -90,7 +90,7 @@ def scene_bodies(glb: bytes, most: int = TRIANGLES, without: Collection[str] = (
     for node in scene.graph.nodes_geometry:
         transform, geometry = scene.graph[node]
         mesh = scene.geometry[geometry]
-        if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces) and not _own(str(node)):
+        if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces) and not _drawn_by_view(str(node)):
             out.append(_body(str(node), mesh.copy().apply_transform(transform), most))
     return tuple(out)
 
@@ -115,11 +115,11 @@ def fewer_triangles(
     for _ in range(HALVINGS):
         cell = 0.5 * (wide + narrow)
         key = np.floor((vertices - low) / max(cell, 1e-9)).astype(np.int64)
-        _, number = np.unique(_as_one(key), return_inverse=True)
+        _, number = np.unique(_row_numbers(key), return_inverse=True)
         joined = number.ravel()[faces]
         solid = (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 2] != joined[:, 0])
         # two triangles of the same corners cover each other
-        kept = np.unique(_as_one(np.sort(joined[solid], axis=1)), return_index=True)[1]
+        kept = np.unique(_row_numbers(np.sort(joined[solid], axis=1)), return_index=True)[1]
         if len(kept) <= most:
             wide, best = cell, (number.ravel(), joined[solid][np.sort(kept)])
         else:
@@ -134,7 +134,7 @@ def fewer_triangles(
     return mean, index, colours if colours.ndim == 1 else colours[first], moved
 
 
-def _as_one(rows: Ints) -> Ints:
+def _row_numbers(rows: Ints) -> Ints:
     """(n,) numbers that are equal and in order where rows (n, 3) of numbers from 0 on are.
 
     >>> _as_one(np.array([[0, 0, 2], [0, 1, 0], [0, 0, 2]])).argsort(kind="stable").tolist()
@@ -190,7 +190,7 @@ def _kind(name: str) -> str:
     return "fixture" if plain == MACHINE_TABLE else next((k for k in KINDS if plain.startswith(k)), "body")
 
 
-def _own(name: str) -> bool:
+def _drawn_by_view(name: str) -> bool:
     """Return whether the view draws a node itself.
 
     >>> [_own(n) for n in ("0-path-plain", "rapids", "0-wall", "stock", "1-cutter")]

@@ -52,7 +52,7 @@ def chip_bodies(mesh: RemovalMesh, columns: Columns) -> ChipBodies:
 
     Parameters
     ----------
-    columns : of its history, all rows; of those known here the greatest or the sum is given to each chip, beside
+    columns : of its history, all rows; of those known here the greatest or the sum is given to each chip, besides
         ``row`` and ``line``, at which the chip is off
 
     Examples
@@ -65,9 +65,9 @@ def chip_bodies(mesh: RemovalMesh, columns: Columns) -> ChipBodies:
     ([1], [7], [7.0])
     """
     frames, first, last = len(mesh.rows), mesh.seen[:, 0].astype(np.int64), mesh.seen[:, 1].astype(np.int64)
-    new, gone = (first >= 1) & (first <= frames), (last >= 1) & (last <= frames)
-    corners = np.concatenate([mesh.corners[new][:, ::-1], mesh.corners[gone]])
-    chip = np.concatenate([first[new], last[gone]])
+    new, removed = (first >= 1) & (first <= frames), (last >= 1) & (last <= frames)
+    corners = np.concatenate([mesh.corners[new][:, ::-1], mesh.corners[removed]])
+    chip = np.concatenate([first[new], last[removed]])
     order = np.argsort(chip, kind="stable")
     corners, chip = corners[order], chip[order]
     unique, at = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)

@@ -1,4 +1,4 @@
-"""The diagram of the boundary of a chip beside the chip, with equal colours for equal pieces.
+"""The diagram of the boundary of a chip and the chip, with equal colours for equal pieces.
 
 Notation: theta [deg] around the section of the cutter across, t from the start to the end of the move up; shaded where
 the edge of the section moves outward.
@@ -161,11 +161,11 @@ def _closed(rings: tuple[Ring, ...]) -> Floats:
 
 def _outline(figure: go.Figure, p: Floats, name: str, line: dict[str, Any], fill: str | None) -> None:
     first = all(trace.name != name for trace in figure.data)
-    look = {"fill": "toself", "fillcolor": fill} if fill else {}
+    style = {"fill": "toself", "fillcolor": fill} if fill else {}
     figure.add_trace(
         go.Scatter(
             x=p[:, 0], y=p[:, 1], mode="lines", name=name, legendgroup=name, showlegend=first, line=line,
-            hoverinfo="skip", **look,
+            hoverinfo="skip", **style,
         ),
         row=1,
         col=2,

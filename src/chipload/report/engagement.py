@@ -38,8 +38,10 @@ def read_engagement(path: Path, track: int) -> EngagementSamples | None:
         It cannot be read.
     """
     try:
-        with np.load(path, allow_pickle=False) as held:
-            own = {name.partition("-")[2]: held[name] for name in held.files if name.partition("-")[0] == str(track)}
+        with np.load(path, allow_pickle=False) as archive:
+            own = {
+                name.partition("-")[2]: archive[name] for name in archive.files if name.partition("-")[0] == str(track)
+            }
     except (OSError, ValueError, KeyError, EOFError) as err:
         raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
     return samples_from(own) if own else None

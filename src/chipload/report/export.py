@@ -28,7 +28,7 @@ from chipload.result.load import HISTORY, load_result
 from chipload.simulation.removal_mesh import RemovalMesh
 from chipload.stock.layers import LayeredStock
 
-#: what can be asked for
+#: kinds of export
 KINDS = ("csv", "vtk", "glb", "sheet")
 #: rows of a history that are written at once
 ROWS = 65_536
@@ -39,11 +39,11 @@ def export_result(
 ) -> tuple[str, ...]:
     """Write a result folder as other files into a new or empty folder; whole or not at all.
 
-    ``csv``: history.csv, a row a step, units in the names of the columns. ``vtk``: the path of each track with all its
+    ``csv``: history.csv, one row for each step, units in the column names. ``vtk``: the path of each track with all its
     numbers (.vtp), its undeformed chips (.vtu), surface maps with displacements by finite elements (.vtu), the stock
     that is left (.vtu and .stl). ``glb``: the undeformed chips of each track, a body a chip. ``sheet``: setup.html, one
     page, and as setup.pdf where ``chipload[export]`` is installed.
-    ``monitor``: reference loads for a load monitor, ``csv`` or ``heidenhain``; ``spindle``: the file that tells the
+    ``monitor``: reference loads for a load monitor, ``csv`` or ``heidenhain``; ``spindle``: the file that states the
     motor's power.
 
     Returns

@@ -1,6 +1,6 @@
 """The result folder, which is written completely or not at all.
 
-Everything is written into a new folder beside the target and then renamed. A result of ours that is already there is
+Everything is written into a new folder next to the target and then renamed. A result of ours that is already there is
 replaced at that moment; anything else that is there is left alone and refused.
 """
 
@@ -58,9 +58,9 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
     try:
         if target.is_symlink() or (target.exists() and not target.is_dir()):
             raise InputError(f"--out {out}: is not a folder: name a folder that is new, empty or holds an older result")
-        if target.exists() and any(target.iterdir()) and not (ours or _ours)(target):
+        if target.exists() and any(target.iterdir()) and not (ours or _is_result)(target):
             raise InputError(
-                f"--out {out}: holds files that are no {what} of chipload: name a folder that is new, empty or "
+                f"--out {out}: holds files that are not a {what} of chipload: name a folder that is new, empty or "
                 f"holds an older {what}"
             )
         above = next(p for p in target.parents if p.exists())
@@ -73,7 +73,7 @@ def check_target(out: str | Path, ours: Callable[[Path], bool] | None = None, wh
 
 
 def checkpoint_folder(out: str | Path) -> Path:
-    """Return the checkpoint folder of a run, beside the folder of its result.
+    """Return the checkpoint folder of a run, next to the folder of its result.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def write_files(
     return target
 
 
-def _ours(folder: Path) -> bool:
+def _is_result(folder: Path) -> bool:
     """Return whether a folder contains a result of chipload and no other files."""
     try:
         holds = json.loads(read_regular(folder / SUMMARY, SUMMARY, LARGEST_SUMMARY))

@@ -30,7 +30,7 @@ from chipload.units import rpm_from_rad_s
 
 Floats = NDArray[np.float64]
 
-#: formats that can be asked for, and the files that they give
+#: available formats, and the files that they give
 MONITORS = {"csv": "load.csv", "heidenhain": "afc-load.tab"}
 #: formats that are not published: what there is instead
 UNPUBLISHED = {
@@ -90,7 +90,7 @@ def sections_of(result: Result, spindle: Path | None = None) -> tuple[LoadSectio
     Raises
     ------
     InputError
-        The result has no spindle power, or the file does not tell the motor's.
+        The result has no spindle power, or the file does not state the motor's.
     """
     out = tuple(section for track in result.in_use for section in _sections(track))
     if not out:

@@ -87,9 +87,9 @@ def _limit_row(track: Track, check: LimitCheck | None) -> list[str]:
     """A limit of a track; None: those that hold, in one row."""
     name = escape(track.name) + (" <b>in use</b>" if track.in_use else "")
     if check is None:
-        held = [x.column.label for x in track.limits if x.state is Verdict.HOLDS]
-        others = "all limits" if len(held) == len(track.limits) else "the other limits"
-        text = f'<span title="{escape(", ".join(held))}">{others} ({len(held)})</span>'
+        passing = [x.column.label for x in track.limits if x.state is Verdict.HOLDS]
+        others = "all limits" if len(passing) == len(track.limits) else "the other limits"
+        text = f'<span title="{escape(", ".join(passing))}">{others} ({len(passing)})</span>'
         return [name, text, state_cell(Verdict.HOLDS), *[""] * 7]
     return [
         name,

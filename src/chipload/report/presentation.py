@@ -40,7 +40,7 @@ class Blank:
 
 @dataclass(frozen=True, eq=False)
 class Presentation:
-    """Contents of a result folder beside the common files.
+    """Contents of a result folder besides the common files.
 
     Parameters
     ----------

@@ -110,7 +110,7 @@ def axes_of_rows(columns: Mapping[str, NDArray[Any]], n: int) -> Floats:
 
 
 def breaks(place: Floats, s: NDArray[Any] | None) -> NDArray[np.bool_]:
-    """(n,) whether a row does not go on from the row before: the path must be longer by their distance."""
+    """(n,) whether a row does not continue from the row before: the path must be longer by their distance."""
     if s is None:
         return np.zeros(len(place), dtype=np.bool_)
     leap = np.linalg.norm(np.diff(place, axis=0, prepend=place[:1]), axis=1)
@@ -147,11 +147,11 @@ def read_cutter_parts(path: Path, track: int) -> dict[int, list[tuple[str, Float
     """
     out: dict[int, list[tuple[int, str, Floats]]] = {}
     try:
-        with np.load(path, allow_pickle=False) as held:
-            for name in held.files:
+        with np.load(path, allow_pickle=False) as archive:
+            for name in archive.files:
                 words = name.split("-")
                 if len(words) == 5 and words[:2] == [str(track), "cutter"]:
-                    out.setdefault(int(words[2]), []).append((int(words[3]), words[4], held[name]))
+                    out.setdefault(int(words[2]), []).append((int(words[3]), words[4], archive[name]))
     except (OSError, ValueError, KeyError, EOFError) as err:
         raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
     return {number: [(kind, p) for _, kind, p in sorted(parts, key=lambda x: x[0])] for number, parts in out.items()}
@@ -166,9 +166,9 @@ def read_refused(path: Path, track: int) -> str:
         It cannot be read.
     """
     try:
-        with np.load(path, allow_pickle=False) as held:
+        with np.load(path, allow_pickle=False) as archive:
             name = f"{track}-{REFUSED}"
-            return str(held[name]) if name in held.files else ""
+            return str(archive[name]) if name in archive.files else ""
     except (OSError, ValueError, KeyError, EOFError) as err:
         raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
 
@@ -182,10 +182,10 @@ def read_removal(path: Path, track: int) -> RemovalMesh | None:
         It cannot be read.
     """
     try:
-        with np.load(path, allow_pickle=False) as held:
-            if f"{track}-corners" not in held:
+        with np.load(path, allow_pickle=False) as archive:
+            if f"{track}-corners" not in archive:
                 return None
-            arrays = {name: held[f"{track}-{name}"] for name in ARRAYS}
+            arrays = {name: archive[f"{track}-{name}"] for name in ARRAYS}
     except (OSError, ValueError, KeyError, EOFError) as err:
         raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
     corners, seen = arrays["corners"], arrays["seen"]

@@ -69,14 +69,14 @@ def view_section(
         elif k in stocks.refused:
             notes.append(f"{of}The stock is not drawn: {stocks.refused[k]}.")
         if len(own.path.t) > POINTS:
-            notes.append(f"{of}The path is drawn by some {POINTS} of its {len(own.path.t)} steps.")
+            notes.append(f"{of}The drawn path has about {POINTS} of its {len(own.path.t)} steps.")
     if left:
         notes.append(f"Not in this file, to keep it small: {', '.join(left)}.")
     names, note = ", ".join(documents), " ".join(filter(None, notes))
-    said = f"{escape(names)}. Drag turns, the wheel zooms, the right button shifts. {escape(note)}"
+    caption = f"{escape(names)}. Drag to turn, scroll to zoom, drag with the right button to pan. {escape(note)}"
     return [
         "<h2>In space</h2>",
-        f'<p class="note">{said}</p>',
+        f'<p class="note">{caption}</p>',
         f'<div id="{VIEW}" class="view3d"><p class="note">The view needs a browser with scripts and WebGL.</p></div>',
         *(
             f'<script class="{DATA}" data-name="{escape(name)}" type="text/plain">{data}</script>'

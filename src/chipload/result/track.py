@@ -54,7 +54,7 @@ class Track:
     programs : names of its program files
     operation : number of its operation
     parameters : what sets it apart beside its name, as ``{"latency_s": 0.1}``
-    blocks : its history, a row a step of the program
+    blocks : its history, one row for each step of the program
     energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty: not simulated.
         One that the error of the loads does not explain is a finding, and the track unproven at best
     """

@@ -136,17 +136,17 @@ def energy_balance(columns: Columns, ktc: float) -> dict[int, float]:
     """
     totals: dict[int, Floats] = {}
     for part in in_rows(columns, ROWS, BALANCED):
-        lost = np.where(part["rapid"], 0.0, part["chip_volume_mm3"])
+        volume = np.where(part["rapid"], 0.0, part["chip_volume_mm3"])
         engaged, work = part["engaged_volume_mm3"], 1000.0 * part["cutting_work_j"]
         has = engaged > 0.0
-        known = lost * np.divide(work, engaged, out=np.zeros(len(work)), where=has)
+        known = volume * np.divide(work, engaged, out=np.zeros(len(work)), where=has)
         for tool in np.unique(part["tool"]).tolist():
             own = part["tool"] == tool
-            sums = [work[own].sum(), engaged[own].sum(), known[own].sum(), lost[own & ~has].sum(), lost[own].sum()]
+            sums = [work[own].sum(), engaged[own].sum(), known[own].sum(), volume[own & ~has].sum(), volume[own].sum()]
             totals[tool] = totals.get(tool, np.zeros(5)) + sums
     out = {}
-    for tool, (work, engaged, known, rest, lost) in sorted(totals.items()):
-        if lost > 0.0:
+    for tool, (work, engaged, known, rest, volume) in sorted(totals.items()):
+        if volume > 0.0:
             mean = work / engaged if engaged > 0.0 else ktc
             out[tool] = float(work / (known + mean * rest) - 1.0)
     return out
@@ -205,16 +205,16 @@ def resolution_error(
     mapping of ``names`` and :data:`WITH_FORCE` to at least 0; inf where the run has a load of 0 and the finer
     one has not
     """
-    asked, count = _asked(columns, before, names)
-    missed = _missed(columns) if setting.moves is None else []
-    asked = list(dict.fromkeys([*asked[:1], *missed, *asked[1:]]))
+    chosen, count = _chosen_steps(columns, before, names)
+    missed = _missed_steps(columns) if setting.moves is None else []
+    chosen = list(dict.fromkeys([*chosen[:1], *missed, *chosen[1:]]))
     found = dict.fromkeys((*names, *WITH_FORCE), 0.0)
-    lost = dict.fromkeys(names, 0.0)
+    excess = dict.fromkeys(names, 0.0)
     worst = {name: float(np.max(columns[name], initial=0.0)) for name in names}
     budget, spent = max(int(SHARE * count), LEAST), 0
     left = max(int(MISSED_SHARE * count), MISSED_LEAST)
-    windows = {w.step: replace(w, parts=PARTS if w.step in missed else 2) for w in _windows(blocks, asked, setting)}
-    for number, step in enumerate(asked):
+    windows = {w.step: replace(w, parts=PARTS if w.step in missed else 2) for w in _windows(blocks, chosen, setting)}
+    for number, step in enumerate(chosen):
         window = windows[step]
         if step in missed and window.cost <= left:
             left -= window.cost
@@ -227,7 +227,7 @@ def resolution_error(
             c, w = float(columns[name][step]), worst[name]
             same = alike.get(name, c)
             off = max(halves[name] - w, abs(same - c) if c >= 0.5 * w else same - w)
-            lost[name] = max(lost[name], window.factor * off)
+            excess[name] = max(excess[name], window.factor * off)
     # the flank of a flat mill is cut into slices where its contact changes: exact
     straight = all(
         c.corner_radius == c.taper == c.bottom == 0.0 and c.barrel_radius is None for c in _used(windows, setting)
@@ -240,8 +240,8 @@ def resolution_error(
                 floor = LEANING_MOVES_FLOOR[name]
             elif setting.moves is not None and not straight:
                 floor = MOVES_FLOOR[name]
-            found[name] = lost[name] / worst[name] + floor + films / (1.0 - films)
-        elif lost[name] > 0.0 or films > 0.0:
+            found[name] = excess[name] / worst[name] + floor + films / (1.0 - films)
+        elif excess[name] > 0.0 or films > 0.0:
             found[name] = math.inf
     return found | dict.fromkeys(WITH_FORCE, found["force_n"])
 
@@ -254,7 +254,7 @@ def _used(windows: Mapping[int, Window], setting: RunSettings) -> list[Cutter]:
     return [setting.cutters[n] for n in sorted(some)]
 
 
-def _asked(columns: Columns, before: LayeredStock, names: Sequence[str]) -> tuple[list[int], int]:
+def _chosen_steps(columns: Columns, before: LayeredStock, names: Sequence[str]) -> tuple[list[int], int]:
     """Return the steps to compute once more, the most significant first, and the number of steps of the run."""
     rapid, volume = np.asarray(columns["rapid"]), np.asarray(columns["chip_volume_mm3"])
     force = np.asarray(columns["force_n"])
@@ -274,7 +274,7 @@ def _asked(columns: Columns, before: LayeredStock, names: Sequence[str]) -> tupl
     return list(dict.fromkeys(out)), len(force)
 
 
-def _missed(columns: Columns) -> list[int]:
+def _missed_steps(columns: Columns) -> list[int]:
     """Return the steps that lose most volume that their middle does not engage, as where a mill meets a wall."""
     volume = np.where(np.asarray(columns["rapid"]), 0.0, np.asarray(columns["chip_volume_mm3"]))
     more = volume - np.asarray(columns["engaged_volume_mm3"])
@@ -296,18 +296,18 @@ def _films(columns: Columns) -> float:
     return float(np.abs(volume[np.asarray(columns["chip_areas"]) == 0]).sum()) / whole if whole > 0.0 else 0.0
 
 
-def _windows(blocks: Iterable[Steps], asked: list[int], setting: RunSettings) -> list[Window]:
+def _windows(blocks: Iterable[Steps], chosen: list[int], setting: RunSettings) -> list[Window]:
     """Return the windows of steps, from one pass for the steps and one for the earlier steps."""
     own: dict[int, tuple[Steps, Floats, Floats]] = {}
-    earlier: dict[int, list[Steps]] = {k: [] for k in asked}
-    last = max(asked, default=-1)
+    earlier: dict[int, list[Steps]] = {k: [] for k in chosen}
+    last = max(chosen, default=-1)
     for turn in range(2):
         at = 0
         for block in blocks:
             if at > last:
                 break
             a, b = boxes(block, setting.cutters)
-            for k in asked:
+            for k in chosen:
                 if turn == 0 and at <= k < at + len(block):
                     own[k] = (_rows(block, np.array([k - at])), a[k - at], b[k - at])
                 if turn == 1:
@@ -316,7 +316,7 @@ def _windows(blocks: Iterable[Steps], asked: list[int], setting: RunSettings) ->
                     if near.any():
                         earlier[k].append(_rows(block, np.flatnonzero(near)))
             at += len(block)
-    return [Window(k, *own[k], tuple(earlier[k])) for k in asked]
+    return [Window(k, *own[k], tuple(earlier[k])) for k in chosen]
 
 
 def _rows(steps: Steps, rows: Ints) -> Steps:

@@ -227,7 +227,7 @@ def rim_engagement(
 
     Parameters
     ----------
-    trail : the path and its stock
+    centres : the path and its stock
     motion, share : (m,) the moments; the heading is that of the motion
     step_deg : spacing of the samples on the rim [deg]. A piece of stock, or a gap in it, narrower than this can be
         missed, except at both ends of the front half, where pieces of a 128th of it are found
@@ -246,7 +246,7 @@ def rim_engagement(
     m = len(k)
     centre, heading = centres.places(k, w)
     angle, count, phi = np.zeros(m), np.zeros(m, dtype=np.int64), np.zeros((m, PIECES, 2))
-    asked = samples(math.radians(step_deg))
+    immersions = samples(math.radians(step_deg))
     mot, grid, rows, radius = centres.motions, centres.grid, centres.rows, centres.radius
     cut = np.linspace(0, m, max(workers, 1) + 1).astype(int)
     begins = np.concatenate([[0.0], np.cumsum(centres.lengths)])
@@ -256,8 +256,8 @@ def rim_engagement(
 
     def run(i: int) -> Any:
         _kernels.rim(
-            k, w, centre, heading, radius, radius - TOUCH_MM, own, displacement_mm, asked, precision, mot, grid, rows,
-            cut[i], cut[i + 1], angle, count, phi,
+            k, w, centre, heading, radius, radius - TOUCH_MM, own, displacement_mm, immersions, precision, mot, grid,
+            rows, cut[i], cut[i + 1], angle, count, phi,
         )  # fmt: skip
 
     with ThreadPoolExecutor(max(workers, 1)) as pool:

@@ -79,8 +79,8 @@ class Stored(Mapping[str, NDArray[Any]]):
         if found is None:
             found = np.concatenate(
                 [
-                    _read(file, [name], count, held)[name]
-                    for (file, count), held in zip(self.files, self.held, strict=True)
+                    _read(file, [name], count, stored_names)[name]
+                    for (file, count), stored_names in zip(self.files, self.held, strict=True)
                 ]
             )
             found.flags.writeable = False
@@ -97,8 +97,8 @@ class Stored(Mapping[str, NDArray[Any]]):
 
     def chunks(self, names: Sequence[str] | None = None) -> Iterator[dict[str, NDArray[Any]]]:
         """Columns, chunk after chunk; None: all."""
-        for (file, count), held in zip(self.files, self.held, strict=True):
-            yield _read(file, self.names if names is None else names, count, held)
+        for (file, count), stored_names in zip(self.files, self.held, strict=True):
+            yield _read(file, self.names if names is None else names, count, stored_names)
 
 
 def in_rows(columns: Arrays, size: int, names: Sequence[str] | None = None) -> Iterator[dict[str, NDArray[Any]]]:
@@ -107,18 +107,18 @@ def in_rows(columns: Arrays, size: int, names: Sequence[str] | None = None) -> I
     >>> [some["x"].tolist() for some in in_rows({"x": np.arange(5)}, 2)]
     [[0, 1], [2, 3], [4]]
     """
-    held, count = list[dict[str, NDArray[Any]]](), 0
+    pending, count = list[dict[str, NDArray[Any]]](), 0
     whole = {} if isinstance(columns, Stored) else {name: columns[name] for name in names or columns}
     for piece in columns.chunks(names) if isinstance(columns, Stored) else (whole,):
-        held.append(piece)
+        pending.append(piece)
         count += len(next(iter(piece.values())))
         if count >= size:
-            whole = _one_below_the_other(held)
+            whole = _one_below_the_other(pending)
             for at in range(0, count - size + 1, size):
                 yield {k: v[at : at + size] for k, v in whole.items()}
-            held, count = [{k: v[count // size * size :].copy() for k, v in whole.items()}], count % size
+            pending, count = [{k: v[count // size * size :].copy() for k, v in whole.items()}], count % size
     if count:
-        yield _one_below_the_other(held)
+        yield _one_below_the_other(pending)
 
 
 def _one_below_the_other(pieces: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
@@ -195,9 +195,8 @@ class Checkpoint:
             if state is not None:
                 return state
             if any(_of_run(file) for file in self.folder.iterdir()):
-                self.notice(
-                    f"begins again: {'it was asked to' if self.fresh else 'what was kept belongs to another input'}"
-                )
+                why = ", as requested" if self.fresh else ": the checkpoint belongs to another input"
+                self.notice(f"starts from the beginning{why}")
             self._clear()
         return None
 
@@ -245,7 +244,7 @@ class Checkpoint:
         return sum(part["steps"] for part in last["parts"]) if last["key"] == self.key else 0
 
     def set_aside(self, what: str, only: Path | None = None) -> None:
-        """Keep what cannot be read in a folder beside this one, and begin again; ``what`` is the file at fault,
+        """Move what cannot be read to a folder next to this one, and start again; ``what`` is the file at fault,
         ``only`` the file of a pass that is set aside alone.
         """
         number = 1
@@ -260,7 +259,7 @@ class Checkpoint:
             raise cannot_write(aside, err) from None
         if only is None:
             self.parts, self.number, self.safe = [], 0, 0
-        self.notice(f"begins again: {what} cannot be read: what was kept is set aside in {aside}")
+        self.notice(f"starts from the beginning: {what} cannot be read: the checkpoint is moved to {aside}")
 
     def add(self, columns: Arrays) -> None:
         """Write a chunk; it is valid from the next :meth:`commit` on."""
@@ -317,7 +316,7 @@ class Checkpoint:
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError:
-            raise InputError(f"{self.folder}: another run has begun there: name another result") from None
+            raise InputError(f"{self.folder}: another run has started there: name another result") from None
         except OSError as err:
             raise cannot_write(self.folder, err) from None
         self._hold()
@@ -333,7 +332,9 @@ class Checkpoint:
                 fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             self.close()
-            raise InputError(f"{self.folder}: another run works there: wait for it or name another result") from None
+            raise InputError(
+                f"{self.folder}: another run uses this folder: wait for it or name another result"
+            ) from None
         sweep(self.folder)
 
     def _clear(self) -> None:
@@ -376,7 +377,7 @@ def require_ours(folder: Path) -> None:
         raise cannot_write(folder, err) from None
     if there and not is_ours(folder):
         raise InputError(
-            f"{folder}: is needed to keep what is finished, and holds other files: move it or name another result"
+            f"{folder}: is needed for the checkpoint and holds other files: move it or name another result"
         )
 
 
@@ -401,13 +402,13 @@ def _feed(out: Any, value: Any) -> None:
         _feed(out, {f.name: getattr(value, f.name) for f in fields(value)})
     elif isinstance(value, Mapping):
         out.update(f"mapping {len(value)}:".encode())
-        for key, held in value.items():
+        for key, item in value.items():
             _feed(out, key)
-            _feed(out, held)
+            _feed(out, item)
     elif isinstance(value, (tuple, list)):
         out.update(f"row {len(value)}:".encode())
-        for held in value:
-            _feed(out, held)
+        for item in value:
+            _feed(out, item)
     elif isinstance(value, bytes):
         out.update(f"bytes {len(value)}:".encode())
         out.update(value)
@@ -423,8 +424,8 @@ def _hash(file: Path) -> str:
         return hashlib.file_digest(data, "sha256").hexdigest()
 
 
-def _read(file: Path, names: Sequence[str], count: int, held: frozenset[str]) -> dict[str, NDArray[Any]]:
+def _read(file: Path, names: Sequence[str], count: int, stored: frozenset[str]) -> dict[str, NDArray[Any]]:
     """Some columns of a file of ``count`` rows that holds the columns ``held``."""
     with pq.ParquetFile(file) as open_file:
-        table = open_file.read(columns=[name for name in names if name in held], use_threads=False)
-    return {name: np.asarray(table.column(name).to_numpy()) if name in held else np.zeros(count) for name in names}
+        table = open_file.read(columns=[name for name in names if name in stored], use_threads=False)
+    return {name: np.asarray(table.column(name).to_numpy()) if name in stored else np.zeros(count) for name in names}

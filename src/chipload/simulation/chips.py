@@ -344,8 +344,8 @@ def remove_block(
     """
     if setting.moves is not None:
         return _moved_block(steps, setting.moves, sums, setting, contact)
-    taken = removed_by_layers(steps, stock, sums.steps, setting, sums.piece) if found is None else found
-    removed, engagement, piece = taken.removed, taken.engagement, taken.piece
+    removal = removed_by_layers(steps, stock, sums.steps, setting, sums.piece) if found is None else found
+    removed, engagement, piece = removal.removed, removal.engagement, removal.piece
     loads, basis, cut = np.zeros((len(steps), len(LOADS))), sums.basis, list[Cuts]()
     watched: dict[str, Floats] = {}
     for number in sorted({int(steps.tool[c.step]) for c in engagement}):
@@ -355,8 +355,8 @@ def remove_block(
         bitten = with_runout(plain, cutter)
         turn = over_turn(bitten, cutter, material, setting.resolution.rotation)
         loads[at] = loads_of_steps(bitten, own, cutter, material, turn, steps.spindle[at], steps.seconds[at])
-        way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
-        cut.append(Cuts(number, cutter, sums.steps + np.array(at), way, bitten, plain, steps.spindle[at]))
+        ends = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
+        cut.append(Cuts(number, cutter, sums.steps + np.array(at), ends, bitten, plain, steps.spindle[at]))
         if setting.watch is not None:
             for name, values in setting.watch(cut[-1]).items():
                 watched.setdefault(name, np.zeros(len(steps)))[at] = values

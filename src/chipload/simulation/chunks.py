@@ -141,7 +141,7 @@ def remove_in_chunks(
         sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, keeps, progress)
     except HandOver as found:
         setting, handed = by_layers(engine, setting, found, program, stock)
-        unfinished.again(f"goes on by layers from the beginning: line {found.line}: {found.why}")
+        unfinished.again(f"starts from the beginning with the engine layers: line {found.line}: {found.why}")
         sums = RunningSums(stock.volume(), handed=handed)
         for state_of in keeps.values():
             state_of.clear()

@@ -195,11 +195,11 @@ def step_deflections(
     work : compliance at these places in the state of removal in which each is cut, (c,) [mm/N] normal or (c, 3, 3);
         None: rigid
     bars : by tool number, from the tip upwards; None: rigid
-    rotation : between two rotations that are looked at [rad]; near the greatest a sixteenth of it
+    rotation : between two evaluated rotations [rad]; near the greatest a sixteenth of it
 
     Returns
     -------
-    columns, (n,) each, a row a step of the removal, 0 where nothing is cut or two surfaces are left
+    columns, (n,) each, one row for each step of the removal, 0 where nothing is cut or two surfaces are left
         ``work_mm``, ``cutter_mm`` float: greatest motion of work and cutter along the normal by which they part;
         ``deflection_mm`` the greatest of their sum; ``force_normal_n`` the greatest force that does it.
     """
@@ -269,7 +269,7 @@ def tip_deflections(
     bars : of cutter, holder and spindle, from the tip upwards
     work : c [mm/N]; (c, s, 3, 3): compliance of the work in the frame of the program at some places of each step, of
         which the one that moves farthest counts; None: the work counts as rigid
-    rotation : between two rotations that are looked at [rad]; without helix, where edges leave at once, a sixteenth of
+    rotation : between two evaluated rotations [rad]; without helix, where edges leave at once, a sixteenth of
         it. At 2 deg the greatest deflection was at most 0.3 % too small, that of a single step 1.4 %
 
     Returns
@@ -443,7 +443,7 @@ def _kept(removal: Removal) -> tuple[Cuts, ...]:
             raise InputError("deflection: the program cuts nothing")
         if not removal.columns["chip_areas"].any():
             return ()  # films, narrower than a few tolerances, have no loads
-        raise InputError("deflection: the removal did not keep what the teeth cut: remove(..., keep=True)")
+        raise InputError("deflection: the removal did not keep the tooth engagement: remove(..., keep=True)")
     return removal.cuts
 
 

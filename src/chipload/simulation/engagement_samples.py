@@ -211,8 +211,8 @@ class EngagementRecorder:
     def restore(self, path: Path) -> None:
         """Load the samples of an earlier run."""
         try:
-            with np.load(path, allow_pickle=False) as held:
-                arrays = {name: held[name] for name in held.files}
+            with np.load(path, allow_pickle=False) as archive:
+                arrays = {name: archive[name] for name in archive.files}
         except (OSError, ValueError, EOFError) as err:
             raise InputError(f"{path}: cannot be read: {err}: remove its folder") from None
         if "stride" not in arrays:

@@ -4,10 +4,10 @@ Notation: q point of the floor; a radius of the flat of the bottom; c centre of 
 nearest to q; w motion of the floor along the normal at q, positive where it is pushed away from the cutter.
 
 An edge passes over q whenever q lies under the flat, |q - c| <= a, at the rotation at which the edge has the direction
-of q - c. A floor that is pulled towards the cutter at such a moment is cut too deep there, and nothing makes up for it;
-one that is pushed away keeps material, which a later edge may cut again or only rub. The error is therefore a bound:
-the deepest of all passages where the floor is pulled, else what the first passages leave, those of the steps whose
-front edge comes to q.
+of q - c. A floor that is pulled towards the cutter at such a moment is cut too deep there, and no later passage
+corrects it; one that is pushed away keeps material, which a later edge may cut again or only rub. The error is
+therefore a bound: the deepest of all passages where the floor is pulled, else what the first passages leave, those of
+the steps whose front edge comes to q.
 
 Steps that do not cut count as absent. The floor deflects at q as if the force acted there.
 """
@@ -82,14 +82,14 @@ def floor_error(
         count = math.ceil(pitch / TURN)
         theta = np.arange(count) * (pitch / count)
         force = in_work(forces_over_turn(cuts.engagement, cuts.cutter, material, theta)[0], cuts.engagement.frames)
-        p0, way, frame = cuts.ends[:, :3], cuts.ends[:, 3:6] - cuts.ends[:, :3], cuts.engagement.frames
-        length = np.linalg.norm(way[:, :2], axis=1)
+        p0, travel, frame = cuts.ends[:, :3], cuts.ends[:, 3:6] - cuts.ends[:, :3], cuts.engagement.frames
+        length = np.linalg.norm(travel[:, :2], axis=1)
         reach = flat + NEAR + 0.5 * length
-        for k, near in enumerate(tree.query_ball_point(p0[:, :2] + 0.5 * way[:, :2], reach)):
+        for k, near in enumerate(tree.query_ball_point(p0[:, :2] + 0.5 * travel[:, :2], reach)):
             some = np.array(near, dtype=np.int64)
             # the centre of the cutter where it is nearest to each point
-            t = np.clip((q[some, :2] - p0[k, :2]) @ way[k, :2] / max(length[k] ** 2, SHORT), 0.0, 1.0)
-            off = q[some] - p0[k] - t[:, None] * way[k]
+            t = np.clip((q[some, :2] - p0[k, :2]) @ travel[k, :2] / max(length[k] ** 2, SHORT), 0.0, 1.0)
+            off = q[some] - p0[k] - t[:, None] * travel[k]
             passed = (np.hypot(off[:, 0], off[:, 1]) <= flat + NEAR) & (np.abs(off[:, 2]) <= below)
             some, off = some[passed], off[passed]
             if not len(some):

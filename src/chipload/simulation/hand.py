@@ -1,7 +1,7 @@
 """Cuts with the spindle turning against the hand of the cutter.
 
 Notation: spindle [rad/s], positive clockwise seen from the spindle (M3). A right-hand cutter cuts clockwise, a
-left-hand cutter counter-clockwise (M4); turned the other way its teeth meet the material with their backs.
+left-hand cutter counter-clockwise (M4); turned the other way, its teeth meet the material with their flanks.
 """
 
 from __future__ import annotations

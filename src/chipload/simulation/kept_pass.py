@@ -23,7 +23,7 @@ from chipload.stock.shapes import read_shapes, shape_bytes
 
 Arrays = Mapping[str, NDArray[Any]]
 
-#: what the file of a pass says of itself
+#: kind of the file of a pass
 KIND = "chipload pass over the steps 1"
 #: writing takes at most this share of the time
 SHARE = 0.05
@@ -83,8 +83,8 @@ class KeptPasses:
 
     @staticmethod
     def _save(kept: Checkpoint, name: str, key: NDArray[np.uint8], steps: int, arrays: Arrays) -> None:
-        held = {**arrays, "key": key, "taken": np.array([steps])}
-        kept.keep_pass(name, shape_bytes(KIND, held, np.empty(0, dtype=object)), steps)
+        stored = {**arrays, "key": key, "taken": np.array([steps])}
+        kept.keep_pass(name, shape_bytes(KIND, stored, np.empty(0, dtype=object)), steps)
 
     @staticmethod
     def _restored(

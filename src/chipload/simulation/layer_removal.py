@@ -64,7 +64,7 @@ def removed_by_layers(
 
     ahead = swept_ahead(steps, stock, setting.cutters, setting.interpolation, tolerance, setting.workers, plan)
     tiles = TileRings(stock)
-    with ThreadPoolExecutor(1) as beside:
+    with ThreadPoolExecutor(1) as executor:
         for k, swept in ahead:
             if own is not None and not own[k]:
                 tiles.remove(swept.met, swept.shape, swept.areas, FILM * tolerance, 0.5 * tolerance)
@@ -74,15 +74,15 @@ def removed_by_layers(
             there = Section(*tiles.edges(layers, swept.low[:2], swept.high[:2]))
             # from 0, so that what the step gains does not depend on what was gained before it
             tidied, stock.tidied = stock.tidied, 0.0
-            taken = tiles.remove(swept.met, swept.shape, swept.areas, FILM * tolerance, 0.5 * tolerance)
+            removal = tiles.remove(swept.met, swept.shape, swept.areas, FILM * tolerance, 0.5 * tolerance)
             gained[k], stock.tidied = stock.tidied, tidied + stock.tidied
-            most = int(taken.parts.max())
+            most = int(removal.parts.max())
             # exact, so that layers that lose nothing do not change how it is rounded
-            removed[k, 0] = math.fsum((taken.area * thickness[swept.met]).tolist()) - float(gained[k])
-            removed[k, 1:3] = most, np.count_nonzero(taken.area)
+            removed[k, 0] = math.fsum((removal.area * thickness[swept.met]).tolist()) - float(gained[k])
+            removed[k, 1:3] = most, np.count_nonzero(removal.area)
             if most:
                 cutter = setting.cutters[int(steps.tool[k])]
-                found = _most_parts(tiles, taken, swept, rank, first + k, cutter, FILM * tolerance)
+                found = _most_parts(tiles, removal, swept, rank, first + k, cutter, FILM * tolerance)
                 if found is not None:
                     best, rank = found, rank_of(found.chips)
                 removed[k, 3] = axial_overrun(tiles, cutter, steps.p1[k], steps.a1[k], FILM * tolerance)
@@ -90,9 +90,9 @@ def removed_by_layers(
             if most and not steps.rapid[k]:
                 cutting.append((k, swept.move, there))
             if len(cutting) == TOGETHER:
-                waiting.append(beside.submit(engaged, cutting))
+                waiting.append(executor.submit(engaged, cutting))
                 cutting = []
-        waiting.append(beside.submit(engaged, cutting))
+        waiting.append(executor.submit(engaged, cutting))
         tiles.finish()
         return TakenByLayers(removed, gained, [engaged for several in waiting for engaged in several.result()], best)
 
@@ -104,12 +104,14 @@ def rank_of(whole: Sequence[Polygon]) -> tuple[int, float]:
 
 
 def _most_parts(
-    tiles: TileRings, taken: Taken, swept: Swept, rank: tuple[int, float], step: int, cutter: Cutter, film: float
+    tiles: TileRings, removal: Taken, swept: Swept, rank: tuple[int, float], step: int, cutter: Cutter, film: float
 ) -> ChipAreas | None:
     """The chip of a step with a higher rank than ``rank``, the highest of its layers; None: it has none."""
     best = None
-    share = taken.least / np.where(taken.parts > 0, taken.whole, 1.0)
-    for e in np.flatnonzero((taken.parts > rank[0]) | ((taken.parts == rank[0]) & (share > rank[1] + EQUAL))).tolist():
+    share = removal.least / np.where(removal.parts > 0, removal.whole, 1.0)
+    for e in np.flatnonzero(
+        (removal.parts > rank[0]) | ((removal.parts == rank[0]) & (share > rank[1] + EQUAL))
+    ).tolist():
         pieces = tiles.parts_of(e)
         whole = [p for p in pieces if 2.0 * p.area > film * p.length]
         if rank_of(whole) > rank:

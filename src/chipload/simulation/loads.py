@@ -151,8 +151,8 @@ def engagement_of_step(
     turn = np.array([b * z - c * y, c * x - a * z, a * y - b * x])
     middle = speed + 0.5 * cutter.flute_length * swing
     frame = tool_frame(axis, speed if speed.any() else middle, bool(steps.spindle[k] > 0.0))
-    way = float(np.linalg.norm(speed))
-    ahead = max(AHEAD * tolerance / way - 0.5, 0.0) if way > 0.0 else 0.0
+    travel = float(np.linalg.norm(speed))
+    ahead = max(AHEAD * tolerance / travel - 0.5, 0.0) if travel > 0.0 else 0.0
     rows, owner = immersed(tip + ahead * speed, frame, speed * tooth, turn * tooth, profile, section)
     return StepEngagement(k, frame, rows, owner)
 

@@ -129,8 +129,8 @@ class MoveRun:
         """Make some steps and return their engagement."""
         pieces, flank = self.corner_slices, self.flank_mm
         if isinstance(self.stock, BrickStock):
-            way = (steps.p0, steps.p1, steps.a0, steps.a1)
-            return self.stock.take(*way, steps.tool, corner_slices=pieces, flank_mm=flank)
+            poses = (steps.p0, steps.p1, steps.a0, steps.a1)
+            return self.stock.take(*poses, steps.tool, corner_slices=pieces, flank_mm=flank)
         return self.stock.take(steps.p0, steps.p1, steps.tool, corner_slices=pieces, flank_mm=flank)
 
     def finish(self, stock: LayeredStock, workers: int) -> None:
@@ -199,9 +199,9 @@ def with_contact(blocks: Iterable[Steps], run: MoveRun | None, workers: int) -> 
             yield steps, None
         return
     waiting = list[tuple[Steps, Future[Engaged]]]()
-    with ThreadPoolExecutor(1) as beside:
+    with ThreadPoolExecutor(1) as executor:
         for steps in blocks:
-            waiting.append((steps, beside.submit(run.contact, steps)))
+            waiting.append((steps, executor.submit(run.contact, steps)))
             if len(waiting) > 1:
                 before, found = waiting.pop(0)
                 yield before, found.result()
@@ -255,7 +255,7 @@ def moved(
         left, spindle = _left(found, entries), np.abs(steps.spindle[step])
         each, at, mean = loads_of_instants(engagement, cutter, material, rotation, left, spindle, steps.seconds[step])
         weight = 1.0 / found.instants[entries]
-        _together(loads, step, each, weight)
+        _merge_instants(loads, step, each, weight)
         if material.has_band:
             some = turned_basis(mean, engagement.frames)
             basis = basis + np.tensordot(steps.seconds[step] * weight, some, 1)
@@ -396,7 +396,7 @@ def _left(found: Engaged, entries: Ints) -> Floats:
     return np.asarray(np.where(one[:, None], total / np.where(one, size, 1.0)[:, None], 0.0))
 
 
-def _together(loads: Floats, step: Ints, each: Floats, weight: Floats) -> None:
+def _merge_instants(loads: Floats, step: Ints, each: Floats, weight: Floats) -> None:
     """Replace the loads of instants by those of their steps: means, greatest, least."""
     fresh = np.unique(step)
     loads[np.ix_(fresh, LEAST)] = math.inf
@@ -448,5 +448,5 @@ def _cuts(
     kept = np.sort(order[np.flatnonzero(np.diff(step[order], prepend=-1))])
     some = plain if len(kept) == len(entries) else plain.part(kept)
     at = step[kept]
-    way = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
-    return Cuts(number, cutter, first + at, way, with_runout(some, cutter), some, steps.spindle[at])
+    ends = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
+    return Cuts(number, cutter, first + at, ends, with_runout(some, cutter), some, steps.spindle[at])

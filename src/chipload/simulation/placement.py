@@ -66,7 +66,7 @@ class Placement:
         return self.depth_mm > self.flute_mm
 
     @property
-    def apart(self) -> tuple[int, ...]:
+    def outside_axes(self) -> tuple[int, ...]:
         """Axes along which the middle of the motions at feed lies outside the stock by more than a radius."""
         middle = 0.5 * (self.low + self.high)
         outside = np.maximum(self.stock_low - middle, middle - self.stock_high)
@@ -92,7 +92,7 @@ def placement_of(
     """
     fed = ~np.asarray(columns["rapid"], dtype=np.bool_)
     if not fed.any():
-        raise InputError("program: no motion at a feed: there is no placement to compare")
+        raise InputError("program: no motion at a feed: the placement cannot be checked")
     stock_low, stock_high = (np.asarray(corner, dtype=np.float64) for corner in bounds)
     seconds, chips = np.asarray(columns["seconds"]), np.asarray(columns["chip_volume_mm3"])
     tip = np.column_stack([columns[f"{x}_mm"] for x in "xyz"])
@@ -119,20 +119,20 @@ def stock_placement(
     :func:`placement_of`.
     """
     at = placement_of(columns, bounds, cutters)
-    if at.in_air + at.too_deep + bool(at.apart) < 2 and not (at.first is None and at.apart):
+    if at.in_air + at.too_deep + bool(at.outside_axes) < 2 and not (at.first is None and at.outside_axes):
         return None
-    said = [f"{at.air_s:.4g} of {at.feed_s:.4g} s at feed are in air"]
+    parts = [f"{at.air_s:.4g} of {at.feed_s:.4g} s at feed are in air"]
     if at.too_deep:
         line = int(columns["line"][at.first]) if "line" in columns else 0
         where = f" (line {line})" if line else ""
-        said.append(f"the first cut{where} is up to {at.depth_mm:.4g} mm deep, the flutes are {at.flute_mm:g} mm long")
-    shown = sorted({*at.apart, *((2,) if at.too_deep else ())})
+        parts.append(f"the first cut{where} is up to {at.depth_mm:.4g} mm deep, the flutes are {at.flute_mm:g} mm long")
+    shown = sorted({*at.outside_axes, *((2,) if at.too_deep else ())})
     boxes = (
         f"the motions at feed lie in {'XYZ'[k]} {at.low[k]:.4g} to {at.high[k]:.4g} mm, the stock in "
         f"{at.stock_low[k]:.4g} to {at.stock_high[k]:.4g} mm"
         for k in shown
     )
-    text = "; ".join([*said, *boxes])
+    text = "; ".join([*parts, *boxes])
     row = at.first
     place = None if row is None else tuple(float(columns[f"{x}_mm"][row]) for x in "xyz")
     return Finding(

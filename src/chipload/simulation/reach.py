@@ -49,9 +49,9 @@ def reached(
     k = np.repeat(np.asarray(some), [len(rows) for rows in layers])
     layer = np.concatenate(layers)
     support = _support(steps, k, stock.heights[layer], cutter)
-    met = np.flatnonzero(np.isfinite(support).all(axis=1))
+    nonempty = np.flatnonzero(np.isfinite(support).all(axis=1))
     touched = np.zeros(len(k), dtype=np.bool_)
-    touched[met] = _touched(support[met], layer[met], stock)
+    touched[nonempty] = _touched(support[nonempty], layer[nonempty], stock)
     ends = np.cumsum([len(rows) for rows in layers])[:-1]
     return [rows[on] for rows, on in zip(layers, np.split(touched, ends), strict=True)]
 

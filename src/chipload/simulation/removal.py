@@ -112,10 +112,10 @@ class Removal:
 
     Parameters
     ----------
-    columns : (n,) each, a row a step, see :func:`remove`
+    columns : (n,) each, one row for each step, see :func:`remove`
     volume_before, volume_after : of the stock [mm^3]
     mean_band : (4,) standard deviation of the mean force x, y, z [N] and torque [N m] over the time in cut, from that
-        of the coefficients; None: the material does not say how sure they are
+        of the coefficients; None: the material does not state their uncertainty
     piece : the chip with most pieces that are most alike; None where nothing was cut
     findings : rapids that cut, and whether the run was handed over to the layers
     labels : of the program, `label` of the columns counts in them
@@ -142,7 +142,7 @@ class Removal:
     @property
     def band_error(self) -> dict[str, float]:
         """Standard deviation over the value, by column, at the greatest value of the column: what the spread of the
-        coefficients makes of it. Empty where the material does not say how sure they are.
+        coefficients makes of it. Empty where the material does not state their uncertainty.
 
         Deflection and stress are linear in the force of one rotation: theirs is that of the force.
         """

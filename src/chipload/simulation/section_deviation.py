@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 BALLS = 0.5
 #: distance of a barrel from the body [mm] beyond which it is not measured
 NEAR = 0.5
-#: motions whose flank is looked at: every so many
+#: the flank is checked in one of so many motions
 FLANKS = 4
 
 
@@ -49,7 +49,7 @@ class WallClearance:
 
 @dataclass(frozen=True)
 class SectionDeviation:
-    """Greatest depth into a body and height over it [mm], where, and how many points of its sections were looked at."""
+    """Greatest depth into a body and height over it [mm], where, and how many points of its sections were checked."""
 
     gouge: float
     at: tuple[float, float, float]

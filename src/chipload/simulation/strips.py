@@ -231,7 +231,7 @@ class Strips:
     Parameters
     ----------
     strips : of :func:`strips_of`, at least one
-    beside : executor of one thread, which waits for the team
+    executor : of one thread, which waits for the team
     stock : before step ``first``
     size : number of steps of a block
     first : number of the first step
@@ -243,17 +243,17 @@ class Strips:
     """
 
     def __init__(
-        self, strips: list[Strip], team: Team, beside: ThreadPoolExecutor, program: Program, stock: LayeredStock,
+        self, strips: list[Strip], team: Team, executor: ThreadPoolExecutor, program: Program, stock: LayeredStock,
         setting: RunSettings, size: int, first: int, piece: ChipAreas | None,
     ) -> None:  # fmt: skip
         self.stock, self.cutters, self.complete = stock, setting.cutters, True
-        self._team, self._beside = team, beside
+        self._team, self._executor = team, executor
         own = replace(setting, watch=None, moves=None, workers=1, processes=Workers())
         team.share(_Shared(stock.xs, stock.ys, plan_of(stock), program, own, size))
         self._states = [_State(strip, part_of(stock, strip), piece, first) for strip in strips]
         self._total = number_of_steps(program, setting.resolution.step_mm, setting.resolution.tolerance)
         self._blocks = list[tuple[Block, ...]]()
-        self._coming = beside.submit(self._round, 1)
+        self._coming = executor.submit(self._round, 1)
 
     def _round(self, blocks: int) -> list[tuple[list[Block], _State]]:
         """Remove the next blocks of all strips; return their results and the states after them, strip by strip."""
@@ -269,7 +269,7 @@ class Strips:
             self._blocks = list(zip(*(found for found, _ in done), strict=False))
             failed = any(isinstance(one, ChiploadError) for one in self._blocks[-1])
             if not failed and self._states[0].first < self._total:
-                self._coming = self._beside.submit(self._round, ROUND)
+                self._coming = self._executor.submit(self._round, ROUND)
         removed, gained = np.zeros((len(steps), 4)), np.zeros(len(steps))
         engagement, pieces = [], list[ChipAreas]()
         for each in self._blocks.pop(0):
@@ -286,10 +286,10 @@ class Strips:
             self.stock.tidied += more
         self.complete = not self._blocks
         for state in self._states if self.complete else ():
-            self._put(state)
+            self._write_back(state)
         return TakenByLayers(removed, gained, sorted(engagement, key=lambda b: b.step), piece)
 
-    def _put(self, state: _State) -> None:
+    def _write_back(self, state: _State) -> None:
         """Write the tiles of a strip into the stock of the caller."""
         strip, part = state.strip, state.stock
         to = _slice(strip.axis, strip.own)
@@ -313,9 +313,9 @@ def strips_for(
         return
     fine = setting.resolution
     # the thread ends after the team, which ends what it waits for
-    with ThreadPoolExecutor(1) as beside, setting.processes.team() as team:
+    with ThreadPoolExecutor(1) as executor, setting.processes.team() as team:
         strips = strips_of(program, stock, setting.cutters, fine.step_mm, fine.tolerance, team.size)
-        yield Strips(strips, team, beside, program, stock, setting, size, first, piece) if strips else None
+        yield Strips(strips, team, executor, program, stock, setting, size, first, piece) if strips else None
 
 
 def _slice(axis: int, columns: tuple[int, int]) -> tuple[slice, slice, slice]:

@@ -163,16 +163,16 @@ def collisions(
     progress : is told how many steps are done
     kept : where the pass keeps what it has found, and goes on from
     """
-    held: list[tuple[str, str, LeastDistance, dict[int, Collision]]] = []
+    watched: list[tuple[str, str, LeastDistance, dict[int, Collision]]] = []
     for name, points in solids.items():
         for what, body in ((ABOVE, above_cutting), ("cutting part", cutting_part)):
             if what == ABOVE or name not in above_only:
                 bodies = {n: body(c) for n, c in cutters.items()}
-                held.append((what, name, LeastDistance(bodies, points, tolerance, tolerance), {}))
+                watched.append((what, name, LeastDistance(bodies, points, tolerance, tolerance), {}))
 
     def state() -> dict[str, NDArray[Any]]:
         out = dict[str, NDArray[Any]]()
-        for i, (_, _, near, best) in enumerate(held):
+        for i, (_, _, near, best) in enumerate(watched):
             numbers = np.array([(c.step, c.line) for c in best.values()], dtype=np.int64).reshape(-1, 2)
             places = np.array([(c.depth_mm, *c.at) for c in best.values()], dtype=np.float64).reshape(-1, 4)
             own = {**near.state(), "numbers": numbers, "places": places}
@@ -180,7 +180,7 @@ def collisions(
         return out
 
     def restore(found: Mapping[str, NDArray[Any]]) -> None:
-        for i, (what, name, near, best) in enumerate(held):
+        for i, (what, name, near, best) in enumerate(watched):
             near.restore({k: found[f"{k}_{i}"] for k in near.state()})
             for (step, line), (depth, *at) in zip(
                 found[f"numbers_{i}"].tolist(), found[f"places_{i}"].tolist(), strict=True
@@ -188,12 +188,12 @@ def collisions(
                 best[line] = Collision(what, name, depth, step, line, (at[0], at[1], at[2]))
 
     depends = (dict(solids), sorted(above_only), tolerance)
-    for block in kept.blocks("collisions", steps, depends, state, restore) if held else ():
-        progress(held[0][2].done)
-        for what, name, near, best in held:
+    for block in kept.blocks("collisions", steps, depends, state, restore) if watched else ():
+        progress(watched[0][2].done)
+        for what, name, near, best in watched:
             first = near.done
             _by_line(block, first, what, name, near.take(block), tolerance, best)
-    return tuple(sorted((c for *_, best in held for c in best.values()), key=lambda c: (c.step, c.what, c.into)))
+    return tuple(sorted((c for *_, best in watched for c in best.values()), key=lambda c: (c.step, c.what, c.into)))
 
 
 def in_stock(

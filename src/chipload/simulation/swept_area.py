@@ -167,8 +167,8 @@ def _left(
     out = dict(zip(of, np.split(left, np.cumsum(counts)[:-1]), strict=True))
     for tool in np.unique(steps.tool[of]).tolist():
         lean = [k for k in of if steps.tool[k] == tool and out[k].any() and min(steps.a0[k, 2], steps.a1[k, 2]) < 1.0]
-        asked = [np.array(ranges[k])[out[k]] for k in lean]
-        for k, near in zip(lean, reached(steps, lean, asked, cutters[tool], stock), strict=True):
+        candidates = [np.array(ranges[k])[out[k]] for k in lean]
+        for k, near in zip(lean, reached(steps, lean, candidates, cutters[tool], stock), strict=True):
             out[k] = np.isin(ranges[k], near)
     return out
 
@@ -201,28 +201,28 @@ def _covered(
 ) -> list[tuple[Ints, Ints, PlaneAreas]]:
     """Return the layers that steps cover and their areas; layers that an upright flank crosses share one."""
     heights = stock.heights
-    asked: list[Floats] = []
+    section_heights: list[Floats] = []
     of: list[Ints] = []
     for k, (_, layers, left) in own.items():
         z = heights[layers.start : layers.stop]
         flank = _flank(steps, k, cutter, z)
         alone = left & ~flank
-        asked.append(z[alone])
+        section_heights.append(z[alone])
         rows = np.cumsum(alone) - 1
         if (left & flank).any():
             # the last one asked for stands for all that the flank crosses; which are left does not choose its height
-            asked[-1] = np.append(asked[-1], z[flank][0])
-            rows[flank] = len(asked[-1]) - 1
+            section_heights[-1] = np.append(section_heights[-1], z[flank][0])
+            rows[flank] = len(section_heights[-1]) - 1
         of.append(np.where(left, rows, -1))
-    areas = covered_rings([move for move, _, _ in own.values()], K, asked, tolerance)
+    areas = covered_rings([move for move, _, _ in own.values()], K, section_heights, tolerance)
     some = np.append(areas.first[:, 1] > areas.first[:, 0], False)
     out = list[tuple[Ints, Ints, PlaneAreas]]()
     before = 0
-    for (_, layers, _), rows, heights_asked in zip(own.values(), of, asked, strict=True):
+    for (_, layers, _), rows, own_heights in zip(own.values(), of, section_heights, strict=True):
         shape = np.where(rows >= 0, rows + before, -1)
         there = some[shape]
         out.append((np.arange(layers.start, layers.stop)[there], shape[there], areas))
-        before += len(heights_asked)
+        before += len(own_heights)
     return out
 
 

@@ -47,7 +47,7 @@ class Verification:
     and where; `unproven`, none failed but something could not be compared, ``reasons`` say what.
     ``engagement_difference_deg`` the greatest |planned - found| and its centre; ``gouge_mm`` and ``excess_mm`` the
     greatest and their places on the wall; ``rapids`` the centres [mm] of rapids that meet stock;
-    ``compared`` rows of the history held against the centre path; ``samples`` points and moments looked at;
+    ``compared`` rows of the history held against the centre path; ``samples`` points and moments checked;
     ``text`` one line that says what was compared.
     """
 
@@ -98,7 +98,7 @@ def verify_contour(
     ----------
     program : motions in the XY plane, at one or more heights; rapids included
     radius : R [mm]
-    history : columns `x_mm`, `y_mm`, `z_mm`, `engagement_deg`, `pass`, a row a step, in the order of the program
+    history : columns `x_mm`, `y_mm`, `z_mm`, `engagement_deg`, `pass`, one row for each step in program order
     stock : the stock before row 0 of the program, in the plane; None: solid everywhere
     stock_top_mm : motions wholly at or above this height cut nothing
     wall : the finished part's wall, empty where there is none to compare with
@@ -108,7 +108,7 @@ def verify_contour(
     wall_below : a height [mm], and the wall of what is cut below it; None: the wall is the same at all heights
     step_mm : spacing on path and wall for gouge, excess and rapids [mm]
     workers : threads; the answer does not depend on it
-    progress : called with the share done; if it raises Cancelled the verdict so far is given, `unproven` at best
+    progress : called with the share done; if it raises Cancelled, the verdict so far is returned, `unproven` at best
 
     Raises
     ------
@@ -144,8 +144,8 @@ def verify_contour(
         hits, samples = _rapids_through_stock(program, levels, step_mm, failed)
         progress(0.15, "rapids")
         if wall:
-            cleft, remains, asked = _wall(levels, wall, wall_below, material, step_mm)
-            samples += asked
+            cleft, remains, points = _wall(levels, wall, wall_below, material, step_mm)
+            samples += points
             if cleft.value_mm > gouge_tolerance_mm:
                 failed.append(_exceeds("gouge", cleft, "mm", gouge_tolerance_mm))
             if remains.value_mm > excess_tolerance_mm:
@@ -172,9 +172,9 @@ def _rapids_through_stock(
     hits: list[Place] = []
     samples = 0
     for level in levels:
-        found, asked = _rapids(program, level, step)
+        found, points = _rapids(program, level, step)
         hits += found
-        samples += asked
+        samples += points
     if hits:
         x, y = hits[0]
         failed.append(f"rapid through stock at ({x:.4f}, {y:.4f}), {len(hits)} motions in all")
@@ -230,7 +230,7 @@ def _wall(
     material: str,
     step: float,
 ) -> tuple[GreatestDistance, GreatestDistance, int]:
-    """The greatest gouge and excess of all levels, and the number of points asked."""
+    """The greatest gouge and excess of all levels, and the number of checked points."""
     cleft = remains = GreatestDistance(0.0, (0.0, 0.0), 0)
     samples = 0
     for level in levels:
@@ -278,19 +278,19 @@ def _levels(program: Program, radius: float, stock: Region | None, top: float) -
 
 
 def _rapids(program: Program, level: _Level, step: float) -> tuple[list[Place], int]:
-    """Centres at which rapids meet uncut stock of this level, one a motion, and the number of moments asked.
+    """Centres at which rapids meet uncut stock of this level, one a motion, and the number of checked points.
 
     The part of a rapid below the level's top sweeps its front half rim, ``RAPID_MM`` smaller than the cutter, through
-    what stood before it; one that comes from above is also asked over its whole disc, in 8 rings of 64 points.
+    what stood before it; one that comes from above is also checked over its whole disc, in 8 rings of 64 points.
     """
     z0, z1 = _heights(program)
     below = np.minimum(z0, z1) < level.top - LEVEL_MM
     at = np.flatnonzero((program.motion == RAPID) & below)
     at = at[at > 0]
     hits: list[Place] = []
-    asked = 0
+    count = 0
     if not len(at):
-        return hits, asked
+        return hits, count
     centres, path = level.centre_path, CentrePath(flat_motions(program), level.centre_path.radius)
     reach = centres.radius - RAPID_MM
     front = np.linspace(0.0, np.pi, 181)
@@ -311,12 +311,12 @@ def _rapids(program: Program, level: _Level, step: float) -> tuple[list[Place], 
         if first > 0.0 or not t.any():
             points = np.vstack([o[0] + disc, points])
             owner = np.concatenate([np.zeros(len(disc), dtype=np.int64), owner])
-        asked += len(points)
+        count += len(points)
         still = centres.uncut(points, np.full(len(points), k - 1), np.ones(len(points)))
         if still.any():
             x, y = o[owner[int(still.argmax())]]
             hits.append((float(x), float(y)))
-    return hits, asked
+    return hits, count
 
 
 def _compare(
@@ -364,7 +364,7 @@ def _compare(
                 at = rows[use]
                 planned = columns["engagement_deg"][at]
                 off = np.abs(_degrees(level.centre_path, kk[at], ww[at], COARSE_DEG, workers) - planned)
-                # a row that agrees on one side of a joint needs no closer look on the other
+                # a row that agrees on one side of a joint needs no finer check on the other
                 again = np.flatnonzero((off > tolerance) & (best[use] > tolerance))
                 if len(again):
                     j = at[again]

@@ -41,7 +41,7 @@ def gouge(centres: CentrePath, wall: Sequence[Contour], material: str, step_mm: 
 
     Parameters
     ----------
-    trail : every motion that cuts
+    centres : every motion that cuts
     wall : closed contours or open chains of the finished part; beyond the loose ends of a chain there is no part
     material : `left` or `right` of the wall's travel
     step_mm : spacing of the centres [mm]; distances are exact, and the greatest local maxima are then narrowed down

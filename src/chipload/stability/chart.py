@@ -26,11 +26,11 @@ Floats = NDArray[np.float64]
 COARSE = 4
 #: a cell is certain where its least |growth| is so many spreads of its corners
 CERTAIN = 1.5
-#: dimensions of the Krylov space beside two a mode, and how still |mu| is then
+#: dimensions of the Krylov space besides two for each mode, and how still |mu| is then
 SPARE, STILL = 10, 1e-3
 #: least growth that counts
 TINY = 1e-9
-#: depths at which the critical one is looked for first, and evaluations that close in on it
+#: depths at which the critical one is searched first, and evaluations that close in on it
 LOOKS, CLOSING = 48, 40
 
 
@@ -117,7 +117,7 @@ def stability_chart(cut: DynamicCuts, speed: ArrayLike, depth: ArrayLike) -> Sta
 def critical_depth(cut: DynamicCuts, deepest: float) -> float:
     """Return the critical depth [mm] of one cut at its speed; ``deepest`` if it is stable up to that depth.
 
-    Stable islands above it are not told. A lobe narrower than a 48th of ``deepest`` may be missed.
+    Stable islands above it are not found. A lobe narrower than a 48th of ``deepest`` may be missed.
 
     Raises
     ------

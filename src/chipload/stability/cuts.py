@@ -138,7 +138,7 @@ def dynamic_cuts(
     modes : None: cutter and work are rigid, as far as no modes are added
     speed : () or (n,) float [rad/s], of the spindle, either sign
     T, n : (n, 2) float, in x and y of the machine; None: those of ``engagement.frame``
-    process : damping by worn edges; None: none is counted
+    process : damping by worn edges; None: left out
     A : (n, 3) float, axis from the tip to the holder in the machine; T and n then have three columns as well. None: z
     directions : 2: thrust is rigid, 3: cutter and work move along the axis as well; None: 3 where a mode does
 

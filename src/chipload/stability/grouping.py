@@ -30,7 +30,7 @@ class CutGroups:
 
     Parameters
     ----------
-    engagement : rounded, a row a step, without frames
+    engagement : rounded, one row for each step, without frames
     T, n : (c, 2) float, rounded feed direction and its normal in x and y
     key : (c,) bytes, the same for steps that are alike
     """
@@ -89,7 +89,7 @@ def grouped(engagement: ToothEngagement, speed: Floats, powers: bool) -> CutGrou
     side = np.sign(np.cross(np.pad(T, ((0, 0), (0, 1))), engagement.frames[:, 1])[:, 2])
     heading = np.column_stack([np.cos(angle * DIRECTION), np.sin(angle * DIRECTION)])
     normal = side[:, None] * np.column_stack([-heading[:, 1], heading[:, 0]])
-    told = np.column_stack([merged, own[at][:, [1, 3, 4, 6]].round(6), foot[at].round(6), thickness[at]])
-    step_told = np.column_stack([np.round(speed, 6), angle, side])
-    keys = tuple(step_told[i].tobytes() + told[start[i] : start[i + 1]].tobytes() for i in range(len(engagement)))
+    range_key = np.column_stack([merged, own[at][:, [1, 3, 4, 6]].round(6), foot[at].round(6), thickness[at]])
+    step_key = np.column_stack([np.round(speed, 6), angle, side])
+    keys = tuple(step_key[i].tobytes() + range_key[start[i] : start[i + 1]].tobytes() for i in range(len(engagement)))
     return CutGroups(out, heading, normal, keys)

@@ -26,13 +26,13 @@ _kernels = LateModule("chipload.stability._kernels")
 
 Floats = NDArray[np.float64]
 
-#: greatest margin that is told from a greater one
+#: greatest margin that is distinguished from a greater one
 MOST_MARGIN = 3.0
 #: cells of the map in a wave of the fastest mode, and where values are printed
 PER_WAVE, PER_WAVE_EXACT = 9.0, 40.0
 #: cells in a wave where the first did not do
 FINER = (15.0, 25.0)
-#: dimensions of the Krylov space beside two a mode, and how still |mu| is then
+#: dimensions of the Krylov space besides two for each mode, and how still |mu| is then
 SPARE, STILL = 24, 1e-4
 #: the same where values are printed
 SPARE_EXACT, STILL_EXACT = 60, 1e-10
@@ -109,7 +109,7 @@ def largest_multipliers(
 def stability_margins(cuts: DynamicCuts) -> StabilityMargins:
     """Return the stability margins of cuts; each takes five to ten evaluations of the map.
 
-    Where a cell of the map has no solution or eigenvalues are not found, the cut is looked at again in finer cells.
+    Where a cell of the map has no solution or eigenvalues are not found, the cut is evaluated again in finer cells.
 
     Raises
     ------
@@ -120,10 +120,10 @@ def stability_margins(cuts: DynamicCuts) -> StabilityMargins:
         return _several_margins(cuts)
     out = np.full((len(cuts), 5), -1.0)
     for per_wave in (PER_WAVE, *FINER):
-        lost = np.flatnonzero(~(out[:, 0] >= 0.0))
-        if not len(lost):
+        failed = np.flatnonzero(~(out[:, 0] >= 0.0))
+        if not len(failed):
             break
-        out[lost] = _margins(cuts if len(lost) == len(cuts) else cuts.chosen(lost), per_wave)
+        out[failed] = _margins(cuts if len(failed) == len(cuts) else cuts.chosen(failed), per_wave)
     if not (out[:, 0] >= 0.0).all():
         raise InputError("stability: a multiplier was not found: check frequency and damping of the modes")
     return StabilityMargins(out[:, 0], out[:, 1], out[:, 2].astype(np.int64), out[:, 3])
@@ -143,19 +143,19 @@ def _several_margins(cuts: DynamicCuts) -> StabilityMargins:
     at_one = growth(every, np.ones(n))
     low, high = np.ones(n), np.ones(n)
     g_low, g_high = at_one.copy(), at_one.copy()
-    stable, looked = at_one < 0.0, 0
+    stable, count = at_one < 0.0, 0
     for factor in (*_kernels.ABOVE.tolist(),):
         which = np.flatnonzero(stable & (g_high < 0.0))
         if len(which):
             low[which], g_low[which] = high[which], g_high[which]
             high[which] = factor
             g_high[which] = growth(which, high[which])
-    while looked < _kernels.DOWN and (g_low >= 0.0).any():
+    while count < _kernels.DOWN and (g_low >= 0.0).any():
         which = np.flatnonzero(g_low >= 0.0)
         high[which], g_high[which] = low[which], g_low[which]
         low[which] *= _kernels.BELOW
         g_low[which] = growth(which, low[which])
-        looked += 1
+        count += 1
     open_ = (g_low < 0.0) & (g_high >= 0.0)
     for k in range(_kernels.CLOSING):
         which = np.flatnonzero(open_ & (high - low > CLOSED * high))

@@ -27,7 +27,7 @@ SAMPLES = 128
 LEAST = 0.1
 #: and a damping ratio at most
 MOST_DAMPED = 0.5
-#: dimensions of the Krylov space beside two a mode, and how still |mu| is then
+#: dimensions of the Krylov space besides two for each mode, and how still |mu| is then
 SPARE, STILL = 12, 1e-3
 #: multiplier below which its logarithm does not matter
 TINY = 1e-9

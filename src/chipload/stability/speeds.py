@@ -1,7 +1,7 @@
 """Quiet speeds: the least margin of several cuts over spindle speed, its windows, and the best speed.
 
 Notation: margin as in :mod:`chipload.stability.margin`; at each speed the least over all cuts is used. A window is a
-range of the calculated speeds in which it is at least the wanted margin. The advised speed has the greatest least
+range of the calculated speeds in which it is at least the required margin. The advised speed has the greatest least
 margin. If many speeds have it (the greatest margin that is calculated), it is the one farthest from where the margin
 falls, then the nearest to the present speed.
 """
@@ -42,8 +42,8 @@ class QuietSpeeds:
     ----------
     speed : (s,) float [rad/s]
     margin : (s,) float, least of all cuts
-    wanted : margin that is asked for
-    cut : (s,) int, number of the cut that has it, over all that were looked at
+    wanted : required margin
+    cut : (s,) int, number of the cut that has it, over all cuts
     """
 
     speed: Floats
@@ -53,7 +53,7 @@ class QuietSpeeds:
 
     @property
     def windows(self) -> tuple[SpeedWindow, ...]:
-        """Windows with the wanted margin, by speed."""
+        """Windows with the required margin, by speed."""
         return speed_windows(self.speed, self.margin, self.wanted)
 
     def advised(self, present: float) -> tuple[float, float]:
@@ -64,7 +64,7 @@ class QuietSpeeds:
         (3.0, 3.0)
         """
         good = self.margin >= self.margin.max() * (1.0 - ALIKE)
-        # what lies beyond the speeds that were looked at is not known: it counts as falling
+        # what lies beyond the searched speeds is not known: it counts as falling
         other = np.concatenate([[-1], np.flatnonzero(~good), [len(good)]])
         far = np.abs(np.arange(len(good))[:, None] - other[None, :]).min(axis=1)
         order = np.lexsort((np.abs(self.speed - present), -far, ~good))

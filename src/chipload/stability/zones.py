@@ -2,7 +2,7 @@
 
 Notation: margin (p, s) of p passes in their order at s speeds, the least over the cuts of a pass. Between two passes
 the cutter is out of the material, so that its speed can change there. The required margin of a pass is its greatest
-over the speeds, but at most the greater of the wanted margin and the greatest margin of the worst pass. A zone is the
+over the speeds, but at most the greater of the required margin and the greatest margin of the worst pass. A zone is the
 longest run of passes for which one speed gives the required margin. Taken from the first pass on, this gives the fewest
 zones.
 """
@@ -37,7 +37,7 @@ def speed_zones(speed: ArrayLike, margin: ArrayLike, wanted: float, present: Arr
     ----------
     speed : (s,) float [rad/s], rising
     margin : (p, s) float
-    wanted : margin that is asked for
+    wanted : required margin
     present : (p,) float [rad/s], the speed of each pass now: of speeds that are as good the nearest is taken
 
     Raises
@@ -59,8 +59,8 @@ def speed_zones(speed: ArrayLike, margin: ArrayLike, wanted: float, present: Arr
             "for each pass at each speed"
         )
     greatest = margins.max(axis=1)
-    asked = np.minimum(greatest, max(float(greatest.min()), wanted)) * (1.0 - ALIKE)
-    good = margins >= asked[:, None]
+    least_margin = np.minimum(greatest, max(float(greatest.min()), wanted)) * (1.0 - ALIKE)
+    good = margins >= least_margin[:, None]
     out, first = [], 0
     while first < len(margins):
         common, last = good[first].copy(), first

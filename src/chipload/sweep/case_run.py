@@ -22,7 +22,7 @@ from chipload.result.summary import summary_bytes
 RECORD_VERSION = 1
 #: [bytes]
 LARGEST_RECORD = 10_000_000
-#: states of a case beside the verdicts
+#: states of a case besides the verdicts
 REFUSED = "refused"
 
 Record = dict[str, Any]

@@ -68,7 +68,7 @@ def sample_files(job: Path, cases: Sequence[Case], samples: Samples, out: Path) 
     Raises
     ------
     InputError
-        There is nothing to draw, or a limit asks for a probability that the samples themselves give.
+        There is nothing to draw, or a limit needs a probability that the samples themselves give.
     """
     written: dict[str, list[Path]] = {}
     found: dict[int, list[SampleFiles]] = {}

@@ -18,7 +18,7 @@ from chipload.web.result import PageResult, PageTrack, TextColumn
 
 Floats = NDArray[np.float64]
 
-#: tracks that are compared at most, and their colours: told apart by all who see colours differently
+#: greatest number of compared tracks, and their colours, which colour-blind readers can distinguish
 MOST = 5
 COLOURS = ("#1f5fa8", "#d17a00", "#0b7a75", "#8a4fa3", "#6b7683")
 #: columns whose greatest size (least value, where a limit is a least value) is compared

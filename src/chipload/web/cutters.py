@@ -1,8 +1,8 @@
 """The shape of each cutter of a track, by tool number.
 
-The result holds it beside its stock (removal.npz). Else it is that of the job where the opened folder has the job that
+The result holds it with its stock (removal.npz). Else it is that of the job where the opened folder has the job that
 the result was made from (by its hash), else the CUTTER of CL data: the result's own, or the program where the folder
-has it. Where none says it, the page shows a pointer and says that the shape is not known.
+has it. Where none states it, the page shows a pointer and states that the shape is not known.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def outline_parts(shape: Sequence[float], height: float) -> Parts:
 
 
 def _numbers(result: PageResult, track: PageTrack) -> set[int]:
-    """Tool numbers that a track uses, as far as the result says it."""
+    """Tool numbers that a track uses, as far as the result states it."""
     if track.tool is not None:
         return {int(n) for n in set(track.tool.tolist())}
     operations = result.result.operations
@@ -76,7 +76,7 @@ def _numbers(result: PageResult, track: PageTrack) -> set[int]:
 
 
 def _kept(result: PageResult, track: PageTrack) -> dict[int, Parts]:
-    """Parts that the result itself holds beside its stock."""
+    """Parts that the result itself holds with its stock."""
     try:
         return read_cutter_parts(result.file(REMOVAL), result.result.tracks.index(track.own))
     except (InputError, ValueError):

@@ -20,7 +20,7 @@ from chipload.result import Verdict, read_summary
 from chipload.result.load import SUMMARY
 from chipload.tables import parsed
 
-#: folders within folders, and entries, that are looked through
+#: folders within folders, and entries, that are searched
 DEEPEST, ENTRIES = 8, 20_000
 #: largest job [bytes]
 LARGEST_JOB = 1_000_000
@@ -130,7 +130,7 @@ def list_folder(root: Path) -> tuple[list[FolderEntry], bool]:
 
 
 def find_by_hash(root: Path, wanted: str) -> Path | None:
-    """The file in the folder that a result says it was made from: ``wanted`` is `name sha256 hash`."""
+    """The file in the folder from which a result states that it was made: ``wanted`` is `name sha256 hash`."""
     parts = wanted.rsplit(" sha256 ", 1)
     if len(parts) != 2:
         return None

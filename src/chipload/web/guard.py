@@ -2,7 +2,7 @@
 
 A page of another site may make a browser send requests to 127.0.0.1, also under a host name of its own that resolves to
 this computer. So every request must name this host and this port, a websocket must come from this page, nothing but GET
-and HEAD is accepted beside the websocket, and what is shown may ask no other host for anything.
+and HEAD is accepted besides the websocket, and what is shown may not contact any other host.
 
 Another user of this computer can connect to the port. So the address that is printed carries a random token; the first
 visit turns it into a cookie, and a request without this cookie is refused.
@@ -22,13 +22,13 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 NAMES = ("127.0.0.1", "localhost")
-#: what the page may load and ask; the page's own scripts stand in it and are compiled there
+#: what the page may load and request; the page's own scripts are part of it and are compiled there
 POLICY = (
     "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:; "
     "style-src 'self' 'unsafe-inline'; connect-src 'self' data: blob:; object-src 'none'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'"
 )
-#: a report is a file of somebody: its scripts may draw, and see and ask nothing
+#: a report is a foreign file: its scripts may draw, but not read or request anything
 SANDBOX = (
     "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src data: blob:"
@@ -133,7 +133,7 @@ def refusal(kind: str, method: str, headers: list[tuple[bytes, bytes]], port: in
         return 403, f"refused: this page is http://127.0.0.1:{port}\n"
     sources = {f"http://{n}:{port}" for n in NAMES} | ({f"http://{n}" for n in NAMES} if port == 80 else set())
     if any(o not in sources for o in origins) or (kind == "websocket" and len(origins) != 1):
-        return 403, "refused: another page asks\n"
+        return 403, "refused: request from another page\n"
     if kind == "http" and method not in ("GET", "HEAD"):
         return 405, "refused: only GET\n"
     return None

@@ -92,7 +92,7 @@ def override_of(field: FormField, entered: Any) -> str | None:
             if field.value is not None and float(text) == float(field.value):
                 return None
         except ValueError:
-            pass  # not a number: the check of the job says so
+            pass  # not a number: the check of the job reports it
         return f"{field.path}={text}"
     return f"{field.path}={json.dumps(entered)}"
 
@@ -122,14 +122,14 @@ def _fields(
         inner, value = properties.get(key), raw[key]
         if inner is None:
             continue
-        many = isinstance(value, list)
+        repeated = isinstance(value, list)
         known = tables_in(model.model_fields[key].annotation) if model is not None and key in model.model_fields else []
-        table = next((t for t, several in known if several == many), known[0][0] if known else None)
+        table = next((t for t, several in known if several == repeated), known[0][0] if known else None)
         if isinstance(value, Mapping):
             yield from _fields(value, _table_schema(inner, defs), defs, table, f"{at}{key}.")
         elif isinstance(value, list) and value and all(isinstance(v, Mapping) for v in value):
             for k, one in enumerate(value):
-                yield from _fields(one, _table_schema(inner, defs, many), defs, table, f"{at}{key}.{k}.")
+                yield from _fields(one, _table_schema(inner, defs, repeated), defs, table, f"{at}{key}.{k}.")
 
 
 def _field(key: str, value: Any, schema: Mapping[str, Any], takes: str, at: str) -> FormField | None:
@@ -170,11 +170,11 @@ def _resolved(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Mapping[str
     return {**schema, **chosen}
 
 
-def _table_schema(schema: Mapping[str, Any], defs: Mapping[str, Any], many: bool = False) -> Mapping[str, Any]:
+def _table_schema(schema: Mapping[str, Any], defs: Mapping[str, Any], repeated: bool = False) -> Mapping[str, Any]:
     """The schema of the table that a key holds, itself or in a list; ``many``: the list, where it may be either."""
     options: list[Mapping[str, Any]] = [schema, *(one for word in CHOICES for one in schema.get(word, ()))]
     tables = [one for one in options if "properties" in one]
     lists = [one for one in options if one.get("type") == "array" and "items" in one]
-    if lists and (many or not tables):
+    if lists and (repeated or not tables):
         return _table_schema(_resolved(lists[0]["items"], defs), defs)
     return dict(tables[0]) if tables else {}

@@ -43,7 +43,7 @@ class ToolUse:
     Parameters
     ----------
     tool : its number; 0: the history names none
-    time_s, cut_s : with it in the spindle, and in material [s]; ``cut_s`` None: the history does not say
+    time_s, cut_s : with it in the spindle, and in material [s]; ``cut_s`` None: the history does not state it
     cut_mm : length of its path in material [mm]
     worst : greatest size of each load, and the row where it is
     periods : when it works
@@ -68,7 +68,7 @@ class LineLoad:
 
 
 def cutting_rows(result: PageResult, track: PageTrack) -> Bools | None:
-    """(n,) rows in material; None: the history has no column that says it."""
+    """(n,) rows in material; None: the history has no such column."""
     for column in CUTS:
         values = _numbers(result, track, column)
         if values is not None:

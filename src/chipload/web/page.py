@@ -65,7 +65,7 @@ class Page:
         self.opened, self.runs, self.assets = opened, runs, assets
         self.result: PageResult | None = None
         self.own: JobRun | None = None
-        self.seen: JobRun | None = runs.now if runs.now is not None and runs.now.over else None
+        self.seen: JobRun | None = runs.now if runs.now is not None and runs.now.ended else None
         ui.add_css(resources.files(__package__).joinpath("page.css").read_text("utf-8"))
         ui.add_head_html(
             '<script>document.documentElement.lang = "en"</script><script src="/viewer.js"></script>'
@@ -114,7 +114,7 @@ class Page:
             title = result.result.title or "result"
             self.title.set_text(title)
             ui.page_title(f"{result.result.verdict.value}: {title} - chipload")
-            self.name.set_text(self._called(name))
+            self.name.set_text(self._folder_name(name))
             options = {k: t.title for k, t in enumerate(result.tracks)}
             self.tracks.set_options(options, value=0)
             self.tracks.set_visibility(len(options) > 1)
@@ -213,13 +213,13 @@ class Page:
         self.others.set_visibility(False)
         with self.home, ui.element("div").classes("cl-card"):
             if job is not None:
-                ui.label(self._called(job)).classes("cl-dialog-title")
+                ui.label(self._folder_name(job)).classes("cl-dialog-title")
                 with ui.element("div").classes("cl-entry"):
-                    _button("Run", lambda: self._ask(job), "play_arrow").mark(f"run-{job}")
+                    _button("Run", lambda: self._request_folder(job), "play_arrow").mark(f"run-{job}")
                     ui.label("plans, checks and writes a result; you can stop it").classes("cl-note")
                 with ui.element("div").classes("cl-job-two"):
                     with ui.element("div").classes("cl-scroll cl-job"):
-                        JobForm(resolve_name(self.opened.root, job), lambda values: self._ask(job, values))
+                        JobForm(resolve_name(self.opened.root, job), lambda values: self._request_folder(job, values))
                     ui.html(self._text(job), sanitize=True).classes("cl-scroll cl-code cl-job").props("tabindex=0")
             ui.label("Results and jobs in this folder").classes("cl-dialog-title")
             self._listed(found, all_seen)
@@ -232,21 +232,21 @@ class Page:
         for f in found:
             with ui.element("div").classes("cl-entry"):
                 ui.icon("analytics" if f.kind == "result" else "description").classes("cl-icon")
-                ui.label(self._called(f.name)).classes("cl-what")
+                ui.label(self._folder_name(f.name)).classes("cl-what")
                 if f.kind == "result":
                     ui.label(f.word).classes(f"cl-pill cl-{VERDICTS[Verdict(f.word)]}")
                     _button("Show", lambda n=f.name: self.show(n)).mark(f"show-{f.name}")
                 else:
                     ui.label("job").classes("cl-pill")
                     _button("Look", lambda n=f.name: self._job(n))
-                    _button("Run", lambda n=f.name: self._ask(n), "play_arrow").mark(f"run-{f.name}")
+                    _button("Run", lambda n=f.name: self._request_folder(n), "play_arrow").mark(f"run-{f.name}")
 
     async def _job(self, name: str) -> None:
         """Show a job."""
         self.opening.close()
         await self._home(name)
 
-    def _called(self, name: str) -> str:
+    def _folder_name(self, name: str) -> str:
         return self.opened.root.name if name == "." else name
 
     def _text(self, job: str) -> str:
@@ -254,8 +254,8 @@ class Page:
         return "".join(f'<div class="cl-line"><i>{k}</i>{escape(t) or " "}</div>' for k, t in enumerate(lines, 1))
 
     # -- running ------------------------------------------------------------------------------------------------
-    def _ask(self, job: str, overrides: Sequence[str] = ()) -> None:
-        """Where the result goes; one with changed values goes beside the last one and is compared with it."""
+    def _request_folder(self, job: str, overrides: Sequence[str] = ()) -> None:
+        """Where the result goes; one with changed values goes next to the last one and is compared with it."""
         self.opening.close()
         stem, folder = PurePosixPath(job).stem, PurePosixPath(job).parent
         last = (folder / ("result" if stem == "job" else f"result-{stem}")).as_posix()
@@ -263,24 +263,24 @@ class Page:
         out = f"{last}-changed" if overrides else last
         self.ask.clear()
         with self.ask:
-            ui.label(f"{self._called(job)}: folder for the result, in the opened folder:").classes("cl-note")
+            ui.label(f"{self._folder_name(job)}: folder for the result, in the opened folder:").classes("cl-note")
             where = ui.input(value=out).props("dense outlined").classes("cl-out").mark("out")
             for text in overrides:
                 ui.label(text).classes("cl-note cl-changed")
             message = ui.label("").classes("cl-no")
-            beside = last if overrides and known else None
+            compared = last if overrides and known else None
             with ui.element("div").classes("cl-entry"):
                 _button(
-                    "Run", lambda: self._run(job, str(where.value), message, overrides, beside), "play_arrow"
+                    "Run", lambda: self._run(job, str(where.value), message, overrides, compared), "play_arrow"
                 ).props("unelevated color=primary").props(remove="flat").mark("start")
                 _button("Cancel", self.running.close)
         self.running.open()
 
-    def _run(self, job: str, out: str, message: Any, overrides: Sequence[str], beside: str | None) -> None:
+    def _run(self, job: str, out: str, message: Any, overrides: Sequence[str], compared: str | None) -> None:
         """Start a run, unless one runs or its folder cannot be written."""
         root = self.opened.root
         try:
-            if self.runs.now is not None and not self.runs.now.over:
+            if self.runs.now is not None and not self.runs.now.ended:
                 raise InputError("a job is running: stop it first")
             path = resolve_name(root, job)
             if not is_job(path):
@@ -291,7 +291,7 @@ class Page:
             message.set_text(str(err).replace(f"--out {root}/", ""))
             return
         self.running.close()
-        self.runs.now = now = JobRun(job, target.relative_to(root).as_posix(), overrides, beside)
+        self.runs.now = now = JobRun(job, target.relative_to(root).as_posix(), overrides, compared)
         self.seen, self.own = None, now
         self.bar.set_visibility(True)
         background_tasks.create(now.work(path, target))
@@ -302,9 +302,9 @@ class Page:
             return
         self.bar.set_visibility(True)
         self.bar_line.set_value(round(now.done, 3))
-        self.bar_line.set_visibility(not now.over)
+        self.bar_line.set_visibility(not now.ended)
         self.bar_stop.set_visibility(now.state == "running")
-        self.bar_close.set_visibility(now.over)
+        self.bar_close.set_visibility(now.ended)
         message = {
             "running": f"{now.job}: {100.0 * now.done:.0f} % \u00b7 {now.what}",
             "stopping": f"{now.job}: stopping",
@@ -313,12 +313,12 @@ class Page:
             "failed": f"{now.job}: {now.message}",
         }[now.state]
         self.bar_text.set_text(message)
-        if now.over:
+        if now.ended:
             self.seen = now
             if now.state == "done" and now is self.own:
                 await self.show(now.out)
-                if now.beside is not None and now.beside != now.out:
-                    self.others.set_value([f"result {now.beside}"])
+                if now.compared is not None and now.compared != now.out:
+                    self.others.set_value([f"result {now.compared}"])
                 self.bar.set_visibility(False)
 
     # -- keys ---------------------------------------------------------------------------------------------------
@@ -336,7 +336,9 @@ class Page:
         """What the result can be compared with: its other tracks, and the other results of the folder."""
         found, _ = await asyncio.to_thread(list_folder, self.opened.root)
         options = {f"track {k}": t.title for k, t in enumerate(result.tracks)}
-        options |= {f"result {f.name}": self._called(f.name) for f in found if f.kind == "result" and f.name != name}
+        options |= {
+            f"result {f.name}": self._folder_name(f.name) for f in found if f.kind == "result" and f.name != name
+        }
         self.others.set_options(options, value=[])
         self.others.set_visibility(len(options) > 1)
 
@@ -354,7 +356,7 @@ class Page:
                         others.append((result, track, track.title))
                 else:
                     other = await asyncio.to_thread(open_result, self.opened.root, rest)
-                    others.append((other, other.tracks[0], f"{self._called(rest)}: {other.tracks[0].own.name}"))
+                    others.append((other, other.tracks[0], f"{self._folder_name(rest)}: {other.tracks[0].own.name}"))
             except InputError as err:
                 ui.notify(str(err), type="negative")
         self.others.props["display-value"] = "; ".join(title for *_, title in others) or "compare with \u2026"
@@ -364,7 +366,7 @@ class Page:
     async def _key(self, event: Any) -> None:
         if not event.action.keydown or event.modifiers.ctrl or event.modifiers.meta or event.modifiers.alt:
             return
-        key, many = event.key, 20 if event.modifiers.shift else 1
+        key, steps = event.key, 20 if event.modifiers.shift else 1
         if key.name == "?":
             self.help.open()
         elif key.name == "o" and not event.action.repeat:
@@ -372,7 +374,7 @@ class Page:
         elif self.result is None or self.help.value or self.opening.value or self.running.value:
             return
         elif key.arrow_left or key.arrow_right:
-            self.view.move(many if key.arrow_right else -many)
+            self.view.move(steps if key.arrow_right else -steps)
         elif key.arrow_up or key.arrow_down:
             self.view.line(1 if key.arrow_down else -1)
         elif key.home:

@@ -75,8 +75,8 @@ def plots(
         colour = sides[0].colour if sides else COLOURS[k % len(COLOURS)]
         axis = "" if k == 0 else str(k + 1)
         top = 1.0 - k * (height + gap)
-        beside = [(side, xs, _numbers(side, column)) for side, xs in others]
-        drawn = [y, *(v for _, _, v in beside if v is not None)]
+        other_columns = [(side, xs, _numbers(side, column)) for side, xs in others]
+        drawn = [y, *(v for _, _, v in other_columns if v is not None)]
         for name, paint, dash in BESIDE.get(column, ()):
             own = result.column(track, name) if name in result.columns else None
             if own is None or isinstance(own, TextColumn) or not np.isfinite(own).any():
@@ -106,11 +106,11 @@ def plots(
                 "hovertemplate": f"%{{y:.5g}} {unit}<extra></extra>",
             }
         )  # fmt: skip
-        for side, xs, v in beside:
+        for side, xs, v in other_columns:
             if v is not None:
                 some = drawn_rows(v)
-                said = f"%{{y:.5g}} {unit} {escape(side.title)}"
-                data.append(_line(f"{column}: {side.title}", xs[some], v[some], axis, side.colour, said))
+                template = f"%{{y:.5g}} {unit} {escape(side.title)}"
+                data.append(_line(f"{column}: {side.title}", xs[some], v[some], axis, side.colour, template))
         notes.append(
             {
                 "text": annotation(result, track, column, row, bound, sides, against), "x": 0.004, "y": top,
@@ -160,12 +160,14 @@ def _layout(against: str, span: list[float]) -> dict[str, Any]:
     }
 
 
-def _line(name: str, x: Floats, y: Floats, axis: str, colour: str, said: str, dash: str = "solid") -> dict[str, Any]:
+def _line(
+    name: str, x: Floats, y: Floats, axis: str, colour: str, template: str, dash: str = "solid"
+) -> dict[str, Any]:
     """One line of the figure; ``axis`` is the ending of its y axis."""
     return {
         "type": "scatter", "mode": "lines", "name": name, "x": x, "y": y, "xaxis": "x", "yaxis": f"y{axis}",
         "connectgaps": False, "showlegend": False, "line": {"color": colour, "width": 1.3, "dash": dash},
-        "hovertemplate": f"{said}<extra></extra>",
+        "hovertemplate": f"{template}<extra></extra>",
     }  # fmt: skip
 
 

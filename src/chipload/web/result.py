@@ -1,7 +1,7 @@
 """A result in the form that the page needs: summary, and history by tracks.
 
 The rows of a track follow one another in history.parquet. Columns are read from
-history.parquet when they are asked for, so that a long history costs only what is looked at.
+history.parquet on request, so that a long history costs only what is shown.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Ints = NDArray[np.int64]
 
 SCENE, REPORT = "scene.glb", "report.html"
 PLACE, AXIS = ("x_mm", "y_mm", "z_mm"), ("axis_x", "axis_y", "axis_z")
-#: columns that say where a row belongs and are not drawn
+#: columns that identify a row and are not drawn
 BELONGS = ("operation", "track")
 #: columns kept for a result at a time
 KEPT = 24
@@ -53,8 +53,8 @@ class PageTrack:
     t, s : (n,) time [s] and path [mm] at the end of each row, never falling
     place : (n, 3) [mm]
     axis : (n, 3) from the tip to the spindle
-    line, tool : (n,), of the source and of the machine; None where the history does not say
-    apart : (n,) whether the path does not go on from the row before
+    line, tool : (n,), of the source and of the machine; None where the history has no such column
+    apart : (n,) whether the path does not continue from the row before
     """
 
     own: Track

@@ -34,7 +34,7 @@ SPEEDS = {0: "30 s", 1: "\u00d71", 10: "\u00d710", 100: "\u00d7100"}
 VERDICTS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
 #: steps of the slider
 STEPS = 4000
-#: tables and pictures beside the 3D view
+#: tables and pictures next to the 3D view
 TABLES = {"limits": "limits", "cut": "cut", "tools": "tools", "lines": "lines", "compare": "compare"}
 
 
@@ -46,11 +46,11 @@ class ResultView:
         self.track: PageTrack | None = None
         self.row = 0
         self.playing = False
-        #: the view was asked to stop where it is, and has not told its row yet
+        #: the view was told to stop and has not reported its row yet
         self.stopping = False
         self.turn = asyncio.Lock()
         self.sides: tuple[Side, ...] = ()
-        #: told when another program of the sequence is shown
+        #: called when another program of the sequence is shown
         self.moved_on: Callable[[int], None] = lambda _: None
         with ui.element("div").classes("cl-verdict") as self.verdict:
             self.word = ui.label("").classes("cl-word").mark("verdict")
@@ -59,11 +59,11 @@ class ResultView:
                 self.tip = ui.tooltip("").classes("cl-tip")
         with ui.element("div").classes("cl-body"):
             with ui.element("div").classes("cl-left"):
-                self.scene = ScenePanel(assets, self._viewed)
+                self.scene = ScenePanel(assets, self._row_reported)
                 self.plots = PlotPanel(self.pick, self._turned)
             with ui.element("div").classes("cl-right"):
                 with ui.element("div").classes("cl-panel cl-tables"):
-                    self.table = ui.toggle(TABLES, value="limits", on_change=self._tabled).props(
+                    self.table = ui.toggle(TABLES, value="limits", on_change=self._show_table).props(
                         "dense no-caps size=sm unelevated toggle-color=blue-grey-7"
                     ).classes("cl-tabs").mark("tables")  # fmt: skip
                     self.limits = LimitPanel(self.find)
@@ -71,7 +71,7 @@ class ResultView:
                     self.tools = ToolPanel(self._found)
                     self.lines = LinePanel(self._found)
                     self.compared = ComparisonPanel()
-                self._tabled()
+                self._show_table()
                 self.source = SourcePanel(self.pick)
         with ui.element("div").classes("cl-foot"):
             self._button("first_page", "to the beginning (Home)", lambda: self.go(0))
@@ -86,12 +86,12 @@ class ResultView:
             )
             self.speed.on("popup-hide", js_handler=RELEASE)
             with self.speed:
-                ui.tooltip("the whole in 30 s, or times as fast as the machine")
+                ui.tooltip("the whole track in 30 s, or a multiple of the machine's speed")
             self.slider = (
                 ui.slider(min=0.0, max=1.0, step=0.001, value=0.0).props('dense aria-label="step"').classes("cl-slider")
             )
             self.slider.mark("slider")
-            self.slider.on("update:model-value", self._slid, throttle=0.05)
+            self.slider.on("update:model-value", self._slider_moved, throttle=0.05)
             # the 3D view follows at once, the other panels when the server has answered
             self.slider.on("update:model-value", js_handler=self.scene.slide)
             self.slider.on("change", js_handler=RELEASE)
@@ -108,19 +108,19 @@ class ResultView:
             if self.result is None or not 0 <= k < len(self.result.tracks) or self.track is self.result.tracks[k]:
                 return
             self.pause()
-            await self._alone()
+            await self._stop_comparing()
             self.track = self.result.tracks[k]
             await self.scene.follow(self.result, self.track)
             await self._tracked(self.result, self.track)
 
     async def compare(self, others: Sequence[tuple[PageResult, PageTrack, str]]) -> None:
-        """Show other tracks beside and over the own one; empty: it alone."""
+        """Show other tracks next to the own one and over it; empty: it alone."""
         async with self.turn:
             if self.result is None or self.track is None:
                 return
             self.pause()
             if not others:
-                await self._alone()
+                await self._stop_comparing()
                 return
             every = [(self.result, self.track, self.track.title), *others][:MOST]
             self.sides = tuple(Side(*side, COLOURS[k]) for k, side in enumerate(every))
@@ -131,7 +131,7 @@ class ResultView:
             self.compared.show(self.sides, self.plots.against.value)
             self.go(self.row)
 
-    async def _alone(self) -> None:
+    async def _stop_comparing(self) -> None:
         """Compare no longer."""
         if self.sides:
             self.sides = ()
@@ -146,7 +146,7 @@ class ResultView:
             self.scene.show(0)
 
     def find(self, row: int) -> None:
-        """A limit or a finding asks for its row: what touches there is shown."""
+        """A limit or a finding requests its row; the bodies that touch there are shown."""
         self.pause()
         self.go(row)
         found = [k for k, m in enumerate(self.scene.marks) if m.row == row]
@@ -155,7 +155,7 @@ class ResultView:
             self.scene.show((touching or found)[0])
 
     def pick(self, row: int) -> None:
-        """A panel asks for a row; below 0: to be told again where it is."""
+        """A panel requests a row; below 0: it requests the current one."""
         self.go(row if row >= 0 else self.row)
 
     def go(self, row: int) -> None:
@@ -203,7 +203,7 @@ class ResultView:
     # -- parts --------------------------------------------------------------------------------------------------
     async def _open(self, result: PageResult) -> None:
         self.pause()
-        await self._alone()
+        await self._stop_comparing()
         track = result.tracks[0]
         self.result, self.track = result, track
         verdict, message = result.result.verdict, result.result.message
@@ -241,7 +241,7 @@ class ResultView:
         self.slider.update()
         self.slider.set_value(float(x[self.row]) if self.row < len(x) else low)
 
-    def _tabled(self) -> None:
+    def _show_table(self) -> None:
         """Show the table that is chosen."""
         chosen = self.table.value
         self.limits.box.set_visibility(chosen == "limits")
@@ -253,7 +253,7 @@ class ResultView:
             self.tools.at(self.row)
 
     async def _found(self, number: int, row: int) -> None:
-        """A table asks for a row, of another track where it names one."""
+        """A table requests a row, of another track where it names one."""
         if self.result is None or self.track is None:
             return
         if 0 <= number < len(self.result.tracks) and self.result.tracks[number] is not self.track:
@@ -274,7 +274,7 @@ class ResultView:
             self.go(0)
             self.toggle()
 
-    def _slid(self, event: Any) -> None:
+    def _slider_moved(self, event: Any) -> None:
         if self.track is None or not isinstance(event.args, (int, float)):
             return
         self.pause()
@@ -282,7 +282,7 @@ class ResultView:
         self.row = nearest(abscissa(self.track, self.plots.against.value), float(event.args))
         self._shown(self.track)
 
-    async def _viewed(self, row: int, why: Standing) -> None:
+    async def _row_reported(self, row: int, why: Standing) -> None:
         """The 3D view stands at a row: it plays or was stopped, or its path was clicked."""
         if self.track is None:
             return

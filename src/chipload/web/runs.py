@@ -19,7 +19,7 @@ from typing import Literal
 
 #: seconds that a run has to stop by itself
 PATIENCE = 8.0
-#: characters kept of what a failed run says
+#: characters that are kept of the output of a failed run
 KEPT = 2000
 
 State = Literal["running", "stopping", "done", "stopped", "failed"]
@@ -32,11 +32,11 @@ class JobRun:
     ----------
     job, out : names in the opened folder
     overrides : values in the place of those of the job, as `--set` takes them
-    beside : name of the result that it is compared with; None: none
+    compared : name of the result that it is compared with; None: none
     """
 
-    def __init__(self, job: str, out: str, overrides: Sequence[str] = (), beside: str | None = None) -> None:
-        self.job, self.out, self.overrides, self.beside = job, out, tuple(overrides), beside
+    def __init__(self, job: str, out: str, overrides: Sequence[str] = (), compared: str | None = None) -> None:
+        self.job, self.out, self.overrides, self.compared = job, out, tuple(overrides), compared
         self.state: State = "running"
         self.done, self.what = 0.0, "starting"
         self.code: int | None = None
@@ -44,7 +44,7 @@ class JobRun:
         self._process: asyncio.subprocess.Process | None = None
 
     @property
-    def over(self) -> bool:
+    def ended(self) -> bool:
         """Whether it has ended."""
         return self.state in ("done", "stopped", "failed")
 
@@ -60,12 +60,12 @@ class JobRun:
             self.state, self.code, self.message = "failed", 1, f"no process could be started: {err.strerror}"
             return
         self._process = process
-        told, warned = process.stdout, process.stderr
-        if told is None or warned is None:
+        output, warned = process.stdout, process.stderr
+        if output is None or warned is None:
             self.state, self.code, self.message = "failed", 1, "the process has no input or output"
             return
         faults = asyncio.create_task(_tail(warned))
-        async for line in told:
+        async for line in output:
             self._take(line)
         code = await process.wait()
         fault = await faults
@@ -81,7 +81,7 @@ class JobRun:
     async def stop(self) -> None:
         """Ask it to stop, and end it where it does not."""
         process = self._process
-        if process is None or self.over or process.returncode is not None:
+        if process is None or self.ended or process.returncode is not None:
             return
         self.state = "stopping"
         _signal(process.pid, signal.SIGTERM)

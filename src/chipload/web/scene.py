@@ -46,7 +46,7 @@ class PageScene:
 
 
 def bodies(result: PageResult) -> tuple[tuple[SceneBody, ...], str]:
-    """The bodies of scene.glb beside path and cutter, and a sentence where there are none or they are simplified."""
+    """The bodies of scene.glb besides path and cutter, and a sentence where there are none or they are simplified."""
     try:
         path = result.file(SCENE)
     except InputError:
@@ -55,7 +55,7 @@ def bodies(result: PageResult) -> tuple[tuple[SceneBody, ...], str]:
         if path.stat().st_size > LARGEST:
             return (), f"{SCENE} is larger than {LARGEST // 1_000_000} MB: only the path is shown."
         out = scene_bodies(path.read_bytes())
-    except Exception:  # a reader of foreign files may fail in any way; the page says so
+    except Exception:  # a reader of foreign files may fail in any way; the page states this
         return (), f"{SCENE} cannot be read: only the path is shown."
     return out, bodies_note(out) if out else "The scene of this result has no bodies; only the path is shown."
 

@@ -19,7 +19,7 @@ from chipload.errors import InputError
 from chipload.lazy import require_extra
 from chipload.web.folder_access import OpenedFolder, open_path, resolve_name
 
-#: the only address that is listened on, and the port that is tried first where none is asked for
+#: the only address that the server listens on, and the port that it tries first by default
 HOST, PORT = "127.0.0.1", 8170
 
 
@@ -35,13 +35,13 @@ def serve(path: str | Path, port: int | None, show: bool, show_line: Callable[[s
     Raises
     ------
     InputError
-        The page is not installed, nothing can be shown of the path, or the port that was asked for is taken.
+        The page is not installed, nothing can be shown of the path, or the requested port is in use.
     """
     require_extra("web")
     opened = open_path(path)
-    listener, taken = listen(port)
+    listener, in_use = listen(port)
     own = int(listener.getsockname()[1])
-    if taken:
+    if in_use:
         show_line(f"port {PORT} is taken: using {own}")
     token = secrets.token_urlsafe(24)
     address = f"http://{HOST}:{own}/?token={token}"
@@ -77,7 +77,7 @@ def listen(port: int | None) -> tuple[socket.socket, bool]:
     Raises
     ------
     InputError
-        The port that was asked for is taken or not allowed.
+        The requested port is in use or not allowed.
     """
     for number in (port,) if port is not None else (PORT, 0):
         own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)

@@ -29,7 +29,7 @@ Ints = NDArray[np.int64]
 
 #: turn of the chords [rad] that rows are followed along, and how far a row may lie from its chord [mm]
 TURN, NEAR_MM = 0.01, 0.02
-#: rows that are followed one by one, chords that are looked ahead, and the largest text [bytes]
+#: rows that are followed one by one, chords of look-ahead, and the largest text [bytes]
 FOLLOWED, AHEAD, LARGEST = 20_000, 48, 50_000_000
 #: after so many rows on no motion at all the rest of the program is no longer searched for one
 LOST = 200
@@ -37,7 +37,7 @@ LOST = 200
 
 @dataclass(frozen=True, eq=False)
 class TrackText:
-    """A text beside a track.
+    """Source text of a track.
 
     Parameters
     ----------
@@ -108,10 +108,10 @@ def followed(place: Floats, program: Program) -> Ints:
     line = np.asarray(chords.line)
     n = len(place)
     rows = np.unique(np.linspace(0, n - 1, min(n, FOLLOWED)).astype(np.int64))
-    out, j, lost = np.zeros(len(rows), dtype=np.int64), 0, 0
+    out, j, skipped = np.zeros(len(rows), dtype=np.int64), 0, 0
     for k, row in enumerate(rows.tolist()):
         p = place[row]
-        for stop in (j + AHEAD, len(a) if lost < LOST else 0):
+        for stop in (j + AHEAD, len(a) if skipped < LOST else 0):
             some = slice(j, stop)
             share = np.clip(((p - a[some]) * d[some]).sum(axis=1) / square[some], 0.0, 1.0)
             off = np.linalg.norm(a[some] + share[:, None] * d[some] - p, axis=1)
@@ -120,7 +120,7 @@ def followed(place: Floats, program: Program) -> Ints:
                 j += int(near[0])
                 break
         else:
-            lost += 1
+            skipped += 1
         out[k] = line[j]
     return out[np.searchsorted(rows, np.arange(n), side="right") - 1]
 

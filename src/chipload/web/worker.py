@@ -18,29 +18,29 @@ from chipload.files import cannot_write, is_full
 
 #: seconds between two lines of progress
 BREATH = 0.1
-#: set when the run is asked to stop: an interrupt that falls into foreign code may be lost
+#: set when the run is to stop: an interrupt within foreign code may be lost
 ASKED = threading.Event()
 
 
 def work(job: str, out: str, *overrides: str) -> dict[str, Any]:
-    """Run the job, with overrides, and write its result; the exit code that `chipload run` has, and what it says."""
-    held = ""
+    """Run the job, with overrides, and write its result; the exit code of `chipload run`, and its message."""
+    kept_text = ""
     try:
         from chipload.jobs import load_job, resume_note, run_job
         from chipload.report.folder import check_target, checkpoint_folder, write_finished
         from chipload.simulation.checkpoint import Checkpoint
 
-        tell = Teller()
-        tell(0.0, "reading")
+        report = Teller()
+        report(0.0, "reading")
         read = load_job(job, overrides)
-        tell(0.0, resume_note(read) or "reading")
+        report(0.0, resume_note(read) or "reading")
         check_target(out)
         with Checkpoint(checkpoint_folder(out)) as kept:
             try:
-                done = run_job(read, lambda part, what: tell(0.85 * part, what), kept)
-                write_finished(done.result, done.presentation, out, lambda part, what: tell(0.85 + 0.15 * part, what))
+                done = run_job(read, lambda part, what: report(0.85 * part, what), kept)
+                write_finished(done.result, done.presentation, out, lambda part, what: report(0.85 + 0.15 * part, what))
             finally:
-                held = kept.what_is_kept()
+                kept_text = kept.what_is_kept()
             kept.discard()
         return {"code": done.result.verdict.exit_code, "message": done.result.message}
     except InputError as err:
@@ -51,7 +51,7 @@ def work(job: str, out: str, *overrides: str) -> dict[str, Any]:
         known = is_full(err)
         return {"code": 4 if known else 1, "message": str(cannot_write("the disk", err)) if known else _fault(err)}
     except (KeyboardInterrupt, Cancelled):
-        why = f"{held}: the next run continues from there" if held else "nothing was written"
+        why = f"{kept_text}: the next run continues from there" if kept_text else "nothing was written"
         return {"code": 130, "message": f"stopped: {why}"}
     except Exception as err:
         return {"code": 1, "message": _fault(err)}

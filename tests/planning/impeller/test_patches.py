@@ -14,7 +14,7 @@ from chipload.planning.impeller.compare import clear_somewhere, cutter_choices, 
 from chipload.planning.impeller.costs import STEP, ChannelSide, Costs, MeasuredCost, Terms
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.patch import Patch
-from chipload.planning.impeller.patches import begun, costs_of, divided
+from chipload.planning.impeller.patches import costs_of, divided, with_begins
 from chipload.planning.impeller.scene import Scene
 from chipload.planning.impeller.step_over import step_over
 
@@ -248,4 +248,4 @@ def test_lines_begin_at_a_border_with_another_patch():
         patch("floor", 0.0, 0.4), patch("floor", 0.4, 1.0, "v"),
     )  # fmt: skip
     # the first of three begins at its end; a patch alone, and one whose neighbour lies across it, where they may
-    assert [p.begin for p in begun(given)] == ["high", "low", "low", "any", "any", "any"]
+    assert [p.begin for p in with_begins(given)] == ["high", "low", "low", "any", "any", "any"]

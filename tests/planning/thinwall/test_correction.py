@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from chipload.errors import InputError
 from chipload.planning.thinwall.blank import FinishSurface
-from chipload.planning.thinwall.correction import found
+from chipload.planning.thinwall.correction import greatest_ratios
 from chipload.planning.thinwall.depth import DepthRange
 from chipload.planning.thinwall.force_table import ForceTable
 from chipload.planning.thinwall.passes import constant, least_first_depth, variable
@@ -34,7 +34,7 @@ def test_every_point_reaches_all_places_whose_depth_it_has_a_part_in():
         for i in range(4):
             hat = np.interp(x, u, np.eye(4)[i])  # the share of place i in the depth at x
             expected[i, j] = max(expected[i, j], r) if hat > 0.0 else expected[i, j]
-    got = found((u, v), at, v[row], ratio)
+    got = greatest_ratios((u, v), at, v[row], ratio)
     assert np.isnan(got[:, 3]).all()
     assert_allclose(got[:, :3], expected[:, :3])
 

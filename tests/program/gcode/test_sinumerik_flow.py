@@ -59,8 +59,8 @@ def test_a_loop_over_holes_is_the_same_as_holes_written_out():
 @pytest.mark.parametrize(
     ("lines", "xs", "line", "text"),
     [
-        (("IF $P_TOOLNO==3 GOTOF E", "G1 X1", "E: X2"), [1, 2], 2, "its value is not known here"),
-        (("IF ACTUAL>3", "G1 X1", "ELSE", "G1 X2", "ENDIF"), [2], 2, "ACTUAL: its value is not known here"),
+        (("IF $P_TOOLNO==3 GOTOF E", "G1 X1", "E: X2"), [1, 2], 2, "its value is not known"),
+        (("IF ACTUAL>3", "G1 X1", "ELSE", "G1 X2", "ENDIF"), [2], 2, "ACTUAL: its value is not known"),
         (("WHILE ACTUAL>3", "G1 X1", "ENDWHILE", "G1 X2"), [2], 2, "ACTUAL"),
         (("REPEAT", "G1 X1", "UNTIL ACTUAL>3", "G1 X2"), [1, 2], 4, "ACTUAL"),
         (("GOTOF NOWHERE", "G1 X1"), [1], 2, "GOTOF NOWHERE: there is no such label"),

@@ -1,4 +1,4 @@
-"""LinuxCNC: the path beside its position, the pins of the controller, a spindle to test against."""
+"""LinuxCNC: the path and the position on it, the pins of the controller, a spindle to test against."""
 
 from __future__ import annotations
 

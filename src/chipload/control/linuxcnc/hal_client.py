@@ -44,8 +44,8 @@ PINS: tuple[tuple[str, str, str], ...] = (
 
 
 class PinValues(NamedTuple):
-    """What the in pins read: time [s], position [mm], velocity on the path [mm/s], torque [N m], override in force,
-    current of the spindle [A] and its speed [rev/s], as LinuxCNC's `spindle.0.speed-in`, spindle override in force.
+    """What the in pins read: time [s], position [mm], velocity on the path [mm/s], torque [N m], override in effect,
+    current of the spindle [A] and its speed [rev/s], as LinuxCNC's `spindle.0.speed-in`, spindle override in effect.
     """
 
     time: float
@@ -66,7 +66,7 @@ class ControlledMachine(Protocol):
     def exchange(self, feed: float, beat: bool, torque: float, status: int, s: float, limit: float) -> PinValues | None:
         """Set the out pins, read the in pins; None: the machine is gone.
 
-        ``torque`` is what the controller is told, 0 without a reading, ``limit`` what it holds at this place [N m].
+        ``torque`` is what the controller receives, 0 without a reading, ``limit`` what it holds at this place [N m].
         """
 
 

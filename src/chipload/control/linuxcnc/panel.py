@@ -1,7 +1,7 @@
 """A panel of the controller for LinuxCNC: the XML that PyVCP draws, and the lines of HAL that connect it.
 
 It shows the torque, in N m and in percent of the limit that is held at the place, the feed override that is sent and
-the one in force, the spindle override that an answer to chatter has set (1: none), and why: a lamp beside each status
+the one in effect, the spindle override that an answer to chatter has set (1: none), and why: a lamp next to each status
 of the controller, in words. The panel reads pins only.
 """
 
@@ -24,7 +24,7 @@ REASONS: Mapping[Status, str] = {
     Status.NO_READING: "STOPPED: no reading of the torque",
     Status.LOW_READING: "STOPPED: torque too low for this cut",
     Status.OFF_PATH: "STOPPED: torque off the path",
-    Status.MACHINE_DATA: "STOPPED: no place or time",
+    Status.MACHINE_DATA: "STOPPED: no position or time",
 }
 #: name that PyVCP's component has under AXIS
 PANEL = "pyvcp"
@@ -46,8 +46,8 @@ def panel_xml(job: HalJob) -> str:
     """The panel of a controller: its bar ends beyond the overload."""
     overload = 100.0 * job.override.overload / job.override.torque_ref
     most = max(LOAD_MOST, int(overload) + 20)
-    torque = ("torque N m", "torque", "6.3f"), ("limit held here N m", "limit", "6.3f")
-    override = ("override sent", "sent", "5.2f"), ("override in force", "in-force", "5.2f")
+    torque = ("torque N m", "torque", "6.3f"), ("torque limit here N m", "limit", "6.3f")
+    override = ("override sent", "sent", "5.2f"), ("override in effect", "in-force", "5.2f")
     lines = [
         "<?xml version='1.0' encoding='UTF-8'?>",
         "<pyvcp>",

@@ -43,7 +43,7 @@ class ToolPath:
     model : rows at the points
     truth : rows at the points; the model itself where nothing else is known
     relief : (n,) float, above 0, torque that is allowed at the points over what is held; the controller
-        is told the torque over it
+        is given the torque over it
 
     Raises
     ------
@@ -148,7 +148,7 @@ def locate(path: ToolPath, position: ArrayLike, s: float, window: float) -> tupl
     path : the path
     position : (3,) float [mm]
     s : last place [mm]
-    window : so far from it the place is looked for, backwards and forwards [mm]
+    window : so far from it the place is searched, backwards and forwards [mm]
 
     Returns
     -------

@@ -43,21 +43,21 @@ def main() -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    asked = json.loads(sys.stdin.readline())
+    request = json.loads(sys.stdin.readline())
     types = {"float": hal.HAL_FLOAT, "bit": hal.HAL_BIT, "s32": hal.HAL_S32}
     directions = {"in": hal.HAL_IN, "out": hal.HAL_OUT}
-    component = hal.component(asked["name"])
+    component = hal.component(request["name"])
     try:
-        for name, kind, direction in asked["pins"]:
+        for name, kind, direction in request["pins"]:
             component.newpin(name, types[kind], directions[direction])
         component.ready()
         there = {x["NAME"] for x in hal.get_info_signals()}
-        for name, sig in asked["signals"].items():
+        for name, sig in request["signals"].items():
             if sig not in there:
-                kind = next(k for n, k, _ in asked["pins"] if n == name)
+                kind = next(k for n, k, _ in request["pins"] if n == name)
                 hal.new_sig(sig, types[kind])
-            hal.connect(f"{asked['name']}.{name}", sig)
-        pins, sources = asked["pins"], asked["sources"]
+            hal.connect(f"{request['name']}.{name}", sig)
+        pins, sources = request["pins"], request["sources"]
         readers = [
             partial(hal.get_value, sources[name]) if name in sources else partial(component.__getitem__, name)
             for name, _, direction in pins

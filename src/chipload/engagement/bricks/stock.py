@@ -1,7 +1,7 @@
 """The stock as the moves that cut it, for a cutter whose axis leans or turns: an index of bricks.
 
 Notation: as in :mod:`chipload.engagement.bricks._kernels`. A brick is ``BRICK`` of the smallest cutter radius wide, or
-as much wider as memory asks for; it decides which moves are asked about a point and what that costs, not the answer.
+as much wider as memory requires; it decides which moves are searched at a point and what that costs, not the answer.
 Bricks are kept in blocks of 8 x 8 x 8 where moves left a surface: memory follows the surface. A cutter ends where its
 flutes end; a step with material there is reported.
 """
@@ -45,7 +45,7 @@ TURN = 0.1
 FIXED = 1e-12
 #: slices of a range in contact, at least: bottom and flank of a leaning cutter have slices as a corner has
 FEW = 12
-#: ranges of a part of the profile that are told apart
+#: ranges of a part of the profile that are distinguished
 RANGES = 32
 
 
@@ -75,9 +75,11 @@ def move_rows(p0: Floats, p1: Floats, a0: Floats, a1: Floats) -> Floats:
     cosine, sine = np.cos(theta)[:, None], np.sin(theta)[:, None]
     u, n = p1 - p0, np.cross(a0, b)
     length = np.linalg.norm(u, axis=1)
-    way = (-(u * v).sum(axis=1) for v in (n, b * cosine - a0 * sine, a0 * cosine + b * sine))
+    products = (-(u * v).sum(axis=1) for v in (n, b * cosine - a0 * sine, a0 * cosine + b * sine))
     bend = (theta + 2.0) * length
-    return np.column_stack([p0, u, a0, b, theta, length, n, *way, -2.0 * np.sin(0.5 * theta) ** 2, np.sin(theta), bend])
+    return np.column_stack(
+        [p0, u, a0, b, theta, length, n, *products, -2.0 * np.sin(0.5 * theta) ** 2, np.sin(theta), bend]
+    )
 
 
 class BrickStock:
@@ -181,7 +183,7 @@ class BrickStock:
         self.kept = fresh
 
     def forget(self) -> None:
-        """Drop the index and the moves, which grow with the program, when nothing more is asked of the stock."""
+        """Drop the index and the moves, which grow with the program, when the stock is no longer used."""
         self.kept = self.alive = self.blocks = np.empty(0, dtype=np.int32)
         self.bricks = np.empty((0, 3), dtype=np.int32)
         self.moves, self.of = np.empty((0, 23)), np.empty(0, dtype=np.int64)
@@ -236,9 +238,13 @@ class BrickStock:
         begin, pieces = self.count, max(pieces, FEW)
         self._enter(moves, tool)
         flank = np.array([flank_mm[n] for n in self.tools])
-        many = 16 * max(int(instants.sum()), 1) + 256
-        slices, rows, owner = np.empty((many, 9)), np.empty((2 * many, 2)), np.empty(2 * many, dtype=np.int64)
-        entry, out = np.empty((many, 3), dtype=np.int64), np.empty((many, 19))
+        capacity = 16 * max(int(instants.sum()), 1) + 256
+        slices, rows, owner = (
+            np.empty((capacity, 9)),
+            np.empty((2 * capacity, 2)),
+            np.empty(2 * capacity, dtype=np.int64),
+        )
+        entry, out = np.empty((capacity, 3), dtype=np.int64), np.empty((capacity, 19))
         state = np.array([begin, 0, 0, 0, 0, *self.more])
         nodes = np.zeros((pieces + 1, pieces, 3))
         for count in range(1, pieces + 1):

@@ -177,7 +177,7 @@ def covered_rings(moves: Sequence[Move], K: Floats, heights: Sequence[Floats], t
         [np.cumsum(count[count > 0]) - count[count > 0], [len(points) + a for a, _ in ends.values()]]
     )
     table = np.column_stack([begin, size]).astype(np.int64)
-    return _together(np.concatenate([points, loops]), table, which, shapes, len(levels))
+    return _plane_areas(np.concatenate([points, loops]), table, which, shapes, len(levels))
 
 
 def _is_straight(move: Move, K: Floats) -> bool:
@@ -219,10 +219,10 @@ def _turning(
     first = np.cumsum([0, *(len(h) for h in heights)])
     which = np.flatnonzero(some).tolist()
     own = [moves[m] for m in which]
-    asked = np.cumsum([0, *(len(heights[m]) for m in which)])
+    starts = np.cumsum([0, *(len(heights[m]) for m in which)])
     levels = np.concatenate([np.empty(0), *(heights[m] for m in which)])
     at = np.flatnonzero(np.repeat(some, np.diff(first))).tolist()
-    buffer, count, knots, whole = _loops(own, K, levels, asked, tolerance)
+    buffer, count, knots, whole = _loops(own, K, levels, starts, tolerance)
     rings, shapes = dict[int, tuple[int, int]](), dict[int, Shape | None]()
     simple = np.flatnonzero(count >= 0)
     end = np.cumsum(count[simple])
@@ -232,14 +232,14 @@ def _turning(
         else:
             shapes[at[i]] = _thick(_untangled(shapely.Polygon(buffer[a : a + n, :2])), tolerance)
     for i in np.flatnonzero(count == trace.GENERAL).tolist():
-        move, h = own[int(np.searchsorted(asked, i, "right")) - 1], float(levels[i])
+        move, h = own[int(np.searchsorted(starts, i, "right")) - 1], float(levels[i])
         edges = _candidates(move, K, h, tolerance, max(_KNOTS, 4 * int(knots[i])))
         found = _noded_shape(edges, move, K, h, tolerance)
         shapes[at[i]] = None if found is None else _thick(found, tolerance)
     return buffer[: int(end[-1]) if len(end) else 0, :2], rings, shapes
 
 
-def _together(points: Floats, table: Ints, which: Ints, shapes: dict[int, Shape | None], count: int) -> PlaneAreas:
+def _plane_areas(points: Floats, table: Ints, which: Ints, shapes: dict[int, Shape | None], count: int) -> PlaneAreas:
     """Areas of ``count`` layers: those of ``which`` have the rings ``table``, some a shape, the others none."""
     first = np.zeros((count, 2), dtype=np.int64)
     first[which] = np.arange(len(which))[:, None] + np.array([0, 1])

@@ -78,10 +78,10 @@ def bulges(edges: Floats, f0: Floats, f1: Floats) -> Floats:
     L2 = (edges[:, 2] - edges[:, 0]) ** 2 + (edges[:, 3] - edges[:, 1]) ** 2
     m0, m1 = edges[:, 8], edges[:, 9]
 
-    def upto(s: Floats) -> Floats:
+    def integral_to(s: Floats) -> Floats:
         return m0 * (s**2 / 2 - 2 * s**3 / 3 + s**4 / 4) + m1 * (s**4 / 4 - s**3 / 3)
 
-    return np.asarray(-L2 * (upto(f1) - upto(f0)))
+    return np.asarray(-L2 * (integral_to(f1) - integral_to(f0)))
 
 
 def ring_of_edges(edges: Floats) -> Ring:

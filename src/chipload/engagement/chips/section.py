@@ -46,7 +46,7 @@ def cutter_numbers(cutter: Cutter) -> Floats:
 
 
 def lengthened(K: Floats, length: float) -> Floats:
-    """The numbers of a cutter whose flutes go on to another length [mm] along its flank."""
+    """The numbers of a cutter whose flutes extend to another length [mm] along its flank."""
     out = K.copy()
     out[10], out[11] = length, K[9] + length * K[8]
     if K[13] > 0.0 and length < K[14] - K[13] * K[6]:

@@ -1,7 +1,7 @@
 """The stock as the moves that cut it: an initial body less the volumes that earlier moves swept.
 
 Notation: as in :mod:`chipload.engagement.moves._kernels`. A cell of the index is ``CELL`` of the smallest cutter radius
-wide, or as much wider as memory asks for; it decides which moves are asked about a point and what that costs, not the
+wide, or as much wider as memory requires; it decides which moves are searched at a point and what that costs, not the
 answer. The axis stands along z; a cutter is open above: what lies above its flutes counts as swept, and a step with
 material there is reported.
 """
@@ -37,9 +37,9 @@ CELL, CELLS = 0.1, 4_000_000
 THIN = 0.1
 #: entries of lists: room that is made at least, and more if the lists take as much
 ROOM = (1 << 17, 1 << 22)
-#: a step is looked at once every so many cutter radii, at its middle at least
+#: a step is evaluated once every so many cutter radii, at its middle at least
 INSTANT = 0.25
-#: instants of a step that is looked at once and does not cut as the one before it, and of one that enters or leaves;
+#: instants of a step that is evaluated once and does not cut as the one before it, and of one that enters or leaves;
 #: of longer steps, of each of their parts
 MORE = (3, 25)
 
@@ -68,7 +68,7 @@ def cutter_row(cutter: Cutter) -> Floats:
 
 
 def corner_parts(count: int) -> Floats:
-    """(count, 3) parts of 0..1 into which the engaged part of a corner is cut: from, to, and where each is looked at.
+    """(count, 3) parts of 0..1 into which the engaged part of a corner is cut: from, to, and where each is evaluated.
 
     They are the weights and nodes of Gauss and Legendre, so that a sum over the slices is that of a smooth engagement;
     the slices are narrow at both ends, where contact begins and where the chip is thickest.
@@ -241,10 +241,10 @@ class MoveStock:
             self.moves = np.concatenate([self.moves, np.empty_like(self.moves)])
             self.of = np.concatenate([self.of, np.empty_like(self.of)])
         end = self.count + len(p0)
-        way = p1 - p0
-        square = np.column_stack([(way[:, :2] ** 2).sum(axis=1), (way**2).sum(axis=1)])
+        vector = p1 - p0
+        square = np.column_stack([(vector[:, :2] ** 2).sum(axis=1), (vector**2).sum(axis=1)])
         over = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
-        self.moves[self.count : end] = np.hstack([p0, way, over])
+        self.moves[self.count : end] = np.hstack([p0, vector, over])
         numbers, at = np.unique(tool, return_inverse=True)
         self.of[self.count : end] = np.array([self.tools[n] for n in numbers.tolist()], dtype=np.int64)[at.ravel()]
         self.count = end
@@ -261,7 +261,7 @@ class MoveStock:
         self.used[0] = used
 
     def forget(self) -> None:
-        """Drop the index and the moves, which grow with the program, when nothing more is asked of the stock."""
+        """Drop the index and the moves, which grow with the program, when the stock is no longer used."""
         self.kept, self.reach = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.uint16)
         self.moves, self.of = np.empty((0, 8)), np.empty(0, dtype=np.int64)
         self.lists, self.level, self.tops = np.empty((0, 4), dtype=np.int64), np.empty((0, 3)), np.empty(0)
@@ -300,9 +300,13 @@ class MoveStock:
         frame = np.where(upright[:, None], [[1.0, 0.0]], u[:, :2] / np.where(upright, 1.0, size)[:, None])
         frame = np.ascontiguousarray(frame)
         flank = np.array([flank_mm[n] for n in self.tools])
-        many = 16 * max(int(instants.sum()), 1) + 256
-        slices, rows, owner = np.empty((many, 6)), np.empty((2 * many, 2)), np.empty(2 * many, dtype=np.int64)
-        entry, out = np.empty((many, 3), dtype=np.int64), np.empty((many, 10))
+        capacity = 16 * max(int(instants.sum()), 1) + 256
+        slices, rows, owner = (
+            np.empty((capacity, 6)),
+            np.empty((2 * capacity, 2)),
+            np.empty(2 * capacity, dtype=np.int64),
+        )
+        entry, out = np.empty((capacity, 3), dtype=np.int64), np.empty((capacity, 10))
         state = np.array([begin, 0, 0, 0, 0, *self.more])
         parts = corner_parts(pieces)
         at, work = 0, work_room(self.grid, self.cutters, pieces, flank)

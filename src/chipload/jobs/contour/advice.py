@@ -69,16 +69,16 @@ def greatest_engagement(
         return _exceeded(cut, feed, math.radians(degrees), limits, checks, machine)
 
     most = min(GREATEST_DEG, limits.get("engagement_deg", GREATEST_DEG))
-    # the rigid model asks for a radial depth that is not too small: what holds need not hold below it
-    looked = [most, *np.arange(math.ceil(most / APART_DEG) - 1, 0, -1) * APART_DEG]
+    # the rigid model needs a radial depth that is not too small: what holds need not hold below it
+    candidates = [most, *np.arange(math.ceil(most / APART_DEG) - 1, 0, -1) * APART_DEG]
     by, high = None, most
-    for low in (float(x) for x in looked if x >= LEAST_DEG):
+    for low in (float(x) for x in candidates if x >= LEAST_DEG):
         found = exceeded(low)
         if found is None:
             break
         by, high = found, low
     else:
-        why = "" if by is None else f": {_told(by)}"
+        why = "" if by is None else f": {_limit_text(by)}"
         raise InputError(
             f"operation.engagement_deg = 'limit': no engagement from {LEAST_DEG:g} deg keeps the limits{why}: lower "
             "feed_mm_min or axial_depth_mm"
@@ -95,10 +95,10 @@ def greatest_engagement(
             low = middle
         else:
             high, by = middle, found
-    return EngagementAdvice(math.radians(low), f"engagement {low:.4g} deg, by {_told(by)}")
+    return EngagementAdvice(math.radians(low), f"engagement {low:.4g} deg, by {_limit_text(by)}")
 
 
-def _told(check: LimitCheck) -> str:
+def _limit_text(check: LimitCheck) -> str:
     """A limit that does not hold, with its value."""
     value = "" if check.worst is None else f" {check.worst:.4g} of {check.limit:.4g}"
     return f"{check.name}{value}{f', {check.reason}' if check.reason else ''}"
@@ -116,11 +116,13 @@ def _exceeded(
     begin = np.linspace(0.0, math.pi - angle, PLACES)
     phi = np.zeros((PLACES, PIECES, 2))
     phi[:, 0, 0], phi[:, 0, 1] = begin, begin + angle
-    met = Engagement(np.full(PLACES, angle), np.ones(PLACES, dtype=np.int64), phi)
+    engagement = Engagement(np.full(PLACES, angle), np.ones(PLACES, dtype=np.int64), phi)
     zero, ahead = np.zeros(PLACES), np.tile([1.0, 0.0], (PLACES, 1))
     wall = np.arange(PLACES) == (PLACES - 1 if cut.milling == "down" else 0)
     zone = np.full(PLACES, "pocket", dtype=object)
-    columns = dict(cost(cut, zone, zero, zero, np.zeros((PLACES, 2)), ahead, 0.0, met, np.full(PLACES, feed), wall))
+    columns = dict(
+        cost(cut, zone, zero, zero, np.zeros((PLACES, 2)), ahead, 0.0, engagement, np.full(PLACES, feed), wall)
+    )
     columns["tool"] = np.full(PLACES, cut.cutter.number)
     found = [check_limit(name, limit, columns) for name, limit in limits.items() if name != "engagement_deg"]
     found += default_limits(checks, machine, columns, "", {})

@@ -24,10 +24,10 @@ def clearing_estimate(cleared: Iterable[tuple[float, Clearing, float]]) -> list[
 
     Parameters
     ----------
-    cleared : area [mm^2], what is asked, and radius of the cutter [mm] of each pocket
+    cleared : area [mm^2], the request, and radius of the cutter [mm] of each pocket
     """
     steps = sum(
-        len(asked.strategies) * area / (asked.radial_depth * min(asked.step, STEP * radius))
-        for area, asked, radius in cleared
+        len(request.strategies) * area / (request.radial_depth * min(request.step, STEP * radius))
+        for area, request, radius in cleared
     )
     return [estimate(round(steps), 0, QUICK, SLOW, coarse=False)] if steps else []

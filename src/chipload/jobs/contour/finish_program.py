@@ -1,7 +1,7 @@
 """The finish path of a contour taken from an NC program, and the semi-finish passes written back into its text.
 
 The level lines and arcs of the stated lines of the program are the path of the cutter's centre in the finish pass; the
-wall lies R beside it, on the side that the milling says. A program may finish a wall at several heights, from above:
+wall lies R to the side that the milling states. A program may finish a wall at several heights, from above:
 each is a level of its own, as deep as it lies below the one before. Semi-finish passes are inserted into the text where
 the program was last at a safe height before a level: after the calls of its tool, under its work offset. All other
 lines stay as they are. The new text is read again: every motion of the old one must come back, and the inserted ones
@@ -113,9 +113,9 @@ def read_finish(
     for first, last in ranges:
         rows = np.flatnonzero(cuts & (p.line >= first) & (p.line <= last))
         if not len(rows):
-            asked = f" in lines {first} to {last}" if lines or labels else ""
+            line_range = f" in lines {first} to {last}" if lines or labels else ""
             raise InputError(
-                f"part.file = {path.name}: no horizontal cut below the stock's top{asked}: state part.lines"
+                f"part.file = {path.name}: no horizontal cut below the stock's top{line_range}: state part.lines"
             )
         ends = np.flatnonzero((np.diff(rows) > 1) | (np.abs(np.diff(z[rows])) > LEVEL_MM)) + 1
         found = np.split(rows, ends)
@@ -190,7 +190,7 @@ def flat_lengths(p: Program) -> NDArray[Any]:
 
 
 def finish_contours(finish: FinishProgram, cutter: Cutter, milling: str, side: str | None) -> tuple[Contour, ...]:
-    """The wall beside the finish path.
+    """The wall next to the finish path.
 
     Raises
     ------
@@ -209,7 +209,7 @@ def finish_contours(finish: FinishProgram, cutter: Cutter, milling: str, side: s
     walls = offset([path], -cutter.radius if right else cutter.radius)
     if len(walls) != 1:
         raise InputError(
-            f"part.file = {finish.file.name}: the wall beside the path has {len(walls)} parts: must have one"
+            f"part.file = {finish.file.name}: the wall next to the path has {len(walls)} parts: must have one"
         )
     sides = (
         ("left", "right") if not path.closed else ("inside", "outside") if path.area > 0.0 else ("outside", "inside")

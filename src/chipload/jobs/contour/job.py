@@ -23,7 +23,7 @@ from chipload.jobs.sources import Limited, entries_of, sources_and_cutters, unkn
 
 @dataclass(frozen=True)
 class ContourJob(Limited):
-    """A job that was read and found whole; paths are absolute.
+    """A valid job; paths are absolute.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class ContourJob(Limited):
     cutters : by number
     part_file : the drawing or model
     machine, material : a shipped name or a file
-    findings : what was noticed and does not stop the job
+    findings : observations that do not stop the job
     overrides : the `--set` texts that were applied
     """
 
@@ -81,7 +81,7 @@ def missing(values: Mapping[str, Any]) -> list[str]:
 
 
 def _contradictions(table: ContourJobTable, cutters: Mapping[int, Cutter]) -> Iterator[str]:
-    """What an operation's values and its cutter contradict, and that nothing is checked at all."""
+    """Contradictions between an operation and its cutter, and a job without limits."""
     for k, op in enumerate(table.operation):
         at = f"operation.{k}"
         if op.kind in STRATEGIES and op.strategies is not None:
@@ -113,7 +113,7 @@ def _contradictions(table: ContourJobTable, cutters: Mapping[int, Cutter]) -> It
 
 
 def _wrong_stock(table: ContourJobTable) -> Iterator[str]:
-    """What contradicts a stock that an earlier result left."""
+    """Contradictions with a stock of an earlier result."""
     if any(op.kind != "pocket" for op in table.operation):
         yield "stock.file: only pockets can continue from an earlier result: leave it out for other kinds"
     if table.part.stock_layers:
@@ -125,7 +125,7 @@ def _wrong_stock(table: ContourJobTable) -> Iterator[str]:
 
 
 def _wrong_pocket(at: str, k: int, table: ContourJobTable, cutters: Mapping[int, Cutter]) -> Iterator[str]:
-    """What the keys of a pocket contradict."""
+    """Contradictions between the keys of a pocket."""
     op = table.operation[k]
     if (op.radial_depth_mm is None) == (op.engagement_deg is None):
         state = "missing" if op.radial_depth_mm is None else "stated twice"
@@ -187,7 +187,7 @@ def _wrong_strategies(at: str, op: OperationTable) -> Iterator[str]:
 
 
 def _unused(table: ContourJobTable) -> tuple[str, ...]:
-    """Keys that are stated but mean nothing to the kind of their operation."""
+    """Stated keys that the kind of their operation does not use."""
     out = []
     for k, op in enumerate(table.operation):
         known = {*ALWAYS, "clearance_mm", *NEEDS[op.kind], *MAY[op.kind]}

@@ -41,9 +41,9 @@ class Operation:
     cutter : the tool
     top, depth : z of the stock's top, depth of cut [mm]
     verifications : by strategy
-    machine_findings : by strategy, what its program asks of the machine that it does not give
+    machine_findings : by strategy, violations of the machine's limits
     limits : of the job, by name
-    checks : what is checked beside the limits; None: nothing
+    checks : checks in addition to the limits; None: nothing
     inserted : name and text of the program that the finish path came from, with the semi-finish passes; else ""
     """
 

@@ -50,8 +50,8 @@ def read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Contour, ...]
     outline, contours = _stock_outline(part.stock_layers, drawing) if part.stock_layers else ((), drawing.contours)
     contours, outline = moved(contours, part.origin_mm), moved(outline, part.origin_mm)
     kept, left_out = closed_alone(contours) if part.open_chains == "dropped" else (contours, ())
-    used, met = clear_of_each_other(kept)
-    return used, outline, tuple(replace(f, text=f"part: {f.text}") for f in (*drawing.findings, *left_out, *met))
+    used, crossings = clear_of_each_other(kept)
+    return used, outline, tuple(replace(f, text=f"part: {f.text}") for f in (*drawing.findings, *left_out, *crossings))
 
 
 def require_heights(job: ContourJob, face: StepLevel) -> None:
@@ -110,7 +110,7 @@ def require_within_travel(contours: Sequence[Contour], machine: Machine, radius:
             remedy = (
                 f"move it by part.origin_mm, {axis} by {middle:.6g}"
                 if high - low - 2.0 * radius <= most - least
-                else "name a machine with more travel, or see whether part.units is right"
+                else "name a machine with more travel, or check part.units"
             )
             raise InputError(
                 f"part: {axis} from {low:.6g} to {high:.6g} mm: machine {machine.name} travels from {least:g} to "

@@ -96,13 +96,13 @@ def along(operation: Operation) -> go.Figure:
         figure.update_yaxes(title_text=COLUMNS[column].title, range=[0.0, reach or 1.0], row=row, col=1)
         if limit is None:
             continue
-        said = {"text": f"limit {limit:g}" + ("" if near else ", far above"), "font": {"color": LIMIT, "size": 11}}
+        label = {"text": f"limit {limit:g}" + ("" if near else ", far above"), "font": {"color": LIMIT, "size": 11}}
         if near:
             line = {"color": LIMIT, "width": 1.2, "dash": "dash"}
-            figure.add_hline(y=limit, line=line, annotation=said, annotation_position="top left", row=row, col=1)
+            figure.add_hline(y=limit, line=line, annotation=label, annotation_position="top left", row=row, col=1)
         else:
             at = {"x": 0.0, "y": reach, "xref": "x domain", "xanchor": "left", "yanchor": "top", "showarrow": False}
-            figure.add_annotation(**said, **at, row=row, col=1)
+            figure.add_annotation(**label, **at, row=row, col=1)
     figure.update_xaxes(title_text="length along the pass [mm]", row=len(shown), col=1)
     figure.update_layout(hovermode="x unified", legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0})
     return _styled(figure, 110 + 172 * len(shown), {"l": 64, "r": 16, "t": 30, "b": 44})

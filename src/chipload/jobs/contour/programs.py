@@ -40,7 +40,7 @@ def inserted_name(operation: int, name: str) -> str:
 
 
 def _comments(outcome: ContourResult, op: Operation, name: str) -> list[str]:
-    """What the man at the machine must know: why not to run it, the tool, the zero."""
+    """Comments for the machine operator: why not to run it, the tool, the zero."""
     c = op.cutter
     bad = failures_of(outcome.machine, op, name)
     out = [] if name == op.result.use else [f"not released: the job uses {op.result.use}"]

@@ -46,7 +46,7 @@ from chipload.simulation.verify import verify_contour
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
-#: what the simulation may find and still call a program proved
+#: greatest deviations with which the simulation proves a program
 ENGAGEMENT_DEG, GOUGE_MM, CHORDS_MM = 0.05, 1e-4, 1e-3
 #: heights of a program are rounded to this [mm]
 ROUNDED_MM = 1e-6
@@ -222,16 +222,16 @@ def check(job: ContourJob) -> tuple[list[str], bool]:
 
 
 def _above_limit(job: ContourJob, k: int, op: OperationTable, cutter: Cutter) -> list[str]:
-    """That the engagement along a straight wall is above its limit: in an inside corner it is greater still."""
+    """Message if the engagement along a straight wall exceeds its limit; in an inside corner it is greater still."""
     limit, depth = job.limits.get("engagement_deg"), op.radial_depth_mm
     if limit is None or depth is None or not 0.0 < depth < cutter.diameter:
         return []
-    asked = math.degrees(math.acos(1.0 - depth / cutter.radius))
-    if asked <= limit * (1.0 + 1e-9):
+    needed = math.degrees(math.acos(1.0 - depth / cutter.radius))
+    if needed <= limit * (1.0 + 1e-9):
         return []
     most = cutter.radius * (1.0 - math.cos(math.radians(limit)))
     return [
-        f"limits.engagement_deg = {limit:g} cannot be held: operation {k} asks for {asked:.4g} deg along a straight "
+        f"limits.engagement_deg = {limit:g} cannot be kept: operation {k} needs {needed:.4g} deg along a straight "
         f"wall: state a radial depth of at most {most:.4g} mm, or a greater limit"
     ]
 
@@ -319,7 +319,7 @@ def _larger(job: ContourJob, op: OperationTable, planned: Sequence[OperationResu
 
 
 def _standing(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[Contour, ...] | None:
-    """What stands in the depth of a pocket before it begins; None where no file says so."""
+    """Material in the depth of a pocket before it begins; None where no file states it."""
     if inputs.standing is None:
         return None
     floor = inputs.top - (op.axial_depth_mm if op.depth_mm is None else op.depth_mm)
@@ -342,7 +342,7 @@ def _wall_finish(op: OperationTable) -> WallFinish | None:
 def _setting(
     job: ContourJob, inputs: Inputs, op: OperationTable, planned: Sequence[OperationResult] = ()
 ) -> Finishing | Clearing:
-    """What an operation asks of its planner, behind those that are ``planned``."""
+    """Request of an operation to its planner, after those that are ``planned``."""
     rigid, radial = _rigid(job), op.radial_depth_mm or 0.0
     if op.kind == "pocket":
         return Clearing(
@@ -400,12 +400,12 @@ def verify(
 ) -> PlanVerification:
     """Compare the history of one strategy with a simulation of its program that is independent of the planner.
 
-    The planner says in ``drawn`` what the program starts from (`stock before`, closed contours; a front starts in the
+    ``drawn`` states the stock from which the program starts (`stock before`, closed contours; a pocket starts in the
     solid) and the `wall`, whose travel has the part on its right.
     """
     before = strategy.drawn.get("stock before", ())
     if not before and op.kind != "pocket":
-        return PlanVerification(Verdict.UNPROVEN, "the planner does not say what stock the program starts from")
+        return PlanVerification(Verdict.UNPROVEN, "the planner does not state the stock from which the program starts")
     # eased joints may leave the drawn wall to either side, a cutter may leave stock in a corner; the path of a pocket
     # lies within a tolerance of its region, and what it leaves over is judged by its area, which the planner reports
     leave = op.tolerance_mm or 0.0
@@ -416,7 +416,7 @@ def verify(
     height = top - (op.depth_mm or op.axial_depth_mm) + (op.tabs.height_mm if op.tabs is not None else 0.0)
     names = np.asarray(strategy.history["pass"]).astype(str)
     left_out = int(np.isin(names, NOT_LEVEL).sum())
-    told = verify_contour(
+    verification = verify_contour(
         strategy.program,
         cutter.radius,
         strategy.history,
@@ -433,17 +433,17 @@ def verify(
         progress=progress,
     )
     return PlanVerification(
-        VERDICTS[told.verdict],
-        "; ".join((*told.reasons, told.text)),
+        VERDICTS[verification.verdict],
+        "; ".join((*verification.reasons, verification.text)),
         {
-            "engagement_difference_deg": told.engagement_difference_deg,
-            "engagement_at_mm": list(told.engagement_at),
-            "gouge_mm": told.gouge_mm,
-            "gouge_at_mm": list(told.gouge_at),
-            "excess_mm": told.excess_mm,
-            "excess_at_mm": list(told.excess_at),
-            "rapids_through_stock": [list(p) for p in told.rapids],
-            "rows_compared": told.compared,
+            "engagement_difference_deg": verification.engagement_difference_deg,
+            "engagement_at_mm": list(verification.engagement_at),
+            "gouge_mm": verification.gouge_mm,
+            "gouge_at_mm": list(verification.gouge_at),
+            "excess_mm": verification.excess_mm,
+            "excess_at_mm": list(verification.excess_at),
+            "rapids_through_stock": [list(p) for p in verification.rapids],
+            "rows_compared": verification.compared,
             "rows_not_compared": left_out,
         },
     )

@@ -81,12 +81,12 @@ def _path(history: Mapping[str, NDArray[Any]], highest: float) -> Any:
     points = np.column_stack([history[k][rows] for k in ("x_mm", "y_mm", "z_mm")])
     colours = engagement_colours(history["engagement_deg"][rows], highest)
     piece = stretches(history)[rows]
-    broken = np.flatnonzero(piece[1:] != piece[:-1]) + 1
+    breaks = np.flatnonzero(piece[1:] != piece[:-1]) + 1
     shade = np.flatnonzero((colours[1:] != colours[:-1]).any(axis=1)) + 1
-    cuts = np.unique(np.concatenate([[0], broken, shade, [len(rows) - 1]]))
+    cuts = np.unique(np.concatenate([[0], breaks, shade, [len(rows) - 1]]))
     entities = [
-        trimesh.path.entities.Line(np.arange(a, b + (b not in broken)), color=colours[a])
+        trimesh.path.entities.Line(np.arange(a, b + (b not in breaks)), color=colours[a])
         for a, b in zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True)
-        if b + (b not in broken) - a >= 2
+        if b + (b not in breaks) - a >= 2
     ]
     return trimesh.path.Path3D(entities=entities, vertices=points, process=False)

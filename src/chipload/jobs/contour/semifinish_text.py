@@ -122,7 +122,7 @@ def _conversational(planned: Program, rows: Ints, p: Program, k: int, decimals: 
     return out
 
 
-def _begun(program: Program, count: int) -> Program:
+def _first_rows(program: Program, count: int) -> Program:
     """The first rows of a program."""
     columns = [f.name for f in fields(program) if f.name != "labels"]
     return replace(program, **{name: getattr(program, name)[:count] for name in columns})
@@ -131,7 +131,7 @@ def _begun(program: Program, count: int) -> Program:
 def _cl_data(planned: Program, rows: Ints, p: Program, k: int) -> list[str]:
     x, y, z = p.p_work[k].tolist()
     safe = max(float(planned.p_work[rows, 2].max()), z)
-    text = write_apt(_begun(planned, len(rows)), None, title="", verified=True)
+    text = write_apt(_first_rows(planned, len(rows)), None, title="", verified=True)
     body = [line for line in text.splitlines() if _WHOLE.match(line) is None]
 
     def rapid(to: Sequence[float]) -> list[str]:

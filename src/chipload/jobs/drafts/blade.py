@@ -41,7 +41,7 @@ def holds_sections(file: Path) -> bool:
 
 
 def draft_sections(file: Path, folder: Path, machine: str | None = None) -> Draft:
-    """The draft of a thin wall whose shape is lofted through sections; numbered files beside this one belong to it.
+    """The draft of a thin wall whose shape is lofted through sections; numbered files next to this one belong to it.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def draft_blade_model(file: Path, folder: Path, model: Model, machine: str | Non
             patch_of(face, "its patch", FIT_MM)
     except InputError as err:
         raise InputError(
-            f"{file.name}: the largest curved faces, {front.number} and {back.number}, are no sides of a thin wall: "
+            f"{file.name}: the largest curved faces, {front.number} and {back.number}, are not sides of a thin wall: "
             f"{err}; chipload check {file.name} lists all faces: write the job with those of one blade"
         ) from None
     rest: list[Face] = [f for f in model.faces if f not in (front, back)]
@@ -103,7 +103,7 @@ def draft_blade_model(file: Path, folder: Path, model: Model, machine: str | Non
 
 
 def _numbered(file: Path) -> list[Path]:
-    """The file, or all files beside it whose names differ in their last number only."""
+    """The file, or all files in its folder whose names differ in their last number only."""
     found = _NUMBERED.match(file.stem)
     if file.suffix.lower() in ENDINGS or found is None:
         return [file]

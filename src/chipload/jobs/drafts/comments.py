@@ -62,7 +62,7 @@ _TOOL_MILL = re.compile(rf"TOOL/MILL\s*,\s*{_NUMBER}\s*,\s*{_NUMBER}\s*,", re.IG
 _CORNER = re.compile(r"\(\s*stock(Min|Max)\s*:([^()\n]*)\)", re.IGNORECASE)
 #: lines above a change of tools whose comments may describe the tool
 ABOVE = 6
-#: what says that a number is no alloy: a date, a time, the name of a file or a program
+#: signs that a number is not an alloy: a date, a time, the name of a file or a program
 _DATE = re.compile(
     r"\b(?:DATE|TIME|CREATED|OUTPUT|GENERATED|EXPORTED|POSTED|VERSION|COPYRIGHT|FILE|PROGRAM)\b|[0-9]{1,2}:[0-9]{2}|"
     r"(?:JAN|FEB|MAR|APR|MAY|JUN|JUL|AUG|SEP|OCT|NOV|DEC)[A-Z]*[ .-]|[0-9][-./][0-9]+[-./][0-9]",
@@ -94,7 +94,7 @@ _MATERIALS = (
 
 @dataclass(frozen=True)
 class Header:
-    """Cutters, stock and material that a text states beside its motions.
+    """Cutters, stock and material that a text states besides its motions.
 
     Parameters
     ----------
@@ -174,19 +174,19 @@ def _at_changes(text: str) -> list[tuple[int, str]]:
         words = _COMMENT.sub(" ", line)
         if found := _TOOL_WORD.search(words):
             chosen = int(found[1])
-        said = [hit[1] or hit[2] or "" for hit in _COMMENT.finditer(line)]
+        comments = [hit[1] or hit[2] or "" for hit in _COMMENT.finditer(line)]
         if _CHANGE.search(words) and chosen:
-            described = [c for c in (*said, *reversed(above)) if _of_a_tool(c)]
+            described = [c for c in (*comments, *reversed(above)) if _of_a_tool(c)]
             out += [(chosen, described[0].strip())] if described else []
             above, waiting = [], 0 if described else chosen
         elif _MOTION.search(words):
             above, waiting = [], 0
         else:
-            below = [c for c in said if waiting and _of_a_tool(c)]
+            below = [c for c in comments if waiting and _of_a_tool(c)]
             if below:
                 out.append((waiting, below[0].strip()))
                 waiting = 0
-            above = [*above, *(said or [""])][-ABOVE:]
+            above = [*above, *(comments or [""])][-ABOVE:]
     return out
 
 
@@ -323,8 +323,8 @@ def _corner(text: str, mm: float) -> tuple[float, ...]:
 
 
 def _material(text: str) -> tuple[str, str] | None:
-    said = [" ".join((hit[1] or hit[2] or hit[3] or "").split()) for hit in _COMMENT.finditer(text)]
-    for comment in said:
+    comments = [" ".join((hit[1] or hit[2] or hit[3] or "").split()) for hit in _COMMENT.finditer(text)]
+    for comment in comments:
         # a tool of high-speed steel is no workpiece of steel, and 2024 may be a year
         if _OF_TOOL.search(comment):
             continue

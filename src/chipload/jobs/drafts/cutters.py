@@ -66,8 +66,8 @@ def _guesses(stated: Mapping[str, tuple[Any, str]], deepest: float) -> dict[str,
     out["flutes"] = (2 if d < 4.0 or drill else 3, "no file states them; a common number")
     if drill and "corner_radius_mm" not in stated:
         spot = re.search(r"SPOT|CENT(?:ER|RE)|NC.?DRILL|ZENTRIER|ANBOHR", str(stated["name"][0]), re.IGNORECASE)
-        out["bottom_deg"] = (45.0, "a point of 90 deg") if spot else (31.0, "a point of 118 deg, usual of drills")
-    out["helix_deg"] = (30.0, "no file states it; usual of end mills")
+        out["bottom_deg"] = (45.0, "a point of 90 deg") if spot else (31.0, "a point of 118 deg, usual for drills")
+    out["helix_deg"] = (30.0, "no file states it; usual for end mills")
     longest = float(stated["overhang_mm"][0]) if "overhang_mm" in stated else 3000.0
     if "flute_length_mm" in stated:
         flute = float(stated["flute_length_mm"][0])

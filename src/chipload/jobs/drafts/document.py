@@ -63,7 +63,7 @@ def read_document(path: Path) -> Document:
     with open_regular(path, path.name, LARGEST_FILE, "save the part alone") as stream:
         try:
             with zipfile.ZipFile(stream) as archive:
-                names = [i for i in archive.infolist() if i.filename == "Document.xml" or _wanted(i.filename)]
+                names = [i for i in archive.infolist() if i.filename == "Document.xml" or _is_part_file(i.filename)]
                 for info in names:
                     if info.file_size > LARGEST_PART:
                         raise InputError(f"{path.name}: {info.filename}: must be at most {LARGEST_PART} bytes")
@@ -88,7 +88,7 @@ def read_document(path: Path) -> Document:
     return Document(objects, parts)
 
 
-def _wanted(name: str) -> bool:
+def _is_part_file(name: str) -> bool:
     return name.lower().endswith((".brp", ".brep", ".nc", ".gcode"))
 
 

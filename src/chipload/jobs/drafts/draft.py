@@ -89,8 +89,8 @@ class Draft:
     ----------
     title : what the job does and the file that it is made from
     tables : of the job
-    notes : what was noticed in the file
-    files : files beside the job by name, made from the file
+    notes : findings in the file
+    files : files next to the job by name, made from the file
     """
 
     title: str

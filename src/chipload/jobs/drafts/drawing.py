@@ -64,7 +64,7 @@ def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft
         The drawing cannot be read, or no cutter fits it.
     """
     on = _machine(machine)
-    drawing, contours, entries = _drawn(file, on)
+    drawing, contours, entries = _read_contours(file, on)
     part = DraftTable("part", (Entry("file", relative(file, folder)), *entries, *_origin(contours, on)))
     top = Entry("top_mm", 0.0, "a drawing has no height: its plane is the top", True)
     tables = (part, DraftTable("stock", (top,)))
@@ -82,7 +82,7 @@ def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft
     return Draft(f"Finish the contours of {file.name} at limited engagement.", (*tables, *rest), notes)
 
 
-def _drawn(file: Path, machine: Machine) -> tuple[Drawing, Sequence[Contour], list[Entry]]:
+def _read_contours(file: Path, machine: Machine) -> tuple[Drawing, Sequence[Contour], list[Entry]]:
     """The drawing, the contours that are milled, and the entries of the part that choose them."""
     drawing, entries = _read(file, machine)
     layers = sorted(set(drawing.layers))
@@ -133,8 +133,8 @@ def _origin(contours: Sequence[Contour], machine: Machine) -> list[Entry]:
         if high[k] - low[k] > most[k] - least[k]:
             raise InputError(
                 f"the drawing is {high[k] - low[k]:.6g} mm wide in {axis}, machine {machine.name} travels "
-                f"{most[k] - least[k]:g} mm: name a larger one (--on of init, --machine of simulate), or see whether "
-                "the unit is right"
+                f"{most[k] - least[k]:g} mm: name a larger one (--on of init, --machine of simulate), or check "
+                "the unit"
             )
     middle = [round(float(v), 3) for v in 0.5 * (low + high) - 0.5 * (least + most)]
     return [Entry("origin_mm", middle, f"the middle: the drawing lies beyond the travel of {machine.name}", True)]
@@ -268,18 +268,18 @@ def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float, bool]:
     whole = float(area.area)
     if not whole > 0.0:
         raise InputError("the contours enclose no area")
-    if not float(_opened(area, DIAMETERS[-1]).area) > 0.0:
+    if not float(_reachable_area(area, DIAMETERS[-1]).area) > 0.0:
         raise InputError(
             f"the contours enclose {whole:.3g} mm2, too narrow for a cutter of {DIAMETERS[-1]:g} mm: if the drawing "
             "is in another unit than it states, write the job by hand with part.units"
         )
-    able = [d for d in DIAMETERS if float(_opened(area, d).area) >= REACH * whole] or [DIAMETERS[-1]]
+    able = [d for d in DIAMETERS if float(_reachable_area(area, d).area) >= REACH * whole] or [DIAMETERS[-1]]
     near = [d for d in able if d >= 0.5 * able[0]]
     roomy = next((d for d in near if not _narrow(area, d)), None)
     return (near[-1], whole, True) if roomy is None else (roomy, whole, False)
 
 
-def _opened(area: Any, d: float) -> Any:
+def _reachable_area(area: Any, d: float) -> Any:
     """Return the part of an area that a cutter of diameter d [mm] reaches."""
     return area.buffer(-0.5 * d).buffer(0.5 * d)
 
@@ -287,8 +287,8 @@ def _opened(area: Any, d: float) -> Any:
 def _narrow(area: Any, d: float) -> bool:
     """Return whether an area has channels that are too narrow for a cutter of diameter d [mm]."""
     wide = ROOM * d
-    lost = shapely.get_parts(_opened(area, d).difference(_opened(area, wide)))
-    if max((float(piece.area) for piece in lost), default=0.0) > CHANNEL * d * d:
+    unreached = shapely.get_parts(_reachable_area(area, d).difference(_reachable_area(area, wide)))
+    if max((float(piece.area) for piece in unreached), default=0.0) > CHANNEL * d * d:
         return True
     centres, apart = area.buffer(-0.5 * d), area.buffer(-0.5 * wide)
     return len(shapely.get_parts(apart)) > len(shapely.get_parts(centres))

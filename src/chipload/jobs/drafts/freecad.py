@@ -26,7 +26,7 @@ from chipload.jobs.drafts.program import Known, draft_program
 _FEED = re.compile(r"\bF\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
 #: [mm] how far a triangle may leave a surface of the stock
 CHORD_MM = 0.01
-#: file beside the program: of which command of which operation each line is
+#: file next to the program: of which command of which operation each line is
 ORIGINS = "program_lines.csv"
 #: keys of a tool bit and of the ``[[cutter]]``
 _BIT = (
@@ -193,12 +193,12 @@ def _stock(document: Document, job: DocumentObject, name: str) -> tuple[Box, str
             mesh = read_mesh(step, unit=None, key="stock", chord_mm=CHORD_MM)
     except InputError:
         return None
-    # a stock that is no box has more room in its box than material: a guess
+    # a stock that is not a box has more room in its box than material: a guess
     box = abs(float(mesh.volume) / float(np.prod(np.ptp(mesh.bounds, axis=0))) - 1.0) < 1e-6
     return (
         _corner(mesh.bounds[0]),
         _corner(mesh.bounds[1]),
-    ), where if box else f"the box around the {where}, which is no box"
+    ), where if box else f"the box around the {where}, which is not a box"
 
 
 def _corner(values: Iterable[float]) -> tuple[float, float, float]:
@@ -207,7 +207,7 @@ def _corner(values: Iterable[float]) -> tuple[float, float, float]:
 
 
 def _of_part(file: Path, folder: Path, document: Document, machine: str | None) -> Draft:
-    """The last shape that has faces, as STEP beside the job."""
+    """The last shape that has faces, as STEP next to the job."""
     shown = [o for o in document.objects.values() if o.text("Shape") in document.parts]
     bodies = [o for o in shown if o.kind in ("PartDesign::Body", "App::Part")] or shown
     reason = "it holds no shape"

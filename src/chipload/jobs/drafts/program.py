@@ -44,7 +44,7 @@ STEPS = 8_000
 LAYER, LAYERS = 0.05, 60
 #: findings that are listed in the draft
 LISTED = 8
-#: ends of the codes of findings that say nothing about the motions
+#: ends of the codes of findings that do not concern the motions
 PLAIN = ("-unused", "-unknown", "-coolant")
 _LARGEST = 500_000_000
 #: the first speed of a text, outside its comments
@@ -128,8 +128,8 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     found = [f for f in chosen.reading.findings if f.severity >= Severity.UNPROVEN]
     rest = [f for f in chosen.reading.findings if f not in found and not f.code.endswith(PLAIN)]
     # a speed is guessed where the spindle rests
-    asked = [f for f in chosen.reading.violations if f.code != "machine-spindle-off"]
-    notes = [text for _, text in grouped((*found, *asked, *rest))][:LISTED]
+    violations = [f for f in chosen.reading.violations if f.code != "machine-spindle-off"]
+    notes = [text for _, text in grouped((*found, *violations, *rest))][:LISTED]
     origin = known.origin or path.name
     return Draft(
         f"Simulate {origin}: chips, forces, torque and collisions of the program in its stock.",
@@ -203,7 +203,7 @@ def _refusal(path: Path, refused: Sequence[tuple[Machine, InputError]], shipped:
             "name a machine that has (--on)"
         )
     why = reasons[0]
-    if "begins no word" in why:
+    if "does not begin a word" in why:
         return InputError(f"{path.name}: neither NC text nor CL data nor a table with a heading of its columns: {why}")
     return refused[0][1]
 
@@ -362,7 +362,7 @@ def _material_table(header: Header) -> DraftTable:
         entry = Entry("name", name, f"by the comment ({where}); chipload materials lists all", True)
     else:
         own = header.unknown_material
-        why = f"none that is shipped is like {own}" if own else "the file names no material"
+        why = f"no shipped material is like {own}" if own else "the file names no material"
         entry = Entry("name", "al7075-t6", f"{why}; chipload materials lists all", True)
     return DraftTable("material", (entry,))
 

@@ -37,7 +37,7 @@ def draft_camotics(file: Path, folder: Path, machine: str | None = None) -> Draf
 
 
 def _program(project: dict[str, Any], file: Path) -> Path:
-    """The NC text of the project; of a script (`.tpl`) the text beside it that CAMotics wrote from it."""
+    """The NC text of the project; of a script (`.tpl`) the text next to it that CAMotics wrote from it."""
     listed = project.get("files", project.get("nc-files", []))
     names = [str(name) for name in (listed if isinstance(listed, list) else [])]
     for name in names:
@@ -51,12 +51,12 @@ def _program(project: dict[str, Any], file: Path) -> Path:
                 return path
     scripts = [name for name in names if name.lower().endswith(".tpl")]
     remedy = (
-        f"export the NC text of {scripts[0]} from CAMotics, as {file.stem}.nc beside the project"
+        f"export the NC text of {scripts[0]} from CAMotics, as {file.stem}.nc next to the project"
         if scripts
-        else "put it beside the project"
+        else "put it next to the project"
     )
     raise InputError(
-        f"{file.name}: none of its files is an NC text that is there ({', '.join(names)[:200] or 'it names none'}): "
+        f"{file.name}: none of its files is an NC text that exists ({', '.join(names)[:200] or 'it names none'}): "
         f"{remedy}"
     )
 

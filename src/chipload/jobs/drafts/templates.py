@@ -13,7 +13,7 @@ TEMPLATES = {
     "material": "material.toml", "machine": "machine.toml", "catalogue": "catalogue.toml",
     "controller": "controller.toml", "fixture": "fixture.stl",
 }  # fmt: skip
-#: corners of the block of the fixture [mm]: a vice jaw beside a workpiece at x = 0
+#: corners of the block of the fixture [mm]: a vice jaw next to a workpiece at x = 0
 JAW = ((-30.0, -50.0, -40.0), (-1.0, 50.0, -5.0))
 
 

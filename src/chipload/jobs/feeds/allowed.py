@@ -26,7 +26,7 @@ from chipload.jobs.feeds.tables import FeedsTable
 from chipload.jobs.feeds.verify import require_same, rubbing_lines, speeds_of, tooth_feeds
 from chipload.machine.feed import row_time_limited
 from chipload.machine.machine import Machine
-from chipload.planning.feeds import KEPT, SLOWEST, LineFeeds, StepContact, calmed, greatest_factor, line_feeds
+from chipload.planning.feeds import KEPT, SLOWEST, LineFeeds, StepContact, greatest_factor, line_feeds, steady_feeds
 from chipload.program.gcode.feed_words import DIGITS, with_feeds
 from chipload.program.program import DWELL, RAPID
 from chipload.program.read import ProgramReading
@@ -40,15 +40,15 @@ from chipload.units import mm_s_from_mm_min
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: what holds a line beside limits, whose codes follow
+#: what holds a line besides limits, whose codes follow
 FASTEST, MACHINE, AIR, LIMITED = 0, 1, 2, 3
 #: the limit, and the column, of the stress of a cutter
 STRESS = "cutter_stress_mpa"
 #: the thickest chip of a step
 CHIP = "chip_max_mm"
-#: angles kappa at which a chip with runout is looked at, and halvings of what it is without
+#: angles kappa at which a chip with runout is evaluated, and halvings of the chip without runout
 KAPPAS, HALVINGS = 41, 40
-#: columns of the removal in which a watch says what each step allows
+#: columns of the removal in which a watch states what each step allows
 _FACTOR, _BY = "feed_factor", "feed_by"
 
 
@@ -64,7 +64,7 @@ class FeedRequest:
     checks : made by default; the stress of the cutters is a limit unless it is switched off
     errors : relative error of loads by the resolution of the simulation, by column; a load is at most its limit
         over 1 + error, so that the limit holds for any error up to this one
-    more : watch that computes further columns beside the greatest loads; None: none
+    more : watch that computes further columns in addition to the greatest loads; None: none
     """
 
     table: FeedsTable
@@ -92,7 +92,7 @@ class FeedRequest:
 
 def watching(
     steps: Steps,
-    asked: FeedRequest,
+    request: FeedRequest,
     cutters: Mapping[int, Cutter],
     material: Material,
     machine: Machine,
@@ -104,11 +104,11 @@ def watching(
     receives the instant of a step with the greatest force. Where another instant has a greater torque, the loads are
     raised to it in the same ratio at every feed. :func:`_chip_of_instant` gives the thicker chip of another instant.
     """
-    least, most, by = _bounds(steps, asked.table, cutters, machine)
+    least, most, by = _bounds(steps, request.table, cutters, machine)
 
     def watch(cuts: Cuts) -> dict[str, Floats]:
         low, high = least[cuts.step], most[cuts.step]
-        there = greatest_loads(cuts, material, asked.rotation, False)
+        there = greatest_loads(cuts, material, request.rotation, False)
         beyond = {
             name: np.maximum(np.divide(before[name][cuts.step], x, out=np.ones(len(x)), where=x > 0.0), 1.0)
             for name, x in there.items()
@@ -120,19 +120,19 @@ def watching(
         def ratios(factor: Floats) -> Floats:
             thickest = chip_at(factor)
             moved = at_feeds(cuts, factor)
-            loads: dict[str, Floats] = greatest_loads(moved, material, asked.rotation, asked.checks.sigma > 0.0)
-            if asked.more is not None:
-                loads |= asked.more(moved)
-            if STRESS in asked.feed_limits and STRESS not in loads:
+            loads: dict[str, Floats] = greatest_loads(moved, material, request.rotation, request.checks.sigma > 0.0)
+            if request.more is not None:
+                loads |= request.more(moved)
+            if STRESS in request.feed_limits and STRESS not in loads:
                 loads[STRESS] = cutter_stress(moved.engagement, moved.cutter, material)
-            upper = upper_loads(loads, asked.checks.sigma)
-            limits = {**asked.limits, STRESS: allowed_stress(moved.cutter)}
+            upper = upper_loads(loads, request.checks.sigma)
+            limits = {**request.limits, STRESS: allowed_stress(moved.cutter)}
             return np.array(
                 [
                     np.maximum(upper[column] * beyond.get(column, 1.0), thickest if column == CHIP else 0.0)
-                    * (1.0 + asked.error(name))
+                    * (1.0 + request.error(name))
                     / limits[name]
-                    for name in asked.feed_limits
+                    for name in request.feed_limits
                     for column in (column_of(name).name,)
                 ]
             )
@@ -183,7 +183,7 @@ def with_new_feeds(
     steps: Steps,
     before: Removal,
     allowed: Mapping[str, NDArray[Any]],
-    asked: FeedRequest,
+    request: FeedRequest,
     cutters: Mapping[int, Cutter],
     machine: Machine,
     read: Callable[[str], ProgramReading],
@@ -208,28 +208,28 @@ def with_new_feeds(
     c = before.columns
     feeds, touch = ~steps.rapid, np.where(c["chip_layers"] > 0, StepContact.FILM, StepContact.AIR)
     touch[c["chip_areas"] > 0] = StepContact.CUT
-    least, most, by = _bounds(steps, asked.table, cutters, machine)
+    least, most, by = _bounds(steps, request.table, cutters, machine)
     cuts = feeds & (touch == StepContact.CUT)
     if cuts.any():
         most, by = np.where(cuts, allowed[_FACTOR], most), np.where(cuts, allowed[_BY].astype(np.int64), by)
     lines = line_feeds(*(x[feeds] for x in (steps.line, touch, least, most, by)))
-    lines = _in_air(lines, steps, feeds, asked.table, machine)
-    factor, useful = _wanted(lines, reading, machine, asked.table)
+    lines = _in_air(lines, steps, feeds, request.table, machine)
+    factor, useful = _feed_factors(lines, reading, machine, request.table)
     new = with_feeds(text, dict(zip(lines.line.tolist(), factor.tolist(), strict=True)))
     after = read(new)
     require_same(reading.program, after.program, lines.line, factor)
     names = {FASTEST: "fastest", MACHINE: "machine", AIR: "air", SLOWEST: "slowest", KEPT: "programmed"}
-    names |= {LIMITED + k: name for k, name in enumerate(asked.feed_limits)}
-    held = np.where((useful < lines.allowed) & (lines.by != SLOWEST), MACHINE, lines.by)
+    names |= {LIMITED + k: name for k, name in enumerate(request.feed_limits)}
+    limited_by = np.where((useful < lines.allowed) & (lines.by != SLOWEST), MACHINE, lines.by)
     fed = FeedResult(
         text=new,
         dialect=dialect,
         line=lines.line,
         factor=factor,
-        by=tuple(names[k] for k in held.tolist()),
+        by=tuple(names[k] for k in limited_by.tolist()),
         before=before,
-        rubs=rubbing_lines(lines, factor, steps, cuts, asked.table, cutters),
-        tooth_feed_least=asked.table.tooth_feed_least_mm,
+        rubs=rubbing_lines(lines, factor, steps, cuts, request.table, cutters),
+        tooth_feed_least=request.table.tooth_feed_least_mm,
         seconds_before=seconds,
     )
     return fed, after
@@ -258,15 +258,17 @@ def _in_air(lines: LineFeeds, steps: Steps, feeds: NDArray[np.bool_], table: Fee
     air = lines.touch == StepContact.AIR
     allowed, by = np.where(air, 1.0, lines.allowed), np.where(air, KEPT, lines.by)
     if table.air_mm_min is not None:
-        asked, fastest = mm_s_from_mm_min(table.air_mm_min), np.zeros(len(lines.line))
+        air_feed, fastest = mm_s_from_mm_min(table.air_mm_min), np.zeros(len(lines.line))
         np.maximum.at(fastest, np.searchsorted(lines.line, steps.line[feeds]), speeds_of(steps)[feeds])
-        faster = air & (fastest > 0.0) & (fastest < min(asked, machine.feed_max))
-        allowed = np.where(faster, min(asked, machine.feed_max) / np.where(faster, fastest, 1.0), allowed)
-        by = np.where(faster, MACHINE if asked > machine.feed_max else AIR, by)
+        faster = air & (fastest > 0.0) & (fastest < min(air_feed, machine.feed_max))
+        allowed = np.where(faster, min(air_feed, machine.feed_max) / np.where(faster, fastest, 1.0), allowed)
+        by = np.where(faster, MACHINE if air_feed > machine.feed_max else AIR, by)
     return replace(lines, least=np.where(air, 1.0, lines.least), allowed=allowed, by=by)
 
 
-def _wanted(lines: LineFeeds, reading: ProgramReading, machine: Machine, table: FeedsTable) -> tuple[Floats, Floats]:
+def _feed_factors(
+    lines: LineFeeds, reading: ProgramReading, machine: Machine, table: FeedsTable
+) -> tuple[Floats, Floats]:
     """Return factors (m,) to write, and those above which the machine is no faster (at least 1 or the allowed)."""
     program = reading.program
     row = np.flatnonzero(np.isin(program.line, lines.line) & (program.motion != RAPID) & (program.motion != DWELL))
@@ -288,7 +290,7 @@ def _wanted(lines: LineFeeds, reading: ProgramReading, machine: Machine, table: 
     out = useful.copy()
     was = fast[one]
     most, enough, least = (was * x[one] for x in (lines.allowed, useful, lines.least))
-    out[one] = calmed(most, enough, least, was, 0.01 * table.change_least_percent) / was
+    out[one] = steady_feeds(most, enough, least, was, 0.01 * table.change_least_percent) / was
     # rounding must not pass for a change
     return np.where(np.abs(out - 1.0) < 10.0 ** -(DIGITS + 4), 1.0, out), useful
 

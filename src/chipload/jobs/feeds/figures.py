@@ -23,7 +23,7 @@ from chipload.result.thinning import thinned
 
 #: colours of the program as it was, and with its new feeds
 BEFORE, AFTER = "#c9821a", "#3457a6"
-#: what limits the feed of a line, beside limits of loads
+#: what limits the feed of a line besides limits of loads
 CAUSES = {
     "fastest": "the greatest feed that the job allows",
     "machine": "the acceleration and the rates of the machine",

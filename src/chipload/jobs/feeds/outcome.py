@@ -20,7 +20,7 @@ class FeedResult(ChangedText):
     factor : (m,) float, the new feed of each over the programmed one
     by : (m,) what holds each: a limit by its name or ``fastest``, ``machine``, ``air``, ``slowest``, ``programmed``
     rubs : lines that cut below the least feed per tooth, and their feeds per tooth [mm]
-    tooth_feed_least : [mm]; None: none is asked for
+    tooth_feed_least : [mm]; None: not stated
     """
 
     line: NDArray[np.int64]

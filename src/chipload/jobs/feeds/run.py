@@ -118,15 +118,15 @@ def _new_feeds(
     before = replace(
         before, resolution_error=with_compliance_error(before.resolution_error, before.columns, compliance)
     )
-    asked = FeedRequest(op.feeds, limits, fine.rotation, checks, errors, more)
+    request = FeedRequest(op.feeds, limits, fine.rotation, checks, errors, more)
     steps = steps_of(program, op.step_mm, op.tolerance_mm)
     # again, for the greatest feed of each step
     allowed = remove(
         program, stock_body(job, reading.program), job.cutters, material, fine, interpolation=op.interpolation,
-        times=times, watch=watching(steps, asked, job.cutters, material, machine, before.columns), accuracy=False,
+        times=times, watch=watching(steps, request, job.cutters, material, machine, before.columns), accuracy=False,
         engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.5, 1.0),
     )  # fmt: skip
     return with_new_feeds(
-        *own, reading, steps, before, allowed.columns, asked, job.cutters, machine,
+        *own, reading, steps, before, allowed.columns, request, job.cutters, machine,
         lambda new: simulation.read_for(job, machine, text=read_as(new)), seconds,
     )  # fmt: skip

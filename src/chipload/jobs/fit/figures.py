@@ -68,7 +68,7 @@ def sections(done: FitResult, figures: dict[str, go.Figure]) -> list[str]:
             rings = f"{w0 / math.tau:.4g} Hz, damping {zeta:.3g}" if math.isfinite(w0) else "taken as rigid"
             known[f"dynamometer, {key}"] = rings
     for key, left, r2 in zip(CHANNELS, fit.channels.residual, fit.channels.r2, strict=True):
-        known[f"left over, {key}"] = f"{_text_of(left)} N, R2 {_text_of(r2)}"
+        known[f"residual, {key}"] = f"{_text_of(left)} N, R2 {_text_of(r2)}"
     return [
         "<h2>Coefficients</h2>",
         table(["coefficient", "value", "95 % interval", "unit"], rows, numbers=(1, 2)),
@@ -82,7 +82,7 @@ def sections(done: FitResult, figures: dict[str, go.Figure]) -> list[str]:
         "<h3>Over a turn</h3>",
         '<p class="note">Dots are samples, lines are the model; tooth 0 is at the start of the slot at 0 deg.</p>',
         figure("turn", _turn(done, False), figures),
-        "<h3>What is left</h3>",
+        "<h3>Residuals</h3>",
         figure("left", _turn(done, True), figures),
     ]
 

@@ -66,7 +66,7 @@ class FitResult:
     job : that was run
     title : of the result
     fit : coefficients, runout, dynamometer
-    comparisons : every measurement beside its prediction, in the order of the job
+    comparisons : every measurement with its prediction, in the order of the job
     material : None where it cannot be written
     findings : of the force files, of the fit, and why there is no material
     provenance : where the numbers come from

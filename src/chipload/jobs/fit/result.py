@@ -75,8 +75,8 @@ def _track(done: FitResult, c: Comparison, name: str) -> Track:
 def _check(c: Comparison, track: str, name: str, limit: float, errors: Floats) -> LimitCheck:
     """Return the check of the greatest error of the measured channels; unproven if one has no error."""
     known = np.isfinite(errors)
-    lost = [CHANNELS[k] for k in np.flatnonzero(c.cut.measured & ~known)]
-    reason = f"{', '.join(lost)}: no error could be calculated" if lost else ""
+    unknown = [CHANNELS[k] for k in np.flatnonzero(c.cut.measured & ~known)]
+    reason = f"{', '.join(unknown)}: no error could be calculated" if unknown else ""
     if not known.any():
         return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason=reason or "no channel was measured")
     worst = float(np.abs(errors[known]).max())
@@ -137,8 +137,8 @@ def _measurement(c: Comparison) -> dict[str, Any]:
         "turns": len(c.turns.mean),
         "scatter_n": _named(c.turns.scatter),
         **{
-            f"{key}_n": {"measured": _named(seen), "model": _named(says), "half_95": _named(half)}
-            for key, (seen, says, half) in rows.items()
+            f"{key}_n": {"measured": _named(seen), "model": _named(predicted), "half_95": _named(half)}
+            for key, (seen, predicted, half) in rows.items()
         },
         "plane_max_n": {"measured": _number(c.forces.plane), "model": _number(model.resultant)},
         "mean_error_percent": _named(c.mean_percent),

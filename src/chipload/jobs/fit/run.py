@@ -40,7 +40,7 @@ def read_cuts(job: FitJob) -> tuple[tuple[MeasuredCut, ...], tuple[Finding, ...]
     table, cuts, findings = job.table, [], []
     for k, (m, file) in enumerate(zip(table.measurement, job.files, strict=True)):
         try:
-            measured, noticed = read_forces(file, m.window_s)
+            measured, file_findings = read_forces(file, m.window_s)
             channels = m.channels or table.channels
             force = np.full((len(measured.force), 3), np.nan)
             side = -1.0 if channels.on == "work" else 1.0
@@ -57,7 +57,7 @@ def read_cuts(job: FitJob) -> tuple[tuple[MeasuredCut, ...], tuple[Finding, ...]
             )  # fmt: skip
         except InputError as err:
             raise InputError(f"{job.path.name}: measurement.{k}: {err}") from None
-        findings += [Finding(f.code, f.line, f"{m.file}: {f.text}", f.severity) for f in noticed]
+        findings += [Finding(f.code, f.line, f"{m.file}: {f.text}", f.severity) for f in file_findings]
     return tuple(cuts), tuple(findings)
 
 
@@ -118,7 +118,7 @@ def _provenance(job: FitJob) -> Provenance:
 
 
 def _compared(fit: Fit, cut: MeasuredCut, use: str) -> Comparison:
-    said = predict(fit, cut)
+    predicted = predict(fit, cut)
     turns = turns_of(cut, fit.search.harmonics or min(8, math.floor(0.8 * math.pi * cut.rate / cut.speed)))
     mean, high, low = (x.mean(axis=0) for x in (turns.mean, turns.high, turns.low))
     larger = np.abs(high) >= np.abs(low)
@@ -126,17 +126,17 @@ def _compared(fit: Fit, cut: MeasuredCut, use: str) -> Comparison:
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
     band = turns.amplitude[0].real + 2.0 * (np.exp(1j * np.outer(theta, k)) @ turns.amplitude[1:]).real
     return Comparison(
-        cut, use, turns, said,
+        cut, use, turns, predicted,
         MeasuredForces(mean, high, low, band.max(axis=0), band.min(axis=0), float(turns.plane.mean())),
-        aligned(fit, cut, turns), _percent(said.mean, mean),
-        _percent(np.where(larger, said.high, said.low), np.where(larger, high, low)),
+        aligned(fit, cut, turns), _percent(predicted.mean, mean),
+        _percent(np.where(larger, predicted.high, predicted.low), np.where(larger, high, low)),
     )  # fmt: skip
 
 
-def _percent(said: Floats, seen: Floats) -> Floats:
+def _percent(predicted: Floats, measured: Floats) -> Floats:
     """Return the error in percent of the measured value; NaN where that is 0."""
-    size = np.where(seen == 0.0, np.nan, np.abs(seen))
-    return np.asarray((said - seen) / size * 100.0)
+    size = np.where(measured == 0.0, np.nan, np.abs(measured))
+    return np.asarray((predicted - measured) / size * 100.0)
 
 
 def peak_excess(comparisons: Sequence[Comparison]) -> float | None:
@@ -148,12 +148,12 @@ def peak_excess(comparisons: Sequence[Comparison]) -> float | None:
     """
     worst: list[float] = []
     for one in comparisons:
-        said = one.predicted
-        predicted = np.append(np.maximum(np.abs(said.high), np.abs(said.low)), said.resultant)
+        prediction = one.predicted
+        predicted = np.append(np.maximum(np.abs(prediction.high), np.abs(prediction.low)), prediction.resultant)
         turns = one.turns
         seen = np.column_stack([np.maximum(np.abs(turns.high), np.abs(turns.low)), turns.plane])
         measured = np.append(one.cut.measured, one.cut.measured[:2].all())
-        counts = measured & np.isfinite(predicted) & (predicted > SMALL * said.resultant)
+        counts = measured & np.isfinite(predicted) & (predicted > SMALL * prediction.resultant)
         if counts.any():
             worst.append(float((np.quantile(seen[:, counts], COVERED, axis=0) / predicted[counts]).max() - 1.0))
     return float(f"{max(0.0, *worst):.4g}") if worst else None
@@ -167,14 +167,16 @@ def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple
     if not fit.identified[[2, 5]].any() and table.axial is not None:
         values[2], values[5] = table.axial.kac_mpa, table.axial.kae_n_mm
         source += f"; axial coefficients: {table.axial.source}"
-    lost = [name for name, v in zip(NAMES, values, strict=True) if not math.isfinite(v)]
-    if lost:
-        what = "measure them or state [axial]" if set(lost) <= {"Kac", "Kae"} else "measure more feeds or channels"
-        return None, (_lost(f"no material is written: {', '.join(lost)} not identified: {what}"),)
+    unidentified = [name for name, v in zip(NAMES, values, strict=True) if not math.isfinite(v)]
+    if unidentified:
+        what = (
+            "measure them or state [axial]" if set(unidentified) <= {"Kac", "Kae"} else "measure more feeds or channels"
+        )
+        return None, (_no_material(f"no material is written: {', '.join(unidentified)} not identified: {what}"),)
     chip = max(cut.feed_per_tooth(job.cutter.flutes) for cut in fit.cuts) + 2.0 * fit.cutter.runout[0]
     cutter = job.cutter
-    said = f"{cutter.name or 'end mill'}, D {cutter.diameter:g} mm, {cutter.flutes} teeth, helix "
-    said += f"{math.degrees(cutter.helix):g} deg"
+    cutter_text = f"{cutter.name or 'end mill'}, D {cutter.diameter:g} mm, {cutter.flutes} teeth, helix "
+    cutter_text += f"{math.degrees(cutter.helix):g} deg"
     cuts = f"{table.engagement.milling}, {table.engagement.axial_depth_mm:g} mm deep"
     numbers: dict[str, Any] = {name: float(f"{v:.6g}") for name, v in zip(NAMES, values, strict=True)}
     covariance: Any = None
@@ -193,14 +195,14 @@ def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple
         found = (*found, Finding("fit-peaks", 0, text))
     try:
         made = Material(
-            name=table.name, source=f"{source}; {table.method} fit", workpiece=table.workpiece, cutter=said,
+            name=table.name, source=f"{source}; {table.method} fit", workpiece=table.workpiece, cutter=cutter_text,
             conditions="; ".join(x for x in (table.conditions, cuts) if x), chip=(0.0, float(f"{chip:.6g}")),
             covariance=covariance, peak_excess=excess or 0.0, **numbers,
         )  # fmt: skip
     except InputError as err:
-        return None, (_lost(f"no material is written: {err}"),)
+        return None, (_no_material(f"no material is written: {err}"),)
     return made, found
 
 
-def _lost(text: str) -> Finding:
+def _no_material(text: str) -> Finding:
     return Finding("fit-no-material", 0, text, Severity.UNPROVEN)

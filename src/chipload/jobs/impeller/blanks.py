@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 #: a cutting part without end is drawn so long, of the outer diameter; a holder so long, of its diameter
 ENDLESS, HOLDER = 0.4, 1.5
-#: modulus [MPa] that stands in a shape whose stiffness is not asked for
+#: modulus [MPa] of a shape whose stiffness is not used
 MODULUS = 2e5
 
 

@@ -18,7 +18,7 @@ from chipload.planning.impeller.impeller import Impeller
 
 Floats = NDArray[np.float64]
 
-#: points of the shroud's curve that distances are taken from
+#: points of the shroud's curve from which distances are measured
 POINTS = 1001
 
 

@@ -22,7 +22,7 @@ from chipload.simulation.channel.gouges import Gouge
 from chipload.simulation.checkpoint import Checkpoint
 from chipload.workers import Team
 
-#: what a part may be made of beside arrays and plain values
+#: what a part may be made of besides arrays and plain values
 RECORDS = (
     Answer, Catalogue, CatalogueCutter, FlankPass, Gouge, Linked, LinkedPath, Moves, NoFiveAxisPath, PlannedPoints,
     PointPath, Ranges, RestPasses, SearchLimits, ToolTrack, Tracks, Unreachable, UnreachedSpan,

@@ -25,9 +25,9 @@ ROWS = 20_000
 
 
 def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> list[str]:
-    """Report sections about programs; none where the job asks for none."""
+    """Report sections about programs; none if the job has none."""
     if milled.programs is None:
-        return ["<h2>Programs</h2>", "<p>The job asks for none: state [operation.paths].</p>"]
+        return ["<h2>Programs</h2>", "<p>The job has none: state [operation.paths].</p>"]
     head = [
         "",
         "program",
@@ -51,8 +51,8 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
     ]  # fmt: skip
     patches = [
         [
-            str(k), f"{BODIES[m.patch.body]} {m.patch.side}", str(m.tracks.lines), f"{s.asked:g}", f"{s.greatest:.4f}",
-            f"{s.mean:.4f}", f"{100.0 * s.mean / s.asked:.0f}", str(s.count), f"{100.0 * s.covered:.1f}",
+            str(k), f"{BODIES[m.patch.body]} {m.patch.side}", str(m.tracks.lines), f"{s.limit:g}", f"{s.greatest:.4f}",
+            f"{s.mean:.4f}", f"{100.0 * s.mean / s.limit:.0f}", str(s.count), f"{100.0 * s.covered:.1f}",
         ]
         for k, p in enumerate(milled.programs, 1)
         for m, s in zip(p.setting.millings, p.scallops, strict=True)
@@ -61,17 +61,17 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         "program",
         "surface",
         "lines",
-        "asked [mm]",
-        "most between passes [mm]",
+        "limit [mm]",
+        "greatest between passes [mm]",
         "mean scallop height [mm]",
-        "of asked [%]",
+        "of the limit [%]",
     ]
     scallop += ["scallops", "of the patch within [%]"]
     turn = np.degrees(milled.impeller.pitch)
     left = [
         [
-            c.name, str(len(c.left.rest)), f"{c.asked:g}", f"{c.greatest[0]:.4f}", f"{100.0 * c.share:.2f}",
-            '<span class="no">left higher</span>' if c.fails else '<span class="ok">as asked</span>',
+            c.name, str(len(c.left.rest)), f"{c.limit:g}", f"{c.greatest[0]:.4f}", f"{100.0 * c.share:.2f}",
+            '<span class="no">above the limit</span>' if c.fails else '<span class="ok">within the limit</span>',
         ]
         for c in milled.covered or ()
     ]  # fmt: skip
@@ -89,17 +89,19 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         figure("paths", paths_figure(milled), figures),
         *_flank_section(milled),
         *_points_section(milled),
-        "<h2>What all programs leave</h2>",
+        "<h2>Material left by all programs</h2>",
         f'<p class="note">Measured along rays on points of every surface, at most {spacing:g} mm apart, as far as its '
         "patches go: the least that any of the programs leaves. Where lines miss, rest passes or a neighbour may have "
-        "milled; what is left higher than asked is red.</p>",
-        table(["surface", "points", "asked [mm]", "most left [mm]", "area within [%]", ""], left, numbers=(1, 2, 3, 4)),
+        "milled. Values above the limit are red.</p>",
+        table(
+            ["surface", "points", "limit [mm]", "greatest left [mm]", "area within [%]", ""], left, numbers=(1, 2, 3, 4)
+        ),
         *(figure(f"left{k}", left_figure(c), figures) for k, c in enumerate(milled.covered or ())),
     ]
 
 
 def _flank_section(milled: ImpellerResult) -> list[str]:
-    """Flank passes on five axes; none where the job asks for none."""
+    """Flank passes on five axes; none if the job has none."""
     if milled.flanks is None:
         return []
     rows = [
@@ -117,7 +119,7 @@ def _flank_section(milled: ImpellerResult) -> list[str]:
 
 
 def _points_section(milled: ImpellerResult) -> list[str]:
-    """Point milling on five axes; none where the job asks for none."""
+    """Point milling on five axes; none if the job has none."""
     if milled.points is None:
         return []
     rows = [
@@ -127,7 +129,7 @@ def _points_section(milled: ImpellerResult) -> list[str]:
         ]
         for name, p in points_names(milled)
     ]  # fmt: skip
-    head = ["program", "lines", *_FIVE_AXIS, "mean scallop of asked [%]", "greatest turn of the axis [deg/mm]"]
+    head = ["program", "lines", *_FIVE_AXIS, "mean scallop of the limit [%]", "greatest turn of the axis [deg/mm]"]
     return [
         "<h2>Point milling on five axes</h2>",
         '<p class="note">Each surface in one path with a smooth axis, beside the programs above; path and time of one '
@@ -138,7 +140,7 @@ def _points_section(milled: ImpellerResult) -> list[str]:
 
 
 #: columns of every program on five axes, after its name and its passes
-_FIVE_AXIS = ("machine", "cutter [mm]", "path [mm]", "time [min]", "most left [mm]", "deepest gouge [mm]", "check")
+_FIVE_AXIS = ("machine", "cutter [mm]", "path [mm]", "time [min]", "greatest left [mm]", "deepest gouge [mm]", "check")
 
 
 def _five_axis_cells(p: CheckedFlank | CheckedPoints) -> list[str]:
@@ -157,7 +159,7 @@ def left_figure(covered: Covered) -> go.Figure:
     """Excess on a surface, unrolled."""
     w = covered.left.wall
     u, v = w.u.reshape(w.shape)[:, 0], w.v.reshape(w.shape)[0]
-    over = 2.0 * covered.asked
+    over = 2.0 * covered.limit
     out = go.Figure(
         go.Heatmap(
             x=u.round(4), y=v.round(4), z=covered.left.rest.reshape(w.shape).T.round(4), zmin=0.0, zmax=over,

@@ -22,7 +22,7 @@ def estimate(points: int, areas: Sequence[float], scallop: float, corner: float,
     ----------
     points : contact points
     areas : of the surfaces [mm2], one channel; empty: there are no programs
-    scallop : asked for [mm]
+    scallop : greatest height [mm]
     corner : least corner radius of the cutters [mm]
     partitions : that are compared
 

@@ -41,7 +41,7 @@ class FiveAxisProgram:
     program : of one channel, to above the beginning of the next
     gouge, left : as of every program
     allowed, most : gouge, and what may be left [mm]
-    findings : what the program asks of the machine that it does not give
+    findings : violations of the machine's limits
     seconds : of one channel
     channels : how many there are
     every : of all channels; a text why there is none

@@ -89,7 +89,7 @@ def _planned(
     """The fewest passes up the side, with the largest cutter that is clear in them and keeps the deviation."""
     surface = how.surface(BODIES.index(side.body), side.side)
     least = math.inf
-    met: set[CatalogueCutter] = set()
+    tried: set[CatalogueCutter] = set()
     cutters = sorted(catalogue.cutters, key=lambda c: (-c.diameter, c.corner_radius))
     for count in range(1, table.most_passes + 1):
         edges = np.linspace(*side.up, count + 1).tolist()
@@ -100,14 +100,14 @@ def _planned(
                 one, deviation = _pass(how, surface, side.along, band, cutter, table, paths, outline)
                 if one is None:
                     if deviation is None:
-                        met.add(cutter)
+                        tried.add(cutter)
                     else:
                         least = min(least, deviation)
                     break
                 found.append(one)
             if len(found) == count:
                 return cutter, found
-    why = f"{len(met)} meet a wall or are too short"
+    why = f"{len(tried)} meet a wall or are too short"
     if math.isfinite(least):
         why += f", the others deviate by {least:.4f} mm and more"
     return NoFiveAxisPath(
@@ -135,7 +135,7 @@ def _pass(
     try:
         path = flank_pass(surface, along, band, cutter, paths.chord_mm)
         for _ in range(_LONGER):
-            # the cutter may come nearest to some heights before the end of the pass: it goes on until it has at all
+            # the cutter may come nearest to some heights before the end of the pass, which continues to reach them all
             first = along[0] - max(float(path.touches[0, 1]) - wanted[0], 0.0)
             last = along[1] + max(wanted[1] - float(path.touches[-1, 0]), 0.0)
             longer = max(first, 0.0), min(last, 1.0)

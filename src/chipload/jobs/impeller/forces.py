@@ -13,7 +13,7 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 
 def force_terms(job: ImpellerJob, catalogue: Catalogue) -> ForceTerms | None:
-    """Data from which feeds are calculated; None: the job does not ask for it.
+    """Data from which feeds are calculated; None: the job has no `forces`.
 
     Raises
     ------

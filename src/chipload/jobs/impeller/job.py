@@ -34,7 +34,7 @@ class ImpellerJob:
     path : the job file
     table : its values
     machine, catalogue : a shipped name or a file
-    material : likewise, of the force coefficients; None: forces are not asked for
+    material : likewise, of the force coefficients; None: the job has no `forces`
     flank_machine, point_machine : likewise, of flank passes and of point milling on five axes; None: there is none
     files : what the part is read from, by what it is
     overrides : the `--set` texts that were applied
@@ -120,8 +120,8 @@ def missing(values: Mapping[str, Any]) -> list[str]:
     stated = [key for key in ("shape", "sections", "step") if key in part]
     if len(stated) == 1:
         return []
-    said = f"{' and '.join(stated)} are" if stated else "none is"
-    return [f"impeller: {said} stated: state one of [impeller.shape], [impeller.sections], [impeller.step]"]
+    count_text = f"{' and '.join(stated)} are" if stated else "none is"
+    return [f"impeller: {count_text} stated: state one of [impeller.shape], [impeller.sections], [impeller.step]"]
 
 
 def _wrong_paths(op: ImpellerOperationTable) -> Iterator[str]:
@@ -196,8 +196,10 @@ def _wrong_step(given: StepTable) -> Iterator[str]:
         if not getattr(given, key):
             yield f"impeller.step.{key} = []: must name at least one face, or a file of points"
     if bool(points) == (given.unit is None):
-        said = "missing: state it for the points of " + " and ".join(points) if points else "of no file: leave it out"
-        yield f"impeller.step.unit: {said}"
+        problem = (
+            "missing: state it for the points of " + " and ".join(points) if points else "of no file: leave it out"
+        )
+        yield f"impeller.step.unit: {problem}"
 
 
 def _wrong_surface(at: str, surface: SurfaceTable, part: ImpellerTable) -> Iterator[str]:

@@ -8,7 +8,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints, FiveAxisProgram
 from chipload.jobs.impeller.outcome import Checked, CheckedPartition, ImpellerResult
 
-#: what the name of a text that goes through all channels ends with
+#: end of the name of a program for all channels
 ALL = "-all"
 
 

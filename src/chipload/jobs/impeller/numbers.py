@@ -154,7 +154,7 @@ def _program(name: str, p: Checked) -> dict[str, Any]:
                 "path_mm": m.tracks.length,
                 "scallop_greatest_mm": s.greatest,
                 "scallop_mean_mm": s.mean,
-                "scallop_mean_share": s.mean / s.asked,
+                "scallop_mean_share": s.mean / s.limit,
                 "scallops": s.count,
                 "covered_share": s.covered,
             }
@@ -174,7 +174,7 @@ def _points(milled: ImpellerResult) -> list[dict[str, Any]]:
 
 
 def _loads(p: Checked) -> dict[str, float] | None:
-    """Feeds of the passes and what they load the cutter with; None: forces are not asked for."""
+    """Feeds of the passes and what they load the cutter with; None: the job has no `forces`."""
     loads = p.setting.loads
     if loads is None or not len(loads.feed):
         return None
@@ -202,7 +202,7 @@ def _roughing(milled: ImpellerResult) -> dict[str, Any]:
 
 
 def _finished(milled: ImpellerResult) -> dict[str, Any]:
-    """What all programs leave together."""
+    """Material that all programs together leave."""
     programs, covered = milled.programs or (), milled.covered or ()
     scallops = [x for p in programs for x in p.scallops]
     count = sum(x.count for x in scallops)
@@ -212,7 +212,7 @@ def _finished(milled: ImpellerResult) -> dict[str, Any]:
         "time_min": sum(p.seconds for p in programs) / 60.0,
         "gouge_mm": max((p.gouge.found for p in programs), default=0.0),
         "scallop_mean_mm": mean,
-        "scallop_mean_share": None if mean is None else mean / scallops[0].asked,
+        "scallop_mean_share": None if mean is None else mean / scallops[0].limit,
         "surfaces": [
             {
                 "surface": x.name,

@@ -35,9 +35,9 @@ PICKED = "hand-picked"
 REASONS: Mapping[str, str] = {
     "turned away": "no table angle faces it",
     "curvature": "every corner radius of the catalogue is larger than its radius of curvature",
-    "cutting part": "the smallest cutters of the catalogue meet other walls",
-    "above": "neck, shank or holder meet other walls",
-    "between": "every cutter that is clear of the check points meets a wall between them",
+    "cutting part": "the smallest cutters of the catalogue collide with other walls",
+    "above": "neck, shank or holder collide with other walls",
+    "between": "every cutter that is clear of the check points collides with a wall between them",
 }
 
 
@@ -136,11 +136,11 @@ class Limiting:
 
 @dataclass(frozen=True)
 class Scallop:
-    """Scallops that the check measures on a patch: ``asked``, greatest excess between two passes, mean height of the
-    scallops [mm], their number, and the share of the patch with no more excess than asked.
+    """Scallops that the check measures on a patch: ``limit``, greatest excess between two passes, mean height of the
+    scallops [mm], their number, and the share of the patch with no more excess than the limit.
     """
 
-    asked: float
+    limit: float
     greatest: float
     mean: float
     count: int
@@ -148,8 +148,8 @@ class Scallop:
 
     @property
     def holds(self) -> bool:
-        """Whether no scallop between two passes is higher than asked."""
-        return self.greatest <= self.asked
+        """Whether no scallop between two passes is higher than the limit."""
+        return self.greatest <= self.limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +162,7 @@ class Checked:
     gouge : deepest that any part of the tool comes below a surface, between bounds
     allowed : what of it is allowed [mm]
     scallops : of each patch
-    findings : what the program asks of the machine that it does not give
+    findings : violations of the machine's limits
     seconds : time of one channel, as the text takes it on the machine [s]
     cutting : of that in tracks; the rest is leads, links and rapids [s]
     between : from the end of one channel to the beginning of the next [s]
@@ -204,8 +204,8 @@ class Checked:
             out.append(f"{self.name}: {self.gouge.message}: gouge_mm = {self.allowed:g} is allowed")
         for m, s in zip(self.setting.millings, self.scallops, strict=True):
             if not s.holds:
-                where = f"{BODIES[m.patch.body]} {m.patch.side}"
-                out.append(f"{self.name}, {where}: {s.greatest:.4f} mm are left between passes: asked {s.asked:g}")
+                where = f"{self.name}, {BODIES[m.patch.body]} {m.patch.side}"
+                out.append(f"{where}: {s.greatest:.4f} mm are left between passes: scallop_mm = {s.limit:g} is allowed")
         loads = self.setting.loads
         if loads is not None and len(loads.feed):
             for what, values, most, unit in loads.columns:
@@ -223,7 +223,7 @@ class Covered:
     ----------
     body, side : of the surface
     left : what the check finds on a grid of its points
-    asked : the scallop [mm]
+    limit : of the scallop [mm]
     spacing : most distance of the points [mm]
     unreached : area [mm2] where the planner found no cutter and table angle for rest passes
     """
@@ -231,7 +231,7 @@ class Covered:
     body: int
     side: str
     left: Remainder
-    asked: float
+    limit: float
     spacing: float
     unreached: float
 
@@ -242,8 +242,8 @@ class Covered:
 
     @property
     def share(self) -> float:
-        """Share of the area with no more excess than asked."""
-        return 1.0 - self.left.excess(self.asked)
+        """Share of the area with no more excess than the limit."""
+        return 1.0 - self.left.excess(self.limit)
 
     @property
     def greatest(self) -> tuple[float, int]:
@@ -255,16 +255,16 @@ class Covered:
     def fails(self) -> tuple[str, ...]:
         """Conditions that do not hold."""
         most, k = self.greatest
-        if most <= self.asked:
+        if most <= self.limit:
             return ()
         wall = self.left.wall
         x, y, z = wall.points[k].tolist()
-        over = float(wall.area[self.left.rest > self.asked].sum())
+        over = float(wall.area[self.left.rest > self.limit].sum())
         least = f"{most:.3f} mm" if most < self.left.height else f"{most:g} mm or more"
-        lost = f", on {self.unreached:.1f} mm2 of it no cutter was found to go" if self.unreached > 0.0 else ""
+        note = f", no cutter was found for {self.unreached:.1f} mm2 of it" if self.unreached > 0.0 else ""
         return (
             f"{self.name}: on {over:.1f} mm2, {100.0 * (1.0 - self.share):.2g} % of what is milled, more than "
-            f"{self.asked:g} mm is left: {least} at ({x:.2f}, {y:.2f}, {z:.2f}){lost}",
+            f"{self.limit:g} mm is left: {least} at ({x:.2f}, {y:.2f}, {z:.2f}){note}",
         )
 
 
@@ -327,15 +327,15 @@ class CheckedPartition:
 
     @property
     def verified(self) -> bool:
-        """Whether every program holds, and together they leave no more excess than asked."""
+        """Whether every program holds, and together they leave no more excess than the limit."""
         return not self.fails
 
     @property
     def scallop(self) -> float | None:
-        """Mean height of the scallops as a share of what is asked; None: there are none."""
+        """Mean height of the scallops as a share of the limit; None: there are none."""
         rows = [x for p in self.programs for x in p.scallops]
         count = sum(x.count for x in rows)
-        return math.fsum(x.mean * x.count for x in rows) / count / rows[0].asked if count else None
+        return math.fsum(x.mean * x.count for x in rows) / count / rows[0].limit if count else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,10 +361,10 @@ class ImpellerResult:
     surfaces : in their order
     one : the largest cutter for all surfaces at one table angle, and the index of that; None: there is none
     partitions : the cutter picked by hand where one is stated, then one cutter, two, ...
-    checked : each partition with its programs, checked; None: the job asks for none
-    roughs : roughing programs, before the others; None: the job asks for none
+    checked : each partition with its programs, checked; None: the job has none
+    roughs : roughing programs, before the others; None: the job has none
     provenance : where the numbers come from
-    flanks, points : flank passes and point milling on five axes, beside the programs; None: the job asks for none
+    flanks, points : flank passes and point milling on five axes, in addition to the programs; None: the job has none
     """
 
     stated: StatedJob
@@ -387,7 +387,7 @@ class ImpellerResult:
 
     @property
     def not_on_five_axes(self) -> tuple[str, ...]:
-        """Reasons why surfaces are not milled on five axes though the job asks for it."""
+        """Reasons why surfaces are not milled on five axes although the job has the table."""
         return tuple(p.reason for p in (*(self.flanks or ()), *(self.points or ())) if isinstance(p, NoFiveAxisPath))
 
     @property
@@ -416,7 +416,7 @@ class ImpellerResult:
 
     @property
     def programs(self) -> tuple[Checked, ...] | None:
-        """Finishing programs of the partition that is milled; None: the job asks for none."""
+        """Finishing programs of the partition that is milled; None: the job has none."""
         return None if self.used_checked is None else self.used_checked.programs
 
     @property
@@ -454,10 +454,10 @@ def unmilled(milled: ImpellerResult) -> tuple[str, ...]:
     if milled.used is None:
         return (f"{milled.partitions[-1].name} of the catalogue do not mill all that can be reached",)
     divided = milled.used.divided
-    untold = divided.untold if divided else 0
+    undecided = divided.undecided if divided else 0
     return (
-        (f"{untold} ranges of pallet angles had too many arcs to be decided: they are taken as blocked",)
-        if untold
+        (f"{undecided} ranges of pallet angles had too many arcs to be decided: they are taken as blocked",)
+        if undecided
         else ()
     )
 

@@ -61,12 +61,12 @@ def read_part(job: ImpellerJob) -> ImpellerPart:
     plain = _without_fillets(job)
     if part.fillet_mm is None:
         return plain
-    made, said = with_fillets(plain.impeller, part.fillet_mm)
+    made, fillet_lines = with_fillets(plain.impeller, part.fillet_mm)
     milled = {(s.body, s.side) for s in job.table.surface}
     names = [(b, f"{k} fillet") for b in BODIES[: len(made.bodies)] for k in ("plus", "minus")]
     left = [" ".join(name) for name in names if name not in milled]
     not_milled = (f"not milled: no [[surface]] names it: {', '.join(left)}",) if left else ()
-    return ImpellerPart(made, (*plain.faces, *said, *not_milled))
+    return ImpellerPart(made, (*plain.faces, *fillet_lines, *not_milled))
 
 
 def _without_fillets(job: ImpellerJob) -> ImpellerPart:
@@ -112,7 +112,7 @@ def _of_sections(folder: Path, given: SectionsTable, blades: int, outer_diameter
 
 def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diameter: float) -> ImpellerPart:
     model, R = read_faces(files["step"], "impeller.step.file"), AGAINST_Z[given.flow]
-    said: list[str] = []
+    lines: list[str] = []
 
     def revolved(key: str, side: int) -> Revolved:
         names = getattr(given, key)
@@ -127,7 +127,7 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
                 raise InputError(f"{at}: face {number} appears twice: name each face once")
         found = meridian_of(faces, R, at, tips=key == "shroud")
         (r0, z0), (r1, z1) = found[0], found[-1]
-        said.append(f"{key}: {'; '.join(map(str, faces))}: r {r0:.6g}, z {z0:.6g} to r {r1:.6g}, z {z1:.6g} mm")
+        lines.append(f"{key}: {'; '.join(map(str, faces))}: r {r0:.6g}, z {z0:.6g} to r {r1:.6g}, z {z1:.6g} mm")
         return Revolved(found, side)
 
     hub, shroud = revolved("hub", 1), revolved("shroud", -1)
@@ -138,11 +138,11 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
             faces = _faces(model, names, at)
             if len(faces) == 1 and four_sided(faces[0]):
                 one = patch_of(faces[0], at, given.fit_mm)
-                taken, patch = str(one), one.patch.rotated(R)
+                face_text, patch = str(one), one.patch.rotated(R)
             else:
                 several = side_of(faces, at, given.fit_mm, R, hub, shroud)
-                taken, patch = str(several), several.patch
-            said.append(f"{prefix}{key}: {'; '.join(map(str, faces))}: {taken}")
+                face_text, patch = str(several), several.patch
+            lines.append(f"{prefix}{key}: {'; '.join(map(str, faces))}: {face_text}")
             return patch
 
         sides = [side("plus", plus), side("minus", minus)]
@@ -152,7 +152,7 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
         except InputError as err:
             raise InputError(f"impeller.step.{prefix}plus and {prefix}minus: {err}") from None
         off = max(foot_off(made.plus, hub), foot_off(made.minus, hub))
-        said.append(f"{'splitter' if prefix else 'blade'}: its foot leaves the hub by at most {off:.3g} mm")
+        lines.append(f"{'splitter' if prefix else 'blade'}: its foot leaves the hub by at most {off:.3g} mm")
         return made
 
     main, splitter = blade(given.plus, given.minus, ""), None
@@ -162,7 +162,7 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
             splitter_apart(splitter, main, math.tau / blades)
         except InputError as err:
             raise InputError(f"impeller.step.splitter_plus and splitter_minus: {err}") from None
-    return ImpellerPart(Impeller(main, splitter, hub, shroud, blades), tuple(said))
+    return ImpellerPart(Impeller(main, splitter, hub, shroud, blades), tuple(lines))
 
 
 def _faces(model: Model, names: Names, key: str) -> list[Face]:

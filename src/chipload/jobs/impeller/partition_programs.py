@@ -23,7 +23,7 @@ from chipload.planning.impeller.compare import CutterChoice, Partition
 from chipload.planning.impeller.costs import Costs, MeasuredCost
 from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.patch import Patch
-from chipload.planning.impeller.planned_settings import PlannedSettings, planned, tell_millings
+from chipload.planning.impeller.planned_settings import PlannedSettings, announce_millings, planned
 from chipload.planning.impeller.settings import (
     CutterSetting,
     FinishSettings,
@@ -37,9 +37,9 @@ from chipload.progress import Progress
 
 #: greatest number of divisions of a partition
 _ROUNDS = 2
-#: where the check finds more than asked on a patch or surface, what is left is counted on points so many times closer
-#: together and planned again; not where it finds more than this share of what is asked on a surface that the planner
-#: knows to be out of reach in part
+#: where the check finds more than the limit on a patch or surface, the excess is measured on points so many times
+#: closer together and planned again; not where it finds more than this share of the limit on a surface that the
+#: planner knows to be out of reach in part
 _FINER, _NEARLY = (0.5, 0.25), 1.25
 
 
@@ -87,7 +87,7 @@ def checked_partitions(
             if partition.divided is not None and not (turn and _same(partition, best[choice.name].partition))
         ]  # fmt: skip
         patches = [(job.with_catalogue(partitions[k].catalogue), partitions[k].division.patches) for k in new]
-        tell_millings(patches, memory.millings, keep, _from(progress, 0.8 * turn / _ROUNDS))
+        announce_millings(patches, memory.millings, keep, _from(progress, 0.8 * turn / _ROUNDS))
         for k in new:
             choice, partition = choices[k], partitions[k]
             done = (turn + k / len(choices)) / _ROUNDS
@@ -117,7 +117,7 @@ def checked_partitions(
 
 
 def _from(progress: Progress, done: float) -> Progress:
-    """Tells what is done, at the same share of all."""
+    """Forward the share that is done, scaled to the whole."""
     return lambda _, what: progress(done, what)
 
 
@@ -175,8 +175,8 @@ def _same(a: Partition, b: Partition) -> bool:
 
 
 def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[tuple[int, MeasuredCost]]:
-    """For each patch the number of its side, and what its program takes; rest passes count to the patch they mend."""
-    taken: dict[int, float] = {}
+    """For each patch the number of its side and the cost of its program; rest passes count to the patch they finish."""
+    rest_time: dict[int, float] = {}
     millings = [m for s in done.plan.settings for m in s.millings]
     for s in done.plan.settings:
         seconds = times_on(s.program, machine)
@@ -185,12 +185,12 @@ def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[
         for number, time in zip(s.linked.track.tolist(), seconds.tolist(), strict=True):
             if number >= 0:
                 owner = id(owners[number].patch)
-                taken[owner] = taken.get(owner, 0.0) + time
+                rest_time[owner] = rest_time.get(owner, 0.0) + time
     out = []
     for m in millings:
         own, order, table, bare = _place(costs, m.patch)
         number = next(k for k, c in enumerate(costs) if c is own)
-        row = MeasuredCost(order, m.patch.cutter, table, bare, taken.get(id(m.patch), 0.0))
+        row = MeasuredCost(order, m.patch.cutter, table, bare, rest_time.get(id(m.patch), 0.0))
         out.append((number, row))
     return out
 
@@ -213,14 +213,14 @@ def _checked(
     keep: Keep,
 ) -> CheckedPartition:  # fmt: skip
     own = job.with_catalogue(done.partition.catalogue)
-    programs, covered = _looked_at(own, done.plan, machine, paths, memory, keep)
+    programs, covered = _checked_plan(own, done.plan, machine, paths, memory, keep)
     for fine in _FINER:
         if not _refinable(_left_shares(programs, covered)):
             break
         plan = planned(
             own, done.partition.division.patches, _changes(choice), known=memory.millings, keep=keep, fine=fine
         )  # fmt: skip
-        again = _looked_at(own, plan, machine, paths, memory, keep)
+        again = _checked_plan(own, plan, machine, paths, memory, keep)
         kept, new = ((_left_shares(*x), sum(p.seconds for p in x[0])) for x in ((programs, covered), again))
         if _rank(*new) < _rank(*kept):
             programs, covered = again
@@ -230,30 +230,30 @@ def _checked(
 
 
 def _left_shares(programs: Sequence[Checked], covered: Sequence[Covered]) -> list[tuple[float, bool]]:
-    """The most that is left in each patch and on each surface, as a share of what is asked, and whether some of the
+    """The most that is left in each patch and on each surface, as a share of the limit, and whether some of the
     surface is known to be out of reach.
     """
-    lost = {(c.body, c.side): c.unreached > 0.0 for c in covered}
+    out_of_reach = {(c.body, c.side): c.unreached > 0.0 for c in covered}
     patches = [
-        (x.greatest / x.asked, lost[m.patch.body, m.patch.side])
+        (x.greatest / x.limit, out_of_reach[m.patch.body, m.patch.side])
         for p in programs
         for x, m in zip(p.scallops, p.setting.millings, strict=True)
     ]
-    return [*patches, *((c.greatest[0] / c.asked, c.unreached > 0.0) for c in covered)]
+    return [*patches, *((c.greatest[0] / c.limit, c.unreached > 0.0) for c in covered)]
 
 
 def _refinable(left: Sequence[tuple[float, bool]]) -> bool:
-    """Whether more is left somewhere than asked that rest passes might take: little, or all of it is within reach.
+    """Whether more is left somewhere than the limit that rest passes might take: little, or all of it is within reach.
 
     >>> _refinable([(0.9, False), (1.4, True)]), _refinable([(1.4, False)]), _refinable([(1.2, True)])
     (False, True, True)
     """
-    return any(x > 1.0 and (x <= _NEARLY or not lost) for x, lost in left)
+    return any(x > 1.0 and (x <= _NEARLY or not out_of_reach) for x, out_of_reach in left)
 
 
 def _rank(left: Sequence[tuple[float, bool]], seconds: float) -> tuple[int, float, float]:
-    """Order of plans: in how many patches and surfaces more is left than asked; the most, to a hundredth of what is
-    asked, where that is too much: a corner that no cutter reaches stays; the time [s].
+    """Order of plans: in how many patches and surfaces more is left than the limit; the most, to a hundredth of what is
+    the limit, where that is too much: a corner that no cutter reaches stays; the time [s].
 
     >>> _rank([(0.9, False), (1.05, False), (5.4, True)], 9.0) > _rank([(1.0, False), (5.4, True)], 10.0)
     True
@@ -264,7 +264,7 @@ def _rank(left: Sequence[tuple[float, bool]], seconds: float) -> tuple[int, floa
     return sum(x > 1.0 for x, _ in left), round(most, 2) if most > 1.0 else 0.0, seconds
 
 
-def _looked_at(
+def _checked_plan(
     own: FinishSettings, plan: PlannedSettings, machine: Machine, paths: PathsTable, memory: _Memory, keep: Keep
 ) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:
     """The programs of a plan with what the check finds; of like programs once."""

@@ -26,7 +26,7 @@ SHADES = 5
 def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> list[str]:
     """Report sections about all surfaces: the partition that is milled, and its patches."""
     out = [
-        "<h2>One cutter, two, three</h2>",
+        "<h2>Partitions with one, two and three cutters</h2>",
         '<p class="note">All channels; path and feed time of the contact points at the stated scallop, with changes of '
         "cutter and table, without lead-in, links and rapids. No sequence of the same strips, with as many cutters, "
         "takes less than the least time; patches of other shapes on the same contact points might. The reached share "
@@ -36,7 +36,7 @@ def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
     ]
     if milled.checked:
         out += [
-            "<h3>Partitions by their programs</h3>",
+            "<h3>Programs of the partitions</h3>",
             '<p class="note">Every partition is written, checked and timed. All channels, without roughing: cut, leads '
             "and links, changes of cutter and table.</p>",
             _programmed(milled),

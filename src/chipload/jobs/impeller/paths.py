@@ -86,7 +86,7 @@ def checked_programs(
     job: FinishSettings, machine: Machine, plan: PlannedSettings, paths: PathsTable, keep: Keep = anew
 ) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:
     """A program for each setting with the result of its check; the excess of all of them on each surface."""
-    impeller, asked, settings = job.impeller, job.how.scallop, plan.settings
+    impeller, scallop, settings = job.impeller, job.how.scallop, plan.settings
     millings = [m for s in settings for m in s.millings]
     faces = list(dict.fromkeys((m.patch.body, m.patch.side) for m in millings))
     dense = [_dense(impeller, m, job.ahead) for m in millings]
@@ -105,17 +105,19 @@ def checked_programs(
     out = []
     for setting in settings:
         program = setting.program
-        scallops = tuple(_scallop(m, next(others), asked) for m in setting.millings)
+        scallops = tuple(_scallop(m, next(others), scallop) for m in setting.millings)
         _, findings = to_axes(program, machine)
-        said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
+        problems = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
         gouge = gouge_by(job, coarse, program, setting.cutter, depth, paths.gouge_mm, keep)
         rows = times_on(program, machine)
         seconds, cutting = float(rows.sum()), float(rows[in_cut(program)].sum())
         between = between_channels(program, machine, impeller.blades)
         repeat = channel_repeat(program, machine, job.table, impeller.blades)
-        out.append(Checked(setting, gouge, paths.gouge_mm, scallops, tuple(said), seconds, cutting, between, repeat))
+        out.append(
+            Checked(setting, gouge, paths.gouge_mm, scallops, tuple(problems), seconds, cutting, between, repeat)
+        )
     covered = tuple(
-        Covered(face[0], face[1], left, asked, _SPACING, plan.unreached[face])
+        Covered(face[0], face[1], left, scallop, _SPACING, plan.unreached[face])
         for face, left in zip(faces, rest[len(dense) :], strict=True)
     )
     return tuple(out), covered
@@ -192,13 +194,13 @@ def _whole(job: FinishSettings, body: int, side: str, millings: Sequence[Milling
     return wall(f"{BODIES[body]} {side}", surface, grid[0], grid[1])
 
 
-def _scallop(milling: Milling, left: Remainder, asked: float) -> Scallop:
+def _scallop(milling: Milling, left: Remainder, limit: float) -> Scallop:
     """The scallop of a patch where passes lie on both sides."""
     within = between_lines(milling.tracks.tracks, milling.along, np.column_stack([left.wall.u, left.wall.v]))
-    numbers = scallop_numbers(left.scallops("v" if milling.along == "u" else "u", within), asked)
+    numbers = scallop_numbers(left.scallops("v" if milling.along == "u" else "u", within), limit)
     most = float(left.rest[within].max()) if within.any() else 0.0
-    covered = float(left.wall.area[left.rest <= asked].sum() / left.wall.area.sum())
-    return Scallop(asked, most, numbers["mean_mm"], int(numbers["count"]), covered)
+    covered = float(left.wall.area[left.rest <= limit].sum() / left.wall.area.sum())
+    return Scallop(limit, most, numbers["mean_mm"], int(numbers["count"]), covered)
 
 
 def _dense(impeller: Impeller, milling: Milling, ahead: float) -> SurfacePoints:

@@ -61,7 +61,7 @@ def _five_axis_files(
     texts: list[tuple[str, Program, Repeat | None, str]] = [("", p.program, None, one)]
     if not isinstance(p.every, str):
         repeat = p.every.repeat
-        by = "row by row" if repeat is None else f"axis {repeat.letter} turned on by {turn}"
+        by = "row by row" if repeat is None else f"axis {repeat.letter} advanced by {turn}"
         texts.append((ALL, p.every.program, repeat, f"all {n} channels: {by}"))
     ending, out = ENDINGS[p.machine.dialect], {}
     for more, program, repeat, line in texts:
@@ -79,7 +79,7 @@ def _programs(
 ) -> Iterator[tuple[str, CatalogueCutter, float, Checked | CheckedRough, Program, bool]]:
     """Name, cutter, table angle, check and program of all; whether there is nothing in it.
 
-    Roughing first, then the way that is milled, then every other one.
+    Roughing first, then the partition that is milled, then all others.
     """
     for name, rough in zip(rough_names(milled), milled.roughs or (), strict=True):
         yield name, rough.rough.cutter, rough.rough.table, rough, rough.rough.program, not rough.rough.machined
@@ -92,7 +92,7 @@ def _comments(
     milled: ImpellerResult, checked: Checked | CheckedRough, c: CatalogueCutter, alpha: float, number: int,
     repeat: Repeat | None,
 ) -> list[str]:  # fmt: skip
-    """What the man at the machine must know."""
+    """Comments for the machine operator."""
     table = milled.surfaces[0].table
     position = float(table.position[np.abs(table.angle - alpha).argmin()])
     out = [f"not verified: {f}" for f in checked.fails[:3]]
@@ -106,5 +106,5 @@ def _comments(
             f"one channel: the others by a pallet offset of {turn:.6f} deg each, {milled.impeller.blades} in all"
         )
     else:
-        out.append(f"all {milled.impeller.blades} channels: axis {repeat.letter} turned on by {turn:.6f} deg each")
+        out.append(f"all {milled.impeller.blades} channels: axis {repeat.letter} advanced by {turn:.6f} deg each")
     return out

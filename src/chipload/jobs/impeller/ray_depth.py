@@ -24,7 +24,7 @@ _AWAY = 1.5
 _POINTS, _OTHER = (121, 21), (1201, 61)
 #: steps by which the nearest place of the other side is found
 _STEPS = 6
-#: over the gouge that is allowed, the least depth that tells it
+#: over the gouge that is allowed, the least depth at which it is recognised
 _LEAST = 1.2
 
 
@@ -39,7 +39,7 @@ def ray_depth(impeller: Impeller, edge: float, gouge: float) -> float:
     Raises
     ------
     InputError
-        The blades are too thin to tell such a gouge from a cutter on their other side.
+        The blades are too thin to distinguish such a gouge from a cutter on their other side.
     """
     least = min(thickness(impeller, index, edge) for index in range(len(impeller.bodies)))
     depth = min(MOST, least - _AWAY * gouge)

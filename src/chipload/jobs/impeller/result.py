@@ -36,7 +36,7 @@ from chipload.simulation.channel.channel import SurfacePoints
 
 #: name of the track of the search, which has no program
 SEARCH = "search"
-#: walls of the channels as points, made when they are first asked for
+#: walls of the channels as points, made at their first use
 Walls = Callable[[], Sequence[SurfacePoints]]
 
 
@@ -197,10 +197,10 @@ def _scallops(track: str, p: Checked) -> tuple[LimitCheck, ...]:
     """The patch with the highest scallop."""
     if not p.scallops:
         return ()
-    k = int(np.argmax([s.greatest / s.asked for s in p.scallops]))
+    k = int(np.argmax([s.greatest / s.limit for s in p.scallops]))
     s = p.scallops[k]
-    state = state_of(s.greatest, s.asked)[0]
-    return (LimitCheck("scallop_mm", s.asked, s.greatest, state, track),)
+    state = state_of(s.greatest, s.limit)[0]
+    return (LimitCheck("scallop_mm", s.limit, s.greatest, state, track),)
 
 
 def _loads(track: str, p: Checked) -> tuple[LimitCheck, ...]:

@@ -40,7 +40,7 @@ from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 _RESOLUTION = 0.2
 #: instants of a row [mm], how far the rays go above and below a surface [mm]
 _STEP, _HEIGHT, _DEPTH = 1.0, 3.0, 0.5
-#: points of the blank's meridian; how far it goes on under the hub [mm]; how far beside the channel, in pitches
+#: points of the blank's meridian; how far it extends under the hub [mm]; how far beside the channel, in pitches
 _MERIDIAN, _UNDER, _BESIDE = 61, 1.0, 0.8
 #: how often rows are left out before a program counts as not verified
 _ROUNDS = 8
@@ -81,15 +81,15 @@ def checked_roughing(
         if plan.index not in stock:
             blanks[plan.index] = blank_of(impeller, plan.index, how, ahead)
             stock[plan.index] = TriDexel.of_mesh(blanks[plan.index], rough.grid_mm)
-        safe, taken, left = without_touch(plan, stock[plan.index], rough.grid_mm, rough.touch_mm3)
+        safe, removal, left = without_touch(plan, stock[plan.index], rough.grid_mm, rough.touch_mm3)
         first = not any(r.rough.index == plan.index for r in out)
         # a further table angle that takes nothing that is left is no program
-        if first or taken.before - taken.after > _LEAST * taken.before:
+        if first or removal.before - removal.after > _LEAST * removal.before:
             stock[plan.index] = left
             numbered = safe.numbered(len(out) + 1)
             out.append(
                 _checked(
-                    machine, numbered, taken, rough.touch_mm3, paths, walls, workers, table, impeller.blades,
+                    machine, numbered, removal, rough.touch_mm3, paths, walls, workers, table, impeller.blades,
                     blanks[plan.index], keep,
                 )
             )  # fmt: skip
@@ -108,40 +108,40 @@ def without_touch(
     """
     for turn in itertools.count():
         left = copy.deepcopy(stock)
-        taken = taken_from(left, plan.program, plan.cutter, grid)
-        bad = np.unique(plan.linked.track[taken.above > touch])
+        removal = taken_from(left, plan.program, plan.cutter, grid)
+        bad = np.unique(plan.linked.track[removal.above > touch])
         if not len(bad) or bad[0] < 0 or turn == _ROUNDS:
             break
         plan = plan.without(bad.tolist())
-    return plan, taken, left
+    return plan, removal, left
 
 
 def _checked(
-    machine: Machine, plan: RoughingSetting, taken: ChannelRemoval, touch: float, paths: PathsTable, walls:
+    machine: Machine, plan: RoughingSetting, removal: ChannelRemoval, touch: float, paths: PathsTable, walls:
     Sequence[SurfacePoints],
     workers: int, table: IndexTable, blades: int, blank: trimesh.Trimesh, keep: Keep,
 ) -> CheckedRough:  # fmt: skip
     program = plan.program
     allowed = paths.gouge_mm
 
-    def looked() -> tuple[Gouge, list[float]]:
+    def checked() -> tuple[Gouge, list[float]]:
         found = left_on(walls, program, plan.cutter, _HEIGHT, _DEPTH, step=_STEP, workers=workers)
         deep = deepest_gouge(
             walls, program, plan.cutter, _DEPTH, _RESOLUTION * allowed, allowed, step=_STEP, workers=workers
         )
         return deep, [float(x.rest.min()) for x in found]
 
-    gouge, rest = keep(("rough check", plan.cutter, program.motion, program.p_work, program.axis), looked)
+    gouge, rest = keep(("rough check", plan.cutter, program.motion, program.p_work, program.axis), checked)
     stands: list[float | None] = []
     for hub in (False, True):
         least = min(r for w, r in zip(walls, rest, strict=True) if w.name.startswith("floor") == hub)
         stands.append(least if least < _HEIGHT else None)
     _, findings = to_axes(program, machine)
-    said = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
+    problems = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
     seconds = float(times_on(program, machine).sum())
     return CheckedRough(
-        plan, gouge, allowed, (stands[0], stands[1]), taken, touch,
-        tuple(said), seconds, between_channels(program, machine, blades),
+        plan, gouge, allowed, (stands[0], stands[1]), removal, touch,
+        tuple(problems), seconds, between_channels(program, machine, blades),
         channel_repeat(program, machine, table, blades), blank,
     )  # fmt: skip
 

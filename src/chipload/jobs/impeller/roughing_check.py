@@ -30,7 +30,7 @@ class CheckedRough:
     stands : least that is left on the blades and on the hub where rows were milled [mm]; None: nowhere within reach
     taken : from the blank as the programs before it leave it, row by row
     touch : [mm3] that a rapid, and what is above the cutting part, may take in one row
-    findings : what the program asks of the machine that it does not give
+    findings : violations of the machine's limits
     seconds : time of one channel [s]
     between : from the end of one channel to the beginning of the next [s]
     repeat : how the text goes through all channels; None: it is of one channel
@@ -64,10 +64,10 @@ class CheckedRough:
     @property
     def missed(self) -> float:
         """Length of rows that are not milled [mm]."""
-        gone = {k for k, _ in self.rough.linked.refused}
+        refused = {k for k, _ in self.rough.linked.refused}
         tracks = self.rough.tracks
         stopped = sum(t.length for t in self.rough.stopped)
-        return sum(x.length for x in tracks.missed) + sum(tracks.tracks[k].length for k in gone) + stopped
+        return sum(x.length for x in tracks.missed) + sum(tracks.tracks[k].length for k in refused) + stopped
 
     @property
     def length(self) -> float:
@@ -115,11 +115,11 @@ class CheckedRough:
 
 
 def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) -> list[str]:
-    """Report sections about roughing; none where the job asks for none."""
+    """Report sections about roughing; none if the job has none."""
     if roughs is None:
         return []
     head = ["program", "layers", "rows", "path [mm]", "time [min]", "taken [cm3]", "left [mm]"]
-    head += ["gouge [mm]", "not by cutting [mm3]", "missed [mm]", "check"]
+    head += ["gouge [mm]", "by rapids, by shank [mm3]", "missed [mm]", "check"]
     rows = []
     for r, name in zip(roughs, names, strict=True):
         v = r.values()
@@ -136,7 +136,8 @@ def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) ->
         "<h2>Roughing</h2>",
         '<p class="note">Rows in layers from the shroud down to the hub, each from outside inwards. The blank is a '
         "body of revolution that stands over the shroud, its neighbour channels uncut; what every part of the tool "
-        "takes of it is counted row by row, program after program: not by cutting is what rapids, and what neck, shank "
-        "and holder take at most in a row. Left is the least on the blades, and on the hub.</p>",
+        "removes of it is counted row by row, program after program. The volumes by rapids and by shank are the most "
+        "that a rapid, and that neck, shank or holder remove in one row. Left is the least on the blades, and on the "
+        "hub.</p>",
         table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7, 8, 9)),
     ]

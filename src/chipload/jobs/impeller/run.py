@@ -48,7 +48,7 @@ from chipload.result import Provenance
 from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.workers import Team, Workers
 
-#: of the time of a run what search, division, roughing and finishing take, with paths and without
+#: shares of the time of a run: search, division, roughing and finishing, with paths and without
 _WITH_PATHS, _SEARCH_ALONE = (5.0, 10.0, 10.0, 75.0), (50.0, 50.0, 0.0, 0.0)
 #: of the tolerance, by how much tapered cutters may stand out of the cylinders that are planned with
 _OUTSIDE = 0.5
@@ -211,7 +211,7 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
 
 
 def _estimate(job: ImpellerJob, surfaces: Sequence[ContactSurface], catalogue: Catalogue) -> str:
-    """What the run will need."""
+    """Estimate of the run."""
     op = job.operation
     areas = [float(s.area.sum()) for s in surfaces] if op.paths is not None else []
     choices = op.most_cutters + (op.hand_picked is not None)
@@ -401,7 +401,7 @@ def _surfaces(job: ImpellerJob, impeller: Impeller, covering: Covering | None = 
 
 
 def _ahead(job: ImpellerJob) -> float:
-    """How far the hub goes on ahead of the leading edge [mm]."""
+    """Length of the hub ahead of the leading edge [mm]."""
     given = job.table.impeller.sections or job.table.impeller.step
     return given.hub_ahead_mm if given is not None else 0.0
 

@@ -1,7 +1,7 @@
 """The file scene.glb of an impeller: the surfaces coloured by their largest diameter, with the other blades and the
 hub.
 
-Lengths are mm, Z is up, as the extras say.
+Lengths are mm, Z is up, as the extras state.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ def scene_bytes(milled: ImpellerResult) -> bytes:
         points, faces = surface_mesh(op)
         colours = engagement_colours(op.answer.diameter, most)
         colours[op.answer.cutter < 0] = MISSED
-        says = engagement_legend("largest cutter diameter [mm]", most)
-        says["words"] = [["no cutter reaches it", "#b3261e"]] if (op.answer.cutter < 0).any() else []
-        _add(scene, f"{k}-largest", points, faces, colours, says)
+        legend = engagement_legend("largest cutter diameter [mm]", most)
+        legend["words"] = [["no cutter reaches it", "#b3261e"]] if (op.answer.cutter < 0).any() else []
+        _add(scene, f"{k}-largest", points, faces, colours, legend)
         if milled.used is not None:
             _add(
                 scene,
@@ -79,12 +79,12 @@ def _patch_legend(milled: ImpellerResult, partition: Partition, op: Searched) ->
 
 
 def _add(
-    scene: Any, name: str, points: Floats, faces: Ints, colours: NDArray[np.uint8], says: dict[str, Any] | None = None
+    scene: Any, name: str, points: Floats, faces: Ints, colours: NDArray[np.uint8], legend: dict[str, Any] | None = None
 ) -> None:
     both = np.concatenate([faces, faces[:, ::-1]])
     mesh = trimesh.Trimesh(points, both, vertex_colors=colours, process=False)
-    if says is not None:
-        mesh.metadata["legend"] = says
+    if legend is not None:
+        mesh.metadata["legend"] = legend
     scene.add_geometry(mesh, node_name=name, geom_name=name)
 
 

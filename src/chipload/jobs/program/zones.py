@@ -25,9 +25,9 @@ from chipload.units import rad_s_from_rpm, rpm_from_rad_s
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: most passes of a tool that are looked at by themselves; more are taken together with their neighbours
+#: greatest number of passes of a tool that are treated separately; more are merged with their neighbours
 MOST_PASSES = 60
-#: cuts of a tool that speeds are looked for with: nearest to chatter, with most edge in cut; least of each in a pass
+#: cuts of a tool with which speeds are searched: nearest to chatter, with most edge in cut; least of each in a pass
 NEAREST, LARGEST, LEAST = 12, 12, 2
 
 
@@ -83,10 +83,10 @@ def passes_of(stability: StabilityResult, program: Program, columns: Columns, to
         speed = float(np.abs(program.spindle[rows]).max()) if rows.any() else 0.0
         change = int(between[0]) if len(between) else first
         out.append(ProgramPass(tool, (first, last), change, np.unique(numbers[inside]), speed))
-    return _together(out)
+    return _merged_passes(out)
 
 
-def _together(passes: Sequence[ProgramPass]) -> tuple[ProgramPass, ...]:
+def _merged_passes(passes: Sequence[ProgramPass]) -> tuple[ProgramPass, ...]:
     """Join neighbouring passes so that at most :data:`MOST_PASSES` remain."""
     if len(passes) <= MOST_PASSES:
         return tuple(passes)

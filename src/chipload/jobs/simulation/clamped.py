@@ -91,9 +91,9 @@ def _clamp(table: ClampTable, name: str, stock: LayeredStock) -> Clamp:
         x, y, z = table.point_mm
         outline = shapely.Point(x, y).buffer(0.5 * table.diameter_mm, quad_segs=ROUND // 4)
         low[2], high[2] = z - 0.5 * table.diameter_mm, z + 0.5 * table.diameter_mm
-    held = np.array([axis in table.directions for axis in "xyz"])
+    fixed_axes = np.array([axis in table.directions for axis in "xyz"])
     stiffness = np.inf if table.stiffness_n_um is None else PER * table.stiffness_n_um
-    return Clamp(name, StockRegion(outline, float(low[2]), float(high[2])), held, stiffness)
+    return Clamp(name, StockRegion(outline, float(low[2]), float(high[2])), fixed_axes, stiffness)
 
 
 def clamped_volumes(table: WorkpieceTable, stock: LayeredStock) -> NDArray[np.float64]:

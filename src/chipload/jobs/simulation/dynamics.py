@@ -43,7 +43,7 @@ class Dynamics:
     unknown : what is not stated and would be needed
     spread : of the modes; None: not stated
     workpiece_damping : of the modes that [workpiece] gives; None: it gives none
-    process : damping by worn edges; None: none is counted
+    process : damping by worn edges; None: left out
     """
 
     modes: Mapping[int, Modes]

@@ -172,4 +172,4 @@ def note_of_passes(job: ProgramJob, *passes: str) -> str:
     found = " and ".join((*passes, *(("the compliance of the workpiece",) if job.table.workpiece is not None else ())))
     if not found:
         return ""
-    return f"what finds {found} does not resume: if it is stopped there, it begins again; the last pass resumes"
+    return f"the calculation of {found} does not resume: if it is stopped there, it starts again; the last pass resumes"

@@ -26,7 +26,7 @@ def program_limits(
 
     Parameters
     ----------
-    columns : of the track, a row a step
+    columns : of the track, one row for each step
     track : its name
     stability : of the track; None: that of the simulation
     """

@@ -54,7 +54,7 @@ class SimulationResult:
     machine : whose spindle supplies torque and power
     limit_table : limits of the job
     settings : the keys of the operation
-    checks : made beside the stated limits, with the cutters and the material
+    checks : made in addition to the stated limits, with the cutters and the material
     collisions : of cutter, shank and holder
     left : differences from the part; None: no part is stated
     rigid : compliant components that are not stated and count as rigid

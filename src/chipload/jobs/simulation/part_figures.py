@@ -73,7 +73,7 @@ def section(
             for name, v in (("deepest gouge [mm]", gouge), ("highest excess [mm]", excess))
         ]
         body += [
-            "<h2>What is left on the part</h2>",
+            "<h2>Gouge and excess on the part</h2>",
             table(["", "mm", "line", "at x, y, z [mm]"], rows, numbers=(1, 2)),
             f"<p>Of {what['part_under_stock']} points of the part that had stock over them "
             f"{100.0 * what['part_reached_share']:.3g} % lie within {left.search_range:g} mm of the tool path; over "

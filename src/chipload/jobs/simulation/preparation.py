@@ -36,7 +36,7 @@ LEANING_FLANK, LEANING_BOTTOM = 0.1, 12
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """Inputs of a simulation beside the stock: program, resolution, part, fixtures and stiffness.
+    """Inputs of a simulation besides the stock: program, resolution, part, fixtures and stiffness.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ def changeable(path: Path, machine: Machine, dialect: str | None, key: str) -> t
     Raises
     ------
     InputError
-        The text cannot be changed; the message says what to do.
+        The text cannot be changed; the message states the remedy.
     """
     words = key.split(".")[-1]
     kind = dialect_of(path, machine, dialect)

@@ -33,7 +33,7 @@ def program_result(
     Parameters
     ----------
     tracks : the one in use first
-    numbers : of the operation, beside those of the simulation and the program
+    numbers : of the operation, in addition to those of the simulation and the program
     note : text of the report below the message
     """
     simulation = program.simulated
@@ -67,7 +67,7 @@ def changed_tracks(
     ----------
     name : of the file with the new text
     not_compared : limits that are checked only after the change
-    found : findings beside those of the simulation
+    found : findings in addition to those of the simulation
     stability : of the program as it was; None: that of the simulation
     blocks : rows of the history after the change; None: those of the simulation
     """

@@ -48,7 +48,7 @@ from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 from chipload.workers import Workers
 
-#: of a simulation, what one pass over its steps beside the removal takes
+#: share of a simulation that one pass over its steps besides the removal takes
 SHARE = 0.2 / 3.0
 
 
@@ -171,7 +171,7 @@ def simulated(
         compliance = compliance_of_workpiece(job, reading, stock, machine, material, progress)
     gives = bodies.stiffness if compliance is None else stiffness_of(job.table.stiffness, job.cutters, compliance.steps)
     points, before, stiffness = bodies.stock_points, insides(stock), job.table.stiffness
-    # layers that were cut before lie face on face, which rays do not tell apart
+    # layers that were cut before lie face on face, which rays do not distinguish
     blank = None if stock.cut.any() else stock.body()
     watches = [with_checks(job.table.checks, material, deflecting(gives, material))]
     steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
@@ -188,7 +188,7 @@ def simulated(
             passing(0.0, "distances to the part"), kept,
         )  # fmt: skip
         solids["part"] = left.points
-    # form error costs as much as the chips, and says little where nothing is known to give way
+    # form error costs as much as the chips, and means little without stiffness data
     made = left if stiffness is not None or compliance is not None or "form_error_um" in job.limits else None
     if made is not None:
         watches.append(forming(made, gives, material))

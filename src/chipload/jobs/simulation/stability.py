@@ -37,13 +37,13 @@ STABILITY_LIMITS = ("stability_margin", PROBABILITY, "sle_um")
 DEFAULT_MARGIN = 1.0
 #: relative error of a margin by the map and by rounding what steps cut
 MARGIN_ERROR = 0.01
-#: steps with the least margins for which the error of followed frequencies is looked at
+#: steps with the least margins for which the error of followed frequencies is calculated
 UNSURE = 48
 #: probabilities of stability [%] that windows of speeds are given at, where spreads of the modes are stated
 SURE = (50, 95)
-#: waves of the fastest mode in a tooth period at the least speed that is looked at: slower ones have no pockets
+#: waves of the fastest mode in a tooth period at the least speed that is searched: slower ones have no pockets
 MOST_WAVES = 20.0
-#: speeds that are looked at, evenly spaced in their logarithm, and how a speed is rounded [1/min]
+#: speeds that are searched, evenly spaced in their logarithm, and how a speed is rounded [1/min]
 SPEEDS, ROUND_RPM = 161, 10.0
 
 
@@ -92,7 +92,7 @@ class StabilityResult:
         return out
 
     @cached_property
-    def sure(self) -> Mapping[int, Floats]:
+    def stable_share(self) -> Mapping[int, Floats]:
         """Probability of stability over the speeds of :attr:`quiet`, by tool, of the cut with the least margin at each.
 
         Empty if spreads of the modes are not stated.
@@ -279,11 +279,11 @@ def stability_numbers(stability: StabilityResult, columns: Columns) -> dict[str,
             {"low_rpm": rpm_from_rad_s(w.low), "high_rpm": rpm_from_rad_s(w.high), "margin": w.margin}
             for w in quiet.windows
         ]
-        if tool in stability.sure:
+        if tool in stability.stable_share:
             for share in SURE:
                 out[f"windows_{share}_percent"] = [
                     {"low_rpm": rpm_from_rad_s(w.low), "high_rpm": rpm_from_rad_s(w.high), "probability": w.margin}
-                    for w in speed_windows(quiet.speed, stability.sure[tool], 0.01 * share)
+                    for w in speed_windows(quiet.speed, stability.stable_share[tool], 0.01 * share)
                 ]
     return out
 
@@ -326,6 +326,6 @@ def stability_of(job: ProgramJob, watch: StabilityWatch, machine: Machine) -> St
     """Return the stability result of a watch that has seen every step."""
     wanted = max(job.limits.get("stability_margin", DEFAULT_MARGIN), DEFAULT_MARGIN)
     radii = {n: c.radius for n, c in job.cutters.items()}
-    asked = job.table.operation[0].speeds
-    speeds = (None, None) if asked is None else (asked.least_rpm, asked.most_rpm)
+    speed_table = job.table.operation[0].speeds
+    speeds = (None, None) if speed_table is None else (speed_table.least_rpm, speed_table.most_rpm)
     return StabilityResult(watch, machine, wanted, radii, speeds)

@@ -56,7 +56,7 @@ def stability_sections(
     left_out = "" if process is not None else ", process damping is left out"
     if process is not None:
         land = f"wear land {process.wear_land:g} mm, {process.indentation:g} N/mm3, friction {process.friction:g}"
-        rows.append(["process damping is counted", land])
+        rows.append(["process damping is included", land])
     axial = "The axial direction is rigid"
     if stability.watch.spatial(int(what["tool"])):
         axial = "Cutter and workpiece move along the axis as well"
@@ -66,7 +66,7 @@ def stability_sections(
         table(["", ""], rows),
     ]
     if speeds is not None:
-        told = [
+        speed_rows = [
             [
                 str(t.tool), f"{t.lines[0]} to {t.lines[1]}", ", ".join(f"{x:.6g}" for x in t.before), f"{t.rpm:.6g}",
                 f"{t.margin:.3g}",
@@ -74,7 +74,7 @@ def stability_sections(
             for t in speeds.tools
         ]  # fmt: skip
         head = ["tool", "lines", "before [rpm]", "new [rpm]", "margin expected"]
-        body += ["<h3>New speeds</h3>", table(head, told)]
+        body += ["<h3>New speeds</h3>", table(head, speed_rows)]
     if what["windows"]:
         cells = [[f"{w['low_rpm']:.5g}", f"{w['high_rpm']:.5g}", f"{w['margin']:.3g}"] for w in what["windows"]]
         head = ["from [rpm]", "to [rpm]", "greatest margin"]
@@ -88,7 +88,7 @@ def stability_sections(
         if some is not None:
             cells = [[f"{w['low_rpm']:.5g}", f"{w['high_rpm']:.5g}", f"{w['probability']:.3g}"] for w in some]
             body += [
-                f"<h3>Speeds that are quiet with {share} %</h3>",
+                f"<h3>Quiet speeds with a probability of {share} %</h3>",
                 '<p class="note">Probability that the cut with the least margin does not chatter at each speed, from '
                 "the stated deviations of the modes and the spread of the coefficients.</p>",
                 table(["from [rpm]", "to [rpm]", "greatest probability"], cells, numbers=(0, 1, 2)),
@@ -106,7 +106,7 @@ def stability_sections(
         body += [
             "<h3>Stability chart</h3>",
             '<p class="note">Limit of the cut with the least margin: above the line it chatters. Dots are the '
-            "different cuts of the tool, each with its own limit; a red dot is below the wanted margin.</p>",
+            "different cuts of the tool, each with its own limit; a red dot is below the required margin.</p>",
             figure(
                 "stability", chart_figure(drawn, tool, stability, None if speeds is None else speeds.stability), figures
             ),
@@ -156,7 +156,7 @@ def chart_figure(
         if chart.is_depth:
             depth = np.where(single, cuts.rows[np.minimum(cuts.start[:-1], len(cuts.rows) - 1), 4], np.nan)
         speed, bad = rpm_from_rad_s(1.0) * cuts.pitch / cuts.period, margin < stability.wanted
-        for chosen, colour, what in ((~bad, STOCK, name), (bad, LIMIT, f"{name}, below the wanted margin")):
+        for chosen, colour, what in ((~bad, STOCK, name), (bad, LIMIT, f"{name}, below the required margin")):
             shown = np.isfinite(depth) & chosen
             if shown.any():
                 out.add_trace(

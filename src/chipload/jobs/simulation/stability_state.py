@@ -30,12 +30,12 @@ WIDTH = 13
 Known = dict[int, dict[bytes, tuple[float, ...]]]
 
 
-def _wide(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _widened(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return rows (b, :data:`WIDTH`), with columns of 0 added to narrower ones."""
     return np.pad(rows, ((0, 0), (0, WIDTH - rows.shape[1])))
 
 
-def asked_bytes(
+def known_cuts_bytes(
     known: Known,
     cuts: Mapping[int, list[DynamicCuts]],
     leaning: set[int],
@@ -65,7 +65,7 @@ def asked_bytes(
         "key_ends": np.cumsum([len(key) for key in keys], dtype=np.int64),
         "values": np.array(values).reshape(len(keys), columns),
         "sizes": np.concatenate([np.diff(c.start) for c in whole.values()]) if whole else none.astype(np.int64),
-        "rows": np.concatenate([_wide(c.rows) for c in whole.values()]) if whole else none.reshape(0, WIDTH),
+        "rows": np.concatenate([_widened(c.rows) for c in whole.values()]) if whole else none.reshape(0, WIDTH),
         "directions": np.array([c.U.shape[1] for c in whole.values()], dtype=np.int64),
         "delay": np.concatenate([c.delay if len(c.delay) else np.zeros(len(c.rows)) for c in whole.values()])
         if whole
@@ -84,10 +84,10 @@ def asked_bytes(
     return shape_bytes(KIND, arrays, np.empty(0, dtype=object))
 
 
-def read_asked(
+def read_known_cuts(
     path: Path, exponents: ArrayLike
 ) -> tuple[Known, dict[int, list[DynamicCuts]], set[int], dict[int, float]]:
-    """Read a file of :func:`asked_bytes`: values by key, cuts, leaning tools, and margins with the first modes.
+    """Read a file of :func:`known_cuts_bytes`: values by key, cuts, leaning tools, and margins with the first modes.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.jobs.simulation.dynamics import Dynamics
-from chipload.jobs.simulation.stability_state import asked_bytes, read_asked
+from chipload.jobs.simulation.stability_state import known_cuts_bytes, read_known_cuts
 from chipload.simulation.loads import Cuts
 from chipload.stability.cuts import DynamicCuts, dynamic_cuts, joined
 from chipload.stability.grouping import grouped
@@ -36,7 +36,7 @@ STABILITY_COLUMNS = ("stability_margin", "chatter_hz", "chatter_mode", "sle_um")
 PROBABILITY = "stable_probability"
 #: the axis of the cutter is upright where its z is at least this
 UPRIGHT = 1.0 - 1e-9
-#: cuts of a tool that speeds are looked for with: those nearest to chatter, and those with most edge in cut
+#: cuts of a tool with which speeds are searched: those nearest to chatter, and those with most edge in cut
 NEAREST, LARGEST = 12, 12
 #: the same of a cutter whose teeth are not alike, of which each takes some times as long
 UNEVEN = (4, 2)
@@ -161,11 +161,11 @@ class StabilityWatch:
 
     def to_bytes(self) -> bytes:
         """Return the results so far as bytes for the state of a run."""
-        return asked_bytes(self.known, self.cuts, self.leaning, len(self.columns), self.first_margin)
+        return known_cuts_bytes(self.known, self.cuts, self.leaning, len(self.columns), self.first_margin)
 
     def restore(self, path: Path) -> None:
         """Load the results of an earlier run."""
-        self.known, self.cuts, self.leaning, self.first_margin = read_asked(path, self.material.exponents)
+        self.known, self.cuts, self.leaning, self.first_margin = read_known_cuts(path, self.material.exponents)
 
     def clear(self) -> None:
         """Delete all stored results."""

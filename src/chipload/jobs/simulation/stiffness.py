@@ -66,30 +66,30 @@ def stiffness_of(
     >>> stiffness_of(StiffnessTable.model_validate({"spindle_n_um": 50.0}), {1: mill}).unknown[:2]
     ('stiffness.grip_n_um', 'stiffness.grip_nm_rad')
     """
-    said = table or StiffnessTable.model_validate({})
-    modulus = said.holder_gpa
+    stated = table or StiffnessTable.model_validate({})
+    modulus = stated.holder_gpa
     if modulus is not None and math.isfinite(modulus) and not MODULI[0] <= modulus <= MODULI[1]:
         raise InputError(
             f"stiffness.holder_gpa = {modulus:g}: must be from {MODULI[0]:g} to {MODULI[1]:g}, or inf for rigid holders"
         )
     chains = {n: c for n, c in cutters.items() if c.tip_stiffness is None}
     keys = [k for k in StiffnessTable.model_fields if k != "holder_gpa"] if chains else ["work_n_um"]
-    missing = [f"stiffness.{k}" for k in keys if getattr(said, k) is None]
+    missing = [f"stiffness.{k}" for k in keys if getattr(stated, k) is None]
     if workpiece is not None:
         missing = [name for name in missing if name != "stiffness.work_n_um"]
     # a spindle that does not tilt feels no lever: the length of a rigid holder does not matter then
-    matters = modulus is None or math.isfinite(modulus) or math.isfinite(said.spindle_nm_rad or 1.0)
+    matters = modulus is None or math.isfinite(modulus) or math.isfinite(stated.spindle_nm_rad or 1.0)
     bare = sorted(n for n, c in chains.items() if not c.holder) if matters else []
     if modulus is None and len(bare) < len(chains):
         missing.append("stiffness.holder_gpa")
     missing += [f"holder_mm of cutter {n}" for n in bare]
-    grip = springs(PER * (said.grip_n_um or math.inf), PER * (said.grip_nm_rad or math.inf))
-    nose = springs(PER * (said.spindle_n_um or math.inf), PER * (said.spindle_nm_rad or math.inf))
+    grip = springs(PER * (stated.grip_n_um or math.inf), PER * (stated.grip_nm_rad or math.inf))
+    nose = springs(PER * (stated.spindle_n_um or math.inf), PER * (stated.spindle_nm_rad or math.inf))
     bars = {n: tool_bars(c) for n, c in cutters.items() if n not in chains}
     for number, cutter in chains.items():
         holder = [_part(length, diameter, modulus) for length, diameter in cutter.holder]
         bars[number] = (*cutter_bars(cutter, grip), *holder, Bar(0.0, 0.0, nose))
-    work = workpiece if workpiece is not None or said.work_n_um is None else 1.0 / (PER * said.work_n_um)
+    work = workpiece if workpiece is not None or stated.work_n_um is None else 1.0 / (PER * stated.work_n_um)
     return Stiffness(bars, work, any(c.gullet is not None for c in cutters.values()), tuple(missing))
 
 

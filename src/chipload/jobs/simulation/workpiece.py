@@ -83,7 +83,7 @@ def stock_points(stock: LayeredStock, pitch: float) -> NDArray[np.float64]:
 
 
 def insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.bool_]]:
-    """Return a function that tells which points [mm] lie in the present stock."""
+    """Return a function that returns which points [mm] lie in the present stock."""
     bounds, sections = np.asarray(stock.bounds), [stock.section(i) for i in range(stock.layers)]
 
     def contains(points: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -136,13 +136,13 @@ def layer_thickness(program: Program, cutters: Mapping[int, Cutter], top: float)
     """
     smallest = min(c.resolved_diameter for c in cutters.values())
     deep = top - min(_lowest(program, cutters), top)
-    p, way = np.asarray(program.p_work), lengths(program)
+    p, distance = np.asarray(program.p_work), lengths(program)
     cuts = (program.motion != RAPID) & (p[:, 2] < top)
     level = cuts & (np.abs(np.diff(p[:, 2], prepend=p[:1, 2])) < 1e-9) & (np.asarray(program.axis)[:, 2] > 1.0 - 1e-12)
-    whole = float(way[cuts].sum())
-    if whole > 0.0 and float(way[level].sum()) >= 0.5 * whole:
+    whole = float(distance[cuts].sum())
+    if whole > 0.0 and float(distance[level].sum()) >= 0.5 * whole:
         heights, at = np.unique(p[level, 2].round(9), return_inverse=True)
-        long = np.bincount(at.ravel(), way[level], minlength=len(heights)) >= 0.05 * whole
+        long = np.bincount(at.ravel(), distance[level], minlength=len(heights)) >= 0.05 * whole
         down = np.diff(np.append(heights[long], top))
         straight = all(c.corner_radius == c.taper == c.bottom == 0.0 and not c.barrel_radius for c in cutters.values())
         share = 0.2 if straight else 0.1
@@ -176,8 +176,8 @@ def _levels(program: Program, cutters: Mapping[int, Cutter], apart: float) -> ND
     kept = np.unique(p[level & upright & flat, 2].round(9))
     pointed = level & upright & ~flat
     heights, at = np.unique(p[pointed, 2].round(9), return_inverse=True)
-    way = np.bincount(at.ravel(), lengths(program)[pointed], minlength=len(heights))
-    for z in heights[np.argsort(-way, kind="stable")].tolist():
+    distance = np.bincount(at.ravel(), lengths(program)[pointed], minlength=len(heights))
+    for z in heights[np.argsort(-distance, kind="stable")].tolist():
         if np.abs(kept - z).min(initial=math.inf) >= apart:
             kept = np.append(kept, z)
     return np.sort(kept)

@@ -47,7 +47,7 @@ SPACING = 0.5
 FLOOR = 0.01
 #: change of a frequency between two states, over that of the deflection
 FREQUENCY = 0.5
-#: steps with most deflection, and with most force, whose stress is looked at
+#: steps with most deflection, and with most force, whose stress is calculated
 STRAINED = 6
 
 
@@ -161,7 +161,7 @@ def workpiece_compliance(
         return None
     op = job.table.operation[0]
     elastic, clamps = elastic_of(table), clamps_of(table, stock)
-    held = clamped_volumes(table, stock)
+    clamped_parts = clamped_volumes(table, stock)
     ahead = cut_ahead(
         program, stock.copied(), job.cutters, material, resolution, op.interpolation,
         lambda done, what: progress(0.4 * done, what),
@@ -170,7 +170,7 @@ def workpiece_compliance(
     most = [0]
 
     def build(then: LayeredStock, cells: CellGrid) -> CellWorkpiece:
-        made = cell_workpiece(then, cells, elastic, clamps, held)
+        made = cell_workpiece(then, cells, elastic, clamps, clamped_parts)
         most[0] = max(most[0], 3 * len(made.modes))
         return made
 

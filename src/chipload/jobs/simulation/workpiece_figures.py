@@ -46,7 +46,7 @@ def bent_section(bent: BentWorkpiece, where: str, figures: dict[str, go.Figure])
     """Return the report section on the workpiece in its worst step; ``where`` begins a sentence."""
     x, y, z = bent.place
     return [
-        "<h3>Bent at its worst</h3>",
+        "<h3>Greatest deflection</h3>",
         f'<p class="note">{where}, under {np.linalg.norm(bent.force):.4g} N; displacement drawn '
         f"{_scale(bent):.3g} times.</p>",
         figure("bent", bent_figure(bent), figures),

@@ -1,4 +1,4 @@
-"""Chatter of a thin wall's passes: stable depths beside the deflection limit, a speed for each pass, the stability
+"""Chatter of a thin wall's passes: stable depths with the deflection limit, a speed for each pass, the stability
 margin.
 
 A pass is checked in two states: with the stock that it leaves, and with the stock before it, thicker by at most the
@@ -55,7 +55,7 @@ class WallChatter:
     Parameters
     ----------
     inputs : of the job
-    cutting : cutter, damping and wanted margin
+    cutting : cutter, damping and required margin
     count : modes of the wall
     speeds : (s,) float [rad/s] that a pass may have, rising
     """

@@ -1,4 +1,4 @@
-"""Further variants that a job can ask for: the least form error in the same time, and a compensated path.
+"""Further variants that a job can request: the least form error in the same time, and a compensated path.
 
 The variable plan takes less time at one deflection. The least-error plan takes the time of the constant plan and has
 less form error, which is that of the last pass of each side: that pass keeps ever smaller shares of the limit, until

@@ -39,25 +39,25 @@ def wall_of_faces(job: ThinWallJob) -> ThinWall:
     front, back = (model.face(named[key], f"wall.{key}") for key in ("front", "back"))
     if front.number == back.number:
         raise InputError(f"wall.back: face {back.number} is wall.front too: state the opposite face")
-    taken = [patch_of(f, f"wall.{key}", fit) for f, key in ((front, "front"), (back, "back"))]
-    made = wall_of(taken[0].patch, taken[1].patch, _clamp(model, named["clamp"], front, taken[0].patch))
+    patches = [patch_of(f, f"wall.{key}", fit) for f, key in ((front, "front"), (back, "back"))]
+    made = wall_of(patches[0].patch, patches[1].patch, _clamp(model, named["clamp"], front, patches[0].patch))
     name = f"wall between faces {front.number} and {back.number} of {model.file.name}"
     wall = opposite(through_sections(made, w.edge_share or 0.0, w.span or (0.0, 1.0), name))
     if model.solid:
         middle = made.plus.at(0.5, 0.5)[0] - made.minus.at(0.5, 0.5)[0]
         if made.plus.normal(0.5, 0.5)[0] @ middle < 0.0:
             raise InputError(f"{name}: no material between them: state the two sides of a wall, not of a slot")
-    return ThinWall(f"{name} (front {taken[0]}; back {taken[1]})", wall.at)
+    return ThinWall(f"{name} (front {patches[0]}; back {patches[1]})", wall.at)
 
 
 def _clamp(model: Model, clamp: Name, front: Face, patch: BSplinePatch) -> Callable[[Floats], float]:
     """Mean distance [mm] of points of a side from what is clamped; one of the front's sides must lie there."""
     sides = [patch.at(_FINE, 0.0), patch.at(_FINE, 1.0), patch.at(0.0, _FINE), patch.at(1.0, _FINE)]
     if isinstance(clamp, int):
-        held = model.face(clamp, "wall.clamp")
+        clamped_face = model.face(clamp, "wall.clamp")
 
         def away(points: Floats) -> float:
-            return float(np.mean([held.distance(p) for p in points.tolist()]))
+            return float(np.mean([clamped_face.distance(p) for p in points.tolist()]))
 
         least = min(away(p[::100]) for p in sides)
         if least > ON:
@@ -68,14 +68,14 @@ def _clamp(model: Model, clamp: Name, front: Face, patch: BSplinePatch) -> Calla
         return away
     point = np.asarray(clamp, dtype=np.float64)
     near = [_to_polyline(point, p) for p in sides]
-    said = f"wall.clamp = [{', '.join(f'{x:g}' for x in clamp)}]"
+    place = f"wall.clamp = [{', '.join(f'{x:g}' for x in clamp)}]"
     if min(near) > ON:
         raise InputError(
-            f"{said}: lies {min(near):.4g} mm off the nearest edge of face {front.number}: must be within {ON:g} mm "
+            f"{place}: lies {min(near):.4g} mm off the nearest edge of face {front.number}: must be within {ON:g} mm "
             "(mm, in the frame of the file)"
         )
     if sum(d <= ON for d in near) > 1:
-        raise InputError(f"{said}: lies at a corner of face {front.number}: take a point within the edge")
+        raise InputError(f"{place}: lies at a corner of face {front.number}: take a point within the edge")
     return lambda points: _to_polyline(point, points)
 
 

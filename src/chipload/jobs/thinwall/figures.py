@@ -34,7 +34,7 @@ def _blanks(walled: ThinWallResult) -> dict[str, Blank]:
 
 
 def _frame(walled: ThinWallResult) -> str:
-    """What coordinates mean."""
+    """The coordinates of the program, in words."""
     if isinstance(walled.geometry.shape, PartShape):
         return "coordinates are those of the part's model"
     return "Z 0 is the clamp, X along the wall, its sides towards Y+ and Y-"
@@ -48,20 +48,20 @@ def program_files(walled: ThinWallResult) -> dict[str, bytes]:
         bad = failures_of(walled, one)
         released = name == USED and not bad
         title = f"{walled.title}, operation 0, thinwall, {name}"
-        said = [] if name == USED else [f"not released: the job uses {USED}"]
-        said += [f"does not hold: {bad[0]}"] if bad else []
-        said += [
+        comments = [] if name == USED else [f"not released: the job uses {USED}"]
+        comments += [f"does not hold: {bad[0]}"] if bad else []
+        comments += [
             f"T{c.number}: D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes, overhang "
             f"{c.overhang:g} mm"
             for c in cutters.values()
         ]
-        said += [f"{_frame(walled)}; machine {walled.planning.machine.name}"]
-        said += [
+        comments += [f"{_frame(walled)}; machine {walled.planning.machine.name}"]
+        comments += [
             f"G43 H{c.number} must be the overhang of {c.overhang:g} mm: the rotary axes turn about it"
             for c in cutters.values()
         ]
         text = write_commands(
-            one.commands, walled.planning.machine, title=title, verified=released, comments=said, number=100 + k
+            one.commands, walled.planning.machine, title=title, verified=released, comments=comments, number=100 + k
         )
         stem = program_name(0, name)
         out[f"{stem}.{ENDINGS[walled.planning.machine.dialect]}"] = text.encode("ascii")

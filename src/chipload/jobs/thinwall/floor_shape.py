@@ -1,6 +1,6 @@
 """Check of floors: the path of an upright cutter against the floor and the walls around it, the stock against the part.
 
-The path is held against sections of the part at all heights that the cutter reaches; the planner keeps the area of its
+The path is compared with sections of the part at all heights that the cutter reaches; the planner keeps the area of its
 centres from sections of its own.
 """
 
@@ -28,7 +28,7 @@ APART, BESIDE = 0.5, 0.02
 
 
 def floor_shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProgram]) -> Shape:
-    """Path and stock beside the finished part."""
+    """Path and stock against the finished part."""
     inputs = places.inputs
     gap, at = _nearest(inputs, pass_programs)
     corner = max(o.cut.cutter.corner_radius for o in inputs.operations)

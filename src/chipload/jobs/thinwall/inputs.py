@@ -115,7 +115,7 @@ class WallInputs:
     ----------
     operations : in the order of cutting
     findings : while it was read
-    neighbours, neighbour_meshes : points, and vertices and faces, of what stands beside one wall, by name
+    neighbours, neighbour_meshes : points, and vertices and faces, of the bodies next to one wall, by name
     """
 
     job: ThinWallJob
@@ -304,15 +304,15 @@ def read_wall(job: ThinWallJob) -> WallInputs:
         before = operations[-1] if operations else None
         operations.append(wall_operation(job, k, machine, material, experiments, rows, before))
     step_over = min(abs(o.cut.step_over) for o in operations)
-    beside = _neighbours(job)
+    neighbours = _neighbours(job)
     return WallInputs(
         job=job,
         title=title_of(job.path),
         body=_part_body(job, shape, step_over) if isinstance(shape, PartShape) else _wall_body(job, shape, sides, foot),
         operations=tuple(operations),
         findings=findings,
-        neighbours={name: points for name, (points, _) in beside.items()},
-        neighbour_meshes={name: mesh for name, (_, mesh) in beside.items()},
+        neighbours={name: points for name, (points, _) in neighbours.items()},
+        neighbour_meshes={name: mesh for name, (_, mesh) in neighbours.items()},
     )
 
 

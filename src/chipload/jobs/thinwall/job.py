@@ -96,7 +96,7 @@ def load(path: Path, table: ThinWallJobTable, overrides: Sequence[str]) -> ThinW
 
 def resume_note(job: ThinWallJob) -> str:
     """Note on the part of the work that is not kept while the job runs: the plan that is being simulated."""
-    return "plans that were simulated are kept; the simulation of a plan does not resume: stopped, it begins again"
+    return "simulated plans are kept; the simulation of a plan does not resume: if it is stopped, it starts again"
 
 
 def missing(values: Mapping[str, Any]) -> list[str]:
@@ -110,7 +110,7 @@ def missing(values: Mapping[str, Any]) -> list[str]:
 
 
 def _contradictions(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
-    """What values of the wall, the operation and its cutter contradict."""
+    """Contradictions between wall, operation and cutter."""
     wall = table.wall
     if isinstance(wall, WallTable):
         needs, may = SHAPES[wall.shape]
@@ -133,7 +133,7 @@ def _contradictions(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Ite
 def _of_operation(
     op: WallOperationTable, number: int, tools: Mapping[int, Cutter], feet: Sequence[tuple[str, float]], most: float
 ) -> Iterator[str]:
-    """What an operation contradicts: its cutter, the feet of the walls and the greatest stock."""
+    """Contradictions of an operation with its cutter, the feet of the walls and the greatest stock."""
     where = f"operation.{number}"
     yield from unknown_cutter(f"{where}.cutter", op.cutter, tools)
     if op.cutter in tools and tools[op.cutter].body:
@@ -143,8 +143,8 @@ def _of_operation(
         )
     yield from _of_rows(op, where)
     if op.rows is None and op.contact == "corner" and (op.step_over_mm is None) == (op.scallop_um is None):
-        said = "none is" if op.step_over_mm is None else "both are"
-        yield f"{where}: {said} stated: state either step_over_mm or scallop_um"
+        state = "none is" if op.step_over_mm is None else "both are"
+        yield f"{where}: {state} stated: state either step_over_mm or scallop_um"
     for key, foot in feet:
         barrel = op.cutter in tools and tools[op.cutter].barrel_radius is not None
         if op.cutter in tools and not barrel and foot < tools[op.cutter].corner_radius:
@@ -204,7 +204,7 @@ def _of_end_keys(op: WallOperationTable, where: str) -> Iterator[str]:
 
 
 def _of_ends(table: ThinWallJobTable) -> Iterator[str]:
-    """What end contact contradicts: the walls, and operations with other contact."""
+    """Contradictions of end contact with the walls and with operations of other contact."""
     ends = [k for k, op in enumerate(table.operation) if op.contact == "end"]
     if not ends:
         if not isinstance(table.wall, WallTable):
@@ -226,7 +226,7 @@ def _of_ends(table: ThinWallJobTable) -> Iterator[str]:
 
 
 def _of_flanks(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
-    """What flank contact contradicts: the wall, other operations, and how long cutter and flutes are."""
+    """Contradictions of flank contact with the wall, other operations, and the length of cutter and flutes."""
     flanks = [k for k, op in enumerate(table.operation) if op.contact == "flank"]
     if not flanks:
         return
@@ -243,22 +243,22 @@ def _of_flanks(table: ThinWallJobTable, tools: Mapping[int, Cutter]) -> Iterator
     if op.cutter not in tools or height is None:
         return
     cutter = tools[op.cutter]
-    beside = height - wall.foot_mm + cutter.corner_radius
-    if cutter.overhang <= beside:
+    needed = height - wall.foot_mm + cutter.corner_radius
+    if cutter.overhang <= needed:
         yield (
-            f"cutter.{op.cutter}.overhang_mm = {cutter.overhang:g}: must be above {beside:g}: the cutter stands along "
-            "the wall, and its holder would run into it"
+            f"cutter.{op.cutter}.overhang_mm = {cutter.overhang:g}: must be above {needed:g}: the cutter stands along "
+            "the wall, and its holder would collide with it"
         )
     thinner = cutter.shank_diameter is not None and cutter.shank_diameter < cutter.diameter
-    if cutter.flute_length < beside and not thinner:
+    if cutter.flute_length < needed and not thinner:
         yield (
-            f"cutter.{op.cutter}.flute_length_mm = {cutter.flute_length:g}: must be at least {beside:g}, from the last "
+            f"cutter.{op.cutter}.flute_length_mm = {cutter.flute_length:g}: must be at least {needed:g}, from the last "
             "row to the free edge, or shank_diameter_mm below the diameter: the shank would rub on the wall"
         )
 
 
 def _of_several(table: ThinWallJobTable, least: float) -> Iterator[str]:
-    """What operations that follow one another contradict: the stock that they leave, and keys of the last one.
+    """Contradictions of consecutive operations: the stock that they leave, and keys of the last one.
 
     ``least`` is the least stock of a side before the first one [mm].
     """
@@ -299,7 +299,7 @@ def _of_parts_only(table: ThinWallJobTable) -> Iterator[str]:
 def _part_contradictions(table: ThinWallJobTable, walls: Sequence[FaceWallTable]) -> Iterator[str]:
     """What the walls of a part lack, and keys that they do not use."""
     if table.neighbour:
-        yield "neighbour: for one [wall] only: leave it out; what stands beside a [[wall]] belongs to the part"
+        yield "neighbour: for one [wall] only: leave it out; what stands next to a [[wall]] belongs to the part"
     if not walls:
         yield "wall: has no entry: state at least one [[wall]]"
     if table.part is None:

@@ -23,7 +23,7 @@ from chipload.result import Provenance
 from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.surface import Collision
 
-#: what a part may be made of beside arrays and plain values
+#: what a part may be made of besides arrays and plain values
 RECORDS = (Collision, Finish, Shape)
 
 

@@ -43,7 +43,7 @@ class SimulatedPass:
     @property
     def compared(self) -> Mapping[str, NDArray[Any]]:
         """Columns whose error is estimated: on a floor the force along the axis instead of that along the normal of a
-        surface beside the cutter.
+        surface next to the cutter.
         """
         names = COMPARED if self.floor else COMPARABLE
         axial = {AXIAL: axial_force(self.columns)} if self.floor else {}

@@ -84,7 +84,7 @@ class Finish:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Shape of the simulated stock beside the finished wall.
+    """Shape of the simulated stock against the finished wall.
 
     Attributes
     ----------
@@ -150,11 +150,11 @@ class Variant:
     commands : on the machine
     beyond : what the machine does not give
     seconds : on the machine
-    columns : a row a step of the simulation
+    columns : one row for each step of the simulation
     finish : a finished side each
-    shape : the simulated stock beside the finished wall
+    shape : the simulated stock against the finished wall
     stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
-    find_load_error : gives ``load_error``, when that is first asked for: it takes longer than the simulation
+    find_load_error : calculates ``load_error`` at its first use: it takes longer than the simulation
     shift : greatest way [mm] by which the last passes were moved against the form error
     """
 
@@ -189,7 +189,7 @@ class Variant:
         Parameters
         ----------
         modelled : whether F_th is
-        assumed : error of F_n, where its own is not asked for
+        assumed : error of F_n, where its own is not calculated
         """
         c = self.columns
         unsure = c["compliance_error"] if modelled else 0.0
@@ -227,7 +227,7 @@ class WallGeometry:
     shape : finished
     allowance : [mm] on k- and k+, or on each side of a part's walls
     stock, finished : (vertices (n, 3), faces (m, 3)) of the workpiece before, and of the finished wall or part
-    neighbours : the same of what stands beside one wall, by name
+    neighbours : the same of the bodies next to one wall, by name
     """
 
     shape: ThinWall | PartShape
@@ -297,7 +297,7 @@ class ThinWallResult:
     variants : by name
     findings : what was found
     settings : JSON values
-    checks : what is checked beside the stated limits
+    checks : checks in addition to the stated limits
     provenance : where the numbers come from
     """
 
@@ -313,7 +313,7 @@ class ThinWallResult:
     provenance: Provenance
 
 
-def helps(place: Help) -> str:
+def remedy_text(place: Help) -> str:
     """Changes that would make a place feasible, in words."""
     if place.feed_per_tooth_mm is not None:
         return f"a feed of at most {place.feed_per_tooth_mm:.4g} mm a tooth would do"

@@ -181,8 +181,10 @@ def part_blank(job: ThinWallJob, body: PartShape, step_over: float) -> PartBlank
     layer = float(np.ptp(body.part.bounds, axis=0).max()) / LAYERS
     first, last = (_layered(body, places, D, layer) for D in (full, [np.zeros((n, m)) for _ in full]))
     grid, wall = cells_over(first, last, made.cell_mm, made.order or 2)
-    body, held, clamps = replace(body, thickness=wall), clamped_volumes(table, first), clamps_of(table, first)
-    return PartBlank(body, places, CONTACT * step_over, elastic_of(table), clamps, held, grid, grid.wider(COARSER))
+    body, clamped_parts, clamps = replace(body, thickness=wall), clamped_volumes(table, first), clamps_of(table, first)
+    return PartBlank(
+        body, places, CONTACT * step_over, elastic_of(table), clamps, clamped_parts, grid, grid.wider(COARSER)
+    )
 
 
 def _layered(body: PartShape, places: tuple[Floats, Floats], left: Sequence[Floats], layer: float) -> LayeredStock:

@@ -3,7 +3,7 @@
 Notation: x, y [mm] along the sides of the smallest box around the floor, from its corner, z over it; u, v = x, y over
 the size of the box; D [mm] stock that is left. The normal is +z, that of the part's frame.
 
-Places of the box that lie beside the floor stand for the nearest place on it. The walls around it are what the part
+Places of the box that lie outside the floor stand for the nearest place on it. The walls around it are what the part
 has above the floor, by its sections at several heights: the centre of the cutter keeps its radius at that height from
 each. At edges without a wall rows run on beyond the edge.
 """
@@ -96,18 +96,18 @@ class PartFloor:
 
     def on(self, xy: Floats, margin: float = 0.0) -> Floats:
         """The nearest places (n, 2) [mm] on the floor, ``margin`` within its outline."""
-        return _onto(self.face.buffer(-margin) if margin else self.face, xy)
+        return _nearest_points(self.face.buffer(-margin) if margin else self.face, xy)
 
     def on_part(self, reach: shapely.Geometry, xy: Floats) -> Floats:
         """The nearest places (n, 2) [mm] on what a cutter reaches of the floor."""
-        return _onto(self.face.intersection(reach), xy)
+        return _nearest_points(self.face.intersection(reach), xy)
 
     def reached(self, u: ArrayLike, v: ArrayLike, area: FloorArea, radius: float) -> Floats:
         """Parameters (k, n, 2) of places on the floor at which a cutter may press that stands over places (n,).
 
         Its centre is the nearest one of its area; the force of its teeth acts on a circle about that.
         """
-        xy = _onto(area.centres, np.column_stack([np.asarray(u) * self.box[0], np.asarray(v) * self.box[1]]))
+        xy = _nearest_points(area.centres, np.column_stack([np.asarray(u) * self.box[0], np.asarray(v) * self.box[1]]))
         angle = np.arange(ROUND) * (math.tau / ROUND)
         ring = radius * np.column_stack([np.cos(angle), np.sin(angle)])
         around = xy + np.concatenate([np.zeros((1, 2)), ring])[:, None]
@@ -116,12 +116,12 @@ class PartFloor:
     def area(self, cutter: Cutter, spacing: float, ramp: float) -> FloorArea:
         """Where a cutter may go; ``spacing`` [mm] of its points, ``ramp`` [rad] of its entries."""
         cover = self.face.buffer(cutter.radius + BEYOND)
-        kept = [_grown(s, _radius(cutter, h)) for h, s in self.walls if not s.is_empty]
+        kept = [_grown_area(s, _radius(cutter, h)) for h, s in self.walls if not s.is_empty]
         centres = cover.difference(shapely.union_all(kept)) if kept else cover
         # sections alike but for rounding leave edges of no length
         centres = shapely.make_valid(shapely.set_precision(centres, ROUNDED))
         centres = MultiPolygon([p for p in shapely.get_parts(centres) if p.geom_type == "Polygon" and p.area > 0.0])
-        # a separate room beside the floor does not belong to it
+        # a separate room next to the floor does not belong to it
         centres = MultiPolygon([p for p in centres.geoms if p.intersects(self.face)])
         if centres.intersection(self.face).is_empty:
             raise InputError(
@@ -198,15 +198,15 @@ def floor_of(face: Face, key: str, part: trimesh.Trimesh, wall: int, allowance: 
     axes = np.stack([along[:2], across[:2]])
     low = np.array([*origin, level])
 
-    def own(shape: MultiPolygon | Polygon) -> MultiPolygon | Polygon:
+    def in_plane(shape: MultiPolygon | Polygon) -> MultiPolygon | Polygon:
         return shapely.transform(shape, lambda xy: (xy - origin) @ axes.T)
 
-    mine = own(outline)
+    mine = in_plane(outline)
     x0, y0, x1, y1 = mine.bounds
     top = float(part.bounds[1][2]) - level
     heights = _heights(top)
     cut = sections(part, level + heights) if len(heights) else []
-    walls = tuple((float(h), own(s)) for h, s in zip(heights, cut, strict=True))
+    walls = tuple((float(h), in_plane(s)) for h, s in zip(heights, cut, strict=True))
     return PartFloor(f"{face.number}", wall, allowance, low, along, across, (x1 - x0, y1 - y0), mine, walls)
 
 
@@ -222,7 +222,7 @@ def _radius(cutter: Cutter, height: float) -> float:
     return float(cutter.radius_at([min(height, cutter.flute_length)])[0])
 
 
-def _grown(shape: MultiPolygon | Polygon, radius: float) -> shapely.Geometry:
+def _grown_area(shape: MultiPolygon | Polygon, radius: float) -> shapely.Geometry:
     """What lies within a radius [mm] of an area: the area and what lies within the radius of each of its edges.
 
     The offset of whole rings would lose or move corners where a ring has a vertex on a straight edge near a corner.
@@ -273,7 +273,7 @@ def _box(outline: Polygon) -> tuple[Floats, Floats, Floats]:
     return np.array([*e, 0.0]), np.array([*left, 0.0]), corner
 
 
-def _onto(shape: Polygon | MultiPolygon, xy: Floats) -> Floats:
+def _nearest_points(shape: Polygon | MultiPolygon, xy: Floats) -> Floats:
     """The nearest points (n, 2) of a shape."""
     points = shapely.points(xy)
     off = ~shapely.intersects(shape, points)

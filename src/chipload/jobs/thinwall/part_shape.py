@@ -166,9 +166,9 @@ def part_of_faces(job: ThinWallJob) -> PartShape:
     each: list[PartSide | PartFloor] = []
     names: dict[int, str] = {}
     for k, wall in enumerate(job.walls):
-        asked: list[tuple[str, FaceName]] = [("face", wall.face)]
-        asked += [] if wall.opposite is None else [("opposite", wall.opposite)]
-        for (what, name), allowance in zip(asked, wall.allowance_mm, strict=True):
+        stated_faces: list[tuple[str, FaceName]] = [("face", wall.face)]
+        stated_faces += [] if wall.opposite is None else [("opposite", wall.opposite)]
+        for (what, name), allowance in zip(stated_faces, wall.allowance_mm, strict=True):
             key = f"wall.{k}.{what}"
             face = model.face(name, key)
             if face.number in names:

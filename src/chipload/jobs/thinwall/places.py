@@ -183,7 +183,7 @@ class Places:
 
         def limited(left: Sequence[Floats], side: int) -> Threshold:
             if self.inputs.floor(self.inputs.body.side_numbers[side]) is not None:
-                return modelled(self._softest(left, side, spare), deflection, factor)
+                return modelled(self._greatest_compliance(left, side, spare), deflection, factor)
             C = between(self.inputs.body.places, self.compliance(left, side), u, v)
             if spare:
                 C *= 1.0 + error_at(self.inputs.body.places, self.error(side), u, v)
@@ -197,7 +197,7 @@ class Places:
         found = limited if self.inputs.depths.experiments is None else measured
         return found if self.chatter is None or not spare else self.chatter.limited(self, found)
 
-    def _softest(self, left: Sequence[Floats], side: int, spare: bool) -> Floats:
+    def _greatest_compliance(self, left: Sequence[Floats], side: int, spare: bool) -> Floats:
         """Greatest C_nn (p,) of the places that a cutter presses on over each place of a floor; ``spare``: with its
         error.
         """

@@ -119,8 +119,8 @@ def _tool_of(program: Program, number: int, name: str) -> int | None:
     """
     known = sorted({int(t) for t in program.tool[program.motion != RAPID]})
     if len(known) > 1 and number not in known:
-        said = ", ".join(map(str, known))
-        raise InputError(f"{name}: cuts with tools {said}: must be one tool, or cutter {number} among them")
+        listed = ", ".join(map(str, known))
+        raise InputError(f"{name}: cuts with tools {listed}: must be one tool, or cutter {number} among them")
     return number if len(known) > 1 else None
 
 

@@ -55,7 +55,7 @@ FLANK_TURN = math.radians(0.25)
 EVEN = ("constant", "unconstrained")
 #: points of a finished side, along and up
 POINTS = (33, 25)
-#: points of the finished wall that the path is held against are so far apart [mm]
+#: spacing [mm] of the points of the finished wall with which the path is compared
 CLOUD = 0.2
 
 
@@ -65,7 +65,7 @@ class Proof:
 
     Attributes
     ----------
-    columns : a row a step, all passes one after another
+    columns : one row for each step, all passes one after another
     thresholds : (n, m) [N] a pass, at the places of its side
     finish, shape : of the finished wall
     stress : greatest equivalent stress at the clamp [MPa]
@@ -246,7 +246,7 @@ def _columns(
         found = _floor_deflections(n, loads)
     elif removal.cuts:
         found = _deflections(inputs, removal, place, gives.max(axis=0), bars)
-    else:  # a pass that takes only films: its loads are not known, as its load_error says
+    else:  # a pass that takes only films: its loads are not known, as its load_error states
         found = dict.fromkeys(("work_mm", "cutter_mm", "deflection_mm", "force_normal_n"), np.zeros(n))
     weakest, each = allowable.argmin(axis=0), np.arange(len(u))
     threshold = allowable[weakest, each]
@@ -337,7 +337,7 @@ def _finish(
 
 
 def _shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProgram]) -> Shape:
-    """Path and stock beside the finished wall, the tool beside its neighbours or the part."""
+    """Path and stock against the finished wall, the tool against its neighbours or the part."""
     inputs = places.inputs
     if isinstance(inputs.body.shape, PartShape) and inputs.body.shape.floors:
         return floor_shape(places, stock, pass_programs)

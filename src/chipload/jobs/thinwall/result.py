@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chipload.errors import Finding, Severity
 from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks, with_peaks
 from chipload.jobs.thinwall.chatter import FIRST_STATE, chatter_limits, chatter_numbers
-from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, helps
+from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, remedy_text
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.report.programs import ENDINGS, program_name
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, check_limit, in_memory, state_of
@@ -28,7 +28,7 @@ DROPPED = ("u", "v", "side", "operation", "label", "compliance_error", FIRST_STA
 ENGAGED = 1.0
 #: limits that are proportional to the compliance of the wall
 OF_COMPLIANCE = ("deflection_workpiece_um", "deflection_um", "force_over_allowable")
-#: loads that a limit goes with, where it is none itself
+#: loads to which a limit is proportional, where it is not a load itself
 GOES_WITH = {
     "deflection_workpiece_um": ("force_normal_n",),
     "force_over_allowable": ("force_normal_n",),
@@ -72,7 +72,7 @@ def _not_calculated(walled: ThinWallResult) -> str:
 
 
 def _unchecked_bodies(walled: ThinWallResult) -> tuple[str, ...]:
-    """What is not held against one another."""
+    """Bodies that are not checked for collisions."""
     cutters = walled.planning.cutters
     alone = not isinstance(walled.geometry.shape, PartShape) and not walled.settings.get("neighbours")
     return (
@@ -96,7 +96,7 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
     over, cuts = "force_over_allowable", c["force_normal_n"] > 0.0
     force = check_limit(over, 1.0 + OVER, c, track=one.name, rows=cuts, error=error_of(walled, one, over))
     strength = float(walled.settings["yield_mpa"])
-    stress = _known("stress_mpa", strength, one.stress, one, error_of(walled, one, "stress_mpa"))
+    stress = _limit_check("stress_mpa", strength, one.stress, one, error_of(walled, one, "stress_mpa"))
     out += [with_peaks(check, walled.checks, c) for check in (force, stress)]
     gouge, tolerance = max(one.shape.gouge, -one.shape.nearest, 0.0), float(walled.settings["gouge_tolerance_mm"])
     place = (float(one.shape.at[0]), float(one.shape.at[1]), float(one.shape.at[2]))
@@ -130,7 +130,7 @@ def mesh_error_of(walled: ThinWallResult, name: str, columns: Mapping[str, NDArr
 
 
 def _growth(values: Floats, error: Floats) -> float:
-    """By how much the greatest of values may grow, each by its own relative error."""
+    """Growth of the greatest value, if each value grows by its own relative error."""
     greatest = float(values.max(initial=0.0))
     return float((values * (1.0 + error)).max()) / greatest - 1.0 if greatest > 0.0 else 0.0
 
@@ -142,7 +142,7 @@ def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
         worst = min(one.plan.infeasible, key=lambda h: h.force_allowable_n)
         text = (
             f"{len(one.plan.infeasible)} places do not allow even the smallest depth of cut: allowable force "
-            f"{worst.force_allowable_n:.4g} N, needed {worst.force_n:.4g} N: {helps(worst)}"
+            f"{worst.force_allowable_n:.4g} N, needed {worst.force_n:.4g} N: {remedy_text(worst)}"
         )
         out.append(Finding("thinwall-infeasible", 0, text, Severity.EXCEEDS, worst.at))
     missed = sum(int((~f.made).sum()) for f in one.finish)
@@ -181,7 +181,7 @@ def _track(walled: ThinWallResult, one: Variant) -> Track:
     )
 
 
-def _known(name: str, limit: float, worst: float, one: Variant, error: float, place: Place = None) -> LimitCheck:
+def _limit_check(name: str, limit: float, worst: float, one: Variant, error: float, place: Place = None) -> LimitCheck:
     """The check of one value of a variant with its relative error; inf: it is not known."""
     state, why = state_of(worst, limit, error)
     known = error if np.isfinite(error) else 1.0
@@ -202,7 +202,7 @@ def _form_error(walled: ThinWallResult, one: Variant, limit: float) -> LimitChec
     sizes = [(np.where(f.made, np.abs(f.error), 0.0).ravel(), f.unsure.ravel()) for f in one.finish]
     mesh = _growth(*(np.concatenate(x) for x in zip(*sizes, strict=True)))
     error = (1.0 + error_of(walled, one, "form_error_um")) * (1.0 + mesh) - 1.0
-    return _known("form_error_um", limit, worst, one, error, place)
+    return _limit_check("form_error_um", limit, worst, one, error, place)
 
 
 def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
@@ -228,7 +228,7 @@ def _operation(walled: ThinWallResult, v: Variant) -> dict[str, Any]:
                 "force_n": h.force_n,
                 "feed_per_tooth_mm": h.feed_per_tooth_mm,
                 "diameter_mm": h.diameter_mm,
-                "helps": helps(h),
+                "helps": remedy_text(h),
             }
             for h in v.plan.infeasible
         ],

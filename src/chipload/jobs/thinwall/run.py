@@ -183,7 +183,7 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
     weak = bearing.force < law.forces[0]
     if weak.any():
         lines.append(
-            f"the limit cannot be held at {int(weak.sum())} of {weak.size} places of the finished side: the normal "
+            f"the limit cannot be kept at {int(weak.sum())} of {weak.size} places of the finished side: the normal "
             f"force at the smallest depth, {law.forces[0]:.4g} N at {law.depths[0]:g} mm, is above their threshold"
         )
     return lines, not weak.any()
@@ -230,14 +230,14 @@ def propose(
 
 
 def _findings(inputs: WallInputs) -> tuple[Finding, ...]:
-    """What asks more of the coefficients than they were measured for, and what the experiments' reader noticed."""
-    asked: list[str] = []
+    """Findings on coefficients used beyond their range, and those of the reader of experiments."""
+    texts: list[str] = []
     for one in inputs.operations:
         cut = one.cut
         lean = math.sin(cut.posture.beta) if isinstance(cut.posture, CutterPose) else 1.0
         speed = cut.pass_motion.spindle * cut.cutter.radius * lean
-        asked += beyond(cut.material, cut.posture.feed_per_tooth, speed)
-    beyond_range = (Finding("chip-beyond-coefficients", 0, text, Severity.UNPROVEN) for text in dict.fromkeys(asked))
+        texts += beyond(cut.material, cut.posture.feed_per_tooth, speed)
+    beyond_range = (Finding("chip-beyond-coefficients", 0, text, Severity.UNPROVEN) for text in dict.fromkeys(texts))
     return (*beyond_range, *inputs.findings)
 
 

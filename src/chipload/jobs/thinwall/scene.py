@@ -1,5 +1,5 @@
 """The file scene.glb of a thin wall: finished wall, workpiece before, neighbours, the cutter, and the contact points of
-each variant coloured by depth. Lengths are mm, Z is up, as the extras say.
+each variant coloured by depth. Lengths are mm, Z is up, as the extras state.
 """
 
 from __future__ import annotations
@@ -50,13 +50,13 @@ def _path(one: Variant, deepest: float) -> Any:
     cut = cut[:: -(-len(cut) // ROWS)]
     points = np.column_stack([np.asarray(c[f"contact_{x}_mm"])[cut] for x in "xyz"])
     colours = engagement_colours(np.asarray(c["depth_mm"])[cut], deepest)
-    broken = np.flatnonzero(np.diff(cut) > 1) + 1
+    breaks = np.flatnonzero(np.diff(cut) > 1) + 1
     shade = np.flatnonzero((colours[1:] != colours[:-1]).any(axis=1)) + 1
-    ends = np.unique(np.concatenate([[0], broken, shade, [len(cut) - 1]]))
+    ends = np.unique(np.concatenate([[0], breaks, shade, [len(cut) - 1]]))
     entities = [
-        trimesh.path.entities.Line(np.arange(a, b + (b not in broken)), color=colours[a])
+        trimesh.path.entities.Line(np.arange(a, b + (b not in breaks)), color=colours[a])
         for a, b in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)
-        if b + (b not in broken) - a >= 2
+        if b + (b not in breaks) - a >= 2
     ]
     return trimesh.path.Path3D(entities=entities, vertices=points, process=False) if entities else None
 

@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 import plotly.graph_objects as go
 
-from chipload.jobs.thinwall.outcome import OVER, USED, ThinWallResult, Variant, helps
+from chipload.jobs.thinwall.outcome import OVER, USED, ThinWallResult, Variant, remedy_text
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.result import failures_of
 from chipload.jobs.thinwall.wall_figures import COLOURS, along, bars, maps, space
@@ -22,7 +22,7 @@ LISTED = 40
 MAPS = 12
 
 
-def _cutting(walled: ThinWallResult, number: int) -> str:
+def _operation_sentence(walled: ThinWallResult, number: int) -> str:
     """An operation in a sentence."""
     own = walled.planning.operations[number]
     c = own.cutter
@@ -44,7 +44,7 @@ def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[s
         f"<p>{length:.4g} mm long, {height:.4g} mm high, at least {thickness:.4g} mm thick when finished, "
         f"{'in the clamps of the part' if isinstance(geometry.shape, PartShape) else 'clamped at z = 0'}; "
         f"{' and '.join(f'{a:g}' for a in geometry.allowance)} mm of stock on its sides. "
-        f"{' '.join(_cutting(walled, k) for k in range(len(planning.operations)))}</p>",
+        f"{' '.join(_operation_sentence(walled, k) for k in range(len(planning.operations)))}</p>",
         f'<p class="note">{escape(", ".join(f"{k} {value_text(v)}" for k, v in walled.settings.items()))}</p>',
         "<h3>Variants</h3>",
         '<p class="note">Variable: the greatest depth that each place allows. Constant: one depth everywhere '
@@ -92,7 +92,7 @@ def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[s
         "<h3>Path</h3>",
         figure("space", space(walled, used), figures),
         *_infeasible(used),
-        *_over(walled),
+        *_overload_section(walled),
         "<h3>Geometry</h3>",
         _checked(walled),
     ]
@@ -181,7 +181,7 @@ def _infeasible(one: Variant) -> list[str]:
             f"{h.force_n:.4g}",
             "" if h.feed_per_tooth_mm is None else f"{h.feed_per_tooth_mm:.4g}",
             "" if h.diameter_mm is None else f"{h.diameter_mm:.4g}",
-            escape(helps(h)),
+            escape(remedy_text(h)),
         ]
         for h in sorted(one.plan.infeasible, key=lambda h: h.force_allowable_n)[:LISTED]
     ]
@@ -199,7 +199,7 @@ def _infeasible(one: Variant) -> list[str]:
     return ["<h3>Places that allow no cut</h3>", table(head, rows, numbers=(0, 1, 2, 3, 4, 5)), *note]
 
 
-def _over(walled: ThinWallResult) -> list[str]:
+def _overload_section(walled: ThinWallResult) -> list[str]:
     out = [f"<h3>Contact points over their allowable force by more than {100.0 * OVER:g} %</h3>"]
     rows = []
     for name, one in walled.variants.items():
@@ -234,7 +234,7 @@ def _checked(walled: ThinWallResult) -> str:
     texts = [
         f"Path of {USED} against the finished wall: the cutter comes no nearer than {1000.0 * s.nearest:.3g} µm "
         f"(below 0 it would gouge; {walled.settings['gouge_tolerance_mm']:g} mm is allowed for chords).",
-        f"What is left of the stock against the finished wall: at most {1000.0 * s.gouge:.3g} µm into it, "
+        f"Remaining stock against the finished wall: at most {1000.0 * s.gouge:.3g} µm into it, "
         f"{1000.0 * s.left:.3g} µm over it above the foot ({s.points} points of its sections).",
     ]
     return items(texts)

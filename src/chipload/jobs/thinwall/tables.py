@@ -30,7 +30,7 @@ from chipload.jobs.thinwall.chatter_tables import WallDynamicsTable
 
 
 def _range(low: float, high: float, unit: str, hint: tuple[str, str]) -> BeforeValidator:
-    """Refuse a value outside the range of all metals; the message asks for the unit that was probably meant."""
+    """Refuse a value outside the range of all metals; the message names the unit that was probably meant."""
 
     def checked(value: Any) -> Any:
         if isinstance(value, (int, float)) and not isinstance(value, bool) and not low <= value <= high:

@@ -16,7 +16,7 @@ from chipload.jobs.thinwall.places import Places, rows_up
 from chipload.jobs.thinwall.proof import Proof, prove
 from chipload.jobs.thinwall.wall_operation import DepthRules
 from chipload.jobs.thinwall.wall_program import OnMachine, linked, on_machine
-from chipload.planning.thinwall.correction import found
+from chipload.planning.thinwall.correction import greatest_ratios
 from chipload.planning.thinwall.depth import largest_depths, normal_force
 from chipload.planning.thinwall.passes import Plan, ThresholdOf, WallPass
 from chipload.planning.thinwall.variants import DepthOperation, even, limited_to, unlimited
@@ -34,14 +34,14 @@ PLANNING = 0.05
 ROUNDS = 3
 #: simulated at most, where none of those holds
 TRIES = 6
-#: these are held to this share of what would just do
+#: these keep this share of what would just hold
 HOLD = 0.97
 #: share of the limit that a plan is to use; one that uses less is raised to this share of it, with its error, and
 #: simulated, in so many turns at most
 USED_SHARE, FULL, RAISES = 0.95, 0.99, 4
 #: a plan is worth another simulation if it takes at most this share of the best one's time
 FASTER = 0.97
-#: constant depths that are simulated at most, until one holds
+#: greatest number of constant depths that are simulated
 CONSTANTS = 3
 
 
@@ -121,7 +121,7 @@ def _room(one: Variant) -> tuple[float, float]:
     return error, 1.0 / (1.0 + error)
 
 
-def _over(one: Variant, modelled: bool, assumed: float) -> tuple[float, bool]:
+def _overload(one: Variant, modelled: bool, assumed: float) -> tuple[float, bool]:
     """Greatest F_n over F_th with the errors that the limit is checked with, and whether the limit holds; the error of
     the loads is ``assumed`` where the limit does not hold with that.
     """
@@ -145,10 +145,10 @@ def constant_within(tried: Tried, free: Variant) -> tuple[Variant, Corrections]:
     at_most = _measured(places, free, tuple(ones for _ in inputs.operations), even_stock=True)
     corrections = at_most
     for turn in range(CONSTANTS):
-        held = share * inputs.depths.deflection if modelled else inputs.depths.deflection
-        planned = even(places.surfaces, _depth_operations(places, share, corrections, True), held)
+        deflection = share * inputs.depths.deflection if modelled else inputs.depths.deflection
+        planned = even(places.surfaces, _depth_operations(places, share, corrections, True), deflection)
         constant = tried.prove(planned, 0.4)
-        if turn == CONSTANTS - 1 or _smallest(places, planned) or _over(constant, modelled, assumed)[1]:
+        if turn == CONSTANTS - 1 or _smallest(places, planned) or _overload(constant, modelled, assumed)[1]:
             break
         corrections = _greater(corrections, _measured(places, constant, corrections, even_stock=True))
     return constant, at_most
@@ -171,18 +171,18 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
     """
     places = tried.places
     inputs = places.inputs
-    modelled, held = inputs.depths.experiments is None, inputs.depths.deflection
+    modelled, deflection = inputs.depths.experiments is None, inputs.depths.deflection
     refine = inputs.job.operation.refine
     best: Variant | None = None
     least: list[tuple[float, Variant]] = []  # of those that exceed, the one that exceeds least
     assumed, share = _room(like)
     raised = False
     for turn in range(TRIES):
-        planned = limited_to(places.surfaces, _depth_operations(places, share, corrections, False), share * held)
+        planned = limited_to(places.surfaces, _depth_operations(places, share, corrections, False), share * deflection)
         if best is not None and not raised and program_seconds(places, planned) > FASTER * best.seconds:
             break
         one = tried.prove(planned, 0.4)
-        over, good = _over(one, modelled, assumed)
+        over, good = _overload(one, modelled, assumed)
         if good and (best is None or one.seconds < best.seconds):
             best, tried.planned["variable"], tried.corrections, tried.share = one, planned, corrections, share
             if not refine:
@@ -207,7 +207,7 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
 
 
 def compared_variants(tried: Tried, variable: Variant, constant: Variant) -> dict[str, Variant]:
-    """Variants that the job asks for beside the three."""
+    """Variants that the job states in addition to the three."""
     places, op, out = tried.places, tried.places.inputs.job.operation, {}
     if op.least_error:
         out["least_error"] = least_error(
@@ -251,7 +251,7 @@ def _measured(places: Places, one: Variant, before: Corrections, *, even_stock: 
         for side, old in enumerate(own):
             k = np.flatnonzero(cut & (c["side"] == side))
             ratio = c["force_normal_n"][k] / law.force(c["depth_mm"][k])
-            new = found((places.u, v), c["u"][k], c["v"][k], ratio)
+            new = greatest_ratios((places.u, v), c["u"][k], c["v"][k], ratio)
             if operation.table.contact == "flank":  # no row is on the free edge: the one below reaches up to it
                 new[:, -1] = new[:, -2]
             if len(v) != len(places.v):
@@ -301,16 +301,16 @@ def _variant(places: Places, planned: Planned, program: Program, run: OnMachine,
     )
 
 
-def _infeasible(places: Places, plan: Plan, held: float) -> tuple[Help, ...]:
+def _infeasible(places: Places, plan: Plan, deflection: float) -> tuple[Help, ...]:
     """Places where even the smallest depth of some pass exceeds the limit itself, with changes that would help."""
     out: list[Help] = []
     for number in range(len(places.inputs.operations)):
-        out += _infeasible_in(places, [p for p in plan.passes if p.operation == number], plan.infeasible, held)
+        out += _infeasible_in(places, [p for p in plan.passes if p.operation == number], plan.infeasible, deflection)
     return tuple(out)
 
 
 def _infeasible_in(
-    places: Places, passes: Sequence[WallPass], infeasible: Sequence[tuple[int, int, int]], held: float
+    places: Places, passes: Sequence[WallPass], infeasible: Sequence[tuple[int, int, int]], deflection: float
 ) -> list[Help]:
     """Those of one operation, by its passes."""
     inputs = places.inputs
@@ -330,11 +330,11 @@ def _infeasible_in(
     keys = sorted(least)
     limits = law.limits
     plane = float(normal_force(own.cut.posture, own.cut.material, [limits.smallest], measure=own.cut.measure)[0])
-    share = plane / float(law.forces[0])  # what helps is asked of plane stock
+    share = plane / float(law.forces[0])  # remedies are calculated for plane stock
     if own.depths.experiments is None:  # the plan may be held to less than the limit
-        least = {key: force * own.depths.deflection / held for key, force in least.items()}
+        least = {key: force * own.depths.deflection / deflection for key, force in least.items()}
     shares = [share / correction[key] for key in keys]
-    asked = largest_depths(
+    largest = largest_depths(
         own.cut.posture,
         own.cut.material,
         [s * least[k] for s, k in zip(shares, keys, strict=True)],
@@ -342,7 +342,7 @@ def _infeasible_in(
         measure=own.cut.measure,
     )
     out = []
-    for one in asked.infeasible:
+    for one in largest.infeasible:
         side, i, j = keys[one.place]
         x, y, z = places.surfaces[side].points[i, j].tolist()
         s = shares[one.place]

@@ -137,9 +137,9 @@ def along(walled: ThinWallResult) -> go.Figure:
     for k, (_, _, title, limit) in enumerate(rows, start=1):
         out.update_yaxes(title_text=title, rangemode="tozero", row=k, col=1)
         if limit is not None:
-            said = {"text": f"limit {limit:g}", "font": {"color": LIMIT, "size": 11}}
+            label = {"text": f"limit {limit:g}", "font": {"color": LIMIT, "size": 11}}
             line = {"color": LIMIT, "width": 1.2, "dash": "dash"}
-            out.add_hline(y=limit, line=line, annotation=said, annotation_position="top right", row=k, col=1)
+            out.add_hline(y=limit, line=line, annotation=label, annotation_position="top right", row=k, col=1)
     out.update_xaxes(gridcolor=GRID, zeroline=False)
     out.update_yaxes(gridcolor=GRID, zeroline=False)
     out.update_xaxes(title_text="time at feed [min]", row=len(rows), col=1)
@@ -199,7 +199,7 @@ def space(walled: ThinWallResult, one: Variant) -> go.Figure:
 
 
 def bars(values: Mapping[str, Mapping[str, float]]) -> go.Figure:
-    """The variants beside each other: {what [unit]: {variant: value}}."""
+    """Comparison of the variants: {what [unit]: {variant: value}}."""
     out = make_subplots(rows=1, cols=len(values), subplot_titles=list(values), horizontal_spacing=0.07)
     for k, given in enumerate(values.values(), start=1):
         names = list(given)

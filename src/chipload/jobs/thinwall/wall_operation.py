@@ -114,12 +114,13 @@ def wall_operation(
     step_over = abs(stated(poses[0].step, f"operation.{number}.step_over_mm"))
     # step-over^2 / 8 r of a plane; the stock has the scallops of the pass before, which may be one of the one before
     scallop = 0.0 if op.contact != "corner" else step_over**2 / (8.0 * cutter.finishing_arc[0])
-    met = scallop if before is None else max(scallop, before.cut.scallop)
+    deepest_scallop = scallop if before is None else max(scallop, before.cut.scallop)
     limits = DepthRange(op.depth_min_mm, op.depth_max_mm)
     # a flank meets the steps of its own rows; an upright cutter at most the depth at its axis
     sloped = (op.slope or 0.0) if op.contact == "corner" else 0.0
     (law, worst), (even, _) = (
-        greatest_law(poses, material, limits, slope=slope, scallop=met, measure="greatest") for slope in (sloped, 0.0)
+        greatest_law(poses, material, limits, slope=slope, scallop=deepest_scallop, measure="greatest")
+        for slope in (sloped, 0.0)
     )
     posture = poses[worst]
     return WallOperation(

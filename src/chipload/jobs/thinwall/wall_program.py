@@ -49,8 +49,8 @@ def on_machine(inputs: WallInputs, program: Program) -> OnMachine:
     lengths = {o.cut.cutter.number: o.cut.cutter.overhang for o in inputs.operations}
     commands, _ = to_axes(program, machine, tool_lengths=lengths)
     axes = axes_of(commands, machine)
-    broken = [*check_program(program, machine), *limit_findings(machine, axes, commands.line, placed=False)]
-    exceeding = tuple(replace(f, severity=Severity.EXCEEDS) for f in broken if f.code != "machine-offset")
+    violations = [*check_program(program, machine), *limit_findings(machine, axes, commands.line, placed=False)]
+    exceeding = tuple(replace(f, severity=Severity.EXCEEDS) for f in violations if f.code != "machine-offset")
     return OnMachine(commands, times_on(program, machine, lengths), exceeding)
 
 

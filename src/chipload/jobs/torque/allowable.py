@@ -52,7 +52,7 @@ class Allowable:
     width : of the contact round the wall [mm]
     limit : of torque, from the wall alone
     torque : the limit that is kept [N mm], the least of that and the stated one; 0: not attainable
-    response : of the real wall, a row a step of the real cut
+    response : of the real wall, one row for each step of the real cut
     path : with what is planned and what is true
     """
 
@@ -130,8 +130,8 @@ def limit_of(job: TorqueJob, planned: Cut) -> tuple[Ritz, PathLimit]:
 
 def allowed(job: TorqueJob) -> tuple[float, float]:
     """Allowed deflection [mm] and stress [MPa]."""
-    ask = job.table.limits
-    return 1e-3 * ask.form_error_um, ask.strength_share * job.shell.strength_mpa
+    limits = job.table.limits
+    return 1e-3 * limits.form_error_um, limits.strength_share * job.shell.strength_mpa
 
 
 def feed_at(planned: CutSteps, limit: PathLimit, k: int) -> float:

@@ -50,14 +50,14 @@ def controller_of(job: TorqueJob, torque: float) -> Override:
 
 def tuned(job: TorqueJob, config: Override, path: ToolPath, spindle: Spindle, loop: Loop) -> Override:
     """The controller with PI gains by the rule, for the heaviest cut of the model, unless the job states them."""
-    ask = job.table.torque_control.override
+    override_table = job.table.torque_control.override
     gain = float(path.over_relief.cut.max()) / config.torque_ref
     lag = max(spindle.sensor_lag + spindle.smoothing, loop.period)
     found = pi_tuning(gain, lag, loop.latency + loop.period) if gain > 0.0 else (config.pi_gain, config.pi_rate)
     return replace(
         config,
-        pi_gain=found[0] if ask.pi_gain is None else ask.pi_gain,
-        pi_rate=found[1] if ask.pi_rate_per_s is None else ask.pi_rate_per_s,
+        pi_gain=found[0] if override_table.pi_gain is None else override_table.pi_gain,
+        pi_rate=found[1] if override_table.pi_rate_per_s is None else override_table.pi_rate_per_s,
     )
 
 
@@ -66,11 +66,11 @@ def cases_of(
     walls: tuple[WallPath, ...], acceleration: float, progress: Progress,
 ) -> tuple[ControllerCase, ...]:  # fmt: skip
     """Every controller, first without latency and then with the latency that the job states."""
-    ask = job.table.loop
-    period = 1e-3 * ask.period_ms
+    loop_table = job.table.loop
+    period = 1e-3 * loop_table.period_ms
     out = []
-    for k, (latency, quantum) in enumerate(((0.0, 0.0), (1e-3 * ask.latency_ms, ask.override_step))):
-        loop = Loop(acceleration, period, latency, min(1e-3, period), seed=ask.seed)
+    for k, (latency, quantum) in enumerate(((0.0, 0.0), (1e-3 * loop_table.latency_ms, loop_table.override_step))):
+        loop = Loop(acceleration, period, latency, min(1e-3, period), seed=loop_table.seed)
         config = tuned(job, replace(controller, quantum=quantum), path, spindle, loop)
         runs = compared(path, config, player(path, table, spindle, deviation_of(job), loop, torque, walls), torque)
         out.append(ControllerCase(loop, quantum, runs))

@@ -42,7 +42,7 @@ Bools = NDArray[np.bool_]
 CHORD_MM = 0.005
 #: most points of a conical helix
 MOST_POINTS = 2_000_000
-#: least cutting coefficient that is believed [MPa]: what the other simulation of the two is made with
+#: least cutting coefficient that is accepted [MPa]; the second of the two simulations uses it
 LITTLE_MPA = 10.0
 #: a flank within so much of the finished surface makes it [mm]
 MAKES_MM = 0.05
@@ -72,7 +72,7 @@ class Place:
         return min(self.table.clamp_z_mm, other), max(self.table.clamp_z_mm, other)
 
     def along(self, z: Floats) -> Floats:
-        """Distance s along the wall of heights [mm]; outside 0 .. length beside the wall."""
+        """Distance s along the wall of heights [mm]; outside 0 .. length beyond the wall."""
         return np.asarray(self._up * (z - self.table.clamp_z_mm) / math.cos(self.angle))
 
     def outer(self, z: Floats) -> Floats:
@@ -139,8 +139,8 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
         It cannot be read, does not hold on the machine, leans its axis, or changes its spindle speed while it cuts.
     """
     if job.program_file is None:
-        ask = stated(job.table.round, "round")
-        program = round_program(ask, Place(job.shell), job.cutters[ask.cutter])
+        round_table = stated(job.table.round, "round")
+        program = round_program(round_table, Place(job.shell), job.cutters[round_table.cutter])
     else:
         table = stated(job.table.program, "program")
         feed = mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None
@@ -171,43 +171,44 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
     return program
 
 
-def round_program(ask: RoundTable, place: Place, cutter: Cutter) -> Program:
+def round_program(table: RoundTable, place: Place, cutter: Cutter) -> Program:
     """Straight to the wall, down it in a helix, one full turn at the bottom, straight away."""
-    spindle, tool = rad_s_from_rpm(ask.speed_rpm), cutter.number
-    feed = mm_s_from_mm_min(ask.feed_mm_min)
+    spindle, tool = rad_s_from_rpm(table.speed_rpm), cutter.number
+    feed = mm_s_from_mm_min(table.feed_mm_min)
     # down milling has the wall on the right of travel: clockwise round it
-    sense = -1 if ask.milling == "down" else 1
+    sense = -1 if table.milling == "down" else 1
     corner = float(cutter.radius_at(cutter.apt[3]))
 
     def radius(z: float) -> float:
         """Of the tip's path, so that the flank leaves the wall."""
         return float(place.outer(np.array([z + cutter.apt[3]]))[0]) + corner
 
-    top, low = ask.top_mm, ask.bottom_mm
-    start = (radius(top), -sense * ask.lead_mm)
-    clear = place.ends[1] + ask.clearance_mm
+    top, low = table.top_mm, table.bottom_mm
+    start = (radius(top), -sense * table.lead_mm)
+    clear = place.ends[1] + table.clearance_mm
     parts = [
         rapid([[*start, clear], [*start, top]], spindle, tool, "link"),
         plunge([radius(top), 0.0, top], feed, spindle, tool, "lead"),
     ]
     if place.angle == 0.0:
         parts.append(
-            helix((radius(top), 0.0), (0.0, 0.0), (top, low), ask.pitch_mm, feed, spindle, tool, "round", sense)
+            helix((radius(top), 0.0), (0.0, 0.0), (top, low), table.pitch_mm, feed, spindle, tool, "round", sense)
         )
     else:
-        turns = math.ceil((top - low) / ask.pitch_mm - 1e-9)
+        turns = math.ceil((top - low) / table.pitch_mm - 1e-9)
         step = 2.0 * math.acos(1.0 - CHORD_MM / max(radius(top), radius(low)))
         n = max(8, math.ceil(math.tau / step))
         if turns * n > MOST_POINTS:
             raise InputError(
-                f"round.pitch_mm = {ask.pitch_mm:g}: {turns:.4g} rounds from top_mm = {top:g} to bottom_mm = {low:g}, "
-                f"{turns * n:.4g} points: must be at most {MOST_POINTS}: state a larger pitch, or a lower top"
+                f"round.pitch_mm = {table.pitch_mm:g}: {turns:.4g} rounds from top_mm = {top:g} to "
+                f"bottom_mm = {low:g}, {turns * n:.4g} points: must be at most {MOST_POINTS}: "
+                "state a larger pitch, or a lower top"
             )
         z = np.concatenate([np.linspace(top, low, turns * n + 1)[1:], np.full(n, low)])
         a = sense * math.tau * np.arange(1, len(z) + 1) / n
         r = np.array([radius(float(x)) for x in z])
         parts.append(plunge(np.column_stack([r * np.cos(a), r * np.sin(a), z]), feed, spindle, tool, "round"))
-    away = [radius(low), sense * ask.lead_mm]
+    away = [radius(low), sense * table.lead_mm]
     parts += [
         plunge([*away, low], feed, spindle, tool, "lead"),
         rapid([*away, clear], spindle, tool, "link"),
@@ -247,8 +248,8 @@ def shell_stock(
 
 def resolution_of(job: TorqueJob) -> Resolution:
     """Resolution of the chips in the simulation."""
-    ask, smallest = job.table.simulation, min(c.radius for c in job.cutters.values())
-    return Resolution(ask.step_mm, ask.tolerance_mm, 6, 0.5 * smallest)
+    table, smallest = job.table.simulation, min(c.radius for c in job.cutters.values())
+    return Resolution(table.step_mm, table.tolerance_mm, 6, 0.5 * smallest)
 
 
 def require_linear(material: Material) -> None:
@@ -320,7 +321,7 @@ def cut(
     makes, soft = np.zeros(len(feed), dtype=np.bool_), np.zeros(len(feed))
     for number in np.unique(tools).tolist():
         rows = np.flatnonzero((tools == number) & (height > 0.0))
-        m, t = _on_the_wall(Place(job.shell), job.cutters[number], points, rows, height)
+        m, t = _finished_surface(Place(job.shell), job.cutters[number], points, rows, height)
         makes[rows], soft[rows] = m, t
     return Cut(removal, stock, points, feed, loads, near, far, makes, soft)
 
@@ -377,7 +378,7 @@ def _depths(place: Place, bounds: Floats, points: Floats, layers: NDArray[np.int
     return np.where(cuts, near, 0.0), np.where(cuts, far, 0.0), np.where(cuts, top - low, 0.0)
 
 
-def _on_the_wall(
+def _finished_surface(
     place: Place, cutter: Cutter, points: Floats, rows: NDArray[np.int64], height: Floats
 ) -> tuple[Bools, Floats]:
     """Whether the flank makes the finished surface, and the cutter's compliance, in the middle of the depth of cut."""

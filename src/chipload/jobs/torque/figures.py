@@ -104,10 +104,10 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
             f"mm would allow {where['true_wall_nm']:.4g} N m. The closed formula for one tooth, which neglects the "
             f"engagement, gives {where['one_tooth_formula_nm']:.3g} N m.</p>"
         )
-    said = what.get("surface_off_um")
-    if said is not None:
+    off = what.get("surface_off_um")
+    if off is not None:
         body.append(
-            f"<p>Without deflection, the surface that the program leaves lies {said['min']:.3g} to {said['max']:.3g} "
+            f"<p>Without deflection, the surface that the program leaves lies {off['min']:.3g} to {off['max']:.3g} "
             "µm from the finished surface of the job.</p>"
         )
     spindle = [f"spindle: {name} {value:+g}" for name, value in asdict(outcome.control.deviation).items() if value]
@@ -151,9 +151,9 @@ def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[s
             f"{by['form_error_change_percent']:+.3g} % compared with the constant feed.</p>",
         ]
     plain, late = outcome.control.cases
-    lost = late.runs[HELD].outcome.time - plain.runs[HELD].outcome.time
+    time_cost = late.runs[HELD].outcome.time - plain.runs[HELD].outcome.time
     body += [
-        f"<p>Latency and override steps cost {lost:.3g} s with the model, and change its greatest torque from "
+        f"<p>Latency and override steps cost {time_cost:.3g} s with the model, and change its greatest torque from "
         f"{1e-3 * plain.runs[HELD].outcome.load_max:.4g} to {1e-3 * late.runs[HELD].outcome.load_max:.4g} N m.</p>",
         '<p class="note">The constant feed and the derated schedule are the fastest that keep the limit everywhere '
         "with all deviations, which are unknown beforehand. The last row is the shortest time that is physically "

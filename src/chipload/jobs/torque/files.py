@@ -32,7 +32,7 @@ SAME_MM = 1e-6
 #: the machine's place is searched so far from its last place, and is off the path beyond [mm]
 WINDOW_MM, AWAY_MM = 5.0, 0.3
 PATH, TABLE, HAL = "path.csv", "controller.toml", "hal.toml"
-#: files that the controller in use takes beside its program
+#: files that the controller in use takes besides its program
 CONTROLLER_FILES = (PATH, TABLE, HAL)
 
 
@@ -41,7 +41,7 @@ def program_files(outcome: TorqueResult) -> dict[str, bytes]:
     machine, ending = outcome.job.machine, ENDINGS[outcome.job.machine.dialect]
     commands, _ = to_axes(outcome.job.program, machine)
     takes = [(0, "M52 P1")] if machine.dialect == "linuxcnc" else []
-    title = f"{outcome.job.title}, programmed feeds, to be run beside chipload hal"
+    title = f"{outcome.job.title}, programmed feeds, to be run with chipload hal"
     text = write_commands(commands, machine, title=title, verified=False, words=takes)
     out = {f"0-override.{ending}": text.encode("ascii")}
     if not outcome.attainable or outcome.control.controller is None:
@@ -64,10 +64,10 @@ def program_files(outcome: TorqueResult) -> dict[str, bytes]:
 
 def planned_override(outcome: TorqueResult, config: Override) -> Floats:
     """Override of each step that the model alone allows, (n,): in whole steps, rounded down but not below the floor."""
-    told = outcome.allowable.path.over_relief
+    profile = outcome.allowable.path.over_relief
     with np.errstate(divide="ignore", invalid="ignore"):
-        rows = np.where(told.cut > 0.0, (config.torque_ref - told.edge) / told.cut, np.inf)
-    rows = np.where((told.cut == 0.0) & (told.edge > config.torque_ref), 0.0, rows)
+        rows = np.where(profile.cut > 0.0, (config.torque_ref - profile.edge) / profile.cut, np.inf)
+    rows = np.where((profile.cut == 0.0) & (profile.edge > config.torque_ref), 0.0, rows)
     least = np.minimum(rows[1:], rows[:-1])
     whole = np.floor(np.clip(least, config.floor, config.cap) / FEED_STEP + 1e-9) * FEED_STEP
     return np.asarray(np.maximum(whole, config.floor))

@@ -21,7 +21,7 @@ ONE_PROGRAM = "state a [program] with a file, or a [round] to generate one"
 ONE_WALL = "state [torque_control.shell] of a wall, or [stock] and [workpiece] of any part"
 #: tables that go with a workpiece and not with a shell
 OF_WORKPIECE = ("stock", "real_stock", "workpiece")
-#: keys that each kind of surprise needs beside `share`
+#: keys that each kind of surprise needs besides `share`
 SURPRISES: Mapping[str, tuple[str, ...]] = {
     "thicker-side": ("at_deg",),
     "hard-spot": ("at_deg", "width_mm", "ramp_mm"),
@@ -170,24 +170,24 @@ def _wrong_shell(table: TorqueJobTable, shell: ShellTable) -> Iterator[str]:
             )
 
 
-def _wrong_round(shell: ShellTable, ask: RoundTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
-    if ask.cutter not in tools:
-        yield from unknown_cutter("round.cutter", ask.cutter, tools)
+def _wrong_round(shell: ShellTable, table: RoundTable, tools: Mapping[int, Cutter]) -> Iterator[str]:
+    if table.cutter not in tools:
+        yield from unknown_cutter("round.cutter", table.cutter, tools)
         return
-    if not ask.bottom_mm < ask.top_mm:
-        yield f"round.bottom_mm = {ask.bottom_mm:g}: must be below top_mm = {ask.top_mm:g}"
-    if (barrel := tools[ask.cutter].barrel_radius) is not None:
+    if not table.bottom_mm < table.top_mm:
+        yield f"round.bottom_mm = {table.bottom_mm:g}: must be below top_mm = {table.top_mm:g}"
+    if (barrel := tools[table.cutter].barrel_radius) is not None:
         yield (
-            f"round.cutter = {ask.cutter}: barrel_radius_mm = {barrel:g}: its flank is an arc and leaves no straight "
+            f"round.cutter = {table.cutter}: barrel_radius_mm = {barrel:g}: its flank is an arc and leaves no straight "
             "wall: state a cutter with a straight flank"
         )
         return
-    taper = math.degrees(tools[ask.cutter].taper)
+    taper = math.degrees(tools[table.cutter].taper)
     # a flank that is wider upwards leaves a wall that is narrower upwards
     upwards = shell.angle_deg * (1.0 if shell.clamped == "low" else -1.0)
     if abs(upwards + taper) > 1e-6:
         yield (
-            f"round.cutter = {ask.cutter}: taper_deg = {taper:g}: must be {max(-upwards, 0.0):g}, that of the wall: "
+            f"round.cutter = {table.cutter}: taper_deg = {taper:g}: must be {max(-upwards, 0.0):g}, that of the wall: "
             "an upright cutter leaves its own angle"
             + ("; this wall is wider upwards: clamp its other end" if upwards > 0.0 else "")
         )

@@ -70,7 +70,7 @@ def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
         }
     answer["spindle_deviation"] = asdict(outcome.control.deviation)
     if isinstance(outcome.wall, ShellWall):
-        answer |= _opinions(outcome.wall)
+        answer |= _wall_models(outcome.wall)
     answer["energy_balance"] = {
         name: {str(tool): value for tool, value in each.items()} for name, each in outcome.energy_balance.items()
     }
@@ -96,7 +96,7 @@ def _workpiece(wall: ClampedWorkpiece) -> dict[str, Any]:
     }
 
 
-def _opinions(wall: ShellWall) -> dict[str, Any]:
+def _wall_models(wall: ShellWall) -> dict[str, Any]:
     """The same wall by hexahedra, and against a beam."""
     whole = float(wall.oval.share.sum())
     return {
@@ -107,7 +107,7 @@ def _opinions(wall: ShellWall) -> dict[str, Any]:
             "places": [
                 {"s_mm": p.s, "shell_um_n": 1e3 * p.shell, "hexahedra_um_n": 1e3 * p.solid} for p in wall.solid.places
             ],
-            "apart_percent_max": 100.0 * wall.solid.apart,
+            "apart_percent_max": 100.0 * wall.solid.greatest_difference,
         },
         "ovalisation": {
             "s_mm": wall.oval_s,

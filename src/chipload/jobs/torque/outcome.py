@@ -110,7 +110,7 @@ class SolidComparison:
     nodes: int
 
     @property
-    def apart(self) -> float:
+    def greatest_difference(self) -> float:
         """Greatest relative difference."""
         return max(abs(x.solid / x.shell - 1.0) for x in self.places)
 
@@ -127,7 +127,7 @@ class SpindleEstimate:
     lag : of sensor and filter [s]
     bandwidth : at which both leave half of the power [Hz]
     range : (least, greatest) torque that it holds for [N mm]
-    resolution : what it cannot tell from nothing [N mm]: noise, quantisation, idle map
+    resolution : torque that it cannot distinguish from zero [N mm]: noise, quantisation, idle map
     constant_error : share by which the torque constant may be wrong
     light : below it the controller trusts nothing [N mm]
     light_share : share of the time in cut below it
@@ -159,7 +159,7 @@ class TorqueInputs:
     settings : the keys of the job but cutters and surprises
     surprises : a text each
     surprise_angles : of those that have one, its angle round the wall [deg] and its kind
-    checks, check_table : what is checked beside the stated limits, and its table
+    checks, check_table : checks in addition to the stated limits, and their table
     """
 
     title: str
@@ -276,7 +276,7 @@ class TorqueResult:
     Parameters
     ----------
     wall : the thin wall, or the workpiece, that limits the torque
-    step_checks : the steps for the checks beside the stated limits
+    step_checks : the steps for the checks in addition to the stated limits
     blank : the stock as it really is before the program, with the cutters
     findings : of the simulations of the plan and of the truth
     resolution_error : relative error of loads by layers and steps, by column of the simulation of the truth
@@ -307,12 +307,12 @@ class TorqueResult:
         """How much shorter than the constant feed and than the model alone, the share of what is possible, and by how
         much the error differs from the constant feed's, all in percent.
         """
-        held, plain, model = case.runs[HELD], case.runs[PLAIN], case.runs[MODEL]
+        controlled, plain, model = case.runs[HELD], case.runs[PLAIN], case.runs[MODEL]
         least = float(plain.error.max())
-        saved, possible = plain.outcome.time - held.outcome.time, plain.outcome.time - self.control.ideal_time
+        saved, possible = plain.outcome.time - controlled.outcome.time, plain.outcome.time - self.control.ideal_time
         return {
-            "shorter_percent": 100.0 * (1.0 - held.outcome.time / plain.outcome.time),
-            "shorter_than_model_percent": 100.0 * (1.0 - held.outcome.time / model.outcome.time),
+            "shorter_percent": 100.0 * (1.0 - controlled.outcome.time / plain.outcome.time),
+            "shorter_than_model_percent": 100.0 * (1.0 - controlled.outcome.time / model.outcome.time),
             "of_possible_percent": 100.0 * saved / possible if possible > 0.0 else 0.0,
-            "form_error_change_percent": 100.0 * (float(held.error.max()) / least - 1.0) if least > 0.0 else 0.0,
+            "form_error_change_percent": 100.0 * (float(controlled.error.max()) / least - 1.0) if least > 0.0 else 0.0,
         }

@@ -37,7 +37,7 @@ class HardestPlace:
 
 def remedies(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) -> list[str]:
     """Changes each of which alone would do; ``shell``: the wall for which the limit is calculated."""
-    places = _hardest(planned, limit)
+    places = _hardest_places(planned, limit)
     k = limit.step
     depth, tolerance, modes = float(planned.far[k] - planned.near[k]), job.shell.wall_tolerance_mm, ritz(shell)
 
@@ -79,7 +79,7 @@ def remedies(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) -> li
     return out
 
 
-def _hardest(planned: Cut, limit: PathLimit) -> list[HardestPlace]:
+def _hardest_places(planned: Cut, limit: PathLimit) -> list[HardestPlace]:
     """The step of the limit, and those with the greatest edge force, alone and times the compliance of the cutter."""
     edge = planned.loads.force_edge * (planned.far > planned.near)
     rows = {limit.step, int(np.argmax(edge)), int(np.argmax(edge * planned.tool)), int(np.argmax(edge * planned.far))}
@@ -105,8 +105,8 @@ def _allowed(job: TorqueJob, modes: Ritz, place: HardestPlace) -> float:
     width = contact_width(job.shell.stock_mm, job.cutters)
     near, far, tool = (np.array([x]) for x in (place.near, place.far, place.tool))
     wall = unit_response(modes, near, far, width, tool)
-    ask = job.table.limits
-    deflection, stress = 1e-3 * ask.form_error_um, ask.strength_share * job.shell.strength_mpa
+    limits = job.table.limits
+    deflection, stress = 1e-3 * limits.form_error_um, limits.strength_share * job.shell.strength_mpa
     return float(min(deflection / wall.compliance[0], stress / wall.stress[0]))
 
 

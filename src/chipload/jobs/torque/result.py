@@ -70,7 +70,7 @@ def result_of(outcome: TorqueResult) -> Result:
 
 def track_name(case: ControllerCase, controller: str) -> str:
     """Name of the track of a controller: with its latency, if the loop has one."""
-    return f"{controller}, {1e3 * case.loop.latency:g} ms" if _real(case) else controller
+    return f"{controller}, {1e3 * case.loop.latency:g} ms" if _is_machine_loop(case) else controller
 
 
 def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
@@ -86,8 +86,8 @@ def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[Limi
         for name, limit in outcome.job.limits.items()
     )
     checks = outcome.job.checks
-    held = (with_peaks(check, checks, columns) for check in stated)
-    found = (*held, *default_limits(checks, outcome.job.machine, columns, track, errors))
+    stated_checks = (with_peaks(check, checks, columns) for check in stated)
+    found = (*stated_checks, *default_limits(checks, outcome.job.machine, columns, track, errors))
     return tuple(over_allowable(x, columns, errors["torque_nm"]) if x.name == OVER else x for x in found)
 
 
@@ -110,7 +110,7 @@ def over_allowable(check: LimitCheck, columns: Columns, error: float) -> LimitCh
     return replace(check, state=state, reason=why, resolution_error=error if math.isfinite(error) else 0.0)
 
 
-def _real(case: ControllerCase) -> bool:
+def _is_machine_loop(case: ControllerCase) -> bool:
     """Whether the loop has latency or steps, as on a machine."""
     return bool(case.loop.latency or case.quantum)
 
@@ -143,7 +143,7 @@ def _not_run(outcome: TorqueResult) -> Track:
 
 
 def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
-    """(n,) columns of a controller, a row a step of it."""
+    """(n,) columns of a controller, one row for each step of it."""
     o, path = run.outcome, outcome.allowable.path
     relief = np.interp(o.s, path.model.s, path.relief)
     over = 100.0 * np.maximum(o.torque / (outcome.allowable.torque * relief) - 1.0, 0.0)
@@ -170,7 +170,7 @@ def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
 
 
 def _run_findings(case: ControllerCase, run: ControllerRun) -> tuple[Finding, ...]:
-    """What was found in a run beside its limits."""
+    """Findings of a run in addition to its limits."""
     out, o, plain = [], run.outcome, case.runs[PLAIN].outcome
     if not o.finished:
         text = f"the controller stopped at {o.s[-1]:.4g} mm of the path: {o.ended}"
@@ -188,7 +188,7 @@ def _run_findings(case: ControllerCase, run: ControllerRun) -> tuple[Finding, ..
 
 
 def _findings(outcome: TorqueResult) -> tuple[Finding, ...]:
-    """What was found in the whole result."""
+    """Findings on the whole result."""
     out = [Finding(f.code, f.line, f.text, Severity.EXCEEDS, f.place, f.row) for f in outcome.findings]
     if not outcome.attainable:
         limit, what = outcome.allowable.limit, "wall" if isinstance(outcome.wall, ShellWall) else "workpiece"

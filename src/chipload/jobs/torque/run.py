@@ -105,7 +105,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
 
 
 def _real_stock(job: TorqueJob, program: Program) -> LayeredStock:
-    """The stock as it really is, before the program."""
+    """The real stock before the program."""
     return real_stock_body(job, program) if job.workpiece is not None else real_shell_stock(job, program)
 
 
@@ -121,7 +121,7 @@ class Followed:
 
 def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Material) -> TorqueInputs:
     """What the job states."""
-    ask = job.table.limits
+    limits = job.table.limits
     return TorqueInputs(
         title=title_of(job.path),
         program_name=job.program_file.name
@@ -129,8 +129,8 @@ def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Materi
         else "generated: a helix down the wall and one turn at the bottom",
         program=program,
         machine=machine,
-        limits=ask.stated,
-        unchecked=ask.unstated,
+        limits=limits.stated,
+        unchecked=limits.unstated,
         settings=job.table.model_dump(exclude_none=True, exclude={"cutter", "surprise"}),
         surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in job.table.surprise),
         surprise_angles=tuple((x.at_deg, x.kind) for x in job.table.surprise if x.at_deg is not None),
@@ -163,11 +163,11 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     wrong = 1.0 + spindle.torque_constant_error
     granted = 1.0 + 1e-2 * job.table.limits.torque_over_percent - wrong * job.table.torque_control.override.hold
     least = torque_resolution(spindle, 1e-3 * job.table.loop.period_ms).total / granted if granted > 0.0 else math.inf
-    count = counted(program, job.cutters, resolution_of(job))
+    count, number = counted(program, job.cutters, resolution_of(job)), len(job.table.surprise)
     return [
         f"{job.path.name}: {what}; "
         f"{len(program)} motions on machine {machine.name}, stock of {stock.volume():.5g} mm3, material "
-        f"{material.name}, controller {table.name}, {len(job.table.surprise)} surprises",
+        f"{material.name}, controller {table.name}, {number} surprise{'' if number == 1 else 's'}",
         f"the controller can hold torque limits from {1e-3 * least:.3g} N m up",
         text,
         estimate(4 * count, len(program)),
@@ -180,7 +180,7 @@ def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spin
     Raises
     ------
     InputError
-        A file cannot be read, the spindle does not resolve the torque, or the loop asks too much of the machine.
+        A file cannot be read, the spindle does not resolve the torque, or the loop exceeds the machine.
     """
     machine, material, table = _named(job)
     require_linear(material)
@@ -211,7 +211,7 @@ def _acceleration(job: TorqueJob, machine: Machine) -> float:
 def _named(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable]:
     machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
     material = material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
-    need_directions(material, "the wall of a shell" if job.workpiece is None else "a workpiece that gives way")
+    need_directions(material, "the wall of a shell" if job.workpiece is None else "an elastic workpiece")
     return machine, material, read_fuzzy(job.control_file) if job.control_file is not None else standard()
 
 

@@ -29,7 +29,7 @@ from chipload.stock.rings import surface_off
 from chipload.structure.shell import Ritz, compliance, ovalisation
 from chipload.structure.wall_solid import normal_compliance, wall_solid
 
-#: elements of the second opinion: half round, along, through
+#: elements of the solid for comparison: half round, along, through
 MESH = (24, 20, 1)
 #: a check simulates the plan if that takes at most so many coarse steps
 MOST_PREVIEWED = 3000
@@ -47,7 +47,7 @@ def shell_wall(job: TorqueJob, a: Allowable) -> ShellWall:
         tolerance=job.shell.wall_tolerance_mm,
         oval=ovalisation(a.thin, a.thin.shell.length),
         oval_s=a.thin.shell.length,
-        solid=_second_opinion(a.thin, a.width, a.planned),
+        solid=_solid_comparison(a.thin, a.width, a.planned),
         surface=surface_off(a.real.stock, place.outer, low, high),
         stock=a.real.stock,
     )
@@ -98,7 +98,7 @@ def _one_tooth(limit: PathLimit, planned: Cut, material: Material, job: TorqueJo
     return float(torque_limit(limit.force, radius, depth, material, min(mean / peak, 1.0)).torque)
 
 
-def _second_opinion(modes: Ritz, width: float, planned: Cut) -> SolidComparison:
+def _solid_comparison(modes: Ritz, width: float, planned: Cut) -> SolidComparison:
     """The wall by hexahedra, nearest to the free end, in the middle of the rounds and nearest to the clamp."""
     on = np.flatnonzero(planned.makes & (planned.far > planned.near))
     rows = on[np.argsort(planned.far[on], kind="stable")] if len(on) else np.argsort(planned.far)[-1:]

@@ -90,10 +90,10 @@ def require_resolved(job: TorqueJob, spindle: Spindle, torque: float) -> None:
         )
 
 
-def wrong_side(key: str, value: float, held: float) -> InputError:
+def wrong_side(key: str, value: float, set_point: float) -> InputError:
     """Error for a torque of the override [N mm] on the wrong side of the torque limit."""
     side = "below" if key == "light_nm" else "above"
     return InputError(
         f"torque_control.override.{key} = {1e-3 * value:g}: must be {side} the torque that is held, "
-        f"{1e-3 * held:.4g} N m"
+        f"{1e-3 * set_point:.4g} N m"
     )

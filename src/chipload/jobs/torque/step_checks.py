@@ -89,7 +89,7 @@ def feed_ratio(programmed: TorqueProfile, outcome: Outcome, speed: float) -> Flo
 def check_columns(
     steps: StepChecks, s: Floats, outcome: Outcome, ratio: Floats, deflection_um: Floats, table: ChecksTable
 ) -> dict[str, NDArray[np.float64]]:
-    """Columns of the default checks, (k,) each, a row a row of the outcome.
+    """Columns of the default checks, (k,) each, one row for each row of the outcome.
 
     Parameters
     ----------

@@ -64,9 +64,9 @@ def along(outcome: TorqueResult, case: ControllerCase, by: str) -> go.Figure:
                 row=row, col=1,
             )  # fmt: skip
     for row, limit in ((1, 1.0), (4, outcome.job.limits["form_error_um"])):
-        said = {"text": f"limit {limit:.4g}", "font": {"color": LIMIT, "size": 11}}
+        label = {"text": f"limit {limit:.4g}", "font": {"color": LIMIT, "size": 11}}
         line = {"color": LIMIT, "width": 1.2, "dash": "dash"}
-        figure.add_hline(y=limit, line=line, annotation=said, annotation_position="top left", row=row, col=1)
+        figure.add_hline(y=limit, line=line, annotation=label, annotation_position="top left", row=row, col=1)
     for row, title in enumerate(titles, start=1):
         figure.update_yaxes(title_text=title, rangemode="tozero", row=row, col=1)
     figure.update_xaxes(title_text="along the path [mm]" if by == "path" else "time [s]", row=4, col=1)

@@ -40,9 +40,9 @@ def unrolled(outcome: TorqueResult) -> go.Figure:
             row=row, col=1,
         )  # fmt: skip
         for at, what in outcome.job.surprise_angles:
-            said = {"text": what, "font": {"color": LIMIT, "size": 11}} if row == 1 else None
+            label = {"text": what, "font": {"color": LIMIT, "size": 11}} if row == 1 else None
             line = {"color": LIMIT, "width": 1.3, "dash": "dash"}
-            figure.add_vline(x=at % 360.0, line=line, annotation=said, row=row, col=1)
+            figure.add_vline(x=at % 360.0, line=line, annotation=label, row=row, col=1)
         figure.update_yaxes(title_text="z [mm]", gridcolor=GRID, zeroline=False, row=row, col=1)
     figure.update_xaxes(range=[0.0, 360.0], dtick=45, gridcolor=GRID, zeroline=False)
     figure.update_xaxes(title_text="round the wall from +X [deg]", row=len(values), col=1)
@@ -61,8 +61,8 @@ def torques(outcome: TorqueResult) -> dict[str, Floats]:
         "true, at the programmed feed": 1e-3 * path.truth.torque(1.0),
     }
     if outcome.control.cases:
-        held = outcome.control.cases[-1].runs[HELD].outcome
-        out["true, under the controller"] = 1e-3 * np.interp(path.model.s, held.s, held.torque)
+        controlled = outcome.control.cases[-1].runs[HELD].outcome
+        out["true, under the controller"] = 1e-3 * np.interp(path.model.s, controlled.s, controlled.torque)
     return out
 
 

@@ -230,18 +230,18 @@ def responses_of(
     factors : (n,) of the parts of the edge and of the feed
     margin : share by which compliance and stress count as greater
     """
-    ask, ones = job.table.limits, np.ones(len(cut.feed))
+    limits, ones = job.table.limits, np.ones(len(cut.feed))
     e, c = factors or (ones, ones)
     e, c = (1.0 + margin) * e, (1.0 + margin) * c
-    most = 1e-3 * ask.form_error_um
-    strength = ask.strength_share * stated(stated(job.workpiece, "workpiece").yield_mpa, "workpiece.yield_mpa")
+    most = 1e-3 * limits.form_error_um
+    strength = limits.strength_share * stated(stated(job.workpiece, "workpiece").yield_mpa, "workpiece.yield_mpa")
     force = TwoParts(cut.loads.force_edge, cut.loads.force_cut)
     out = [
         ("deflection", cut.error, most),
         ("strength", force.times(cut.strained * ones, cut.strained * ones), strength),
     ]
-    if ask.deflection_workpiece_um is not None:
-        out.append(("workpiece deflection", cut.work, 1e-3 * ask.deflection_workpiece_um))
+    if limits.deflection_workpiece_um is not None:
+        out.append(("workpiece deflection", cut.work, 1e-3 * limits.deflection_workpiece_um))
     return [LimitedResponse(name, x.edge * e, x.cut * c, most) for name, x, most in out]
 
 
@@ -269,18 +269,18 @@ def allowable_on_workpiece(
     InputError
         As :func:`workpiece_cut`; the real stock is not cut by the same steps.
     """
-    ask, half = job.table, part_of(progress, 0.0, 0.5)
-    planned = workpiece_cut(job, stated(ask.stock, "stock"), program, material, machine.rapid, half)
+    table, half = job.table, part_of(progress, 0.0, 0.5)
+    planned = workpiece_cut(job, stated(table.stock, "stock"), program, material, machine.rapid, half)
     real = planned
-    if ask.real_stock is not None:
-        real = workpiece_cut(job, ask.real_stock, program, material, machine.rapid, part_of(progress, 0.5, 1.0))
-    factors = surprise_factors(len(real.feed), lambda x: _away(real, x), ask.surprise)
+    if table.real_stock is not None:
+        real = workpiece_cut(job, table.real_stock, program, material, machine.rapid, part_of(progress, 0.5, 1.0))
+    factors = surprise_factors(len(real.feed), lambda x: _spot_distance(real, x), table.surprise)
     e, c = factors
     loads = Loads(
         real.loads.torque_edge * e, real.loads.torque_cut * c, real.loads.force_edge * e, real.loads.force_cut * c
     )
     limit = limit_on_workpiece(planned.loads, responses_of(job, planned, margin=planned.compliance.error))
-    most = ask.limits.torque_nm
+    most = table.limits.torque_nm
     torque = limit.torque if most is None else min(limit.torque, 1e3 * most)
     return AllowableWorkpiece(
         planned, real, loads, factors, limit, torque, limit_on_workpiece(loads, responses_of(job, real, factors)),
@@ -293,7 +293,7 @@ def real_stock_body(job: TorqueJob, program: Program) -> LayeredStock:
     return stock_body(simulation_of(job, job.table.real_stock or stated(job.table.stock, "stock")), program)
 
 
-def _away(cut: WorkpieceCut, x: SurpriseTable) -> Floats:
+def _spot_distance(cut: WorkpieceCut, x: SurpriseTable) -> Floats:
     """(n,) distance of the steps from the middle of a hard spot [mm]."""
     middle = 0.5 * (cut.points[1:] + cut.points[:-1])
     return np.asarray(np.linalg.norm(middle - np.array(stated(x.at_mm, "surprise.at_mm")), axis=1))

@@ -65,7 +65,7 @@ def corner(theta: float, rho: float, length: float) -> Floats:
     return np.column_stack([kappa, lengths])
 
 
-def _laid(table: Floats, start: Floats, heading: float) -> Floats:
+def _chained_segments(table: Floats, start: Floats, heading: float) -> Floats:
     """Segments of arcs (kappa, length) laid one after the other from ``start`` along ``heading`` [rad]."""
     rows = []
     p = np.array(start)
@@ -85,7 +85,7 @@ def eased(path: Contour, radius: float, engagement: float, tolerance_mm: float) 
     """``path`` with clothoids at both ends of every arc that stands between two lines it is tangent to.
 
     The arc's radius is chosen so that the path leaves the drawn one least; where that is still more than
-    ``tolerance_mm`` the clothoids are shortened until it is not, and an event says so: the engagement overshoots there.
+    ``tolerance_mm`` the clothoids are shortened until it is not, and an event states that the engagement overshoots.
     Other joints with a step of curvature stay as they are, and are reported. O(arcs x samples).
     """
     seg = path.segments.copy()
@@ -129,7 +129,7 @@ def eased(path: Contour, radius: float, engagement: float, tolerance_mm: float) 
                 )
             )
         u = (seg[before, 2:4] - seg[before, 0:2]) / path.lengths[before]
-        pieces[k] = _laid(table, seg[k, 0:2] - set_back * u, math.atan2(u[1], u[0]))
+        pieces[k] = _chained_segments(table, seg[k, 0:2] - set_back * u, math.atan2(u[1], u[0]))
         trimmed[before, 1] += set_back
         trimmed[after, 0] += set_back
         worst = max(worst, deviation)
@@ -181,7 +181,7 @@ def _fit(
 
 
 def _chain(theta: float, rho: float, length: float) -> Floats:
-    return _laid(corner(theta, rho, length), np.zeros(2), 0.0)
+    return _chained_segments(corner(theta, rho, length), np.zeros(2), 0.0)
 
 
 def _set_back(theta: float, rho: float, length: float) -> float:

@@ -7,7 +7,7 @@ feed, O(i) = Q(i) + R Rot(+90 deg) T(i) the cutter's centre, L = |P(i) - Q(i)| =
 2. T(i+1) = Rot(-a*/2) (P(i+1) - Q(i+1)) / L
 
 First order in the step. It is sure for convex stock (material that bulges towards the cutter); elsewhere it can fail
-and then says where: the centre stops or turns back, no Q(i+1) at distance L exists, or the corner is sharper than
+and then states where: the centre stops or turns back, no Q(i+1) at distance L exists, or the corner is sharper than
 90 deg - a*/2.
 
 Reference: [Stori2000], as given (repaired) in [Uddin2007].
@@ -33,7 +33,7 @@ SEAM_MM = 1e-3
 @dataclass(frozen=True, eq=False)
 class ForwardPass:
     """Rows along the pass: ``centre`` (n, 2) [mm], ``heading`` (n, 2), ``made`` (n, 2) the new surface Q [mm]; ``old``
-    the old surface as run; ``event`` says why it stopped before the end of the old surface, None if it did not.
+    the old surface as run; ``event`` states why it stopped before the end of the old surface; None: it did not.
     """
 
     centre: Floats
@@ -106,7 +106,7 @@ def forward_pass(old: Contour, radius: float, a: float, step: float) -> ForwardP
     for i in range(n + 1):
         o = q + radius * np.array([-t[1], t[0]])
         if centres and float((o - centres[-1]) @ t) <= 0.0:
-            event = _stop("forward-stops", o, "the centre stops or turns back: no pass of this cutter goes on")
+            event = _stop("forward-stops", o, "the centre stops or turns back: no pass of this cutter continues")
             break
         centres.append(o)
         headings.append(t)

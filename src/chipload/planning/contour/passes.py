@@ -155,12 +155,12 @@ def with_leads(
     on = lead + 2.0 * later * radius
     first, last = walls.run_on - ahead, path.length - walls.run_on - ahead
     path, begins, ends = path.part(first, last), path.part(first - on, first), path.part(last, last + on)
-    way_in, way_out = _quarter(begins, walls, radius, lead, 0.0), _quarter(ends, walls, radius, lead, None)
+    lead_in, lead_out = _quarter(begins, walls, radius, lead, 0.0), _quarter(ends, walls, radius, lead, None)
     return ContourPass(
         name,
         path,
-        begins if way_in is None else Contour.join([way_in, begins]),
-        ends if way_out is None else Contour.join([ends, way_out]),
+        begins if lead_in is None else Contour.join([lead_in, begins]),
+        ends if lead_out is None else Contour.join([ends, lead_out]),
         stock,
     )
 
@@ -177,8 +177,8 @@ def _quarter(path: Contour, walls: Walls, radius: float, lead: float, at: float 
     while lead > 1e-3 * radius:
         c = o + lead * n
         ends = (*(c - lead * t), *o) if at is not None else (*o, *(c + lead * t))
-        way = Contour(np.array([[*ends, *c, 0.5 * math.pi]]))
-        if distance(wall, way.at(np.linspace(0.0, way.length, 64))[0]).min() >= radius - 1e-7:
-            return way
+        arc = Contour(np.array([[*ends, *c, 0.5 * math.pi]]))
+        if distance(wall, arc.at(np.linspace(0.0, arc.length, 64))[0]).min() >= radius - 1e-7:
+            return arc
         lead *= 0.5
     return None

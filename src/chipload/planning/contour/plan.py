@@ -152,7 +152,7 @@ def plan_contour(
     Raises
     ------
     InputError
-        The contour, the cutter and the depths do not go together; the message says where and what would.
+        The contour, the cutter and the depths do not go together; the message states where, and the remedy.
     """
     job = _prepared(contours, setting, cutter, material, machine, limits)
     a = setting.engagement(cutter.radius)
@@ -227,20 +227,20 @@ def _depth(job: _Job) -> float:
 def _stock(job: _Job) -> Region:
     """What the first motion meets, in the work frame."""
     rough = _rough(job) if job.finish else job.walls.extended
-    return Region(tuple(_back(c, job.flip) for c in rough_stock(job.walls, rough, _behind(job)).contours))
+    return Region(tuple(_back(c, job.flip) for c in rough_stock(job.walls, rough, _stock_depth_in_part(job)).contours))
 
 
-def _behind(job: _Job) -> float:
+def _stock_depth_in_part(job: _Job) -> float:
     """Depth of the considered stock inside the part [mm]."""
     return 0.5 * job.radius + (0.0 if job.finish else job.setting.passes * job.setting.radial_depth)
 
 
-def _cleared(job: _Job, planar: list[ContourPass]) -> dict[str, float]:
+def _clearing_totals(job: _Job, planar: list[ContourPass]) -> dict[str, float]:
     """What the passes clear; nothing of those into the material, which make a wall of their own."""
     if not job.finish:
         return {}
-    stock, depth = rough_stock(job.walls, _rough(job), _behind(job)), _depth(job)
-    return {"cleared_percent": cleared_percent(stock, job.walls, _behind(job), depth, planar, job.radius)}
+    stock, depth = rough_stock(job.walls, _rough(job), _stock_depth_in_part(job)), _depth(job)
+    return {"cleared_percent": cleared_percent(stock, job.walls, _stock_depth_in_part(job), depth, planar, job.radius)}
 
 
 def _passes(job: _Job, a: float | None) -> list[ContourPass]:
@@ -323,7 +323,7 @@ def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> tuple[Strategy
         "finish path": tuple(r.path for r in runs if r.name != "semifinish"),
         "stock": tuple(Contour(c.segments) for r in runs if r.name != "semifinish" for c in _chains(r.stock.segments)),
     }
-    summary = {**_summary(job, name, history, on_wall), **counts(len(runs), history), **_cleared(job, planar)}
+    summary = {**_summary(job, name, history, on_wall), **counts(len(runs), history), **_clearing_totals(job, planar)}
     finish = [steps for run, (steps, _) in zip(runs, clocks, strict=True) if run.name == "finish"]
     done = StrategyResult(name, program, history, summary, events, on_wall, drawn)
     return done, FinishPasses(tuple(finish), wanted if name == "feed" else None)
@@ -340,8 +340,8 @@ def _pass_times(
     out, first = [], 0
     for program, (steps, speed) in zip(programs, clocks, strict=True):
         last = first + len(program) - 1
-        way = np.concatenate([[0.0], np.cumsum(lengths(program)[2:-1])])
-        own = np.interp(way, steps.s, speed.time)
+        travel = np.concatenate([[0.0], np.cumsum(lengths(program)[2:-1])])
+        own = np.interp(travel, steps.s, speed.time)
         clock = ends[first + 1 : last]
         out.append(np.concatenate([clock[:1], np.interp(speed.time, own, clock), ends[last : last + 1]]))
         first = last + 1
@@ -395,15 +395,15 @@ def _events(job: _Job, runs: list[ContourPass], history: Columns, name: str) -> 
         if r.lead_in is None and r.stopped is None:
             x, y = r.path.start
             out.append(Event("lead-none", x, y, f"{r.name}: no room to lead in: the cutter enters on the wall"))
-    broken = history["arcs"] < 0
-    if broken.any():
-        k = int(np.flatnonzero(broken)[0])
+    unknown = history["arcs"] < 0
+    if unknown.any():
+        k = int(np.flatnonzero(unknown)[0])
         out.append(
             Event(
                 "engagement-unknown",
                 float(history["x_mm"][k]),
                 float(history["y_mm"][k]),
-                f"the stock's boundary is broken here: engagement unknown in {int(broken.sum())} steps",
+                f"the stock's boundary is broken here: engagement unknown in {int(unknown.sum())} steps",
                 failure=True,
             )
         )
@@ -411,7 +411,7 @@ def _events(job: _Job, runs: list[ContourPass], history: Columns, name: str) -> 
 
 
 def _overshoots(job: _Job, runs: list[ContourPass]) -> list[Event]:
-    """Joints of the finish path where the cutter cannot make the surface that constant engagement asks for."""
+    """Joints of the finish path where the cutter cannot make the surface that constant engagement needs."""
     out = []
     wanted = job.setting.engagement(job.radius)
     surface = np.vstack([r.stock.segments for r in runs if r.name == "finish"])
@@ -438,7 +438,7 @@ def _overshoots(job: _Job, runs: list[ContourPass]) -> list[Event]:
 def _semifinish_overshoots(job: _Job, histories: list[Columns]) -> list[Event]:
     """The greatest engagement of every semi-finish pass but the first that rises above a*, one event a pass.
 
-    Each pass back raises the curvature of O*, until a cutter of radius R cannot make the surface it asks for. The
+    Each pass back raises the curvature of O*, until a cutter of radius R cannot make that surface. The
     finish pass has its own events.
     """
     wanted = math.degrees(job.setting.engagement(job.radius))
@@ -452,8 +452,8 @@ def _semifinish_overshoots(job: _Job, histories: list[Columns]) -> list[Event]:
         if highest > wanted + OVERSHOOT_DEG:
             text = (
                 f"semi-finish pass {number} of {len(histories) - len(job.finish)}: the engagement rises to "
-                f"{highest:.4g} deg here, {wanted:.4g} deg are wanted: the cutter cannot make the surface that "
-                "constant engagement asks of the pass before"
+                f"{highest:.4g} deg here, {wanted:.4g} deg are required: the cutter cannot make the surface that "
+                "constant engagement requires of the preceding pass"
             )
             out.append(Event("semifinish-overshoot", float(h["x_mm"][k]), float(h["y_mm"][k]), text))
     return out
@@ -492,7 +492,7 @@ def _thin_stock(job: _Job, runs: list[ContourPass]) -> list[Event]:
         Event(
             "stock-thin",
             *place,
-            f"constant engagement asks for {worst:.4g} mm of stock on the wall here, roughing leaves {rough:.4g} mm: "
+            f"constant engagement needs {worst:.4g} mm of stock on the wall here, roughing leaves {rough:.4g} mm: "
             f"raise semifinish_depth_mm by {worst - rough:.4g}",
             failure=True,
         )

@@ -93,17 +93,17 @@ def _closing(
         a, b = np.where(cut_lo, hi, lo), np.where(cut_lo, lo, hi)  # a stays in stock, b has been cut
         for _ in range(HALVINGS):
             middle = 0.5 * (a + b)
-            gone = _cut(o[late], t[late], middle, radius, early)
-            a, b = np.where(gone, a, middle), np.where(gone, middle, b)
+            cut_here = _cut(o[late], t[late], middle, radius, early)
+            a, b = np.where(cut_here, a, middle), np.where(cut_here, middle, b)
         lo = np.where(some & cut_lo, a, lo)
         hi = np.where(some & cut_hi, a, hi)
         empty = cut_lo & cut_hi
         phi[late, k, 0], phi[late, k, 1] = np.where(empty, 0.0, lo), np.where(empty, 0.0, hi)
-    lost = angle[late] - (phi[late, :, 1] - phi[late, :, 0]).sum(axis=1)
-    angle[late] -= lost
+    removed = angle[late] - (phi[late, :, 1] - phi[late, :, 0]).sum(axis=1)
+    angle[late] -= removed
     count[late] = ((phi[late, :, 1] - phi[late, :, 0]) > 0.0).sum(axis=1)
     zone = zone.copy()
-    zone[late[(lost > 1e-9) & (zone[late] == run.name)]] = "closing"
+    zone[late[(removed > 1e-9) & (zone[late] == run.name)]] = "closing"
     return zone, Engagement(angle, count, phi)
 
 

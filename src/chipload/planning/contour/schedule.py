@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 
 #: the schedule is written in steps of this share of f0, and is at least the second share: below it edges rub
 FEED_SHARE, LEAST_SHARE = 0.01, 0.2
-#: engagements are rounded up to a multiple of this [rad] before the force model is asked
+#: engagements are rounded up to a multiple of this [rad] before the force model is evaluated
 ROUNDED = 5e-4
 #: places in which the smoothing works, and by how much its window grows where the jerk is not kept yet
 PLACES, GROWTH = 4000, 1.25
@@ -67,7 +67,7 @@ def constant_force(cut: CutConditions, met: Engagement, feed: float, wanted: flo
 
     n = len(first)
     share = greatest_factor(ratio, np.full(n, LEAST_SHARE), np.ones(n))
-    # what a straight wall is engaged by needs no lower feed; the rounding up would ask for one
+    # what a straight wall is engaged by needs no lower feed; the rounding up would require one
     share = np.where(_straight(*arcs, wanted), 1.0, np.where(np.isnan(share), LEAST_SHARE, share))
     return np.asarray(feed * share[of.reshape(-1)])
 

@@ -36,11 +36,11 @@ def cleared_percent(
         return shapely.LineString(contour.flatten(CHORD))
 
     part = rough_stock(walls, walls.extended, behind).flatten(CHORD)
-    beside = shapely.union_all([shapely.buffer(line(w), 1.01 * depth, cap_style="flat") for w in walls.walls])
-    asked = shapely.intersection(shapely.difference(stock.flatten(CHORD), part), beside)
+    zone = shapely.union_all([shapely.buffer(line(w), 1.01 * depth, cap_style="flat") for w in walls.walls])
+    to_clear = shapely.intersection(shapely.difference(stock.flatten(CHORD), part), zone)
     lines = [contour for p in passes for contour in (p.lead_in, p.path, p.lead_out) if contour is not None]
     swept = shapely.union_all([shapely.buffer(line(contour), radius, quad_segs=OF_RADIUS) for contour in lines])
-    return float(100.0 * shapely.intersection(asked, swept).area / asked.area)
+    return float(100.0 * shapely.intersection(to_clear, swept).area / to_clear.area)
 
 
 def counts(passes: int, history: Columns) -> dict[str, object]:

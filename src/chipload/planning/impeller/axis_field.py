@@ -234,9 +234,9 @@ class _Nodes:
         n = self.normal @ T.T
         low, high = contact_band(self.cutter, self.limits.lean)
         some = able & (n > low) & (n < high)
-        node, way = np.nonzero(some)
+        node, direction = np.nonzero(some)
         out = np.zeros(some.shape, dtype=np.bool_)
-        out[node, way] = self._free(node, T[way])
+        out[node, direction] = self._free(node, T[direction])
         return out
 
     def _free(self, node: NDArray[np.intp], T: Floats) -> Flags:
@@ -295,12 +295,12 @@ def _chosen(cost: Floats, turn: Floats) -> NDArray[np.intp]:
         # lines along u and lines along v in turn
         for lines, picks in ((cost.transpose(1, 0, 2), chosen.T), (cost, chosen)):
             for j, line in enumerate(lines):
-                held = line.copy()
+                shifted = line.copy()
                 for side in (j - 1, j + 1):
                     if 0 <= side < len(lines):
                         known = picks[side] >= 0
-                        held[known] += turn[picks[side][known]]
-                picks[j] = _line(held, turn)
+                        shifted[known] += turn[picks[side][known]]
+                picks[j] = _line(shifted, turn)
         if sweep and (chosen == before).all():
             break
     return chosen

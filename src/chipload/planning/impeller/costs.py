@@ -81,7 +81,7 @@ class ChannelSide:
     u, v : (a,), (b,) of the contact points, ascending
     area : (a b,) what each stands for [mm2]
     answer : of :func:`largest_cutters` with ``every``
-    clearance, pallets : as it was asked with
+    clearance, pallets : of the search
     """
 
     body: int
@@ -141,7 +141,7 @@ class Costs:
     time : (2, c, k, t) [s] of an order; inf: not valid
     known : (c, k, t) bool; else ``time`` is a bound from below
     ranges : of what is known and valid, by (c, k, t)
-    asked : how many ranges were computed
+    computed : how many ranges were computed
     factor : (2, k, t) by what the programs take longer than ``time``, for an order of strips; 1 until it is measured
     """
 
@@ -149,8 +149,8 @@ class Costs:
         self.side, self.tables, self.terms = side, tables, terms
         self.catalogue: Catalogue = side.answer.catalogue
         self.ranges: dict[tuple[int, int, int], Floats] = {}
-        self.asked = 0
-        self.untold = 0
+        self.computed = 0
+        self.undecided = 0
         spans = np.asarray(side.pallets, dtype=np.float64).reshape(-1, 2)
         self._grid = np.concatenate(
             [np.linspace(lo, hi, max(math.ceil((hi - lo) / STEP), 1) + 1) for lo, hi in spans.tolist()]
@@ -183,7 +183,7 @@ class Costs:
     def measured(self, rows: Sequence[MeasuredCost]) -> None:
         """Take the factors from programs; a patch that is in no program takes the mean of its order, or of all.
 
-        A patch of which no contact point is reached predicts no time: its program says nothing of the others.
+        A patch of which no contact point is reached predicts no time: its program does not describe the others.
         """
         rows = [r for r in rows if r.predicted > 0.0]
         if not rows:
@@ -199,24 +199,24 @@ class Costs:
             for key in {(r.cutter, r.table) for r in own}:
                 self.factor[order, key[0], key[1]] = ratio([r for r in own if (r.cutter, r.table) == key])
 
-    def prove(self, asked: Sequence[tuple[int, int, int]], workers: int = 1, keep: Keep = anew) -> None:
+    def prove(self, pairs: Sequence[tuple[int, int, int]], workers: int = 1, keep: Keep = anew) -> None:
         """Prove the times (c, k, t)."""
         groups: dict[int, list[tuple[int, int]]] = {}
-        for point, cutter, table in sorted(set(asked)):
+        for point, cutter, table in sorted(set(pairs)):
             if not self.known[point, cutter, table]:
                 groups.setdefault(cutter, []).append((point, table))
         for k, members in groups.items():
             which = np.array(members)
             c, t = which[:, 0], which[:, 1]
             got = self._proved(c, k, t, workers, keep)
-            self.asked += len(c)
-            self.untold += int((~got.complete).sum())
+            self.computed += len(c)
+            self.undecided += int((~got.complete).sum())
             self.known[c, k, t] = True
-            going = np.array([len(rows) > 0 for rows in got.ranges])
-            self.time[:, c[~going], k, t[~going]] = np.inf
-            if not going.any():
+            feasible = np.array([len(rows) > 0 for rows in got.ranges])
+            self.time[:, c[~feasible], k, t[~feasible]] = np.inf
+            if not feasible.any():
                 continue
-            c, t, rows = c[going], t[going], [r for r in got.ranges if len(r)]
+            c, t, rows = c[feasible], t[feasible], [r for r in got.ranges if len(r)]
             for one in zip(c.tolist(), t.tolist(), rows, strict=True):
                 self.ranges[one[0], k, one[1]] = one[2]
             valid = np.array([_within(self._grid, r) for r in rows])

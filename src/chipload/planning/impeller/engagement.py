@@ -174,7 +174,7 @@ def _ranges(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Floats, Floats]
     whole = np.flatnonzero(mask.all(axis=1))
     begins = np.argwhere(mask & ~np.roll(mask, 1, axis=1))
     ends = np.argwhere(mask & ~np.roll(mask, -1, axis=1))
-    # ends of a row in the order of its begins: where the last run goes on over 2 pi the first end belongs to it
+    # ends of a row in the order of its begins: where the last run continues over 2 pi the first end belongs to it
     over = mask[:, 0] & mask[:, -1] & ~mask.all(axis=1)
     order = np.lexsort((np.where(over[ends[:, 0]] & _first_of_row(ends), ends[:, 1] + n, ends[:, 1]), ends[:, 0]))
     stop = np.where(over[ends[:, 0]] & _first_of_row(ends), ends[:, 1] + n, ends[:, 1])[order]

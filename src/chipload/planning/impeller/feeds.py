@@ -34,7 +34,7 @@ from chipload.planning.impeller.scene import Floats
 from chipload.planning.impeller.step_over import step_over
 from chipload.structure.beam import compliance
 
-#: lowest feed over the greatest one that is asked of a pass
+#: least ratio of the feed of a pass to the greatest feed
 LEAST = 0.02
 #: relative error of the loads by the samples of the chip
 ERROR = 0.1

@@ -33,7 +33,7 @@ def with_fillets(impeller: Impeller, radius: float) -> tuple[Impeller, tuple[str
     """
     blades: list[Blade] = []
     fillets: list[Blade] = []
-    said = []
+    lines = []
     for body, name in zip(impeller.bodies, ("blade", "splitter"), strict=False):
         sides: list[Filleted] = []
         for key, side in (("plus", body.plus), ("minus", body.minus)):
@@ -42,7 +42,7 @@ def with_fillets(impeller: Impeller, radius: float) -> tuple[Impeller, tuple[str
             except InputError as err:
                 raise InputError(f"impeller.fillet_mm = {radius:g}: {name} {key}: {err}: state a smaller one") from None
             sides.append(made)
-            said.append(
+            lines.append(
                 f"{name} {key} fillet: {radius:g} mm, up to {made.height:.4g} mm of the side are under it, within "
                 f"{made.off:.2g} mm"
             )
@@ -55,7 +55,7 @@ def with_fillets(impeller: Impeller, radius: float) -> tuple[Impeller, tuple[str
             f"impeller.fillet_mm = {radius:g}: larger than half of the channel: two fillets overlap by "
             f"{-least:.4g} mm on the hub: state a smaller one"
         )
-    return out, (*said, f"floor: at least {least:.4g} mm wide between two fillets, round the axis")
+    return out, (*lines, f"floor: at least {least:.4g} mm wide between two fillets, round the axis")
 
 
 def _floor_width(plain: Impeller, made: Impeller, index: int) -> float:

@@ -85,8 +85,8 @@ def lifted(
     out = path.tip[end] - path.tip[1 if end == 0 else -2]
     out = out / np.linalg.norm(out)
     for size in _LIFTS:
-        for way in (N, N + A, N + out, out, A):
-            step = how.lift * size * way / np.linalg.norm(way)
+        for direction in (N, N + A, N + out, out, A):
+            step = how.lift * size * direction / np.linalg.norm(direction)
             tips = p + np.arange(1, _SMALL + 1)[:, None] / _SMALL * step
             rise = np.linspace(0.0, max(top_of(outline, A, how) - float(tips[-1] @ A), 0.0), _SMALL)
             up = tips[-1] + rise[:, None] * A

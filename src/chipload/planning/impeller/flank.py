@@ -192,8 +192,8 @@ class _Side:
             k = far.argmin(axis=1)
             rows = np.arange(len(k))
             place, wide = U[rows, k], 2.0 * wide / _BESIDE
-        way, at = _from_line(P[rows, k], ends)
-        return far[rows, k], way / far[rows, k][:, None], at, place
+        vector, at = _from_line(P[rows, k], ends)
+        return far[rows, k], vector / far[rows, k][:, None], at, place
 
     def deviations(self, u: float, ends: Floats) -> Floats:
         """(m,) d of an axis through ``ends`` (2, 3)."""
@@ -202,11 +202,11 @@ class _Side:
     def fitted(self, u: float, x: Floats) -> tuple[Floats, float]:
         """The x (3,) of least deviation from those to begin with, and the bound of the last linear program."""
         step, least = _STEP, 0.0
-        far, way, at, _ = self.nearest(u, self.ends(u, x))
+        far, direction, at, _ = self.nearest(u, self.ends(u, x))
         now = float(np.abs(far - self.radius).max())
         _, N, D = self.frame(u)
         for _ in range(_ROUNDS):
-            J = np.column_stack([-(1.0 - at) * (way @ N[0]), -at * (way @ N[1]), -at * (way @ D)])
+            J = np.column_stack([-(1.0 - at) * (direction @ N[0]), -at * (direction @ N[1]), -at * (direction @ D)])
             d, one = far - self.radius, np.ones((len(far), 1))
             found = linprog(
                 [0.0, 0.0, 0.0, 1.0], np.vstack([np.hstack([J, -one]), np.hstack([-J, -one])]), np.concatenate([-d, d]),
@@ -219,7 +219,7 @@ class _Side:
             got = self.nearest(u, self.ends(u, new))
             there = float(np.abs(got[0] - self.radius).max())
             if there < now:
-                x, now, (far, way, at, _) = new, there, got
+                x, now, (far, direction, at, _) = new, there, got
             else:
                 step *= 0.25
         return x, least

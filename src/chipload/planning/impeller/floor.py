@@ -2,7 +2,7 @@
 
 Notation: u along the hub from inlet to outlet, v across a channel from the plus side of a body to the next body round,
 both 0..1, as the contact points of ``surfaces.py``. A layer lies at the share w of the way from the hub, less an
-allowance, to the shroud; it may go on beyond the outlet, straight in its meridional plane.
+allowance, to the shroud; it may continue beyond the outlet, straight in its meridional plane.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def patch_of(impeller: Impeller, body: str, side: str, ahead: float = 0.0) -> BS
 
     Parameters
     ----------
-    ahead : how far the hub goes on ahead of the blade's leading edge [mm]
+    ahead : length of the hub ahead of the blade's leading edge [mm]
     """
     index = BODIES.index(body)
     if side != "floor":
@@ -49,7 +49,7 @@ def layer_of(
     Parameters
     ----------
     allowance : between the hub and the layer w = 0 [mm]
-    beyond : how far the layer goes on beyond the outlet [mm]
+    beyond : length of the layer beyond the outlet [mm]
     """
     low, high = hub_range(impeller, ahead)
     u, v = np.linspace(0.0, 1.0, _ALONG), np.linspace(0.0, 1.0, _ACROSS)

@@ -164,7 +164,7 @@ class Impeller:
         return out
 
     def _foot(self, index: int, side: int, s: ArrayLike) -> Floats:
-        """Theta (a,) of a side's foot; a blade goes on straight beyond its edges, a splitter beside its blade."""
+        """Theta (a,) of a side's foot; a blade continues straight beyond its edges, a splitter next to its blade."""
         at = np.asarray(s, dtype=np.float64)
         first = index - index % len(self.bodies)
         places, theta = _theta_of(self.foot(index, side), self.hub)

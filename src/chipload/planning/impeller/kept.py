@@ -38,7 +38,7 @@ class PlanTask:
 class Keep(Protocol):
     """Source of the parts of a plan: a kept part, or the one that ``make`` plans.
 
-    ``key``: numbers, texts, arrays and dataclasses of them that say which part of the run it is and what it depends on.
+    ``key``: numbers, texts, arrays and dataclasses of them that identify the part of the run and its inputs.
     """
 
     def __call__(self, key: tuple[object, ...], make: Callable[[], T]) -> T:

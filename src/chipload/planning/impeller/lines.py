@@ -266,7 +266,7 @@ class Lines:
         """Tracks of the parts of a line where it is in ``use``, and the spans that are missed of what they ``need`` to
         mill.
 
-        A piece that ends between two stations goes on from the last as far as the cutter does; where the next piece
+        A piece that ends between two stations extends from the last as far as the cutter does; where the next piece
         begins so far back that they meet, nothing is missed.
         """
         tracks: list[ToolTrack] = []
@@ -277,7 +277,7 @@ class Lines:
         owner = np.full(len(use), -1)
         for k, piece in enumerate(line.sections):
             owner[piece.first : piece.last] = k
-        gone: dict[tuple[int, int], float] = {}  # (first station, towards the next 1 or back -1): how far [share]
+        shares: dict[tuple[int, int], float] = {}  # (first station, towards the next 1 or back -1): how far [share]
         for mine, piece in enumerate(line.sections):
             for a, b in runs(use[piece.first : piece.last]):
                 i, j = piece.first + a, piece.first + b
@@ -287,7 +287,7 @@ class Lines:
                     if not (0 <= there < len(use) and use[there] and owner[there] != mine):
                         continue
                     more = refinement.furthest(line.at[here], B[0 if side < 0 else -1], line.at[there])
-                    gone[here, side] = 0.0 if more is None else more[2]
+                    shares[here, side] = 0.0 if more is None else more[2]
                     if more is not None:
                         k = 0 if side < 0 else len(at)
                         at.insert(k, more[0])
@@ -303,13 +303,13 @@ class Lines:
         for a, b in runs(need & ~covered):
             ends = [*line.at[a:b]]
             if a and use[a - 1]:
-                ends.insert(0, line.at[a - 1] + gone.get((a - 1, 1), 0.0) * (line.at[a] - line.at[a - 1]))
+                ends.insert(0, line.at[a - 1] + shares.get((a - 1, 1), 0.0) * (line.at[a] - line.at[a - 1]))
             if b < len(use) and use[b]:
-                ends.append(line.at[b] + gone.get((b, -1), 0.0) * (line.at[b - 1] - line.at[b]))
+                ends.append(line.at[b] + shares.get((b, -1), 0.0) * (line.at[b - 1] - line.at[b]))
             missed.append(self._missed(number, np.array(ends), "no pallet angle"))
         for k in range(1, len(use)):
             if need[k - 1] and need[k] and covered[k - 1] and covered[k] and owner[k - 1] != owner[k]:
-                first, last = gone.get((k - 1, 1), 0.0), 1.0 - gone.get((k, -1), 0.0)
+                first, last = shares.get((k - 1, 1), 0.0), 1.0 - shares.get((k, -1), 0.0)
                 if first < last:
                     step = line.at[k] - line.at[k - 1]
                     between = line.at[k - 1] + np.array([[first], [last]]) * step

@@ -128,7 +128,7 @@ def surface_joint(refinements: Sequence[Refinement | None]) -> Joint:
 
 
 def _grown(one: Pass, between: ToolTrack, number: int, track: ToolTrack) -> Pass:
-    """A pass that goes on through a link to a further track."""
+    """A pass that continues through a link to a further track."""
     # the way begins where the pass ends and ends where the track begins
     inner = slice(1, len(between.tip) - 1)
     link = len(between.tip) - 2

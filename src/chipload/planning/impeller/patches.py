@@ -42,7 +42,7 @@ class PatchDivision:
     bound : below it is no time of the same strips in any sequence, with as many cutters [s]
     bound_any_shape : nor, below this, of patches of any shape on the same contact points [s]
     unreachable : for each side the contact points that no cutter of the catalogue mills
-    untold : ranges with too many arcs to decide, which count as closed
+    undecided : ranges with too many arcs to decide, which count as closed
     """
 
     patches: tuple[Patch, ...]
@@ -55,7 +55,7 @@ class PatchDivision:
     bound: float
     bound_any_shape: float
     unreachable: tuple[tuple[Unreachable, ...], ...]
-    untold: int
+    undecided: int
 
     @property
     def above_bound(self) -> float:
@@ -107,13 +107,13 @@ def divided(
         best = assigned(times, changes, most)
         if best is None:
             return None
-        open_ = [_asked(c, [s for s in best.steps if s.side == k]) for k, c in enumerate(costs)]
+        open_ = [_open_times(c, [s for s in best.steps if s.side == k]) for k, c in enumerate(costs)]
         rounds += 1
         progress(1.0 - 1.0 / (1.0 + 0.05 * rounds), "patches")
         if not any(open_):
             break
-        for c, asked in zip(costs, open_, strict=True):
-            c.prove(asked, workers, keep)
+        for c, open_times in zip(costs, open_, strict=True):
+            c.prove(open_times, workers, keep)
     patches = _patches(costs, best.steps)
     runs = [(p.cutter, p.table) for p in patches]
     cutter_changes = sum(a[0] != b[0] for a, b in pairwise(runs))
@@ -129,7 +129,7 @@ def divided(
         bound=bound_of_strips(times, changes, most),
         bound_any_shape=bound_of_cells(times, changes, most),
         unreachable=tuple(c.side.answer.unreachable for c in costs),
-        untold=sum(c.untold for c in costs),
+        undecided=sum(c.undecided for c in costs),
     )
 
 
@@ -139,7 +139,7 @@ def _points(costs: Costs, step: Step) -> list[int]:
     return [int(i) for i in (row if step.cell < 0 else row[step.cell : step.cell + 1])]
 
 
-def _asked(costs: Costs, steps: Sequence[Step]) -> list[tuple[int, int, int]]:
+def _open_times(costs: Costs, steps: Sequence[Step]) -> list[tuple[int, int, int]]:
     return [
         (c, s.cutter, s.table) for s in steps for c in _points(costs, s) if not costs.known[c, s.cutter, s.table]
     ]  # fmt: skip
@@ -157,10 +157,10 @@ def _patches(costs: Sequence[Costs], steps: Sequence[Step]) -> tuple[Patch, ...]
             groups[-1].append(step)
         else:
             groups.append([step])
-    return begun(tuple(_patch(costs[g[0].side], g) for g in groups))
+    return with_begins(tuple(_patch(costs[g[0].side], g) for g in groups))
 
 
-def begun(patches: Sequence[Patch]) -> tuple[Patch, ...]:
+def with_begins(patches: Sequence[Patch]) -> tuple[Patch, ...]:
     """Patches whose lines begin at a border that they share with another patch of their surface.
 
     The first line lies as far inside its border as its pass reaches, the last one up to a step beyond: there it would

@@ -57,7 +57,7 @@ class PatchFinish:
     ----------
     scallop : greatest height h [mm]
     motion : what the lines are milled with
-    overrun : how far the lines go on beyond the patch at their ends [mm], where the surface does and the cutter reaches
+    overrun : length of the lines beyond the patch at their ends [mm], where the surface does and the cutter reaches
     aim : share of h that the step is laid out for; the rest is for what is not of second order
     """
 
@@ -139,10 +139,10 @@ def _stacked(before: Tracks, middle: Tracks, after: Tracks) -> Tracks:
     """Lines on either side of one, numbered from the first to the last; ``before`` goes away from it, from 1 on."""
     n = before.lines
     low = [replace(t, line=n - t.line) for t in reversed(before.tracks)]
-    gone = [replace(x, line=n - x.line) for x in before.missed]
+    shifted = [replace(x, line=n - x.line) for x in before.missed]
     high, own = ([replace(t, line=n + t.line) for t in x.tracks] for x in (after, middle))
     missed = [replace(x, line=n + x.line) for x in (*middle.missed, *after.missed)]
-    return Tracks((*low, *own, *high), (*gone, *missed), n + 1 + after.lines)
+    return Tracks((*low, *own, *high), (*shifted, *missed), n + 1 + after.lines)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +164,8 @@ class _March:
 
     def alone(self, line: Line) -> Tracks:
         """The tracks of the line number 0."""
-        new, gone = self.step.lines.tracks(line, np.ones(len(line.q), dtype=np.bool_), 0, self.step.need)
-        return Tracks(tuple(new), tuple(gone), 1)
+        new, missed = self.step.lines.tracks(line, np.ones(len(line.q), dtype=np.bool_), 0, self.step.need)
+        return Tracks(tuple(new), tuple(missed), 1)
 
     def after(self, line: Line, number: int) -> Tracks:
         """The lines after one, counted from ``number`` on."""
@@ -182,15 +182,15 @@ class _March:
             # where the pass of the line before has reached the border there is nothing left
             use = binary_dilation(open_)
             line = self.step.next(line, reach, high, use & need)
-            new, gone = self.step.lines.tracks(line, use, number + k, need)
+            new, refused = self.step.lines.tracks(line, use, number + k, need)
             tracks += new
-            missed += gone
+            missed += refused
         raise InputError(f"finish.scallop = {self.step.scallop:g} mm: more than {_LINES} lines: raise it")
 
 
 @dataclass(frozen=True, eq=False)
 class _Stepper:
-    """From line to line at the scallop asked, within ``aim`` of it, at the stations that ``need`` it."""
+    """From line to line at the scallop height, within ``aim`` of it, at the stations that ``need`` it."""
 
     lines: Lines
     scallop: float
@@ -223,27 +223,27 @@ class _Stepper:
         """(n,) stations at which the pass of a line stays below the scallop to the border; its :meth:`reach`."""
         ahead, _ = reach
         w = np.where(np.isfinite(ahead), _INSIDE * ahead, 0.0)
-        # beyond the patch lines go on as at its ends
+        # beyond the patch lines continue as at its ends
         inner = np.flatnonzero(self.need)
         near = inner[np.abs(inner - np.arange(len(w))[:, None]).argmin(axis=1)]
         out: Flags = (line.q + self._dq(line, w) >= border)[near]
         return out
 
     def next(self, line: Line, reach: tuple[Floats, Floats], border: float, use: Flags) -> Line:
-        """The next line, so that the scallop between is as high as asked, by the :meth:`reach` of this one.
+        """The next line, so that the scallop between has the required height, by the :meth:`reach` of this one.
 
         It may lie beyond the border, as the last one of a patch does, if all that is in ``use`` is reached there.
         """
         ahead, behind = reach
         w = self._step(line, self._even(line, ahead + behind), line.pallet)
         free = self._next(line, w, self.lines.ends[1])
-        lost = int((use & np.isnan(free.pallet)).sum())
+        blocked = int((use & np.isnan(free.pallet)).sum())
         # a line in one piece that loses nothing is not worse than any other
-        if not (free.q[use] > border).any() or (lost == 0 and len(free.sections) <= 1):
+        if not (free.q[use] > border).any() or (blocked == 0 and len(free.sections) <= 1):
             return free
         inside = self._next(line, w, border)
         less = int((use & np.isnan(inside.pallet)).sum())
-        return free if (lost, len(free.sections)) <= (less, len(inside.sections)) else inside
+        return free if (blocked, len(free.sections)) <= (less, len(inside.sections)) else inside
 
     def _next(self, line: Line, w: Floats, end: float) -> Line:
         """The next line, no farther than ``end``, by the step ``w`` for the pallet angles of this line.

@@ -81,7 +81,7 @@ def planned(
     """
     groups: dict[Pair, list[Milling]] = {}
     known = {} if known is None else known
-    tell_millings([(job, patches)], known, keep, part_of(progress, 0.0, 0.8))
+    announce_millings([(job, patches)], known, keep, part_of(progress, 0.0, 0.8))
     for done, patch in enumerate(patches):
         key = milling_key(job.catalogue, patch)
         if key not in known:
@@ -101,9 +101,9 @@ def planned(
         if turn == rounds:
             break
         open_yet = [
-            (face, region, lost)
-            for face, over, lost in zip(faces, left, hopeless, strict=True)
-            for region in regions(over, _AIM * h, lost)
+            (face, region, unreachable)
+            for face, over, unreachable in zip(faces, left, hopeless, strict=True)
+            for region in regions(over, _AIM * h, unreachable)
         ]
         part = part_of(progress, 0.8 + 0.2 * turn / rounds, 0.8 + 0.2 * (turn + 1) / rounds)
         new = _rest_passes(job, tuple(settings), open_yet, keep, part)
@@ -115,17 +115,17 @@ def planned(
             tool = [*settings].index(pair) + 1 if pair in settings else len(settings) + 1
             settings[pair] = job.setting(pair, *rows, tool, keep)
         progress(0.8 + 0.2 * (turn + 1) / rounds, f"rest passes, {turn + 1} times")
-    area, lost_area = {}, {}
-    for face, over, lost in zip(faces, left, hopeless, strict=True):
+    area, unreachable_area = {}, {}
+    for face, over, unreachable in zip(faces, left, hopeless, strict=True):
         cell = _cells(face)
         area[face.body, face.side] = float(cell[over > h].sum())
-        lost_area[face.body, face.side] = float(cell[(over > h) & lost].sum())
+        unreachable_area[face.body, face.side] = float(cell[(over > h) & unreachable].sum())
     order = setting_order(list(settings), changes)
     numbered = tuple(settings[pair].numbered(job.tools + k) for k, pair in enumerate(order, 1))
-    return PlannedSettings(settings_with_feeds(job, numbered), area, lost_area)
+    return PlannedSettings(settings_with_feeds(job, numbered), area, unreachable_area)
 
 
-def tell_millings(
+def announce_millings(
     plans: Sequence[tuple[FinishSettings, Sequence[Patch]]], known: Mapping[MillingKey, Milling], keep: Keep,
     progress: Progress = silent,
 ) -> None:  # fmt: skip
@@ -154,10 +154,10 @@ def _rest_passes(
         lambda done, _: progress(0.5 * done, "cutters of rest passes"),
     )
     chosen = []
-    for face, region, lost in open_yet:
+    for face, region, unreachable in open_yet:
         pair = plan.chosen(face, region)
         if pair is None:
-            lost |= region
+            unreachable |= region
         else:
             chosen.append((face, region, pair))
         progress(0.5, "cutters of rest passes")
@@ -239,9 +239,9 @@ def _left(face: SurfaceGrid, settings: Iterable[CutterSetting], memory: LeftMemo
     """Excess (a, b) float [mm] of all tracks that are in the moves, on the grid of a surface."""
     out = np.full((len(face.u), len(face.v)), np.inf)
     for s in settings:
-        gone, first = {k for k, _ in s.linked.refused}, 0
+        refused, first = {k for k, _ in s.linked.refused}, 0
         for tracks in (*(m.tracks.tracks for m in s.millings), *(r.tracks for r in s.rests)):
-            milled = tuple(t for k, t in enumerate(tracks, first) if k not in gone)
+            milled = tuple(t for k, t in enumerate(tracks, first) if k not in refused)
             first += len(tracks)
             key = (id(face), tuple(id(t) for t in milled))
             if key not in memory:

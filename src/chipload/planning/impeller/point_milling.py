@@ -50,7 +50,7 @@ _SMOOTH = 1.5
 _NEAR = 5
 #: lines at most, halvings of a row
 _LINES, _HALVINGS = 5000, 6
-#: how far a line goes on where the one before it covers the border [mm]; of a step, how far inside it that one may lie
+#: how far a line extends where the one before it covers the border [mm]; of a step, how far inside it that one may lie
 _BEYOND, _COVERS = 1.0, 0.05
 #: by how much a line may lie beside its rows [mm]
 _BEND = 0.01
@@ -235,7 +235,7 @@ class _Lines:
     def laid_out(self, low: Floats, high: Floats, need: Flags) -> tuple[tuple[_LinePiece, ...], ...]:
         """Pieces of lines between ``low`` and ``high`` (n,): from the middle on, from either border on.
 
-        ``need`` : stations (n,) at which the scallop counts; elsewhere lines go on as at the nearest of these.
+        ``need`` : stations (n,) at which the scallop counts; elsewhere lines continue as at the nearest of these.
 
         Raises
         ------
@@ -296,11 +296,11 @@ class _Lines:
         aim, most = _AIM * self.scallop, _MOST * self.scallop
         for turn in range(_ROUNDS + _MORE):
             new = np.minimum(self.after(line, w), high)
-            crest = np.where(use, self.scallops(np.where(on, line, np.nan), np.where(on, new, np.nan)), np.nan)
-            highest = float(np.nanmax(crest))
+            height = np.where(use, self.scallops(np.where(on, line, np.nan), np.where(on, new, np.nan)), np.nan)
+            highest = float(np.nanmax(height))
             free = new < high
-            ratio = np.clip(np.sqrt(aim / np.clip(crest, 0.1 * aim, None)), 0.6, 1.3)
-            # a line at the border says nothing of a wider step
+            ratio = np.clip(np.sqrt(aim / np.clip(height, 0.1 * aim, None)), 0.6, 1.3)
+            # a line at the border does not show a wider step
             wider = np.where(free, ratio, np.minimum(ratio, 1.0))
             then = self.even(w * wider, size, use)
             still = float(np.abs(then / w - 1.0)[use].max()) < _STILL
@@ -356,20 +356,20 @@ def _spread(lines: list[Floats], last: Floats) -> Floats:
 
 
 def _joined(job: _Lines, laid: tuple[_LinePiece, ...], chord: float) -> PointPath:
-    """All lines there and back, from one to the next on the surface, with as many rows as the chord asks for."""
+    """All lines there and back, from one to the next on the surface, with as many rows as the chord requires."""
     p: list[Floats] = []
     q: list[Floats] = []
     number: list[NDArray[np.int64]] = []
     for k, forth in _order(job, laid):
         piece = laid[k]
-        way = slice(None) if forth else slice(None, None, -1)
+        order = slice(None) if forth else slice(None, None, -1)
         if p:
             share = np.linspace(0.0, 1.0, 6)[1:-1]
-            p.append(p[-1][-1] + share * (piece.p[way][0] - p[-1][-1]))
-            q.append(q[-1][-1] + share * (piece.q[way][0] - q[-1][-1]))
+            p.append(p[-1][-1] + share * (piece.p[order][0] - p[-1][-1]))
+            q.append(q[-1][-1] + share * (piece.q[order][0] - q[-1][-1]))
             number.append(np.full(len(share), -1))
-        p.append(piece.p[way])
-        q.append(piece.q[way])
+        p.append(piece.p[order])
+        q.append(piece.q[order])
         number.append(np.full(len(piece.p), piece.line))
     P, Q, of = np.concatenate(p), np.concatenate(q), np.concatenate(number)
     keep = _needed(P, Q, of, np.abs(job.across_at(P, Q)))
@@ -395,7 +395,7 @@ def _joined(job: _Lines, laid: tuple[_LinePiece, ...], chord: float) -> PointPat
 def _needed(P: Floats, Q: Floats, of: NDArray[np.int64], size: Floats) -> Flags:
     """Which rows (n,) of lines are needed: every fourth, and more where a line bends between them.
 
-    ``size`` (n,) [mm] across the line for a growth of q by 1. Rows are added again where the chord asks for them.
+    ``size`` (n,) [mm] across the line for a growth of q by 1. Rows are added again where the chord requires them.
     """
     ends = np.ones(len(P), dtype=np.bool_)
     ends[1:-1] = (of[1:-1] != of[2:]) | (of[1:-1] != of[:-2])
@@ -403,8 +403,8 @@ def _needed(P: Floats, Q: Floats, of: NDArray[np.int64], size: Floats) -> Flags:
     keep: Flags = ends | (at % 4 == 0)
     for every in (2, 1):
         kept = np.flatnonzero(keep)
-        way = np.searchsorted(kept, at, side="right") - 1
-        first, last = kept[way], kept[np.minimum(way + 1, len(kept) - 1)]
+        interval = np.searchsorted(kept, at, side="right") - 1
+        first, last = kept[interval], kept[np.minimum(interval + 1, len(kept) - 1)]
         share = (P - P[first]) / np.where(P[last] != P[first], P[last] - P[first], 1.0)
         off = np.abs(Q - Q[first] - share * (Q[last] - Q[first])) * size
         bent = np.zeros(len(P), dtype=np.bool_)

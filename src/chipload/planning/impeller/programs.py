@@ -59,6 +59,6 @@ def too_fast(program: Program, machine: Machine) -> tuple[Finding, ...]:
     if not len(speed) or speed.max() <= most * (1.0 + 1e-9):
         return ()
     k = int(speed.argmax())
-    asked, given = math.degrees(speed[k]), math.degrees(most)
-    text = f"row {k}: the pallet turns at {asked:g} deg/s: machine {machine.name} reaches {given:g}"
+    needed, greatest = math.degrees(speed[k]), math.degrees(most)
+    text = f"row {k}: the pallet turns at {needed:g} deg/s: machine {machine.name} reaches {greatest:g}"
     return (Finding("machine-rate", 0, text),)

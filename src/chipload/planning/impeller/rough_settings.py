@@ -71,13 +71,13 @@ class RoughingSetting:
 
     def without(self, numbers: Sequence[int]) -> RoughingSetting:
         """The setting without some of its rows, with new links."""
-        gone = set(numbers)
-        keep = tuple(t for k, t in enumerate(self.tracks.tracks) if k not in gone)
-        out = tuple(t for k, t in enumerate(self.tracks.tracks) if k in gone)
+        removed = set(numbers)
+        keep = tuple(t for k, t in enumerate(self.tracks.tracks) if k not in removed)
+        out = tuple(t for k, t in enumerate(self.tracks.tracks) if k in removed)
         tracks = replace(self.tracks, tracks=keep)
-        way = _linked(keep, self.walls, self.cutter, self.table, self.how, self.link, self.top)
-        program = program_of(way.moves, self.spindle, self.tool)
-        return replace(self, tracks=tracks, linked=way, program=program, stopped=(*self.stopped, *out))
+        linked = _linked(keep, self.walls, self.cutter, self.table, self.how, self.link, self.top)
+        program = program_of(linked.moves, self.spindle, self.tool)
+        return replace(self, tracks=tracks, linked=linked, program=program, stopped=(*self.stopped, *out))
 
     def numbered(self, tool: int) -> RoughingSetting:
         """The setting with another tool number."""
@@ -86,8 +86,8 @@ class RoughingSetting:
     @property
     def machined(self) -> tuple[ToolTrack, ...]:
         """The rows that are in the moves."""
-        gone = {k for k, _ in self.linked.refused}
-        return tuple(t for k, t in enumerate(self.tracks.tracks) if k not in gone)
+        refused = {k for k, _ in self.linked.refused}
+        return tuple(t for k, t in enumerate(self.tracks.tracks) if k not in refused)
 
 
 def roughed(
@@ -102,14 +102,14 @@ def roughed(
     ----------
     stated : the cutter; None: the largest of the catalogue that goes at the ``share`` of the points of the channels
     spindle : [rad/s]
-    ahead : how far the hub goes on ahead of the blade's leading edge [mm]
+    ahead : length of the hub ahead of the blade's leading edge [mm]
 
     Raises
     ------
     InputError
         No cutter goes at the share of the points.
     """
-    scenes = [_looked_at(impeller, k, how, ahead) for k in range(len(impeller.bodies))]
+    scenes = [_channel_scene(impeller, k, how, ahead) for k in range(len(impeller.bodies))]
     cutter = stated
     if cutter is None:
         cutter = keep(("rough cutter",), lambda: _largest(scenes, catalogue, how, table, share, workers))
@@ -143,14 +143,16 @@ def roughed(
             ),
         )  # fmt: skip
         walls, top = thickened(impeller, index, how, ahead), uncut(impeller, index, how, ahead, whole=True)
-        way = keep(
+        linked = keep(
             ("rough links", index, cutter, alpha, before),
             partial(_linked, tracks.tracks, walls, cutter, alpha, how, link, top),
         )
         count = len(layers(impeller, how.depth, how.hub, ahead))
-        program, tool = program_of(way.moves, spindle, len(out) + 1), len(out) + 1
+        program, tool = program_of(linked.moves, spindle, len(out) + 1), len(out) + 1
         out.append(
-            RoughingSetting(index, cutter, alpha, count, tracks, way, program, (), walls, top, how, link, spindle, tool)
+            RoughingSetting(
+                index, cutter, alpha, count, tracks, linked, program, (), walls, top, how, link, spindle, tool
+            )
         )
     return tuple(out)
 
@@ -175,8 +177,8 @@ def _part(progress: Progress, k: int, n: int) -> Progress:
     return lambda done, what: progress((k + done) / n, what)
 
 
-def _looked_at(impeller: Impeller, index: int, how: RoughingSettings, ahead: float) -> Scene:
-    """Points of some layers of a channel, beside its thickened walls."""
+def _channel_scene(impeller: Impeller, index: int, how: RoughingSettings, ahead: float) -> Scene:
+    """Points of some layers of a channel, with its thickened walls."""
     w = layers(impeller, how.depth, how.hub, ahead)
     some = w[np.unique(np.linspace(0, len(w) - 1, min(len(w), _LAYERS)).round().astype(int))]
     parts: list[tuple[Floats, Floats, Floats]] = []
@@ -215,10 +217,10 @@ def _reached_at(
     scene: Scene, cutter: CatalogueCutter, how: RoughingSettings, table: IndexTable, workers: int
 ) -> NDArray[np.bool_]:
     """(t, c) at which points of a channel a cutter goes at each table angle."""
-    return np.array([_goes(scene, cutter, float(alpha), how, table, workers) for alpha in table.angle])
+    return np.array([_fits_at(scene, cutter, float(alpha), how, table, workers) for alpha in table.angle])
 
 
-def _goes(
+def _fits_at(
     scene: Scene, cutter: CatalogueCutter, alpha: float, how: RoughingSettings, table: IndexTable, workers: int
 ) -> NDArray[np.bool_]:
     got = valid_ranges(scene, cutter, alpha, how.motion.clearance, table.spans, workers=workers)

@@ -117,9 +117,9 @@ def roughing(
             use = np.ones(len(p), dtype=np.bool_)
             if done is not None:
                 use = done.query(line.S)[0] > 0.5 * how.step
-            new, gone = lines.tracks(line, use, number)
+            new, refused = lines.tracks(line, use, number)
             tracks += [t.back() for t in new[::-1]]
-            missed += gone
+            missed += refused
             number += 1
             progress((k + (j + 1) / (count + 1)) / len(shares), f"layer {k + 1} of {len(shares)}")
     return Tracks(tuple(tracks), tuple(missed), number)

@@ -118,7 +118,7 @@ class Scene:
     def walls(self) -> CheckPoints:
         """The check points with their tree."""
         if self.shared is None:
-            raise InputError("scene: its check points are not known: make it anew")
+            raise InputError("scene: its check points are not known: create it again")
         return self.shared
 
     @property

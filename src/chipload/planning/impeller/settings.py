@@ -82,7 +82,7 @@ class CutterSetting:
     rests : rest passes where other passes leave too much, after the patches
     linked : all moves; tracks that cannot be come to
     program : in the frame of the impeller, of one channel
-    loads : of its passes; None: forces are not asked for
+    loads : of its passes; None: the job has no `forces`
     """
 
     cutter: CatalogueCutter
@@ -101,8 +101,8 @@ class CutterSetting:
     @property
     def machined(self) -> tuple[ToolTrack, ...]:
         """The tracks that are in the moves."""
-        gone = {k for k, _ in self.linked.refused}
-        return tuple(t for k, t in enumerate(self.tracks) if k not in gone)
+        refused = {k for k, _ in self.linked.refused}
+        return tuple(t for k, t in enumerate(self.tracks) if k not in refused)
 
     @property
     def length(self) -> float:
@@ -130,7 +130,7 @@ class FinishSettings:
     ----------
     scene : of :func:`channel_scene`
     spindle : [rad/s]
-    ahead : how far the hub goes on ahead of the blade's leading edge [mm]
+    ahead : length of the hub ahead of the blade's leading edge [mm]
     tools : tool numbers that are taken
     forces : what feeds are found with; None: every pass has the feed of ``how``
     """

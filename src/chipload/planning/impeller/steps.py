@@ -31,8 +31,8 @@ def even_steps(w: Floats, size: Floats, over: float = 1.0) -> Floats:
     known = np.flatnonzero(np.isfinite(w))
     near = known[np.abs(known[None] - np.arange(len(w))[:, None]).argmin(axis=1)]
     far = np.concatenate([[0.0], np.cumsum(_GROWTH * size)])
-    held = (w[near][None] + np.abs(far[:, None] - far[None])).min(axis=1)
-    out: Floats = np.minimum(gaussian_filter1d(held, over, mode="nearest"), held)
+    limited = (w[near][None] + np.abs(far[:, None] - far[None])).min(axis=1)
+    out: Floats = np.minimum(gaussian_filter1d(limited, over, mode="nearest"), limited)
     return out
 
 
@@ -45,8 +45,8 @@ def straightened(q: Floats, before: Floats, across: Floats, size: Floats, over: 
     ahead = np.maximum(np.abs(across), 1e-12)
     far = np.concatenate([[0.0], np.cumsum(_SKEW * size / np.minimum(ahead[1:], ahead[:-1]))])
     soft = np.minimum(gaussian_filter1d(q, over, mode="nearest"), q)
-    held = (soft[None] + np.abs(far[:, None] - far[None])).min(axis=1)
-    out: Floats = np.maximum(held, before + _HELD * (q - before))
+    limited = (soft[None] + np.abs(far[:, None] - far[None])).min(axis=1)
+    out: Floats = np.maximum(limited, before + _HELD * (q - before))
     return out
 
 

@@ -34,7 +34,7 @@ class ContactSampling:
     spacing : greatest distance of check points along their surfaces [mm]
     near : as :class:`Scene` [mm]
     around : as :meth:`Impeller.scene`
-    ahead : how far the hub goes on ahead of the blade's leading edge [mm]
+    ahead : length of the hub ahead of the blade's leading edge [mm]
     """
 
     along: tuple[float, float]

@@ -55,9 +55,9 @@ class IndexTable:
         InputError
             One is no position of the table.
         """
-        asked = np.atleast_1d(np.asarray(angles, dtype=np.float64))
+        requested = np.atleast_1d(np.asarray(angles, dtype=np.float64))
         rows = []
-        for a in asked:
+        for a in requested:
             k = int(np.abs(self.angle - a).argmin())
             if abs(self.angle[k] - a) > _STATED:
                 near = ", ".join(f"{math.degrees(x):g}" for x in self.angle[max(k - 1, 0) : k + 2])

@@ -18,9 +18,9 @@ LEAST, GREATEST = 0.35, 2000.0
 SWEEP, BEND = 2.6, 0.16
 #: vertices in one segment at most
 MOST = 256
-#: greatest turn between two places that are looked at [rad]; so near to the limit [rad] the greatest is looked for
+#: greatest turn between two examined places [rad]; so near to the limit [rad] the greatest is searched
 TURN, NEAR = 0.03, 0.02
-#: where E changes by so much [rad] between two places, a narrow strip of stock may stand there: looked at more closely
+#: where E changes by so much [rad] between two places, a narrow strip of stock may stand there: examined more closely
 JUMP = 0.05
 #: distance / R of the places at which a segment is held against the centre region
 EVERY = 0.01
@@ -139,7 +139,7 @@ def segment_length(seg):
 
 @njit(cache=True, nogil=True)
 def in_region(seg, R, slack, grid, flag, edges, rows, row_edges):
-    """Whether a segment stays in the centre region, within ``slack`` to either side, asked every 0.01 R.
+    """Whether a segment stays in the centre region, within ``slack`` to either side, checked every 0.01 R.
 
     Between two places a wall as tight as R and an arc as tight as 0.35 R come nearer by at most 5e-5 R.
     """

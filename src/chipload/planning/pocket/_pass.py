@@ -24,7 +24,7 @@ from chipload.stock._kernels import uncut
 RUNNING, LOST, BLOCKED = 0, 1, 2
 #: steps are written at the latest when they are so long / R, or turn by so much [rad]
 HELD, TURNED = 2.5, 1.0
-#: a turn that differs so much [rad] from that of the last step is looked at more closely
+#: a turn that differs so much [rad] from that of the last step is examined more closely
 CHANGE = 0.012
 #: capsules that there must be room for before a step: those of all steps that are not written
 ROOM = 400

@@ -13,7 +13,7 @@ from chipload.stock.planar import TOUCH
 
 #: curvature x R above which the cutter meets what the same arc has just cut
 TIGHT = 0.9
-#: length / R behind the cutter whose cut is not taken out before its rim is looked at
+#: length / R behind the cutter whose cut is not removed before its rim is examined
 BEHIND = 1e-4
 #: engaged arcs that are kept
 KEPT = 4

@@ -178,7 +178,7 @@ def require_clearing(
 
 
 class _Run:
-    """The state of one clearing: stock, path so far, places to go on from."""
+    """The state of one clearing: stock, path so far, places from which to continue."""
 
     def __init__(
         self, centres: Region, radius: float, limit: float, step: float, free: Sequence[Region], progress: Progress,
@@ -234,7 +234,7 @@ class _Run:
         self.add(line, ENTRY, math.pi)
         self.stock.remove_segments(np.column_stack([ends[:1], ends[1:], np.zeros((1, 3))]))
         long = float(np.hypot(*(ends[1] - ends[0])))
-        self.events.append(Event("pocket-entry", x, y, f"ramp of {long:.4g} mm to and fro: a full slot by its nature"))
+        self.events.append(Event("pocket-entry", x, y, f"ramp of {long:.4g} mm to and fro: cuts a full slot"))
         n = max(2, math.ceil(long / self.step))
         for p, q in (ends, line):
             points = p + np.linspace(0.0, 1.0, n + 1)[:, None] * (q - p)
@@ -252,7 +252,7 @@ class _Run:
         self.add(half, ENTRY, math.pi, circle)
         self.stock.remove_segments(np.column_stack([half[::-1], half, circle]))
         self.events.append(
-            Event("pocket-entry", x, y, f"helical bore of diameter {2.0 * (R + rh):.4g} mm: a full slot by its nature")
+            Event("pocket-entry", x, y, f"helical bore of diameter {2.0 * (R + rh):.4g} mm: cuts a full slot")
         )
         self.starts.add(np.column_stack([x + rh * np.cos(a), y + rh * np.sin(a)]), a + 0.5 * math.pi)
 
@@ -310,10 +310,10 @@ class _Run:
             return
         loops = Trochoid(self.stock, region, R, allowance, (self.limit, self.most_engaged))
         for k, line in enumerate(lines.branches(start)):
-            way = line if k or bore is None else np.vstack([bore[:2], line])
-            begins = rho if k == 0 else min(trochoid.WIDEST * R, 0.9 * loops.room(way[0]))
+            path_line = line if k or bore is None else np.vstack([bore[:2], line])
+            begins = rho if k == 0 else min(trochoid.WIDEST * R, 0.9 * loops.room(path_line[0]))
             places = []
-            for arcs, engaged in loops.circles(way, begins):
+            for arcs, engaged in loops.circles(path_line, begins):
                 first = arcs[0, 0:2]
                 clear = bool(self.rows) and self._linked(first)
                 self.add(first[None, :], LINK if clear else LIFT)

@@ -95,7 +95,7 @@ def near_partly_cleared(
 
 
 class PocketRemainder:
-    """Remaining material of a region, reduced as a path goes on; each part of the path is removed once."""
+    """Remaining material of a region, reduced as a path continues; each part of the path is removed once."""
 
     def __init__(self, reachable: Region, radius: float, free: Sequence[Region] = ()) -> None:
         self.radius = radius
@@ -117,7 +117,7 @@ class PocketRemainder:
             self.take(*near_partly_cleared(stock, points, breaks))
 
     def parts(self) -> tuple[float, tuple[Contour, ...], list[tuple[float, tuple[float, float]]]]:
-        """Area [mm^2] left, contours of the pieces that are no mere film, and (area, place) of each, greatest first."""
+        """Area [mm^2] left, contours of the pieces other than films, and (area, place) of each, greatest first."""
         solid = [g for g in shapely.get_parts(self.rest) if g.area > 0.0]
         kept = [g for g in solid if not shapely.is_empty(shapely.buffer(g, -0.5 * NARROW * self.radius))]
         kept.sort(key=lambda g: -g.area)

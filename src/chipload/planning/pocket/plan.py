@@ -37,7 +37,7 @@ from chipload.planning.pocket.motions import (
     speeds,
 )
 from chipload.planning.pocket.reach import CHORD
-from chipload.planning.pocket.request import Asked, Clearing, laid_out, material_before
+from chipload.planning.pocket.request import Clearing, ClearingTask, laid_out, material_before
 from chipload.planning.pocket.stages import FLOOR, TROCHOIDAL, PocketStage, require_finish, sections_of, stages_of
 from chipload.planning.pocket.totals import summary_of
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
@@ -72,7 +72,7 @@ def plan_pocket(
     InputError
         A contour is open, the cutter fits nowhere, s is 2 R or more.
     """
-    asked = laid_out(contours, setting, cutter.radius)
+    task = laid_out(contours, setting, cutter.radius)
     require_finish(setting)
     results = {}
     for k, name in enumerate(setting.strategies):
@@ -80,14 +80,14 @@ def plan_pocket(
         def part(done: float, what: str, start: int = k) -> None:
             progress((start + done) / len(setting.strategies), what)
 
-        results[name] = _strategy(name, asked, setting, cutter, material, machine, limits, part)
+        results[name] = _strategy(name, task, setting, cutter, material, machine, limits, part)
     progress(1.0, "pocket")
     return OperationResult("pocket", setting.use, results)
 
 
 def _strategy(
     name: str,
-    asked: Asked,
+    task: ClearingTask,
     setting: Clearing,
     cutter: Cutter,
     material: Material,
@@ -97,11 +97,11 @@ def _strategy(
 ) -> StrategyResult:
     """One strategy with its program and its totals."""
     radius = cutter.radius
-    sections = sections_of(asked, setting)
+    sections = sections_of(task, setting)
     stages = stages_of(sections, setting, radius, name, lambda done, what: progress(0.9 * done, what))
     history, program, whole, motions = _history(stages, setting, cutter, material, machine)
     on_front = np.isin(history["pass"], [stage.name for stage in stages])
-    reaches = [_reach(section.asked, setting, radius) for section in sections]
+    reaches = [_reach(section.task, setting, radius) for section in sections]
     areas, most = [_in_stock(reach, setting) for reach in reaches], limits.get("engagement_deg", 0.0)
     return StrategyResult(
         name,
@@ -114,19 +114,19 @@ def _strategy(
         ),
         np.append(on_front, False),
         {
-            "wall": _walls(reaches[0], setting, asked),
-            "wall below": tuple(c for reach in reaches[1:] for c in _walls(reach, setting, sections[1].asked)),
-            "part": asked.region.contours,
+            "wall": _walls(reaches[0], setting, task),
+            "wall below": tuple(c for reach in reaches[1:] for c in _walls(reach, setting, sections[1].task)),
+            "part": task.region.contours,
             "leftover": stages[-1].path.leftover,
             "front path": tuple(chain for one in motions for chain in _chains(one)),
-            "stock before": material_before(asked, setting, radius),
+            "stock before": material_before(task, setting, radius),
         },
     )
 
 
-def _reach(asked: Asked, setting: Clearing, radius: float) -> Region:
+def _reach(task: ClearingTask, setting: Clearing, radius: float) -> Region:
     """What the cutter can reach of a region, with the allowance that stays on its walls."""
-    return offset_region(offset_region(asked.region, radius + setting.left_on_walls), -radius)
+    return offset_region(offset_region(task.region, radius + setting.left_on_walls), -radius)
 
 
 def _planned(stages: Sequence[PocketStage]) -> list[PocketStage]:
@@ -148,7 +148,7 @@ def _history(
     ends = row_ends(program, machine)
     rows, first, travelled = [], 0, 0.0
     for stage, levels, programs in zip(stages, each, parts, strict=True):
-        samples = samples_of(levels[0], stage.asked.step)
+        samples = samples_of(levels[0], stage.task.step)
         columns, own = _columns(stage, levels[0], samples, setting, cutter, material, machine)
         for m, runs in zip(levels, programs, strict=True):
             count = sum(len(p) for p in runs)
@@ -175,13 +175,13 @@ def _columns(
     machine: Machine,
 ) -> tuple[Columns, Floats]:
     """Columns of one level of a stage, and the time within its runs [s]."""
-    radius, asked = cutter.radius, stage.asked
-    met, most = replayed(motions, samples, radius, asked.free, stage.before)
+    radius, task = cutter.radius, stage.task
+    met, most = replayed(motions, samples, radius, task.free, stage.before)
     length, speed, own = speeds(motions, samples, machine)
     kind = motions.kind[samples.motion]
     zone = np.array([{**ZONES, CUT: stage.name}[int(k)] for k in kind], dtype=object)
     zone[:-1][(kind[:-1] == LIFT) & (kind[1:] == ENTRY)] = "entry"
-    off = distance(asked.region.segments, samples.centre) - radius - stage.allowance
+    off = distance(task.region.segments, samples.centre) - radius - stage.allowance
     makes_wall = (np.abs(off) <= 2.0 * CHORD * radius) & (kind == CUT) & stage.makes_wall
     place = (zone, length, own, samples.centre, samples.heading, 0.0, met, speed, makes_wall)
     cut = CutConditions(cutter, material, stage.depth, stage.spindle_speed, setting.milling, *setting.rigid)
@@ -192,20 +192,20 @@ def _columns(
     return columns, own
 
 
-def _walls(reach: Region, setting: Clearing, asked: Asked) -> tuple[Contour, ...]:
+def _walls(reach: Region, setting: Clearing, task: ClearingTask) -> tuple[Contour, ...]:
     """The contours, or parts of them, that the cutter makes a wall of: inside the stock, and not where the edge of free
     space was made before.
     """
-    if not asked.free:
+    if not task.free:
         return reach.contours
     stock = Region.of(Region(setting.stock).contours) if setting.stock else None
-    edges = np.vstack([region.segments for region in asked.free])
+    edges = np.vstack([region.segments for region in task.free])
     out: list[Contour] = []
     for contour in reach.contours:
         s = np.linspace(0.0, contour.length, max(16, math.ceil(contour.length / WALL_STEP_MM)) + 1)
         points = contour.at(s)[0]
         made = distance(edges, points) > EDGE_MM
-        for region in asked.free:
+        for region in task.free:
             made &= ~region.contains(points)
         if stock is not None:
             made &= stock.contains(points)
@@ -234,13 +234,13 @@ def check_pocket(contours: Sequence[Contour], setting: Clearing, cutter: Cutter)
     InputError
         As :func:`plan_pocket`.
     """
-    asked = laid_out(contours, setting, cutter.radius)
+    task = laid_out(contours, setting, cutter.radius)
     require_finish(setting)
-    for section in sections_of(asked, setting):
+    for section in sections_of(task, setting):
         require_clearing(
-            section.asked.region, cutter.radius, asked.engagement, setting.milling, asked.step, setting.allowance
+            section.task.region, cutter.radius, task.engagement, setting.milling, task.step, setting.allowance
         )
-    return asked.region.area
+    return task.region.area
 
 
 def _chains(motions: Motions) -> tuple[Contour, ...]:
@@ -268,11 +268,11 @@ def misses(
     An engagement within the limit that the job states is no failure.
     """
     out = []
-    wanted = stages[0].asked.engagement
+    wanted = stages[0].task.engagement
     most = np.where(on_front, history["engagement_max_deg"], 0.0)
     k = int(np.argmax(most))
     if most[k] > math.degrees(wanted) + ABOVE_DEG:
-        text = f"engagement {most[k]:.4f} deg, wanted at most {math.degrees(wanted):.4f} deg"
+        text = f"engagement {most[k]:.4f} deg: must be at most {math.degrees(wanted):.4f} deg"
         at = float(history["x_mm"][k]), float(history["y_mm"][k])
         out.append(Event("pocket-engagement", *at, text, failure=bool(most[k] > limit_deg)))
     for stage in _planned(stages):

@@ -78,7 +78,7 @@ class Clearing:
     around : the contours are those of a part that stands in the stock, which is cleared around it
     holes : (x, y, diameter) of pre-drilled holes as deep as the pocket
     larger : what cleared the contours before; None: nothing did
-    standing : closed contours of the material as it stands over the whole depth; None: as the other keys say
+    standing : closed contours of the material as it stands over the whole depth; None: from the other keys
     floor_allowance : left on the floor by the levels that clear
     floor_finish, wall_finish : passes that take the allowances; None: they stay
     tabs : what stays over the floor; None: nothing
@@ -142,8 +142,8 @@ class Clearing:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
-    """A request laid out in the plane.
+class ClearingTask:
+    """Region, free space and engagement of a pocket in the plane.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class Asked:
     step: float
 
 
-def laid_out(contours: Sequence[Contour], setting: Clearing, radius: float) -> Asked:
+def laid_out(contours: Sequence[Contour], setting: Clearing, radius: float) -> ClearingTask:
     """Region, free space, constant engagement and step of a request.
 
     Raises
@@ -180,8 +180,8 @@ def laid_out(contours: Sequence[Contour], setting: Clearing, radius: float) -> A
         stock = Region.of(Region(setting.stock).contours)
         free.append(outside_of(stock, radius))
         if setting.around:
-            beside = offset_region(stock, -(radius + setting.allowance + AROUND * radius))
-            region = Region.of([*beside.contours, *drawn.contours])
+            outside = offset_region(stock, -(radius + setting.allowance + AROUND * radius))
+            region = Region.of([*outside.contours, *drawn.contours])
     elif setting.around:
         raise InputError("operation.side = 'outside': needs part.stock_layers: state the layers of the stock's outline")
     free += [hole(x, y, diameter, radius) for x, y, diameter in setting.holes]
@@ -193,17 +193,17 @@ def laid_out(contours: Sequence[Contour], setting: Clearing, radius: float) -> A
     if setting.standing is not None:
         free += [r for r in [without_stock(drawn, setting.standing, radius, setting.left_on_walls)] if r.contours]
     wanted = math.acos(1.0 - setting.radial_depth / radius)
-    return Asked(region, tuple(free), wanted, min(max(setting.step, STEP * radius), 0.25 * radius))
+    return ClearingTask(region, tuple(free), wanted, min(max(setting.step, STEP * radius), 0.25 * radius))
 
 
-def material_before(asked: Asked, setting: Clearing, radius: float) -> tuple[Contour, ...]:
+def material_before(task: ClearingTask, setting: Clearing, radius: float) -> tuple[Contour, ...]:
     """The contours of the material that the first motion meets; none where it is everywhere."""
-    if not asked.free:
+    if not task.free:
         return ()
-    inner = asked.free[1:] if setting.stock else asked.free
+    inner = task.free[1:] if setting.stock else task.free
     outer: Sequence[Contour] = setting.stock
     if not outer:
-        xmin, ymin, xmax, ymax = asked.region.bounds
+        xmin, ymin, xmax, ymax = task.region.bounds
         m = 8.0 * radius
         box = [(xmin - m, ymin - m), (xmax + m, ymin - m), (xmax + m, ymax + m), (xmin - m, ymax + m)]
         outer = (Contour.polyline(box, closed=True),)

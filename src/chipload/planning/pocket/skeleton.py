@@ -36,7 +36,7 @@ class Skeleton:
         """Polylines (k, 2) that run along all edges which can be reached from a place, each once, the widest first.
 
         A polyline begins at a place of one before it (the first at ``start``) and ends at a place of one before it or
-        where no edge goes on.
+        where no edge continues.
         """
         near: dict[int, list[int]] = {}
         for a, b in self.edges.tolist():

@@ -17,7 +17,7 @@ from chipload.planning.pocket.clearing import clear_region
 from chipload.planning.pocket.clearing_path import ClearingPath, EarlierPath
 from chipload.planning.pocket.motions import Heights
 from chipload.planning.pocket.reach import centre_region
-from chipload.planning.pocket.request import Asked, Clearing
+from chipload.planning.pocket.request import Clearing, ClearingTask
 from chipload.planning.pocket.tabs import without_tabs
 from chipload.progress import Progress
 
@@ -37,7 +37,7 @@ class PocketSection:
 
     top: float
     floor: float
-    asked: Asked
+    task: ClearingTask
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class PocketStage:
     ----------
     name : `pocket`, `floor` or `wall`
     section : number of its section, from 0
-    asked : region, free space and engagement
+    task : region, free space and engagement
     path : of the centre
     heights : of each level, from above
     feed, spindle_speed : [mm/s], [rad/s]
@@ -59,7 +59,7 @@ class PocketStage:
 
     name: str
     section: int
-    asked: Asked
+    task: ClearingTask
     path: ClearingPath
     heights: tuple[Heights, ...]
     feed: float
@@ -116,15 +116,15 @@ def require_finish(setting: Clearing) -> None:
         )
 
 
-def sections_of(asked: Asked, setting: Clearing) -> list[PocketSection]:
+def sections_of(task: ClearingTask, setting: Clearing) -> list[PocketSection]:
     """The whole depth, or what lies above the tops of the tabs and what lies below."""
     if setting.tabs is None:
-        return [PocketSection(setting.top, setting.bottom, asked)]
+        return [PocketSection(setting.top, setting.bottom, task)]
     height = setting.bottom + setting.tabs.height
-    region = without_tabs(asked.region, setting.tabs)
+    region = without_tabs(task.region, setting.tabs)
     return [
-        PocketSection(setting.top, height, asked),
-        PocketSection(height, setting.bottom, replace(asked, region=region)),
+        PocketSection(setting.top, height, task),
+        PocketSection(height, setting.bottom, replace(task, region=region)),
     ]
 
 
@@ -146,17 +146,17 @@ def _stages(
     number: int, section: PocketSection, setting: Clearing, radius: float, strategy: str, progress: Progress
 ) -> list[PocketStage]:
     """The stages of one section."""
-    asked = section.asked
+    task = section.task
 
     def path_of(allowance: float, earlier: EarlierPath | None, share: tuple[float, float]) -> ClearingPath:
         return clear_region(
-            asked.region,
+            task.region,
             radius,
-            asked.engagement,
+            task.engagement,
             milling=setting.milling,
-            step=asked.step,
+            step=task.step,
             allowance=allowance,
-            free=asked.free,
+            free=task.free,
             earlier=earlier,
             trochoidal=strategy == TROCHOIDAL and earlier is None,
             entry=setting.entry,
@@ -169,7 +169,7 @@ def _stages(
     clearing = PocketStage(
         CLEARING,
         number,
-        asked,
+        task,
         path,
         tuple(setting.levels_between(section.top, section.floor + left, setting.axial_depth)),
         setting.feed,
@@ -187,12 +187,12 @@ def _stages(
     if wall is not None:
         floor = out[-1].heights[-1].floor
         axial_depth = section.top - floor if wall.axial_depth is None else wall.axial_depth
-        earlier = EarlierPath.of(path, centre_region(asked.region, radius + setting.allowance))
+        earlier = EarlierPath.of(path, centre_region(task.region, radius + setting.allowance))
         out.append(
             PocketStage(
                 WALL,
                 number,
-                asked,
+                task,
                 path_of(wall.allowance, earlier, (0.7, 0.3)),
                 tuple(setting.levels_between(section.top, floor, axial_depth)),
                 wall.feed,

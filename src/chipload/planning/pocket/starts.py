@@ -92,16 +92,16 @@ class Starts:
     def search(self, stock: PlanarStock, reach: Reach, depth: float) -> None:
         """Find the open places: material within ``depth`` x R beside them that the cutter may go to.
 
-        Only those near the last pass are asked again: elsewhere the stock is as it was.
+        Only those near the last pass are searched again: elsewhere the stock is as it was.
         """
-        asked = np.flatnonzero(self.fresh)
-        out = np.zeros(len(asked), dtype=bool)
+        searched = np.flatnonzero(self.fresh)
+        out = np.zeros(len(searched), dtype=bool)
         _kernels.open_sides(
-            self.p, self.normal, self.live[asked], depth * self.radius, LEAST, self.radius, TOUCH,
+            self.p, self.normal, self.live[searched], depth * self.radius, LEAST, self.radius, TOUCH,
             stock.grid, stock.head, stock.link, stock.axis, stock.rim, *reach.arguments(), out,
         )  # fmt: skip
         kept = ~self.fresh
-        kept[asked] = out
+        kept[searched] = out
         self.live = self.live[kept]
         self.fresh = np.zeros(len(self.live), dtype=bool)
 

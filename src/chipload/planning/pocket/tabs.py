@@ -63,7 +63,7 @@ def _strip(region: Region, whole: shapely.Geometry, place: tuple[float, float], 
     if far > width:
         raise InputError(
             f"operation.tabs.at_mm: ({place[0]:g}, {place[1]:g}) is {far:.4g} mm from the nearest wall: must be within "
-            f"width_mm = {width:g}: state a place on the wall of what is held"
+            f"width_mm = {width:g}: state a place on the wall of the piece that is held"
         )
     xmin, ymin, xmax, ymax = region.bounds
     ray = shapely.linestrings([p + SPACING_MM * across, p + math.hypot(xmax - xmin, ymax - ymin) * across])

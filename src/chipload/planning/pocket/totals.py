@@ -35,7 +35,7 @@ def summary_of(stages: Sequence[PocketStage], history: Columns, motions: int, wh
         "engagement_deg": {
             **_span(history["engagement_max_deg"][on_front]),
             "p95": float(np.percentile(history["engagement_max_deg"][on_front], 95.0)),
-            "wanted": math.degrees(stages[0].asked.engagement),
+            "wanted": math.degrees(stages[0].task.engagement),
         },
         "force_xy_n": _span(history["force_xy_n"][on_front]),
         "torque_nm": {"min": 0.0, "max": float(history["torque_nm"].max())},

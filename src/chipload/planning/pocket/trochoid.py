@@ -3,7 +3,7 @@
 Notation: R cutter radius, rho [mm] radius of a circle, p [mm] its advance beyond the one before. With equal circles in
 a straight channel the leading point P is where the cutter's circle about O = rho (cos t, sin t) crosses that of radius
 rho + R about (-p, 0); the angle between P and the contact is the engagement, greatest near t = 0. Here the engagement
-is asked of the stock, and p is the greatest that keeps a*. Only the part of a circle that cuts is run; from its end a
+is that in the stock, and p is the greatest that keeps a*. Only the part of a circle that cuts is run; from its end a
 link leads to the next one.
 """
 
@@ -35,7 +35,7 @@ LEAST, FARTHEST, SLOWEST = 0.005, 0.5, 2e-4
 SPACING = 0.05
 #: spacing / R of the places on the walls that it lies between
 WALLS = 0.03
-#: places of a circle that are asked first, and halvings of the advance
+#: places of a circle that are checked first, and halvings of the advance
 PLACES, HALVINGS = 48, 9
 #: greatest sweep of one arc [rad]
 SWEEP = 2.0
@@ -57,7 +57,7 @@ class Trochoid:
         """The arcs (m, 7) of each circle along a polyline (k, 2), with the greatest engagement (m,) of each [rad].
 
         ``rho`` is the radius that is free about the beginning of the line. Each circle is taken from the stock when
-        the next one is asked for. It ends early where even the least advance would exceed the engagement.
+        the next one is requested. It ends early where even the least advance would exceed the engagement.
         """
         R = self.radius
         at, s, room = self._places(line)
@@ -88,7 +88,7 @@ class Trochoid:
             if not len(arcs):
                 continue
             engaged = np.array([self._along(seg) for seg in arcs])
-            if engaged.max() > self.most_engaged:  # between the places that were asked it is greater
+            if engaged.max() > self.most_engaged:  # it is greater between the checked places
                 along, rho, advance = along - low, max(LEAST * R, wide - low), 0.45 * low
                 if advance < SLOWEST * R:
                     return

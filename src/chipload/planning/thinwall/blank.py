@@ -269,7 +269,7 @@ class WallBlank:
         """Whether each place lies on the clamp itself, (p,) bool. Such places do not move and take the compliance of
         the stiffest place.
         """
-        held = np.zeros(len(self.solid.grid.nodes), dtype=np.bool_)
-        held[self.solid.grid.side("j-")] = self.solid.constrained[self.solid.grid.side("j-")].all(axis=1)
+        fixed = np.zeros(len(self.solid.grid.nodes), dtype=np.bool_)
+        fixed[self.solid.grid.side("j-")] = self.solid.constrained[self.solid.grid.side("j-")].all(axis=1)
         foot = places.local[:, 1] <= -1.0 + 1e-12
-        return np.asarray(foot & held[self.solid.grid.elements[places.element]].any(axis=1))
+        return np.asarray(foot & fixed[self.solid.grid.elements[places.element]].any(axis=1))

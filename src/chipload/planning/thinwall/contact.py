@@ -109,8 +109,8 @@ def _nearest(
     point, normal = side(u, v)
     offset = _corner_centre(C, axis, normal, e) - point
     over = (offset * normal).sum(axis=1)
-    beside = np.linalg.norm(offset - over[:, None] * normal, axis=1)
-    return u, v, np.where(beside <= ALONG, over - r, np.inf)
+    lateral = np.linalg.norm(offset - over[:, None] * normal, axis=1)
+    return u, v, np.where(lateral <= ALONG, over - r, np.inf)
 
 
 def _corner_centre(C: Floats, axis: Floats, normal: Floats, e: float) -> Floats:

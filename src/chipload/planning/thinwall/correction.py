@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 ROW = 0.75
 
 
-def found(places: tuple[Floats, Floats], u: ArrayLike, v: ArrayLike, ratio: ArrayLike) -> Floats:
+def greatest_ratios(places: tuple[Floats, Floats], u: ArrayLike, v: ArrayLike, ratio: ArrayLike) -> Floats:
     """Greatest ratio of the contact points around each place, (n, m) float; NaN where no point is near.
 
     Parameters
@@ -31,7 +31,7 @@ def found(places: tuple[Floats, Floats], u: ArrayLike, v: ArrayLike, ratio: Arra
     --------
     >>> import numpy as np
     >>> places = np.array([0.0, 0.5, 1.0]), np.array([0.0, 1.0])
-    >>> found(places, [0.25, 0.75], [1.0, 1.0], [0.6, 0.9]).tolist()
+    >>> greatest_ratios(places, [0.25, 0.75], [1.0, 1.0], [0.6, 0.9]).tolist()
     [[nan, 0.6], [nan, 0.9], [nan, 0.9]]
     """
     a, b = places

@@ -73,7 +73,7 @@ class Infeasible:
     place : its number
     threshold, force, edge_force : [N], the last two at the smallest depth; the edge alone
     feed_per_tooth : [mm] that would make it feasible; None: none would
-    diameter : [mm] of a cutter of the same shape that would; None: not asked (a feed does), or none would
+    diameter : [mm] of a cutter of the same shape that would; None: not calculated (a feed does), or none would
     """
 
     place: int

@@ -67,7 +67,7 @@ class Rows:
     ----------
     contact, normal, feed : (r, s, 3) float: q [mm], n, t; rows from the free edge on, points in the order of travel
     cut : (r, s) bool, where stock is found
-    axis : (r, s, 3) float, of the cutter; None: as the posture says
+    axis : (r, s, 3) float, of the cutter; None: that of the posture
     count : (r,) int, points of each row, the last of which is repeated; None: s
     """
 

@@ -22,7 +22,7 @@ LARGEST_TOOL = 99_999_999
 
 
 def read_cutters(text: str, *, units: Literal["mm", "inch"] = "mm") -> tuple[dict[int, Shape], tuple[Finding, ...]]:
-    r"""(d, r, e, f, alpha, beta, h) [mm, rad] of each tool number, and what was noticed.
+    r"""(d, r, e, f, alpha, beta, h) [mm, rad] of each tool number, and the findings.
 
     Of a CUTTER of fewer numbers e = d/2 - r, f = r, and alpha, beta, h are 0. A tool that is described anew keeps its
     first shape: a finding.
@@ -30,7 +30,7 @@ def read_cutters(text: str, *, units: Literal["mm", "inch"] = "mm") -> tuple[dic
     Parameters
     ----------
     text : CL data
-    units : of lengths before the text says UNITS
+    units : of lengths before the first UNITS
 
     Raises
     ------
@@ -54,10 +54,10 @@ def read_cutters(text: str, *, units: Literal["mm", "inch"] = "mm") -> tuple[dic
         if record.word in ("UNITS", "UNIT"):
             mm = MM_PER[length_unit(record)]
         elif record.word in ("CUTTER", "TLDATA"):
-            said = nx_shape(record, mm) if record.word == "TLDATA" else shape(record, mm)
-            if said is not None:
+            numbers = nx_shape(record, mm) if record.word == "TLDATA" else shape(record, mm)
+            if numbers is not None:
                 settle()
-                pending = (said, record)
+                pending = (numbers, record)
         elif record.word in LOADS:
             tool = tool_number(record)
         elif record.word in ("GOTO", "FROM", "GODLTA"):
@@ -94,10 +94,10 @@ def nx_shape(record: AptRecord, mm: float) -> Shape | None:
 
 def length_unit(record: AptRecord) -> str:
     """The unit that a UNITS record names."""
-    said = UNITS.get(",".join(record.args))
-    if said is None:
+    unit = UNITS.get(",".join(record.args))
+    if unit is None:
         raise record.error("must be MM, CM or INCHES")
-    return said
+    return unit
 
 
 def tool_number(record: AptRecord) -> int:

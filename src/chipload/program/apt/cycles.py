@@ -25,7 +25,7 @@ from chipload.units import MM_PER
 SPIN = -1
 #: pecks of one hole
 MOST_PECKS = 10_000
-#: a peck comes back to this above the bottom so far [mm]
+#: a peck returns to this height above the bottom drilled so far [mm]
 RETURN_MM = 0.254
 
 #: cycles that cut straight to the depth, and whether they come out at the feed

@@ -4,7 +4,7 @@ Notation: p_work in the one work frame, p in the coordinates of the text; R (3, 
 direction a_work = R a. CSYS/a11,a12,a13,t1,a21,a22,a23,t2,a31,a32,a33,t3 describes a coordinate system whose axes, in
 the work frame, are the columns of (a_ij) = A, and p = A' p_work + t are the coordinates in it.
 
-TRNTYP says what the points are given in. Under TRNTYP/WORLD, which CAM systems write for indexed tables, that is the
+TRNTYP states the coordinates of the points. Under TRNTYP/WORLD, which CAM systems write for indexed tables, that is the
 work frame: R = 1, t = 0, and CSYS gives the axis of the tool alone, its third axis. Under TRNTYP/LOCAL it is the system
 of CSYS: R = A.
 
@@ -36,29 +36,29 @@ _ABOUT = {"AAXIS": 0, "BAXIS": 1, "CAXIS": 2}
 _Z = (0.0, 0.0, 1.0)
 
 
-def _one() -> Floats:
+def _identity() -> Floats:
     return np.eye(3)
 
 
-def _nought() -> Floats:
+def _zero() -> Floats:
     return np.zeros(3)
 
 
 @dataclass(frozen=True, eq=False)
 class Coordinates:
-    """What CSYS, TRNTYP, ROTABL and TLAXIS say so far.
+    """The current values of CSYS, TRNTYP, ROTABL and TLAXIS.
 
     Parameters
     ----------
     A : (3, 3) float, t : (3,) float [mm], of CSYS
-    points_in : ``work`` or ``csys``, what points under a CSYS are in; None: not said
+    points_in : ``work`` or ``csys``, coordinates of points under a CSYS; None: not stated
     turned : angles as ROTABL gives them, about X, Y, Z
-    tlaxis : of TLAXIS, a unit vector; None: not said
+    tlaxis : of TLAXIS, a unit vector; None: not stated
     line : of the CSYS
     """
 
-    A: Floats = field(default_factory=_one)
-    t: Floats = field(default_factory=_nought)
+    A: Floats = field(default_factory=_identity)
+    t: Floats = field(default_factory=_zero)
     points_in: str | None = None
     turned: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tlaxis: tuple[float, float, float] | None = None
@@ -70,12 +70,12 @@ class Coordinates:
         Raises
         ------
         InputError
-            It is not said what the points are in, or ROTABL and TLAXIS do not agree.
+            The coordinates of the points are not stated, or ROTABL and TLAXIS do not agree.
         """
         if any(self.turned):
-            R = self._turned()
+            R = self._table_rotation()
             return R, np.zeros(3), R @ _Z
-        if not self._plain and self.points_in is None:
+        if not self._untransformed and self.points_in is None:
             raise InputError(
                 f"line {self.line}: CSYS without TRNTYP leaves the frame of the points open: state whether it is the "
                 "work frame or the coordinates of CSYS"
@@ -86,24 +86,24 @@ class Coordinates:
     @property
     def in_work(self) -> bool:
         """Whether points are in the work frame as they stand."""
-        return not any(self.turned) and (self._plain or self.points_in == "work")
+        return not any(self.turned) and (self._untransformed or self.points_in == "work")
 
     @property
     def note(self) -> str:
-        """How points are read where a CSYS or ROTABL is in force, else empty."""
+        """How points are read where a CSYS or ROTABL is in effect, else empty."""
         if any(self.turned):
             return "ROTABL: points are turned back with the table into the work frame"
-        if self._plain:
+        if self._untransformed:
             return ""
         if self.points_in == "csys":
             return "CSYS: points are brought from its coordinates into the work frame"
         return "CSYS: points are in the work frame and stay unchanged"
 
     @cached_property
-    def _plain(self) -> bool:
+    def _untransformed(self) -> bool:
         return bool(np.abs(self.A - np.eye(3)).max() < 1e-12) and not self.t.any()
 
-    def _turned(self) -> Floats:
+    def _table_rotation(self) -> Floats:
         about = [k for k in range(3) if abs(self.turned[k]) > 1e-9]
         if self.tlaxis is None or len(about) > 1:
             raise InputError(
@@ -111,13 +111,13 @@ class Coordinates:
             )
         if not about:
             return np.eye(3)
-        k, said = about[0], self.turned[about[0]]
+        k, angle = about[0], self.turned[about[0]]
         u = self.tlaxis
         own = (math.atan2(-u[1], u[2]), math.atan2(u[0], u[2]), 0.0)[k]
-        near = [abs(math.remainder(said * scale - own, math.tau)) < SAME_AXIS for scale in (1.0, math.pi / 180.0)]
+        near = [abs(math.remainder(angle * scale - own, math.tau)) < SAME_AXIS for scale in (1.0, math.pi / 180.0)]
         if sum(near) != 1 or abs(u[k]) > SAME_AXIS:
             raise InputError(
-                f"line {self.line}: ROTABL: an angle of {said:g} turns the tool to TLAXIS {u} neither in rad nor in "
+                f"line {self.line}: ROTABL: an angle of {angle:g} turns the tool to TLAXIS {u} neither in rad nor in "
                 f"degrees: correct the angle or TLAXIS"
             )
         return _rotation(k, own)

@@ -66,7 +66,7 @@ class AptInterpreter:
         self._drilling = False
         self._shape: Shape | None = None  # of the last CUTTER
         self._changed: AptRecord | None = None  # the CUTTER that changed it since the last point
-        self._loaded = False  # whether a tool was loaded since then
+        self._loaded = False  # whether a tool was loaded after it
         self._sense = -1.0 if track.spindle < 0.0 else 1.0
         self._speed = abs(track.spindle)
         self._counts: tuple[str, float | None] = (MINUTE, None)
@@ -132,7 +132,7 @@ class AptInterpreter:
         if self._circle is not None:
             self.track.note("apt-circle", self._circle.record.line, "CIRCLE without a GOTO after it is left out")
         if not self.ended and not self._path_ended:
-            self.track.leave_out("apt-end", 0, "the text does not end with FINI: it may have been cut off")
+            self.track.leave_out("apt-end", 0, "the text does not end with FINI: it may be truncated")
         return self.track.program()
 
     # ------------------------------------------------------------------------------------------------ motions
@@ -249,7 +249,7 @@ class AptInterpreter:
     def _arc(self, circle: Circle, p: Point, b: Point, record: AptRecord) -> None:
         self._circle = None
         if self._rapid:
-            self.track.note("apt-arc", record.line, "RAPID before an arc: it is cut at the feed in force")
+            self.track.note("apt-arc", record.line, "RAPID before an arc: it is cut at the feed in effect")
         R, t, _ = self._frame()
         centre, normal = _tuple(R @ (np.multiply(circle.centre, self.mm) - t)), _tuple(R @ circle.normal)
         start = self.track.at
@@ -328,7 +328,7 @@ class AptInterpreter:
             raise record.error("turns of the spindle, which is at rest: SPINDL must come before it")
         self.track.dwell(value * math.tau / abs(self.track.spindle) if turns else value, record.line)
 
-    # ------------------------------------------------------------------------------------------------ what holds
+    # --------------------------------------------------------------------------------------------- modal words
 
     def _fedrat(self, record: AptRecord) -> None:
         values = [k for k, word in enumerate(record.args) if word not in FEEDS and word != "DPM"]
@@ -376,11 +376,11 @@ class AptInterpreter:
             self._in = self._in.tool_axis(record)
 
     def _cutter(self, record: AptRecord) -> None:
-        said = nx_shape(record, self.mm) if record.word == "TLDATA" else shape(record, self.mm)
-        if said is None:
+        numbers = nx_shape(record, self.mm) if record.word == "TLDATA" else shape(record, self.mm)
+        if numbers is None:
             self.track.note("apt-unused", record.line, str(record))
-        elif said != self._shape:
-            self._shape, self._changed = said, record
+        elif numbers != self._shape:
+            self._shape, self._changed = numbers, record
 
     def _label(self, record: AptRecord) -> None:
         text = record.args[0]

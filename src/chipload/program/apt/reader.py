@@ -2,8 +2,8 @@
 
 Notation: a record is WORD/arg,arg,... GOTO/x,y,z[,i,j,k] moves the tip straight, after CIRCLE/x,y,z,i,j,k[,r] on an arc
 counter-clockwise about (i, j, k) through (x, y, z); ends over one another are a full turn. RAPID holds for one motion,
-FEDRAT, SPINDL and the axis of the tool until they are said anew; a FEDRAT without a unit counts as the one before, the
-first as lengths of the text in a minute. SPINDL without CLW or CCLW turns as before, first CLW. A GOTO of three numbers
+FEDRAT, SPINDL and the axis of the tool until stated again; a FEDRAT without a unit counts as the one before, the first
+as lengths of the text in a minute. SPINDL without CLW or CCLW turns as before, first CLW. A GOTO of three numbers
 keeps the axis; MULTAX/OFF, CSYS and TLAXIS set it as :mod:`~chipload.program.apt.frames` says, which tells in what
 coordinates points are. :mod:`~chipload.program.apt.cycles` tells how holes are cut. PPRINT, INSERT and OPFEATSTART name
 what the rows after them belong to. Cutters are for :mod:`~chipload.program.apt.cutters`.
@@ -40,16 +40,16 @@ def read_apt(
     tool: int = 0,
     csys: Literal["work", "csys"] | None = None,
 ) -> tuple[Program, tuple[Finding, ...]]:
-    r"""The motions of CL data in the work frame, and what was noticed.
+    r"""The motions of CL data in the work frame, and the findings.
 
     Parameters
     ----------
     text : of the CL data
     name : for messages, and of the rows before any PPRINT
-    units : of lengths before the text says UNITS
-    feed : [mm/s] of cuts before the text says FEDRAT; None: such a cut is refused
-    spindle, tool : [rad/s] and number before the text says SPINDL and LOAD
-    csys : what points under a CSYS are given in before the text says TRNTYP; None: such a point is refused
+    units : of lengths before the first UNITS
+    feed : [mm/s] of cuts before the first FEDRAT; None: such a cut is refused
+    spindle, tool : [rad/s] and number before the first SPINDL and LOAD
+    csys : coordinates of points under a CSYS before the first TRNTYP; None: such a point is refused
 
     Raises
     ------
@@ -74,7 +74,7 @@ def read_apt(
             reader.track.note(
                 "apt-after-end",
                 record.line,
-                f"{record} stands after {reader.ended}: it and all that follows is left out",
+                f"{record} follows {reader.ended}: it and all records after it are left out",
             )
             break
         reader.read(record)

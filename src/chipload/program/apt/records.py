@@ -44,7 +44,7 @@ class AptRecord:
         return text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
 
     def error(self, what: str) -> InputError:
-        """What is wrong with this record, to be raised."""
+        """Error about this record, for the caller to raise."""
         return InputError(f"line {self.line}: {self}: {what}")
 
     def number(self, k: int) -> float:
@@ -57,7 +57,7 @@ class AptRecord:
         return value
 
     def numbers(self, *counts: int) -> tuple[float, ...]:
-        """All arguments as numbers, as many as one of ``counts`` says (none: any number of them)."""
+        """All arguments as numbers, their number one of ``counts`` (empty: any number)."""
         if counts and len(self.args) not in counts:
             raise self.error(f"has {len(self.args)} numbers: must have {' or '.join(map(str, counts))}")
         return tuple(self.number(k) for k in range(len(self.args)))
@@ -99,13 +99,13 @@ def records(text: str) -> Iterator[AptRecord]:
         if as_text is not None:
             yield AptRecord(as_text[1].upper(), (as_text[2].strip(),), line)
             continue
-        said, comment, _ = whole.partition("$$")
-        said, more, _ = said.partition("$")
+        statement, comment, _ = whole.partition("$$")
+        statement, more, _ = statement.partition("$")
         first = first or line
-        begun += said
+        begun += statement
         if len(begun) > LONGEST_RECORD:
             raise InputError(f"line {first}: a record of more than {LONGEST_RECORD} characters: must be shorter")
-        if more or (begun.strip() and comment and not said.strip()):
+        if more or (begun.strip() and comment and not statement.strip()):
             continue
         record = _record(begun, first)
         begun, first = "", 0

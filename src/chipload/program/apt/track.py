@@ -1,4 +1,4 @@
-"""The rows of a Program as CL data is read: what holds until it is said anew, and the motions.
+"""The rows of a Program as CL data is read: the modal state and the motions.
 
 Notation: all in the work frame, mm, s and rad. ``stated`` is the feed as the text gives it, a number and what it
 counts: mm in a minute or in a turn of the spindle, or degrees in a minute (DPM) for the tool's axis where the tip
@@ -81,7 +81,7 @@ class AptRows:
         self._add(RAPID, p, axis, _NO_CENTRE, _UP, 0.0, line)
 
     def straight(self, p: Point, axis: Point, line: int) -> None:
-        """A straight cut at the feed in force; where a program begins, a rapid."""
+        """A straight cut at the feed in effect; where a program begins, a rapid."""
         if self.at is None:
             self.note_once("apt-start", line, "the program begins here: no motion leads to the first point")
             self.rapid(p, axis, line)
@@ -168,7 +168,7 @@ class AptRows:
         return (float(moved[0]), float(moved[1]), float(moved[2])), float(np.linalg.norm(v1 - shift * along))
 
     def program(self) -> tuple[Program, tuple[Finding, ...]]:
-        """All rows, and what was noticed."""
+        """All rows, and the findings."""
         if not self._rows:
             raise InputError(f"{self.name}: no point: CL data must have at least one GOTO")
         if self._left:

@@ -45,7 +45,7 @@ def write_apt(
     ----------
     cutters : cutter of each tool number but 0, which is no tool; None: not known, no CUTTER is written
     title : of the part, in PARTNO
-    verified : whether an independent simulation has found the program good
+    verified : whether an independent simulation has verified the program
     chord_mm : greatest distance of a helical arc from its chords [mm], > 0
 
     Raises
@@ -53,8 +53,8 @@ def write_apt(
     InputError
         A tool number has no cutter.
     """
-    said = "VERIFIED BY INDEPENDENT SIMULATION" if verified else "NOT VERIFIED"
-    out = [f"PARTNO/{_text(title)}", f"PPRINT/CHIPLOAD: {said}", "UNITS/MM"]
+    status = "VERIFIED BY INDEPENDENT SIMULATION" if verified else "NOT VERIFIED"
+    out = [f"PARTNO/{_text(title)}", f"PPRINT/CHIPLOAD: {status}", "UNITS/MM"]
     tilted = bool((np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > 1e-12).any())
     if tilted:
         out.append("MULTAX/ON")

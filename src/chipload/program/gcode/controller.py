@@ -80,7 +80,7 @@ class Controller:
         self.strict_tools = dialect == "linuxcnc"
         self.findings = Findings()
         self.track = MotionRows(most_rows)
-        self.parameters = Parameters(parameters, self._noted)
+        self.parameters = Parameters(parameters, self._note_unproven)
         self.line = 0
         self.label = 0
         self.returned = (0.0, 0.0)
@@ -120,7 +120,7 @@ class Controller:
                 self.parameters.numbered[5210 + 20 * number] = turn
         self._start(start)
 
-    def _noted(self, code: str, text: str) -> None:
+    def _note_unproven(self, code: str, text: str) -> None:
         self.findings.once(code, self.line, text, Severity.UNPROVEN)
 
     def note(self, code: str, text: str) -> None:
@@ -206,8 +206,8 @@ class Controller:
         if self.tools is not None and self.strict_tools:
             raise InputError(f"{what}{number}: tool {number} is not in the tool table: add it there")
         where = "is not in the tool table" if self.tools is not None else "is used and no tool table is given"
-        taken = "length is taken" if number in self.diameters else "length and diameter are taken"
-        self.once("nc-tool-unknown", f"tool {number} {where}: its {taken} as 0")
+        assumed = "length is taken" if number in self.diameters else "length and diameter are taken"
+        self.once("nc-tool-unknown", f"tool {number} {where}: its {assumed} as 0")
         return Tool(number)
 
     def compensation_diameter(self, name: str, number: int, stated: float) -> float:
@@ -229,17 +229,17 @@ class Controller:
             )
             return 0.0
         diameter = self.diameters[known]
-        taken = f"the {diameter:g} mm of cutter {known} are taken"
+        assumed = f"the {diameter:g} mm of cutter {known} are taken"
         if number in (self.tools or {}):
             self.leave_out(
                 "nc-diameter-missing",
                 f"{name} D{number}: the tool table states no D for tool {number}, so the controller compensates by "
-                f"0: {taken}: write D{diameter:g} in the table",
+                f"0: {assumed}: write D{diameter:g} in the table",
             )
         elif known != number and self.dialect == "linuxcnc":
-            self.leave_out("nc-diameter-unknown", f"{name} D{number}: no diameter of tool {number} is known: {taken}")
+            self.leave_out("nc-diameter-unknown", f"{name} D{number}: no diameter of tool {number} is known: {assumed}")
         else:
-            self.once("nc-diameter-of-cutter", f"{name} D{number}: {taken}")
+            self.once("nc-diameter-of-cutter", f"{name} D{number}: {assumed}")
         return diameter
 
     # -- compensation ----------------------------------------------------------------------------------------------
@@ -307,8 +307,8 @@ class Controller:
         new = {k for k in axes if k < 3} - self.placed
         if new and not self.state.absolute and motion in (0, 10, 20, 30):
             axis = ", ".join(AXES[k].upper() for k in sorted(new))
-            said = f"G91: {axis} moves before any position is stated: the program's zero is taken as its start: begin "
-            self.once("nc-start-unknown", f"{said}with G90 and a position", Severity.UNPROVEN)
+            text = f"G91: {axis} moves before any position is stated: the program's zero is taken as its start: begin "
+            self.once("nc-start-unknown", f"{text}with G90 and a position", Severity.UNPROVEN)
         unplaced = motion == 0 and bool(new)
         self.placed = {0, 1, 2} if motion > 0 and motion != NO_MOTION else self.placed | new
         if unplaced != self.unplaced:

@@ -89,8 +89,8 @@ def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
 def _tapping(code: int, sense: int) -> None:
     right = 1 if code == 840 else -1
     if sense != right:
-        said = {0: "does not turn", 1: "turns clockwise", -1: "turns counter-clockwise"}[sense]
-        raise InputError(f"G{code // 10}: the spindle {said}: start it by M{3 if right > 0 else 4}")
+        state = {0: "does not turn", 1: "turns clockwise", -1: "turns counter-clockwise"}[sense]
+        raise InputError(f"G{code // 10}: the spindle {state}: start it by M{3 if right > 0 else 4}")
 
 
 def _pecks(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
@@ -111,33 +111,33 @@ def _pecks(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
 def _back_bore(a: float, b: float, hole: Hole) -> Iterator[Step]:
     if hole.sense == 0:
         raise InputError("G87: the spindle does not turn: start it by M3 or M4")
-    aside, beside = a + hole.shift[0], b + hole.shift[1]
-    yield RAPID, aside, beside, hole.r, 0.0
-    yield SPIN, aside, beside, hole.r, 0
-    yield RAPID, aside, beside, hole.bottom, 0.0
+    shifted_a, shifted_b = a + hole.shift[0], b + hole.shift[1]
+    yield RAPID, shifted_a, shifted_b, hole.r, 0.0
+    yield SPIN, shifted_a, shifted_b, hole.r, 0
+    yield RAPID, shifted_a, shifted_b, hole.bottom, 0.0
     yield RAPID, a, b, hole.bottom, 0.0
     yield SPIN, a, b, hole.bottom, hole.sense
     yield LINE, a, b, hole.middle, 0.0
     yield LINE, a, b, hole.bottom, 0.0
     yield SPIN, a, b, hole.bottom, 0
-    yield RAPID, aside, beside, hole.bottom, 0.0
-    yield RAPID, aside, beside, hole.clear, 0.0
+    yield RAPID, shifted_a, shifted_b, hole.bottom, 0.0
+    yield RAPID, shifted_a, shifted_b, hole.clear, 0.0
     yield RAPID, a, b, hole.clear, 0.0
     yield SPIN, a, b, hole.clear, hole.sense
 
 
 def _fanuc_back_bore(a: float, b: float, hole: Hole) -> Iterator[Step]:
     """R is below: from there the tool bores up to Z, stops, goes aside and out."""
-    aside, beside = a + hole.shift[0], b + hole.shift[1]
+    shifted_a, shifted_b = a + hole.shift[0], b + hole.shift[1]
     yield SPIN, a, b, hole.clear, 0
-    yield RAPID, aside, beside, hole.clear, 0.0
-    yield RAPID, aside, beside, hole.r, 0.0
+    yield RAPID, shifted_a, shifted_b, hole.clear, 0.0
+    yield RAPID, shifted_a, shifted_b, hole.r, 0.0
     yield RAPID, a, b, hole.r, 0.0
     yield SPIN, a, b, hole.r, 1
     yield LINE, a, b, hole.bottom, 0.0
     yield DWELL, a, b, hole.bottom, hole.dwell or 0.0
     yield SPIN, a, b, hole.bottom, 0
-    yield RAPID, aside, beside, hole.bottom, 0.0
-    yield RAPID, aside, beside, hole.clear, 0.0
+    yield RAPID, shifted_a, shifted_b, hole.bottom, 0.0
+    yield RAPID, shifted_a, shifted_b, hole.clear, 0.0
     yield RAPID, a, b, hole.clear, 0.0
     yield SPIN, a, b, hole.clear, 1

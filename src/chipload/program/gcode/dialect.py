@@ -58,10 +58,10 @@ class Dialect:
         """The block of a line; None where there is nothing to carry out."""
         text, comments = bare(raw)
         if not self.strict and text.startswith("$"):
-            said = f"{text[:20].upper()}: a command to the controller, no block: left out"
+            message = f"{text[:20].upper()}: a command to the controller, not a block: left out"
             # homing and jogging of GRBL move the machine, which matters behind the first motion
             moves = bool(c.placed) and text.startswith(("$h", "$j"))
-            c.once("nc-ignored", said, Severity.UNPROVEN if moves else Severity.NOTE)
+            c.once("nc-ignored", message, Severity.UNPROVEN if moves else Severity.NOTE)
             return None
         block = read_block(text, comments, c.parameters)
         if self.strict:
@@ -92,7 +92,7 @@ def _other_controllers(block: Block, c: Controller) -> None:
             block.g[block.g.index(code)] = units[code]
     arc = next((code for code in block.g if code in (20, 30)), c.state.motion)
     if arc in (20, 30) and c.state.plane == 170 and block.words.get("k") == 0.0:
-        c.once("nc-unused-word", "K0: is no coordinate of the plane of the arc: left out")
+        c.once("nc-unused-word", "K0: is not a coordinate of the arc's plane: left out")
         del block.words["k"]
 
 

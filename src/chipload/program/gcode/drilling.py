@@ -59,8 +59,8 @@ class Drilling:
         if state.feed_mode == 930:
             raise InputError(f"{shown(code)}: a cycle has no inverse time: write G94 and F")
         if state.feed_mode == 950 and state.speed == 0.0 and state.feed != 0.0:
-            said = f"{shown(code)}: feed per revolution (G95) and no spindle speed"
-            c.once("nc-feed-unknown", said, Severity.UNPROVEN)
+            message = f"{shown(code)}: feed per revolution (G95) and no spindle speed"
+            c.once("nc-feed-unknown", message, Severity.UNPROVEN)
         else:
             rate(self.c, block, shown(code))
         first, second, along = PLANE_AXES[PLANES[state.plane]]

@@ -126,7 +126,7 @@ def _bracket(text: str, at: int, parameters: Parameters, depth: int) -> tuple[fl
 def _apply(operator: str, a: float, b: float) -> float:
     if operator == "**":
         if a < 0.0 and b != int(b):
-            raise InputError(f"{a:g} ** {b:g}: a negative number has whole powers only")
+            raise InputError(f"{a:g} ** {b:g}: a negative number takes integer powers only")
         if a == 0.0 and b < 0.0:
             raise InputError(f"0 ** {b:g}: has no value")
         try:

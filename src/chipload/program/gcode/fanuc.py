@@ -112,8 +112,8 @@ class Fanuc(Dialect):
         plain = _COMMENT.sub(lambda found: " " * len(found[0]), text)
         found = _NO_POINT.search(plain)
         if found is not None:
-            said = f"{found[0]!r} has no decimal point: taken as a whole unit, not as the least increment"
-            c.findings.add("nc-no-point", 1 + plain.count("\n", 0, found.start()), said, Severity.UNPROVEN)
+            message = f"{found[0]!r} has no decimal point: taken as a whole unit, not as the least increment"
+            c.findings.add("nc-no-point", 1 + plain.count("\n", 0, found.start()), message, Severity.UNPROVEN)
 
     def read(self, raw: str, c: Controller) -> Block | None:
         """The block of a line, in LinuxCNC's words."""
@@ -279,8 +279,8 @@ class Fanuc(Dialect):
             return
         kinds = {None: "a tool offset", 11.0: "a wear of length", 12.0: "a radius", 13.0: "a wear of radius"}
         what = kinds.get(which, "data of the controller")
-        said = f" R{value:g}" if "r" in words else ""
-        c.leave_out("nc-offset-left-out", f"G10{'' if which is None else f' L{which:g}'}{said}: {what} is left out")
+        radius = f" R{value:g}" if "r" in words else ""
+        c.leave_out("nc-offset-left-out", f"G10{'' if which is None else f' L{which:g}'}{radius}: {what} is left out")
 
     def _holes(self, block: Block, c: Controller) -> None:
         """Tapping, fine and back boring in LinuxCNC's words."""

@@ -101,8 +101,8 @@ def _units(open_text: str, units: dict[str, str]) -> dict[str, str]:
 def _feed_word(open_text: str, number: int) -> re.Match[str] | None:
     found = _F.search(open_text)
     if found is not None and found[1] is None:
-        said = open_text[found.start() :].strip()[:20]
-        raise InputError(f"line {number}: {said}: a feed that is calculated cannot be changed: write the number")
+        shown = open_text[found.start() :].strip()[:20]
+        raise InputError(f"line {number}: {shown}: a feed that is calculated cannot be changed: write the number")
     return found
 
 

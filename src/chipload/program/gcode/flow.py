@@ -143,24 +143,24 @@ class Flow:
 
         LinuxCNC 2.9 carries out all motions before it and stops with an error; what stands behind it is lost.
         """
-        said = "%: ends a text that begins with %, and this one does not"
-        lost = any(text.strip() for text in self.source.lines[self.line + 1 :])
-        remedy = "remove it" if lost else "write M2 in its place"
+        message = "%: ends a text that begins with %, and this one does not"
+        text_follows = any(text.strip() for text in self.source.lines[self.line + 1 :])
+        remedy = "remove it" if text_follows else "write M2 in its place"
         if self.dialect.strict:
-            raise InputError(f"{said}: {remedy}")
-        if lost:
-            self.c.refused("nc-percent", f"{said}: the lines after it are left out: {remedy}")
+            raise InputError(f"{message}: {remedy}")
+        if text_follows:
+            self.c.refused("nc-percent", f"{message}: the lines after it are left out: {remedy}")
         else:
             self.c.findings.add(
-                "nc-percent", self.c.line, f"{said}: the motions end here, the spindle goes on: {remedy}"
+                "nc-percent", self.c.line, f"{message}: the motions end here, the spindle goes on: {remedy}"
             )
 
     def _check_length(self, raw: str) -> None:
         if self.c.dialect == "linuxcnc" and len(raw.rstrip("\r")) > LONGEST_LINE:
-            said = f"{len(raw)} characters: a line has at most {LONGEST_LINE}"
+            message = f"{len(raw)} characters: a line has at most {LONGEST_LINE}"
             if self.dialect.strict:
-                raise InputError(said)
-            self.c.leave_out("nc-long-line", said)
+                raise InputError(message)
+            self.c.leave_out("nc-long-line", message)
 
     def _block(self, raw: str) -> bool:
         if self.dialect.jump(self, raw):
@@ -204,7 +204,7 @@ class Flow:
             raise InputError(f"the text ends within o{self._calls[-1].label}: endsub or M99 is missing")
         if self.dialect.strict:
             raise InputError("the text ends without M2, M30 or %: write M2 as its last block")
-        self.c.leave_out("nc-no-end", "the text ends without M2 or M30: it may have been cut off")
+        self.c.leave_out("nc-no-end", "the text ends without M2 or M30: it may be truncated")
         self.i.finish()
         return False
 
@@ -286,15 +286,15 @@ class Flow:
         raise InputError(f"o{label}: no keyword of an O-word follows the label")
 
     def _choose(self, word: OWord, line: int) -> None:
-        taken = self._condition(word) != 0.0
-        while not taken:
+        holds = self._condition(word) != 0.0
+        while not holds:
             line = self.source.after(line, word.key, ("elseif", "else", "endif"))
             other = self.source.words[line]
             assert isinstance(other, OWord)
             if other.keyword != "elseif":
                 break
             self.line = line
-            taken = self._condition(other) != 0.0
+            holds = self._condition(other) != 0.0
         self.line = line + 1
 
     def _is_tail(self, line: int, key: tuple[str, str]) -> int:
@@ -445,10 +445,10 @@ class Flow:
         if place is None and label in self.main.numbers:
             place, source = self.main.numbers[label], self.main
         if place is None:
-            said = f"M98 P{label}: there is no block O{label} in this text"
+            message = f"M98 P{label}: there is no block O{label} in this text"
             if self.dialect.strict:
-                raise InputError(said)
-            self.c.leave_out("nc-call", f"{said}: the call is left out")
+                raise InputError(message)
+            self.c.leave_out("nc-call", f"{message}: the call is left out")
             self.line += 1
             return
         self.line += 1

@@ -84,13 +84,13 @@ class BlockInterpreter:
         if motion < 0 and lasting == 52 and "p" in block.words and "motion" not in codes:
             motion = 52
         for letter in unused(block, motion):
-            said = f"{letter.upper()}{block.words[letter]:g}: no code of the block uses it"
+            message = f"{letter.upper()}{block.words[letter]:g}: no code of the block uses it"
             if c.strict:
-                raise InputError(f"{said}: remove it")
+                raise InputError(f"{message}: remove it")
             if motion in (10, 20, 30) and letter in CONTOUR:
-                c.leave_out("nc-unused-word", f"{said}, and it may change the motion")
+                c.leave_out("nc-unused-word", f"{message}, and it may change the motion")
             else:
-                c.refused("nc-unused-word", said)
+                c.refused("nc-unused-word", message)
             del block.words[letter]
         if codes.get("once") == 40 and motion in (20, 30) and "p" in block.words:
             raise InputError(f"G4 with {shown(motion)}: both use P: write two blocks")
@@ -115,9 +115,9 @@ class BlockInterpreter:
         c = self.c
         message = _MESSAGE.match(text)
         if message is not None:
-            said = message[2] if message[1].lower() == "msg" else self._filled(message[2])
+            text_out = message[2] if message[1].lower() == "msg" else self._filled(message[2])
             code = "nc-print" if message[1].lower() == "print" else "nc-message"
-            c.note(code, said.strip()[:LONGEST])
+            c.note(code, text_out.strip()[:LONGEST])
             return
         other = _OTHER.match(text)
         if other is not None:
@@ -310,8 +310,8 @@ class BlockInterpreter:
             state.path = codes["path"]
             state.path_mode = path_mode(state.path, words, state.scale)
             c.changed()
-            said = "".join(f" {x.upper()}{words[x]:g}" for x in "pqr" if x in words and state.path == 640)
-            c.note("nc-path-mode", f"{shown(state.path)}{said}")
+            tolerances = "".join(f" {x.upper()}{words[x]:g}" for x in "pqr" if x in words and state.path == 640)
+            c.note("nc-path-mode", f"{shown(state.path)}{tolerances}")
         if "distance" in codes:
             state.absolute = codes["distance"] == 900
         if "centre" in codes:

@@ -84,11 +84,11 @@ def _condition(flow: Flow, rest: str) -> tuple[bool, str]:
 
 def _choose(flow: Flow, rest: str) -> None:
     """IF[...]GOTO n and IF[...]THEN with an assignment."""
-    taken, rest = _condition(flow, rest)
+    holds, rest = _condition(flow, rest)
     if rest.startswith("goto"):
-        flow.line = target(flow, rest) if taken else flow.line + 1
+        flow.line = target(flow, rest) if holds else flow.line + 1
     elif rest.startswith("then"):
-        if taken:
+        if holds:
             flow.statement(rest[4:])
         flow.line += 1
     else:

@@ -94,7 +94,9 @@ def check_codes(block: Block) -> dict[str, int]:
     for code in block.g:
         group = GROUP_OF.get(code)
         if group is None:
-            raise InputError(f"{shown(code)}: is no code of LinuxCNC: remove it, or read the text in its own dialect")
+            raise InputError(
+                f"{shown(code)}: is not a code of LinuxCNC: remove it, or read the text in its own dialect"
+            )
         if group in found:
             raise InputError(f"{shown(found[group])} and {shown(code)}: exclude each other in one block")
         found[group] = code
@@ -104,7 +106,7 @@ def check_codes(block: Block) -> dict[str, int]:
     for m in block.m:
         group = M_GROUP_OF.get(m, "user" if m in USER_M else None)
         if group is None:
-            raise InputError(f"M{m}: is no code of LinuxCNC: remove it, or read the text in its own dialect")
+            raise InputError(f"M{m}: is not a code of LinuxCNC: remove it, or read the text in its own dialect")
         if group in seen:
             raise InputError(f"M{seen[group]} and M{m}: exclude each other in one block")
         seen[group] = m

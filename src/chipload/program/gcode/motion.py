@@ -122,7 +122,7 @@ class ControllerMotion:
             if not words.keys() & set(letters):
                 raise InputError(f"{shown(code)}: neither R nor I, J, K: an arc needs its radius or its centre")
             if letters[along] in words:
-                raise InputError(f"{letters[along].upper()}: is no coordinate of the plane of the arc")
+                raise InputError(f"{letters[along].upper()}: is not a coordinate of the arc's plane")
             if state.absolute_centre:
                 for k in (first, second):
                     if letters[k] not in words:
@@ -144,7 +144,7 @@ class ControllerMotion:
         to = end(self.c, block)
         if math.dist(state.at, to) < LEAST_PROBE:
             raise InputError(f"{shown(code)}: ends less than {LEAST_PROBE:g} mm from where it starts: go farther")
-        c.note("nc-probe", f"{shown(code)}: a touch may end it earlier; the program goes on from its end")
+        c.note("nc-probe", f"{shown(code)}: a probe signal may end it earlier; the program goes on from its end")
         c.straight(PROBE, to)
         for k, axis in enumerate(to):
             c.parameters.numbered[5061 + k] = axis / (c.machine_scale if k in LINEAR else 1.0)

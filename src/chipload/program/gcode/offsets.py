@@ -55,8 +55,8 @@ def note_unset_offsets(c: Controller) -> None:
     used = {frame.number for frame in c.track.used_frames() if frame.number > 0}
     severity = Severity.UNPROVEN if len(used) > 1 else Severity.NOTE
     for line, name in c.unset_offsets.values():
-        said = "its origin is not known and is taken as the machine's: state it in program.work_offsets"
-        c.findings.once("nc-offset-unset", line, f"{name}: {said}", severity)
+        reason = "its origin is not known and is taken as the machine's: state it in program.work_offsets"
+        c.findings.once("nc-offset-unset", line, f"{name}: {reason}", severity)
 
 
 def note_missing_lengths(c: Controller, commands: Commands) -> None:
@@ -67,8 +67,8 @@ def note_missing_lengths(c: Controller, commands: Commands) -> None:
     for number in np.unique(commands.tool[cuts]).tolist():
         if number > 0 and number not in c.with_length:
             line = int(commands.line[cuts & (commands.tool == number)][0])
-            said = "no length offset (G43) is given for it: the machine would move it with that of another tool"
-            c.findings.once("nc-length-missing", line, f"tool {number} cuts and {said}", Severity.UNPROVEN)
+            reason = "no length offset (G43) is given for it: the machine would move it with that of another tool"
+            c.findings.once("nc-length-missing", line, f"tool {number} cuts and {reason}", Severity.UNPROVEN)
 
 
 def note_machine_coordinates(c: Controller, name: str) -> None:

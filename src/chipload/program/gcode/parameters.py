@@ -57,14 +57,14 @@ class Parameters:
             value = self.numbered.get(key)
             if value is None:
                 if self.noted is not None and (key < 5000):
-                    said = f"#{key} is read before it is set and is taken as 0: state it in program.parameters"
-                    self.noted("nc-parameter-unset", said)
+                    message = f"#{key} is read before it is set and is taken as 0: state it in program.parameters"
+                    self.noted("nc-parameter-unset", message)
                 return 0.0
             return value
         space = self.shared if key.startswith("_") else self.local
         if key not in space:
-            said = "is read before it is set: assign it first, or state it in program.parameters"
-            raise InputError(f"parameter #<{key}>: {said}")
+            message = "is read before it is set: assign it first, or state it in program.parameters"
+            raise InputError(f"parameter #<{key}>: {message}")
         return space[key]
 
     def exists(self, key: int | str) -> bool:

@@ -105,7 +105,7 @@ class Sinumerik(Dialect):
             if found is None:
                 if not body[at:].strip():
                     break
-                raise InputError(f"{body[at : at + 16].strip()!r}: begins no word")
+                raise InputError(f"{body[at : at + 16].strip()!r}: does not begin a word")
             at = found.end()
             if found["letter"]:
                 _letter(block, c, found["letter"], float(found["number"]), values)
@@ -147,16 +147,16 @@ class Sinumerik(Dialect):
             clockwise = (words.get("k", 1.0) > 0.0) != c.reversed
             block.m = [m for m in block.m if m not in (3, 4, 5)] + [3 if clockwise else 4]
             c.reversed = None
-        for letter, way, value in values:
+        for letter, mode, value in values:
             k = AXES.find(letter) if letter in AXES else "ijk".find(letter)
             here = state.at[k] / (scale if k in LINEAR else 1.0)
             if letter in "ijk":
-                words[letter] = value - here if way != "IC" else value
-            elif way == "IC":
+                words[letter] = value - here if mode != "IC" else value
+            elif mode == "IC":
                 words[letter] = here + value if absolute else value
             else:
-                if way != "AC":
-                    c.once("nc-ignored", f"{way}: the direction in which a rotary axis turns is left to the machine")
+                if mode != "AC":
+                    c.once("nc-ignored", f"{mode}: the direction in which a rotary axis turns is left to the machine")
                 words[letter] = value if absolute else value - here
         if 6 in block.m and c.tools is not None and not {430, 490} & set(block.g):
             block.g.append(430)
@@ -186,7 +186,7 @@ def _value(text: str, c: Controller) -> float:
             if name in FUNCTIONS:
                 continue
             if f"_{name.lower()}" not in c.parameters.shared:
-                raise NotReadError(f"{name}: its value is not known here")
+                raise NotReadError(f"{name}: its value is not known")
             plain = re.sub(rf"(?<![A-Z0-9_]){re.escape(name)}(?![A-Z0-9_])", f"#<_{name.lower()}>", plain)
     plain = plain.replace("(", "[").replace(")", "]").lower()
     value, end = read_value(f"[{plain}]", 0, c.parameters)
@@ -207,7 +207,7 @@ def _letter(block: Block, c: Controller, letter: str, value: float, values: list
     elif letter == "N":
         block.number = int(min(value, 1e12))
     elif letter == "L":
-        raise NotReadError(f"L{value:g}: calls a subroutine, which is not here")
+        raise NotReadError(f"L{value:g}: calls a subroutine that is not in this text")
     elif letter in _WORDS:
         _put(block, letter.lower(), value)
     else:
@@ -277,10 +277,10 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
     elif name == "RPL":
         _put(block, "p", _value(text, c))
     elif len(name) == 1 and name in _WORDS:
-        way = _WAY.match(text)
-        value = _value(way[2] if way is not None else text, c)
-        if way is not None and name in "XYZABCUVWIJK":
-            values.append((name.lower(), way[1], value))
+        dimension = _WAY.match(text)
+        value = _value(dimension[2] if dimension is not None else text, c)
+        if dimension is not None and name in "XYZABCUVWIJK":
+            values.append((name.lower(), dimension[1], value))
         else:
             _put(block, name.lower(), value)
     elif re.fullmatch(r"[SM][0-9]", name):
@@ -378,6 +378,6 @@ def _keyword(block: Block, c: Controller, word: str, body: str = "") -> None:
     elif word in IDLE:
         c.once("nc-ignored", f"{word}: does not affect the path; it is ignored")
     elif re.fullmatch(rf"(?:N[0-9]+\s*)?{re.escape(word)}\s*", body):
-        c.leave_out("nc-call", f"{word[:40]}: calls a program that is not here: left out")
+        c.leave_out("nc-call", f"{word[:40]}: calls a program that is not in this text: left out")
     else:
         c.leave_out("nc-unknown-word", f"{word[:40]}: is not known: its effect is left out")

@@ -178,8 +178,8 @@ def _next(flow: Flow, some: Statements, one: Statement, value: Value) -> int:
         case "IF":
             jump = _GOTO.search(rest)
             if jump is not None:
-                taken = condition(rest[: jump.start()], flow.c, value)
-                return _target(flow, some, jump) if taken else line + 1
+                holds = condition(rest[: jump.start()], flow.c, value)
+                return _target(flow, some, jump) if holds else line + 1
             if condition(rest, flow.c, value):
                 return line + 1
             return some.other.get(line, some.partner[line]) + 1
@@ -210,21 +210,21 @@ def _next(flow: Flow, some: Statements, one: Statement, value: Value) -> int:
 
 def _target(flow: Flow, some: Statements, jump: re.Match[str]) -> int:
     """The line that a jump leads to."""
-    way, name, line = jump[1], jump[2], flow.line
-    if way == "S":
+    direction, name, line = jump[1], jump[2], flow.line
+    if direction == "S":
         raise NotReadError("GOTOS starts the program again without end: it is read once")
     if not name:
         raise NotReadError("a jump to a label that is calculated")
     places = some.labels.get(name, some.labels.get(f"N{name}", []))
     later, earlier = [k for k in places if k > line], [k for k in places if k <= line]
-    order = {"F": later, "B": earlier[::-1]}.get(way, [*later, *earlier])
+    order = {"F": later, "B": earlier[::-1]}.get(direction, [*later, *earlier])
     if order:
         return order[0]
     if name in flow.c.parameters.shared or re.fullmatch(r"R[0-9]+", name):
         raise NotReadError(f"{name}: a label that is calculated")
-    if way == "C":
+    if direction == "C":
         return line + 1
-    raise NotReadError(f"GOTO{way} {name}: there is no such label")
+    raise NotReadError(f"GOTO{direction} {name}: there is no such label")
 
 
 def _variable(name: str) -> int | str:

@@ -40,8 +40,8 @@ IDLE = frozenset(
     """.split()  # noqa: SIM905
 )
 #: addresses whose effect is not read, and what is done instead
-_ALLOWANCE, _CORNER = "an allowance beside the contour is left out", "the corner stays sharp"
-_TOOL, _TOUCH = "an offset of the tool is left out", "a touch may end the motion earlier"
+_ALLOWANCE, _CORNER = "an allowance on the contour is left out", "the corner stays sharp"
+_TOOL, _TOUCH = "an offset of the tool is left out", "a probe signal may end the motion earlier"
 _LEFT_OUT = "the motion of its block is left out"
 UNREAD = {
     **dict.fromkeys(("RND", "RNDM", "CHF", "CHR", "DISC"), _CORNER),

@@ -110,8 +110,10 @@ def _found(text: str) -> list[tuple[int, re.Match[str]]]:
             raise InputError(f"line {line}: two S words: write one")
         if words:
             if words[0][1] is None:
-                said = open_text[words[0].start() :].strip()[:20]
-                raise InputError(f"line {line}: {said}: a speed that is calculated cannot be changed: write the number")
+                shown = open_text[words[0].start() :].strip()[:20]
+                raise InputError(
+                    f"line {line}: {shown}: a speed that is calculated cannot be changed: write the number"
+                )
             out.append((line, words[0]))
     return out
 

@@ -120,10 +120,10 @@ class Splines:
         c = self.c
         for x, y in points:
             c.check(put(c.state.at, {0: float(x), 1: float(y)}))
-        way = nurbs.spline_points(points, weights, order)
-        spans = np.linalg.norm(np.diff(np.vstack([points[:1], way]), axis=0), axis=1)
+        chords = nurbs.spline_points(points, weights, order)
+        spans = np.linalg.norm(np.diff(np.vstack([points[:1], chords]), axis=0), axis=1)
         total = float(spans.sum())
-        for (x, y), span in zip(way.tolist(), spans.tolist(), strict=True):
+        for (x, y), span in zip(chords.tolist(), spans.tolist(), strict=True):
             # by inverse time the whole curve takes 1 / F: each chord its share
             own = None if rate is None else rate * total / span if span else rate
             c.straight(LINE, put(c.state.at, {0: x, 1: y}), own)

@@ -73,8 +73,8 @@ def rate(c: Controller, block: Block, what: str) -> float | None:
         c.changed()
     if state.feed_mode == 950:
         if state.surface:
-            said = "feed per revolution (G95) with G96: the spindle speed is not known here"
-            c.once("nc-feed-unknown", said, Severity.UNPROVEN)
+            message = "feed per revolution (G95) with G96: the spindle speed is not known here"
+            c.once("nc-feed-unknown", message, Severity.UNPROVEN)
         elif state.speed == 0.0:
             raise InputError(f"{what}: feed per revolution (G95) and no spindle speed: give S")
     return None

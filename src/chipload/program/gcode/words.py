@@ -145,7 +145,7 @@ def read_block(text: str, comments: list[str], parameters: Parameters) -> Block:
                 raise InputError(f"{letter.upper()}: appears twice in one block")
             words[letter], at = read_value(text, at, parameters)
         else:
-            raise InputError(f"character {letter!r}: begins no word")
+            raise InputError(f"character {letter!r}: does not begin a word")
     if len(block.m) > MOST_M:
         raise InputError(f"{len(block.m)} M codes: a block has at most {MOST_M}")
     return block

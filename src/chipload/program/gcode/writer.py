@@ -102,8 +102,8 @@ def write_commands(
     fanuc = machine.dialect == "fanuc"
     if not 1 <= number <= 9999:
         raise InputError(f"program number = {number}: must be from 1 to 9999")
-    said = VERIFIED if verified else NOT_VERIFIED
-    head = [f"O{number:04d} {comment(said, fanuc)}" if fanuc else comment(said, fanuc)]
+    status = VERIFIED if verified else NOT_VERIFIED
+    head = [f"O{number:04d} {comment(status, fanuc)}" if fanuc else comment(status, fanuc)]
     head += [comment(text, fanuc) for text in (title, *comments)]
     blocks = [*_modes(machine), *Blocks(commands, machine, words).text()]
     if repeat is not None:

@@ -37,14 +37,14 @@ class Element:
 
     def along(self, point: complex) -> complex:
         """Unit vector of the motion at a point of it."""
-        way = self.end - self.start if self.sense == 0 else 1j * self.sense * (point - self.centre)
-        return way / abs(way)
+        tangent = self.end - self.start if self.sense == 0 else 1j * self.sense * (point - self.centre)
+        return tangent / abs(tangent)
 
     def share(self, point: complex) -> float:
         """How far along a point lies, 0 at the start, 1 at the end."""
         if self.sense == 0:
-            way = self.end - self.start
-            return ((point - self.start) / way).real
+            vector = self.end - self.start
+            return ((point - self.start) / vector).real
         whole = self._angle(self.end) or math.tau
         angle = self._angle(point)
         return (angle if angle < 0.5 * (whole + math.tau) else angle - math.tau) / whole
@@ -77,7 +77,7 @@ def rounding(before: Element, after: Element, radius: float) -> CornerArc | None
     if abs(across) < 1e-9:
         return None
     side = 1 if across > 0.0 else -1
-    centres = _met(_shifted(before, side * radius), _shifted(after, side * radius))
+    centres = _intersections(_shifted(before, side * radius), _shifted(after, side * radius))
     best: CornerArc | None = None
     for centre in sorted(centres, key=lambda c: abs(c - before.end)):
         a, b = _foot(before, centre), _foot(after, centre)
@@ -157,33 +157,33 @@ Shifted = tuple[complex, complex | None, float]
 
 def _shifted(element: Element, by: float) -> Shifted:
     if element.sense == 0:
-        way = element.along(element.start)
-        return element.start + 1j * way * by, way, 0.0
+        tangent = element.along(element.start)
+        return element.start + 1j * tangent * by, tangent, 0.0
     return element.centre, None, element.radius - element.sense * by
 
 
 def _foot(element: Element, centre: complex) -> complex:
     """The point of an element nearest to the centre of a rounding."""
     if element.sense == 0:
-        way = element.along(element.start)
-        return element.start + way * ((centre - element.start) / way).real
+        tangent = element.along(element.start)
+        return element.start + tangent * ((centre - element.start) / tangent).real
     out = centre - element.centre
     return element.centre + (out / abs(out) * element.radius if abs(out) > SAME else element.start - element.centre)
 
 
-def _met(one: Shifted, two: Shifted) -> list[complex]:
+def _intersections(one: Shifted, two: Shifted) -> list[complex]:
     """Where two shifted elements meet."""
     if one[1] is None and two[1] is not None:
         one, two = two, one
-    (p, way, r0), (q, other, r1) = one, two
-    if way is not None and other is not None:
-        return [_crossing(p, way, q, other)]
-    if min(r0 if way is None else 1.0, r1) <= 0.0:
+    (p, direction, r0), (q, other, r1) = one, two
+    if direction is not None and other is not None:
+        return [_line_intersection(p, direction, q, other)]
+    if min(r0 if direction is None else 1.0, r1) <= 0.0:
         return []
-    if way is not None:
-        at = (q - p) / way
+    if direction is not None:
+        at = (q - p) / direction
         under = r1**2 - at.imag**2
-        return [] if under < 0.0 else [p + way * (at.real + s * math.sqrt(under)) for s in (-1.0, 1.0)]
+        return [] if under < 0.0 else [p + direction * (at.real + s * math.sqrt(under)) for s in (-1.0, 1.0)]
     apart = abs(q - p)
     if apart <= SAME:
         return []
@@ -192,6 +192,6 @@ def _met(one: Shifted, two: Shifted) -> list[complex]:
     return [] if under < 0.0 else [p + (q - p) / apart * complex(x, s * math.sqrt(under)) for s in (-1.0, 1.0)]
 
 
-def _crossing(p: complex, way: complex, q: complex, other: complex) -> complex:
+def _line_intersection(p: complex, direction: complex, q: complex, other: complex) -> complex:
     """Where two lines cross that are not parallel."""
-    return p + way * ((q - p) / other).imag / (way / other).imag
+    return p + direction * ((q - p) / other).imag / (direction / other).imag

@@ -95,7 +95,7 @@ class Cycles:
             return q_cycles.MAX
         if text.endswith("AUTO"):
             # the feed that lasts, in units of the text
-            return self.s.need() * 60.0 / self.s.scale
+            return self.s.cutting_feed() * 60.0 / self.s.scale
         return self.s.q.formula(text)
 
     def _value(self, number: int, body: str) -> float:

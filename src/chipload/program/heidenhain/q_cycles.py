@@ -140,13 +140,13 @@ def _drilling(h: HoleValues, out: tuple[int, float], steady: bool) -> Iterator[S
     """Plunges of 200 and 203; ``out`` the motion and feed between them."""
     feed, dwell = h.feed(206), h.q(210, 0.0)
     breaks, back = (0.0, 0.0) if steady else (h.q(213, 0.0), abs(h.mm(256, 0.2)))
-    broken, done = 0, 0.0
+    chip_breaks, done = 0, 0.0
     for depth in h.plunges(0.0, steady):
-        if done > 0.0 and broken < breaks:
-            broken += 1
+        if done > 0.0 and chip_breaks < breaks:
+            chip_breaks += 1
             yield out[0], h.surface - done + back, out[1]
         elif done > 0.0:
-            broken = 0
+            chip_breaks = 0
             yield out[0], h.top, out[1]
             if dwell > 0.0:
                 yield DWELL, h.top, dwell

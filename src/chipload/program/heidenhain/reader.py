@@ -10,7 +10,7 @@ Notation: a block is a line; X Y Z [mm], A B C [rad].
 | switches (:mod:`~chipload.program.heidenhain.switches`) | TOOL DEF, TOOL CALL, M functions, FUNCTION TCPM |
 | order (:mod:`~chipload.program.heidenhain.flow`) | labels, REP, FN, Q parameters, CALL PGM of a file beside it |
 
-What else a block asks for is left out, with a finding on its line that leaves the program unproven. A block whose words
+Everything else in a block is left out, with a finding on its line that leaves the program unproven. A block whose words
 are wrong is refused.
 """
 
@@ -64,7 +64,7 @@ def read_heidenhain(
     feed: float | None = None,
     swivel: Swivel | None = None,
 ) -> tuple[Commands, tuple[Finding, ...]]:
-    r"""The motions that a conversational program asks for, and what was noticed.
+    r"""The motions of a conversational program, and the findings.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class _Blocks:
         for _ in range(MOST_BLOCKS):
             blocks = self.flow.text.blocks
             if at >= len(blocks):
-                self.s.unproven("heidenhain-no-end", "the text does not end with END PGM: it may have been cut off")
+                self.s.unproven("heidenhain-no-end", "the text does not end with END PGM: it may be truncated")
                 back = self.flow.end()
                 if back is None:
                     return

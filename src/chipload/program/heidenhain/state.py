@@ -1,4 +1,4 @@
-"""What holds while a conversational program is carried out, and the rows that it makes.
+"""State of a conversational program while it is executed, and the rows that it produces.
 
 Notation: ``at`` (9) is the programmed position [mm, rad]; beside a contour (RL, RR) the tool's centre stands elsewhere,
 and ``lag`` (2) [mm] is by how much it still does after R0, until X or Y is given. Axes in ``unknown`` stand where the
@@ -31,7 +31,7 @@ RADIUS_Q = 108
 
 
 class ConversationalState:
-    """State and outlets of one reading.
+    """State and output of one reading.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ class ConversationalState:
             raise InputError(f"F{value:g} for each turn: the spindle speed is not known: give S")
         self.feed = value * self.speed / math.tau if of_turn else mm_s_from_mm_min(value)
 
-    def need(self) -> float:
+    def cutting_feed(self) -> float:
         """The feed of a cut [mm/s]."""
         if self.feed is None:
             raise InputError("a cut has no feed: give F")
@@ -204,14 +204,14 @@ class ConversationalState:
 
     def straight(self, motion: int, end: list[float]) -> None:
         """RAPID or LINE to the programmed ``end``."""
-        feed = 0.0 if motion == RAPID else self.need()
+        feed = 0.0 if motion == RAPID else self.cutting_feed()
         self._turn_to(complex(end[0] - self.at[0], end[1] - self.at[1]))
         self._piece(Piece(motion, self.at, end, (0.0, 0.0), 0, feed, self._tail()))
         self.at = end
 
     def arc(self, end: list[float], centre: tuple[float, float], turns: int) -> None:
         """ARC to the programmed ``end``."""
-        feed = self.need()
+        feed = self.cutting_feed()
         out = complex(end[0] - centre[0], end[1] - centre[1]) * (1j if turns > 0 else -1j)
         self._turn_to(out)
         self._piece(Piece(ARC, self.at, end, centre, turns, feed, self._tail()))
@@ -239,11 +239,11 @@ class ConversationalState:
             self._carry(piece)
 
     def sharp(self, text: str) -> None:
-        """Say that a corner stays sharp; ``text`` asked for another."""
+        """Report that a corner stays sharp; ``text`` is the block that requests another."""
         self.unproven("heidenhain-corner", f"{text[:40]}: the corner stays sharp: its rounding or chamfer is left out")
 
     def _flush(self) -> None:
-        """Carry out what waits for a corner that does not come."""
+        """Execute the motion that waits for a corner block."""
         waiting, corner = self._waiting, self._corner
         self._waiting = self._corner = None
         if waiting is not None:

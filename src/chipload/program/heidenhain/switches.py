@@ -1,4 +1,4 @@
-"""What conversational blocks switch: M functions, tools, the working plane, tip control, the datum.
+"""Modal functions of conversational blocks: M functions, tools, working plane, tool centre point control, datum.
 
 Turned, mirrored and scaled coordinates are not read: motions are left out until they end.
 """
@@ -66,7 +66,7 @@ def after(s: ConversationalState, codes: list[int]) -> None:
         elif m in (97, 98):
             s.unproven("heidenhain-corner", f"M{m}: is ignored at a corner of a compensated contour")
         elif m == 130:
-            s.unproven("heidenhain-m130", "M130: untilted coordinates are read as those in force")
+            s.unproven("heidenhain-m130", "M130: untilted coordinates are read as the current ones")
         elif m not in KNOWN and m not in SILENT:
             s.note("heidenhain-unknown", f"M{m}: its effect is not known here")
 

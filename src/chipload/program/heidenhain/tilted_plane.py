@@ -147,7 +147,7 @@ def turn(s: ConversationalState, target: NDArray[np.float64], motion: int = RAPI
         s.row(RAPID, s.at)
     now[3:6] = target[3:6]
     _stand(s, now)
-    s.row(motion, s.at, 0.0 if motion == RAPID else s.need())
+    s.row(motion, s.at, 0.0 if motion == RAPID else s.cutting_feed())
     s.tilt = tilt
     if tilt is not None:
         s.frame()
@@ -159,10 +159,10 @@ def _turn_about_tip(s: ConversationalState, target: NDArray[np.float64]) -> None
     s.end_contour()
     if np.abs(target[3:6] - np.array(s.at[3:6])).max() < STILL:
         return
-    held, s.tcp = s.tcp, True
+    tcp_before, s.tcp = s.tcp, True
     s.at = [*s.at[:3], *target[3:6].tolist(), *s.at[6:]]
     s.row(RAPID, s.at)
-    s.tcp = held
+    s.tcp = tcp_before
 
 
 def axes_of(s: ConversationalState) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ class JobForm:
         self.path, self.run = path, run
         self.entered: dict[str, Any] = {}
         self.inputs: dict[str, Any] = {}
-        self.asked = 0
+        self.checks = 0
         try:
             self.fields = job_fields(path)
         except InputError as err:
@@ -93,10 +93,10 @@ class JobForm:
 
     async def _check(self) -> None:
         """Read the job with what was entered, as a run would."""
-        self.asked += 1
-        asked, overrides = self.asked, self.overrides
+        self.checks += 1
+        check, overrides = self.checks, self.overrides
         errors = await asyncio.to_thread(job_errors, self.path, overrides)
-        if asked != self.asked:
+        if check != self.checks:
             return
         self.start.set_enabled(not errors)
         for field in self.fields:
@@ -107,8 +107,8 @@ class JobForm:
                 same = override_of(field, self.entered.get(field.path)) is None
                 made.classes(**{"remove" if same else "add": "cl-form-changed"})
         count = len(overrides)
-        many = f"{count} values changed" if count != 1 else "1 value changed"
-        changed = f"{many}: the file stays" if count else "as in the file"
+        count_text = f"{count} values changed" if count != 1 else "1 value changed"
+        changed = f"{count_text}: the file stays" if count else "as in the file"
         self.state.set_text(f"{len(errors)} wrong" if errors else f"right, {changed}")
         self.errors.set_content("".join(f"<div class='cl-no'>{escape(text)}</div>" for text in errors))
 

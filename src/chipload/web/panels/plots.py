@@ -61,7 +61,7 @@ class PlotPanel:
         self._draw()
 
     def at(self, row: int) -> None:
-        """Put the cursor at a row, and say the values there."""
+        """Put the cursor at a row, and show the values there."""
         self.row = row
         if self.result is None or self.track is None or self.drawn == row:
             return

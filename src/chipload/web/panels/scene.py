@@ -1,7 +1,7 @@
 """The 3D view: bodies, stock at the row, path coloured by a column, cutter, marks.
 
 The view itself runs in the browser (viewer/src, built into report/viewer/viewer.js): it moves by itself while a track
-is played and tells the row. Here are its controls, and what it is told.
+is played and reports the row. This module holds its controls and the calls to it.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ SECTIONS = {"": "no section", "x": "section X", "y": "section Y", "z": "section 
 
 
 class Standing(StrEnum):
-    """Why the view tells its row."""
+    """Why the view reports its row."""
 
     PLAYING = "playing"
     STOPPED = "stopped"
@@ -49,12 +49,12 @@ class Standing(StrEnum):
 class ScenePanel:
     """The 3D view of a result."""
 
-    def __init__(self, assets: AssetCache, told: Callable[[int, Standing], Awaitable[None]]) -> None:
-        self.assets, self.told = assets, told
+    def __init__(self, assets: AssetCache, report_row: Callable[[int, Standing], Awaitable[None]]) -> None:
+        self.assets, self.report_row = assets, report_row
         self.result: PageResult | None = None
         self.track: PageTrack | None = None
         self.scene: PageScene | None = None
-        self.beside: PageScene | None = None
+        self.second_scene: PageScene | None = None
         self.found: Any = ((), "")
         self.seen: dict[str, bool] = {}
         self.sides: tuple[Side, ...] = ()
@@ -76,7 +76,7 @@ class ScenePanel:
                 ).classes("cl-colour").mark("map")  # fmt: skip
                 self.map.on("popup-hide", js_handler=RELEASE)
                 self.bent = ui.slider(min=0.0, max=1.0, step=0.01, value=0.0, on_change=self._map).props(
-                    'dense aria-label="how far the map is bent"'
+                    'dense aria-label="scale of the deflection"'
                 )
                 self.bent.on("change", js_handler=RELEASE)
                 self.factor = ui.label("").classes("cl-note").mark("factor")
@@ -129,8 +129,8 @@ class ScenePanel:
             self._first(f"lead({second}, '{what}', {here}, {there})")
 
     async def compare(self, sides: tuple[Side, ...], found: Any) -> None:
-        """Show the first two sides beside each other; empty: the own track alone. ``found``: bodies of the second."""
-        self.sides, self.beside = sides, None
+        """Show the first two sides next to each other; empty: the own track alone. ``found``: bodies of the second."""
+        self.sides, self.second_scene = sides, None
         self.frame.classes(**{"add" if sides else "remove": "cl-two"})
         self.second.set_visibility(bool(sides))
         for k, title in enumerate(self.titles):
@@ -153,7 +153,7 @@ class ScenePanel:
         )
         if sides is not self.sides:
             return
-        self.beside = scene
+        self.second_scene = scene
         here, there = (json.dumps(v.tolist()) for v in knots(sides[0], other, self.counted))
         url, second = self.assets.put(scene.document), f"c{self.second.id}"
         ui.run_javascript(
@@ -181,7 +181,7 @@ class ScenePanel:
             return
         self.scene = scene
         self._offer_maps(scene)
-        few = f"The path is drawn by some {POINTS} of its {len(track)} steps." if len(track) > POINTS else ""
+        few = f"The drawn path has about {POINTS} of its {len(track)} steps." if len(track) > POINTS else ""
         self.notice.set_text(" ".join(t for t in (scene.notice, few) if t))
         url = self.assets.put(scene.document)
         self._boxes(scene)
@@ -210,7 +210,7 @@ class ScenePanel:
 
     # -- parts --------------------------------------------------------------------------------------------------
     def _first(self, what: str) -> None:
-        """Call the own view; a view beside it follows."""
+        """Call the own view; a second view follows."""
         if self.track is not None:
             ui.run_javascript(f"window.chiploadViewer && chiploadViewer.of('{self.view_id}').{what}")
 
@@ -226,12 +226,12 @@ class ScenePanel:
         if self.sides and isinstance(detail, dict) and isinstance(detail.get("row"), int):
             row = min(max(detail["row"], 0), len(self.sides[1].track) - 1)
             if detail.get("why") == Standing.CLICKED:
-                await self.told(matching_row(self.sides[1], self.sides[0], self.counted, row), Standing.CLICKED)
+                await self.report_row(matching_row(self.sides[1], self.sides[0], self.counted, row), Standing.CLICKED)
 
     async def _moved(self, event: Any) -> None:
         detail = event.args
         if isinstance(detail, dict) and isinstance(detail.get("row"), int) and detail.get("why") in set(Standing):
-            await self.told(detail["row"], Standing(detail["why"]))
+            await self.report_row(detail["row"], Standing(detail["why"]))
 
     async def _recoloured(self, views: int = 2) -> None:
         """Colour the path by the column that is chosen, in the first views."""
@@ -240,8 +240,8 @@ class ScenePanel:
             return
 
         shown = [(self.view_id, Side(result, track, "", ""), scene)]
-        if self.sides and self.beside is not None and column in self.sides[1].result.columns:
-            shown.append((f"c{self.second.id}", self.sides[1], self.beside))
+        if self.sides and self.second_scene is not None and column in self.sides[1].result.columns:
+            shown.append((f"c{self.second.id}", self.sides[1], self.second_scene))
         span = common_span([side for _, side, _ in shown], column) if len(shown) > 1 else None
 
         def document(side: Side, own: PageScene) -> bytes:
@@ -270,11 +270,13 @@ class ScenePanel:
         self.boxes.clear()
         with self.boxes:
             for name, on in self.seen.items():
-                box = ui.checkbox(_plain(name), value=on, on_change=lambda e, n=name: self._see(n, bool(e.value)))
+                box = ui.checkbox(
+                    _plain(name), value=on, on_change=lambda e, n=name: self._set_visible(n, bool(e.value))
+                )
                 box.props(f'dense size=xs aria-label="{html.escape(_plain(name))}"')
                 box.on("update:model-value", js_handler=RELEASE)
 
-    def _see(self, name: str, wanted: bool) -> None:
+    def _set_visible(self, name: str, wanted: bool) -> None:
         self.seen[name] = wanted
         if self.track is not None:
             ui.run_javascript(self._layer(name, wanted))
@@ -306,7 +308,7 @@ class ScenePanel:
         self.factor.set_visibility(bends)
 
     async def _map(self) -> None:
-        """Show the map that is chosen, bent as the slider says."""
+        """Show the chosen map, deflected by the scale of the slider."""
         self._map_controls()
         if self.track is None or self.scene is None:
             return
@@ -318,7 +320,7 @@ class ScenePanel:
             return
         with contextlib.suppress(TimeoutError):
             found = await ui.run_javascript(call, timeout=30.0)
-            self.factor.set_text(f"bent {float(found or 0.0):.3g} times" if self.bent.value else "not bent")
+            self.factor.set_text(f"deflection x {float(found or 0.0):.3g}" if self.bent.value else "no deflection")
 
     def _measure(self) -> None:
         self.measures = not self.measures

@@ -20,7 +20,7 @@ CLICK = "(e) => { const r = e.target.closest('[data-line]'); if (r) emit(Number(
 
 
 class SourcePanel:
-    """The text beside a track."""
+    """The source text of a track."""
 
     def __init__(self, pick: Callable[[int], None]) -> None:
         self.pick = pick

@@ -224,7 +224,7 @@ def apart_at(at, c, part, a, b, na, nb, ea, eb, guess, index, wait, to, ring, fr
 
 @njit(cache=True, nogil=True)
 def places(at, c, part, a, b, looks, known, index, wait, to, ring, front, spans, out):
-    """Ranges of a part of the profile that are told apart by where the contact jumps: rows of ``out`` (to, spans and
+    """Ranges of a part of the profile that are distinguished by where the contact jumps: rows of ``out`` (to, spans and
     angle in contact just before it, spans and angle just after it, by how much the angle differs within); their number.
     Ranges beyond the room of ``out`` are as one. In the first ``known`` rows of ``out`` are those of another instant.
     """

@@ -2,7 +2,7 @@
 """Drive a LinuxCNC without a screen: wait for the controller's beat, run one program, write down what the machine does.
 
 Runs as the [DISPLAY] of tube.ini, so in the Python of LinuxCNC's own modules. It reads `$PROGRAM`, waits for the beat,
-and writes `machine.csv`: time [s, monotonic], X, Y, Z [mm], velocity [mm/s], override in force. It ends with the
+and writes `machine.csv`: time [s, monotonic], X, Y, Z [mm], velocity [mm/s], override in effect. It ends with the
 program, after `$SECONDS` of it, or when the file `end` appears; LinuxCNC goes down with it.
 """
 
