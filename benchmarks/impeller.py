@@ -1,10 +1,12 @@
 """The largest cutters of the paper's problem, certified, against its own sampled test; and cost against both numbers.
 
-    python benchmarks/impeller.py [--patches] [--programs RESULT] [--large [--out FOLDER]]
+    python benchmarks/impeller.py [--patches] [--programs RESULT] [--large [--out FOLDER]] [--tasks]
 
 `--patches`: instead, one, two, three cutters against one picked by hand, on that impeller and on NASA's HECC.
 `--programs`: the table of every way by its programs, of the result folder of the example.
 `--large`: cost against both numbers; a picture of it in the folder.
+`--tasks`: the search of the surfaces of the example in tasks of blocks of contact points: processor time of each task,
+both times on one process and on two with their start, on Dask with two workers, and whether the bytes are the same.
 
 Reference: [Wu2019]: 100 contact points, 2900 check points, 15 table angles, 36 diameters. The impeller is the one by
 formula. Its method, compiled the same way on the same two threads: for every table angle, diameter, contact point and
@@ -16,6 +18,7 @@ too (``every``); the whole answer adds the second corner radius and the exact ra
 
 import json
 import math
+import multiprocessing
 import os
 import sys
 import time
@@ -27,9 +30,17 @@ import numpy as np
 from numba import njit
 from plotly.subplots import make_subplots
 
+from chipload import examples
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import checked, loft, read_meridian, read_sections
+from chipload.jobs import load_job
+from chipload.jobs.impeller import run as impeller_run
+from chipload.jobs.impeller import surface_search
+from chipload.jobs.impeller.checkpoint import KeptParts, part_bytes
+from chipload.jobs.impeller.part import read_part
+from chipload.jobs.impeller.surface_search import SearchInputs
+from chipload.machine.machine import machine_named
 from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.compare import cutter_choices
 from chipload.planning.impeller.costs import ChannelSide, Terms
@@ -37,6 +48,7 @@ from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.search import limits
 from chipload.planning.impeller.surfaces import ContactSampling, surface_of
+from chipload.workers import Workers
 
 HECC = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[1].parent / "shared" / "data")) / "blades/nasa_hecc"
 HECC = HECC / "HECC_Vaned_Configuration/Coordinates"
@@ -285,8 +297,68 @@ def programs(folder: str) -> None:
               f"{way['verdict']} |")  # fmt: skip
 
 
+def search_inputs() -> SearchInputs:
+    """What the search of the example takes."""
+    job = load_job(Path(examples.__file__).parent / "impeller" / "job.toml").job
+    impeller, catalogue = read_part(job).impeller, catalogue_named(job.catalogue)
+    covering = impeller_run._covering(job, impeller, catalogue)
+    surfaces = impeller_run._surfaces(job, impeller, covering)
+    table = impeller_run._tables(machine_named(job.machine), job.operation)
+    return SearchInputs(surfaces, table, catalogue, job.operation.clearance_mm)
+
+
+def block_seconds(inputs: SearchInputs, k: int, first: int, last: int) -> float:
+    """Processor time of a task."""
+    begin = time.process_time()
+    surface_search._block(inputs, k, first, last)
+    return time.process_time() - begin
+
+
+def tasks() -> None:
+    """The search of the example in tasks."""
+    from distributed import LocalCluster
+
+    inputs = search_inputs()
+    each = [
+        (k, a, b)
+        for k, s in enumerate(inputs.surfaces)
+        for a, b in surface_search.blocks_of(len(s.scene.contact), len(inputs.table.angle))
+    ]
+    surface_search._block(inputs, 0, 0, 1)
+    took = sorted(block_seconds(inputs, *one) for one in each)
+    whole = sum(took) / sum(len(s.scene.contact) for s in inputs.surfaces) / len(inputs.table.angle)
+    print(f"{len(took)} tasks of {surface_search.PAIRS} pairs of contact point and table angle or more")
+    print(f"processor time of a task: {took[0]:.3f} s at least, {took[len(took) // 2]:.3f} s in the middle, "
+          f"{took[-1]:.3f} s at most; {1e3 * whole:.2f} ms a pair")  # fmt: skip
+    rows = []
+    before = sum(os.times()[:4])
+
+    def searched(name: str, where: Workers) -> None:
+        begin = time.perf_counter()
+        with where.team() as team:
+            keep = KeptParts(None, "", None if where.alone else team)
+            keep.share(inputs)
+            found = surface_search.searched_surfaces(inputs, keep, not where.alone)
+        rows.append((name, time.perf_counter() - begin, part_bytes(tuple((x.answer, x.one) for x in found))))
+
+    searched("one process, two threads", Workers(1))
+    spent = [before, sum(os.times()[:4])]
+    searched("two processes", Workers(2))
+    for child in multiprocessing.active_children():
+        child.join(10.0)
+    spent.append(sum(os.times()[:4]))
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        searched("Dask, two workers", Workers(dask=cluster.scheduler_address))
+    for name, seconds, found in rows:
+        print(f"{name}: {seconds:.1f} s elapsed, {'the same bytes' if found == rows[0][2] else 'OTHER BYTES'}")
+    print(f"processor time: one process {spent[1] - spent[0]:.1f} s, two with their start {spent[2] - spent[1]:.1f} s; "
+          f"load {os.getloadavg()[0]:.0f} on {os.cpu_count()} cores")  # fmt: skip
+
+
 if __name__ == "__main__":
-    if "--patches" in sys.argv:
+    if "--tasks" in sys.argv:
+        tasks()
+    elif "--patches" in sys.argv:
         patches()
     elif "--programs" in sys.argv:
         programs(sys.argv[sys.argv.index("--programs") + 1])

@@ -10,9 +10,9 @@ from chipload import examples
 from chipload.jobs import load_job
 from chipload.jobs.impeller import run
 from chipload.jobs.impeller.contact_tables import ANGLES, contact_table
+from chipload.jobs.impeller.surface_search import SearchInputs, searched_surfaces
 from chipload.planning.impeller.compare import clear_somewhere, gouges
 from chipload.planning.impeller.kept import anew
-from chipload.progress import silent
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,9 @@ def searched():
     machine, catalogue, part = run._machine(job), run._catalogue(job), run.read_part(job)
     table = run._tables(machine, job.operation)
     surface = run._surfaces(job, part.impeller, None)[0]
-    return run._searched(job, 0, surface, table, catalogue, silent, anew)
+    inputs = SearchInputs([surface], table, catalogue, job.operation.clearance_mm)
+    (found,) = searched_surfaces(inputs, anew, spread=False)
+    return run._searched(job, 0, inputs, found, 0.0)
 
 
 def test_the_cutter_is_clear_and_the_next_is_not(searched):

@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 import chipload.workers as workers_module
 from chipload.cli import app
 from chipload.jobs import FinishedJob, load_job, run_job
+from chipload.jobs.impeller import surface_search
 from chipload.jobs.impeller.checkpoint import part_bytes
 from chipload.result.summary import summary_bytes
 from chipload.simulation import strips
@@ -156,13 +157,18 @@ def numbers(done: FinishedJob) -> tuple[list[bytes], Any]:
     return [part_bytes(s.answer) for s in done.outcome.surfaces], timeless(json.loads(summary_bytes(done.result, {})))
 
 
-def test_surfaces_of_an_impeller_are_searched_by_processes_and_on_a_cluster(impeller, cluster):
+def test_surfaces_of_an_impeller_are_searched_by_processes_and_on_a_cluster(impeller, cluster, monkeypatch):
+    """In two blocks of each surface."""
     address, _ = cluster
     alone = numbers(run_job(load_job(impeller)))
     assert len(alone[0]) == 2
     assert alone[0][0] != alone[0][1]
+    monkeypatch.setattr(surface_search, "PAIRS", 4)
     for where in (Workers(dask=address), Workers(2)):
-        assert numbers(run_job(load_job(impeller), workers=where)) == alone
+        told: list[str] = []
+        spread = run_job(load_job(impeller), lambda _, what, told=told: told.append(what), workers=where)
+        assert "search, 4 of 4 parts" in told
+        assert numbers(spread) == alone
 
 
 def test_programs_of_an_impeller_on_a_cluster_that_loses_a_worker_are_those_of_one_process(cluster, tmp_path):

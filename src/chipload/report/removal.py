@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import io
+import multiprocessing
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +20,9 @@ from chipload.report.presentation import Blank
 from chipload.report.view import parts_of
 from chipload.result import Result, Track
 from chipload.simulation.removal_mesh import RemovalMesh, ToolPoses, removal_mesh
+
+if TYPE_CHECKING:
+    import trimesh
 
 Floats = NDArray[np.float64]
 
@@ -49,19 +55,45 @@ def removal_meshes(result: Result, blanks: Mapping[str, Blank]) -> ShownStocks:
     known = [k for k in order if (own := blanks.get(result.tracks[k].name)) is not None and own.mesh is not None]
     out: dict[int, RemovalMesh] = {}
     refused = dict.fromkeys(known[TRACKS:], f"the stock of {TRACKS} tracks is kept, those in use first")
-    for k in known[:TRACKS]:
-        blank = blanks[result.tracks[k].name]
-        path = tool_path(result.tracks[k], blank)
-        if path is None or blank.mesh is None:
-            continue
-        before, cutters = _before(result, blanks, blank)
-        cutters |= dict(blank.cutters)
-        try:
-            solid = {n: c for n, c in cutters.items() if not c.body}
-            out[k] = removal_mesh(blank.mesh, path, solid, before, blank.wider)
-        except InputError as err:
-            refused[k] = str(err)
+    tasks = [(k, *task) for k in known[:TRACKS] if (task := _removal(result, blanks, k)) is not None]
+    # the loops of the dexels run without the interpreter's lock
+    with ThreadPoolExecutor(threads()) as pool:
+        found = pool.map(lambda task: _stock(*task[1:]), tasks)
+        for (k, *_), stock in zip(tasks, found, strict=True):
+            if isinstance(stock, RemovalMesh):
+                out[k] = stock
+            else:
+                refused[k] = stock
     return ShownStocks(out, refused)
+
+
+def threads() -> int:
+    """Threads for the stocks of tracks: one for each core; one in a process that shares the cores with others."""
+    return 1 if multiprocessing.parent_process() is not None else len(os.sched_getaffinity(0))
+
+
+def _removal(
+    result: Result, blanks: Mapping[str, Blank], k: int
+) -> tuple[trimesh.Trimesh, ToolPoses, dict[int, Cutter], list[ToolPoses], float] | None:
+    """Blank, path, cutters and earlier paths of track k, and how wide the cells are; None: it has no history."""
+    blank = blanks[result.tracks[k].name]
+    path = tool_path(result.tracks[k], blank)
+    if path is None or blank.mesh is None:
+        return None
+    before, cutters = _before(result, blanks, blank)
+    solid = {n: c for n, c in (cutters | dict(blank.cutters)).items() if not c.body}
+    # a copy: tracks may share their blank, and its index of triangles is not for two threads
+    return blank.mesh.copy(), path, solid, before, blank.wider
+
+
+def _stock(
+    mesh: trimesh.Trimesh, path: ToolPoses, cutters: dict[int, Cutter], before: list[ToolPoses], wider: float
+) -> RemovalMesh | str:
+    """The stock over the rows of a track, or why it is refused."""
+    try:
+        return removal_mesh(mesh, path, cutters, before, wider)
+    except InputError as err:
+        return str(err)
 
 
 def _before(result: Result, blanks: Mapping[str, Blank], blank: Blank) -> tuple[list[ToolPoses], dict[int, Cutter]]:

@@ -8,6 +8,7 @@ import pytest
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named
 from chipload.planning.impeller.answer import largest_cutters, one_cutter
 from chipload.planning.impeller.closed_form import axis_at, contact_limit
+from chipload.planning.impeller.ranges import _kernels
 from chipload.planning.impeller.ranges.ranges import valid_ranges
 from chipload.planning.impeller.scene import Scene
 
@@ -144,3 +145,26 @@ def test_turned_away():
     down = Scene(s.contact, np.array([[0.0, 0.0, -1.0]]), s.curvature, s.surface, s.check, s.check_surface, 1.0)
     found = largest_cutters(down, catalogue_named("wu2019"), [0.3], clearance=0.0)
     assert [u.reason for u in found.unreachable] == ["turned away"]
+
+
+@pytest.mark.parametrize("cutter", [PLAIN, WHOLE])
+def test_a_point_that_bounds_prove_clear_is_clear_at_every_angle(cutter):
+    """Of many points and parts of B the gouge test of the point alone, at angles within the part."""
+    s, rng = channel(1), np.random.default_rng(7)
+    table, stages = 0.9, cutter.enclosing(0.5)
+    cone, proved, met, open_ = np.array([math.sin(table), math.cos(table)]), 0, 0, 0
+    for i in rng.choice(len(s.check), 400, replace=False).tolist():
+        one = Scene(s.contact, s.normal, s.curvature, s.surface, s.check[i : i + 1], s.check_surface[i : i + 1], s.near)
+        low = rng.uniform(-1.2, 1.0)
+        part = low, low + math.radians(8.0)
+        goes = all(clear(one, 0, cutter, table, B, 0.5) for B in np.linspace(*part, 41))
+        if _kernels.clear_within(
+            s.check, i, s.rows[0], cone, cutter.corner_radius, cutter.rho, stages, *part, math.radians(0.5)
+        ):
+            assert goes
+            proved += 1
+        else:
+            met, open_ = met + (not goes), open_ + goes
+    # most of what is clear is proved
+    assert min(proved, met) > 20
+    assert open_ <= 0.2 * proved

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chipload.jobs.impeller.outcome import Checked, CheckedPartition, Covered
 from chipload.jobs.impeller.paths import checked_programs
@@ -45,11 +46,14 @@ _FINER, _NEARLY = (0.5, 0.25), 1.25
 
 @dataclass(frozen=True, eq=False)
 class _Planned:
-    """A planned partition: its division, its predicted time [s], its settings, their time of all channels [s]."""
+    """A planned partition: its division, its predicted time [s], its settings, the times of the rows of each program
+    (n,) [s], the time of all channels [s].
+    """
 
     partition: Partition
     predicted: float
     plan: PlannedSettings
+    rows: tuple[NDArray[np.float64], ...]
     seconds: float
 
 
@@ -92,7 +96,7 @@ def checked_partitions(
             choice, partition = choices[k], partitions[k]
             done = (turn + k / len(choices)) / _ROUNDS
             plan = _planned(choice, partition, job, machine, memory, _from(progress, 0.8 * done), keep)
-            for number, row in _measured(choice.costs, plan, machine):
+            for number, row in _measured(choice.costs, plan):
                 rows.setdefault(id(choice.costs), []).append((number, row))
             if choice.name not in best or plan.seconds < best[choice.name].seconds:
                 best[choice.name] = plan
@@ -153,9 +157,10 @@ def _planned(
     plan = planned(
         own, partition.division.patches, _changes(choice), progress=progress, known=memory.millings, keep=keep
     )
-    each = [float(times_on(s.program, machine).sum()) for s in plan.settings]
+    rows = tuple(times_on(s.program, machine) for s in plan.settings)
+    each = [float(row.sum()) for row in rows]
     seconds = choice.costs[0].terms.repeats * sum(each) + _change_time(plan.settings, choice)
-    return _Planned(partition, _predicted(choice, partition), plan, seconds)
+    return _Planned(partition, _predicted(choice, partition), plan, rows, seconds)
 
 
 def _change_time(settings: Sequence[CutterSetting], choice: CutterChoice) -> float:
@@ -174,12 +179,11 @@ def _same(a: Partition, b: Partition) -> bool:
     return [key(p) for p in a.divided.patches] == [key(p) for p in b.divided.patches]
 
 
-def _measured(costs: Sequence[Costs], done: _Planned, machine: Machine) -> list[tuple[int, MeasuredCost]]:
+def _measured(costs: Sequence[Costs], done: _Planned) -> list[tuple[int, MeasuredCost]]:
     """For each patch the number of its side and the cost of its program; rest passes count to the patch they finish."""
     rest_time: dict[int, float] = {}
     millings = [m for s in done.plan.settings for m in s.millings]
-    for s in done.plan.settings:
-        seconds = times_on(s.program, machine)
+    for s, seconds in zip(done.plan.settings, done.rows, strict=True):
         owners = [m for m in s.millings for _ in m.tracks.tracks]
         owners += [_patch_of_rest(r.body, r.side, r.box, millings) for r in s.rests for _ in r.tracks]
         for number, time in zip(s.linked.track.tolist(), seconds.tolist(), strict=True):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
@@ -29,21 +27,20 @@ from chipload.jobs.impeller.paths import EDGE, finish_settings, walls_of
 from chipload.jobs.impeller.point_milling import checked_points
 from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.roughing import checked_roughing
+from chipload.jobs.impeller.surface_search import WORKERS, SearchInputs, SurfaceSearch, searched_surfaces
 from chipload.jobs.impeller.tables import ImpellerOperationTable
 from chipload.jobs.provenance import provenance_of, sources, title_of, versions
 from chipload.jobs.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
-from chipload.planning.impeller.answer import Answer, largest_cutters, one_cutter, one_cutter_of
+from chipload.planning.impeller.answer import Answer, one_cutter_of
 from chipload.planning.impeller.compare import CutterChoice, cutter_choices
 from chipload.planning.impeller.costs import ChannelSide, Terms
 from chipload.planning.impeller.covering.covering import Covering, covering_of, first_edge
 from chipload.planning.impeller.impeller import Impeller
-from chipload.planning.impeller.kept import Keep, PlanTask
+from chipload.planning.impeller.kept import Keep
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling, ContactSurface, hub_range, surface_of
 from chipload.planning.impeller.tables import IndexTable, index_table
-from chipload.planning.impeller.unreached import with_fits
-from chipload.progress import Progress, silent
-from chipload.progress import part_of as within
+from chipload.progress import Progress, part_of, silent
 from chipload.result import Provenance
 from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.workers import Team, Workers
@@ -52,8 +49,6 @@ from chipload.workers import Team, Workers
 _WITH_PATHS, _SEARCH_ALONE = (5.0, 10.0, 10.0, 75.0), (50.0, 50.0, 0.0, 0.0)
 #: of the tolerance, by how much tapered cutters may stand out of the cylinders that are planned with
 _OUTSIDE = 0.5
-#: threads of the search; its answer does not depend on them
-WORKERS = len(os.sched_getaffinity(0))
 
 
 def run(
@@ -97,20 +92,18 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     if checkpoint is not None:
         checkpoint.notice(_estimate(job, surfaces, catalogue))
     first, second, third, last = _stages(op, progress)
-    keep.share((job, surfaces, table, catalogue))
-    searches = [PlanTask(("search", k), _found, (k,)) for k in range(len(surfaces))]
-    keep.ahead(searches, lambda done, what: first(done, f"search, {what}"))
-    done = []
-    for k, surface in enumerate(surfaces):
-        found = _searched(job, k, surface, table, catalogue, part_of(first, k, len(surfaces)), keep)
-        done.append(replace(found, search_s=found.search_s + took / len(surfaces)))
-        _reached(k, done[-1])
-    pairs = [(found.surface.scene, found.answer) for found in done]
+    inputs = SearchInputs(surfaces, table, catalogue, op.clearance_mm)
+    keep.share(inputs)
+    found = searched_surfaces(inputs, keep, team is not None, first)
+    done = [_searched(job, k, inputs, one, took / len(surfaces)) for k, one in enumerate(found)]
+    for k, surface in enumerate(done):
+        _reached(k, surface)
+    pairs = [(surface.surface.scene, surface.answer) for surface in done]
     whole = keep(("one cutter",), lambda: one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS))
     one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
     feeds = cutter_feeds(job, catalogue, forces)
-    choices = _choices(job, done, catalogue, impeller, feeds, part_of(second, 0, 2), keep)
-    partitions = tuple(choice.partition(WORKERS, part_of(second, 1, 2), keep) for choice in choices)
+    choices = _choices(job, done, catalogue, impeller, feeds, part_of(second, 0.0, 0.5), keep)
+    partitions = tuple(choice.partition(WORKERS, part_of(second, 0.5, 1.0), keep) for choice in choices)
     stated = StatedJob(title_of(job.path), _settings(op), job.table.impeller.outer_diameter_mm, _ahead(job))
     milled = ImpellerResult(
         stated, impeller, catalogue, machine, tuple(done), one, partitions, None, None, provenance,
@@ -134,14 +127,6 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     keep.write(at_once=True)
     milled = replace(milled, flanks=flanks, points=points)
     return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
-
-
-def _found(
-    shared: tuple[ImpellerJob, Sequence[ContactSurface], IndexTable, Catalogue], k: int
-) -> tuple[Answer, tuple[int, int, tuple[NDArray[np.float64], ...]] | None, float]:
-    """The search of one surface; another process executes it."""
-    job, surfaces, table, catalogue = shared
-    return _search(job, surfaces[k], table, catalogue, silent, 1)
 
 
 def _five_axis_machines(job: ImpellerJob) -> None:
@@ -222,44 +207,17 @@ def _stages(op: ImpellerOperationTable, progress: Progress) -> list[Progress]:
     """Progress of the search, the division, roughing and finishing, by the share of the time that each takes."""
     shares = _WITH_PATHS if op.paths is not None else _SEARCH_ALONE
     edges = np.concatenate([[0.0], np.cumsum(shares)]) / sum(shares)
-    return [within(progress, float(a), float(b)) for a, b in itertools.pairwise(edges)]
+    return [part_of(progress, float(a), float(b)) for a, b in itertools.pairwise(edges)]
 
 
-def part_of(progress: Progress, k: int, n: int) -> Progress:
-    """Progress of the k-th of n similar parts."""
-    return lambda done, what: progress((k + done) / n, what)
-
-
-def _searched(
-    job: ImpellerJob, k: int, surface: ContactSurface, table: IndexTable, catalogue: Catalogue, progress: Progress,
-    keep: Keep,
-) -> Searched:  # fmt: skip
-    """The largest cutters of a surface."""
-    op = job.operation
-    answer, one, took = keep(("search", k), lambda: _search(job, surface, table, catalogue, progress))
-    best = None
-    if one is not None:
-        reached = np.flatnonzero(answer.cutter >= 0)
-        best = OneCutter(catalogue.cutters[one[0]], one[1], reached, one[2])
-    settings = _settings(op) | _settings(job.table.surface[k])
-    return Searched(settings, surface, answer, table, best, op.clearance_mm, took)
-
-
-def _search(
-    job: ImpellerJob,
-    surface: ContactSurface,
-    table: IndexTable,
-    catalogue: Catalogue,
-    progress: Progress,
-    threads: int = WORKERS,
-) -> tuple[Answer, tuple[int, int, tuple[NDArray[np.float64], ...]] | None, float]:
-    """Largest cutters of a surface, the one cutter that reaches most of it, and the time that this took [s]."""
-    begin, scene, clearance = time.perf_counter(), surface.scene, job.operation.clearance_mm
-    answer = largest_cutters(
-        scene, catalogue, table.angle, clearance, pallets=table.spans, workers=threads, progress=progress
-    )
-    answer = replace(answer, unreachable=with_fits(scene, answer, table.spans, threads))
-    return answer, one_cutter(scene, answer, clearance, table.spans, threads), time.perf_counter() - begin
+def _searched(job: ImpellerJob, k: int, inputs: SearchInputs, found: SurfaceSearch, covering_s: float) -> Searched:
+    """Surface k with its largest cutters; ``covering_s`` its share of the time of the covering [s]."""
+    surface, best = inputs.surfaces[k], None
+    if found.one is not None:
+        reached = np.flatnonzero(found.answer.cutter >= 0)
+        best = OneCutter(inputs.catalogue.cutters[found.one[0]], found.one[1], reached, found.one[2])
+    settings = _settings(job.operation) | _settings(job.table.surface[k])
+    return Searched(settings, surface, found.answer, inputs.table, best, inputs.clearance, found.search_s + covering_s)
 
 
 def _choices(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,7 +46,7 @@ class Unreachable:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Largest cutter at each contact point, with its table angle and pallet angles.
+    """Largest cutter at each contact point of a scene, or of a selection of them, with its table and pallet angles.
 
     Parameters
     ----------
@@ -91,6 +91,7 @@ def largest_cutters(
     sampling: Sampling | None = None,
     workers: int = 1,
     progress: Progress = silent,
+    points: ArrayLike | None = None,
 ) -> Answer:
     """Largest cutter of the catalogue at each contact point, over the table angles [rad] and all pallet angles.
 
@@ -98,13 +99,15 @@ def largest_cutters(
     ----------
     clearance : [mm] of neck, shank and holder
     every : as :func:`limits`
+    points : (c,) int, which contact points; None: all. :func:`joined` makes one answer of several selections
     """
     alpha = np.atleast_1d(np.asarray(tables, dtype=np.float64))
+    among = np.arange(len(scene.contact)) if points is None else np.asarray(points, dtype=np.int64)
     families = tuple(
-        _family(scene, catalogue.family(r), alpha, every, pallets, sampling, workers, progress)
+        _family(scene, catalogue.family(r), alpha, every, pallets, sampling, workers, progress, among)
         for r in catalogue.families
     )
-    c = len(scene.contact)
+    c = len(among)
     cutter, table = np.full(c, -1), np.zeros(c, dtype=np.int64)
     empty = np.zeros((0, 2))
     ranges, refused = [empty] * c, [np.zeros(0, dtype=np.int64)] * c
@@ -118,7 +121,7 @@ def largest_cutters(
         for k in open_points:
             groups.setdefault(waiting[k][place[k]][0], []).append(k)
         for index, members in sorted(groups.items()):
-            which = np.array(members)
+            which = among[members]
             tried = np.array([waiting[k][place[k]][1] for k in members])
             got = valid_ranges(
                 scene, catalogue.cutters[index], alpha[tried], clearance, pallets, which, workers=workers
@@ -134,7 +137,7 @@ def largest_cutters(
         open_points = [k for k in open_points if cutter[k] < 0 and place[k] < len(waiting[k])]
     blockers = tuple(np.unique(np.concatenate([refused[k], *(_proof(f, k) for f in families)])) for k in range(c))
     missed = tuple(
-        _reason(scene, families, int(k), bool(waiting[k]), bool(between[k]), blockers[k])
+        _reason(scene, families, int(k), int(among[k]), bool(waiting[k]), bool(between[k]), blockers[k])
         for k in np.flatnonzero(cutter < 0)
     )
     proves = np.array([_proves(scene, one, clearance) for one in catalogue.cutters] + [scene.covering is not None])
@@ -143,6 +146,41 @@ def largest_cutters(
         catalogue, alpha, families, cutter, table, tuple(ranges), blockers, bounded, bounded & proves[cutter],
         tolerance, missed,
     )  # fmt: skip
+
+
+def joined(parts: Sequence[Answer]) -> Answer:
+    """The answer of all contact points from those of selections that follow one another; the same to the last bit."""
+    first = parts[0]
+    families = tuple(_joined([part.families[k] for part in parts]) for k in range(len(first.families)))
+    return Answer(
+        first.catalogue,
+        first.tables,
+        families,
+        np.concatenate([x.cutter for x in parts]),
+        np.concatenate([x.table for x in parts]),
+        tuple(row for x in parts for row in x.ranges),
+        tuple(row for x in parts for row in x.blockers),
+        np.concatenate([x.bounded for x in parts]),
+        np.concatenate([x.certified for x in parts]),
+        first.tolerance,
+        tuple(one for x in parts for one in x.unreachable),
+    )
+
+
+def _joined(parts: Sequence[SearchLimits]) -> SearchLimits:
+    """The bounds of a family; where a part has fewer blockers, its rows are filled up with -1."""
+    blockers = np.full((*np.shape(parts[0].rho)[1:], max(f.blockers.shape[2] for f in parts)), -1, dtype=np.int64)
+    rows = [np.repeat(blockers[None], len(f.rho), axis=0) for f in parts]
+    for row, f in zip(rows, parts, strict=True):
+        row[:, :, : f.blockers.shape[2]] = f.blockers
+    return replace(
+        parts[0],
+        rho=np.concatenate([f.rho for f in parts]),
+        bound=np.concatenate([f.bound for f in parts]),
+        pallet=np.concatenate([f.pallet for f in parts]),
+        certified=np.concatenate([f.certified for f in parts]),
+        blockers=np.concatenate(rows),
+    )
 
 
 def _proves(scene: Scene, cutter: CatalogueCutter, clearance: float) -> bool:
@@ -218,11 +256,13 @@ def _of(answer: Answer, cutter: CatalogueCutter) -> SearchLimits:
 
 def _family(
     scene: Scene, cutters: tuple[CatalogueCutter, ...], alpha: Floats, every: bool, pallets: ArrayLike,
-    sampling: Sampling | None, workers: int, progress: Progress,
+    sampling: Sampling | None, workers: int, progress: Progress, points: Ints,
 ) -> SearchLimits:  # fmt: skip
     r = cutters[0].corner_radius
     rho = [c.rho for c in cutters]
-    return limits(scene, alpha, r, max(rho), min(rho), shortest(cutters), every, pallets, sampling, workers, progress)
+    return limits(
+        scene, alpha, r, max(rho), min(rho), shortest(cutters), every, pallets, sampling, workers, progress, points
+    )
 
 
 def shortest(cutters: Sequence[CatalogueCutter]) -> float:
@@ -252,16 +292,17 @@ def _proof(f: SearchLimits, k: int) -> Ints:
 
 
 def _reason(
-    scene: Scene, families: tuple[SearchLimits, ...], k: int, tried: bool, between: bool, blockers: Ints
+    scene: Scene, families: tuple[SearchLimits, ...], k: int, point: int, tried: bool, between: bool, blockers: Ints
 ) -> Unreachable:
+    """Why the contact ``point``, row k of the ``families``, is not reached."""
     best = max(families, key=lambda f: (f.rho[k].max() >= 0.0, f.rho[k].max() + f.corner_radius))
     rho = best.rho[k].max()
     fits, corner = (2.0 * (rho + best.corner_radius), best.corner_radius) if rho >= 0.0 else (math.nan, math.nan)
     who = tuple(int(i) for i in blockers)
     if tried:
-        return Unreachable(k, "between" if between else "above", who, math.nan, math.nan)
-    if all(f.corner_radius * scene.curvature_max[k] >= 1.0 for f in families):
-        return Unreachable(k, "curvature", (CURVATURE,), math.nan, math.nan)
+        return Unreachable(point, "between" if between else "above", who, math.nan, math.nan)
+    if all(f.corner_radius * scene.curvature_max[point] >= 1.0 for f in families):
+        return Unreachable(point, "curvature", (CURVATURE,), math.nan, math.nan)
     if not who:
-        return Unreachable(k, "turned away", (), math.nan, math.nan)
-    return Unreachable(k, "cutting part", who, fits, corner)
+        return Unreachable(point, "turned away", (), math.nan, math.nan)
+    return Unreachable(point, "cutting part", who, fits, corner)

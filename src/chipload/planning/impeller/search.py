@@ -103,6 +103,7 @@ def limits(
     sampling: Sampling | None = None,
     workers: int = 1,
     progress: Progress = silent,
+    points: ArrayLike | None = None,
 ) -> SearchLimits:
     """Largest rho of one corner radius at each contact point and table angle.
 
@@ -115,6 +116,7 @@ def limits(
     every : each table angle to its own rho*; else only proved that it takes none larger than the best one
     pallets : (k, 2) [rad], where B may be, ascending, apart, within one turn
     workers : threads
+    points : (c,) int, which contact points; None: all. A contact point has the same result in any selection
 
     Raises
     ------
@@ -133,12 +135,13 @@ def limits(
         raise InputError("pallets: must be ascending ranges, apart, within one turn")
     if not 0.0 <= corner_radius < math.inf or not 0.0 <= floor <= cap < math.inf:
         raise InputError(f"corner_radius {corner_radius:g}, floor {floor:g}, cap {cap:g}: must be 0 <= floor <= cap")
-    c, t = len(scene.contact), len(alpha)
+    which = np.arange(len(scene.contact)) if points is None else np.asarray(points, dtype=np.int64)
+    c, t = len(which), len(alpha)
     rho, bound, pallet = np.full((c, t), -np.inf), np.full((c, t), -np.inf), np.zeros((c, t))
     proved = np.ones((c, t), dtype=np.bool_)
     proof = np.full((c, t, how.blockers), -1, dtype=np.int64)
-    round_enough = corner_radius * scene.curvature_max < 1.0
-    rows = np.ascontiguousarray(scene.rows[round_enough])
+    round_enough = corner_radius * scene.curvature_max[which] < 1.0
+    rows = np.ascontiguousarray(scene.rows[which[round_enough]])
     part = tuple(np.ascontiguousarray(x[round_enough]) for x in (rho, pallet, bound, proved, proof))
     tree = scene.tree
     points, own = scene.ordered, scene.own

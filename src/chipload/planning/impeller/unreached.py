@@ -29,15 +29,13 @@ def with_fits(
     if not rows:
         return answer.unreachable
     at = np.array([answer.unreachable[k].point for k in rows])
-    part = replace(
-        scene, contact=scene.contact[at], normal=scene.normal[at], curvature=scene.curvature[at],
-        surface=scene.surface[at],
-    )  # fmt: skip
     best = np.full(len(at), np.nan)
     corner = np.full(len(at), np.nan)
     for f in answer.families:
         cut = shortest(answer.catalogue.family(f.corner_radius))
-        found = limits(part, answer.tables, f.corner_radius, f.cap, 0.0, cut, pallets=pallets, workers=workers)
+        found = limits(
+            scene, answer.tables, f.corner_radius, f.cap, 0.0, cut, pallets=pallets, workers=workers, points=at
+        )
         rho = found.rho.max(axis=1)
         size = np.where(rho >= 0.0, 2.0 * (rho + f.corner_radius), np.nan)
         larger = ~(size <= best) & (size > 0.0)

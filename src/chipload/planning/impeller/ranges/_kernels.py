@@ -18,6 +18,9 @@ from numba import njit
 from chipload.planning.impeller._kernels import domain, gaps, point_arcs
 from chipload.planning.impeller.arcs._kernels import radius_at, slack
 
+#: half of the narrowest part of B for which a near point is proved clear before its arcs are calculated [rad]
+FINE = math.radians(0.5)
+
 
 @njit(cache=True, nogil=True)
 def widest(low: float, high: float, rho: float, r: float, stages: Any) -> float:
@@ -87,6 +90,54 @@ def collect(
             out[found] = i
             found += 1
     return found
+
+
+@njit(cache=True, nogil=True)
+def clear_within(
+    points: Any, i: int, cc: Any, cone: Any, r: float, rho: float, stages: Any, lo: float, hi: float, least: float
+) -> bool:  # fmt: skip
+    """Whether the bounds of ``collect`` prove that the cutter does not meet a point in lo..hi, halved down to
+    ``least``.
+    """
+    x, y, z = points[i, 0] - cc[0] - r * cc[3], points[i, 1] - cc[1] - r * cc[4], points[i, 2] - cc[2] - r * cc[5]
+    yy, yN = x * x + y * y + z * z, x * cc[3] + y * cc[4] + z * cc[5]
+    away = math.sqrt(yy)
+    # part k of as many as are in hi - lo, each ``half`` to either side of B
+    k, half, whole = 0, 0.5 * (hi - lo), True
+    while not (whole and k == 1):
+        B = lo + (2 * k + 1) * half
+        c, s = math.cos(B), math.sin(B)
+        h = cone[0] * (x * c + y * s) + cone[1] * z
+        n = cone[0] * (cc[3] * c + cc[4] * s) + cone[1] * cc[5]
+        sine = math.sqrt(max(1.0 - n * n, 1e-300))
+        turn = cone[0] * half
+        clear = False
+        if sine > turn:
+            high = h + turn * away
+            far2 = yy - 2.0 * rho * (yN - n * h) / sine + rho * rho
+            if high < -r:
+                clear = True
+            else:
+                slide = rho * turn * max(1.0, min(abs(n) + turn, 1.0) / (sine - turn))
+                slide += turn * math.sqrt(max(far2, 0.0))
+                if high < 0.0:
+                    P = rho + math.sqrt(r * r - high * high)
+                else:
+                    P = widest(h - turn * away, high, rho, r, stages)
+                clear = far2 - h * h > (P + slide) * (P + slide)
+        if clear:
+            k += 1
+            while k % 2 == 0 and not whole:
+                k //= 2
+                half *= 2.0
+                whole = half > 0.4 * (hi - lo)
+            continue
+        if half <= least:
+            return False
+        k *= 2
+        half *= 0.5
+        whole = False
+    return True
 
 
 @njit(cache=True, nogil=True)
@@ -169,18 +220,25 @@ def merged(cover: Any, number: int, arcs: Any, first: int, last: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def widest_uncovered(cover: Any, number: int, lo: float, hi: float, least: float) -> tuple[float, float]:
-    """The widest part of lo..hi that is not covered, (lo, lo): none is wider than ``least``."""
+def uncovered(
+    cover: Any, number: int, lo: float, hi: float, least: float
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """The widest part of lo..hi that is not covered, (lo, lo) where none is wider than ``least``; the begin of the
+    first such part and the end of the last.
+    """
     a, b, reached = lo, lo, lo
+    begin, end = hi, lo
     for k in range(number + 1):
         left = hi if k == number else min(cover[k, 0], hi)
-        if left - reached > max(least, b - a):
-            a, b = reached, left
+        if left - reached > least:
+            begin, end = min(begin, reached), left
+            if left - reached > b - a:
+                a, b = reached, left
         if k < number:
             reached = max(reached, cover[k, 1])
             if reached >= hi:
                 break
-    return a, b
+    return a, b, begin, end
 
 
 @njit(cache=True, nogil=True)
@@ -212,7 +270,7 @@ def valid(
     while waiting > 0:
         waiting -= 1
         lo, hi = todo[waiting, 0], todo[waiting, 1]
-        a, b = widest_uncovered(cover, covered, lo, hi, least)
+        a, b, begin, end = uncovered(cover, covered, lo, hi, least)
         if b <= a:
             continue
         # one point that forbids the middle of the widest gap may spare all others
@@ -244,6 +302,10 @@ def valid(
             if covered < 0:
                 return 0, -1
             continue
+        if not steep:
+            # what is covered at either end of the part is left out; s stays above the turn of what is left
+            lo, hi = begin, end
+            B, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
         if steep or hi - lo > width:
             if waiting + 2 > len(todo):
                 return 0, -1
@@ -253,6 +315,10 @@ def valid(
             continue
         found = collect(points, own, nodes, spans, leaves, cc, cone, r, near2, rho, stages, B, half, seen, stamp, near)
         for j in range(found):
+            if clear_within(points, near[j], cc, cone, r, rho, stages, lo, hi, FINE):
+                # it may be met elsewhere
+                seen[near[j]] = 0
+                continue
             before = filled
             for k in range(count):
                 filled = point_arcs(

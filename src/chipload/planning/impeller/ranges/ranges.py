@@ -23,8 +23,8 @@ FULL = ((0.0, 2.0 * math.pi),)
 #: a part of B narrower than this [rad] next to n = 1 counts as forbidden
 FLAT = 1e-4
 
-#: of a part of B for which near check points are collected at once, of all B and where only a narrow part is asked for
-_WIDTH, _WIDER, _NARROW = math.radians(2.0), math.radians(8.0), math.radians(30.0)
+#: widest part of B for which near check points are collected at once [rad]
+_WIDTH = math.radians(8.0)
 _MOST = 32  # ranges of one contact point, points of one proof
 
 
@@ -79,11 +79,10 @@ def valid_ranges(
     tool = np.array([cutter.rho, cutter.corner_radius])
     stages = cutter.enclosing(clearance)
     check, own = scene.ordered, scene.own
-    width = _WIDER if (spans[:, 1] - spans[:, 0]).sum() <= _NARROW else _WIDTH
 
     def block(first: int) -> None:
         _kernels.fitted(
-            check, own, tree.nodes, tree.spans, tree.leaves, rows, cones, scene.near**2, tool, stages, spans, width,
+            check, own, tree.nodes, tree.spans, tree.leaves, rows, cones, scene.near**2, tool, stages, spans, _WIDTH,
             FLAT, least, hints, first, min(first + BLOCK, len(rows)), number, found, proof,
         )  # fmt: skip
 
