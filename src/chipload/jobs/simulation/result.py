@@ -15,6 +15,7 @@ from chipload.jobs.simulation.numbers import operation_numbers, program_numbers
 from chipload.jobs.simulation.outcome import ChangedText, ProgramResult, SimulationResult
 from chipload.jobs.simulation.rows import step_rows
 from chipload.jobs.simulation.stability import StabilityResult
+from chipload.jobs.simulation.workpiece import stock_box
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict
 from chipload.result.limits import Columns
 from chipload.simulation.placement import stock_placement
@@ -149,9 +150,8 @@ def misplaced(simulation: SimulationResult, limits: tuple[LimitCheck, ...]) -> t
     """Return the finding that the stock is probably misplaced, if a limit is exceeded."""
     if all(check.state is not Verdict.EXCEEDS for check in limits):
         return ()
-    stock = simulation.stock
-    low, high = (np.array([stock.xs[k], stock.ys[k], stock.bounds[k]], dtype=np.float64) for k in (0, -1))
-    found = stock_placement(simulation.removal.columns, (low, high), simulation.checks.cutters)
+    box = stock_box(simulation.stock)
+    found = stock_placement(simulation.removal.columns, box, simulation.checks.cutters)
     return () if found is None else (exceeding(found),)
 
 
