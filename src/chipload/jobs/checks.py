@@ -21,10 +21,15 @@ from chipload.result import LimitCheck, Verdict, check_limit
 from chipload.result.limits import Columns
 from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.loads import Cuts, Floats, Ints
+from chipload.simulation.ramp import ramp_angle
 from chipload.simulation.removal import BANDED
 
 #: columns that these checks add to those of the simulation
 CHECK_COLUMNS = ("cutter_stress_mpa", "deflection_share")
+#: columns that they add to those of a program
+PROGRAM_COLUMNS = (*CHECK_COLUMNS, "ramp_deg")
+#: a ramp that is at most so much steeper than its limit is as steep [deg]; one that is as much flatter than 90 a plunge
+STEEPER = 1e-3
 
 
 #: steps with less than this share of the greatest load of their tool are not judged by their deflection: the cutter
@@ -110,7 +115,7 @@ def default_checks(
 def with_checks(
     table: ChecksTable, material: Material, bends: Callable[[Cuts], Mapping[str, Floats]]
 ) -> Callable[[Cuts], dict[str, Floats]]:
-    """Columns of ``bends``, which has the deflection, and :data:`CHECK_COLUMNS`."""
+    """Columns of ``bends``, which has the deflection, and :data:`PROGRAM_COLUMNS`."""
 
     def columns(cuts: Cuts) -> dict[str, Floats]:
         found = dict(bends(cuts))
@@ -118,6 +123,7 @@ def with_checks(
         found["deflection_share"] = deflection_share(
             cuts.plain, found["deflection_um"], table.deflection_of_feed, table.deflection_of_depth
         )
+        found["ramp_deg"] = ramp_angle(cuts)
         return found
 
     return columns
@@ -187,6 +193,42 @@ def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
     return tuple(out)
 
 
+def ramp_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...]:
+    """Plunges and ramps into material of cutters that cannot, or are not known to, do so: the steepest of each tool.
+
+    A cutter with a stated ``ramp_angle`` is checked against that instead, see :func:`default_limits`.
+
+    Parameters
+    ----------
+    columns : of a track, a row a step; ``ramp_deg`` among them, else nothing is found
+    """
+    if "plunge" in checks.off or "ramp_deg" not in columns:
+        return ()
+    ramp, tool, out = np.asarray(columns["ramp_deg"]), np.asarray(columns["tool"]), []
+    for number, cutter in sorted(checks.cutters.items()):
+        own = np.where(tool == number, ramp, 0.0)
+        k = int(np.argmax(own)) if len(own) else 0
+        if cutter.ramp_angle is not None or cutter.plunges or not len(own) or not own[k] > STEEPER:
+            continue
+        plunge = own[k] >= 90.0 - STEEPER
+        does = "plunges into solid material" if plunge else f"ramps into solid material at {own[k]:.3g} deg"
+        if cutter.centre_cutting is None:
+            why = (
+                f"whether its {cutter.flutes} teeth reach its axis is not known: state centre_cutting, or "
+                "ramp_angle_deg (RMPX), in its [[cutter]]"
+            )
+        elif plunge:
+            why = "no tooth cuts under its centre (centre_cutting = false): enter by a ramp, a helix or a drilled hole"
+        else:
+            why = (
+                "how steep it may is not known (centre_cutting = false): state ramp_angle_deg (RMPX) in its [[cutter]]"
+            )
+        found = _at_step("plunge", columns, k, f"tool {number} {does}: {why}")
+        severe = plunge and cutter.centre_cutting is False
+        out.append(replace(found, severity=Severity.EXCEEDS) if severe else found)
+    return tuple(out)
+
+
 def _beyond(checks: DefaultChecks, columns: Columns) -> float:
     """The thickest chip [mm] where it is above those that the coefficients were measured with; 0: none is."""
     chip = checks.material.chip
@@ -231,11 +273,26 @@ def default_limits(
             )
     if "flute_length" not in checks.off and "axial_overrun_mm" in columns:
         out.append(check_limit("axial_overrun_mm", 0.0, columns, track=track))
+    if "plunge" not in checks.off and "ramp_deg" in columns:
+        out += _ramp(checks, columns, track)
     if "rigid_model" not in checks.off and "deflection_share" in columns:
         rows, error = _could_be_greatest(columns, checks), load_error(errors, "deflection_share")
         check = check_limit("deflection_share", 1.0, columns, track=track, rows=rows, error=error, reason=direction)
         out.append(_rigid(check))
     return tuple(with_peaks(check, checks, columns) for check in out)
+
+
+def _ramp(checks: DefaultChecks, columns: Columns, track: str) -> list[LimitCheck]:
+    """The steepest ramp over the ramp angle of its cutter, where one is stated."""
+    stated = {n: math.degrees(c.ramp_angle) for n, c in checks.cutters.items() if c.ramp_angle is not None}
+    tool, ramp = np.asarray(columns["tool"]), np.asarray(columns["ramp_deg"])
+    if not len(tool) or not np.isin(tool, list(stated)).any():
+        return []
+    allowed = np.array([stated.get(n, math.inf) for n in tool.tolist()])
+    ramp = np.where(ramp <= allowed + STEEPER, np.minimum(ramp, allowed), ramp)
+    k = int(np.argmax(np.where(np.isfinite(allowed), ramp / allowed, -1.0)))
+    rows, own = np.arange(len(tool)) == k, {**columns, "ramp_deg": ramp}
+    return [check_limit("ramp_deg", float(allowed[k]), own, track=track, rows=rows)]
 
 
 def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chipload.cutting.material import Material
 from chipload.errors import InputError, Severity, grouped, worst_severity
-from chipload.jobs.checks import CHECK_COLUMNS, with_checks
+from chipload.jobs.checks import PROGRAM_COLUMNS, with_checks
 from chipload.jobs.provenance import provenance_of, sources, title_of, versions
 from chipload.jobs.simulation.form_error import forming
 from chipload.jobs.simulation.job import ProgramJob
@@ -219,7 +219,7 @@ def simulated(
                 None if stability_watch is None else stability_watch.dynamics,
             ),
         )  # fmt: skip
-    removal = with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS))
+    removal = with_columns(removal, (*watched(gives, formed=made is not None), *PROGRAM_COLUMNS))
     errors = with_compliance_error(removal.resolution_error, removal.columns, compliance)
     changes = changes_in_stock(program, job.cutters, *stock_box(stock), reading.retractions)
     findings = (*removal.findings, *reversed_cuts(steps, removal.columns, job.cutters), *changes)
