@@ -15,12 +15,13 @@ from chipload.cutting.material import Material
 from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.errors import Finding, InputError, Severity
+from chipload.jobs.rubbing import over_feed, rubbing
 from chipload.jobs.tables import ChecksTable
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, Verdict, check_limit
 from chipload.result.limits import Columns
 from chipload.simulation.chip_space import flute_fill
-from chipload.simulation.loads import Cuts, Floats, Ints
+from chipload.simulation.loads import Cuts, Floats
 from chipload.simulation.ramp import ramp_angle
 from chipload.simulation.removal import BANDED
 
@@ -35,8 +36,6 @@ STEEPER = 1e-3
 #: steps with less than this share of the greatest load of their tool are not judged by their deflection: the cutter
 #: only touches there
 LOADED = 0.1
-#: an axis that changes by less from step to step does not turn
-UPRIGHT = 1e-9
 #: the column by which :func:`_could_be_greatest` judges a step, the first that a track has
 LOADS = ("force_n", "force_xy_n", "force_normal_n", "torque_mean_nm")
 #: what a load does at its place, which a light load may do most
@@ -277,8 +276,9 @@ def default_limits(
         out += _ramp(checks, columns, track)
     if "rigid_model" not in checks.off and "deflection_share" in columns:
         rows, error = _could_be_greatest(columns, checks), load_error(errors, "deflection_share")
-        check = check_limit("deflection_share", 1.0, columns, track=track, rows=rows, error=error, reason=direction)
-        out.append(_rigid(check))
+        why = direction or ("" if rows.any() else "nothing is cut")
+        check = check_limit("deflection_share", 1.0, columns, track=track, rows=rows, error=error, reason=why)
+        out.append(_rigid(check, checks, columns))
     return tuple(with_peaks(check, checks, columns) for check in out)
 
 
@@ -305,7 +305,7 @@ def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> NDArray[np.bo
     load = np.asarray(columns[next(c for c in LOADS if c in columns)])
     tool = np.asarray(columns["tool"]) if "tool" in columns else np.zeros(len(load), dtype=np.int64)
     share = np.asarray(columns["deflection_share"])
-    of_feed = np.minimum(checks.of_feed * share, _over_feed(columns, tool, checks.cutters))
+    of_feed = np.minimum(checks.of_feed * share, over_feed(columns, tool, checks.cutters))
     more = (1.0 + of_feed) * (1.0 + checks.of_depth * share)
     judged = [np.abs(np.asarray(columns[c])) for c in dict.fromkeys((*LOADS, *PLACED)) if c in columns]
     out = np.zeros(len(load), dtype=np.bool_)
@@ -317,36 +317,12 @@ def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> NDArray[np.bo
     return out
 
 
-def _over_feed(columns: Columns, tool: Ints, cutters: Mapping[int, Cutter]) -> Floats:
-    """The deflection over the feed per tooth; inf where that is not known, or the axis turns.
-
-    The share of the model's range is the greater of this and of the deflection over the radial depth: of a film, whose
-    depth is next to nothing, it says nothing of the feed.
-    """
-    out = np.full(len(tool), math.inf)
-    bent = next((c for c in ("deflection_um", "deflection_cutter_um") if c in columns), "")
-    if not bent or not {"feed_mm_min", "power_w", "torque_mean_nm"} <= set(columns):
-        return out
-    power, torque = np.asarray(columns["power_w"]), np.asarray(columns["torque_mean_nm"])
-    speed = np.divide(power, torque, out=np.zeros(len(tool)), where=torque > 0.0)
-    numbers, of = np.unique(tool, return_inverse=True)
-    teeth = np.array([cutters[n].flutes if n in cutters else 0 for n in numbers.tolist()])[of]
-    delta = np.asarray(columns[bent]) / 1000.0
-    # feed per tooth [mm]: mm/min over 60 s, over the teeth that pass in a second
-    passing = 60.0 / math.tau * speed * teeth
-    feed = np.divide(columns["feed_mm_min"], passing, out=np.zeros(len(tool)), where=passing > 0.0)
-    np.divide(delta, feed, out=out, where=feed > 0.0)
-    for name in ("axis_x", "axis_y", "axis_z"):
-        if name in columns:
-            axis = np.asarray(columns[name])
-            out[np.abs(np.diff(axis, prepend=axis[:1])) > UPRIGHT] = math.inf
-    return out
-
-
-def _rigid(check: LimitCheck) -> LimitCheck:
+def _rigid(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> LimitCheck:
     """A deflection beyond the rigid model makes loads unknown; it is no limit that is exceeded."""
     if check.state is not Verdict.EXCEEDS:
         return check
+    if (rubs := rubbing(check, checks.material, checks.of_feed, checks.cutters, columns)) is not None:
+        return replace(check, state=Verdict.UNPROVEN, reason=rubs)
     reason = "the cutter bends further than the rigid model covers, so its loads are not known: shorten it or cut less"
     return replace(check, state=Verdict.UNPROVEN, reason=reason)
 

@@ -36,6 +36,8 @@ def read(text: str, dialect: str = "fanuc") -> tuple[Commands, list[Finding]]:
         ("G10 P1 R3.", 0),
         ("G10 L50", 0),
         ("G1 X50. ,A30.", 0),
+        # a signal ends the motion
+        ("G31 X50. F100.", 1),
         # the corner stays sharp
         ("G1 X50. ,R5.", 1),
         ("G1 X50.,C3.", 1),

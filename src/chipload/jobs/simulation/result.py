@@ -18,7 +18,7 @@ from chipload.jobs.simulation.stability import StabilityResult
 from chipload.jobs.simulation.workpiece import stock_box
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict
 from chipload.result.limits import Columns
-from chipload.simulation.placement import stock_placement
+from chipload.simulation.placement import nothing_cut, stock_placement
 
 #: names of the tracks of a program as it was, and with another text
 ORIGINAL, OPTIMISED = "original", "optimised"
@@ -114,8 +114,13 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
 
 
 def findings_of(program: ProgramResult, simulation: SimulationResult) -> tuple[Finding, ...]:
-    """Return the findings: motions beyond the limits of the machine, then those of the simulation."""
-    return (*(exceeding(f) for f in program.reading.violations), *simulation_findings(simulation))
+    """Return the findings: nothing is cut, motions beyond the limits of the machine, then those of the simulation."""
+    empty = nothing_cut(simulation.removal.columns, stock_box(simulation.stock), simulation.checks.cutters)
+    return (
+        *([] if empty is None else [empty]),
+        *(exceeding(f) for f in program.reading.violations),
+        *simulation_findings(simulation),
+    )
 
 
 def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:

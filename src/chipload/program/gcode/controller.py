@@ -140,6 +140,15 @@ class Controller:
         severity = Severity.UNPROVEN if self.dialect == "linuxcnc" else Severity.NOTE
         self.findings.add(code, self.line, text, severity)
 
+    def touch(self, code: str, name: str, ends: str) -> None:
+        """A motion that a touch ends: where the tool is behind it, and what it measures, is not known."""
+        self.leave_out(
+            code,
+            f"{name}: the motion ends where {ends}; it is taken to its programmed end: the position behind it, and all "
+            "that the program derives from it, is not known: leave the probing out and state the offsets that it sets "
+            "in program.work_offsets or program.parameters",
+        )
+
     # -- offsets ---------------------------------------------------------------------------------------------------
 
     def stored(self, first: int) -> Nine:

@@ -262,7 +262,7 @@ class Fanuc(Dialect):
             words["k"] = words.pop("f")
         if SKIP in g:
             g[g.index(SKIP)] = 10
-            c.once("nc-skip", f"{shown(SKIP)}: a signal may end the motion earlier; the program goes on from its end")
+            c.touch("nc-skip", shown(SKIP), "its signal comes")
         motion = next((x for x in g if x in CYCLES), c.state.motion)
         if motion in CYCLES:
             if "k" in words:
