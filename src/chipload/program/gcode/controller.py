@@ -99,6 +99,8 @@ class Controller:
         self.program_frame: ProgramFrame | None = None
         #: where a retraction to where only the machine knows was left out
         self.retracted: Nine | None = None
+        #: by what each peck of a hole is shorter than the one before it, and the least [units of the text]
+        self.pecks = 0.0, 0.0
         #: why motions are left out until further notice; empty: they are not
         self.left_out = ""
         self.level = 0

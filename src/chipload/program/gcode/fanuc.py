@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from chipload.errors import InputError, Severity
 from chipload.program.gcode.controller import Controller
-from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING
+from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING, NEED_Q
 from chipload.program.gcode.dialect import UNREAD, Dialect, NotReadError, go_on, leave_out, lenient
 from chipload.program.gcode.frames import remove, turn_about
 from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, system_variables, with_brackets
@@ -265,10 +265,25 @@ class Fanuc(Dialect):
             c.touch("nc-skip", shown(SKIP), "its signal comes")
         motion = next((x for x in g if x in CYCLES), c.state.motion)
         if motion in CYCLES:
+            self._shorter_pecks(words, g, motion, c)
             if "k" in words:
                 words["l"] = words.pop("k")
             if "p" in words and 40 not in g and 98 not in block.m:
                 words["p"] /= 1000.0
+
+    @staticmethod
+    def _shorter_pecks(words: dict[str, float], g: list[int], motion: int, c: Controller) -> None:
+        """G83 and G73 of a Haas with I: the first peck; each that follows is shorter by J, and at least K.
+
+        Reference: Haas, Mill Operator's Manual, "G83 Normal Peck Drilling Canned Cycle".
+        """
+        if motion in NEED_Q and "i" in words:
+            if "q" in words:
+                raise NotReadError(f"{shown(motion)}: I with Q: pecks that retract after a depth Q")
+            words["q"] = words.pop("i")
+            c.pecks = words.pop("j", 0.0), words.pop("k", 0.0)
+        elif any(code in CYCLES for code in g) or "q" in words:
+            c.pecks = 0.0, 0.0
 
     @staticmethod
     def _tool_offset(words: dict[str, float], c: Controller) -> None:
