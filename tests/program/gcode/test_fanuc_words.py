@@ -38,9 +38,6 @@ def read(text: str, dialect: str = "fanuc") -> tuple[Commands, list[Finding]]:
         ("G1 X50. ,A30.", 0),
         # a signal ends the motion
         ("G31 X50. F100.", 1),
-        # the corner stays sharp
-        ("G1 X50. ,R5.", 1),
-        ("G1 X50.,C3.", 1),
         # words of roundings, spirals and helices by other controllers
         ("G1 X50. R5.", 1),
         ("G3 X0. Y0. Z-5. I10. L3", 1),
