@@ -31,6 +31,8 @@ from chipload.errors import InputError
 ORDINARY = ToolStrength()
 #: equivalent diameter of the fluted part over the cutter's diameter [Kops1990]
 FLUTED_FACTOR = 0.8
+#: an end mill with more teeth or a greater diameter [mm] may have none that reach its axis
+CENTRE_FLUTES, CENTRE_MM = 4, 25.0
 #: limits of a cutter: least and greatest diameter [mm], greatest overhang [mm], greatest number of teeth
 THINNEST, WIDEST, LONGEST, MOST_FLUTES = 0.01, 1000.0, 3000.0, 200
 
@@ -67,6 +69,8 @@ class Cutter:
         with part, stock and fixtures but not simulated; empty: the seven APT numbers are its shape
     number : tool number, >= 0; 0: the tool of a program that names no tool
     name : name in the shop
+    centre_cutting : whether its teeth reach its axis, so that it can plunge; None: not stated
+    ramp_angle : greatest angle [rad] at which it may descend into solid material, up to pi/2; None: not known
     left_hand : cuts while the spindle turns counter-clockwise (M4); its helix is left-handed then
 
     Raises
@@ -100,6 +104,8 @@ class Cutter:
     name: str = ""
     barrel_radius: float | None = None
     left_hand: bool = False
+    centre_cutting: bool | None = None
+    ramp_angle: float | None = None
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: float, limit: str) -> None:
@@ -171,6 +177,9 @@ class Cutter:
         factor = self.fluted_factor
         need(0.0 < factor <= 1.0, "fluted_factor", factor, "must be above 0 and at most 1 (0.8 is usual for end mills)")
         check_material(self.strength, self.modulus)
+        ramp = self.ramp_angle
+        limit = "must be above 0 and at most 90 (a plunge)"
+        need(ramp is None or 0.0 < ramp <= 0.5 * math.pi + 1e-9, "ramp_angle_deg", math.degrees(ramp or 0.0), limit)
         need(self.number >= 0, "number", self.number, "must be at least 0")
 
     def _check_corner(self) -> None:
@@ -235,6 +244,21 @@ class Cutter:
         """
         pitch = np.array(self.pitch) if self.pitch else np.full(self.flutes, math.tau / self.flutes)
         return np.asarray(np.concatenate([[0.0], np.cumsum(pitch[1:])]))
+
+    @property
+    def plunges(self) -> bool | None:
+        """Whether it can plunge into solid material: ``centre_cutting`` where that is stated; None: not known.
+
+        A tip that is round or pointed at the axis reaches it, and so do by custom the teeth of end mills up to
+        ``CENTRE_FLUTES`` teeth and ``CENTRE_MM``.
+
+        >>> [Cutter(d, n, 0.5, 20.0, 30.0, 6e5).plunges for d, n in ((10.0, 4), (10.0, 6), (50.0, 4))]
+        [True, None, None]
+        """
+        if self.centre_cutting is not None:
+            return self.centre_cutting
+        pointed = self.bottom > 0.0 or self.apt[2] <= 1e-9 * self.diameter
+        return True if pointed or (self.flutes <= CENTRE_FLUTES and self.diameter <= CENTRE_MM) else None
 
     @property
     def radius(self) -> float:

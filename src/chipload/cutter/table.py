@@ -13,7 +13,16 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from chipload.cutter.camotics import read_camotics_tool
-from chipload.cutter.cutter import FLUTED_FACTOR, LONGEST, MOST_FLUTES, THINNEST, WIDEST, Cutter
+from chipload.cutter.cutter import (
+    CENTRE_FLUTES,
+    CENTRE_MM,
+    FLUTED_FACTOR,
+    LONGEST,
+    MOST_FLUTES,
+    THINNEST,
+    WIDEST,
+    Cutter,
+)
 from chipload.cutter.fctb import read_fctb
 from chipload.cutter.fusion import read_fusion_tool
 from chipload.cutter.iso13399 import read_iso13399
@@ -55,6 +64,14 @@ class CutterTable(BaseModel):
     helix_deg: float | None = Field(None, description="helix angle, of the hand of the cutter, below 80")
     left_hand: bool | None = Field(
         None, description="whether it cuts with the spindle counter-clockwise (M4); default false"
+    )
+    centre_cutting: bool | None = Field(
+        None,
+        description="whether its teeth reach its axis, so that it can plunge (ISO 13399 CCC); default: true of round "
+        f"and pointed tips and up to {CENTRE_FLUTES} teeth and {CENTRE_MM:g} mm, else not known",
+    )
+    ramp_angle_deg: float | None = Field(
+        None, description="greatest angle at which it may descend into solid material (ISO 13399 RMPX), at most 90"
     )
     flute_length_mm: float | None = Field(None, description="length of the cutting edges along the axis")
     overhang_mm: float | None = Field(None, description=f"length from the holder to the tip, at most {LONGEST:g}")
@@ -155,6 +172,8 @@ class CutterTable(BaseModel):
             number=values["number"],
             name=values.get("name", ""),
             left_hand=values.get("left_hand", False),
+            centre_cutting=values.get("centre_cutting"),
+            ramp_angle=math.radians(values["ramp_angle_deg"]) if "ramp_angle_deg" in values else None,
         )
 
     def _from_file(self, folder: Path) -> dict[str, Any]:

@@ -15,23 +15,27 @@ from chipload.cutting.material import Material
 from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.errors import Finding, InputError, Severity
+from chipload.jobs.rubbing import over_feed, rubbing
 from chipload.jobs.tables import ChecksTable
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, Verdict, check_limit
 from chipload.result.limits import Columns
 from chipload.simulation.chip_space import flute_fill
-from chipload.simulation.loads import Cuts, Floats, Ints
+from chipload.simulation.loads import Cuts, Floats
+from chipload.simulation.ramp import ramp_angle
 from chipload.simulation.removal import BANDED
 
 #: columns that these checks add to those of the simulation
 CHECK_COLUMNS = ("cutter_stress_mpa", "deflection_share")
+#: columns that they add to those of a program
+PROGRAM_COLUMNS = (*CHECK_COLUMNS, "ramp_deg")
+#: a ramp that is at most so much steeper than its limit is as steep [deg]; one that is as much flatter than 90 a plunge
+STEEPER = 1e-3
 
 
 #: steps with less than this share of the greatest load of their tool are not judged by their deflection: the cutter
 #: only touches there
 LOADED = 0.1
-#: an axis that changes by less from step to step does not turn
-UPRIGHT = 1e-9
 #: the column by which :func:`_could_be_greatest` judges a step, the first that a track has
 LOADS = ("force_n", "force_xy_n", "force_normal_n", "torque_mean_nm")
 #: what a load does at its place, which a light load may do most
@@ -110,7 +114,7 @@ def default_checks(
 def with_checks(
     table: ChecksTable, material: Material, bends: Callable[[Cuts], Mapping[str, Floats]]
 ) -> Callable[[Cuts], dict[str, Floats]]:
-    """Columns of ``bends``, which has the deflection, and :data:`CHECK_COLUMNS`."""
+    """Columns of ``bends``, which has the deflection, and :data:`PROGRAM_COLUMNS`."""
 
     def columns(cuts: Cuts) -> dict[str, Floats]:
         found = dict(bends(cuts))
@@ -118,6 +122,7 @@ def with_checks(
         found["deflection_share"] = deflection_share(
             cuts.plain, found["deflection_um"], table.deflection_of_feed, table.deflection_of_depth
         )
+        found["ramp_deg"] = ramp_angle(cuts)
         return found
 
     return columns
@@ -187,6 +192,42 @@ def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
     return tuple(out)
 
 
+def ramp_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...]:
+    """Plunges and ramps into material of cutters that cannot, or are not known to, do so: the steepest of each tool.
+
+    A cutter with a stated ``ramp_angle`` is checked against that instead, see :func:`default_limits`.
+
+    Parameters
+    ----------
+    columns : of a track, a row a step; ``ramp_deg`` among them, else nothing is found
+    """
+    if "plunge" in checks.off or "ramp_deg" not in columns:
+        return ()
+    ramp, tool, out = np.asarray(columns["ramp_deg"]), np.asarray(columns["tool"]), []
+    for number, cutter in sorted(checks.cutters.items()):
+        own = np.where(tool == number, ramp, 0.0)
+        k = int(np.argmax(own)) if len(own) else 0
+        if cutter.ramp_angle is not None or cutter.plunges or not len(own) or not own[k] > STEEPER:
+            continue
+        plunge = own[k] >= 90.0 - STEEPER
+        does = "plunges into solid material" if plunge else f"ramps into solid material at {own[k]:.3g} deg"
+        if cutter.centre_cutting is None:
+            why = (
+                f"whether its {cutter.flutes} teeth reach its axis is not known: state centre_cutting, or "
+                "ramp_angle_deg (RMPX), in its [[cutter]]"
+            )
+        elif plunge:
+            why = "no tooth cuts under its centre (centre_cutting = false): enter by a ramp, a helix or a drilled hole"
+        else:
+            why = (
+                "how steep it may is not known (centre_cutting = false): state ramp_angle_deg (RMPX) in its [[cutter]]"
+            )
+        found = _at_step("plunge", columns, k, f"tool {number} {does}: {why}")
+        severe = plunge and cutter.centre_cutting is False
+        out.append(replace(found, severity=Severity.EXCEEDS) if severe else found)
+    return tuple(out)
+
+
 def _beyond(checks: DefaultChecks, columns: Columns) -> float:
     """The thickest chip [mm] where it is above those that the coefficients were measured with; 0: none is."""
     chip = checks.material.chip
@@ -231,11 +272,27 @@ def default_limits(
             )
     if "flute_length" not in checks.off and "axial_overrun_mm" in columns:
         out.append(check_limit("axial_overrun_mm", 0.0, columns, track=track))
+    if "plunge" not in checks.off and "ramp_deg" in columns:
+        out += _ramp(checks, columns, track)
     if "rigid_model" not in checks.off and "deflection_share" in columns:
         rows, error = _could_be_greatest(columns, checks), load_error(errors, "deflection_share")
-        check = check_limit("deflection_share", 1.0, columns, track=track, rows=rows, error=error, reason=direction)
-        out.append(_rigid(check))
+        why = direction or ("" if rows.any() else "nothing is cut")
+        check = check_limit("deflection_share", 1.0, columns, track=track, rows=rows, error=error, reason=why)
+        out.append(_rigid(check, checks, columns))
     return tuple(with_peaks(check, checks, columns) for check in out)
+
+
+def _ramp(checks: DefaultChecks, columns: Columns, track: str) -> list[LimitCheck]:
+    """The steepest ramp over the ramp angle of its cutter, where one is stated."""
+    stated = {n: math.degrees(c.ramp_angle) for n, c in checks.cutters.items() if c.ramp_angle is not None}
+    tool, ramp = np.asarray(columns["tool"]), np.asarray(columns["ramp_deg"])
+    if not len(tool) or not np.isin(tool, list(stated)).any():
+        return []
+    allowed = np.array([stated.get(n, math.inf) for n in tool.tolist()])
+    ramp = np.where(ramp <= allowed + STEEPER, np.minimum(ramp, allowed), ramp)
+    k = int(np.argmax(np.where(np.isfinite(allowed), ramp / allowed, -1.0)))
+    rows, own = np.arange(len(tool)) == k, {**columns, "ramp_deg": ramp}
+    return [check_limit("ramp_deg", float(allowed[k]), own, track=track, rows=rows)]
 
 
 def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> NDArray[np.bool_]:
@@ -248,7 +305,7 @@ def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> NDArray[np.bo
     load = np.asarray(columns[next(c for c in LOADS if c in columns)])
     tool = np.asarray(columns["tool"]) if "tool" in columns else np.zeros(len(load), dtype=np.int64)
     share = np.asarray(columns["deflection_share"])
-    of_feed = np.minimum(checks.of_feed * share, _over_feed(columns, tool, checks.cutters))
+    of_feed = np.minimum(checks.of_feed * share, over_feed(columns, tool, checks.cutters))
     more = (1.0 + of_feed) * (1.0 + checks.of_depth * share)
     judged = [np.abs(np.asarray(columns[c])) for c in dict.fromkeys((*LOADS, *PLACED)) if c in columns]
     out = np.zeros(len(load), dtype=np.bool_)
@@ -260,36 +317,12 @@ def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> NDArray[np.bo
     return out
 
 
-def _over_feed(columns: Columns, tool: Ints, cutters: Mapping[int, Cutter]) -> Floats:
-    """The deflection over the feed per tooth; inf where that is not known, or the axis turns.
-
-    The share of the model's range is the greater of this and of the deflection over the radial depth: of a film, whose
-    depth is nearly zero, it says nothing about the feed.
-    """
-    out = np.full(len(tool), math.inf)
-    bent = next((c for c in ("deflection_um", "deflection_cutter_um") if c in columns), "")
-    if not bent or not {"feed_mm_min", "power_w", "torque_mean_nm"} <= set(columns):
-        return out
-    power, torque = np.asarray(columns["power_w"]), np.asarray(columns["torque_mean_nm"])
-    speed = np.divide(power, torque, out=np.zeros(len(tool)), where=torque > 0.0)
-    numbers, of = np.unique(tool, return_inverse=True)
-    teeth = np.array([cutters[n].flutes if n in cutters else 0 for n in numbers.tolist()])[of]
-    delta = np.asarray(columns[bent]) / 1000.0
-    # feed per tooth [mm]: mm/min over 60 s, over the teeth that pass in a second
-    passing = 60.0 / math.tau * speed * teeth
-    feed = np.divide(columns["feed_mm_min"], passing, out=np.zeros(len(tool)), where=passing > 0.0)
-    np.divide(delta, feed, out=out, where=feed > 0.0)
-    for name in ("axis_x", "axis_y", "axis_z"):
-        if name in columns:
-            axis = np.asarray(columns[name])
-            out[np.abs(np.diff(axis, prepend=axis[:1])) > UPRIGHT] = math.inf
-    return out
-
-
-def _rigid(check: LimitCheck) -> LimitCheck:
+def _rigid(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> LimitCheck:
     """A deflection beyond the rigid model makes loads unknown; it is no limit that is exceeded."""
     if check.state is not Verdict.EXCEEDS:
         return check
+    if (rubs := rubbing(check, checks.material, checks.of_feed, checks.cutters, columns)) is not None:
+        return replace(check, state=Verdict.UNPROVEN, reason=rubs)
     reason = "the cutter bends further than the rigid model covers, so its loads are not known: shorten it or cut less"
     return replace(check, state=Verdict.UNPROVEN, reason=reason)
 

@@ -52,6 +52,8 @@ ENDINGS: dict[str, Dialect | None] = {
 }
 #: findings that leave a result unproven where the machine has rotary axes, whose place depends on the tool's length
 OF_LENGTHS = ("nc-length-unknown", "heidenhain-tool-unknown")
+#: findings on retractions to positions of the machine that are not known, and so have no row
+OF_RETRACTIONS = ("nc-machine-retraction", "heidenhain-m91")
 #: largest tool table [bytes]
 LARGEST_TABLE = 10_000_000
 
@@ -81,6 +83,11 @@ class ProgramReading:
     def axes(self) -> Floats:
         """(n, 9) float [mm, rad], the machine's own axes at the end of each row of ``commands``; made at each call."""
         return axes_of(self.commands, self.machine, self.placed)
+
+    @property
+    def retractions(self) -> tuple[int, ...]:
+        """Lines that retract the tool to a position of the machine that is not known, and so have no row."""
+        return tuple(f.line for f in self.findings if f.code in OF_RETRACTIONS)
 
 
 def read_program(

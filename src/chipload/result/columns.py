@@ -125,6 +125,7 @@ _ROWS = (
     ("deflection_share", "", "deflection over model range", "deflection over the range of the rigid force model"),
     ("form_error_um", "\u00b5m", "form error", "material left on the surface by deflection; negative: removed", True),
     ("form_points", "", "finished points", "number of points of the part's surface that the step finishes"),
+    ("ramp_deg", "deg", "ramp angle", "angle of descent into material under the cutter's centre; 90: a plunge"),
     ("axial_overrun_mm", "mm", "cut above the flutes", "engaged length of the cutter above its flutes"),
     # vibration
     ("stability_margin", "", "stability margin", "factor by which the cutting force (with straight teeth, the depth of "

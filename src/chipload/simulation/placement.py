@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.errors import Finding, InputError
+from chipload.errors import Finding, InputError, Severity
 
 Floats = NDArray[np.float64]
 #: share of the time at feed that is spent in air
@@ -108,6 +108,47 @@ def placement_of(
         float(seconds[fed].sum()), float(seconds[fed & (chips <= 0.0)].sum()), first, depth, flute,
         tip[fed].min(axis=0), tip[fed].max(axis=0), stock_low, stock_high, max(used),
     )  # fmt: skip
+
+
+def nothing_cut(
+    columns: Mapping[str, NDArray[Any]], bounds: tuple[Floats, Floats], cutters: Mapping[int, Cutter]
+) -> Finding | None:
+    """Return the finding that a program removes nothing; None if it does, or has tools whose chips are not simulated.
+
+    Parameters and errors as those of :func:`placement_of`.
+    """
+    fed, tool = ~np.asarray(columns["rapid"], dtype=np.bool_), np.asarray(columns["tool"])
+    bodies = [number for number, cutter in cutters.items() if cutter.body]
+    if (np.asarray(columns["chip_volume_mm3"]) > 0.0).any() or np.isin(tool[fed], bodies).any():
+        return None
+    remedy = (
+        "compare the zero point of the program (work offset, program.placed_in, tool length) with the position of the "
+        "stock (low_mm, high_mm, or the coordinates of its file)"
+    )
+    if not fed.any():
+        return Finding("nothing-cut", 0, f"nothing is cut: no motion is at a feed: {remedy}", Severity.UNPROVEN)
+    at = placement_of(columns, bounds, cutters)
+    upright = bool((np.asarray(columns["axis_z"])[fed] > 1.0 - 1e-9).all())
+    # an upright cutter stands on its tip: it reaches by its radius to the sides and without a limit upwards
+    below, above = at.stock_low - at.high, at.low - at.stock_high
+    below[:2], above[:2] = below[:2] - at.radius_mm, above[:2] - at.radius_mm
+    below[2] = 0.0
+    apart = [
+        f"{distance:.4g} mm {word}"
+        for distance, word in (
+            (above[2], "above"), (below[0], "beside (X-)"), (above[0], "beside (X+)"),
+            (below[1], "beside (Y-)"), (above[1], "beside (Y+)"),
+        )
+        if upright and distance > 0.0
+    ]  # fmt: skip
+    boxes = (
+        ", ".join(f"{'XYZ'[k]} {low[k] + 0.0:.4g} to {high[k] + 0.0:.4g}" for k in range(3))
+        for low, high in ((at.low, at.high), (at.stock_low, at.stock_high))
+    )
+    path, stock = boxes
+    where = f"the cutter stays {' and '.join(apart)} the stock: " if apart else ""
+    text = f"nothing is cut: {where}the tip at a feed lies in {path} mm, the stock in {stock} mm: {remedy}"
+    return Finding("nothing-cut", 0, text, Severity.UNPROVEN)
 
 
 def stock_placement(

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from chipload.errors import Finding, Severity
-from chipload.program.commands import Commands
+from chipload.errors import Finding, InputError, Severity
+from chipload.program.commands import LINE, Commands
 from chipload.program.gcode.reader import read_gcode
 
 HEAD = "G17 G90 G21 G94 G40\nT1 M6\nS5000 M3\nG54\nG0 X0. Y0. Z10.\nG1 Z-1. F500.\n"
@@ -36,9 +36,8 @@ def read(text: str, dialect: str = "fanuc") -> tuple[Commands, list[Finding]]:
         ("G10 P1 R3.", 0),
         ("G10 L50", 0),
         ("G1 X50. ,A30.", 0),
-        # the corner stays sharp
-        ("G1 X50. ,R5.", 1),
-        ("G1 X50.,C3.", 1),
+        # a signal ends the motion
+        ("G31 X50. F100.", 1),
         # words of roundings, spirals and helices by other controllers
         ("G1 X50. R5.", 1),
         ("G3 X0. Y0. Z-5. I10. L3", 1),
@@ -94,3 +93,42 @@ def test_a_text_that_gives_no_lengths_is_not_asked_for_them() -> None:
 @pytest.mark.parametrize(("line", "moves"), [("$H", True), ("$J=G91 X10 F500", True), ("$X", False)])
 def test_homing_and_jogging_of_grbl(line: str, moves: bool) -> None:
     assert bool(read(HEAD + line + TAIL, "linuxcnc")[1]) == moves
+
+
+HOLE_HEAD = "G90 G21 G17\nT1 M6\nS900 M3\nG0 X0. Y0. Z10.\nG99 "
+
+
+def depths(cycle: str) -> list[float]:
+    """Heights at which the feeds of the holes end."""
+    commands, unproven = read(f"{HOLE_HEAD}{cycle}\nX12.\nG80\nM30\n")
+    assert unproven == []
+    return [float(z) for z in commands.position[commands.motion == LINE, 2]]
+
+
+@pytest.mark.parametrize(
+    ("words", "pecks"),
+    [
+        # I is the first peck, each is J shorter, and none is below K, but the last one ends at the bottom
+        ("I5. J1. K2.", [5.0, 4.0, 3.0, 2.0, 2.0, 2.0, 2.0]),
+        ("I6. J2.5 K3.", [6.0, 3.5, 3.0, 3.0, 3.0, 1.5]),
+        ("I8. J0 K2.", [8.0, 8.0, 4.0]),
+        ("Q8.", [8.0, 8.0, 4.0]),
+    ],
+)
+@pytest.mark.parametrize("code", ["G83", "G73"])
+def test_pecks_of_a_haas_become_shorter(code: str, words: str, pecks: list[float]) -> None:
+    ends = (1.0 - np.cumsum(pecks)).tolist()
+    assert ends[-1] == -19.0
+    assert depths(f"{code} X5. Z-19. R1. {words} F100.") == pytest.approx([*ends, *ends], abs=1e-12)
+
+
+def test_pecks_that_become_nothing_are_refused() -> None:
+    with pytest.raises(InputError, match="K0: pecks become shorter by J, 0 or more, down to K, which must be above 0"):
+        depths("G83 X5. Z-19. R1. I5. J1. F100.")
+    _, unproven = read(f"{HOLE_HEAD}G83 X5. Z-19. R1. I5. J1. K1. Q4. F100.\nG80\nM30\n")
+    assert "I with Q" in unproven[0].text
+
+
+def test_a_series_of_equal_pecks_follows_one_of_shorter_ones() -> None:
+    found = depths("G83 X5. Z-19. R1. I5. J1. K2. F100.\nG83 X7. Z-19. R1. Q10.")
+    assert found[7:] == pytest.approx([-9.0, -19.0, -9.0, -19.0])

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
 from chipload.program.commands import ARC, DWELL, LINE, PROBE, RAPID, YZ, ZX
 from chipload.program.gcode import nurbs
 from chipload.program.gcode.reader import read_gcode
@@ -181,6 +181,9 @@ def test_probing_is_a_motion_and_a_finding():
     commands, findings = read_gcode("F60\nG38.2 Z-5\n(debug, #5063 #5070)\nM2")
     assert commands.motion.tolist() == [PROBE]
     assert [x.code for x in findings] == ["nc-probe", "nc-message"]
+    # where the touch ends it is not known
+    assert findings[0].severity is Severity.UNPROVEN
+    assert "program.work_offsets" in findings[0].text
 
 
 def test_polar_coordinates():

@@ -24,10 +24,6 @@ def read(block: str) -> tuple[int, list[str]]:
 @pytest.mark.parametrize(
     ("block", "rows"),
     [
-        ("G1 X50 RND=5", 1),
-        ("G1 X50 CHF=3", 1),
-        ("G1 X50 CHR=3", 1),
-        ("G1 X50 RNDM=2", 1),
         ("G1 X50 FB=200", 1),
         ("G1 X50 TOFFL=1", 1),
         ("G1 X50 MEAS=1", 1),

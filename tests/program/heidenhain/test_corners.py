@@ -11,7 +11,7 @@ import shapely
 
 from chipload.errors import Severity
 from chipload.program.commands import ARC, LINE
-from chipload.program.heidenhain.corners import Element, chamfer, rounding
+from chipload.program.corners import Element, chamfer, rounding
 from chipload.program.heidenhain.reader import read_heidenhain
 
 HEAD = ("BEGIN PGM A MM", "TOOL DEF 1 L+0 R+1", "TOOL CALL 1 Z S1000 F500", "L X+0 Y+10 Z+0 R0 FMAX M3")

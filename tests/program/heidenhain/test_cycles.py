@@ -176,3 +176,12 @@ def test_a_call_at_a_place():
     c, _ = read(*START, "CYCL DEF 200 Q200=2 Q201=-3 Q206=60 Q202=5 Q203=0 Q204=20", "CYCL CALL POS X+7 Y+8 Z+0 FMAX")
     np.testing.assert_allclose(c.position[1:3, :3], [[7, 8, 50], [7, 8, 0]])
     assert c.position[c.motion == LINE, :3].tolist() == [[7, 8, -3]]
+
+
+@pytest.mark.parametrize(
+    ("name", "seconds"), [("DWELL 1.5", 1.5), ("V.ZEIT 1.5", 1.5), ("V.ZEIT.25", 0.25), ("V.ZEIT2", 2.0)]
+)
+def test_a_dwell_is_read_in_both_languages(name: str, seconds: float) -> None:
+    commands, findings = read("L X+5 Y+0 Z+2 FMAX", f"CYCL DEF 9.0 VERWEILZEIT\nCYCL DEF 9.1 {name}", "L X+9 FMAX")
+    assert commands.feed[commands.motion == DWELL].tolist() == [seconds]
+    assert findings == ()

@@ -42,6 +42,8 @@ ALLOWANCE = 0.025
 FLUTES, NECK = 1.5, 2.0
 #: cutting speed [m/min], for aluminium with carbide
 CUTTING_M_MIN = 200.0
+#: a wall is thin below this share of the diameter, both sides together
+THIN_WALL = 0.2
 #: layers that a note names
 LISTED = 8
 #: points along a contour that the size of the cutter is found on
@@ -204,8 +206,35 @@ def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
     stands = "the top of the model" if top > level + 1e-3 else "one depth of cut above the face"
     stock = DraftTable("stock", (Entry("top_mm", round(level + (depth or axial), 6), stands, True),))
     tables = (part, stock, *_rest(_machine(machine), machine, size, axial, "pocket", narrow=narrow, depth=depth))
-    notes = tuple(str(f) for f in drawing.findings[:8])
+    notes = (*thin_rings(model.faces), *(str(f) for f in drawing.findings[:8]))
     return Draft(f"Clear the face at z = {level:g} mm of {file.name}: {region:.4g} mm2.", tables, notes)
+
+
+def thin_rings(faces: Sequence[Face]) -> tuple[str, ...]:
+    """A note where a model is a thin tube or cone about Z, whose wall is milled by a torque job, not by this one.
+
+    Its largest two curved faces are such walls where both have square boxes about one middle, and the sides of the
+    boxes differ by less than ``THIN_WALL`` of the outer one.
+    """
+    curved = sorted((f for f in faces if f.kind in ("cylinder", "cone")), key=lambda f: -f.area)[:2]
+    if len(curved) < 2:
+        return ()
+    sides = [f.high[:2] - f.low[:2] for f in curved]
+    middles = [0.5 * (f.low[:2] + f.high[:2]) for f in curved]
+    round_z = all(abs(s[0] - s[1]) <= 1e-3 * s[0] for s in sides)
+    outer, inner = max(s[0] for s in sides), min(s[0] for s in sides)
+    tall = min(float(f.high[2] - f.low[2]) for f in curved)
+    if not round_z or float(np.abs(middles[0] - middles[1]).max()) > 1e-3 * outer:
+        return ()
+    if not 0.0 < outer - inner < THIN_WALL * outer or tall < outer - inner:
+        return ()
+    kind = "cone" if "cone" in [f.kind for f in curved] else "tube"
+    wide = " at its wide end" if kind == "cone" else ""
+    return (
+        f"the model is a {kind} of {0.25 * (outer + inner):.5g} mm mean radius{wide} with a wall of about "
+        f"{0.5 * (outer - inner):.4g} mm: this draft clears its end face; to finish the wall, write a torque job "
+        f"([torque_control]), beginning with the example: chipload example {kind}",
+    )
 
 
 def _floors(file: Path, planes: Sequence[Face], top: float) -> list[tuple[float, Drawing, float, float, bool]]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from chipload.cutting.material import Material
-from chipload.jobs.checks import CHECK_COLUMNS, default_checks, with_checks
+from chipload.jobs.checks import PROGRAM_COLUMNS, default_checks, with_checks
 from chipload.jobs.feeds.allowed import FeedRequest, watching, with_new_feeds
 from chipload.jobs.feeds.job import FeedsJob
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
@@ -111,7 +111,7 @@ def _new_feeds(
         program, stock, job.cutters, material, fine, interpolation=op.interpolation, times=times, watch=bends,
         engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.0, 0.5),
     )  # fmt: skip
-    before = with_columns(before, (*watched(gives), *CHECK_COLUMNS))
+    before = with_columns(before, (*watched(gives), *PROGRAM_COLUMNS))
     more = bends if limits.keys() & {"deflection_um", "deflection_workpiece_um"} else None
     errors = {name: SPARE * error for name, error in before.resolution_error.items()}
     errors = with_compliance_error(errors, before.columns, compliance)  # the compliance does not change with the feed

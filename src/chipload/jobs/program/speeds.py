@@ -14,7 +14,7 @@ import numpy as np
 
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.jobs.checks import CHECK_COLUMNS, with_checks
+from chipload.jobs.checks import PROGRAM_COLUMNS, with_checks
 from chipload.jobs.program.zones import row_speeds, zone_speeds
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.simulation.outcome import SpeedResult, ToolSpeed
@@ -91,7 +91,7 @@ def new_speeds(
         program, stock, job.cutters, material, resolution_of(job, reading.program), interpolation=op.interpolation,
         times=times, watch=watch, accuracy=False, engine=op.engine, processes=workers or op.workers, progress=progress,
     )  # fmt: skip
-    before = with_columns(before, (*watched(gives), *CHECK_COLUMNS, *stability.columns))
+    before = with_columns(before, (*watched(gives), *PROGRAM_COLUMNS, *stability.columns))
     found = stability_of(job, stability, machine)
     table = stated(op.speeds, "operation.0.speeds")
     tools: list[tuple[ToolSpeed, int]] = []

@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import chip_findings, unchecked_checks
+from chipload.jobs.checks import chip_findings, ramp_findings, unchecked_checks
 from chipload.jobs.simulation.limits import program_limits
 from chipload.jobs.simulation.numbers import operation_numbers, program_numbers
 from chipload.jobs.simulation.outcome import ChangedText, ProgramResult, SimulationResult
 from chipload.jobs.simulation.rows import step_rows
 from chipload.jobs.simulation.stability import StabilityResult
+from chipload.jobs.simulation.workpiece import stock_box
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict
 from chipload.result.limits import Columns
-from chipload.simulation.placement import stock_placement
+from chipload.simulation.placement import nothing_cut, stock_placement
 
 #: names of the tracks of a program as it was, and with another text
 ORIGINAL, OPTIMISED = "original", "optimised"
@@ -113,8 +114,13 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
 
 
 def findings_of(program: ProgramResult, simulation: SimulationResult) -> tuple[Finding, ...]:
-    """Return the findings: motions beyond the limits of the machine, then those of the simulation."""
-    return (*(exceeding(f) for f in program.reading.violations), *simulation_findings(simulation))
+    """Return the findings: nothing is cut, motions beyond the limits of the machine, then those of the simulation."""
+    empty = nothing_cut(simulation.removal.columns, stock_box(simulation.stock), simulation.checks.cutters)
+    return (
+        *([] if empty is None else [empty]),
+        *(exceeding(f) for f in program.reading.violations),
+        *simulation_findings(simulation),
+    )
 
 
 def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
@@ -127,7 +133,8 @@ def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
     if simulation.workpiece is not None:
         out += simulation.workpiece.findings
     out += _bodies(simulation)
-    return (*out, *chip_findings(simulation.checks, simulation.removal.columns))
+    columns = simulation.removal.columns
+    return (*out, *ramp_findings(simulation.checks, columns), *chip_findings(simulation.checks, columns))
 
 
 def _bodies(simulation: SimulationResult) -> list[Finding]:
@@ -149,9 +156,8 @@ def misplaced(simulation: SimulationResult, limits: tuple[LimitCheck, ...]) -> t
     """Return the finding that the stock is probably misplaced, if a limit is exceeded."""
     if all(check.state is not Verdict.EXCEEDS for check in limits):
         return ()
-    stock = simulation.stock
-    low, high = (np.array([stock.xs[k], stock.ys[k], stock.bounds[k]], dtype=np.float64) for k in (0, -1))
-    found = stock_placement(simulation.removal.columns, (low, high), simulation.checks.cutters)
+    box = stock_box(simulation.stock)
+    found = stock_placement(simulation.removal.columns, box, simulation.checks.cutters)
     return () if found is None else (exceeding(found),)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chipload.cutting.material import Material
 from chipload.errors import InputError, Severity, grouped, worst_severity
-from chipload.jobs.checks import CHECK_COLUMNS, with_checks
+from chipload.jobs.checks import PROGRAM_COLUMNS, with_checks
 from chipload.jobs.provenance import provenance_of, sources, title_of, versions
 from chipload.jobs.simulation.form_error import forming
 from chipload.jobs.simulation.job import ProgramJob
@@ -21,7 +21,7 @@ from chipload.jobs.simulation.program_text import changeable, straight
 from chipload.jobs.simulation.stability import stability_of, watch_of
 from chipload.jobs.simulation.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.jobs.simulation.tables import SimulateTable
-from chipload.jobs.simulation.workpiece import fixture_meshes, insides, stock_body
+from chipload.jobs.simulation.workpiece import fixture_meshes, insides, stock_body, stock_box
 from chipload.jobs.simulation.workpiece_compliance import (
     WorkpieceCompliance,
     with_compliance_error,
@@ -44,6 +44,7 @@ from chipload.simulation.loads import Cuts
 from chipload.simulation.moves import leans
 from chipload.simulation.steps import StepBlocks
 from chipload.simulation.surface import collisions, difference, in_stock
+from chipload.simulation.tool_change import changes_in_stock
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 from chipload.workers import Workers
@@ -218,9 +219,10 @@ def simulated(
                 None if stability_watch is None else stability_watch.dynamics,
             ),
         )  # fmt: skip
-    removal = with_columns(removal, (*watched(gives, formed=made is not None), *CHECK_COLUMNS))
+    removal = with_columns(removal, (*watched(gives, formed=made is not None), *PROGRAM_COLUMNS))
     errors = with_compliance_error(removal.resolution_error, removal.columns, compliance)
-    findings = (*removal.findings, *reversed_cuts(steps, removal.columns, job.cutters))
+    changes = changes_in_stock(program, job.cutters, *stock_box(stock), reading.retractions)
+    findings = (*removal.findings, *reversed_cuts(steps, removal.columns, job.cutters), *changes)
     removal = replace(removal, resolution_error=errors, samples=recorder.samples(), findings=findings)
     if stability_watch is not None:
         removal = with_columns(removal, stability_watch.columns)

@@ -27,6 +27,14 @@ from chipload.jobs.tables import (
 )
 
 
+class ProgramChecksTable(ChecksTable):
+    """Default checks. `false` switches a check off; the report lists the checks that are off."""
+
+    plunge: bool = Field(
+        True, strict=True, description="check that the cutters can plunge and ramp into material as the program does"
+    )
+
+
 class ProgramTable(Table):
     """The program: an NC program or CL data."""
 
@@ -266,6 +274,6 @@ class SimulationJobTable(Table):
     stiffness: StiffnessTable | None = None
     dynamics: DynamicsTable | None = None
     workpiece: WorkpieceTable | None = None
-    checks: ChecksTable = Field(default_factory=ChecksTable.model_construct)
+    checks: ProgramChecksTable = Field(default_factory=ProgramChecksTable.model_construct)
     operation: tuple[SimulateTable, ...] = Field((), max_length=1)
     limits: ProgramLimitsTable = Field(default_factory=ProgramLimitsTable.model_construct)

@@ -68,9 +68,15 @@ def fixture_meshes(job: ProgramJob, machine: Machine) -> dict[str, trimesh.Trime
     return out
 
 
+def stock_box(stock: LayeredStock) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the low and high corner of the box of the stock, (3,) [mm] each."""
+    low, high = (np.array([stock.xs[i], stock.ys[i], stock.bounds[i]], dtype=np.float64) for i in (0, -1))
+    return low, high
+
+
 def stock_points(stock: LayeredStock, pitch: float) -> NDArray[np.float64]:
     """Return the points [mm] of a grid that lie in the stock."""
-    low, high = (np.array([stock.xs[i], stock.ys[i], stock.bounds[i]]) for i in (0, -1))
+    low, high = stock_box(stock)
     count = float(np.prod(np.ceil((high - low) / pitch)))
     if not count <= MOST_POINTS:
         raise InputError(

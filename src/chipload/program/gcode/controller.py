@@ -10,8 +10,10 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, cast
 
 from chipload.errors import InputError, Severity
-from chipload.program.commands import ARC, DWELL, PLANE_AXES, RAPID, XY, YZ, ZX
+from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, XY, YZ, ZX
 from chipload.program.compensation import CentreMove, Compensation
+from chipload.program.corners import Corner, Piece, joined
+from chipload.program.corners import turns as turns_at
 from chipload.program.gcode import arcs
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.parameters import Parameters
@@ -99,6 +101,12 @@ class Controller:
         self.program_frame: ProgramFrame | None = None
         #: where a retraction to where only the machine knows was left out
         self.retracted: Nine | None = None
+        #: by what each peck of a hole is shorter than the one before it, and the least [units of the text]
+        self.pecks = 0.0, 0.0
+        #: rounds every corner (RNDM of a Sinumerik)
+        self.rounding: Corner | None = None
+        self._held: tuple[Piece, int, Corner, bool] | None = None
+        self._asked: tuple[int, Corner] | None = None
         #: why motions are left out until further notice; empty: they are not
         self.left_out = ""
         self.level = 0
@@ -140,6 +148,15 @@ class Controller:
         severity = Severity.UNPROVEN if self.dialect == "linuxcnc" else Severity.NOTE
         self.findings.add(code, self.line, text, severity)
 
+    def touch(self, code: str, name: str, ends: str) -> None:
+        """A motion that a touch ends: where the tool is behind it, and what it measures, is not known."""
+        self.leave_out(
+            code,
+            f"{name}: the motion ends where {ends}; it is taken to its programmed end: the position behind it, and all "
+            "that the program derives from it, is not known: leave the probing out and state the offsets that it sets "
+            "in program.work_offsets or program.parameters",
+        )
+
     # -- offsets ---------------------------------------------------------------------------------------------------
 
     def stored(self, first: int) -> Nine:
@@ -177,6 +194,7 @@ class Controller:
         """Other coordinates, the machine where it is."""
         state = self.state
         if datum != state.datum:
+            self.end_corner()
             before = state.at
             state.at = position_of(self, datum, machine_of(self, state.datum, state.at))
             state.datum = datum
@@ -252,6 +270,7 @@ class Controller:
     def compensate(self, code: int, d: float | None = None, orientation: float | None = None) -> None:
         """G40, or G41, G42 with the tool D, or G41.1, G42.1 with the diameter D and the orientation L."""
         state = self.state
+        self.end_corner()
         if code == 400:
             if self._beside is not None:
                 self._emit(self._beside.finish())
@@ -299,6 +318,75 @@ class Controller:
                 self.track.arc(row, *move.centre, move.turns)
             else:
                 self.track.rows.append(row)
+
+    # -- corners ---------------------------------------------------------------------------------------------------
+
+    def round_off(self, corner: Corner) -> None:
+        """Round or chamfer the corner behind the motion of the block that is read."""
+        self._asked = self.line, corner
+
+    def round_all(self, corner: Corner | None) -> None:
+        """Round every corner from the motion of the block that is read on; None: no more."""
+        self.rounding = corner
+
+    @property
+    def in_corner(self) -> bool:
+        """Whether motions wait for a corner, or ask for one."""
+        return self._held is not None or self._asked is not None or self.rounding is not None
+
+    def _piece(self, motion: int, end: Nine, centre: tuple[float, float], turns: int, context: int) -> None:
+        """A motion of the contour: it waits where the corner behind it is to be rounded."""
+        piece = Piece(motion, list(self.state.at), list(end), centre, turns, 0.0, (context, self.line))
+        held, asked = self._held, self._asked
+        self._held = self._asked = None
+        if asked is not None and asked[0] != self.line:
+            self._sharp(*asked)
+            asked = None
+        if held is not None:
+            before, line, corner, modal = held
+            flat = PLANES[self.state.plane] == XY and self.state.feed_mode != 930
+            made = joined(before, piece, corner) if flat else None
+            # a modal rounding rounds what are corners of the contour
+            if made is None and (not modal or (motion in (LINE, ARC) and turns_at(before, piece))):
+                self._sharp(line, corner)
+            for some in (before,) if made is None else made[:-1]:
+                self._carry(some)
+            piece = piece if made is None else made[-1]
+        own = asked[1] if asked is not None else self.rounding
+        if own is not None and motion in (LINE, ARC):
+            self._held = piece, self.line, own, asked is None
+        else:
+            if asked is not None:
+                self._sharp(*asked)
+            self._carry(piece)
+
+    def end_corner(self) -> None:
+        """Carry out what waits for a corner that does not come."""
+        held, asked = self._held, self._asked
+        self._held = self._asked = None
+        if held is not None:
+            if not held[3]:
+                self._sharp(held[1], held[2])
+            self._carry(held[0])
+        if asked is not None and asked[0] != self.line:
+            self._sharp(*asked)
+        elif asked is not None:
+            self._asked = asked
+
+    def _sharp(self, line: int, corner: Corner) -> None:
+        said = f"{corner.text[:40]}: the corner stays sharp: its rounding or chamfer is left out"
+        self.findings.add("nc-corner", line, said, Severity.UNPROVEN)
+
+    def _carry(self, piece: Piece) -> None:
+        end, (context, line) = nine(piece.end), cast(tuple[int, int], piece.tail)
+        if self._beside is not None and piece.motion == ARC:
+            self._emit(self._beside.arc(end, piece.centre, piece.turns, (context, line)))
+        elif self._beside is not None:
+            self._emit(self._beside.line(piece.motion, end, (context, line)))
+        elif piece.motion == ARC:
+            self.track.arc((ARC, *end, context, line), *piece.centre, piece.turns)
+        else:
+            self.track.rows.append((piece.motion, *end, context, line))
 
     # -- rows ------------------------------------------------------------------------------------------------------
 
@@ -373,7 +461,9 @@ class Controller:
         """RAPID, LINE or PROBE to ``end``."""
         self.check(end)
         context = self.straight_context(motion, end, rate)
-        if self._beside is not None:
+        if self.in_corner:
+            self._piece(motion, end, (0.0, 0.0), 0, context)
+        elif self._beside is not None:
             self._emit(self._beside.line(motion, end, (context, self.line)))
         else:
             self.track.rows.append((motion, *end, context, self.line))
@@ -398,7 +488,9 @@ class Controller:
         """ARC to ``end`` in the active plane."""
         self.check(end)
         context = self.arc_context(end, centre, turns, rate)
-        if self._beside is not None:
+        if self.in_corner:
+            self._piece(ARC, end, centre, turns, context)
+        elif self._beside is not None:
             self._emit(self._beside.arc(end, centre, turns, (context, self.line)))
         else:
             self.track.arc((ARC, *end, context, self.line), *centre, turns)
@@ -406,6 +498,7 @@ class Controller:
 
     def dwell(self, seconds: float) -> None:
         """DWELL where the machine is."""
+        self.end_corner()
         context = self.track.context(self.carried(seconds))
         if self._beside is not None:
             self._emit(self._beside.pause((context, self.line)))

@@ -36,6 +36,7 @@ Step = tuple[int, float, float, float, float]
 class Hole:
     """Numbers of one hole [units of the text, s]; ``sense`` of the spindle: 1, -1 or 0.
 
+    ``shorter``: each peck is by that shorter than the one before it, and at least ``least`` where it is.
     ``shift`` [mm] and ``middle`` of G87; ``back`` is RETURN in units of the text.
     """
 
@@ -48,6 +49,8 @@ class Hole:
     shift: tuple[float, float] = (0.0, 0.0)
     middle: float = 0.0
     back: float = RETURN
+    shorter: float = 0.0
+    least: float = 0.0
 
 
 def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
@@ -98,13 +101,22 @@ def _pecks(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
         raise InputError(f"Q{hole.peck:g}: the depth of a peck must be above 0")
     if (hole.r - hole.bottom) / hole.peck > MOST_PECKS:
         raise InputError(f"Q{hole.peck:g}: makes more than {MOST_PECKS} pecks: raise it")
-    depth = hole.r - hole.peck
+    if hole.shorter < 0.0 or (hole.shorter > 0.0 and not 0.0 < hole.least <= hole.peck):
+        raise InputError(
+            f"I{hole.peck:g} J{hole.shorter:g} K{hole.least:g}: pecks become shorter by J, 0 or more, down to K, which "
+            "must be above 0 and at most I"
+        )
+    if hole.shorter > 0.0 and (hole.r - hole.bottom) / hole.least > MOST_PECKS:
+        raise InputError(f"K{hole.least:g}: makes more than {MOST_PECKS} pecks: raise it")
+    peck = hole.peck
+    depth = hole.r - peck
     while depth > hole.bottom:
         yield LINE, a, b, depth, 0.0
         if code == 830:
             yield RAPID, a, b, hole.r, 0.0
         yield RAPID, a, b, depth + hole.back, 0.0
-        depth -= hole.peck
+        peck = max(peck - hole.shorter, hole.least) if hole.shorter > 0.0 else peck
+        depth -= peck
     yield LINE, a, b, hole.bottom, 0.0
 
 

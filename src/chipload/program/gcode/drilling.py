@@ -165,5 +165,14 @@ class Drilling:
         if dwell is not None and dwell < 0.0:
             raise InputError(f"P{dwell:g}: the time at the bottom must be 0 or more")
         return cycles.Hole(
-            r, bottom, clear, series.peck or 0.0, dwell, self.c.state.sense, shift, middle, cycles.RETURN / scale
+            r,
+            bottom,
+            clear,
+            series.peck or 0.0,
+            dwell,
+            self.c.state.sense,
+            shift,
+            middle,
+            cycles.RETURN / scale,
+            *(self.c.pecks if code in cycles.NEED_Q else ()),
         )

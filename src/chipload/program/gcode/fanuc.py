@@ -21,9 +21,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from chipload.errors import InputError, Severity
+from chipload.program.corners import Corner
 from chipload.program.gcode.controller import Controller
-from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING
+from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING, NEED_Q
 from chipload.program.gcode.dialect import UNREAD, Dialect, NotReadError, go_on, leave_out, lenient
+from chipload.program.gcode.expression import read_value
 from chipload.program.gcode.frames import remove, turn_about
 from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, system_variables, with_brackets
 from chipload.program.gcode.modal import GROUP_OF, shown
@@ -93,6 +95,8 @@ IDLE = frozenset(
     | {531, 690, 691, 692, 693, 1030, 1130, 1870}
 )
 EXTENDED = 541
+#: largest rounding or chamfer [mm]
+LARGEST_CORNER = 1e6
 #: G154 P and G234 of a Haas: more work offsets, tip control
 HAAS_EXTENDED, HAAS_TIP = 1540, 2340
 
@@ -122,7 +126,7 @@ class Fanuc(Dialect):
         if OUTPUTS.match(text):
             c.once("nc-output", f"{text[:20].upper()}: its output is not written")
             return None
-        block = read_block(with_brackets(_sharp(text, c)), comments, c.parameters)
+        block = read_block(with_brackets(_corners(text, c)), comments, c.parameters)
         for code in block.g:
             if code in NOT_READ:
                 raise NotReadError(f"{shown(code)}: {NOT_READ[code]}")
@@ -262,13 +266,28 @@ class Fanuc(Dialect):
             words["k"] = words.pop("f")
         if SKIP in g:
             g[g.index(SKIP)] = 10
-            c.once("nc-skip", f"{shown(SKIP)}: a signal may end the motion earlier; the program goes on from its end")
+            c.touch("nc-skip", shown(SKIP), "its signal comes")
         motion = next((x for x in g if x in CYCLES), c.state.motion)
         if motion in CYCLES:
+            self._shorter_pecks(words, g, motion, c)
             if "k" in words:
                 words["l"] = words.pop("k")
             if "p" in words and 40 not in g and 98 not in block.m:
                 words["p"] /= 1000.0
+
+    @staticmethod
+    def _shorter_pecks(words: dict[str, float], g: list[int], motion: int, c: Controller) -> None:
+        """G83 and G73 of a Haas with I: the first peck; each that follows is shorter by J, and at least K.
+
+        Reference: Haas, Mill Operator's Manual, "G83 Normal Peck Drilling Canned Cycle".
+        """
+        if motion in NEED_Q and "i" in words:
+            if "q" in words:
+                raise NotReadError(f"{shown(motion)}: I with Q: pecks that retract after a depth Q")
+            words["q"] = words.pop("i")
+            c.pecks = words.pop("j", 0.0), words.pop("k", 0.0)
+        elif any(code in CYCLES for code in g) or "q" in words:
+            c.pecks = 0.0, 0.0
 
     @staticmethod
     def _tool_offset(words: dict[str, float], c: Controller) -> None:
@@ -334,8 +353,8 @@ class Fanuc(Dialect):
         return super().call(words)
 
 
-def _sharp(text: str, c: Controller) -> str:
-    """A block without the roundings and chamfers (,R and ,C) behind it: the corner stays sharp.
+def _corners(text: str, c: Controller) -> str:
+    """A block without the rounding or chamfer (,R or ,C) behind it, which the controller makes.
 
     Raises
     ------
@@ -345,7 +364,12 @@ def _sharp(text: str, c: Controller) -> str:
     if "," not in text or OUTPUTS.match(text):
         return text
     for found in _CORNER.finditer(text):
-        c.leave_out("nc-corner", f"{found[0].upper()}: the corner stays sharp: its rounding or chamfer is left out")
+        size = read_value(found[2], 0, c.parameters)[0] * c.state.scale
+        said = found[0].upper()
+        if not 0.0 <= size <= LARGEST_CORNER:
+            raise InputError(f"{said}: a corner must be from 0 to {LARGEST_CORNER:g} mm")
+        if size > 0.0:
+            c.round_off(Corner(found[1] == "r", size, None, said))
     left = _CORNER.sub("", text)
     if "," in left:
         raise NotReadError(f"{left[left.index(',') :][:12].upper()!r}: what stands behind a comma is not read")

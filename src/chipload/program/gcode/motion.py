@@ -144,7 +144,7 @@ class ControllerMotion:
         to = end(self.c, block)
         if math.dist(state.at, to) < LEAST_PROBE:
             raise InputError(f"{shown(code)}: ends less than {LEAST_PROBE:g} mm from where it starts: go farther")
-        c.note("nc-probe", f"{shown(code)}: a probe signal may end it earlier; the program goes on from its end")
+        c.touch("nc-probe", shown(code), "the probe touches")
         c.straight(PROBE, to)
         for k, axis in enumerate(to):
             c.parameters.numbered[5061 + k] = axis / (c.machine_scale if k in LINEAR else 1.0)

@@ -272,7 +272,7 @@ def in_machine_unknown(c: Controller, name: str, axes: Axes) -> bool:
             Severity.UNPROVEN,
         )
     else:
-        c.once(
+        c.note(
             "nc-machine-retraction",
             f"{name}: a retraction to a position of the machine is left out: state "
             f"{_offset_name(number)} in program.work_offsets to have it",

@@ -100,6 +100,7 @@ def _ready(c: Controller, motion: ControllerMotion) -> bool:
     state = c.state
     return (
         state.absolute
+        and not c.in_corner
         and state.feed_mode in (930, 940)
         and not state.absolute_centre
         and not state.diameter

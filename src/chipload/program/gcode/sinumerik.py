@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from chipload.errors import InputError
+from chipload.program.corners import Corner
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.dialect import NOTED, Dialect, NotReadError, go_on, leave_out, lenient
 from chipload.program.gcode.expression import integer_of, read_value
@@ -32,6 +33,7 @@ from chipload.program.gcode.sinumerik_flow import flow_step
 from chipload.program.gcode.sinumerik_swivel import swivel
 from chipload.program.gcode.sinumerik_words import (
     ALONG_TOOL,
+    CORNERS,
     CURVES,
     END_ALONG_TOOL,
     FRAMES,
@@ -49,6 +51,8 @@ from chipload.program.setup import FIRST_NAMED
 if TYPE_CHECKING:
     from chipload.program.gcode.flow import Flow
 
+#: largest rounding or chamfer [mm]
+LARGEST_CORNER = 1e6
 _TOKEN = re.compile(
     r"""\s*(?:
       (?P<name>[A-Z_$][A-Z0-9_$]*?)\s*(?:\[[^\]]*\])?\s*=\s*(?P<value>"[^"]*"|(?:[^\s=()"]|\([^()]*(?:\([^()]*\)[^()]*)*\))+)
@@ -255,6 +259,9 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
     if name in CURVES:
         _left_out(block, c, name)
         return
+    if name in CORNERS:
+        _corner(c, name, text)
+        return
     if left_out := unread(name, text):
         c.leave_out("nc-unknown-word", left_out)
         if leaves_out(name) and NOTED not in block.g:
@@ -287,6 +294,18 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
         c.note("nc-unknown-word", f"{name}={text}: further spindles are left out")
     else:
         c.note("nc-unknown-word", f"{name}={text[:40]}: is not known")
+
+
+def _corner(c: Controller, name: str, text: str) -> None:
+    """A rounding or chamfer behind the motion of the block; RNDM behind every motion until RNDM=0."""
+    size, said = _value(text, c) * c.state.scale, f"{name}={text.strip()[:20]}"
+    if not 0.0 <= size <= LARGEST_CORNER:
+        raise InputError(f"{said}: must be from 0 to {LARGEST_CORNER:g} mm")
+    corner = Corner(name.startswith("RND"), size, None, said, edge=name == "CHF") if size > 0.0 else None
+    if name == "RNDM":
+        c.round_all(corner)
+    elif corner is not None:
+        c.round_off(corner)
 
 
 def _left_out(block: Block, c: Controller, word: str) -> None:

@@ -51,7 +51,7 @@ def swivel(c: Controller, values: list[float]) -> None:
     )
     if retract in TO_MACHINE:
         c.retracted = c.state.at
-        c.once("nc-machine-retraction", "CYCLE800: a retraction to a position of the machine is left out")
+        c.note("nc-machine-retraction", "CYCLE800: a retraction to a position of the machine is left out")
     elif retract == INCREMENTAL and given[FR_I] > 0.0:
         c.straight(RAPID, put(c.state.at, {2: c.state.at[2] + given[FR_I] * c.state.scale}))
     order = order_of(mode) or ("" if any(angles) else "xyz")

@@ -40,11 +40,11 @@ IDLE = frozenset(
     """.split()  # noqa: SIM905
 )
 #: addresses whose effect is not read, and what is done instead
-_ALLOWANCE, _CORNER = "an allowance on the contour is left out", "the corner stays sharp"
+_ALLOWANCE = "an allowance on the contour is left out"
 _TOOL, _TOUCH = "an offset of the tool is left out", "a probe signal may end the motion earlier"
 _LEFT_OUT = "the motion of its block is left out"
 UNREAD = {
-    **dict.fromkeys(("RND", "RNDM", "CHF", "CHR", "DISC"), _CORNER),
+    "DISC": "the corner stays sharp",
     **dict.fromkeys(("AR", "ANG", "PO", "POS", "POSA", "POSP"), _LEFT_OUT),
     **dict.fromkeys(("TOFF", "TOFFL", "TOFFR"), _TOOL),
     **dict.fromkeys(("MEAS", "MEAW", "MEASA", "MEAWA"), _TOUCH),
@@ -52,6 +52,8 @@ UNREAD = {
     "FB": "the feed of the block is that before it",
     "FL": "the limit of an axis's feed is left out",
 }
+#: roundings and chamfers: of the next corner, and of all (RNDM)
+CORNERS = ("RND", "RNDM", "CHF", "CHR")
 #: an axis of the machine with a number, such as Z1=50
 _AXIS = re.compile(r"[XYZABCUVWQ][0-9]{1,2}")
 _FRAME, _TOOL_DATA = re.compile(r"\$(?:P|AC|AA)_\w*(?:FRAME|UIFR)"), re.compile(r"\$TC_DP")
@@ -61,8 +63,8 @@ _OVERRIDES = ("OVR", "OVRRAP")
 def unread(name: str, text: str) -> str:
     """What is left out of an assignment, empty where its effect is no concern of the path.
 
-    >>> unread("RND", "5"), unread("OVR", "100"), unread("Z1", "0")
-    ('RND=5: is not read: the corner stays sharp', '', 'Z1=0: is not read: the motion of its block is left out')
+    >>> unread("DISC", "5"), unread("OVR", "100"), unread("Z1", "0")
+    ('DISC=5: is not read: the corner stays sharp', '', 'Z1=0: is not read: the motion of its block is left out')
     """
     if name in UNREAD or _AXIS.fullmatch(name):
         return f"{name}={text[:40]}: is not read: {UNREAD.get(name, _LEFT_OUT)}"

@@ -31,7 +31,7 @@ SILENT = (13, 14, 20, 32)
 #: by what the coordinates are changed, and the value that leaves them as they are
 CHANGES = {8: ("mirrored", 0.0), 10: ("turned", 0.0), 11: ("scaled", 1.0), 26: ("scaled", 1.0)}
 PRESET, PATTERNS, WORKING_PLANE = 247, (220, 221), 19
-_VALUE = re.compile(r"([A-Z ]*?)\s*([-+]?\d*\.?\d+)\s*$")
+_VALUE = re.compile(r"([A-Z. ]*?)\s*([-+]?\d*\.?\d+)\s*$")
 _SPATIAL = re.compile(rf"\b([ABC])\s*([-+]?)\s*({words.VALUE})")
 _CHANGED = re.compile(rf"(?:\b|(?<=\s))[A-Z]*\s*([-+]?)\s*({words.VALUE})")
 

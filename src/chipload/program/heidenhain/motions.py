@@ -2,7 +2,7 @@
 
 Notation: ``text`` is a block without its first word; DR+ counter-clockwise; PR, PA polar coordinates about the pole.
 Approaches (APPR) go straight to the start of the contour, departures (DEP) are left out: findings say so. Roundings
-(RND) and chamfers (CHF) are in :mod:`~chipload.program.heidenhain.corners`; one that the contour has no room for stays
+(RND) and chamfers (CHF) are in :mod:`~chipload.program.corners`; one that the contour has no room for stays
 sharp. A motion in the machine's own coordinates (M91) is left out: where they lie in the work is not known.
 
 Reference: Heidenhain, iTNC 530 User's Manual HEIDENHAIN Conversational, "Programming: Programming Contours".
@@ -16,8 +16,8 @@ import re
 
 from chipload.errors import InputError
 from chipload.program.commands import LINE, RAPID
+from chipload.program.corners import Corner
 from chipload.program.heidenhain import tilted_plane, words
-from chipload.program.heidenhain.corners import Corner
 from chipload.program.heidenhain.formula import NotKnownError
 from chipload.program.heidenhain.state import FARTHEST, ConversationalState
 from chipload.program.heidenhain.switches import after, before, m_codes

@@ -14,7 +14,7 @@ from typing import cast
 from chipload.errors import Finding, InputError, Severity
 from chipload.program.commands import ARC, DWELL, LINE, RAPID, XY, Frame, Row
 from chipload.program.compensation import CentreMove, Compensation
-from chipload.program.heidenhain.corners import Corner, Piece, joined
+from chipload.program.corners import Corner, Piece, joined
 from chipload.program.heidenhain.formula import NotKnownError, QParameters, q_number
 from chipload.program.heidenhain.words import AXIS, FEED, RETRACT, SETTINGS, TURN_FEED, number, rest_of
 from chipload.program.swivel import Swivel

@@ -1,12 +1,14 @@
-"""Roundings (RND) and chamfers (CHF) between two elements of a contour in the plane.
+"""Roundings and chamfers between two elements of a contour in the plane, of all controllers.
 
 Notation: points of the plane are complex numbers [mm]; an element leads from its start to its end, straight or about a
 centre, counter-clockwise where ``sense`` is 1. At the corner P the contour turns to the side o, 1 to the left. The
 centre of a rounding of radius r lies on both elements shifted by r to that side: a line by r along its normal, an arc
-of radius R to the radius R - o sense r. A chamfer of length l leaves each line l before and behind P.
+of radius R to the radius R - o sense r. A chamfer of length l leaves each line l before and behind P; one that is
+stated by the length s of its own edge has l = s / |a + b|, with a and b the unit vectors of the lines.
 
 Reference: Heidenhain, iTNC 530 User's Manual HEIDENHAIN Conversational, "Inserting a chamfer between two straight
-lines", "Corner rounding RND".
+lines", "Corner rounding RND"; Siemens, SINUMERIK 840D sl Fundamentals, "Chamfer, rounding (CHF, CHR, RND, RNDM)";
+Haas, Mill Operator's Manual, "Corner rounding and chamfering".
 """
 
 from __future__ import annotations
@@ -122,18 +124,31 @@ class Piece:
 
 @dataclass(frozen=True)
 class Corner:
-    """A block RND (``round``) or CHF: radius or length [mm]; its feed [mm/s], None: that of what follows; its text."""
+    """A rounding (``round``) or chamfer: radius or length [mm]; its feed [mm/s], None: that of what follows; its text;
+    whether the length is that of the edge of the chamfer itself.
+    """
 
     round: bool
     size: float
     feed: float | None
     text: str
+    edge: bool = False
+
+
+def turns(before: Piece, after: Piece) -> bool:
+    """Whether the contour has a corner between two pieces: both move in the plane and do not run into one another."""
+    first, second = before.element, after.element
+    if any(e.sense == 0 and abs(e.end - e.start) <= SAME for e in (first, second)):
+        return False
+    turned = second.along(second.start) / first.along(first.end)
+    return abs(cmath.phase(turned)) > 1e-6
 
 
 def joined(before: Piece, after: Piece, corner: Corner) -> tuple[Piece, Piece, Piece] | None:
     """Two pieces and what a corner puts between them; None: the corner cannot be made."""
     level = all(a[2:] == b[2:] for a, b in ((before.start, before.end), (after.start, after.end)))
-    if not level or max(abs(before.turns), abs(after.turns)) > 1 or after.motion not in (LINE, ARC):
+    flat = any(e.sense == 0 and abs(e.end - e.start) <= SAME for e in (before.element, after.element))
+    if not level or flat or max(abs(before.turns), abs(after.turns)) > 1 or after.motion not in (LINE, ARC):
         return None
     feed = after.feed if corner.feed is None else corner.feed
     if corner.round:
@@ -142,7 +157,13 @@ def joined(before: Piece, after: Piece, corner: Corner) -> tuple[Piece, Piece, P
             return None
         ends, centre, turns, motion = (arc.start, arc.end), (arc.centre.real, arc.centre.imag), arc.sense, ARC
     else:
-        found = chamfer(before.element, after.element, corner.size)
+        size = corner.size
+        if corner.edge:
+            apart = abs(before.element.along(before.element.end) + after.element.along(after.element.start))
+            if apart < 1e-9:
+                return None
+            size /= apart
+        found = chamfer(before.element, after.element, size)
         if found is None:
             return None
         ends, centre, turns, motion = found, (0.0, 0.0), 0, LINE
