@@ -22,6 +22,7 @@ from chipload.result.limits import Columns
 from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.loads import Cuts, Floats, Ints
 from chipload.simulation.removal import BANDED
+from chipload.units import mm_min_from_mm_s
 
 #: columns that these checks add to those of the simulation
 CHECK_COLUMNS = ("cutter_stress_mpa", "deflection_share")
@@ -158,7 +159,54 @@ def unchecked_checks(checks: DefaultChecks) -> tuple[str, ...]:
     return tuple(out)
 
 
-def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...]:
+def range_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...]:
+    """Chips and cutting speeds outside the range that the coefficients were measured in.
+
+    Parameters
+    ----------
+    columns : of a track, a row a step; ``chip_max_mm``, ``power_w`` and ``torque_mean_nm`` among them
+    """
+    if "chip_range" in checks.off:
+        return ()
+    return (*_chip_findings(checks, columns), *_speed_findings(checks, columns))
+
+
+def _speed_findings(checks: DefaultChecks, columns: Columns) -> list[Finding]:
+    """Steps that cut slower or faster than the coefficients were measured at, at the cutter's ``diameter_mm``."""
+    material = checks.material
+    if material.speed is None:
+        return []
+    low, high = (mm_min_from_mm_s(v) / 1000.0 for v in material.speed)
+    radius = {n: c.diameter / 2.0 for n, c in checks.cutters.items()}
+    # a strategy of a contour has one cutter, and no column of tools
+    tools = columns["tool"] if "tool" in columns else np.full(len(columns["power_w"]), min(radius))
+    radii = np.array([radius.get(int(n), 0.0) for n in np.asarray(tools).tolist()])
+    speed = mm_min_from_mm_s(1.0) / 1000.0 * _spindle_speed(columns) * radii
+    out = []
+    for side, k in (("below", _least_above_zero(speed)), ("above", int(np.argmax(speed)) if len(speed) else -1)):
+        if k < 0 or not (0.0 < speed[k] < low * (1.0 - 1e-6) if side == "below" else speed[k] > high * (1.0 + 1e-6)):
+            continue
+        text = (
+            f"the cutting speed is {speed[k]:.4g} m/min: the coefficients of {material.name} hold from {low:g} to "
+            f"{high:g} m/min, the loads {side} that are not known"
+        )
+        out.append(_at_step(f"speed-{side}-coefficients", columns, k, text))
+    return out
+
+
+def _least_above_zero(values: Floats) -> int:
+    """Index of the least value above 0; -1: none is."""
+    return int(np.argmin(np.where(values > 0.0, values, math.inf))) if np.any(values > 0.0) else -1
+
+
+def _spindle_speed(columns: Columns) -> Floats:
+    """Speed of the spindle [rad/s] of the steps that cut, their power over their torque; 0: the step does not cut."""
+    power, torque = np.asarray(columns["power_w"]), np.asarray(columns["torque_mean_nm"])
+    speed: Floats = np.divide(power, torque, out=np.zeros(len(torque)), where=torque > 0.0)
+    return speed
+
+
+def _chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...]:
     """Chips that are thicker than those that the coefficients were measured with, and steps where all are thinner.
 
     Parameters
@@ -167,7 +215,7 @@ def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
     """
     material, thick = checks.material, columns["chip_max_mm"]
     chip = material.chip
-    if chip is None or "chip_range" in checks.off or len(thick) == 0:
+    if chip is None or len(thick) == 0:
         return ()
     out = []
     k = int(np.argmax(thick))
@@ -270,8 +318,7 @@ def _over_feed(columns: Columns, tool: Ints, cutters: Mapping[int, Cutter]) -> F
     bent = next((c for c in ("deflection_um", "deflection_cutter_um") if c in columns), "")
     if not bent or not {"feed_mm_min", "power_w", "torque_mean_nm"} <= set(columns):
         return out
-    power, torque = np.asarray(columns["power_w"]), np.asarray(columns["torque_mean_nm"])
-    speed = np.divide(power, torque, out=np.zeros(len(tool)), where=torque > 0.0)
+    speed = _spindle_speed(columns)
     numbers, of = np.unique(tool, return_inverse=True)
     teeth = np.array([cutters[n].flutes if n in cutters else 0 for n in numbers.tolist()])[of]
     delta = np.asarray(columns[bent]) / 1000.0

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import chip_findings, unchecked_checks
+from chipload.jobs.checks import range_findings, unchecked_checks
 from chipload.jobs.simulation.limits import program_limits
 from chipload.jobs.simulation.numbers import operation_numbers, program_numbers
 from chipload.jobs.simulation.outcome import ChangedText, ProgramResult, SimulationResult
@@ -127,7 +127,7 @@ def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
     if simulation.workpiece is not None:
         out += simulation.workpiece.findings
     out += _bodies(simulation)
-    return (*out, *chip_findings(simulation.checks, simulation.removal.columns))
+    return (*out, *range_findings(simulation.checks, simulation.removal.columns))
 
 
 def _bodies(simulation: SimulationResult) -> list[Finding]:
