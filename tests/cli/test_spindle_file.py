@@ -67,3 +67,16 @@ def test_more_than_was_identified_is_refused(job):
         code, _, err = call("check", job, "--set", "spindle.file=other.toml")
         assert code == 2
         assert wanted in err
+
+
+def test_less_than_was_identified_is_refused(job):
+    """A torque that is held below the range of the estimate; the check states the least limit, range over hold."""
+    text = (job.parent / "spindle.toml").read_text()
+    (job.parent / "least.toml").write_text(re.sub(r"^torque_nm = .*$", "torque_nm = [0.27, 0.5]", text, flags=re.M))
+    own = ("--set", "spindle.file=least.toml", "--set", "torque_control.override.light_nm=0.06")
+    code, out, _ = call("check", job, *own)
+    assert code == 0
+    assert "the controller can hold torque limits from 0.3 N m up" in out
+    code, _, err = call("check", job, *own, "--set", "limits.torque_nm=0.2")
+    assert code == 2
+    assert "spindle: the estimate is valid from 0.27 N m up, the torque that is held is 0.18 N m: log lighter" in err

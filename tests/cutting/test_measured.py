@@ -70,6 +70,22 @@ def test_clipped_and_drifting(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("names", "scale"),
+    [
+        ("time_ms,fx_kn", 1000.0),
+        ("time [ms],Fx [kN]", 1000.0),
+        ("Time (ms),Fx (N)", 1.0),
+        ("Time [ms],Fx[lbf]", 4.4482216),
+    ],
+)
+def test_units_in_names(tmp_path, names, scale):
+    data, _ = read_forces(written(tmp_path, names + "\n0,1\n0.5,2\n1.0,3\n"))
+    assert data.names == (names.split(",")[1],)
+    assert data.rate == pytest.approx(2000.0)
+    np.testing.assert_allclose(data.force[:, 0], scale * np.array([1.0, 2.0, 3.0]), rtol=1e-7)
+
+
+@pytest.mark.parametrize(
     ("text", "says"),
     [
         (HEAD + "0,1,2,3\n0.001,1,2,3\n0.003,1,2,3\n0.004,1,2,3\n", "samples are missing (1 gaps): between 0.001"),
@@ -81,7 +97,7 @@ def test_clipped_and_drifting(tmp_path):
         ("fx_n,fy_n\n1,2\n2,3\n3,4\n", "line 1: no time column and no sampling rate"),
         ("1,2\n2,3\n", "line 1: numbers without names"),
         ("time_s,speed_v\n0,1\n1,2\n2,3\n", "no column of forces among time_s, speed_v"),
-        ("time_h,fx_n\n0,1\n1,2\n2,3\n", "time_h: its unit must be one of s, ms, us"),
+        ("time_h,fx_n\n0,1\n1,2\n2,3\n", "time_h: its unit must be one of s, ms, us: name it time_s"),
         (HEAD, "holds no numbers"),
         (HEAD + "0,1,2,3\n", "1 samples in the window"),
         ("a\x00b", "line 1: is not text"),

@@ -130,6 +130,18 @@ def test_chips_thinner_than_the_coefficients_hold_for_are_unproven() -> None:
     assert "chip-below-coefficients" not in codes(off)
 
 
+def test_a_cutting_speed_outside_that_of_the_coefficients_is_unproven() -> None:
+    # 300 rad/s at a radius of 5 mm: 1.5 m/s, 90 m/min
+    for (low, high), code in (((60.0, 89.9), "above"), ((90.1, 200.0), "below"), ((60.0, 120.0), "")):
+        own = replace(AL, speed=(1000.0 * low / 60.0, 1000.0 * high / 60.0))
+        done = slot(material=own)
+        assert {c for c in codes(done) if c.startswith("speed-")} == ({f"speed-{code}-coefficients"} if code else set())
+        assert done.verdict == ("unproven" if code else "holds")
+        if code:
+            assert f"the cutting speed is 90 m/min: the coefficients of {AL.name} hold from {low:g} to" in done.message
+    assert slot(material=replace(AL, speed=(2000.0, 3000.0)), checks={"chip_range": False}).verdict == "holds"
+
+
 def test_a_band_on_every_limit_of_the_force_and_the_verdict_at_its_upper_end() -> None:
     done = slot()
     theta = np.radians(np.arange(180.0))

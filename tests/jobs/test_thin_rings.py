@@ -23,8 +23,8 @@ def test_a_thin_wall_is_named_with_its_sizes(kind: str) -> None:
     (text,) = thin_rings((wall(21.0, 60.0, kind), wall(19.0, 60.0, kind)))
     name = "tube" if kind == "cylinder" else "cone"
     assert (
-        f"the model is a {name} of 20 mm mean radius{'' if name == 'tube' else ' at its wide end'} with a wall of about 2 mm"
-        in text
+        f"the model is a {name} of 20 mm mean radius{'' if name == 'tube' else ' at its wide end'} with a wall of about"
+        " 2 mm" in text
     )
     assert f"chipload example {name}" in text
 

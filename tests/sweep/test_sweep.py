@@ -24,7 +24,7 @@ from chipload.errors import InputError
 from chipload.jobs import load_job
 from chipload.sweep.cases import Samples, cases_of
 from chipload.sweep.run import Combination, SweepResult, run_sweep
-from chipload.sweep.table import pareto
+from chipload.sweep.table import job_text, pareto
 from chipload.workers import WorkerDied, completed
 from conftest import EXAMPLES
 from slot_job import slot_job
@@ -123,6 +123,20 @@ def test_the_best_job_is_a_job(alone):
     assert loaded.job.table.cutter[0].diameter_mm == 10.0
     assert loaded.job.table.operation[0].feed_mm_min == 600.0
     assert "# " in (alone / "best.toml").read_text()
+
+
+def test_the_best_job_has_the_values_as_its_cases_had_them(tmp_path):
+    """A file of one's own replaces a name, its path is that from the sweep; .5 is a number."""
+    job = slot_job(tmp_path / "job")
+    (job.parent / "own.toml").write_text(material_text(material_named("al6082-t6")))
+    values = (("material.file", "own.toml"), ("operation.0.step_mm", ".5"), ("checks.chip_space", "false"))
+    out = tmp_path / "sweep"
+    out.mkdir()
+    (out / "best.toml").write_text(job_text(job, Combination(1, values, ()), out))
+    table = load_job(out / "best.toml").job.table
+    assert (table.material.name, table.material.file) == (None, "../job/own.toml")
+    assert table.operation[0].step_mm == 0.5
+    assert table.checks.chip_space is False
 
 
 def test_a_pool_and_a_cluster_give_the_same_bytes(alone, job, tmp_path):

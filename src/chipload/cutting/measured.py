@@ -3,7 +3,7 @@
 Notation: F force [N], t time [s].
 
 A file is UTF-8 or latin-1 text: lines ``key,value`` (DynoWare's header, may be missing), a line of column names, a line
-of units where the names do not hold them (``fx_n``, ``time_s``), then numbers with a decimal point. Time says where a
+of units where the names do not hold them (``fx_n``, ``Fx [N]``), then numbers with a decimal point. Time says where a
 sample is missing; without a time column the header's sampling rate holds, and the first sample is at 0.
 """
 
@@ -234,10 +234,12 @@ def _columns(
     """Return column and scale of the time and of each force."""
     time, forces = None, []
     for k, name in enumerate(names):
-        unit = units[k] if units is not None else name.lower().rsplit("_", 1)[-1]
+        unit = units[k] if units is not None else _unit(name)
         if name.lower().startswith("time") or name.lower() in ("t", "t_s"):
             if unit not in TIME_UNITS:
-                raise InputError(f"{label}: line {at}: {name}: its unit must be one of {', '.join(TIME_UNITS)}")
+                raise InputError(
+                    f"{label}: line {at}: {name}: its unit must be one of {', '.join(TIME_UNITS)}: name it time_s"
+                )
             time = (k, TIME_UNITS[unit])
         elif unit in FORCE_UNITS:
             forces.append((k, FORCE_UNITS[unit]))
@@ -250,6 +252,12 @@ def _columns(
             f"{label}: line {at}: no column of forces among {', '.join(names)}: name them fx_n, fy_n, fz_n"
         )
     return time, forces
+
+
+def _unit(name: str) -> str:
+    """Return the unit in a name: ``fx_n``, ``Fx [N]`` and ``Fx (N)`` all hold n."""
+    bracket = re.search(r"[\[(]\s*(\w+)\s*[\])]\s*$", name)
+    return (bracket[1] if bracket else name.rsplit("_", 1)[-1]).lower()
 
 
 def _rate(header: Mapping[str, str], label: str) -> float | None:

@@ -15,7 +15,7 @@ from chipload.cutting.material import Material
 from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.errors import Finding, InputError, Severity
-from chipload.jobs.rubbing import over_feed, rubbing
+from chipload.jobs.rubbing import over_feed, rubbing, spindle_speed
 from chipload.jobs.tables import ChecksTable
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, Verdict, check_limit
@@ -24,6 +24,7 @@ from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.loads import Cuts, Floats
 from chipload.simulation.ramp import ramp_angle
 from chipload.simulation.removal import BANDED
+from chipload.units import mm_min_from_mm_s
 
 #: columns that these checks add to those of the simulation
 CHECK_COLUMNS = ("cutter_stress_mpa", "deflection_share")
@@ -163,7 +164,47 @@ def unchecked_checks(checks: DefaultChecks) -> tuple[str, ...]:
     return tuple(out)
 
 
-def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...]:
+def range_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...]:
+    """Chips and cutting speeds outside the range that the coefficients were measured in.
+
+    Parameters
+    ----------
+    columns : of a track, a row a step; ``chip_max_mm``, ``power_w`` and ``torque_mean_nm`` among them
+    """
+    if "chip_range" in checks.off:
+        return ()
+    return (*_chip_findings(checks, columns), *_speed_findings(checks, columns))
+
+
+def _speed_findings(checks: DefaultChecks, columns: Columns) -> list[Finding]:
+    """Steps that cut slower or faster than the coefficients were measured at, at the cutter's ``diameter_mm``."""
+    material = checks.material
+    if material.speed is None:
+        return []
+    low, high = (mm_min_from_mm_s(v) / 1000.0 for v in material.speed)
+    radius = {n: c.diameter / 2.0 for n, c in checks.cutters.items()}
+    # a strategy of a contour has one cutter, and no column of tools
+    tools = columns["tool"] if "tool" in columns else np.full(len(columns["power_w"]), min(radius))
+    radii = np.array([radius.get(int(n), 0.0) for n in np.asarray(tools).tolist()])
+    speed = mm_min_from_mm_s(1.0) / 1000.0 * spindle_speed(columns) * radii
+    out = []
+    for side, k in (("below", _least_above_zero(speed)), ("above", int(np.argmax(speed)) if len(speed) else -1)):
+        if k < 0 or not (0.0 < speed[k] < low * (1.0 - 1e-6) if side == "below" else speed[k] > high * (1.0 + 1e-6)):
+            continue
+        text = (
+            f"the cutting speed is {speed[k]:.4g} m/min: the coefficients of {material.name} hold from {low:g} to "
+            f"{high:g} m/min, the loads {side} that are not known"
+        )
+        out.append(_at_step(f"speed-{side}-coefficients", columns, k, text))
+    return out
+
+
+def _least_above_zero(values: Floats) -> int:
+    """Index of the least value above 0; -1: none is."""
+    return int(np.argmin(np.where(values > 0.0, values, math.inf))) if np.any(values > 0.0) else -1
+
+
+def _chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...]:
     """Chips that are thicker than those that the coefficients were measured with, and steps where all are thinner.
 
     Parameters
@@ -172,7 +213,7 @@ def chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
     """
     material, thick = checks.material, columns["chip_max_mm"]
     chip = material.chip
-    if chip is None or "chip_range" in checks.off or len(thick) == 0:
+    if chip is None or len(thick) == 0:
         return ()
     out = []
     k = int(np.argmax(thick))
@@ -331,8 +372,7 @@ def _spindle(machine: Machine, columns: Columns, track: str, errors: Mapping[str
     """Torque and power of the spindle; its torque depends on the speed, so the step with the greatest share counts."""
     out = []
     torque, power = np.asarray(columns["torque_mean_nm"]), np.asarray(columns["power_w"])
-    speed = np.divide(power, torque, out=np.zeros(len(power)), where=torque > 0.0)
-    able = machine.torque_at(speed) / 1000.0
+    able = machine.torque_at(spindle_speed(columns)) / 1000.0
     k = int(np.argmax(torque / able))
     if np.isfinite(able[k]):
         rows, error = np.arange(len(torque)) == k, load_error(errors, "torque_mean_nm")

@@ -19,18 +19,24 @@ UPRIGHT = 1e-9
 MOST_FEED = 1e4
 
 
+def spindle_speed(columns: Columns) -> Floats:
+    """Speed of the spindle [rad/s] of the steps that cut, their power over their torque; 0: the step does not cut."""
+    power, torque = np.asarray(columns["power_w"]), np.asarray(columns["torque_mean_nm"])
+    speed: Floats = np.divide(power, torque, out=np.zeros(len(torque)), where=torque > 0.0)
+    return speed
+
+
 def over_feed(columns: Columns, tool: Ints, cutters: Mapping[int, Cutter]) -> Floats:
     """The deflection over the feed per tooth; inf where that is not known, or the axis turns.
 
     The share of the model's range is the greater of this and of the deflection over the radial depth: of a film, whose
-    depth is next to nothing, it says nothing of the feed.
+    depth is nearly zero, it says nothing about the feed.
     """
     out = np.full(len(tool), math.inf)
     bent = next((c for c in ("deflection_um", "deflection_cutter_um") if c in columns), "")
     if not bent or not {"feed_mm_min", "power_w", "torque_mean_nm"} <= set(columns):
         return out
-    power, torque = np.asarray(columns["power_w"]), np.asarray(columns["torque_mean_nm"])
-    speed = np.divide(power, torque, out=np.zeros(len(tool)), where=torque > 0.0)
+    speed = spindle_speed(columns)
     numbers, of = np.unique(tool, return_inverse=True)
     teeth = np.array([cutters[n].flutes if n in cutters else 0 for n in numbers.tolist()])[of]
     delta = np.asarray(columns[bent]) / 1000.0

@@ -149,7 +149,9 @@ class ChecksTable(Table):
     flute_length: bool = Field(True, strict=True, description="check that the cutter does not cut above its flutes")
     chip_space: bool = Field(True, strict=True, description="check the chip space, if gullet_mm2 is stated")
     chip_range: bool = Field(
-        True, strict=True, description="check that the chip thickness is within the range of the coefficients"
+        True,
+        strict=True,
+        description="check that chip thickness and cutting speed are within the range of the coefficients",
     )
     spindle: bool = Field(True, strict=True, description="check torque and power of the machine's spindle")
     rigid_model: bool = Field(

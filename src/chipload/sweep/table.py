@@ -12,6 +12,8 @@ from typing import Any
 import tomlkit
 
 from chipload.files import is_file, read_regular, write_whole
+from chipload.jobs import capability_of
+from chipload.jobs.override import override
 from chipload.sweep.run import Combination, SweepResult
 from chipload.tables import LARGEST_FILE
 
@@ -124,16 +126,11 @@ def job_text(job: Path, best: Combination, out: Path) -> str:
     """Return the job file with the best values and its comments; file names are relative to the folder of the sweep."""
     text = read_regular(job, str(job), LARGEST_FILE, "not a job").decode()
     document = tomlkit.parse(text)
+    values = [f"{path}={value}" for path, value in best.values]
+    root = capability_of(document, values).root
+    for value in values:
+        override(document, value, root)
     _move_files(document, job.parent, out)
-    for path, value in best.values:
-        *keys, last = path.split(".")
-        here: Any = document
-        for key in keys:
-            here = here[int(key)] if isinstance(here, list) else here.setdefault(key, tomlkit.table())
-        try:
-            here[int(last) if isinstance(here, list) else last] = tomlkit.parse(f"value = {value}")["value"]
-        except tomlkit.exceptions.ParseError:
-            here[last] = value
     return tomlkit.dumps(document)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import chip_findings, ramp_findings, unchecked_checks
+from chipload.jobs.checks import ramp_findings, range_findings, unchecked_checks
 from chipload.jobs.simulation.limits import program_limits
 from chipload.jobs.simulation.numbers import operation_numbers, program_numbers
 from chipload.jobs.simulation.outcome import ChangedText, ProgramResult, SimulationResult
@@ -134,7 +134,7 @@ def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
         out += simulation.workpiece.findings
     out += _bodies(simulation)
     columns = simulation.removal.columns
-    return (*out, *ramp_findings(simulation.checks, columns), *chip_findings(simulation.checks, columns))
+    return (*out, *ramp_findings(simulation.checks, columns), *range_findings(simulation.checks, columns))
 
 
 def _bodies(simulation: SimulationResult) -> list[Finding]:

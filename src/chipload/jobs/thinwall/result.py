@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks, with_peaks
+from chipload.jobs.checks import default_limits, range_findings, unchecked_checks, with_peaks
 from chipload.jobs.thinwall.chatter import FIRST_STATE, chatter_limits, chatter_numbers
 from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, remedy_text
 from chipload.jobs.thinwall.part_shape import PartShape
@@ -155,7 +155,7 @@ def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
     for c in one.shape.collisions:
         text = f"{c.what} goes {c.depth_mm:.3g} mm into {c.into}"
         out.append(Finding("collision", c.line, text, Severity.EXCEEDS, c.at, c.step))
-    return (*out, *chip_findings(walled.checks, one.columns))
+    return (*out, *range_findings(walled.checks, one.columns))
 
 
 def failures_of(walled: ThinWallResult, one: Variant) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from chipload.control.override import STATUS
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import chip_findings, default_limits, unchecked_checks, with_peaks
+from chipload.jobs.checks import default_limits, range_findings, unchecked_checks, with_peaks
 from chipload.jobs.torque.numbers import operation_numbers
 from chipload.jobs.torque.outcome import (
     HELD,
@@ -125,7 +125,7 @@ def _track(outcome: TorqueResult, case: ControllerCase, name: str) -> Track:
         in_use=used,
         time_s=run.outcome.time,
         limits=limits_of(outcome, columns, track),
-        findings=(*_run_findings(case, run), *chip_findings(outcome.job.checks, columns)),
+        findings=(*_run_findings(case, run), *range_findings(outcome.job.checks, columns)),
         programs=(f"0-override.{ENDINGS[outcome.job.machine.dialect]}",) if used else (),
         parameters={"latency_s": case.loop.latency, "override_step": case.quantum},
         energy_balance=outcome.energy_balance["real"],

@@ -163,6 +163,8 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     wrong = 1.0 + spindle.torque_constant_error
     granted = 1.0 + 1e-2 * job.table.limits.torque_over_percent - wrong * job.table.torque_control.override.hold
     least = torque_resolution(spindle, 1e-3 * job.table.loop.period_ms).total / granted if granted > 0.0 else math.inf
+    # below this set point the readings count as air, or the estimate is not valid
+    least = max(least, estimate_range(job, spindle)[0] / job.table.torque_control.override.hold)
     count, number = counted(program, job.cutters, resolution_of(job)), len(job.table.surprise)
     return [
         f"{job.path.name}: {what}; "

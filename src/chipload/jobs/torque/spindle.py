@@ -75,9 +75,14 @@ def require_resolved(job: TorqueJob, spindle: Spindle, torque: float) -> None:
     override = job.table.torque_control.override
     excess = 1e-2 * job.table.limits.torque_over_percent
     check_limit(spindle, 1e-3 * job.table.loop.period_ms, torque, override.hold, excess)
-    light, most = 1e3 * override.light_nm, estimate_range(job, spindle)[1]
+    light, (least, most) = 1e3 * override.light_nm, estimate_range(job, spindle)
     if light >= override.hold * torque:
         raise wrong_side("light_nm", light, override.hold * torque)
+    if override.hold * torque < least:
+        raise InputError(
+            f"spindle: the estimate is valid from {1e-3 * least:.4g} N m up, the torque that is held is "
+            f"{1e-3 * override.hold * torque:.4g} N m: log lighter cuts of known torque, each over several seconds"
+        )
     if override.hold * torque > most:
         raise InputError(
             f"spindle: the estimate is valid up to {1e-3 * most:.4g} N m, the torque that is held is "
