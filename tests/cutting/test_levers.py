@@ -13,7 +13,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.levers.levers import greatest_height, has_lever_loads, lever_loads
 from chipload.cutting.strength import cutter_stress, normal_stress, section_loads, sections_of, von_mises_stress
 from chipload.engagement.tooth_engagement import with_runout
-from chipload.simulation.bending._kernels import bent_many
+from chipload.simulation.bending._kernels import loads_of_teeth
 from chipload.structure.spindle import Bar, Joint, chain_compliance, tip_compliance
 from cutting.test_revolution import STEEL, some_engagement
 
@@ -53,7 +53,7 @@ def test_loads_are_those_rotation_by_rotation(flutes: int, helix: float, runout:
     out, law = np.empty((n * count, 5)), np.array(STEEL.law)
     rows = (engagement.start, engagement.rows, engagement.tooth, engagement.slice, engagement.slices)
     at = (np.repeat(np.arange(n), count), np.tile(theta, n), np.zeros(n * count))
-    bent_many(*at, *rows, cutter.flutes, law, chain, out)
+    loads_of_teeth(*at, *rows, cutter.flutes, law, chain, out)
     moments = np.swapaxes(out.reshape(n, count, 5), 1, 2)
     np.testing.assert_allclose(found[:, 4:6], moments[:, :2], rtol=1e-5, atol=1e-5 * abs(moments[:, :2]).max())
     np.testing.assert_allclose(found[:, 8:], moments[:, 3:], rtol=1e-5, atol=1e-5 * abs(moments[:, 3:]).max())

@@ -1,7 +1,7 @@
-"""Compiled loops of the geometry room: distances to lines and arcs, and their mutual crossings.
+"""Compiled loops of plane geometry: distances of points from lines and arcs, and the crossings of segments.
 
 Segments are rows ``[x0, y0, x1, y1, xc, yc, sweep]`` (see ``contour.py``), boxes rows ``[xmin, ymin, xmax, ymax]``;
-lengths in mm, angles in rad. ``distance.py`` and ``offset.py`` are the users.
+lengths in mm, angles in rad. ``distance.py``, ``split.py`` and ``offset.py`` call them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def point_segment(px: float, py: float, seg: Any) -> float:
-    """Distance [mm] of a point to one segment (7,)."""
+    """Distance [mm] of a point from one segment (7,)."""
     sweep = seg[6]
     if sweep == 0.0:
         dx, dy = seg[2] - seg[0], seg[3] - seg[1]
@@ -39,7 +39,7 @@ def point_segment(px: float, py: float, seg: Any) -> float:
 
 @njit(cache=True, nogil=True)
 def distance(segments: Any, boxes: Any, points: Any, out: Any) -> None:
-    """Least distance of each point (m, 2) to the segments (n, 7) into ``out`` (m,)."""
+    """Write the least distance [mm] of each point (m, 2) from the segments (n, 7) to ``out`` (m,)."""
     for k in range(len(points)):
         px, py = points[k, 0], points[k, 1]
         best = np.inf
@@ -52,8 +52,8 @@ def distance(segments: Any, boxes: Any, points: Any, out: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def nearer(segments: Any, boxes: Any, points: Any, limit: float, out: Any) -> None:
-    """Whether any of the points (m, k, 2) of a row lies nearer than ``limit`` to a segment, into ``out`` (m,)."""
+def within_distance(segments: Any, boxes: Any, points: Any, limit: float, out: Any) -> None:
+    """Write to ``out`` (m,) whether any of the points (m, k, 2) of a row is within ``limit`` [mm] of a segment."""
     last = 0
     for m in range(len(points)):
         out[m] = False
@@ -78,8 +78,8 @@ def nearer(segments: Any, boxes: Any, points: Any, limit: float, out: Any) -> No
 
 
 @njit(cache=True, nogil=True)
-def _holds(seg: Any, px: float, py: float, tol: float) -> bool:
-    """Whether a point of the whole line or circle of a segment lies within its ends, to ``tol`` [mm]."""
+def _within_ends(seg: Any, px: float, py: float, tol: float) -> bool:
+    """Whether a point of the infinite line, or full circle, of a segment lies on the segment, to ``tol`` [mm]."""
     if seg[6] == 0.0:
         dx, dy = seg[2] - seg[0], seg[3] - seg[1]
         length = math.hypot(dx, dy)
@@ -96,10 +96,10 @@ def _holds(seg: Any, px: float, py: float, tol: float) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _meet(a: Any, b: Any, tangent: float, hit: Any) -> int:
-    """Common points of the whole lines or circles of two segments into ``hit`` (2, 2); how many there are.
+def _intersections(a: Any, b: Any, tangent: float, hit: Any) -> int:
+    """Write the common points of the infinite lines, or full circles, of two segments to ``hit`` (2, 2); their number.
 
-    Curves that miss or pass each other by less than ``tangent`` [mm] touch in one point; coincident ones give none.
+    Curves that miss or overlap each other by less than ``tangent`` [mm] touch in one point; coincident ones have none.
     """
     if a[6] != 0.0 and b[6] == 0.0:
         a, b = b, a
@@ -110,11 +110,11 @@ def _meet(a: Any, b: Any, tangent: float, hit: Any) -> int:
         dy /= length
         if b[6] == 0.0:
             ex, ey = b[2] - b[0], b[3] - b[1]
-            other = math.hypot(ex, ey)
-            cross = (dx * ey - dy * ex) / other
+            length_b = math.hypot(ex, ey)
+            cross = (dx * ey - dy * ex) / length_b
             if abs(cross) < 1e-11:
                 return 0
-            u = ((b[0] - a[0]) * ey - (b[1] - a[1]) * ex) / other / cross
+            u = ((b[0] - a[0]) * ey - (b[1] - a[1]) * ex) / length_b / cross
             hit[0, 0], hit[0, 1] = a[0] + u * dx, a[1] + u * dy
             return 1
         r = math.hypot(b[0] - b[4], b[1] - b[5])
@@ -133,21 +133,21 @@ def _meet(a: Any, b: Any, tangent: float, hit: Any) -> int:
     r = math.hypot(a[0] - a[4], a[1] - a[5])
     q = math.hypot(b[0] - b[4], b[1] - b[5])
     dx, dy = b[4] - a[4], b[5] - a[5]
-    gap = math.hypot(dx, dy)
-    if gap <= tangent:
+    spacing = math.hypot(dx, dy)
+    if spacing <= tangent:
         return 0
-    dx /= gap
-    dy /= gap
-    u = 0.5 * (gap + (r - q) * (r + q) / gap)
-    if abs(gap - r - q) <= tangent or abs(gap - abs(r - q)) <= tangent:
+    dx /= spacing
+    dy /= spacing
+    u = 0.5 * (spacing + (r - q) * (r + q) / spacing)
+    if abs(spacing - r - q) <= tangent or abs(spacing - abs(r - q)) <= tangent:
         s = r if u > 0.0 else -r
         hit[0, 0], hit[0, 1] = a[4] + s * dx, a[5] + s * dy
         return 1
-    if gap > r + q or gap < abs(r - q):
+    if spacing > r + q or spacing < abs(r - q):
         return 0
     # four times the area of the triangle of the two centres and a common point, by Heron's formula
-    area = math.sqrt((r + q + gap) * (r + q - gap) * (gap + r - q) * (gap - r + q))
-    w = 0.5 * area / gap
+    area = math.sqrt((r + q + spacing) * (r + q - spacing) * (spacing + r - q) * (spacing - r + q))
+    w = 0.5 * area / spacing
     hit[0, 0], hit[0, 1] = a[4] + u * dx - w * dy, a[5] + u * dy + w * dx
     hit[1, 0], hit[1, 1] = a[4] + u * dx + w * dy, a[5] + u * dy - w * dx
     return 2
@@ -155,12 +155,13 @@ def _meet(a: Any, b: Any, tangent: float, hit: Any) -> int:
 
 @njit(cache=True, nogil=True)
 def crossings(
-    segments: Any, boxes: Any, order: Any, smooth: Any, tol: float, tangent: float, who: Any, where: Any
+    segments: Any, boxes: Any, order: Any, smooth: Any, tol: float, tangent: float, pairs: Any, places: Any
 ) -> int:
-    """Where segments cross, touch, or carry an end of another: rows (segment, other) and points; how many.
+    """Points in which segments cross or touch, or in which one has an end on the other; their number.
 
-    ``order`` (n,) sorts the boxes by xmin; ``smooth`` (n,) names the segment that follows tangentially (-1: none),
-    such a pair is skipped. No more than ``len(who)`` rows are written: call again with more room if more are counted.
+    ``pairs`` (k, 2) receives the segment and the other one, ``places`` (k, 2) [mm] the point. ``order`` (n,) sorts the
+    boxes by xmin; ``smooth`` (n,) is the number of the segment that follows tangentially (-1: none), and such a pair is
+    skipped. At most k rows are written: if more are counted, call again with larger arrays.
     """
     count = 0
     hit = np.empty((2, 2))
@@ -175,23 +176,23 @@ def crossings(
             if smooth[i] == j or smooth[j] == i:
                 continue
             a, b = segments[i], segments[j]
-            for k in range(_meet(a, b, tangent, hit)):
+            for k in range(_intersections(a, b, tangent, hit)):
                 px, py = hit[k, 0], hit[k, 1]
-                if _holds(a, px, py, tol) and _holds(b, px, py, tol):
-                    if count + 1 < len(who):
-                        who[count, 0], who[count, 1] = i, j
-                        who[count + 1, 0], who[count + 1, 1] = j, i
-                        where[count, 0], where[count, 1] = px, py
-                        where[count + 1, 0], where[count + 1, 1] = px, py
+                if _within_ends(a, px, py, tol) and _within_ends(b, px, py, tol):
+                    if count + 1 < len(pairs):
+                        pairs[count, 0], pairs[count, 1] = i, j
+                        pairs[count + 1, 0], pairs[count + 1, 1] = j, i
+                        places[count, 0], places[count, 1] = px, py
+                        places[count + 1, 0], places[count + 1, 1] = px, py
                     count += 2
             for k in range(4):
                 s = b if k < 2 else a
                 o = a if k < 2 else b
                 px, py = s[2 * (k % 2)], s[2 * (k % 2) + 1]
                 if point_segment(px, py, o) <= tol:
-                    if count < len(who):
-                        who[count, 0] = i if k < 2 else j
-                        who[count, 1] = j if k < 2 else i
-                        where[count, 0], where[count, 1] = px, py
+                    if count < len(pairs):
+                        pairs[count, 0] = i if k < 2 else j
+                        pairs[count, 1] = j if k < 2 else i
+                        places[count, 0], places[count, 1] = px, py
                     count += 1
     return count

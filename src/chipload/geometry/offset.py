@@ -240,27 +240,27 @@ def true_centres(seg: Floats) -> Floats:
 def _trimmed(
     raw: RawSegments, given: Floats, d: float, tol: float, snap: float
 ) -> tuple[tuple[Contour, ...], Floats | None]:
-    """The parallel, and a place where a sound piece was left over (none: all is well)."""
+    """The parallel contours, and a point of a valid piece that joins no contour (None: there is no such piece)."""
     pieces, loose = split_segments(raw, tol, snap)
     pieces = pieces[~raw.knife[pieces.raw]]
     fixed = boxes(given)
 
     def too_near(some: SplitSegments, limit: float) -> NDArray[np.bool_]:
         out = np.empty(len(some.raw), dtype=np.bool_)
-        _kernels.nearer(given, fixed, _samples(raw, some), limit, out)
+        _kernels.within_distance(given, fixed, _samples(raw, some), limit, out)
         return out
 
     pieces = pieces[~too_near(pieces, abs(d) - tol)]
     pieces = pieces[_single(raw, pieces, 10.0 * snap)]
     alive = _rooted(pieces, loose)
-    left = pieces[~alive]
+    rest = pieces[~alive]
     pieces = pieces[alive]
-    if len(left.raw):
-        seg = raw.segments[left.raw]
-        long = lengths_of(seg) * (left.span[:, 1] - left.span[:, 0]) > 100.0 * snap
-        sound = long & ~too_near(left, abs(d) - 1e-3 * tol)
+    if len(rest.raw):
+        seg = raw.segments[rest.raw]
+        long = lengths_of(seg) * (rest.span[:, 1] - rest.span[:, 0]) > 100.0 * snap
+        sound = long & ~too_near(rest, abs(d) - 1e-3 * tol)
         if sound.any():
-            return (), left.place[left.node[int(sound.argmax()), 0]]
+            return (), rest.place[rest.node[int(sound.argmax()), 0]]
     return chained_segments(raw, pieces, d, tol), None
 
 
@@ -271,7 +271,7 @@ def _samples(raw: RawSegments, pieces: SplitSegments) -> Floats:
 
 
 def _single(raw: RawSegments, pieces: SplitSegments, same: float) -> NDArray[np.bool_]:
-    """(m,) which pieces stay where some coincide: of those that run one way the first, of opposite ones none."""
+    """(m,) whether each piece is retained: of coincident pieces in one direction the first, of opposite ones none."""
     middle = _samples(raw, pieces)[:, 0]
     groups: dict[tuple[int, int], list[int]] = defaultdict(list)
     for k, (a, b) in enumerate(pieces.node):
@@ -295,7 +295,7 @@ def _single(raw: RawSegments, pieces: SplitSegments, same: float) -> NDArray[np.
 
 
 def _rooted(pieces: SplitSegments, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(m,) pieces that are left when dead ends have been taken away, one after another."""
+    """(m,) whether each piece remains when dead ends are removed until there are none."""
     alive = np.ones(len(pieces.raw), dtype=np.bool_)
     if not len(alive):
         return alive

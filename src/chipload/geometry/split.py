@@ -60,21 +60,21 @@ class SplitSegments:
 
 
 def meetings(raw: RawSegments, tol: float) -> tuple[Ints, Floats]:
-    """Where segments cross, touch, or carry an end of another: (k, 2) the segment and the other, (k, 2) the points."""
+    """Points in which segments cross, touch, or end on another: (k, 2) both segments, (k, 2) the points [mm]."""
     seg = raw.segments
     box = boxes(seg)
     order = np.argsort(box[:, 0], kind="stable")
     room = 16 * len(seg) + 64
     while True:
-        who, where = np.empty((room, 2), dtype=np.int64), np.empty((room, 2))
-        count = _kernels.crossings(seg, box, order, raw.smooth, tol, TOUCH_MM, who, where)
+        pairs, places = np.empty((room, 2), dtype=np.int64), np.empty((room, 2))
+        count = _kernels.crossings(seg, box, order, raw.smooth, tol, TOUCH_MM, pairs, places)
         if count <= room:
-            return who[:count], where[:count]
+            return pairs[:count], places[:count]
         room = count
 
 
 def split_segments(raw: RawSegments, tol: float, snap: float) -> tuple[SplitSegments, NDArray[np.bool_]]:
-    """All pieces between crossings, and which nodes (k,) may end an open chain."""
+    """Divide the segments at their crossings: all pieces, and whether each node (k,) may end an open chain."""
     seg = raw.segments
     n = len(seg)
     who, where = meetings(raw, tol)
@@ -98,13 +98,13 @@ def split_segments(raw: RawSegments, tol: float, snap: float) -> tuple[SplitSegm
     whole = (np.abs(seg[owner[a], 6]) > np.pi) & (t[b] - t[a] > 0.5)
     real = (owner[a] == owner[b]) & ((label[a] != label[b]) | whole)
     a, b = a[real], b[real]
-    # what fell out between two pieces was a point: the next begins where the one before it ended
+    # a piece that was dropped between two others is a single point: the next piece begins where the last one ended
     span = np.column_stack([t[a], t[b]])
     return SplitSegments(owner[a], span, np.column_stack([label[a], label[b]]), place), loose
 
 
 def _parameter(seg: Floats, p: Floats) -> Floats:
-    """(m,) share of the way along each segment (m, 7) of a point (m, 2) on it; may leave 0..1 by a rounding."""
+    """(m,) share of the length of each segment (m, 7) at a point (m, 2) on it; rounding may put it outside 0..1."""
     chord = seg[:, 2:4] - seg[:, 0:2]
     arc = seg[:, 6] != 0.0
     line = np.sum((p - seg[:, 0:2]) * chord, axis=1) / np.where(arc, 1.0, np.sum(chord**2, axis=1))

@@ -371,7 +371,7 @@ def _rigid(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> LimitC
 def _spindle(machine: Machine, columns: Columns, track: str, errors: Mapping[str, float]) -> list[LimitCheck]:
     """Torque and power of the spindle; its torque depends on the speed, so the step with the greatest share counts."""
     out = []
-    torque, power = np.asarray(columns["torque_mean_nm"]), np.asarray(columns["power_w"])
+    torque = np.asarray(columns["torque_mean_nm"])
     able = machine.torque_at(spindle_speed(columns)) / 1000.0
     k = int(np.argmax(torque / able))
     if np.isfinite(able[k]):

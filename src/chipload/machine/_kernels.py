@@ -1,4 +1,4 @@
-"""The two passes of the speed limit; plain arrays in and out."""
+"""Compiled: the forward and backward pass that limit the acceleration along a path."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ Floats = NDArray[np.float64]
 
 
 @njit(cache=True, error_model="numpy")
-def two_passes(step: Floats, acceleration: Floats, w: Floats) -> None:
-    """Lower ``w`` (n,) = v^2 in place until no piece ``step`` (n - 1,) climbs or falls by more than 2 a step."""
+def limit_acceleration(step: Floats, acceleration: Floats, w: Floats) -> None:
+    """Lower ``w`` (n,) = v^2 [mm2/s2] in place until it changes by at most 2 a step over every step.
+
+    ``step`` (n - 1,) [mm], ``acceleration`` a (n - 1,) [mm/s2].
+    """
     for k in range(len(step)):
         w[k + 1] = min(w[k + 1], w[k] + 2.0 * acceleration[k] * step[k])
     for k in range(len(step) - 1, -1, -1):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
-from chipload.machine._kernels import two_passes
+from chipload.machine._kernels import limit_acceleration
 from chipload.machine.machine import Machine
 
 Floats = NDArray[np.float64]
@@ -89,7 +89,7 @@ def limited_speed(
     w = wanted**2
     w[0] = min(w[0], start_speed**2)
     w[-1] = min(w[-1], end_speed**2)
-    two_passes(step, np.ascontiguousarray(a), w)
+    limit_acceleration(step, np.ascontiguousarray(a), w)
     v: Floats = np.sqrt(w)
     total = v[:-1] + v[1:]
     moving = step > 0.0

@@ -361,7 +361,7 @@ def form_error(
     all_cuts = _kept(removal) if isinstance(removal, Removal) else removal
     least = np.full(len(q), np.inf)
     for cuts in all_cuts:
-        _kernels.least_gaps(q, n, cuts.ends, _shape(cuts.cutter), near, facing, least)
+        _kernels.least_distances(q, n, cuts.ends, _shape(cuts.cutter), near, facing, least)
     rigid, cutter, yielded, force = (np.zeros(len(q)) for _ in range(4))
     out = FormError(np.full(len(q), -1), rigid, cutter, yielded, force, np.zeros(len(q), dtype=np.bool_))
     best = np.full(len(q), np.inf)
@@ -410,7 +410,7 @@ def _made_by(
     for j in range(1 if cuts.cutter.teeth_alike else cuts.cutter.flutes):
         there, made = np.empty(count), np.empty(count, dtype=np.bool_)
         b = cuts.engagement
-        _kernels.points_in_engagement(
+        _kernels.nearest_engaged_many(
             k, s, phi, b.start, b.rows, b.tooth, b.slice, b.slices, j, model.reach, there, made
         )
         if lag > 0.0:
@@ -490,5 +490,7 @@ def _bent(
     out = np.empty((len(k), 5))
     b = cuts.engagement
     law = np.array(material.law)
-    _kernels.bent_many(k, theta, z, b.start, b.rows, b.tooth, b.slice, b.slices, cuts.cutter.flutes, law, chain, out)
+    _kernels.loads_of_teeth(
+        k, theta, z, b.start, b.rows, b.tooth, b.slice, b.slices, cuts.cutter.flutes, law, chain, out
+    )
     return out

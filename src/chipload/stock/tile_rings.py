@@ -142,7 +142,7 @@ class TileRings:
         tidy : as of :meth:`LayeredStock.remove_many`
         """
         while True:
-            n = kernels.listed(
+            n = kernels.list_operations(
                 layers, shape, areas.boxes, self.stock.xs, self.stock.ys, self.slot_of, self.boxes, self.ops
             )
             if n >= 0:
@@ -155,7 +155,7 @@ class TileRings:
         self.chip_used[:] = 0
         at = 0
         while True:
-            at = kernels.cut(
+            at = kernels.cut_tiles(
                 at, n, layers, shape, areas.points, areas.rings, areas.first, areas.boxes, self.points, self.rings,
                 self.slots, self.boxes, self.slot_of, self.used, self.chip, self.chip_rings, self.chip_used, self.ops,
                 self.x, self.cross,
@@ -168,7 +168,9 @@ class TileRings:
                 self._cut_by_geos(at, areas.polygon(int(shape[self.ops[at, kernels.ENTRY]])))
                 at += 1
         out = np.empty((len(layers), 4))
-        kernels.taken(len(layers), n, self.ops, self.stock.xs, self.stock.ys, self.chip, self.chip_rings, film, out)
+        kernels.removed_areas(
+            len(layers), n, self.ops, self.stock.xs, self.stock.ys, self.chip, self.chip_rings, film, out
+        )
         self._changed(tidy)
         return Taken(out[:, 0], out[:, 1].astype(np.int64), out[:, 2], out[:, 3])
 
@@ -265,7 +267,7 @@ class TileRings:
             if self.slot_of[m, k, n] == kernels.NONE:
                 self.read(range(m, m + 1), range(k, k + 1), range(n, n + 1))
             first, count, _ = self.slots[self.slot_of[m, k, n]].tolist()
-            if kernels.holds(self.points, self.rings, first, first + count, x, y):
+            if kernels.contains(self.points, self.rings, first, first + count, x, y):
                 return True
         return False
 

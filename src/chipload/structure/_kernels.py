@@ -1,7 +1,6 @@
-"""The cutter's beam and the triangular solutions, compiled.
+"""Compiled: deflection of the cutter as a stepped beam, and triangular solves of a sparse factorisation.
 
-The oracle of the first is the NumPy version in :mod:`chipload.structure.beam`, that of the others the
-solution of SuperLU itself.
+Oracles: the NumPy version in :mod:`chipload.structure.beam`, and the solution of SuperLU.
 """
 
 from __future__ import annotations
@@ -10,8 +9,8 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def stepped(za, zb, length, fluted, flex_fluted, flex_shank):
-    """Deflection at height zb under a unit force at za; see :func:`chipload.structure.beam.compliance`."""
+def beam_deflection(za, zb, length, fluted, flex_fluted, flex_shank):
+    """Deflection [mm/N] at height zb under a unit force at za; see :func:`chipload.structure.beam.compliance`."""
     top = max(za, zb)
     d = top - min(za, zb)
     t1 = length - top
@@ -23,8 +22,11 @@ def stepped(za, zb, length, fluted, flex_fluted, flex_shank):
 
 
 @njit(cache=True, nogil=True)
-def ancestors(indptr, indices, wanted):
-    """Mark every row of the solution that a marked row needs on the way up."""
+def mark_ancestors(indptr, indices, wanted):
+    """Mark in ``wanted`` (n,) every row on which a marked row depends in the backward substitution.
+
+    ``indptr``, ``indices`` the columns of L (compressed sparse columns).
+    """
     for j in range(len(wanted)):
         if wanted[j]:
             for p in range(indptr[j], indptr[j + 1]):
@@ -32,8 +34,12 @@ def ancestors(indptr, indices, wanted):
 
 
 @njit(cache=True, nogil=True)
-def triangular(indptr, indices, data, inverse, wanted, out):
-    """Turn right-hand sides into solutions of L D L^T, in place; see :mod:`chipload.structure.factors`."""
+def solve_triangular(indptr, indices, data, inverse, wanted, out):
+    """Solve L D L^T x = b in place for the right-hand sides ``out`` (n, q); see :mod:`chipload.structure.factors`.
+
+    L in compressed sparse columns, ``inverse`` (n,) of the diagonal of D, ``wanted`` (n,) rows of the solution that are
+    computed.
+    """
     n, q = out.shape
     for j in range(n):
         y = out[j]

@@ -4,7 +4,7 @@ Notation: A (f, f) = P^T L D L^T P with P a permutation (minimum degree on A + A
 diagonal; B right-hand sides (f, q).
 
 SuperLU factors without pivots. Its own solution processes the columns one after the other through 100 MB of factors.
-:func:`chipload.structure._kernels.triangular` processes 64 together, skips rows that are still zero in forward
+:func:`chipload.structure._kernels.solve_triangular` processes 64 together, skips rows that are still zero in forward
 substitution and rows that are not needed in back substitution: ten times as many a second (benchmarks/structure.py).
 """
 
@@ -71,13 +71,13 @@ class Factors:
         wanted = np.ones(len(order), dtype=np.bool_) if rows is None else np.zeros(len(order), dtype=np.bool_)
         if rows is not None:
             wanted[order[rows]] = True
-            _kernels.ancestors(indptr, indices, wanted)
+            _kernels.mark_ancestors(indptr, indices, wanted)
         out = np.empty((len(order) if rows is None else len(rows), right.shape[1]))
         for at in range(0, right.shape[1], ABREAST):
             part = slice(at, at + ABREAST)
             work = np.empty((len(order), right[:, part].shape[1]))
             work[order] = right[:, part]
-            _kernels.triangular(indptr, indices, data, inverse, wanted, work)
+            _kernels.solve_triangular(indptr, indices, data, inverse, wanted, work)
             out[:, part] = work[order if rows is None else order[rows]]
         return out
 

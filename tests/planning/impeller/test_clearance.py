@@ -3,7 +3,7 @@
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.planning.impeller.clearance.clearance import between, clearance, moves_clear
+from chipload.planning.impeller.clearance.clearance import clearance, interpolated_axes, moves_clear
 from chipload.planning.impeller.scene import Scene
 
 CUTTER = CatalogueCutter(10.0, 2.0, 12.0, neck_diameter=8.0, neck_length=20.0, reach=30.0, holder_diameter=24.0)
@@ -61,7 +61,7 @@ def test_moves_proved_clear_are_clear_at_every_instant():
     share = np.linspace(0.0, 1.0, 201)
     for k in range(n - 1):
         at = tips[k] + share[:, None] * (tips[k + 1] - tips[k])
-        turned = between(np.tile(axes[k], (201, 1)), np.tile(axes[k + 1], (201, 1)), share)
+        turned = interpolated_axes(np.tile(axes[k], (201, 1)), np.tile(axes[k + 1], (201, 1)), share)
         least = min(gap(points, p, a, 0.0).min() for p, a in zip(at, turned, strict=True))
         if said[k]:
             assert least >= 0.3 - 1e-9

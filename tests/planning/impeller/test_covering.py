@@ -159,7 +159,7 @@ def test_ranges_end_where_a_node_is_met(impeller, covering):
     for k in where[:3]:
         cutter, table = SHOP.cutters[answer.cutter[k]], TABLES[answer.table[k]]
         before = (answer.ranges[k],)
-        (after,), told = covering.kept(scene, cutter, np.array([table]), CLEARANCE, np.array([k]), before, 1e-9)
+        (after,), told = covering.clear_ranges(scene, cutter, np.array([table]), CLEARANCE, np.array([k]), before, 1e-9)
         assert told.all()
         stages = covering.stages(cutter, CLEARANCE)
         for low, high in answer.ranges[k]:

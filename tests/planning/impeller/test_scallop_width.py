@@ -111,10 +111,10 @@ def test_keys_of_many_poses_are_those_of_their_distances():
     poses = np.stack([np.hstack([tips, axes]).T] * 2)
     got = np.empty(40)
     for point in rng.uniform(-8.0, 8.0, (50, 3)):
-        _scallop.keys(*point, poses, 1, 0, 40, R - r, r, got)
+        _scallop.distance_keys(*point, poses, 1, 0, 40, R - r, r, got)
         want = distance(point, tips, axes, R - r, r)
-        assert _scallop.distance_of(got[7], r) > 1e6
-        there = [_scallop.distance_of(key, r) for key in np.delete(got, 7)]
+        assert _scallop.key_distance(got[7], r) > 1e6
+        there = [_scallop.key_distance(key, r) for key in np.delete(got, 7)]
         assert there == pytest.approx(np.delete(want, 7), abs=1e-12)
 
 

@@ -13,7 +13,7 @@ from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.axis_field import pose
 from chipload.planning.impeller.covering.covering import covering_of
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
-from chipload.planning.impeller.ranges.ranges import on_corner, valid_ranges
+from chipload.planning.impeller.ranges.ranges import corner_ranges, valid_ranges
 from chipload.planning.impeller.scene import Scene
 from chipload.planning.impeller.surfaces import ContactSampling, hub_range, surface_of
 
@@ -73,7 +73,7 @@ def test_on_the_corner_is_where_the_normal_belongs_to_it():
         N /= np.linalg.norm(N)
         alpha, taper = rng.uniform(0.0, 1.5), rng.uniform(0.0, 0.6)
         given = np.array([[0.3, 2.0], [2.5, 5.9]])
-        got = on_corner(given, N, alpha, taper, 0.0)
+        got = corner_ranges(given, N, alpha, taper, 0.0)
         T = np.stack(
             [math.sin(alpha) * np.cos(B), math.sin(alpha) * np.sin(B), np.full(len(B), math.cos(alpha))], axis=-1
         )

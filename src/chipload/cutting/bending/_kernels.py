@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from chipload.cutting._kernels import BESIDE, GOLDEN, REFINEMENTS, TAU, breaks_of, thickness_power
-from chipload.structure._kernels import stepped
+from chipload.structure._kernels import beam_deflection
 
 #: Gauss-Legendre on [-1, 1], five points
 NODES = np.array([-0.906179845938664, -0.5384693101056831, 0.0, 0.5384693101056831, 0.906179845938664])
@@ -66,7 +66,7 @@ def push(theta, z, rows, tooth, lo, hi, teeth, lag, c, length, fluted, flex_flut
                                 thick = rows[r, 4] * s + rows[r, 6] * v + rows[r, 5]
                                 f = (c[0] * thickness_power(thick, c[6]) + c[3]) * s
                                 f -= (c[1] * thickness_power(thick, c[7]) + c[4]) * v
-                                flex = stepped(zz, z, length, fluted, flex_fluted, flex_shank) + work
+                                flex = beam_deflection(zz, z, length, fluted, flex_fluted, flex_shank) + work
                                 total += 0.5 * h * WEIGHTS[g] * f * flex
                 turn += TAU
     return total

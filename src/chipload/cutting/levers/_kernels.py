@@ -6,7 +6,7 @@ height above the tip. Where all of an engagement range's edge cuts, its points o
 rotation: as there, its load is a sum of cosine and sine of the rotation and of twice it, the factors of which are
 added where that begins and taken away where it ends.
 Oracles: :func:`chipload.cutting._strength.in_sections_over_turn` and
-:func:`chipload.simulation.bending._kernels.bent_many`, which integrate engagement range by engagement range and
+:func:`chipload.simulation.bending._kernels.loads_of_teeth`, which integrate engagement range by engagement range and
 rotation by rotation.
 """
 

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.cutter.catalogue import Catalogue
 from chipload.errors import InputError
 from chipload.planning.impeller.answer import Answer, left_open, shortest
-from chipload.planning.impeller.grid.grid import admitted
+from chipload.planning.impeller.grid.grid import largest_on_grid
 from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.ranges.ranges import FULL, Ranges, valid_ranges
 from chipload.planning.impeller.scene import Floats, Scene
@@ -258,7 +258,7 @@ class Costs:
         limit = {}
         for f in answer.families:
             cut = shortest(self.catalogue.family(f.corner_radius))
-            limit[f.corner_radius] = admitted(self.side.scene, f, self._grid, cut, workers)
+            limit[f.corner_radius] = largest_on_grid(self.side.scene, f, self._grid, cut, workers)
         for k, cutter in enumerate(self.catalogue.cutters):
             out[:, k, self._where] = cutter.rho <= limit[cutter.corner_radius] + _TOUCH
         return np.array(out & allowed[..., None], dtype=np.bool_)

@@ -21,7 +21,7 @@ from scipy.spatial import ConvexHull
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.machine.machine import Machine
-from chipload.planning.impeller.clearance.clearance import between, clearance
+from chipload.planning.impeller.clearance.clearance import clearance, interpolated_axes
 from chipload.planning.impeller.links import Link, Moves
 from chipload.planning.impeller.programs import program_of
 from chipload.planning.impeller.scene import Floats, Scene
@@ -168,7 +168,7 @@ def _round(outline: Floats, a: tuple[Floats, Floats], b: tuple[Floats, Floats], 
     """Rapids above the part from one tip and axis to another: at every turn of the axis the tip is above the part."""
     angle = float(np.arccos(np.clip(a[1] @ b[1], -1.0, 1.0)))
     share = np.linspace(0.0, 1.0, max(int(np.ceil(angle / _TURN)), 1) + 1)[:-1]
-    axes = between(np.tile(a[1], (len(share), 1)), np.tile(b[1], (len(share), 1)), share)
+    axes = interpolated_axes(np.tile(a[1], (len(share), 1)), np.tile(b[1], (len(share), 1)), share)
     tips = a[0] + share[:, None] * (b[0] - a[0])
     # between two of them the part may turn up towards the tip by its size times half of the angle
     size = float(np.linalg.norm(outline, axis=1).max())

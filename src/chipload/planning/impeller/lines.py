@@ -348,7 +348,7 @@ class Lines:
         for piece in pieces:
             own = slice(piece.first, piece.last)
             tips, axes = posed(S[own], N[own], self.table, written(piece.pallet), self.cutter)
-            for k in np.flatnonzero(covering.met(self.cutter, tips, axes, self.how.clearance) > 0.0).tolist():
+            for k in np.flatnonzero(covering.node_depth(self.cutter, tips, axes, self.how.clearance) > 0.0).tolist():
                 at, B = piece.first + k, float(piece.pallet[k])
                 if not any(abs(math.remainder(B - one, math.tau)) <= _EXACT for one in exact[at]):
                     out[at] = B
@@ -358,7 +358,7 @@ class Lines:
         """What of ranges of points is clear of the walls between the check points."""
         if scene.covering is None:
             return ranges
-        kept, _ = scene.covering.kept(
+        kept, _ = scene.covering.clear_ranges(
             scene, self.cutter, np.full(len(points), self.table), self.how.clearance, np.array(points), ranges, _LEAST,
             self.workers,
         )  # fmt: skip

@@ -28,7 +28,7 @@ import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
-from chipload.planning.impeller.clearance.clearance import between, clearance, moves_clear
+from chipload.planning.impeller.clearance.clearance import clearance, interpolated_axes, moves_clear
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.pass_order import pass_order
 from chipload.planning.impeller.passes import Joint, Pass, joined, single
@@ -358,7 +358,7 @@ def deepest(moves: Moves, scene: Scene, cutter: CatalogueCutter, above: float, p
     share = np.arange(1, places + 2) / (places + 1)
     tips = (moves.tip[:-1, None] + share[:, None] * (moves.tip[1:] - moves.tip[:-1])[:, None]).reshape(-1, 3)
     row = np.repeat(np.arange(1, len(moves.tip)), len(share))
-    axes = between(moves.axis[row - 1], moves.axis[row], np.tile(share, len(moves.tip) - 1))
+    axes = interpolated_axes(moves.axis[row - 1], moves.axis[row], np.tile(share, len(moves.tip) - 1))
     got, _ = clearance(scene, cutter, tips, axes, 1.0, above)
     k = int(got.argmin())
     return float(got[k]), int(row[k])

@@ -28,7 +28,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.axis_field import AxisField, pose
-from chipload.planning.impeller.clearance.clearance import between
+from chipload.planning.impeller.clearance.clearance import interpolated_axes
 from chipload.planning.impeller.pass_order import pass_order
 from chipload.planning.impeller.scallop_height import profile_scallops, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
@@ -378,7 +378,7 @@ def _joined(job: _Lines, laid: tuple[_LinePiece, ...], chord: float) -> PointPat
         tip, axis, _ = job.poses(P, Q)
         half = 0.5 * (P[1:] + P[:-1]), 0.5 * (Q[1:] + Q[:-1])
         there, turned, _ = job.poses(*half)
-        even = between(axis[:-1], axis[1:], np.full(len(half[0]), 0.5))
+        even = interpolated_axes(axis[:-1], axis[1:], np.full(len(half[0]), 0.5))
         r, e, f = job.cutter.contact_arc
         lever = 2.0 * max(e + r, f)
         off = np.linalg.norm(there - 0.5 * (tip[1:] + tip[:-1]), axis=1)

@@ -16,7 +16,7 @@ import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch
-from chipload.planning.impeller.clearance.clearance import between, clearance
+from chipload.planning.impeller.clearance.clearance import clearance, interpolated_axes
 from chipload.planning.impeller.ranges.ranges import valid_ranges
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.track import ToolTrack, posed, track_of
@@ -71,12 +71,12 @@ class Refinement:
         row = np.repeat(np.arange(len(at)), len(_SHARES))
         share = np.tile(_SHARES, len(at))
         tips = track.tip[row] + share[:, None] * (track.tip[row + 1] - track.tip[row])
-        axes = between(track.axis[row], track.axis[row + 1], share)
+        axes = interpolated_axes(track.axis[row], track.axis[row + 1], share)
         got, _ = clearance(self.scene, self.cutter, tips, axes, 1.0, self.clearance)
         deep = np.zeros(len(at))
         np.maximum.at(deep, row, -got)
         if self.scene.covering is not None:
-            np.maximum.at(deep, row, self.scene.covering.met(self.cutter, tips, axes, self.clearance))
+            np.maximum.at(deep, row, self.scene.covering.node_depth(self.cutter, tips, axes, self.clearance))
         out: Ints = np.flatnonzero((off > self.chord) | (deep > self.chord))
         return out
 

@@ -133,7 +133,7 @@ def left_over(face: SurfaceGrid, passes: Sequence[tuple[CatalogueCutter, Sequenc
         number = (at[:, 0] * cells[1] + at[:, 1]) * cells[2] + at[:, 2]
         order = np.argsort(number, kind="stable")
         starts = np.searchsorted(number[order], np.arange(int(cells.prod()) + 1))
-        _scallop.left_of(
+        _scallop.excess_of_poses(
             points, normals, cells, low, size, starts, order, tips, axes, of, cutter.rho, cutter.corner_radius, out
         )
     return out.reshape(face.points.shape[:2])

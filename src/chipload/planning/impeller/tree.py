@@ -1,7 +1,7 @@
-"""Tree of balls over the check points.
+"""Tree of bounding balls over points.
 
-Notation: node k has the children 2 k + 1 and 2 k + 2; nodes from ``leaves`` on hold points. A ball is a row
-``x, y, z, radius`` [mm]; a negative radius is empty.
+Notation: node k has the children 2 k + 1 and 2 k + 2; nodes from ``leaves`` on are leaves and hold points. A ball is a
+row ``x, y, z, radius`` [mm]; a ball with a negative radius holds no point.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ class Tree:
 
     Parameters
     ----------
-    order : (m,) int, which given point stands at each place
-    nodes : (k, 4) float [mm], centre and radius
-    spans : (k, 2) int, places of the node's points
-    leaves : the first leaf
+    order : (m,) int, number of the point at each position of the tree's order
+    nodes : (k, 4) float [mm], centre and radius of each ball
+    spans : (k, 2) int, first position of each node's points and the one after the last
+    leaves : number of the first leaf
     """
 
     order: Ints
@@ -34,7 +34,9 @@ class Tree:
 
 
 def tree_of(points: Floats, most: int = 12) -> Tree:
-    """The tree of the points (m, 3) [mm], at most ``most`` in a leaf; each node is cut across its longest side.
+    """Tree of the points (m, 3) [mm], at most ``most`` in a leaf.
+
+    The points of each node are split at the median along the longest side of their bounding box.
 
     >>> tree = tree_of(np.arange(60.0).reshape(20, 3), most=8)
     >>> tree.leaves, len(tree.nodes), tree.spans[-1].tolist()

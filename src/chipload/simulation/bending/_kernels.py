@@ -19,14 +19,17 @@ from chipload.cutting._kernels import BESIDE, TAU, engaged_part, first_turn
 from chipload.cutting._strength import NODES, PIECE, WEIGHTS, edge_at, points_of
 
 GOLDEN = 0.6180339887498949
-#: steps of the golden section: the bracket shrinks to 1e-6 of the step, the distance to its square
-NARROWED = 29
+#: steps of the golden-section search: the bracket shrinks to 1e-6 of the step, the error of the distance to 1e-12
+STEPS = 29
 
 
 @njit(cache=True, nogil=True)
 def foot(rho, z, shape, out):
-    """Distance of a point at (rho, z) from the profile, below 0 inside: out = d, s, foot's z, sin and cos of kappa
-    (of the direction to the point on a sharp corner, 0 and 0 where the foot is the end of the flutes).
+    """Distance d [mm] of a point at (rho, z) from the profile, negative inside: ``out`` (5,) = d, s, z of the foot, sin
+    and cos of kappa.
+
+    On a sharp corner kappa is that of the direction to the point. Sine and cosine are 0 if the foot is the upper end of
+    the flutes.
     """
     r, e, f, alpha, beta, h, end, E, F, R, first, last = shape
     sa, ca = math.sin(alpha), math.cos(alpha)
@@ -91,9 +94,10 @@ def foot(rho, z, shape, out):
 
 
 @njit(cache=True, nogil=True)
-def at_share(q, row, t, shape, frame, out):
-    """``foot`` of q with the cutter a share t into the step; ``frame`` gets the tip, the axis and the unit direction
-    from the axis to q.
+def foot_at(q, row, t, shape, frame, out):
+    """:func:`foot` of q with the cutter at the share t of the step.
+
+    ``frame`` (9,) receives the tip, the axis and the unit vector from the axis to q.
     """
     size = 0.0
     for c in range(3):
@@ -117,37 +121,40 @@ def at_share(q, row, t, shape, frame, out):
 
 @njit(cache=True, nogil=True)
 def nearest(q, n, row, shape, most, facing, frame, out):
-    """Share of the step at which the cutter is nearest to q; -1 where it stays farther than ``most`` or does not face
-    the surface there. Fills ``frame`` and ``out`` for that moment.
+    """Share of the step at which the cutter is nearest to q; -1 if it stays farther than ``most`` [mm] or does not face
+    the surface there.
+
+    The cutter faces the surface if the cosine of the angle between its normal and -n is at least ``facing``. Fills
+    ``frame`` and ``out``, as :func:`foot_at`, for that moment.
     """
-    at_share(q, row, 0.5, shape, frame, out)
-    way = 0.0
+    foot_at(q, row, 0.5, shape, frame, out)
+    travel = 0.0
     turn = 0.0
     for c in range(3):
-        way += (row[3 + c] - row[c]) ** 2
+        travel += (row[3 + c] - row[c]) ** 2
         turn += (row[9 + c] - row[6 + c]) ** 2
-    way = math.sqrt(way)
-    if out[0] - 0.5 * (way + math.sqrt(turn) * (shape[5] + most)) > most:
+    travel = math.sqrt(travel)
+    if out[0] - 0.5 * (travel + math.sqrt(turn) * (shape[5] + most)) > most:
         return -1.0
     a, b = 0.0, 1.0
     x, y = b - GOLDEN, a + GOLDEN
-    at_share(q, row, x, shape, frame, out)
+    foot_at(q, row, x, shape, frame, out)
     dx = out[0]
-    at_share(q, row, y, shape, frame, out)
+    foot_at(q, row, y, shape, frame, out)
     dy = out[0]
-    for _ in range(NARROWED):
+    for _ in range(STEPS):
         if dx <= dy:
             b, y, dy = y, x, dx
             x = b - GOLDEN * (b - a)
-            at_share(q, row, x, shape, frame, out)
+            foot_at(q, row, x, shape, frame, out)
             dx = out[0]
         else:
             a, x, dx = x, y, dy
             y = a + GOLDEN * (b - a)
-            at_share(q, row, y, shape, frame, out)
+            foot_at(q, row, y, shape, frame, out)
             dy = out[0]
     t = 0.5 * (a + b)
-    at_share(q, row, t, shape, frame, out)
+    foot_at(q, row, t, shape, frame, out)
     if out[0] > most:
         return -1.0
     towards = 0.0
@@ -157,44 +164,46 @@ def nearest(q, n, row, shape, most, facing, frame, out):
 
 
 @njit(cache=True, nogil=True)
-def least_gaps(points, normals, steps, shape, most, facing, out):
-    """Least distance of each point from the cutter over all steps, if below ``most``: out (p,)."""
-    frame, found = np.empty(9), np.empty(5)
+def least_distances(points, normals, steps, shape, most, facing, out):
+    """Lower ``out`` (p,) [mm] to the least distance of each point from the cutter over all steps, if below ``most``."""
+    frame, foot_values = np.empty(9), np.empty(5)
     for p in range(len(points)):
         best = out[p]
         for k in range(len(steps)):
-            if nearest(points[p], normals[p], steps[k], shape, min(best, most), facing, frame, found) >= 0.0:
-                best = min(best, found[0])
+            if nearest(points[p], normals[p], steps[k], shape, min(best, most), facing, frame, foot_values) >= 0.0:
+                best = min(best, foot_values[0])
         out[p] = best
 
 
 @njit(cache=True, nogil=True)
 def contacts(points, normals, steps, shape, most, facing, owner, moment):
-    """Pairs of point and step no farther apart than ``most`` (p,): owner (m, 2), moment (m, 14) = d, s, z, sin and cos
-    of kappa, tip, axis, direction to q. Returns how many there are; fills as many as there is room for.
+    """Pairs of point and step no farther apart than ``most`` (p,) [mm]; their number.
+
+    ``owner`` (m, 2) point and step, ``moment`` (m, 14) = d, s, z, sin and cos of kappa, tip, axis, direction to q. If
+    there are more than m pairs, only the first m are written.
     """
-    frame, found = np.empty(9), np.empty(5)
+    frame, foot_values = np.empty(9), np.empty(5)
     m = 0
     for p in range(len(points)):
         for k in range(len(steps)):
-            if nearest(points[p], normals[p], steps[k], shape, most[p], facing, frame, found) < 0.0:
+            if nearest(points[p], normals[p], steps[k], shape, most[p], facing, frame, foot_values) < 0.0:
                 continue
             if m < len(owner):
                 owner[m, 0], owner[m, 1] = p, k
-                moment[m, :5] = found
+                moment[m, :5] = foot_values
                 moment[m, 5:] = frame
             m += 1
     return m
 
 
 @njit(cache=True, nogil=True)
-def point_in_engagement(s, phi, rows, tooth, piece, slices, lo, hi, j, reach):
-    """The immersion phi moved just inside the nearest engagement range of tooth j at s, and whether its end is within
-    ``reach`` along the circle of its slice.
+def nearest_engaged(s, phi, rows, tooth, piece, slices, lo, hi, j, reach):
+    """Immersion phi [rad] moved just inside the nearest engagement range of tooth j at s, and whether an end of a range
+    is within ``reach`` [mm] along the circle of its slice.
     """
     best = reach
     out = phi
-    made = False
+    reached = False
     for r in range(lo, hi):
         if not rows[r, 2] - 1e-9 <= s <= rows[r, 3] + 1e-9 or (tooth[r] >= 0 and tooth[r] != j):
             continue
@@ -210,17 +219,17 @@ def point_in_engagement(s, phi, rows, tooth, piece, slices, lo, hi, j, reach):
             off = inner = p + TAU - x
             x = p
         rho = slices[piece[r], 1]
-        made = made or inner * rho <= reach
+        reached = reached or inner * rho <= reach
         if off * rho <= best:
             best = off * rho
             margin = min(BESIDE, 0.5 * (q - p))
             out = min(max(x, p + margin), q - margin)
-    return out, made
+    return out, reached
 
 
 @njit(cache=True, nogil=True)
-def chained(za, zb, bars):
-    """Deflection at height zb under a unit force at za; see :func:`chipload.structure.spindle.chain_compliance`."""
+def chain_compliance(za, zb, bars):
+    """Deflection [mm/N] at height zb under a unit force at za, as of ``chipload.structure.spindle``."""
     top = max(za, zb)
     c = top - min(za, zb)
     end = 0.0
@@ -236,10 +245,12 @@ def chained(za, zb, bars):
 
 
 @njit(cache=True, nogil=True)
-def bent(theta, z, rows, tooth, piece, slices, lo, hi, teeth, c, bars, out):
-    """Load of all teeth at one rotation: out (5,) = force on the cutter along T, n, A [N], displacement of the cutter
-    at height z along T, n [mm]. Points of Gauss on pieces that neither z nor ``PIECE`` of immersion
-    divides, as many as their immersion asks for.
+def load_of_teeth(theta, z, rows, tooth, piece, slices, lo, hi, teeth, c, bars, out):
+    """Load of all teeth at the rotation theta: ``out`` (5,) = force on the cutter along T, n, A [N], displacement of
+    the cutter at height z along T, n [mm].
+
+    Gauss quadrature over pieces of at most ``PIECE`` of immersion, divided at z; the number of points depends on their
+    immersion.
     """
     out[:] = 0.0
     linear = c[6] == 0.0 and c[7] == 0.0 and c[8] == 0.0
@@ -251,9 +262,9 @@ def bent(theta, z, rows, tooth, piece, slices, lo, hi, teeth, c, bars, out):
         base = slices[k, 5] - rate * slices[k, 0]
         first = base + rate * rows[r, 2]
         last = base + rate * rows[r, 3]
-        one = tooth[r] >= 0
-        for i in range(1 if one else teeth):
-            j = tooth[r] if one else i
+        single = tooth[r] >= 0
+        for i in range(1 if single else teeth):
+            j = tooth[r] if single else i
             turn = first_turn(theta, j, teeth, p, first)
             while turn - last <= q:
                 s1, s2 = engaged_part(turn, base, rate, p, q, rows[r, 2], rows[r, 3])
@@ -277,25 +288,23 @@ def bent(theta, z, rows, tooth, piece, slices, lo, hi, teeth, c, bars, out):
                             out[1] += w * n
                             out[2] += w * a
                             if len(bars):
-                                flex = w * chained(slices[k, 2] + sine * (s - slices[k, 0]), z, bars)
+                                flex = w * chain_compliance(slices[k, 2] + sine * (s - slices[k, 0]), z, bars)
                                 out[3] += flex * t
                                 out[4] += flex * n
                 turn += TAU
 
 
 @njit(cache=True, nogil=True)
-def bent_many(step, theta, z, start, rows, tooth, piece, slices, teeth, c, bars, out):
-    """``bent`` of many moments (m,): out (m, 5)."""
+def loads_of_teeth(step, theta, z, start, rows, tooth, piece, slices, teeth, c, bars, out):
+    """:func:`load_of_teeth` of many moments (m,): ``out`` (m, 5)."""
     for m in range(len(step)):
         i = step[m]
-        bent(theta[m], z[m], rows, tooth, piece, slices, start[i], start[i + 1], teeth, c, bars, out[m])
+        load_of_teeth(theta[m], z[m], rows, tooth, piece, slices, start[i], start[i + 1], teeth, c, bars, out[m])
 
 
 @njit(cache=True, nogil=True)
-def points_in_engagement(step, s, phi, start, rows, tooth, piece, slices, j, reach, out, made):
-    """``point_in_engagement`` of many moments (m,), for tooth j."""
+def nearest_engaged_many(step, s, phi, start, rows, tooth, piece, slices, j, reach, out, made):
+    """:func:`nearest_engaged` of many moments (m,), for tooth j."""
     for m in range(len(step)):
         i = step[m]
-        out[m], made[m] = point_in_engagement(
-            s[m], phi[m], rows, tooth, piece, slices, start[i], start[i + 1], j, reach
-        )
+        out[m], made[m] = nearest_engaged(s[m], phi[m], rows, tooth, piece, slices, start[i], start[i + 1], j, reach)

@@ -1,11 +1,12 @@
 """Independent check of programs that mill between walls: gouges by the whole tool, and remaining material.
 
-Notation: S points of the true surface, dense, N their normals out of the metal. On each stands a ray S + s N; every
-part of the tool (cutting part, neck, shank, holder) is taken through every row of the program and the exact interval
-of the ray in it is found. The least s of the cutting part in feeds is the material left there (the scallop), a least s
-below 0 of any part in any row is a gouge of that depth.
+Notation: S points of the true surface, close together, N their normals out of the metal. Each point has a ray S + s N.
+Every part of the tool (cutting part, neck, shank, holder) is moved along every row of the program, and the exact
+interval of the ray inside the part is computed. The least s of the cutting part in feed moves is the remaining material
+(the scallop); a negative least s of any part in any row is a gouge of that depth.
 
-Nothing of the planner is used: no closed form of the largest cutter, none of its check points, ranges or step-overs.
+The check uses nothing of the planner: neither its closed form of the largest cutter, nor its check points, ranges or
+step-overs.
 
 Reference: [Jerard1989].
 """
@@ -35,11 +36,11 @@ Ints = NDArray[np.int64]
 
 #: parts of a tool, in their order
 PARTS = ("cutting part", "neck", "shank", "holder")
-#: a part without an end goes on so far [mm]
+#: length of a part without a stated end [mm]
 ENDLESS = 500.0
-#: longest piece of a row [mm] that is looked at as one
+#: greatest length [mm] of the moves into which a row is divided
 PIECE = 4.0
-#: moves that are left out together where none of them can meet a ray
+#: moves of a group; a group of which no move can meet a ray is skipped as a whole
 GROUP = 3
 _BLOCK = 512
 
@@ -64,7 +65,7 @@ class SurfacePoints:
 def wall(name: str, surface: BSplinePatch, u: Floats, v: Floats) -> SurfacePoints:
     """Return the points of the grid u x v (a,), (b,) on a surface.
 
-    Keep off the edges of the metal, as the tip of a blade: a ray inwards from there lies in the face beside it, which a
+    Leave out the edges of the metal, such as the tip of a blade: there an inward ray lies in the adjacent face, which a
     cutter may touch.
 
     >>> from chipload.geometry.bspline import through
@@ -91,10 +92,10 @@ class Remainder:
     Parameters
     ----------
     wall : the points
-    rest : (n,) [mm] material left along the normal, at most ``height``: so much or more
+    rest : (n,) [mm] remaining material along the normal; ``height``: this or more
     gouge : (n,) [mm] greatest depth below the surface, at most ``depth``
-    row, part : (n,) of the program, of :data:`PARTS`, that gouges; -1: none does
-    height, depth : how far the rays go
+    row, part : (n,) row of the program and part (:data:`PARTS`) of the gouge; -1: there is none
+    height, depth : ends of the rays above and below the surface [mm]
     """
 
     wall: SurfacePoints
@@ -107,7 +108,7 @@ class Remainder:
 
     @property
     def deepest(self) -> tuple[float, int]:
-        """The deepest gouge [mm] and its point."""
+        """The deepest gouge [mm] and the number of its point."""
         k = int(self.gouge.argmax())
         return float(self.gouge[k]), k
 
@@ -123,24 +124,25 @@ class Remainder:
         )
 
     def scallops(self, across: str, within: NDArray[np.bool_] | None = None, prominence: float = 1e-3) -> Floats:
-        """Heights [mm] of the scallops: of the highest points between two passes, along every grid line.
+        """Heights [mm] of the scallops: the maxima between neighbouring passes along every grid line.
 
         Parameters
         ----------
-        across : `u` or `v`, the direction in which pass follows on pass
-        within : (n,) which points count, as those between the passes; None: those with less than ``height`` left
-        prominence : [mm] what stands out less is no scallop
+        across : `u` or `v`, the direction across the passes
+        within : (n,) the points that count, for example those between the passes; None: those with a rest below
+            ``height``
+        prominence : [mm] least prominence of a maximum that counts as a scallop
         """
         rest = self.rest.reshape(self.wall.shape)
         use = (self.rest < self.height if within is None else within).reshape(self.wall.shape)
         if across == "u":
             rest, use = rest.T, use.T
-        found = [
+        heights = [
             row[peaks[ok[peaks]]]
             for row, ok in zip(rest, use, strict=True)
             for peaks in [find_peaks(row, prominence=prominence)[0]]
         ]
-        out: Floats = np.concatenate(found) if found else np.zeros(0)
+        out: Floats = np.concatenate(heights) if heights else np.zeros(0)
         return out
 
     def excess(self, over: float) -> float:
@@ -149,7 +151,7 @@ class Remainder:
 
 
 def tool_parts(cutter: CatalogueCutter) -> tuple[Floats, Floats, Ints]:
-    """Return heights (k,) [mm] above the tip at which parts begin, shapes (k, 14) and kinds in :data:`PARTS`."""
+    """Return for each part its lower end (k,) [mm] above the tip, its shape (k, 14) and its kind in :data:`PARTS`."""
     top = ENDLESS if cutter.cutting_length is None else cutter.cutting_length
     end = ENDLESS if cutter.reach is None else cutter.reach
     rows = [(0.0, min(top, end), 0.5 * cutter.diameter, cutter.corner_radius, 0)]
@@ -163,7 +165,7 @@ def tool_parts(cutter: CatalogueCutter) -> tuple[Floats, Floats, Ints]:
     if cutter.reach is not None and cutter.holder_diameter is not None:
         rows.append((cutter.reach, cutter.reach + ENDLESS, 0.5 * cutter.holder_diameter, 0.0, 3))
     rows = [row for row in rows if row[1] > row[0]]
-    # no flank arc: it ends where it begins, at z3 = z2 = r
+    # without a flank arc: the arc has no length, z3 = z2 = r
     shapes = [[r, R - r, r, 0.0, 0.0, r, R, 0.0, high - low, R, 0.0, R - r, r, r] for low, high, R, r, _ in rows]
     if not cutter.straight:
         shapes[0] = cutter_shape((*cutter.shape.apt[:6], min(top, end), *cutter.shape.outline[7:])).tolist()
@@ -185,10 +187,10 @@ def left_on(
 
     Parameters
     ----------
-    height : [mm] above the surface that is looked at
-    depth : [mm] below it; less than the thickness of a blade, else its other side counts as gouged
-    step : [mm] between the instants at which a move is looked at first
-    tol : [mm] of the extremes between them
+    height : [mm] end of the rays above the surface
+    depth : [mm] end of the rays below it; less than the thickness of a blade, else its other side counts as gouged
+    step : [mm] sweep of the tool between the instants at which a move is evaluated first
+    tol : [mm] tolerance of the lowest point between them
 
     Raises
     ------
@@ -215,7 +217,7 @@ def left_on(
             first: int, w: SurfacePoints = w, frames: Floats = frames, rest: Floats = rest, rest_row: Ints = rest_row,
             gouge: Floats = gouge, row: Ints = row, part: Ints = part,
         ) -> None:  # fmt: skip
-            _kernels.left(
+            _kernels.rest_and_gouge(
                 w.points, frames, tips, axes, groups, GROUP, starts, shapes, cutting, depth, height, step, tol, first,
                 min(first + _BLOCK, len(w.points)), rest, rest_row, gouge, row, part,
             )  # fmt: skip
@@ -243,9 +245,9 @@ def parted_moves(program: Program) -> tuple[Floats, Floats, Ints]:
 
 
 def move_groups(tips: Floats, axes: Floats) -> Floats:
-    """(g, 8) float: bounds of every :data:`GROUP` moves, as :func:`_kernels.groups_of`."""
+    """(g, 8) float: bounds of every :data:`GROUP` moves, as :func:`_kernels.bound_groups`."""
     out = np.empty((max(0, math.ceil((len(tips) - 1) / GROUP)), 8))
-    _kernels.groups_of(tips, axes, GROUP, out)
+    _kernels.bound_groups(tips, axes, GROUP, out)
     return out
 
 
@@ -257,18 +259,18 @@ def frames_of(normals: Floats) -> Floats:
     return np.ascontiguousarray(np.stack([e1, np.cross(normals, e1), normals], axis=1))
 
 
-def scallop_numbers(crests: Floats, asked: float) -> dict[str, float]:
+def scallop_numbers(heights: Floats, required: float) -> dict[str, float]:
     """Return greatest and mean scallop height [mm], and the mean over the required height; 0 if there are none.
 
     >>> scallop_numbers(np.array([0.25, 0.5]), 0.5)
     {'greatest_mm': 0.5, 'mean_mm': 0.375, 'mean_share': 0.75, 'count': 2.0}
     """
-    if not len(crests):
+    if not len(heights):
         return {"greatest_mm": 0.0, "mean_mm": 0.0, "mean_share": 0.0, "count": 0.0}
-    mean = math.fsum(crests) / len(crests)
+    mean = math.fsum(heights) / len(heights)
     return {
-        "greatest_mm": float(crests.max()),
+        "greatest_mm": float(heights.max()),
         "mean_mm": mean,
-        "mean_share": mean / asked,
-        "count": float(len(crests)),
+        "mean_share": mean / required,
+        "count": float(len(heights)),
     }

@@ -1,17 +1,16 @@
-"""The deepest gouge of a program on walls within bounds, by division of wall cells that may hide a deeper one.
+"""The deepest gouge of a program on walls, between bounds: cells of a wall that may contain a deeper one are divided.
 
 Notation: p a point of a wall, N its normal, s(p) the least s at which the ray p + s N is in a part of the tool in any
 row; -s is the gouge. t [mm] greatest distance along a wall from a point of a cell to its nearest corner q, w [rad]
 greatest angle of their normals.
 
-Where the gouge is greatest, G, the part's boundary lies along the wall. If a ball of radius r rolls round inside the
-part, one of them has its centre at r - G over p, and from q it is met at s(q) <= bend - G with bend = r - sqrt(r^2 -
-(t + r w)^2) + 3/2 t w. So no gouge of a cell is deeper than bend - s of its corners. The cutting part rolls its corner
-radius. Parts above have rims: they are made larger by g all round, rolled by a ball of that radius, and what they come
-deeper than g counts.
+Where the gouge is greatest, G, the part's boundary is parallel to the wall. If a ball of radius r rolls inside the part
+along its boundary, one of its positions has the centre at the height r - G over p, and the ray of q meets it at s(q) <=
+bend - G with bend = r - sqrt(r^2 - (t + r w)^2) + 3/2 t w. No gouge of a cell is therefore deeper than bend - s of its
+corners. Inside the cutting part rolls a ball of its corner radius. The parts above have sharp edges: they are enlarged
+by g all round, a ball of radius g then rolls inside them, and their depth less g counts.
 
-Limits: w is taken from the normals at the corners, half as much again. On the edge of a wall the bound is that along
-the edge.
+Limits: w is 1.5 times the angle of the normals at the corners. On the edge of a wall the bound is that along the edge.
 """
 
 from __future__ import annotations
@@ -43,23 +42,23 @@ Floats = NDArray[np.float64]
 
 #: width of the first cells [mm]
 _FIRST = 2.5
-#: how often a cell is halved at most
+#: greatest number of times that a cell is halved
 _LEVELS = 8
-#: of the reach of a cell, by how much parts above the cutting part are made larger
+#: enlargement g of the parts above the cutting part, as a multiple of the reach t of the cells
 _GROWN = 2.5
-#: of the normals' angle at the corners of a cell, what counts for the way to the nearest one
+#: angle w to the nearest corner of a cell as a share of the greatest angle between the normals at its corners
 _TURN = 0.75
-#: so many corners are looked at in all; then the bound stays as it is
+#: greatest number of corners that are evaluated; the division of cells ends there
 _MOST = 4_000_000
-#: reach of the cells at which a cutter with a sharp corner is looked at [mm]; its bound is not known
+#: reach of the cells at which a cutter with a sharp corner is evaluated [mm]; its bound is unknown
 _SHARP = 0.5
 #: a bound below this share of the limit is enough
 _ENOUGH = 0.5
-#: of the depth of a ray, how far down its end is told from what is above it
+#: share of the depth of a ray below which a value counts as its end
 _BOTTOM = 1.0 - 1e-9
-#: what rounding may do to a height [mm]
+#: allowance for rounding of a height [mm]
 _ROUNDED = 1e-12
-#: least height above a wall that is looked at [mm]; how much lower a tool may come between two instants
+#: least height above a wall that is searched [mm]; bound of the dip of a tool between two instants [mm]
 _LOW, _DIP = 0.1, 0.05
 _BLOCK = 512
 
@@ -70,9 +69,9 @@ class Gouge:
 
     Parameters
     ----------
-    found : deepest that a part of the tool comes below a wall [mm]; 0: none does
-    bound : no part comes deeper below any point of the walls [mm]; inf: it is not known, as with a sharp corner
-    wall, place, row, part : of what was found: name of the wall, point [mm], row of the program, of :data:`PARTS`
+    found : greatest depth found of a part of the tool below a wall [mm]; 0: there is no gouge
+    bound : upper bound of the depth below all points of the walls [mm]; inf: unknown, as with a sharp corner
+    wall, place, row, part : of the gouge found: name of the wall, point [mm], row of the program, of :data:`PARTS`
     """
 
     found: float
@@ -123,9 +122,9 @@ def deepest_gouge(
 
     Parameters
     ----------
-    walls : their surfaces, from the least to the greatest u and v of each are looked at
-    depth : [mm] how far below a wall is looked; less than the thickness of a blade
-    resolution : of the gouge [mm]; finer where the limit lies between what is found and its bound
+    walls : the surface of each is searched from the least to the greatest u and v of its points
+    depth : [mm] depth of the search below a wall; less than the thickness of a blade
+    resolution : of the gouge [mm]; finer where the limit lies between the gouge found and its bound
     limit : of the gouge [mm]
     step, tol : as :func:`left_on`
 
@@ -142,7 +141,7 @@ def deepest_gouge(
     groups = move_groups(tips, axes)
     cells = _first(walls)
     best = Gouge(0.0, 0.0, "", (0.0, 0.0, 0.0), -1, 0)
-    settled, looked = 0.0, 0
+    settled, evaluated = 0.0, 0
     for level in range(_LEVELS + 1):
         at = cells.corners()
         # cells share their corners
@@ -154,7 +153,7 @@ def deepest_gouge(
         grown = _GROWN * float(t.max())
         known = _known(cutter.corner_radius, grown, t, w).any()
         if not known and cutter.corner_radius > resolution and level < _LEVELS and 16 * len(t) <= _MOST:
-            # whatever is met, every cell is divided
+            # every cell is divided, whatever the rays meet
             cells = cells.divided(np.ones(len(t), dtype=np.bool_))
             continue
         starts, shapes, kinds = _parts(cutter, grown)
@@ -170,7 +169,7 @@ def deepest_gouge(
         ) -> None:  # fmt: skip
             last = min(first + _BLOCK, len(points))
             frames = frames_of(normals[first:last])
-            _kernels.lowest(
+            _kernels.lowest_of_kinds(
                 points[first:last], frames, tips, axes, groups, GROUP, starts, shapes, kinds, depth, height, step, tol,
                 low[first:last], row[first:last], part[first:last],
             )  # fmt: skip
@@ -191,16 +190,16 @@ def deepest_gouge(
                 int(tool_parts(cutter)[2][part[k, which]]),
             )
         bound = _bounds(low[corner].min(axis=1), t, w, cutter.corner_radius, grown, depth)
-        looked += len(points)
+        evaluated += len(points)
         target = max(best.found + resolution, _ENOUGH * limit)
         if best.found <= limit < target:
             target = max(limit, best.found + 0.1 * resolution)
         open_cells = bound > target
         settled = max(settled, float(bound[~open_cells].max(initial=0.0)))
         sharp = cutter.corner_radius <= resolution and float(t.max()) <= _SHARP
-        # as deep as the rays go, or deeper
+        # the gouge reaches the ends of the rays
         ended = sharp or best.found >= depth
-        if ended or level == _LEVELS or looked + 16 * int(open_cells.sum()) > _MOST or not open_cells.any():
+        if ended or level == _LEVELS or evaluated + 16 * int(open_cells.sum()) > _MOST or not open_cells.any():
             settled = max(settled, float(bound.max(initial=0.0)))
             break
         cells = cells.divided(open_cells)
@@ -208,15 +207,17 @@ def deepest_gouge(
 
 
 def _known(r: float, grown: float, t: Floats, w: Floats) -> NDArray[np.bool_]:
-    """Whether cells (n,) have a bound, whatever comes near them."""
+    """Whether cells (n,) have a bound at all."""
     return np.isfinite(_sag(r, t, w)) & np.isfinite(_sag(grown, t, w))
 
 
 def _enough(
     corner: NDArray[np.int64], count: int, r: float, grown: float, t: Floats, w: Floats, bound: float, found: float
 ) -> Floats:
-    """Height (count, 3) above each point that no part of a kind need be known to keep: below it, no cell of its
-    ``corner`` (n, 4) has a higher bound than ``bound``, and nothing is deeper than what is ``found``.
+    """Heights (count, 3) [mm] over each point above which the parts of each kind need not be known.
+
+    Parts above them neither raise the bound of a cell, whose ``corner`` (n, 4) are points, beyond ``bound``, nor are
+    deeper than ``found``.
     """
     out = np.full((count, 3), -found)
     out[:, 2] = -np.inf
@@ -234,7 +235,10 @@ def _height(bend: Floats, grown: float) -> float:
 
 
 def _parts(cutter: CatalogueCutter, grown: float) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """As :func:`tool_parts`, what is above once more, larger: kinds 0 cutting part, 1 above it, 2 above and larger."""
+    """As :func:`tool_parts`, with the parts above the cutting part a second time, enlarged by ``grown`` [mm].
+
+    Kinds: 0 cutting part, 1 part above it, 2 enlarged part above it.
+    """
     starts, shapes, kinds = tool_parts(cutter)
     upper = kinds > 0
     larger = shapes[upper].copy()
@@ -249,24 +253,24 @@ def _parts(cutter: CatalogueCutter, grown: float) -> tuple[Floats, Floats, NDArr
 
 
 def _bounds(low: Floats, t: Floats, w: Floats, r: float, grown: float, depth: float) -> Floats:
-    """Deepest gouge (n,) that cells may have, whose corners have the least s ``low`` (n, 3) of the kinds of parts."""
+    """Upper bound (n,) [mm] of the gouge in cells with the least s ``low`` (n, 3) of the kinds of parts at corners."""
     out = _sag(r, t, w) - low[:, 0]
     larger = _sag(grown, t, w) - low[:, 2] - grown
-    # a ray ends at the depth: deeper is not seen
+    # rays end at the depth: a deeper gouge is not measured
     larger[low[:, 2] <= -depth] = np.inf
     out[low[:, 0] <= -depth] = np.inf
     return np.maximum(out, larger)
 
 
 def _sag(r: float, t: Floats, w: Floats) -> Floats:
-    """Return the height (n,) [mm] by which a ball of radius r, lowest on a cell, is higher at the nearest corner."""
+    """Return the bend (n,) [mm]: how much higher than its lowest point a ball of radius r is at the nearest corner."""
     wide = t + r * w
     out: Floats = np.where(wide < r, r - np.sqrt(np.maximum(r * r - wide * wide, 0.0)) + 1.5 * t * w, np.inf)
     return out
 
 
 def _first(walls: Sequence[SurfacePoints]) -> _Cells:
-    """All of the walls in cells of about :data:`_FIRST`."""
+    """Divide all walls into cells about :data:`_FIRST` wide."""
     number, boxes = [], []
     for k, wall in enumerate(walls):
         ends = []

@@ -32,9 +32,9 @@ class ChannelRemoval:
     Parameters
     ----------
     before, after : volume [mm3]
-    rapid : (n,) volume [mm3] that each rapid takes, 0 for feeds
-    above : (n,) volume [mm3] that neck, shank and holder take in each row
-    part : (n,) of :data:`PARTS`, the one above the cutting part that takes most; -1: none
+    rapid : (n,) volume [mm3] that each rapid removes, 0 for feed moves
+    above : (n,) greatest volume [mm3] that neck, shank or holder removes in each row
+    part : (n,) the part (:data:`PARTS`) that removes it; -1: none
     """
 
     before: float
@@ -44,7 +44,10 @@ class ChannelRemoval:
     part: Ints
 
     def problems(self, least: float) -> tuple[str, ...]:
-        """Rows that take more than ``least`` [mm3] as they must not, in words: the worst of each kind."""
+        """Messages on rapids, and on parts above the cutting part, that remove more than ``least`` [mm3].
+
+        Each names the worst row of its kind.
+        """
         out = []
         if self.rapid.max(initial=0.0) > least:
             k = int(self.rapid.argmax())
@@ -56,7 +59,7 @@ class ChannelRemoval:
 
 
 def sector(inner: Floats, outer: Floats, first: float, last: float, turn: float = math.radians(2.0)) -> trimesh.Trimesh:
-    """The blank between meridional curves (n, 2) r, z, as many points each, from theta ``first`` to ``last`` [rad].
+    """Blank between two meridional curves (n, 2) of r, z [mm], n points each, from theta ``first`` to ``last`` [rad].
 
     >>> straight = np.array([[0.0, 0.0], [0.0, 10.0]])
     >>> half = sector(straight + [10.0, 0.0], straight + [20.0, 0.0], 0.0, np.pi)

@@ -1,7 +1,7 @@
-"""Compiled loop that lays out the edges of rings by layer; arrays and scalars only.
+"""Compiled: the edges of rings, sorted by layer.
 
-Notation: ``points`` (n, 2) [mm] of closed rings, one after the other, ``ring`` (n,) the ring of each, ``layer`` of each
-ring, rising.
+Notation: ``points`` (n, 2) [mm] of successive closed rings, ``ring`` (n,) number of the ring of each point, ``layer``
+(r,) layer of each ring, ascending.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def ring_edges(points, ring, layer, x0, y0, y1, edges, start):
-    """Rows x0, y0, x1, y1 into ``edges`` (n, 4) and where each layer begins into ``start`` (l + 1,); their count.
+    """Write the edges (x0, y0, x1, y1) to ``edges`` (n, 4), the first of each layer to ``start`` (l + 1,); the count.
 
-    Left out are edges that no ray along +x from a place right of ``x0`` and between ``y0`` and ``y1`` meets.
+    Edges that no ray along +x from a point with x >= ``x0`` and ``y0`` <= y <= ``y1`` meets are left out.
     """
     count = 0
-    here = 0
+    current = 0
     for k in range(1, len(points)):
         if ring[k] != ring[k - 1]:
             continue
-        while here < layer[ring[k]]:
-            here += 1
-            start[here] = count
+        while current < layer[ring[k]]:
+            current += 1
+            start[current] = count
         ax, ay, bx, by = points[k - 1, 0], points[k - 1, 1], points[k, 0], points[k, 1]
         if max(ax, bx) >= x0 and max(ay, by) >= y0 and min(ay, by) <= y1:
             edges[count, 0] = ax
@@ -30,6 +30,6 @@ def ring_edges(points, ring, layer, x0, y0, y1, edges, start):
             edges[count, 2] = bx
             edges[count, 3] = by
             count += 1
-    for k in range(here + 1, len(start)):
+    for k in range(current + 1, len(start)):
         start[k] = count
     return count

@@ -1,11 +1,11 @@
-"""Compiled loops over the tiles of a layered stock: removal of areas, pieces of chips, edges, points.
+"""Compiled loops over the tiles of a layered stock: removal of areas, pieces of the removed area, edges, points.
 
-Notation: rings and areas as in :mod:`chipload.stock.clip._kernels`. ``slots`` (n, 3) holds of each area its first ring,
-its number of rings and of points; ``boxes`` (n, 4) the least and greatest x and y. ``slot_of`` (layers, rows, columns)
-holds the area of each tile: NONE where it was not read yet, 0 the empty one. Areas never change: a tile that loses
-something gets another one, so that layers that were cut alike share theirs. ``used`` holds the numbers of points,
-rings and slots. An **entry** is a layer and the area that a step removes from it; an **operation** is an entry and a
-tile under it.
+Notation: rings and areas as in :mod:`chipload.stock.clip._kernels`. ``slots`` (n, 3) the first ring, the number of
+rings and the number of points of each area; ``boxes`` (n, 4) its least x and y and greatest x and y. ``slot_of``
+(layers, rows, columns) the slot of each tile's area: NONE where it is not read yet, 0 the empty area. Areas never
+change: a tile that loses material is given another area, so that layers that are cut alike share areas. ``used`` the
+numbers of points, rings and slots in use. An **entry** is a layer and the area that a step removes from it; an
+**operation** is an entry and a tile under it.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from chipload.stock.clip._kernels import CUT, clip, ring_size
 from chipload.stock.clip.crossings._kernels import FULL
 
 NONE = -1
-#: results of :func:`remove` beside those of :func:`clip`: all is done, a tile was not read
-DONE, MISSING = 0, -3
-#: columns of an operation: entry, layer, row, column, the slot before and after, first chip ring and the one after the
-#: last, and the operation that did the same before it or itself
+#: result of :func:`list_operations` besides the number and FULL: a tile was not read
+MISSING = -3
+#: columns of an operation: entry, layer, row, column, slot before and after, first ring of the chip and the one after
+#: the last, and the earlier operation with the same result, or itself
 ENTRY, LAYER, J, I, OLD, NEW, CHIP_0, CHIP_1, AS = range(9)
-#: ends of an edge this near a border are on it [mm]
+#: an end of an edge within this distance of a border is on it [mm]
 ON_BORDER = 1e-9
-#: most that edges are moved when they are made simpler, over the width of a film
+#: greatest displacement of an edge by simplification, as a share of the width of a film
 SIMPLER = 0.125
-#: columns of what an entry takes: area, pieces that are no films, least and whole area of these
+#: columns of the result of an entry: removed area, number of pieces that are not films, their least and total area
 AREA, PIECES, LEAST, WHOLE = range(4)
 
 
@@ -38,8 +38,8 @@ AREA, PIECES, LEAST, WHOLE = range(4)
     cache=True,
     nogil=True,
 )
-def listed(layers, shapes, shape_boxes, xs, ys, slot_of, boxes, ops):
-    """Enter the operations of entries (layer, shape) into ``ops``: their number, FULL or MISSING."""
+def list_operations(layers, shapes, shape_boxes, xs, ys, slot_of, boxes, ops):
+    """Write the operations of the entries (layer, shape) to ``ops``; their number, FULL or MISSING."""
     n = 0
     for e in range(len(layers)):
         x0, y0, x1, y1 = shape_boxes[shapes[e]]
@@ -66,8 +66,8 @@ def listed(layers, shapes, shape_boxes, xs, ys, slot_of, boxes, ops):
 @njit(
     "int64(float64[:,::1], int64[:,::1], int64[:,::1], float64[:,::1], int64[::1], int64[::1])", cache=True, nogil=True
 )
-def entered(P, rings, slots, boxes, used, own):
-    """Enter the rings up to ``own`` (points, rings) as a new slot; its number."""
+def add_slot(P, rings, slots, boxes, used, own):
+    """Add the rings from ``used`` up to ``own`` (points, rings) as a new slot; its number, 0 if there are none."""
     if own[1] == used[1]:
         return 0
     slot = used[2]
@@ -90,26 +90,26 @@ def entered(P, rings, slots, boxes, used, own):
     cache=True,
     nogil=True,
 )
-def cut(begin, count, layers, shapes, Q, C, first, shape_boxes, P, rings, slots, boxes, slot_of, used, chip, chip_rings,
-        chip_used, ops, X, cross):  # fmt: skip
-    """Do the operations from ``begin`` on; the number of the first that was not done (``count``: none is left).
+def cut_tiles(begin, count, layers, shapes, Q, C, first, shape_boxes, P, rings, slots, boxes, slot_of, used, chip,
+              chip_rings, chip_used, ops, X, cross):  # fmt: skip
+    """Carry out the operations from ``begin`` on; the number of the first that is not done, ``count`` if all are.
 
-    What stopped it is in ``used[3]``: DEGENERATE or FULL.
+    ``used[3]`` receives the reason for an early end: DEGENERATE or FULL.
     """
     areas = np.empty(3)
     own = np.empty(2, dtype=np.int64)
-    # operations of the entry before, among which one may do the same
-    before, here = 0, 0
+    # range of the operations of the previous entry, one of which may have the same result
+    before, next_entry = 0, 0
     for k in range(begin, count):
         e, layer, j, i = ops[k, ENTRY], ops[k, LAYER], ops[k, J], ops[k, I]
-        while ops[here, ENTRY] < e:
-            before, past = here, ops[here, ENTRY]
-            while ops[here, ENTRY] == past:
-                here += 1
+        while ops[next_entry, ENTRY] < e:
+            before, previous = next_entry, ops[next_entry, ENTRY]
+            while ops[next_entry, ENTRY] == previous:
+                next_entry += 1
         slot, shape = slot_of[layer, j, i], shapes[e]
         ops[k, OLD] = slot
         same = -1
-        for b in range(before, here):
+        for b in range(before, next_entry):
             if ops[b, OLD] == slot and shapes[ops[b, ENTRY]] == shape:
                 same = b
         if same >= 0:
@@ -130,22 +130,22 @@ def cut(begin, count, layers, shapes, Q, C, first, shape_boxes, P, rings, slots,
             return k
         if status == CUT:
             ops[k, CHIP_1] = chip_used[1]
-            ops[k, NEW] = entered(P, rings, slots, boxes, used, own)
+            ops[k, NEW] = add_slot(P, rings, slots, boxes, used, own)
             slot_of[layer, j, i] = ops[k, NEW]
     return count
 
 
 @njit("int64(int64[::1], int64)", cache=True, nogil=True)
 def root(parent, a):
-    """First of the pieces that a is joined with."""
+    """Representative of the pieces with which piece a is joined."""
     while parent[a] != a:
         a = parent[a]
     return a
 
 
 @njit("boolean(float64[:,::1], int64[:,::1], int64, int64, float64, float64)", cache=True, nogil=True)
-def holds(points, rings, first, last, x, y):
-    """Whether an area holds a point."""
+def contains(points, rings, first, last, x, y):
+    """Whether the area of the rings ``first``..``last`` - 1 contains the point (x, y)."""
     odd = False
     for r in range(first, last):
         start, count = rings[r, 0], rings[r, 1]
@@ -159,16 +159,16 @@ def holds(points, rings, first, last, x, y):
 
 
 @njit("int64(int64, int64, int64, float64[::1], int64[::1], float64[:,::1], int64[:,::1])", cache=True, nogil=True)
-def around(h, n0, n1, area, ring, points, rings):
-    """The smallest of the rings n0 to n1 - 1 that holds the hole h; itself where none does."""
+def enclosing_ring(h, n0, n1, area, ring, points, rings):
+    """Smallest of the rings n0 to n1 - 1 that encloses the hole h; h itself if none does."""
     x, y = points[rings[ring[h], 0], 0], points[rings[ring[h], 0], 1]
-    found = h
+    smallest = h
     for k in range(n0, n1):
-        if area[k] <= -area[h] or (found != h and area[k] >= area[found]):
+        if area[k] <= -area[h] or (smallest != h and area[k] >= area[smallest]):
             continue
-        if holds(points, rings, ring[k], ring[k] + 1, x, y):
-            found = k
-    return found
+        if contains(points, rings, ring[k], ring[k] + 1, x, y):
+            smallest = k
+    return smallest
 
 
 @njit(
@@ -176,8 +176,8 @@ def around(h, n0, n1, area, ring, points, rings):
     cache=True,
     nogil=True,
 )
-def border(a, b, xs, ys, points, ring_a, ring_b, near):
-    """Length that two rings of the tiles of operations a and b share on the border of these tiles, within ``near``."""
+def shared_border(a, b, xs, ys, points, ring_a, ring_b, near):
+    """Length [mm] that two rings of the tiles of operations a and b share on the tiles' border, within ``near``."""
     if a[J] == b[J] and abs(a[I] - b[I]) == 1:
         across, at = 0, xs[max(a[I], b[I])]
     elif a[I] == b[I] and abs(a[J] - b[J]) == 1:
@@ -204,11 +204,11 @@ def border(a, b, xs, ys, points, ring_a, ring_b, near):
     cache=True,
     nogil=True,
 )
-def joined(k0, k1, ops, xs, ys, chip, chip_rings, film, out):
-    """Pieces of the chip of one entry, whose operations are k0 to k1 - 1, joined over the tiles, into ``out``.
+def join_over_tiles(k0, k1, ops, xs, ys, chip, chip_rings, film, out):
+    """Join the pieces that one entry removes, of its operations k0 to k1 - 1, over the tiles; their sums in ``out``.
 
-    A piece is a film if twice its area is at most ``film`` times its length. Pieces that come as near to a border of
-    tiles as edges are moved when they are made simpler are joined over it.
+    A piece is a film if twice its area is at most ``film`` times its perimeter. Pieces are joined over a border of
+    tiles if they are as near to it as simplification may move an edge.
     """
     near = max(ON_BORDER, SIMPLER * film)
     n = 0
@@ -229,12 +229,12 @@ def joined(k0, k1, ops, xs, ys, chip, chip_rings, film, out):
             n += 1
         for h in range(n0, n):
             if area[h] < 0.0:
-                parent[h] = around(h, n0, n, area, ring, chip, chip_rings)
+                parent[h] = enclosing_ring(h, n0, n, area, ring, chip, chip_rings)
     for a in range(n):
         for b in range(a + 1, n):
             if of[a] == of[b] or area[a] <= 0.0 or area[b] <= 0.0:
                 continue
-            shared = border(ops[of[a]], ops[of[b]], xs, ys, chip, chip_rings[ring[a]], chip_rings[ring[b]], near)
+            shared = shared_border(ops[of[a]], ops[of[b]], xs, ys, chip, chip_rings[ring[a]], chip_rings[ring[b]], near)
             if shared > ON_BORDER:
                 length[a] -= 2.0 * shared
                 p, q = root(parent, a), root(parent, b)
@@ -257,8 +257,8 @@ def joined(k0, k1, ops, xs, ys, chip, chip_rings, film, out):
     cache=True,
     nogil=True,
 )
-def taken(entries, count, ops, xs, ys, chip, chip_rings, film, out):
-    """What each entry takes, of :func:`joined`; an entry that did the same as the one before it takes the same."""
+def removed_areas(entries, count, ops, xs, ys, chip, chip_rings, film, out):
+    """Result of :func:`join_over_tiles` of each entry; it is copied if the previous entry has the same operations."""
     k, before, old = 0, 0, 0
     for e in range(entries):
         k0 = k
@@ -270,7 +270,7 @@ def taken(entries, count, ops, xs, ys, chip, chip_rings, film, out):
         if alike:
             out[e] = out[e - 1]
         else:
-            joined(k0, k, ops, xs, ys, chip, chip_rings, film, out[e])
+            join_over_tiles(k0, k, ops, xs, ys, chip, chip_rings, film, out[e])
         before, old = k0, k
 
 
@@ -281,10 +281,10 @@ def taken(entries, count, ops, xs, ys, chip, chip_rings, film, out):
     nogil=True,
 )
 def edges_under(l0, l1, j0, j1, i0, i1, x0, y0, y1, P, rings, slots, slot_of, edges, start):
-    """Rows x0, y0, x1, y1 of the edges in tiles into ``edges`` (n, 4) and where each layer begins into ``start``.
+    """Write the edges (x0, y0, x1, y1) in tiles to ``edges`` (n, 4), and the first of each layer to ``start``.
 
-    Left out are edges that no ray along +x from a place right of ``x0`` and between ``y0`` and ``y1`` meets. Returns
-    their number, MISSING, or FULL.
+    Edges that no ray along +x from a point with x >= ``x0`` and ``y0`` <= y <= ``y1`` meets are left out. Returns their
+    number, MISSING, or FULL.
     """
     n = 0
     for layer in range(l0, l1):

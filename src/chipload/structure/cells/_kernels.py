@@ -1,4 +1,4 @@
-"""Moments of polygons in the cells of a plane grid, compiled; the tests hold them against clipped polygons."""
+"""Compiled: moments of polygons in the cells of a plane grid. Oracle: clipped polygons, in tests/structure/cells."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def _cell(planes, x):
-    """The cell of a place within the grid."""
+    """Number of the cell between ``planes`` (n + 1,), ascending, that contains x."""
     low, high = 0, len(planes) - 2
     while low < high:
         middle = (low + high + 1) // 2
@@ -20,11 +20,11 @@ def _cell(planes, x):
 
 @njit(cache=True, nogil=True)
 def _strip(left, right, low, high, i, s, xs, ys, at, weight, out):
-    """A piece of an edge within one column of cells: what lies below it."""
+    """Add the moments of the area below a piece of an edge, within the column i of cells, with the sign s."""
     ny, n = out.shape[1], out.shape[2]
     width = xs[i + 1] - xs[i]
     a, va = left, low
-    # the cell in which the piece goes on from (a, va)
+    # the cell into which the piece continues from (a, va)
     j = _cell(ys, va)
     if high < va and va == ys[j] and j > 0:
         j -= 1

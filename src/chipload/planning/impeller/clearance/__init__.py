@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from chipload.lazy import attach
 
 if TYPE_CHECKING:
-    from chipload.planning.impeller.clearance.clearance import between, moves_clear, nearest
+    from chipload.planning.impeller.clearance.clearance import interpolated_axes, moves_clear, nearest
 
-__all__ = ["between", "moves_clear", "nearest"]
+__all__ = ["interpolated_axes", "moves_clear", "nearest"]
 
 __getattr__, __dir__ = attach(
     __name__,
     {
-        "clearance": "between moves_clear nearest",
+        "clearance": "interpolated_axes moves_clear nearest",
     },
 )

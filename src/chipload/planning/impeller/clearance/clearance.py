@@ -1,9 +1,9 @@
 """Clearance of the whole cutter from the check points, at a pose or over a whole move.
 
-Notation: p [mm] tip, T unit axis; D distance of the nearest check point from the cutter, below 0 where one is in it. On
-a move the tip goes straight and the axis turns evenly from T0 to T1. No point of the cutter within L of the tip goes
-further than |p1 - p0| + L angle(T0, T1), so that D at the middle less half of that bounds D on all of the move: it is
-halved until the bound decides.
+Notation: p [mm] tip, T unit axis; D distance of the nearest check point from the cutter, negative if one is inside. On
+a move the tip goes straight and the axis turns at a constant rate from T0 to T1. No point of the cutter within L of the
+tip travels farther than |p1 - p0| + L angle(T0, T1). D at the middle less half of that is therefore a lower bound of D
+on the whole move; the move is halved until the bound decides.
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.planning.impeller import _profile
 from chipload.planning.impeller.clearance import _kernels
 from chipload.planning.impeller.profile import profile_numbers
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.tree import Tree
 
-#: halvings of a move before it counts as not clear
+#: number of times that a move is halved before it counts as not clear
 _DEPTH = 14
 
 
@@ -30,12 +29,12 @@ def clearance(
     Parameters
     ----------
     tips, axes : (n, 3) [mm], unit
-    cap : [mm] what is farther counts as this far
-    above : [mm] that neck, shank and holder are made larger by
+    cap : [mm] greatest distance that is returned
+    above : [mm] by which neck, shank and holder are enlarged
 
     Returns
     -------
-    (n,) float [mm], (n,) int the check point, -1: none within ``cap``
+    (n,) float [mm], (n,) int the nearest check point, -1: none within ``cap``
     """
     tree = scene.tree
     out, which = nearest(scene.ordered, tree, cutter, cutter.stages(above), tips, axes, cap)
@@ -45,24 +44,23 @@ def clearance(
 def nearest(
     ordered: Floats, tree: Tree, cutter: CatalogueCutter, stages: Floats, tips: ArrayLike, axes: ArrayLike, cap: float
 ) -> tuple[Floats, Ints]:
-    """The clearance as of :func:`clearance`, of points ``ordered`` (m, 3) by their tree, and the nearest point's place
-    in that order.
+    """As :func:`clearance`, of points ``ordered`` (m, 3) [mm] in the order of their tree, with the parts ``stages``.
+
+    The nearest point is its position in that order.
     """
     p = np.ascontiguousarray(tips, dtype=np.float64).reshape(-1, 3)
     a = np.ascontiguousarray(axes, dtype=np.float64).reshape(-1, 3)
     out, which = np.empty(len(p)), np.empty(len(p), dtype=np.int64)
-    if not cutter.straight:
-        numbers = profile_numbers(cutter)
-        _profile.nearest(ordered, tree.nodes, tree.spans, tree.leaves, p, a, numbers, stages, cap, out, which)
-        return out, which
-    _kernels.nearest(
-        ordered, tree.nodes, tree.spans, tree.leaves, p, a, cutter.rho, cutter.corner_radius, stages, cap, out, which
-    )
+    search = ordered, tree.nodes, tree.spans, tree.leaves, p, a
+    if cutter.straight:
+        _kernels.nearest(*search, cutter.rho, cutter.corner_radius, stages, cap, out, which)
+    else:
+        _kernels.nearest_to_profile(*search, profile_numbers(cutter), stages, cap, out, which)
     return out, which
 
 
-def between(axes0: Floats, axes1: Floats, share: Floats) -> Floats:
-    """Unit axes (n, 3) at the ``share`` (n,) of the turn from ``axes0`` to ``axes1`` (n, 3)."""
+def interpolated_axes(axes0: Floats, axes1: Floats, share: Floats) -> Floats:
+    """Unit axes (n, 3), the turn from ``axes0`` to ``axes1`` (n, 3) at the ``share`` (n,) of its angle."""
     dot = np.clip((axes0 * axes1).sum(axis=1), -1.0, 1.0)
     angle = np.arccos(dot)
     flat = angle < 1e-7
@@ -77,11 +75,12 @@ def between(axes0: Floats, axes1: Floats, share: Floats) -> Floats:
 def moves_clear(
     scene: Scene, cutter: CatalogueCutter, tips: ArrayLike, axes: ArrayLike, margin: float, above: float = 0.0
 ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Whether the cutter keeps ``margin`` [mm] from every check point all along each of the n - 1 moves: proved.
+    """Whether it is proved that the cutter stays ``margin`` [mm] from every check point on each of the n - 1 moves.
 
     Parameters
     ----------
-    tips, axes : (n, 3) poses, one after the other
+    tips, axes : (n, 3) [mm], unit: successive poses
+    above : [mm] by which neck, shank and holder are enlarged
     """
     p = np.asarray(tips, dtype=np.float64).reshape(-1, 3)
     a = np.asarray(axes, dtype=np.float64).reshape(-1, 3)
@@ -98,11 +97,13 @@ def moves_clear(
         mid = 0.5 * (low + high)
         tip = p[row] + mid[:, None] * (p[row + 1] - p[row])
         half = 0.5 * (high - low) * reach[row]
-        got, _ = clearance(scene, cutter, tip, between(a[row], a[row + 1], mid), margin + float(half.max()), above)
-        bad = got < margin
+        distance, _ = clearance(
+            scene, cutter, tip, interpolated_axes(a[row], a[row + 1], mid), margin + float(half.max()), above
+        )
+        bad = distance < margin
         ok[row[bad]] = False
-        left = ok[row] & (got < margin + half)
-        row, low, mid, high = row[left], low[left], mid[left], high[left]
+        undecided = ok[row] & (distance < margin + half)
+        row, low, mid, high = row[undecided], low[undecided], mid[undecided], high[undecided]
         row, low, high = np.tile(row, 2), np.concatenate([low, mid]), np.concatenate([mid, high])
     ok[row] = False
     return ok

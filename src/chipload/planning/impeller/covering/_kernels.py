@@ -1,8 +1,9 @@
-"""Compiled: what of ranges of the pallet angle B is clear of nodes that lie close together.
+"""Compiled: the parts of ranges of the pallet angle B in which a cutter is clear of the nodes of a covering.
 
-Notation: as in ``ranges/_kernels.py``. A node whose distance from the cutter at the middle of a part of B is more than
-the node and the cutter can move against each other within it is clear in all of it. Parts are halved; what is left of
-few nodes, or in a narrow part, is told by the exact arcs of each.
+Notation: as in ``ranges/_kernels.py``; a part is an interval of B. If a node's distance from the cutter at the middle
+of a part is greater than the relative motion of node and cutter within the part, the node is clear in the whole part.
+Parts are halved until this decides, or until few nodes remain or the part is narrow: then the exact arcs of the
+remaining nodes decide.
 """
 
 from __future__ import annotations
@@ -13,20 +14,26 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from chipload.planning.impeller._kernels import gaps, point_arcs
+from chipload.planning.impeller._kernels import point_arcs, uncovered_parts
+from chipload.planning.impeller._tree import next_node
 from chipload.planning.impeller.clearance._kernels import distance
-from chipload.planning.impeller.ranges._kernels import merged
+from chipload.planning.impeller.ranges._kernels import add_arcs
 
-#: so few nodes are told by their arcs, and in so narrow a part [rad] as many as there are
+#: the exact arcs decide where at most this many nodes remain
 FEW = 2
-#: with more nodes than these a part wider than the width is halved
+#: a part wider than ``width`` is halved where more nodes than this are in reach
 MANY = 256
+#: the exact arcs decide in a part narrower than this [rad], for any number of nodes
 NARROW = 1e-4
 
 
 @njit(cache=True, nogil=True)
-def framed(cc: Any, cone: Any, r: float, B: float, half: float, rho: float, out: Any) -> None:
-    """``out`` (11,): T, V, the centre S + r N, sin(alpha) half, how far the axis goes within ``half`` of B."""
+def frame_at(cc: Any, cone: Any, r: float, B: float, half: float, rho: float, out: Any) -> None:
+    """Frame of the cutter at the pallet angle B, ``out`` (11,).
+
+    T, V, the corner's centre S + r N [mm], the greatest turn sin(alpha) ``half`` [rad] of the axis within ``half`` of
+    B, and the greatest displacement [mm] of the axis (of rho V) within it.
+    """
     Tx, Ty, Tz = cone[0] * math.cos(B), cone[0] * math.sin(B), cone[1]
     n = cc[3] * Tx + cc[4] * Ty + cc[5] * Tz
     s = math.sqrt(max(1.0 - n * n, 1e-300))
@@ -40,76 +47,76 @@ def framed(cc: Any, cone: Any, r: float, B: float, half: float, rho: float, out:
 
 
 @njit(cache=True, nogil=True)
-def spare(x: float, y: float, z: float, R: float, f: Any, rho: float, r: float, stages: Any) -> tuple[float, float]:
-    """Distance [mm] of a ball about a point from the cutter, and how much of it a part of B may take."""
+def distance_and_motion(
+    x: float, y: float, z: float, R: float, f: Any, rho: float, r: float, stages: Any
+) -> tuple[float, float]:
+    """Distance [mm] from the cutter of a ball of radius R, and a bound [mm] of their relative motion in a part of B.
+
+    ``f`` (11,) frame of the cutter at the middle of the part, as :func:`frame_at`.
+    """
     x, y, z = x - f[6], y - f[7], z - f[8]
     h = x * f[0] + y * f[1] + z * f[2]
     u, v, w = x - rho * f[3], y - rho * f[4], z - rho * f[5]
-    far2 = u * u + v * v + w * w
-    d = math.sqrt(max(far2 - h * h, 0.0))
-    away = f[9] * (math.sqrt(x * x + y * y + z * z) + R)
-    side = f[10] + f[9] * (math.sqrt(far2) + R)
-    return distance(h, d, rho, r, stages) - R, math.sqrt(away * away + side * side)
+    axis2 = u * u + v * v + w * w
+    d = math.sqrt(max(axis2 - h * h, 0.0))
+    axial = f[9] * (math.sqrt(x * x + y * y + z * z) + R)
+    lateral = f[10] + f[9] * (math.sqrt(axis2) + R)
+    return distance(h, d, rho, r, stages) - R, math.sqrt(axial * axial + lateral * lateral)
 
 
 @njit(cache=True, nogil=True)
-def about(points: Any, nodes: Any, spans: Any, leaves: int, cc: Any, near2: float, stack: Any, out: Any) -> int:
-    """The nodes nearer to the contact point than the root of ``near2``."""
-    near, found, top = math.sqrt(near2), 0, 1
-    stack[0] = 0
-    while top > 0:
-        top -= 1
-        k = stack[top]
-        x, y, z = nodes[k, 0] - cc[0], nodes[k, 1] - cc[1], nodes[k, 2] - cc[2]
-        if nodes[k, 3] < 0.0 or x * x + y * y + z * z > (near + nodes[k, 3]) ** 2:
-            continue
-        if k < leaves:
-            stack[top], stack[top + 1] = 2 * k + 1, 2 * k + 2
-            top += 2
-            continue
-        for i in range(spans[k, 0], spans[k, 1]):
-            x, y, z = points[i, 0] - cc[0], points[i, 1] - cc[1], points[i, 2] - cc[2]
-            if x * x + y * y + z * z < near2:
-                out[found] = i
-                found += 1
-    return found
+def nodes_near_contact(points: Any, nodes: Any, spans: Any, leaves: int, cc: Any, near2: float, out: Any) -> int:
+    """Write the nodes within the distance sqrt(``near2``) of the contact point to ``out``; their number."""
+    near, count, node = math.sqrt(near2), 0, 0
+    while node >= 0:
+        x, y, z, R = nodes[node, 0] - cc[0], nodes[node, 1] - cc[1], nodes[node, 2] - cc[2], nodes[node, 3]
+        enter = R >= 0.0 and x * x + y * y + z * z <= (near + R) ** 2
+        if enter and node >= leaves:
+            for i in range(spans[node, 0], spans[node, 1]):
+                x, y, z = points[i, 0] - cc[0], points[i, 1] - cc[1], points[i, 2] - cc[2]
+                if x * x + y * y + z * z < near2:
+                    out[count] = i
+                    count += 1
+        node = next_node(node, leaves, enter)
+    return count
 
 
 @njit(cache=True, nogil=True)
-def collected(
+def nodes_in_reach(
     points: Any, nodes: Any, spans: Any, leaves: int, f: Any, rho: float, r: float, stages: Any, seen: Any, stamp: int,
-    most: int, stack: Any, out: Any,
+    most: int, out: Any,
 ) -> int:  # fmt: skip
-    """Nodes not ``seen`` that the cutter may meet in the part of B of a frame ``f``; -1: more than ``most``."""
-    found, top = 0, 1
-    stack[0] = 0
-    while top > 0:
-        top -= 1
-        k = stack[top]
-        if nodes[k, 3] < 0.0:
-            continue
-        away, moves = spare(nodes[k, 0], nodes[k, 1], nodes[k, 2], nodes[k, 3], f, rho, r, stages)
-        if away > moves:
-            continue
-        if k < leaves:
-            stack[top], stack[top + 1] = 2 * k + 1, 2 * k + 2
-            top += 2
-            continue
-        for i in range(spans[k, 0], spans[k, 1]):
-            if seen[i] == stamp:
-                continue
-            away, moves = spare(points[i, 0], points[i, 1], points[i, 2], 0.0, f, rho, r, stages)
-            if away <= moves:
-                if found == most:
-                    return -1
-                out[found] = i
-                found += 1
-    return found
+    """Write the nodes that the cutter may meet in the part of B of a frame ``f`` to ``out``; their number.
+
+    Nodes whose ``seen`` equals ``stamp`` are left out. -1: there are more than ``most``.
+    """
+    count, node = 0, 0
+    while node >= 0:
+        enter = False
+        if nodes[node, 3] >= 0.0:
+            separation, motion = distance_and_motion(
+                nodes[node, 0], nodes[node, 1], nodes[node, 2], nodes[node, 3], f, rho, r, stages
+            )
+            enter = separation <= motion
+        if enter and node >= leaves:
+            for i in range(spans[node, 0], spans[node, 1]):
+                if seen[i] == stamp:
+                    continue
+                separation, motion = distance_and_motion(
+                    points[i, 0], points[i, 1], points[i, 2], 0.0, f, rho, r, stages
+                )
+                if separation <= motion:
+                    if count == most:
+                        return -1
+                    out[count] = i
+                    count += 1
+        node = next_node(node, leaves, enter)
+    return count
 
 
 @njit(cache=True, nogil=True)
-def uncovered(cover: Any, number: int, lo: float, hi: float) -> tuple[float, float]:
-    """From the first to the last B of lo..hi that ``cover`` (k, 2), ascending and apart, leaves; (hi, hi): none."""
+def uncovered_span(cover: Any, number: int, lo: float, hi: float) -> tuple[float, float]:
+    """Least and greatest B of lo..hi outside the intervals ``cover`` (k, 2), ascending and disjoint; (hi, hi): none."""
     for k in range(number):
         if cover[k, 0] <= lo < cover[k, 1]:
             lo = cover[k, 1]
@@ -120,79 +127,84 @@ def uncovered(cover: Any, number: int, lo: float, hi: float) -> tuple[float, flo
 
 
 @njit(cache=True, nogil=True)
-def halved(todo: Any, of: Any, waiting: int, lo: float, hi: float, first: int, last: int) -> int:
-    """Puts both halves of a part with its nodes ``first``..``last`` to what is waiting; how many wait, -1: too many."""
+def push_halves(stack: Any, spans: Any, top: int, lo: float, hi: float, first: int, last: int) -> int:
+    """Push both halves of the part lo..hi on the ``stack`` of parts, with its span ``first``..``last`` of nodes.
+
+    The new number of parts on the stack; -1: the stack is full.
+    """
     middle = 0.5 * (lo + hi)
-    todo[waiting, 0], todo[waiting, 1] = middle, hi
-    todo[waiting + 1, 0], todo[waiting + 1, 1] = lo, middle
-    for k in range(waiting, waiting + 2):
-        of[k, 0], of[k, 1] = first, last
-    return waiting + 2 if waiting + 4 <= len(todo) else -1
+    stack[top, 0], stack[top, 1] = middle, hi
+    stack[top + 1, 0], stack[top + 1, 1] = lo, middle
+    for k in range(top, top + 2):
+        spans[k, 0], spans[k, 1] = first, last
+    return top + 2 if top + 4 <= len(stack) else -1
 
 
 @njit(cache=True, nogil=True)
-def kept_of(
+def clear_parts_at_contact(
     points: Any, nodes: Any, spans: Any, leaves: int, cc: Any, cone: Any, rho: float, r: float, stages: Any, parts: Any,
-    count: int, near2: float, width: float, least: float, seen: Any, stamp: int, work: Any, todo: Any, of: Any,
-    arcs: Any, cover: Any, out: Any,
+    count: int, near2: float, width: float, least: float, seen: Any, stamp: int, work: Any, stack: Any,
+    stack_spans: Any, arcs: Any, cover: Any, out: Any,
 ) -> int:  # fmt: skip
-    """What of the ``parts`` is clear of the nodes as rows of ``out``; how many, -1: too many arcs to tell.
+    """Write the parts of the ``count`` ``parts`` that are clear of all nodes to ``out``; their number.
 
-    ``work`` (2 m,), ``todo`` (k, 2) with ``of`` (k, 2) their nodes in ``work``, ``arcs``, ``cover`` are room to work.
+    -1: there are more arcs, or more parts to examine, than the workspace holds. Workspace: ``work`` (2 m,) numbers of
+    nodes, ``stack`` (k, 2) parts to examine and ``stack_spans`` (k, 2) their nodes in ``work``, ``arcs`` (a, 2),
+    ``cover`` (b, 2).
     """
-    stack, f = np.empty(64, dtype=np.int64), np.empty(11)
+    f = np.empty(11)
     covered = 0
-    found = about(points, nodes, spans, leaves, cc, near2, stack, work)
-    for j in range(found):
+    near = nodes_near_contact(points, nodes, spans, leaves, cc, near2, work)
+    for j in range(near):
         seen[work[j]] = stamp
         filled = 0
         for k in range(count):
             filled = point_arcs(
                 points, work[j], cc, cone, rho, r, stages, parts[k, 0], parts[k, 1], least, arcs, filled
             )
-        covered = merged(cover, covered, arcs, 0, filled)
+        covered = add_arcs(cover, covered, arcs, 0, filled)
         if covered < 0:
             return -1
-    waiting = gaps(parts, count, cover, covered, least, todo)
-    of[:waiting] = -1
-    while waiting > 0:
-        waiting -= 1
-        lo, hi = todo[waiting, 0], todo[waiting, 1]
-        first, last = of[waiting, 0], of[waiting, 1]
-        lo, hi = uncovered(cover, covered, lo, hi)
+    top = uncovered_parts(parts, count, cover, covered, least, stack)
+    stack_spans[:top] = -1
+    while top > 0:
+        top -= 1
+        lo, hi = stack[top, 0], stack[top, 1]
+        first, last = stack_spans[top, 0], stack_spans[top, 1]
+        lo, hi = uncovered_span(cover, covered, lo, hi)
         if hi - lo <= least:
             continue
-        framed(cc, cone, r, 0.5 * (lo + hi), 0.5 * (hi - lo), rho, f)
+        frame_at(cc, cone, r, 0.5 * (lo + hi), 0.5 * (hi - lo), rho, f)
         if first < 0:
-            # a wide part that meets few nodes is looked at as a whole
+            # a wide part with few nodes in reach is not halved
             most = MANY if hi - lo > width else len(points)
-            first, last = 0, collected(points, nodes, spans, leaves, f, rho, r, stages, seen, stamp, most, stack, work)
+            first, last = 0, nodes_in_reach(points, nodes, spans, leaves, f, rho, r, stages, seen, stamp, most, work)
             if last < 0:
-                waiting = halved(todo, of, waiting, lo, hi, -1, -1)
-                if waiting < 0:
+                top = push_halves(stack, stack_spans, top, lo, hi, -1, -1)
+                if top < 0:
                     return -1
                 continue
-        deepest, who, end = 0.0, -1, last
+        least_separation, deepest, end = 0.0, -1, last
         for j in range(first, last):
             i = work[j]
             if seen[i] == stamp:
                 continue
-            away, moves = spare(points[i, 0], points[i, 1], points[i, 2], 0.0, f, rho, r, stages)
-            if away > moves:
+            separation, motion = distance_and_motion(points[i, 0], points[i, 1], points[i, 2], 0.0, f, rho, r, stages)
+            if separation > motion:
                 continue
             if end == len(work):
                 return -1
             work[end] = i
             end += 1
-            if away < deepest:
-                deepest, who = away, i
+            if separation < least_separation:
+                least_separation, deepest = separation, i
         if end == last:
             continue
-        tell = end - last <= FEW or hi - lo < NARROW
-        if tell or who >= 0:
+        exact = end - last <= FEW or hi - lo < NARROW
+        if exact or deepest >= 0:
             for j in range(last, end):
                 i = work[j]
-                if (not tell and i != who) or seen[i] == stamp:
+                if (not exact and i != deepest) or seen[i] == stamp:
                     continue
                 seen[i] = stamp
                 filled = 0
@@ -200,36 +212,37 @@ def kept_of(
                     filled = point_arcs(
                         points, i, cc, cone, rho, r, stages, parts[k, 0], parts[k, 1], least, arcs, filled
                     )
-                covered = merged(cover, covered, arcs, 0, filled)
+                covered = add_arcs(cover, covered, arcs, 0, filled)
                 if covered < 0:
                     return -1
-        if tell:
+        if exact:
             continue
-        if who >= 0:
-            todo[waiting, 0], todo[waiting, 1] = lo, hi
-            of[waiting, 0], of[waiting, 1] = first, last
-            waiting += 1
+        if deepest >= 0:
+            stack[top, 0], stack[top, 1] = lo, hi
+            stack_spans[top, 0], stack_spans[top, 1] = first, last
+            top += 1
             continue
-        waiting = halved(todo, of, waiting, lo, hi, last, end)
-        if waiting < 0:
+        top = push_halves(stack, stack_spans, top, lo, hi, last, end)
+        if top < 0:
             return -1
-    return gaps(parts, count, cover, covered, least, out)  # type: ignore[no-any-return]
+    return uncovered_parts(parts, count, cover, covered, least, out)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
-def kept(
+def clear_parts(
     points: Any, nodes: Any, spans: Any, leaves: int, ccs: Any, cones: Any, tool: Any, stages: Any, ranges: Any,
     count: Any, near2: float, width: float, least: float, first: int, last: int, seen: Any, work: Any, out: Any,
     number: Any,
 ) -> None:  # fmt: skip
-    """Each contact point of ``first``..``last`` at its own table angle and its own ``ranges`` (c, k, 2).
+    """Clear parts of the ``ranges`` (c, k, 2) of the contact points ``first``..``last``, each at its own table angle.
 
-    ``seen`` (m,) zeros and ``work`` (k,) are room to work; what of them is not touched costs nothing.
+    Fills ``out`` (c, k, 2) and ``number`` (c,), as :func:`clear_parts_at_contact`. Workspace: ``seen`` (m,) zeros,
+    ``work`` (k,); memory of them that no contact point needs is never touched.
     """
-    todo, of = np.empty((4096, 2)), np.empty((4096, 2), dtype=np.int64)
+    stack, stack_spans = np.empty((4096, 2)), np.empty((4096, 2), dtype=np.int64)
     arcs, cover = np.empty((256, 2)), np.empty((4096, 2))
     for c in range(first, last):
-        number[c] = kept_of(
+        number[c] = clear_parts_at_contact(
             points, nodes, spans, leaves, ccs[c], cones[c], tool[0], tool[1], stages, ranges[c], count[c], near2, width,
-            least, seen, c + 1, work, todo, of, arcs, cover, out[c],
+            least, seen, c + 1, work, stack, stack_spans, arcs, cover, out[c],
         )  # fmt: skip

@@ -1,16 +1,18 @@
-"""Covering of the walls of an impeller: points so close that a cutter clear of them is clear of the walls.
+"""Covering of the walls of an impeller: points so close together that a cutter clear of them is clear of the walls.
 
 Notation: r corner radius; tolerance [mm]; nodes q of the walls as in ``nodes.py``, with reach t and bend e; sunk [mm]
-how deep in the metal a node is put, c its place.
+depth of a node below the surface of the wall.
 
-Lemma: let a wall have its deepest point p in a convex part of the tool that a ball of radius r rolls round inside, at
-the depth d < r. There the wall is along the boundary of the part: a ball of radius r of the part has p at r - d from
-its centre, and the step from p to its nearest node goes along the wall. So the node lies within
-sqrt((r - d)^2 + t^2) + e + sunk of that centre, and in the part if that is below r. If no node is in the part,
-d <= r - sqrt((r - e - sunk)^2 - t^2). On an edge of a wall the same holds along the edge, which has nodes too.
+Lemma: let p be the deepest point of a wall in a convex part of the tool, at the depth d < r, and let a ball of radius r
+roll inside that part along its boundary. At p the wall is parallel to the boundary of the part: one position of the
+ball has p at the distance r - d from its centre, and the vector from p to its nearest node is along the wall. The node
+is therefore within sqrt((r - d)^2 + t^2) + e + sunk of that centre, and inside the part if this is below r. If no node
+is in the part, d <= r - sqrt((r - e - sunk)^2 - t^2). On an edge of a wall the same holds along the edge, which has
+nodes too.
 
-The cutting part rolls a ball of its corner radius. Neck, shank and holder are taken larger by their clearance; rolled
-by a ball of that radius they still contain themselves, if they begin lower by what the bound is above the tolerance.
+Inside the cutting part rolls a ball of its corner radius. Neck, shank and holder are enlarged by their clearance. With
+their edges rounded to that radius they still contain the real parts if they begin lower by the amount by which the
+bound exceeds the tolerance.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from chipload.errors import InputError
 from chipload.planning.impeller.blocks import BLOCK, in_blocks
 from chipload.planning.impeller.clearance.clearance import nearest
 from chipload.planning.impeller.covering import _kernels
-from chipload.planning.impeller.covering.nodes import Nodes, grid_of, hub_nodes, patch_nodes, turned
+from chipload.planning.impeller.covering.nodes import Nodes, grid_of, hub_nodes, patch_nodes, turn_nodes
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.scene import Scene
 from chipload.planning.impeller.tree import Tree, tree_of
@@ -35,23 +37,23 @@ from chipload.progress import silent
 
 Floats = NDArray[np.float64]
 
-#: of the tolerance, how deep the nodes lie in the metal: what the cutter touches does not count as met
+#: depth of the nodes below the surface as a share of the tolerance, so that a wall that is touched has no node inside
 SUNK = 0.2
 #: nodes in a leaf of the tree
 _LEAF = 96
-#: first width of the cells over the one of a plane wall; of the width that is right to first order, what is taken
+#: first width of the cells as a share of that for a plane wall; share of the width that is correct to first order
 _FIRST, _LESS = 0.98, 0.995
-#: at once they are made narrower by no more than this share: the widest reach may be of another wall then
+#: least factor by which the cells are made narrower at once: another wall may then have the greatest reach
 _STEP = 0.94
-#: nodes nearer to the contact than this are tried one by one [mm]
+#: the exact arcs of nodes within this distance of the contact are computed first [mm]
 _NEAR = 1.0
-#: of a part of B for which nodes are collected at once [rad]
+#: width of a part of B whose nodes in reach are listed at once [rad]
 _WIDTH = math.radians(1.0)
-#: so many nodes are made at most
+#: greatest number of nodes
 _MOST_NODES = 5e6
-#: lists of nodes that are kept at a time
+#: length of the workspace for lists of nodes, in numbers of all nodes
 _LISTS = 8
-#: ranges of one contact point
+#: greatest number of ranges of one contact point
 _MOST = 32
 
 
@@ -62,10 +64,12 @@ class Covering:
     Parameters
     ----------
     points : (m, 3) float [mm], sunk into the metal
-    tolerance : how deep a wall may lie in a cutter that is clear of the nodes, a tapered one by its cylinders [mm]
+    tolerance : greatest depth of a wall in a cutter that is clear of the nodes [mm]; a tapered one stands for its
+        enclosing cylinders
     corner : least corner radius for which that holds [mm]
     reach, bend, sunk : of the nodes [mm]
-    slack : by how much a tapered cutter may stand out of its cylinders [mm]; its corner is above ``corner`` by that
+    slack : distance by which a tapered cutter may protrude from its cylinders [mm]; its corner radius is at least
+        ``corner`` plus this
     """
 
     points: Floats
@@ -83,14 +87,15 @@ class Covering:
         object.__setattr__(self, "ordered", np.ascontiguousarray(self.points[self.tree.order]))
 
     def depth(self, radius: float) -> float:
-        """Greatest depth of a wall in a part of the tool inside which a ball of this radius rolls [mm]; inf: none."""
+        """Greatest depth [mm] of a wall in a part of the tool inside which a ball of ``radius`` rolls; inf: unknown."""
         return depth_of(radius, self.reach, self.bend, self.sunk)
 
     def proves(self, cutter: CatalogueCutter, clearance: float) -> bool:
         """Whether a cutter that is clear of the nodes is clear of the walls within the tolerance.
 
-        A tapered cutter that stands out of its cylinders by c, less c all round, lies in them, and a ball of its corner
-        radius less c rolls in it: no wall is deeper in that than the tolerance less ``slack``.
+        A tapered cutter that protrudes from its cylinders by c lies inside them once it is reduced by c all round. A
+        ball of its corner radius less c rolls inside the reduced cutter: no wall is deeper in that than the tolerance
+        less ``slack``.
         """
         out = cutter.not_enclosed
         if cutter.corner_radius - out < self.corner or out > self.slack or cutter.barrel_radius is not None:
@@ -99,57 +104,62 @@ class Covering:
         return bool((np.diff(radii) <= 0.0).all()) or math.isfinite(self.depth(clearance))
 
     def stages(self, cutter: CatalogueCutter, clearance: float) -> Floats:
-        """As :meth:`CatalogueCutter.stages`, each part above the cutting part begins lower by what its rim needs."""
+        """As :meth:`CatalogueCutter.stages`, with every part above the cutting part extended down to cover its edge."""
         out = cutter.enclosing(clearance)
         drop = self.depth(clearance) - self.tolerance
         if len(out) > 1 and 0.0 < drop < math.inf:
             upper = cutter.stages(clearance)[1:]
             upper[:, 0] = np.maximum(upper[:, 0] - drop, 0.0)
             cone = out[: len(out) - len(upper)]
-            # what the lowest part above the cone reaches down to is as wide as the wider of both
+            # where the lowest part above the cone now overlaps the cone, the wider of both counts
             upper[0, 1] = max(upper[0, 1], cone[-1, 1]) if len(cone) > 1 else upper[0, 1]
             out = np.vstack([cone[:1], cone[1:][cone[1:, 0] < upper[0, 0]], upper])
         return out
 
-    def met(self, cutter: CatalogueCutter, tips: Floats, axes: Floats, clearance: float) -> Floats:
-        """Depth of the deepest node in a cutter at each pose (n,) [mm]; 0: no node is in it."""
-        away, _ = nearest(self.ordered, self.tree, cutter, self.stages(cutter, clearance), tips, axes, 0.0)
-        return -away
+    def node_depth(self, cutter: CatalogueCutter, tips: Floats, axes: Floats, clearance: float) -> Floats:
+        """Depth (n,) [mm] of the deepest node in a cutter at each pose; 0: no node is in it."""
+        distance, _ = nearest(self.ordered, self.tree, cutter, self.stages(cutter, clearance), tips, axes, 0.0)
+        return -distance
 
-    def kept(
+    def clear_ranges(
         self, scene: Scene, cutter: CatalogueCutter, tables: Floats, clearance: float, points: NDArray[np.int64],
         ranges: tuple[Floats, ...], least: float, workers: int = 1,
     ) -> tuple[tuple[Floats, ...], NDArray[np.bool_]]:  # fmt: skip
-        """Parts of the ranges of B that hold for the nodes too; False where there were too many arcs to decide.
+        """Parts of the ranges of B that are clear of the nodes too, and whether each contact point was decided.
+
+        A contact point is not decided where there are more arcs than the workspace holds.
 
         Parameters
         ----------
-        tables : alpha (c,) [rad] of the contact ``points`` (c,)
+        tables : table angle alpha (c,) [rad] of each contact point
+        clearance : [mm] by which neck, shank and holder are enlarged
+        points : (c,) int, the contact points of the scene
         ranges : for each of them (k, 2) [rad], clear of the check points
+        least : [rad] narrower parts are left out
         """
         rows = np.ascontiguousarray(scene.rows[points])
         cones = np.column_stack([np.sin(tables), np.cos(tables)])
-        given, count = np.zeros((len(rows), _MOST, 2)), np.zeros(len(rows), dtype=np.int64)
+        parts, count = np.zeros((len(rows), _MOST, 2)), np.zeros(len(rows), dtype=np.int64)
         for k, row in enumerate(ranges):
-            given[k, : len(row)], count[k] = row, len(row)
-        found, number = np.zeros((len(rows), _MOST, 2)), np.zeros(len(rows), dtype=np.int64)
+            parts[k, : len(row)], count[k] = row, len(row)
+        clear, number = np.zeros((len(rows), _MOST, 2)), np.zeros(len(rows), dtype=np.int64)
         tool = np.array([cutter.rho, cutter.corner_radius])
         stages, tree, size = self.stages(cutter, clearance), self.tree, len(self.points)
 
         def block(first: int) -> None:
-            _kernels.kept(
-                self.ordered, tree.nodes, tree.spans, tree.leaves, rows, cones, tool, stages, given, count, _NEAR**2,
+            _kernels.clear_parts(
+                self.ordered, tree.nodes, tree.spans, tree.leaves, rows, cones, tool, stages, parts, count, _NEAR**2,
                 _WIDTH, least, first, min(first + BLOCK, len(rows)), np.zeros(size, dtype=np.int64),
-                np.empty(_LISTS * size + 64, dtype=np.int64), found, number,
+                np.empty(_LISTS * size + 64, dtype=np.int64), clear, number,
             )  # fmt: skip
 
         in_blocks(block, len(rows), workers, silent, "between check points")
-        out = tuple(found[k, : max(int(n), 0)].copy() for k, n in enumerate(number))
+        out = tuple(clear[k, : max(int(n), 0)].copy() for k, n in enumerate(number))
         return out, number >= 0
 
 
 def depth_of(radius: float, reach: float, bend: float, sunk: float) -> float:
-    """The bound of the lemma [mm].
+    """Bound of the lemma: greatest depth [mm] of a wall of such nodes in a part with no node inside.
 
     >>> round(depth_of(2.0, 0.4, 0.0, 0.0), 6)
     0.040408
@@ -162,14 +172,14 @@ def covering_of(
     impeller: Impeller, tolerance: float, corner: float, around: int, hub_range: tuple[float, float],
     slack: float = 0.0,
 ) -> Covering:  # fmt: skip
-    """Covering of the walls of the channels beside the bodies of an impeller.
+    """Covering of the walls of the channels of an impeller.
 
     Parameters
     ----------
     tolerance : [mm] > 0
     corner : least corner radius of the cutters [mm], > 0
     around, hub_range : as :meth:`Impeller.scene`
-    slack : [mm] by which tapered cutters stand out of their cylinders, below tolerance and corner
+    slack : [mm] by which tapered cutters protrude from their cylinders, below tolerance and corner
 
     Raises
     ------
@@ -179,21 +189,21 @@ def covering_of(
     tolerance, corner = tolerance - slack, corner - slack
     sunk, edge = SUNK * tolerance, first_edge(impeller, tolerance, corner, around)
     while True:
-        sides, hub = _each(impeller, around, hub_range, edge)
-        made = [*itertools.chain.from_iterable(sides), hub]
-        reach, bend = max(x.reach for x in made), max(x.bend for x in made)
+        sides, hub = _nodes_of_pitch(impeller, around, hub_range, edge)
+        parts = [*itertools.chain.from_iterable(sides), hub]
+        reach, bend = max(x.reach for x in parts), max(x.bend for x in parts)
         if depth_of(corner, reach, bend, sunk) <= tolerance:
             break
-        edge *= max(_lessened(corner, reach, bend, sunk, tolerance), _STEP)
-    parts = [*_round(impeller, around, sides), hub]
+        edge *= max(_narrowing(corner, reach, bend, sunk, tolerance), _STEP)
+    parts = [*_nodes_of_all(impeller, around, sides), hub]
     points = np.concatenate([x.points - sunk * x.normals for x in parts])
     return Covering(points, tolerance + slack, corner, reach, bend, sunk, slack)
 
 
-def _lessened(corner: float, reach: float, bend: float, sunk: float, tolerance: float) -> float:
-    """By what the cells are made narrower: the reach goes with their width, the bend with its square.
+def _narrowing(corner: float, reach: float, bend: float, sunk: float, tolerance: float) -> float:
+    """Factor by which the cells are made narrower: reach is proportional to their width, bend to its square.
 
-    >>> round(_lessened(2.0, 0.5, 0.0, 0.0, 0.04), 3)
+    >>> round(_narrowing(2.0, 0.5, 0.0, 0.0, 0.04), 3)
     0.792
     """
     low, high = 0.1, 1.0
@@ -226,7 +236,7 @@ def first_edge(impeller: Impeller, tolerance: float, corner: float, around: int)
 
 
 def _area(impeller: Impeller, around: int) -> float:
-    """About the area [mm2] of the walls."""
+    """Approximate area [mm2] of the walls."""
     t = np.linspace(0.0, 1.0, 17)
     u, v = (0.5 * (x[1:] + x[:-1]) for x in (t, t))
     sides = [side for blade in impeller.bodies for side in (blade.plus, blade.minus)]
@@ -239,10 +249,10 @@ def _area(impeller: Impeller, around: int) -> float:
     return each * (2 + 2 * around + bodies) / bodies + ring
 
 
-def _each(
+def _nodes_of_pitch(
     impeller: Impeller, around: int, hub_range: tuple[float, float], edge: float
 ) -> tuple[list[list[Nodes]], Nodes]:
-    """Nodes of the sides of each body once, and of the hub under all of them."""
+    """Nodes of the sides of each body of one pitch, and of the hub under all bodies."""
     bodies = len(impeller.bodies)
     first, last = -1 - around, bodies + around
     out = []
@@ -256,8 +266,8 @@ def _each(
     return out, hub_nodes(impeller.hub, hub_range, (low, min(high, low + math.tau)), edge)
 
 
-def _round(impeller: Impeller, around: int, sides: list[list[Nodes]]) -> list[Nodes]:
-    """The nodes of every body round the channels."""
+def _nodes_of_all(impeller: Impeller, around: int, sides: list[list[Nodes]]) -> list[Nodes]:
+    """Nodes of every body round the channels, turned copies of ``sides``."""
     bodies = len(impeller.bodies)
     numbers = range(-1 - around, bodies + around + 1)
-    return [turned(x, impeller.pitch * (k // bodies)) for k in numbers for x in sides[k % bodies]]
+    return [turn_nodes(x, impeller.pitch * (k // bodies)) for k in numbers for x in sides[k % bodies]]

@@ -1,10 +1,10 @@
-"""Nodes that cover a surface: every point of it is within a stated bound of one of them.
+"""Nodes that cover a surface: every point of the surface is within a stated bound of a node.
 
 Notation: X(u, v) [mm] a surface, q = X(u_i, v_j) a node, p = X(u_i + a, v_j + b) a point of it nearer to q than to its
 neighbours, |a| <= A, |b| <= B. With bounds M of the second derivatives between them p - q = t + e, t = X_u(p) a +
 X_v(p) b in the tangent plane at p, |e| <= E = (M_uu A^2 + 2 M_uv A B + M_vv B^2) / 2 and |t| <= |X_u(q) a + X_v(q) b| +
-2 E. The bounds of a B-spline are those of the control points of its derivatives (convex hull), span by span of its
-knots, so that no sample decides.
+2 E. The bounds of a B-spline are those of the control points of its derivatives (convex hull), for each span of its
+knots; they do not depend on samples.
 
 Reference: [Piegl1997] ch. 3.
 """
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Points of a surface, their unit normals out of the metal (0 where there is none), and what they cover.
+    """Points of a surface, their unit normals out of the metal (0 where there is none), and the bounds of the covering.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Nodes:
 
 
 def patch_nodes(patch: BSplinePatch, edge: float) -> Nodes:
-    """Nodes of a patch, its cells not wider than ``edge`` [mm].
+    """Nodes of a patch at the corners of cells at most ``edge`` [mm] wide.
 
     >>> from chipload.geometry.bspline import through
     >>> flat = through([[[0, 0, 0], [0, 3, 0]], [[4, 0, 0], [4, 3, 0]]], [0, 1], [0, 1])
@@ -48,9 +48,9 @@ def patch_nodes(patch: BSplinePatch, edge: float) -> Nodes:
     >>> len(made.points), round(made.reach, 9), made.bend
     (20, 0.707106781, 0.0)
     """
-    size = {d: _largest(patch, *d) for d in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))}
-    u, span_u = _divided(patch.knots_u, size[1, 0].max(axis=1), edge)
-    v, span_v = _divided(patch.knots_v, size[0, 1].max(axis=0), edge)
+    size = {d: _derivative_bound(patch, *d) for d in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))}
+    u, span_u = _parameters_of(patch.knots_u, size[1, 0].max(axis=1), edge)
+    v, span_v = _parameters_of(patch.knots_v, size[0, 1].max(axis=0), edge)
     shape = (len(u), len(v))
     X, Xu, Xv = (grid_of(patch, u, v, *d) for d in ((0, 0), (1, 0), (0, 1)))
     A, B = 0.5 * np.diff(u)[:, None], 0.5 * np.diff(v)[None, :]
@@ -69,16 +69,19 @@ def patch_nodes(patch: BSplinePatch, edge: float) -> Nodes:
 
 
 def hub_nodes(hub: Revolved, along: tuple[float, float], theta: tuple[float, float], edge: float) -> Nodes:
-    """Nodes of a part of a surface of revolution: s and theta [rad] from where to where, as :func:`patch_nodes`."""
+    """Nodes of a part of a surface of revolution, as :func:`patch_nodes`.
+
+    ``along`` first and last parameter s of its curve, ``theta`` first and last angle [rad].
+    """
     knots = np.unique(np.concatenate([along, hub.knots]))
     knots = knots[(knots >= along[0]) & (knots <= along[1])]
-    # of a cubic r'' is linear and r' a parabola between knots: bounded by their ends and by r''
+    # between knots r'' of a cubic is linear and r' a parabola: both are bounded by their end values and r''
     first, second = (np.linalg.norm(hub.curve(knots, d), axis=1) for d in (1, 2))
     wide = np.diff(knots)
     M2 = np.maximum(second[1:], second[:-1])
     M1 = np.maximum(first[1:], first[:-1]) + 0.5 * M2 * wide
     count = np.maximum(np.ceil(M1 * wide / edge), 1.0).astype(np.int64)
-    s, span = _parted(knots, count)
+    s, span = _steps_of(knots, count)
     r = hub.curve(s)[:, 0]
     turns = np.maximum(np.ceil(r * (theta[1] - theta[0]) / edge), 1.0).astype(np.int64)
     rows = np.repeat(np.arange(len(s)), turns + 1)
@@ -94,7 +97,7 @@ def hub_nodes(hub: Revolved, along: tuple[float, float], theta: tuple[float, flo
     return Nodes(hub.at(at, angle), hub.normal(at, angle), float(reach.max()), float(bend.max()))
 
 
-def turned(nodes: Nodes, angle: float) -> Nodes:
+def turn_nodes(nodes: Nodes, angle: float) -> Nodes:
     """The nodes turned about z by an angle [rad]."""
     c, s = math.cos(angle), math.sin(angle)
     R = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -111,22 +114,22 @@ def grid_of(patch: BSplinePatch, u: Floats, v: Floats, du: int = 0, dv: int = 0)
     return out
 
 
-def _divided(knots: Floats, slope: Floats, edge: float) -> tuple[Floats, NDArray[np.int64]]:
-    """Parameters from knot to knot, as many that no step is longer than ``edge`` [mm]; the span of each step."""
+def _parameters_of(knots: Floats, slope: Floats, edge: float) -> tuple[Floats, NDArray[np.int64]]:
+    """Parameters that divide each knot span into equal steps at most ``edge`` [mm] long, and the span of each step."""
     ends = np.unique(knots)
     count = np.maximum(np.ceil(slope * np.diff(ends) / edge), 1.0).astype(np.int64)
-    return _parted(ends, count)
+    return _steps_of(ends, count)
 
 
-def _parted(ends: Floats, count: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
-    """The numbers that divide each span into ``count`` steps; the span of each step."""
+def _steps_of(ends: Floats, count: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
+    """Parameters that divide each span into ``count`` equal steps, and the span of each step."""
     rows = zip(ends[:-1].tolist(), ends[1:].tolist(), count.tolist(), strict=True)
     parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in rows]
     return np.concatenate([*parts, ends[-1:]]), np.repeat(np.arange(len(count)), count)
 
 
-def _largest(patch: BSplinePatch, du: int, dv: int) -> Floats:
-    """(spans of u, spans of v) no derivative of this order is longer in a span [mm]."""
+def _derivative_bound(patch: BSplinePatch, du: int, dv: int) -> Floats:
+    """Bound (spans of u, spans of v) of the length [mm] of the derivative of this order in each span."""
     net, axes = patch.control, []
     for axis, (knots, degree, order) in enumerate(
         zip((patch.knots_u, patch.knots_v), patch.degrees, (du, dv), strict=True)
@@ -135,7 +138,7 @@ def _largest(patch: BSplinePatch, du: int, dv: int) -> Floats:
         middles = 0.5 * (middles[1:] + middles[:-1])
         k = knots
         for _ in range(order):
-            net, k, degree = _derived(net, k, degree, axis)
+            net, k, degree = _derivative(net, k, degree, axis)
         last = np.searchsorted(k, middles, side="right") - 1
         axes.append(np.clip(last[:, None] - np.arange(degree + 1), 0, net.shape[axis] - 1))
     size = np.linalg.norm(net, axis=2)
@@ -143,13 +146,13 @@ def _largest(patch: BSplinePatch, du: int, dv: int) -> Floats:
     return out
 
 
-def _derived(net: Floats, knots: Floats, degree: int, axis: int) -> tuple[Floats, Floats, int]:
+def _derivative(net: Floats, knots: Floats, degree: int, axis: int) -> tuple[Floats, Floats, int]:
     """Control points, knots and degree of the derivative along an axis."""
     if degree == 0:
         return np.zeros_like(net), knots, 0
     width = knots[degree + 1 : -1] - knots[1 : -degree - 1]
     shape = [1, 1, 1]
     shape[axis] = len(width)
-    # a basis function over knots that coincide is nowhere
+    # a basis function over coincident knots is zero
     share = np.divide(degree, width, out=np.zeros(len(width)), where=width > 0.0).reshape(shape)
     return np.diff(net, axis=axis) * share, knots[1:-1], degree - 1

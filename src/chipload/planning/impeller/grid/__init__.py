@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from chipload.lazy import attach
 
 if TYPE_CHECKING:
-    from chipload.planning.impeller.grid.grid import admitted
+    from chipload.planning.impeller.grid.grid import largest_on_grid
 
-__all__ = ["admitted"]
+__all__ = ["largest_on_grid"]
 
 __getattr__, __dir__ = attach(
     __name__,
     {
-        "grid": "admitted",
+        "grid": "largest_on_grid",
     },
 )

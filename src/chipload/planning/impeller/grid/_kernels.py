@@ -14,14 +14,15 @@ from chipload.planning.impeller._kernels import largest_at
 
 
 @njit(cache=True, nogil=True)
-def on_grid(
+def largest_at_pallets(
     points: Any, own: Any, nodes: Any, spans: Any, leaves: int, ccs: Any, cones: Any, tool: Any, pallets: Any,
     most: Any, hints: Any, first: int, last: int, out: Any,
 ) -> None:  # fmt: skip
-    """Fills ``out`` (c, t, B) with rho*, at most ``most`` (c, t); -inf where the axis points into the surface.
+    """Fill ``out`` (c, t, B) with the largest rho [mm], at most ``most`` (c, t); -inf where the axis points into the
+    surface.
 
-    ``hints`` (c, t, h) points that are tried first, -1: none; the last is written over by what limited the angle
-    before.
+    ``hints`` (c, t, h) points that are tried first, -1: none; the last is overwritten by the limiting point of the
+    pallet angle before.
     """
     last_hint = hints.shape[2] - 1
     for c in range(first, last):

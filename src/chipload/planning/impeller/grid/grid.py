@@ -15,15 +15,17 @@ from chipload.planning.impeller.search import SearchLimits
 from chipload.progress import silent
 
 
-def admitted(
+def largest_on_grid(
     scene: Scene, found: SearchLimits, pallets: ArrayLike, cut: float = np.inf, workers: int = 1, slack: float = 1e-9
 ) -> Floats:
-    """Largest rho (c, t, B) [mm] of the cutting part at pallet angles [rad], within the limits that were found.
+    """Largest rho of the cutting part at every contact point, table angle and pallet angle of a grid.
 
     Parameters
     ----------
-    found : of the corner radius, with its table angles; values above bounds and ``slack`` [mm] are alike
-    cut : height of the cutting part above the corner's centres [mm], as the limits were found with
+    found : largest rho and its bound for every contact point and table angle, of one corner radius
+    pallets : pallet angles B [rad]
+    cut : height of the cutting part above the corner's centre [mm], the same as in the search for ``found``
+    slack : [mm] a value is cut off at this much above the bound
 
     Returns
     -------
@@ -43,7 +45,7 @@ def admitted(
     hints[:, :, :-1] = np.where(found.blockers >= 0, place[np.maximum(found.blockers, 0)], -1)
 
     def block(first: int) -> None:
-        _kernels.on_grid(
+        _kernels.largest_at_pallets(
             points, own, tree.nodes, tree.spans, tree.leaves, rows, cones, tool, B, most, hints, first,
             min(first + BLOCK, len(rows)), out,
         )  # fmt: skip

@@ -1,10 +1,9 @@
-"""Compiled: the pallet angles at which one cutter is clear of every check point, exactly.
+"""Compiled: the exact ranges of the pallet angle in which a cutter is clear of every check point.
 
-Notation: as in the kernels of ``impeller``; ``stages`` (k, 2) height above the corner's centres where a cylinder
-begins and its radius, the first row the cutting part (its radius rho + r is put in). d distance of a check point from
-the cutter's axis. When B moves by dB, h moves by at most sin(alpha) |y| dB and d by at most
-sin(alpha) (rho max(1, n/s) + |y - rho V|) dB: only the check points that come that near can matter, and the arcs of
-those are computed exactly.
+Notation: as in the kernels of ``impeller``; ``stages`` as in ``clearance/_kernels.py``, the radius of row 0 is not used
+(it is rho + r). d distance of a check point from the cutter's axis. When B changes by dB, h changes by at most
+sin(alpha) |y| dB and d by at most sin(alpha) (rho max(1, n/s) + |y - rho V|) dB. Only the check points that come within
+the cutter by these bounds can forbid a part of B; their arcs are computed exactly.
 """
 
 from __future__ import annotations
@@ -15,15 +14,16 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from chipload.planning.impeller._kernels import domain, gaps, point_arcs
-from chipload.planning.impeller.arcs._kernels import radius_at, slack
+from chipload.planning.impeller._kernels import facing_parts, point_arcs, uncovered_parts
+from chipload.planning.impeller._tree import next_node
+from chipload.planning.impeller.arcs._kernels import limit_function, radius_at
 
 #: half of the narrowest part of B for which a near point is proved clear before its arcs are calculated [rad]
 FINE = math.radians(0.5)
 
 
 @njit(cache=True, nogil=True)
-def widest(low: float, high: float, rho: float, r: float, stages: Any) -> float:
+def largest_radius(low: float, high: float, rho: float, r: float, stages: Any) -> float:
     """Largest radius [mm] of the cutter between two heights."""
     P = rho + r if len(stages) == 1 or low < stages[1, 0] else 0.0
     for j in range(1, len(stages)):
@@ -33,11 +33,14 @@ def widest(low: float, high: float, rho: float, r: float, stages: Any) -> float:
 
 
 @njit(cache=True, nogil=True)
-def collect(
+def points_in_reach(
     points: Any, own: Any, nodes: Any, spans: Any, leaves: int, cc: Any, cone: Any, r: float, near2: float, rho: float,
     stages: Any, B: float, half: float, seen: Any, stamp: int, out: Any,
 ) -> int:  # fmt: skip
-    """Points not ``seen`` with this ``stamp`` that the cutter may meet within ``half`` of B; -1: too many."""
+    """Write the check points that the cutter may meet within ``half`` of B to ``out``; their number.
+
+    Points whose ``seen`` equals ``stamp`` are left out. -1: ``out`` is full.
+    """
     Tx, Ty, Tz = cone[0] * math.cos(B), cone[0] * math.sin(B), cone[1]
     n = cc[3] * Tx + cc[4] * Ty + cc[5] * Tz
     s = math.sqrt(max(1.0 - n * n, 1e-300))
@@ -47,56 +50,49 @@ def collect(
     least = s - turn
     slide = rho * turn * max(1.0, min(abs(n) + turn, 1.0) / least)
     sid = int(cc[15])
-    found, top = 0, 1
-    stack = np.empty(64, dtype=np.int64)
-    stack[0] = 0
-    while top > 0:
-        top -= 1
-        k = stack[top]
-        x, y, z, R = nodes[k, 0] - Cx, nodes[k, 1] - Cy, nodes[k, 2] - Cz, nodes[k, 3]
-        if R < 0.0:
-            continue
-        h = x * Tx + y * Ty + z * Tz
-        away = turn * (math.sqrt(x * x + y * y + z * z) + R)
-        u, v, w = x - rho * Vx, y - rho * Vy, z - rho * Vz
-        far = math.sqrt(u * u + v * v + w * w)
-        P = widest(h - R - away, h + R + away, rho, r, stages) + R + slide + turn * (far + R)
-        if h + R + away < -r or far * far - h * h > P * P:
-            continue
-        if k < leaves:
-            stack[top], stack[top + 1] = 2 * k + 1, 2 * k + 2
-            top += 2
-            continue
-        for i in range(spans[k, 0], spans[k, 1]):
-            if seen[i] == stamp:
-                continue
-            x, y, z = points[i, 0] - Cx, points[i, 1] - Cy, points[i, 2] - Cz
+    count, node = 0, 0
+    while node >= 0:
+        enter, R = False, nodes[node, 3]
+        if R >= 0.0:
+            x, y, z = nodes[node, 0] - Cx, nodes[node, 1] - Cy, nodes[node, 2] - Cz
             h = x * Tx + y * Ty + z * Tz
-            away = turn * math.sqrt(x * x + y * y + z * z)
-            if h + away < -r:
-                continue
+            rise = turn * (math.sqrt(x * x + y * y + z * z) + R)
             u, v, w = x - rho * Vx, y - rho * Vy, z - rho * Vz
-            far = math.sqrt(u * u + v * v + w * w)
-            P = widest(h - away, h + away, rho, r, stages) + slide + turn * far
-            if far * far - h * h > P * P:
-                continue
-            seen[i] = stamp
-            if own[i] == sid:
-                u, v, w = points[i, 0] - cc[0], points[i, 1] - cc[1], points[i, 2] - cc[2]
-                if u * u + v * v + w * w < near2:
+            length = math.sqrt(u * u + v * v + w * w)
+            P = largest_radius(h - R - rise, h + R + rise, rho, r, stages) + R + slide + turn * (length + R)
+            enter = h + R + rise >= -r and length * length - h * h <= P * P
+        if enter and node >= leaves:
+            for i in range(spans[node, 0], spans[node, 1]):
+                if seen[i] == stamp:
                     continue
-            if found == len(out):
-                return -1
-            out[found] = i
-            found += 1
-    return found
+                x, y, z = points[i, 0] - Cx, points[i, 1] - Cy, points[i, 2] - Cz
+                h = x * Tx + y * Ty + z * Tz
+                rise = turn * math.sqrt(x * x + y * y + z * z)
+                if h + rise < -r:
+                    continue
+                u, v, w = x - rho * Vx, y - rho * Vy, z - rho * Vz
+                length = math.sqrt(u * u + v * v + w * w)
+                P = largest_radius(h - rise, h + rise, rho, r, stages) + slide + turn * length
+                if length * length - h * h > P * P:
+                    continue
+                seen[i] = stamp
+                if own[i] == sid:
+                    u, v, w = points[i, 0] - cc[0], points[i, 1] - cc[1], points[i, 2] - cc[2]
+                    if u * u + v * v + w * w < near2:
+                        continue
+                if count == len(out):
+                    return -1
+                out[count] = i
+                count += 1
+        node = next_node(node, leaves, enter)
+    return count
 
 
 @njit(cache=True, nogil=True)
 def clear_within(
     points: Any, i: int, cc: Any, cone: Any, r: float, rho: float, stages: Any, lo: float, hi: float, least: float
 ) -> bool:  # fmt: skip
-    """Whether the bounds of ``collect`` prove that the cutter does not meet a point in lo..hi, halved down to
+    """Whether the bounds of ``points_in_reach`` prove that the cutter does not meet a point in lo..hi, halved down to
     ``least``.
     """
     x, y, z = points[i, 0] - cc[0] - r * cc[3], points[i, 1] - cc[1] - r * cc[4], points[i, 2] - cc[2] - r * cc[5]
@@ -123,7 +119,7 @@ def clear_within(
                 if high < 0.0:
                     P = rho + math.sqrt(r * r - high * high)
                 else:
-                    P = widest(h - turn * away, high, rho, r, stages)
+                    P = largest_radius(h - turn * away, high, rho, r, stages)
                 clear = far2 - h * h > (P + slide) * (P + slide)
         if clear:
             k += 1
@@ -141,11 +137,11 @@ def clear_within(
 
 
 @njit(cache=True, nogil=True)
-def deepest(
+def deepest_point(
     points: Any, own: Any, nodes: Any, spans: Any, leaves: int, cc: Any, cone: Any, r: float, near2: float, rho: float,
     stages: Any, B: float,
 ) -> int:  # fmt: skip
-    """The check point that is deepest in the cutter at B, by what :func:`slack` says; -1: none."""
+    """Number of the check point in the cutter at B whose :func:`limit_function` is least; -1: none is in it."""
     Tx, Ty, Tz = cone[0] * math.cos(B), cone[0] * math.sin(B), cone[1]
     n = cc[3] * Tx + cc[4] * Ty + cc[5] * Tz
     s2 = 1.0 - n * n
@@ -155,47 +151,43 @@ def deepest(
     Vx, Vy, Vz = (cc[3] - n * Tx) / s, (cc[4] - n * Ty) / s, (cc[5] - n * Tz) / s
     Cx, Cy, Cz = cc[0] + r * cc[3], cc[1] + r * cc[4], cc[2] + r * cc[5]
     sid = int(cc[15])
-    deepest, who, top = 0.0, -1, 1
-    stack = np.empty(64, dtype=np.int64)
-    stack[0] = 0
-    while top > 0:
-        top -= 1
-        k = stack[top]
-        x, y, z, R = nodes[k, 0] - Cx, nodes[k, 1] - Cy, nodes[k, 2] - Cz, nodes[k, 3]
-        if R < 0.0:
-            continue
-        h = x * Tx + y * Ty + z * Tz
-        u, v, w = x - rho * Vx, y - rho * Vy, z - rho * Vz
-        P = widest(h - R, h + R, rho, r, stages) + R
-        if h + R < -r or u * u + v * v + w * w - h * h > P * P:
-            continue
-        if k < leaves:
-            stack[top], stack[top + 1] = 2 * k + 1, 2 * k + 2
-            top += 2
-            continue
-        for i in range(spans[k, 0], spans[k, 1]):
-            x, y, z = points[i, 0] - Cx, points[i, 1] - Cy, points[i, 2] - Cz
+    least, number, node = 0.0, -1, 0
+    while node >= 0:
+        enter, R = False, nodes[node, 3]
+        if R >= 0.0:
+            x, y, z = nodes[node, 0] - Cx, nodes[node, 1] - Cy, nodes[node, 2] - Cz
             h = x * Tx + y * Ty + z * Tz
-            if h <= -r:
-                continue
-            P = radius_at(h, rho, r, stages) if h >= 0.0 else 0.0
-            if h >= 0.0 and P <= 0.0:
-                continue
-            yN = x * cc[3] + y * cc[4] + z * cc[5]
-            deep = slack(h < 0.0, h, n, s2, yN, x * x + y * y + z * z, rho, r, P)
-            if deep >= deepest:
-                continue
-            if own[i] == sid:
-                u, v, w = points[i, 0] - cc[0], points[i, 1] - cc[1], points[i, 2] - cc[2]
-                if u * u + v * v + w * w < near2:
+            u, v, w = x - rho * Vx, y - rho * Vy, z - rho * Vz
+            P = largest_radius(h - R, h + R, rho, r, stages) + R
+            enter = h + R >= -r and u * u + v * v + w * w - h * h <= P * P
+        if enter and node >= leaves:
+            for i in range(spans[node, 0], spans[node, 1]):
+                x, y, z = points[i, 0] - Cx, points[i, 1] - Cy, points[i, 2] - Cz
+                h = x * Tx + y * Ty + z * Tz
+                if h <= -r:
                     continue
-            deepest, who = deep, i
-    return who
+                P = radius_at(h, rho, r, stages) if h >= 0.0 else 0.0
+                if h >= 0.0 and P <= 0.0:
+                    continue
+                yN = x * cc[3] + y * cc[4] + z * cc[5]
+                value = limit_function(h < 0.0, h, n, s2, yN, x * x + y * y + z * z, rho, r, P)
+                if value >= least:
+                    continue
+                if own[i] == sid:
+                    u, v, w = points[i, 0] - cc[0], points[i, 1] - cc[1], points[i, 2] - cc[2]
+                    if u * u + v * v + w * w < near2:
+                        continue
+                least, number = value, i
+        node = next_node(node, leaves, enter)
+    return number
 
 
 @njit(cache=True, nogil=True)
-def merged(cover: Any, number: int, arcs: Any, first: int, last: int) -> int:
-    """Puts the ``arcs`` first..last into ``cover``, ascending and apart; how many there are, -1: too many."""
+def add_arcs(cover: Any, number: int, arcs: Any, first: int, last: int) -> int:
+    """Add the ``arcs`` first..last to the union ``cover`` (k, 2) of arcs, ascending and disjoint.
+
+    The new number of arcs in ``cover``; -1: it is full.
+    """
     for k in range(first, last):
         lo, hi = arcs[k, 0], arcs[k, 1]
         i = 0
@@ -220,11 +212,11 @@ def merged(cover: Any, number: int, arcs: Any, first: int, last: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def uncovered(
+def widest_uncovered(
     cover: Any, number: int, lo: float, hi: float, least: float
 ) -> tuple[float, float, float, float]:  # fmt: skip
-    """The widest part of lo..hi that is not covered, (lo, lo) where none is wider than ``least``; the begin of the
-    first such part and the end of the last.
+    """Widest part of lo..hi outside ``cover``, (lo, lo): none is wider than ``least``; the begin of the first such part
+    and the end of the last.
     """
     a, b, reached = lo, lo, lo
     begin, end = hi, lo
@@ -242,14 +234,16 @@ def uncovered(
 
 
 @njit(cache=True, nogil=True)
-def valid(
+def ranges_at_contact(
     points: Any, own: Any, nodes: Any, spans: Any, leaves: int, cc: Any, cone: Any, r: float, near2: float, rho: float,
     stages: Any, parts: Any, count: int, width: float, flat: float, least: float, hints: Any, seen: Any, stamp: int,
     arcs: Any, owner: Any, out: Any,
 ) -> tuple[int, int]:  # fmt: skip
-    """Valid parts as rows of ``out`` and how many; how many ``arcs`` were filled (-1: too many), with their ``owner``.
+    """Write the valid ranges within ``parts`` of one contact point to ``out``: their number, and that of the ``arcs``.
 
-    Parts narrower than ``flat`` where n comes near 1 count as forbidden (owner -3).
+    ``owner`` (a,) number of the check point that forbids each arc; -2: the curvature at the contact; -3: the part is
+    narrower than ``flat`` and n is close to 1, it counts as forbidden. The number of arcs is -1 where they are more
+    than the workspace holds. ``hints`` (h,) points whose arcs are computed first, -1: none.
     """
     filled = 0
     for j in range(len(hints)):
@@ -264,30 +258,28 @@ def valid(
             )
         owner[before:filled] = hints[j]
     near = np.empty(len(points), dtype=np.int64)
-    todo, cover = np.empty((512, 2)), np.empty((4096, 2))
-    waiting = gaps(parts, count, arcs, filled, least, todo)
-    covered = merged(cover, 0, arcs, 0, filled)
-    while waiting > 0:
-        waiting -= 1
-        lo, hi = todo[waiting, 0], todo[waiting, 1]
-        a, b, begin, end = uncovered(cover, covered, lo, hi, least)
+    stack, cover = np.empty((512, 2)), np.empty((4096, 2))
+    top = uncovered_parts(parts, count, arcs, filled, least, stack)
+    covered = add_arcs(cover, 0, arcs, 0, filled)
+    while top > 0:
+        top -= 1
+        lo, hi = stack[top, 0], stack[top, 1]
+        a, b, begin, end = widest_uncovered(cover, covered, lo, hi, least)
         if b <= a:
             continue
-        # one point that forbids the middle of the widest gap may spare all others
-        who = deepest(points, own, nodes, spans, leaves, cc, cone, r, near2, rho, stages, 0.5 * (a + b))
-        if who >= 0 and seen[who] != stamp:
-            seen[who] = stamp
+        # the deepest point at the middle of the widest uncovered part often forbids all of it: no other is needed then
+        i = deepest_point(points, own, nodes, spans, leaves, cc, cone, r, near2, rho, stages, 0.5 * (a + b))
+        if i >= 0 and seen[i] != stamp:
+            seen[i] = stamp
             before = filled
             for k in range(count):
-                filled = point_arcs(
-                    points, who, cc, cone, rho, r, stages, parts[k, 0], parts[k, 1], least, arcs, filled
-                )
-            owner[before:filled] = who
-            covered = merged(cover, covered, arcs, before, filled)
+                filled = point_arcs(points, i, cc, cone, rho, r, stages, parts[k, 0], parts[k, 1], least, arcs, filled)
+            owner[before:filled] = i
+            covered = add_arcs(cover, covered, arcs, before, filled)
             if filled + 32 > len(arcs) or covered < 0:
                 return 0, -1
-            todo[waiting, 0], todo[waiting, 1] = lo, hi
-            waiting += 1
+            stack[top, 0], stack[top, 1] = lo, hi
+            top += 1
             continue
         B, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
         n = cone[0] * (cc[3] * math.cos(B) + cc[4] * math.sin(B)) + cone[1] * cc[5]
@@ -298,7 +290,7 @@ def valid(
                 return 0, -1
             arcs[filled, 0], arcs[filled, 1], owner[filled] = lo, hi, -3
             filled += 1
-            covered = merged(cover, covered, arcs, filled - 1, filled)
+            covered = add_arcs(cover, covered, arcs, filled - 1, filled)
             if covered < 0:
                 return 0, -1
             continue
@@ -307,14 +299,16 @@ def valid(
             lo, hi = begin, end
             B, half = 0.5 * (lo + hi), 0.5 * (hi - lo)
         if steep or hi - lo > width:
-            if waiting + 2 > len(todo):
+            if top + 2 > len(stack):
                 return 0, -1
-            todo[waiting, 0], todo[waiting, 1] = B, hi
-            todo[waiting + 1, 0], todo[waiting + 1, 1] = lo, B
-            waiting += 2
+            stack[top, 0], stack[top, 1] = B, hi
+            stack[top + 1, 0], stack[top + 1, 1] = lo, B
+            top += 2
             continue
-        found = collect(points, own, nodes, spans, leaves, cc, cone, r, near2, rho, stages, B, half, seen, stamp, near)
-        for j in range(found):
+        reached = points_in_reach(
+            points, own, nodes, spans, leaves, cc, cone, r, near2, rho, stages, B, half, seen, stamp, near
+        )
+        for j in range(reached):
             if clear_within(points, near[j], cc, cone, r, rho, stages, lo, hi, FINE):
                 # it may be met elsewhere
                 seen[near[j]] = 0
@@ -325,43 +319,47 @@ def valid(
                     points, near[j], cc, cone, rho, r, stages, parts[k, 0], parts[k, 1], least, arcs, filled
                 )
             owner[before:filled] = near[j]
-            covered = merged(cover, covered, arcs, before, filled)
+            covered = add_arcs(cover, covered, arcs, before, filled)
             if filled + 32 > len(arcs) or covered < 0:
                 return 0, -1
-    return gaps(parts, count, arcs, filled, least, out), filled
+    return uncovered_parts(parts, count, arcs, filled, least, out), filled
 
 
 @njit(cache=True, nogil=True)
-def chain(parts: Any, count: int, arcs: Any, owner: Any, number: int, least: float, out: Any) -> int:
-    """Fewest owners whose arcs together forbid the ``parts`` (that all arcs forbid); how many."""
+def fewest_blockers(parts: Any, count: int, arcs: Any, owner: Any, number: int, least: float, out: Any) -> int:
+    """Write the fewest owners whose arcs together forbid the ``parts`` to ``out``; their number.
+
+    All arcs together must forbid the parts.
+    """
     order = np.argsort(arcs[:number, 0])
-    found = 0
+    total = 0
     for k in range(count):
         reached, j = parts[k, 0], 0
         while reached < parts[k, 1] - least:
-            best, who = reached, -1
+            farthest, arc = reached, -1
             while j < number and arcs[order[j], 0] <= reached + least:
-                if arcs[order[j], 1] > best:
-                    best, who = arcs[order[j], 1], order[j]
+                if arcs[order[j], 1] > farthest:
+                    farthest, arc = arcs[order[j], 1], order[j]
                 j += 1
-            if who < 0 or found == len(out):
-                return found
-            out[found] = owner[who]
-            found += 1
-            reached = best
-    return found
+            if arc < 0 or total == len(out):
+                return total
+            out[total] = owner[arc]
+            total += 1
+            reached = farthest
+    return total
 
 
 @njit(cache=True, nogil=True)
-def fitted(
+def ranges_of_contacts(
     points: Any, own: Any, nodes: Any, spans: Any, leaves: int, ccs: Any, cones: Any, near2: float, tool: Any,
     stages: Any, limits: Any, width: float, flat: float, least: float, hints: Any, first: int, last: int, number: Any,
     ranges: Any, proof: Any,
 ) -> None:  # fmt: skip
-    """Each contact point of ``first``..``last`` at its own table angle ``cones`` (c, 2) with one cutter.
+    """Valid ranges of one cutter at the contact points ``first``..``last``, each at its table angle ``cones`` (c, 2).
 
-    ``tool`` (2,) rho, r. ``number`` (c,) how many ``ranges`` (c, k, 2); -1: too many arcs to tell. ``proof`` (c, k)
-    the points that forbid all, where there are none.
+    ``tool`` (2,) rho, r; ``limits`` (k, 2) pallet angles that the machine reaches. Fills ``ranges`` (c, k, 2), their
+    ``number`` (c,), -1 where there are more arcs than the workspace holds, and ``proof`` (c, k), where there is no
+    range: the points that forbid every B.
     """
     seen = np.zeros(len(points), dtype=np.int64)
     arcs, owner = np.empty((65536, 2)), np.empty(65536, dtype=np.int64)
@@ -369,12 +367,12 @@ def fitted(
     for c in range(first, last):
         count = 0
         for k in range(len(limits)):
-            count += domain(ccs[c], cones[c], limits[k, 0], limits[k, 1], parts[count:])
-        number[c], filled = valid(
+            count += facing_parts(ccs[c], cones[c], limits[k, 0], limits[k, 1], parts[count:])
+        number[c], filled = ranges_at_contact(
             points, own, nodes, spans, leaves, ccs[c], cones[c], tool[1], near2, tool[0], stages, parts, count, width,
             flat, least, hints[c], seen, c + 1, arcs, owner, ranges[c],
         )  # fmt: skip
         if filled < 0:
             number[c] = -1
         elif number[c] == 0:
-            chain(parts, count, arcs, owner, filled, least, proof[c])
+            fewest_blockers(parts, count, arcs, owner, filled, least, proof[c])

@@ -1,7 +1,8 @@
-"""Exact ranges of the pallet angle in which one cutter is clear, with neck, shank and holder.
+"""Exact ranges of the pallet angle in which a cutter, with neck, shank and holder, is clear of every check point.
 
-Notation: as in ``search.py``. A range is a row (from, to) [rad] of pallet angles; at its ends the cutter touches.
-Parts narrower than ``FLAT`` where the cutter's axis stands along the normal are left out: there V has no direction.
+Notation: as in ``search.py``. A range is a row (from, to) [rad] of pallet angles; at its ends the cutter touches a
+check point. Parts narrower than ``FLAT`` in which the cutter's axis is along the normal are left out: V is undefined
+there.
 """
 
 from __future__ import annotations
@@ -20,12 +21,13 @@ from chipload.progress import Progress, silent
 
 #: all pallet angles [rad]
 FULL = ((0.0, 2.0 * math.pi),)
-#: a part of B narrower than this [rad] next to n = 1 counts as forbidden
+#: a part of B narrower than this [rad] with n close to 1 counts as forbidden
 FLAT = 1e-4
 
-#: widest part of B for which near check points are collected at once [rad]
+#: widest part of B whose check points in reach are listed at once [rad]
 _WIDTH = math.radians(8.0)
-_MOST = 32  # ranges of one contact point, points of one proof
+#: greatest number of ranges of one contact point, and of points of one proof
+_MOST = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +36,10 @@ class Ranges:
 
     Parameters
     ----------
-    ranges : for each contact point (k, 2) float [rad]; k = 0: nowhere
+    ranges : for each contact point (k, 2) float [rad]; k = 0: there is no range
     blockers : for each contact point the check points that forbid every B, where there is no range, else none
-    complete : (c,) bool; False: there were too many arcs to tell, no range is claimed
-    between : (c,) bool, the check points leave a range, the walls between them leave none
+    complete : (c,) bool; False: there were more arcs than the workspace holds, no range is stated
+    between : (c,) bool, the check points leave a range, but the walls between them leave none
     """
 
     ranges: tuple[Floats, ...]
@@ -61,10 +63,10 @@ def valid_ranges(
 
     Parameters
     ----------
-    tables : alpha [rad], one for all or one for each of the ``points``
-    clearance : between all above the cutting part and the check points [mm]
-    pallets : (k, 2) [rad], where B may be
-    points : (c,) int, which contact points; None: all
+    tables : table angle alpha [rad], one for all or one for each of the ``points``
+    clearance : least distance of the parts above the cutting part from the check points [mm]
+    pallets : (k, 2) [rad], pallet angles that the machine reaches
+    points : (c,) int, the contact points; None: all
     least : narrower ranges [rad] are left out
     """
     which = np.arange(len(scene.contact)) if points is None else np.asarray(points, dtype=np.int64)
@@ -81,7 +83,7 @@ def valid_ranges(
     check, own = scene.ordered, scene.own
 
     def block(first: int) -> None:
-        _kernels.fitted(
+        _kernels.ranges_of_contacts(
             check, own, tree.nodes, tree.spans, tree.leaves, rows, cones, scene.near**2, tool, stages, spans, _WIDTH,
             FLAT, least, hints, first, min(first + BLOCK, len(rows)), number, found, proof,
         )  # fmt: skip
@@ -95,19 +97,20 @@ def valid_ranges(
     ranges = tuple(found[k, : max(int(n), 0)].copy() for k, n in enumerate(number))
     if cutter.taper > 0.0:
         ranges = tuple(
-            on_corner(row, scene.normal[i], float(a), cutter.taper, least)
+            corner_ranges(row, scene.normal[i], float(a), cutter.taper, least)
             for row, i, a in zip(ranges, which, alpha, strict=True)
         )
         number = np.array([len(row) if n > 0 else n for row, n in zip(ranges, number, strict=True)], dtype=np.int64)
-    given = np.where(proof >= 0, tree.order[np.maximum(proof, 0)] if len(check) else proof, proof)
+    forbidding = np.where(proof >= 0, tree.order[np.maximum(proof, 0)] if len(check) else proof, proof)
     blockers = tuple(
-        np.unique(row[(row != -1) & (row != -3)]) if n == 0 else row[:0] for row, n in zip(given, number, strict=True)
+        np.unique(row[(row != -1) & (row != -3)]) if n == 0 else row[:0]
+        for row, n in zip(forbidding, number, strict=True)
     )
     complete, between = number >= 0, np.zeros(len(which), dtype=np.bool_)
     open_rows = np.flatnonzero(number > 0)
     if scene.covering is None or not len(open_rows):
         return Ranges(ranges, blockers, complete, between)
-    kept, told = scene.covering.kept(
+    clear, decided = scene.covering.clear_ranges(
         scene,
         cutter,
         alpha[open_rows],
@@ -117,27 +120,27 @@ def valid_ranges(
         least,
         workers,
     )
-    left = dict(zip(open_rows.tolist(), kept, strict=True))
-    complete[open_rows] = told
-    between[open_rows] = told & np.array([len(row) == 0 for row in kept])
-    return Ranges(tuple(left.get(k, row) for k, row in enumerate(ranges)), blockers, complete, between)
+    of_row = dict(zip(open_rows.tolist(), clear, strict=True))
+    complete[open_rows] = decided
+    between[open_rows] = decided & np.array([len(row) == 0 for row in clear])
+    return Ranges(tuple(of_row.get(k, row) for k, row in enumerate(ranges)), blockers, complete, between)
 
 
-def on_corner(ranges: Floats, normal: Floats, alpha: float, taper: float, least: float) -> Floats:
-    """Parts of ranges (k, 2) at which a tapered cutter touches with its corner: N.T is at least the sine of its taper.
+def corner_ranges(ranges: Floats, normal: Floats, alpha: float, taper: float, least: float) -> Floats:
+    """Parts of ranges (k, 2) [rad] in which a tapered cutter touches with its corner: N.T is at least sin(taper).
 
     >>> full = np.array([[0.0, 2.0 * math.pi]])
-    >>> np.degrees(on_corner(full, np.array([1.0, 0.0, 0.0]), math.radians(90.0), math.radians(30.0), 0.0)).round(9)
+    >>> np.degrees(corner_ranges(full, np.array([1.0, 0.0, 0.0]), math.radians(90.0), math.radians(30.0), 0.0)).round(9)
     array([[  0.,  60.],
            [300., 360.]])
     """
     size = math.sin(alpha) * math.hypot(normal[0], normal[1])
-    need = math.sin(taper) - math.cos(alpha) * float(normal[2])
-    if need <= -size:
+    required = math.sin(taper) - math.cos(alpha) * float(normal[2])
+    if required <= -size:
         return ranges
-    if need > size:
+    if required > size:
         return ranges[:0]
-    half, middle = math.acos(need / size), math.atan2(float(normal[1]), float(normal[0]))
+    half, middle = math.acos(required / size), math.atan2(float(normal[1]), float(normal[0]))
     out = []
     for low, high in ranges.tolist():
         first = math.ceil((low - middle - half) / math.tau)
