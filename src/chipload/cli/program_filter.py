@@ -92,6 +92,7 @@ def _read(file: Path, name: str, tools: Path | None) -> Severity:
 
 def _run(file: Path) -> Severity:
     """Run the job of the same name, write its result and its verdict."""
+    from chipload.files import is_file
     from chipload.jobs import load_job, run_job
     from chipload.report.folder import check_target, write_finished
     from chipload.result import Verdict
@@ -99,7 +100,7 @@ def _run(file: Path) -> Severity:
     path, out = file.with_suffix(".toml"), file.with_name(f"{file.stem}-checked")
     loaded = load_job(path)
     named = getattr(loaded.job, "program_file", None)
-    if named is None or not Path(named).samefile(file):
+    if named is None or not is_file(Path(named)) or not Path(named).samefile(file):
         raise InputError(
             f"{path.name}: is not a job of {file.name}: name the program in [program] file, or rename the job"
         )

@@ -401,7 +401,10 @@ def target_in(root: Any, out: str) -> Any:
     if not out.strip() or part.is_absolute() or ".." in part.parts or "\\" in out or "\0" in out:
         raise InputError(f"{out}: must be the name of a folder in the opened one")
     target = root / part
-    above = next(p for p in (target, *target.parents) if p.exists())
+    try:
+        above = next(p for p in (target, *target.parents) if p.exists())
+    except OSError as err:
+        raise InputError(f"{out[:40]}: cannot be written: {err.strerror}: name another folder") from None
     if not above.resolve().is_relative_to(root) or target == root:
         raise InputError(f"{out}: must be the name of a folder in the opened one")
     return target

@@ -40,6 +40,8 @@ def _program(project: dict[str, Any], file: Path) -> Path:
     """The NC text of the project; of a script (`.tpl`) the text next to it that CAMotics wrote from it."""
     listed = project.get("files", project.get("nc-files", []))
     names = [str(name) for name in (listed if isinstance(listed, list) else [])]
+    # a folder, as "/", has no name that could have another ending
+    names = [name for name in names if (file.parent / name).name]
     for name in names:
         path = file.parent / name
         if path.suffix.lower() in ENDINGS and is_file(path):

@@ -171,12 +171,12 @@ def _same(old: Program, new: Program, wanted: Floats) -> None:
     wrong, at = len(old) != len(new), 0
     if not wrong:
         off = differing(old, new, "motion", "p_work", "axis", "centre", "normal", "turns", "tool", "line")
+        off |= (old.motion == DWELL) & (old.feed != new.feed)
         moves = (old.motion != RAPID) & (old.motion != DWELL)
-        own = moves & (old.spindle != 0.0) & ~np.isnan(wanted)
-        factor = np.ones(len(old))
-        speed = np.sign(old.spindle[own]) * wanted[own]
-        off[own] |= np.abs(new.spindle[own] - speed) > 1e-9 * np.abs(speed)
-        factor[own] = np.abs(speed / old.spindle[own])
+        speed = np.where(np.isnan(wanted), old.spindle, np.sign(old.spindle) * wanted)
+        off |= moves & (np.abs(new.spindle - speed) > 1e-9 * np.abs(speed))
+        turned = np.abs(old.spindle)
+        factor = np.divide(np.abs(speed), turned, out=np.ones(len(old)), where=turned > 0.0)
         rounded = 1.01 * 10.0 ** (1 - DIGITS)
         feed = old.feed * factor
         off |= moves & ((new.feed > feed * (1.0 + 1e-9)) | (new.feed < feed * (1.0 - rounded)))

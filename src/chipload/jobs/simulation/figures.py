@@ -21,8 +21,7 @@ from chipload.jobs.simulation.rows import motion_rows
 from chipload.jobs.simulation.stability_figures import stability_sections
 from chipload.jobs.simulation.workpiece_figures import workpiece_section
 from chipload.program.apt.writer import write_apt
-from chipload.program.motions import spans
-from chipload.program.program import DWELL, RAPID, Program
+from chipload.program.program import RAPID, Program
 from chipload.report.diagram import diagram_figure
 from chipload.report.gltf import GltfScene
 from chipload.report.presentation import Blank, Content, Presentation
@@ -35,7 +34,6 @@ from chipload.result.thinning import thinned
 from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.stock.solid import prisms
 from chipload.stock.tile_grid import polygons
-from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
 
@@ -258,12 +256,6 @@ def _drawn(program: Program) -> tuple[Floats, NDArray[np.bool_]]:
     """Return the points of the path with arcs as chords, and whether a rapid leads to each."""
     chords = chords_of(program)
     return np.asarray(chords.p_work), np.asarray(chords.motion == RAPID)
-
-
-def _drawn_feeds(program: Program) -> Floats:
-    chords = chords_of(program)
-    moving = (chords.motion != RAPID) & (chords.motion != DWELL) & (spans(chords) > 0.0)
-    return np.where(moving, mm_min_from_mm_s(1.0) * chords.feed, 0.0)
 
 
 def _runs(chosen: NDArray[np.bool_]) -> list[tuple[int, int]]:

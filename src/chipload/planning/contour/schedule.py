@@ -86,11 +86,12 @@ def within_machine(s: Floats, wanted: Floats, acceleration: float, jerk: float |
         return v
     even = np.linspace(0.0, float(s[-1]), PLACES)
     ds = even[1]
-    least = np.interp(even, s, v)
+    # squares of the speed are averaged: their slope is twice the acceleration, and a mean is nowhere steeper
+    least = np.interp(even, s, v) ** 2
     half = fastest * acceleration / jerk
     while True:
         width = 2 * max(1, round(half / ds)) + 1
-        smooth = uniform_filter1d(minimum_filter1d(least, width, mode="nearest"), width, mode="nearest")
+        smooth = np.sqrt(uniform_filter1d(minimum_filter1d(least, width, mode="nearest"), width, mode="nearest"))
         if width >= PLACES or _jerk(smooth, ds) <= jerk:
             return np.asarray(np.minimum(np.interp(s, even, smooth), wanted))
         half *= GROWTH

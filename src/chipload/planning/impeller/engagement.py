@@ -63,12 +63,6 @@ class EarlierPoses:
         axes = axes / np.linalg.norm(axes, axis=1)[:, None]
         return EarlierPoses(tips, axes, np.tile([rho, corner], (len(at), 1)))
 
-    def with_more(self, other: EarlierPoses) -> EarlierPoses:
-        """The poses of both."""
-        return EarlierPoses(
-            np.vstack([self.tip, other.tip]), np.vstack([self.axis, other.axis]), np.vstack([self.shape, other.shape])
-        )
-
 
 @dataclass(frozen=True, eq=False)
 class PassPlaces:
