@@ -7,14 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from chipload.errors import InputError
+from chipload.errors import InputError, Severity
+from chipload.jobs.contour.result import findings_of
 from chipload.planning.pocket.clearing_path import ENTRY, LIFT
-from chipload.planning.pocket.motions import Heights, Motions, entry_depth
-from chipload.program.program import LINE
+from chipload.planning.pocket.motions import Heights, Motions, entries
+from chipload.program.program import LINE, RAPID
 from pocket_job import checked, done, operation, swept, written
 
 #: a slot of 11 mm for a cutter of 8 mm: a bore in it would be 1.5 mm beside its middle
 SLOT = [(0, 0), (40, 0), (40, 11), (0, 11)]
+WIDE = [(0, 0), (40, 0), (40, 26), (0, 26)]
 RAMP = 'radial_depth_mm = 1.2\ndepth_mm = 5.0\nentry = "ramp"\n'
 
 
@@ -53,7 +55,7 @@ def test_a_ramp_in_a_slot(tmp_path):
         np.array([[0.0, 0.0, *way[0, :2], 0.0, 0.0, 0.0], [*way[0, :2], *way[1, :2], 0.0, 0.0, 0.0]]),
         np.full(2, -2.5), np.array([LIFT, ENTRY]), np.ones(2), Heights(-2.5, -2.4, 0.0, 5.0),
     )  # fmt: skip
-    assert max(depths_by_hand(line, way[:, 2])) == pytest.approx(entry_depth(motions, 2.5), rel=0.01)
+    assert max(depths_by_hand(line, way[:, 2])) == pytest.approx(entries(motions, 2.5)[0], rel=0.01)
     h = strategy.history
     assert (h["pass"] == "entry").any()
     wanted = strategy.summary["engagement_deg"]["wanted"]
@@ -67,3 +69,39 @@ def test_circles_need_a_bore(tmp_path):
     more = RAMP + 'strategies = ["pocket", "trochoidal"]\nuse = "pocket"\n'
     with pytest.raises(InputError, match="entry = 'ramp': trochoidal passes begin at a bore: state helix"):
         checked(written(tmp_path, {"0": [SLOT]}, operation(more)))
+
+
+@pytest.mark.parametrize("entry", ["ramp", "helix"])
+def test_an_entry_is_no_steeper_than_its_cutter_allows(tmp_path, entry):
+    job = written(tmp_path, {"0": [WIDE]}, operation(RAMP.replace('"ramp"', f'"{entry}"')))
+    text = job.read_text()
+    job.write_text(text.replace("diameter_mm = 8.0\n", "diameter_mm = 8.0\nramp_angle_deg = 1.0\n"))
+    (strategy,), outcome = done(job)
+    p, names = strategy.program, np.array(strategy.program.labels, dtype=object)[strategy.program.label]
+    rows = np.flatnonzero((names == "entry") & (p.motion != RAPID))
+    ends = np.hypot(*(p.p_work[rows, :2] - p.p_work[rows - 1, :2]).T)
+    radius = np.hypot(*(p.p_work[rows, :2] - p.centre[rows, :2]).T)
+    chord = np.clip(0.5 * ends / np.where(radius > 0.0, radius, 1.0), 0.0, 1.0)
+    arc = np.where(ends < 1e-9, math.tau, 2.0 * np.arcsin(chord))
+    along = np.where(p.motion[rows] == LINE, ends, radius * arc)
+    down = p.p_work[rows - 1, 2] - p.p_work[rows, 2]
+    flat = along > 1e-6
+    steepest = float(np.degrees(np.arctan(down[flat] / along[flat])).max())
+    assert 0.8 < steepest <= 1.0 + 1e-6
+    assert strategy.history["ramp_deg"].max() == pytest.approx(steepest, abs=1e-6)
+    assert not (strategy.history["ramp_deg"] > 0.0)[strategy.history["pass"] == "pocket"].any()
+    assert [f.code for f in findings_of(outcome.operations[0], "pocket") if f.code == "plunge"] == []
+
+
+def test_an_entry_of_a_cutter_without_teeth_at_its_centre_is_unproven(tmp_path):
+    job = written(tmp_path, {"0": [SLOT]}, operation(RAMP))
+    text = job.read_text()
+    job.write_text(text.replace("diameter_mm = 8.0\n", "diameter_mm = 8.0\ncentre_cutting = false\n"))
+    _, outcome = done(job)
+    (found,) = (f for f in findings_of(outcome.operations[0], "pocket") if f.code == "plunge")
+    assert found.severity is Severity.UNPROVEN
+    assert "tool 1 ramps into solid material at 2." in found.text
+    assert "state ramp_angle_deg (RMPX)" in found.text
+    job.write_text(job.read_text() + "[checks]\nplunge = false\n")
+    _, outcome = done(job)
+    assert [f.code for f in findings_of(outcome.operations[0], "pocket") if f.code == "plunge"] == []

@@ -21,7 +21,7 @@ from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, Verdict, check_limit
 from chipload.result.limits import Columns
 from chipload.simulation.chip_space import flute_fill
-from chipload.simulation.loads import Cuts, Floats
+from chipload.simulation.loads import Cuts, Floats, Ints
 from chipload.simulation.ramp import ramp_angle
 from chipload.simulation.removal import BANDED
 from chipload.units import mm_min_from_mm_s
@@ -169,7 +169,7 @@ def range_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ..
 
     Parameters
     ----------
-    columns : of a track, a row a step; ``chip_max_mm``, ``power_w`` and ``torque_mean_nm`` among them
+    columns : of a track, one row for each step; ``chip_max_mm``, ``power_w`` and ``torque_mean_nm`` among them
     """
     if "chip_range" in checks.off:
         return ()
@@ -183,9 +183,7 @@ def _speed_findings(checks: DefaultChecks, columns: Columns) -> list[Finding]:
         return []
     low, high = (mm_min_from_mm_s(v) / 1000.0 for v in material.speed)
     radius = {n: c.diameter / 2.0 for n, c in checks.cutters.items()}
-    # a strategy of a contour has one cutter, and no column of tools
-    tools = columns["tool"] if "tool" in columns else np.full(len(columns["power_w"]), min(radius))
-    radii = np.array([radius.get(int(n), 0.0) for n in np.asarray(tools).tolist()])
+    radii = np.array([radius.get(int(n), 0.0) for n in _tools(checks, columns).tolist()])
     speed = mm_min_from_mm_s(1.0) / 1000.0 * spindle_speed(columns) * radii
     out = []
     for side, k in (("below", _least_above_zero(speed)), ("above", int(np.argmax(speed)) if len(speed) else -1)):
@@ -197,6 +195,13 @@ def _speed_findings(checks: DefaultChecks, columns: Columns) -> list[Finding]:
         )
         out.append(_at_step(f"speed-{side}-coefficients", columns, k, text))
     return out
+
+
+def _tools(checks: DefaultChecks, columns: Columns) -> Ints:
+    """The cutter of each step; a strategy of a contour has one, and no column of them."""
+    if "tool" in columns:
+        return np.asarray(columns["tool"])
+    return np.full(len(next(iter(columns.values()))), min(checks.cutters))
 
 
 def _least_above_zero(values: Floats) -> int:
@@ -240,11 +245,11 @@ def ramp_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
 
     Parameters
     ----------
-    columns : of a track, a row a step; ``ramp_deg`` among them, else nothing is found
+    columns : of a track, one row for each step; ``ramp_deg`` among them, else nothing is found
     """
     if "plunge" in checks.off or "ramp_deg" not in columns:
         return ()
-    ramp, tool, out = np.asarray(columns["ramp_deg"]), np.asarray(columns["tool"]), []
+    ramp, tool, out = np.asarray(columns["ramp_deg"]), _tools(checks, columns), []
     for number, cutter in sorted(checks.cutters.items()):
         own = np.where(tool == number, ramp, 0.0)
         k = int(np.argmax(own)) if len(own) else 0
@@ -326,7 +331,7 @@ def default_limits(
 def _ramp(checks: DefaultChecks, columns: Columns, track: str) -> list[LimitCheck]:
     """The steepest ramp over the ramp angle of its cutter, where one is stated."""
     stated = {n: math.degrees(c.ramp_angle) for n, c in checks.cutters.items() if c.ramp_angle is not None}
-    tool, ramp = np.asarray(columns["tool"]), np.asarray(columns["ramp_deg"])
+    tool, ramp = _tools(checks, columns), np.asarray(columns["ramp_deg"])
     if not len(tool) or not np.isin(tool, list(stated)).any():
         return []
     allowed = np.array([stated.get(n, math.inf) for n in tool.tolist()])

@@ -168,3 +168,11 @@ class ChecksTable(Table):
     def off(self) -> tuple[str, ...]:
         """Names of the checks that are switched off."""
         return tuple(name for name, value in self.model_dump().items() if value is False)
+
+
+class ProgramChecksTable(ChecksTable):
+    """Default checks. `false` switches a check off; the report lists the checks that are off."""
+
+    plunge: bool = Field(
+        True, strict=True, description="check that the cutters can plunge and ramp into material as the program does"
+    )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import default_limits, range_findings, unchecked_checks, with_peaks
+from chipload.jobs.checks import default_limits, ramp_findings, range_findings, unchecked_checks, with_peaks
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.machine.machine import Machine
 from chipload.planning.result import Event, StrategyResult
@@ -106,7 +106,7 @@ def findings_of(op: Operation, name: str) -> tuple[Finding, ...]:
     elif check.verdict is not Verdict.HOLDS:
         out.append(Finding("simulation", 0, f"simulation: {check.text}", SEVERITIES[check.verdict]))
     if op.checks is not None:
-        out += range_findings(op.checks, strategy.history)
+        out += (*ramp_findings(op.checks, strategy.history), *range_findings(op.checks, strategy.history))
     return tuple(out)
 
 

@@ -9,13 +9,13 @@ from pydantic import Field
 
 from chipload.cutter.table import CutterTable
 from chipload.jobs.tables import (
-    ChecksTable,
     Count,
     Limits,
     LineNumber,
     NotNegative,
     Number,
     Positive,
+    ProgramChecksTable,
     SourceTable,
     Table,
     Text,
@@ -201,7 +201,7 @@ class ContourJobTable(Table):
     cutter: tuple[CutterTable, ...] = Field(min_length=1)
     operation: tuple[OperationTable, ...] = Field(min_length=1)
     limits: ContourLimitsTable = Field(default_factory=ContourLimitsTable.model_construct)
-    checks: ChecksTable = Field(default_factory=ChecksTable.model_construct)
+    checks: ProgramChecksTable = Field(default_factory=ProgramChecksTable.model_construct)
 
 
 #: keys that every planned operation needs

@@ -13,26 +13,18 @@ from pydantic import BeforeValidator, Field
 from chipload.cutter.table import CutterTable
 from chipload.jobs.simulation.dynamics_tables import DynamicsTable, SpeedsTable
 from chipload.jobs.tables import (
-    ChecksTable,
     Count,
     Limits,
     NotNegative,
     Number,
     Point,
     Positive,
+    ProgramChecksTable,
     SourceTable,
     Table,
     Text,
     Unit,
 )
-
-
-class ProgramChecksTable(ChecksTable):
-    """Default checks. `false` switches a check off; the report lists the checks that are off."""
-
-    plunge: bool = Field(
-        True, strict=True, description="check that the cutters can plunge and ramp into material as the program does"
-    )
 
 
 class ProgramTable(Table):

@@ -38,7 +38,7 @@ RAMP = 4
 ZONES = {ENTRY: "entry", CUT: "pocket", LINK: "link", LIFT: "link", RAMP: "ramp"}
 #: length of a ramp over its height, and the share of a link that each of its ramps takes at most
 SLOPE, SHARE = 10.0, 0.25
-#: slope of the helical entry [rad]
+#: greatest slope of a helical or ramped entry, where the cutter states none that is less [rad]
 HELIX = math.radians(3.0)
 
 
@@ -63,6 +63,7 @@ class Motions:
     kind : (n,) int
     feed : (n,) float [mm/s], as programmed
     heights : the levels
+    slope : greatest slope of entries [rad]
     """
 
     segments: Floats
@@ -70,6 +71,7 @@ class Motions:
     kind: Ints
     feed: Floats
     heights: Heights
+    slope: float = HELIX
 
     @cached_property
     def lengths(self) -> Floats:
@@ -83,7 +85,7 @@ class Motions:
         return list(zip(first.tolist(), [*(first[1:] - 1).tolist(), len(self.kind) - 1], strict=True))
 
 
-def motions_of(path: ClearingPath, heights: Heights, feed: float, link_feed: float) -> Motions:
+def motions_of(path: ClearingPath, heights: Heights, feed: float, link_feed: float, slope: float = HELIX) -> Motions:
     """The motions of a path: links longer than their ramps run ``heights.link`` high, at ``link_feed`` [mm/s]."""
     rise = heights.link - heights.floor
     seg, z, kind = [], [], []
@@ -103,7 +105,7 @@ def motions_of(path: ClearingPath, heights: Heights, feed: float, link_feed: flo
             kind.append(k)
     kinds = np.array(kind, dtype=np.int64)
     speed = np.where((kinds == CUT) | (kinds == ENTRY), feed, link_feed)
-    return Motions(np.array(seg), np.array(z), kinds, speed, heights)
+    return Motions(np.array(seg), np.array(z), kinds, speed, heights, slope)
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,40 +252,51 @@ def clock(motions: Motions, samples: MotionSamples, time: Floats, programs: list
     return out
 
 
-def bore_turns(radius: float, depth: float) -> int:
-    """Turns of a helical bore ``depth`` [mm] deep, the axis on a circle of ``radius`` [mm]."""
-    return max(1, math.ceil(depth / (math.tau * radius * math.tan(HELIX))))
+def bore_turns(radius: float, depth: float, slope: float) -> int:
+    """Turns of a helical bore ``depth`` [mm] deep, the axis on a circle of ``radius`` [mm], at most ``slope`` [rad]."""
+    return max(1, math.ceil(depth / (math.tau * radius * math.tan(slope)) - 1e-9))
 
 
-def ramp_strokes(length: float, depth: float) -> int:
-    """Legs of a ramp to and fro ``depth`` [mm] deep along a line of ``length`` [mm]: an even number of them."""
-    return 2 * max(1, math.ceil(depth / (2.0 * length * math.tan(HELIX)) - 1e-9))
+def ramp_strokes(length: float, depth: float, slope: float) -> int:
+    """Legs of a ramp to and fro ``depth`` [mm] deep along a line of ``length`` [mm], at most ``slope`` [rad]: an even
+    number of them.
+    """
+    return 2 * max(1, math.ceil(depth / (2.0 * length * math.tan(slope)) - 1e-9))
 
 
-def entry_depth(motions: Motions, depth: float) -> float:
-    """Greatest axial depth [mm] of any entry: what a turn of a bore goes down, or two legs of a ramp where it turns."""
+def entries(motions: Motions, depth: float) -> tuple[float, float]:
+    """Greatest axial depth [mm] of any entry and greatest slope [rad]; the depth is what a turn of a bore goes down, or
+    two legs of a ramp where it turns.
+    """
     first = np.array([a + 1 for a, b in motions.runs if b > a and motions.kind[a + 1] == ENTRY])
     seg = motions.segments[first]
     radii = np.hypot(seg[:, 0] - seg[:, 4], seg[:, 1] - seg[:, 5])
     straight = np.hypot(seg[:, 2] - seg[:, 0], seg[:, 3] - seg[:, 1])
-    return max(
-        depth / bore_turns(r, depth) if sweep else 2.0 * depth / ramp_strokes(line, depth)
+    down = [
+        (depth / bore_turns(r, depth, motions.slope), math.tau * r)
+        if sweep
+        else (2.0 * depth / ramp_strokes(line, depth, motions.slope), 2.0 * line)
         for r, line, sweep in zip(radii.tolist(), straight.tolist(), seg[:, 6].tolist(), strict=True)
-    )
+    ]
+    return max(z for z, _ in down), max(math.atan2(z, along) for z, along in down)
 
 
-def _bore(at: Floats, seg: Floats, heights: tuple[float, float], feed: float, spindle: float, tool: int) -> Program:
+def _bore(
+    at: Floats, seg: Floats, heights: tuple[float, float], slope: float, feed: float, spindle: float, tool: int
+) -> Program:
     """Turns around the centre of an arc ``seg`` (7,), from one height evenly down to the other."""
     x, y, sweep = seg[4:7].tolist()
     depth = heights[0] - heights[1]
-    pitch = depth / bore_turns(math.hypot(at[0] - x, at[1] - y), depth)
+    pitch = depth / bore_turns(math.hypot(at[0] - x, at[1] - y), depth, slope)
     sense: Literal[1, -1] = 1 if sweep > 0.0 else -1
     return helix(at, (x, y), heights, pitch, feed, spindle, tool, "entry", sense=sense, level=False)
 
 
-def _ramp(at: Floats, seg: Floats, heights: tuple[float, float], feed: float, spindle: float, tool: int) -> Program:
+def _ramp(
+    at: Floats, seg: Floats, heights: tuple[float, float], slope: float, feed: float, spindle: float, tool: int
+) -> Program:
     """Legs to and fro along a line ``seg`` (7,), from one height evenly down to the other, the last back to ``at``."""
-    strokes = ramp_strokes(float(np.hypot(*(seg[2:4] - at))), heights[0] - heights[1])
+    strokes = ramp_strokes(float(np.hypot(*(seg[2:4] - at))), heights[0] - heights[1], slope)
     z = np.linspace(*heights, strokes + 1)[1:]
     to = np.where((np.arange(strokes) % 2 == 0)[:, None], seg[2:4], at)
     line = np.full(strokes, LINE)
@@ -304,7 +317,7 @@ def programs_of(
         if b > a and motions.kind[a + 1] == ENTRY:
             parts.append(plunge([*at, h.top], setting_feed, spindle, tool, "entry"))
             descend = _ramp if seg[0, 6] == 0.0 else _bore
-            parts.append(descend(at, seg[0], (h.top, h.floor), setting_feed, spindle, tool))
+            parts.append(descend(at, seg[0], (h.top, h.floor), motions.slope, setting_feed, spindle, tool))
         else:
             parts.append(plunge([*at, h.floor], motions.feed[a], spindle, tool, "entry"))
         for first, last, name in _stretches([zones[int(k)] for k in motions.kind[a + 1 : b + 1]]):

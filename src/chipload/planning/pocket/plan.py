@@ -25,11 +25,12 @@ from chipload.planning.link_rows import row_ends, with_last_link
 from chipload.planning.pocket.clearing import require_clearing
 from chipload.planning.pocket.clearing_path import CUT, ENTRY, LIFT
 from chipload.planning.pocket.motions import (
+    HELIX,
     ZONES,
     Motions,
     MotionSamples,
     clock,
-    entry_depth,
+    entries,
     motions_of,
     programs_of,
     replayed,
@@ -139,7 +140,8 @@ def _history(
 ) -> tuple[Columns, Program, float, list[Motions]]:
     """Rows of all levels of all stages, the program, its time [s], and the motions of each path at its first level."""
     link_feed = machine.feed_max if setting.link_feed is None else setting.link_feed
-    each = [[motions_of(stage.path, h, stage.feed, link_feed) for h in stage.heights] for stage in stages]
+    slope = HELIX if cutter.ramp_angle is None else min(HELIX, cutter.ramp_angle)
+    each = [[motions_of(stage.path, h, stage.feed, link_feed, slope) for h in stage.heights] for stage in stages]
     parts = [
         [programs_of(m, stage.feed, stage.depth, stage.spindle_speed, cutter.number, stage.name) for m in levels]
         for stage, levels in zip(stages, each, strict=True)
@@ -185,9 +187,10 @@ def _columns(
     makes_wall = (np.abs(off) <= 2.0 * CHORD * radius) & (kind == CUT) & stage.makes_wall
     place = (zone, length, own, samples.centre, samples.heading, 0.0, met, speed, makes_wall)
     cut = CutConditions(cutter, material, stage.depth, stage.spindle_speed, setting.milling, *setting.rigid)
-    columns: Columns = {**cost(cut, *place), "engagement_max_deg": np.degrees(most)}
+    columns: Columns = {**cost(cut, *place), "engagement_max_deg": np.degrees(most), "ramp_deg": np.zeros(len(kind))}
     if (kind == ENTRY).any():  # a turn of a bore is as deep as its pitch, a leg of a ramp as two
-        thin = cost(replace(cut, axial_depth=entry_depth(motions, stage.depth)), *place)
+        deep, steep = entries(motions, stage.depth)
+        thin = {**cost(replace(cut, axial_depth=deep), *place), "ramp_deg": np.full(len(kind), math.degrees(steep))}
         columns = {k: np.where(kind == ENTRY, thin.get(k, v), v) for k, v in columns.items()}
     return columns, own
 

@@ -106,7 +106,7 @@ class Controller:
         #: rounds every corner (RNDM of a Sinumerik)
         self.rounding: Corner | None = None
         self._held: tuple[Piece, int, Corner, bool] | None = None
-        self._asked: tuple[int, Corner] | None = None
+        self._requested: tuple[int, Corner] | None = None
         #: why motions are left out until further notice; empty: they are not
         self.left_out = ""
         self.level = 0
@@ -147,15 +147,6 @@ class Controller:
         """A finding on what LinuxCNC refuses and other controllers take."""
         severity = Severity.UNPROVEN if self.dialect == "linuxcnc" else Severity.NOTE
         self.findings.add(code, self.line, text, severity)
-
-    def touch(self, code: str, name: str, ends: str) -> None:
-        """A motion that a touch ends: where the tool is behind it, and what it measures, is not known."""
-        self.leave_out(
-            code,
-            f"{name}: the motion ends where {ends}; it is taken to its programmed end: the position behind it, and all "
-            "that the program derives from it, is not known: leave the probing out and state the offsets that it sets "
-            "in program.work_offsets or program.parameters",
-        )
 
     # -- offsets ---------------------------------------------------------------------------------------------------
 
@@ -322,8 +313,8 @@ class Controller:
     # -- corners ---------------------------------------------------------------------------------------------------
 
     def round_off(self, corner: Corner) -> None:
-        """Round or chamfer the corner behind the motion of the block that is read."""
-        self._asked = self.line, corner
+        """Round or chamfer the corner after the motion of the block that is read."""
+        self._requested = self.line, corner
 
     def round_all(self, corner: Corner | None) -> None:
         """Round every corner from the motion of the block that is read on; None: no more."""
@@ -332,16 +323,16 @@ class Controller:
     @property
     def in_corner(self) -> bool:
         """Whether motions wait for a corner, or ask for one."""
-        return self._held is not None or self._asked is not None or self.rounding is not None
+        return self._held is not None or self._requested is not None or self.rounding is not None
 
     def _piece(self, motion: int, end: Nine, centre: tuple[float, float], turns: int, context: int) -> None:
-        """A motion of the contour: it waits where the corner behind it is to be rounded."""
+        """A motion of the contour: it waits where the corner after it is to be rounded."""
         piece = Piece(motion, list(self.state.at), list(end), centre, turns, 0.0, (context, self.line))
-        held, asked = self._held, self._asked
-        self._held = self._asked = None
-        if asked is not None and asked[0] != self.line:
-            self._sharp(*asked)
-            asked = None
+        held, requested = self._held, self._requested
+        self._held = self._requested = None
+        if requested is not None and requested[0] != self.line:
+            self._sharp(*requested)
+            requested = None
         if held is not None:
             before, line, corner, modal = held
             flat = PLANES[self.state.plane] == XY and self.state.feed_mode != 930
@@ -352,30 +343,30 @@ class Controller:
             for some in (before,) if made is None else made[:-1]:
                 self._carry(some)
             piece = piece if made is None else made[-1]
-        own = asked[1] if asked is not None else self.rounding
+        own = requested[1] if requested is not None else self.rounding
         if own is not None and motion in (LINE, ARC):
-            self._held = piece, self.line, own, asked is None
+            self._held = piece, self.line, own, requested is None
         else:
-            if asked is not None:
-                self._sharp(*asked)
+            if requested is not None:
+                self._sharp(*requested)
             self._carry(piece)
 
     def end_corner(self) -> None:
         """Carry out what waits for a corner that does not come."""
-        held, asked = self._held, self._asked
-        self._held = self._asked = None
+        held, requested = self._held, self._requested
+        self._held = self._requested = None
         if held is not None:
             if not held[3]:
                 self._sharp(held[1], held[2])
             self._carry(held[0])
-        if asked is not None and asked[0] != self.line:
-            self._sharp(*asked)
-        elif asked is not None:
-            self._asked = asked
+        if requested is not None and requested[0] != self.line:
+            self._sharp(*requested)
+        elif requested is not None:
+            self._requested = requested
 
     def _sharp(self, line: int, corner: Corner) -> None:
-        said = f"{corner.text[:40]}: the corner stays sharp: its rounding or chamfer is left out"
-        self.findings.add("nc-corner", line, said, Severity.UNPROVEN)
+        text = f"{corner.text[:40]}: the corner stays sharp: its rounding or chamfer is left out"
+        self.findings.add("nc-corner", line, text, Severity.UNPROVEN)
 
     def _carry(self, piece: Piece) -> None:
         end, (context, line) = nine(piece.end), cast(tuple[int, int], piece.tail)

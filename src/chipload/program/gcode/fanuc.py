@@ -29,7 +29,7 @@ from chipload.program.gcode.expression import read_value
 from chipload.program.gcode.frames import remove, turn_about
 from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, system_variables, with_brackets
 from chipload.program.gcode.modal import GROUP_OF, shown
-from chipload.program.gcode.offsets import choose
+from chipload.program.gcode.offsets import choose, probed
 from chipload.program.gcode.tilted_plane import align, level, tilted
 from chipload.program.gcode.words import Block, bare, read_block
 from chipload.program.tilt import tilt_of, turned
@@ -266,7 +266,7 @@ class Fanuc(Dialect):
             words["k"] = words.pop("f")
         if SKIP in g:
             g[g.index(SKIP)] = 10
-            c.touch("nc-skip", shown(SKIP), "its signal comes")
+            probed(c, "nc-skip", shown(SKIP), "its signal comes")
         motion = next((x for x in g if x in CYCLES), c.state.motion)
         if motion in CYCLES:
             self._shorter_pecks(words, g, motion, c)

@@ -17,7 +17,7 @@ from chipload.program.gcode.cycles import CYCLES
 from chipload.program.gcode.drilling import Drilling
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.modal import shown
-from chipload.program.gcode.offsets import in_machine_unknown, note_machine_coordinates
+from chipload.program.gcode.offsets import in_machine_unknown, note_machine_coordinates, probed
 from chipload.program.gcode.splines import Splines
 from chipload.program.gcode.state import LINEAR, NO_MOTION, Nine, put
 from chipload.program.gcode.synchronised import synchronised
@@ -144,7 +144,7 @@ class ControllerMotion:
         to = end(self.c, block)
         if math.dist(state.at, to) < LEAST_PROBE:
             raise InputError(f"{shown(code)}: ends less than {LEAST_PROBE:g} mm from where it starts: go farther")
-        c.touch("nc-probe", shown(code), "the probe touches")
+        probed(c, "nc-probe", shown(code), "the probe touches")
         c.straight(PROBE, to)
         for k, axis in enumerate(to):
             c.parameters.numbered[5061 + k] = axis / (c.machine_scale if k in LINEAR else 1.0)

@@ -71,6 +71,16 @@ def note_missing_lengths(c: Controller, commands: Commands) -> None:
             c.findings.once("nc-length-missing", line, f"tool {number} cuts and {reason}", Severity.UNPROVEN)
 
 
+def probed(c: Controller, code: str, name: str, ends: str) -> None:
+    """A motion that a probe or a signal ends: the position after it, and what it measures, is not known."""
+    c.leave_out(
+        code,
+        f"{name}: the motion ends where {ends}; it is taken to its programmed end: the position after it, and all that "
+        "the program derives from it, is not known: leave the probing out and state the offsets that it sets in "
+        "program.work_offsets or program.parameters",
+    )
+
+
 def note_machine_coordinates(c: Controller, name: str) -> None:
     """A finding on a motion in the machine's coordinates under a work offset without an origin."""
     number = c.state.datum.number
