@@ -94,7 +94,7 @@ def test_a_camotics_project_without_its_program(folder: Path, files: object, nam
     Path("own.camotics").write_text(json.dumps({"files": files, "tools": {}}))
     code, _, err = call("init", "own.camotics", "new")
     assert code == 2
-    assert f"none of its files is an NC text that is there ({named}): put it beside the project" in err
+    assert f"none of its files is an NC text that exists ({named}): put it next to the project" in err
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ def test_a_stopped_run_tells_what_is_kept(folder: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(jobs, "run_job", stopped)
     code, out, err = call("run", slot_job(folder / "slot"), "--out", "r")
     assert (code, out) == (130, "")
-    told = "12 steps of a pass are kept in r.unfinished: the same command continues from there; with --fresh it begins"
+    told = "12 steps of a pass are kept in r.unfinished: the same command continues from there; with --fresh it starts"
     assert err.startswith(f"chipload: stopped: {told if kept else 'nothing was written'}")
     assert (folder / "r.unfinished").exists() is kept
     assert not (folder / "r").exists()

@@ -13,7 +13,7 @@ from chipload.jobs.simulation.result import simulation_findings
 def test_a_rapid_that_cuts_exceeds_and_a_program_that_was_handed_over_is_noted() -> None:
     findings = (Finding("rapid-cuts", 3, "a rapid goes through material"), Finding("handed-over", 6, "by layers"))
     removal = SimpleNamespace(findings=findings, columns={"chip_max_mm": []})
-    checks = SimpleNamespace(material=SimpleNamespace(chip=None), off=(), cutters={})
+    checks = SimpleNamespace(material=SimpleNamespace(chip=None, speed=None), off=(), cutters={})
     simulation: Any = SimpleNamespace(removal=removal, collisions=CollisionCheck(), workpiece=None, checks=checks)
     found = [(f.code, f.line, f.severity) for f in simulation_findings(simulation)]
     assert found == [("rapid-cuts", 3, Severity.EXCEEDS), ("handed-over", 6, Severity.NOTE)]

@@ -137,7 +137,7 @@ def fewer_triangles(
 def _row_numbers(rows: Ints) -> Ints:
     """(n,) numbers that are equal and in order where rows (n, 3) of numbers from 0 on are.
 
-    >>> _as_one(np.array([[0, 0, 2], [0, 1, 0], [0, 0, 2]])).argsort(kind="stable").tolist()
+    >>> _row_numbers(np.array([[0, 0, 2], [0, 1, 0], [0, 0, 2]])).argsort(kind="stable").tolist()
     [0, 2, 1]
     """
     if len(rows) and int(rows.max()) >= 1 << 21:
@@ -193,7 +193,7 @@ def _kind(name: str) -> str:
 def _drawn_by_view(name: str) -> bool:
     """Return whether the view draws a node itself.
 
-    >>> [_own(n) for n in ("0-path-plain", "rapids", "0-wall", "stock", "1-cutter")]
+    >>> [_drawn_by_view(n) for n in ("0-path-plain", "rapids", "0-wall", "stock", "1-cutter")]
     [True, True, False, False, True]
     """
     return _plain(name).startswith(OWN)
