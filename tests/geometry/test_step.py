@@ -11,6 +11,7 @@ import pytest
 from chipload.errors import InputError
 from chipload.geometry.contour import Region
 from chipload.geometry.step import read_step_face
+from step_files import written
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
 
@@ -87,3 +88,19 @@ def test_nist_part_by_two_protocols():
     old, new = (read_step_face(DATA / f"cad/nist_step/nist_ctc_01_asme1_ap{n}.stp") for n in (203, 242))
     assert [c.area for c in old.contours] == pytest.approx([c.area for c in new.contours], rel=1e-6)
     assert all(c.closed for c in old.contours)
+
+
+def test_what_looks_down_is_no_floor(tmp_path: Path) -> None:
+    """A rib over a plate of 40 x 16 mm, 5 mm longer on both sides: its undersides lie at the height of the face."""
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+    from OCP.gp import gp_Pnt
+
+    plate = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(40, 16, 8)).Shape()
+    rib = BRepPrimAPI_MakeBox(gp_Pnt(19, -5, 8), gp_Pnt(21, 21, 20)).Shape()
+    written(tmp_path / "rib.step", BRepAlgoAPI_Fuse(plate, rib).Shape())
+    lengths = {z: [c.length for c in read_step_face(tmp_path / "rib.step", z_mm=z).contours] for z in (0.0, 8.0, 20.0)}
+    # each side of the face is 19 x 16 mm; the bottom looks down, and is read as nothing else is at its height
+    assert lengths[8.0] == pytest.approx([70.0, 70.0])
+    assert lengths[0.0] == pytest.approx([112.0])
+    assert lengths[20.0] == pytest.approx([56.0])

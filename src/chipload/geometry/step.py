@@ -205,7 +205,7 @@ def triangles(part: Part, chord_mm: float, angle: float) -> tuple[Floats, NDArra
 
 def levels(part: Part) -> list[float]:
     """Height [mm] of every horizontal planar face."""
-    return [z for z, _ in _level_faces(part)]
+    return [z for z, _, _ in _level_faces(part)]
 
 
 def highest(part: Part) -> float:
@@ -219,21 +219,28 @@ def highest(part: Part) -> float:
 
 
 def edges_at(part: Part, level: float, tolerance_mm: float) -> list[list[Floats]]:
-    """(n, 7) segments [mm] of each edge of each horizontal face at a height."""
-    return [list(_edges(face, tolerance_mm)) for z, face in _level_faces(part) if abs(z - level) <= 1e-3]
+    """(n, 7) segments [mm] of each edge of each horizontal face at a height that looks up; of those that look down, such
+    as the underside of a part, where none looks up.
+    """
+    faces = [(up, face) for z, up, face in _level_faces(part) if abs(z - level) <= 1e-3]
+    any_up = any(up for up, _ in faces)
+    return [list(_edges(face, tolerance_mm)) for up, face in faces if up == any_up]
 
 
-def _level_faces(part: Part) -> Iterator[tuple[float, Any]]:
-    """Height [mm] and face of every horizontal plane."""
+def _level_faces(part: Part) -> Iterator[tuple[float, bool, Any]]:
+    """Height [mm] of every horizontal plane, whether the material is below it, and its face."""
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_Plane
+    from OCP.TopAbs import TopAbs_REVERSED
 
     for face in part.faces:
         surface = BRepAdaptor_Surface(face)
         if surface.GetType() == GeomAbs_Plane:
-            axis = surface.Plane().Axis().Direction()
+            plane = surface.Plane()
+            axis = plane.Axis().Direction()
             if np.hypot(axis.X(), axis.Y()) < LEVEL:
-                yield float(surface.Plane().Location().Z()), face
+                up = (axis.Z() > 0.0) == plane.Direct()
+                yield float(plane.Location().Z()), up != (face.Orientation() == TopAbs_REVERSED), face
 
 
 def _edges(face: Any, tolerance_mm: float) -> Iterator[Floats]:
