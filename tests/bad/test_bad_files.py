@@ -206,8 +206,8 @@ class Dying:
 @pytest.mark.parametrize(
     ("function", "message"),
     [
-        ("dies", r"damaged: the CAD kernel crashes on it: write it again from CAD, or check it there$"),
-        ("loops", r"the CAD kernel did not finish it within 1 s: write the part alone, or check it in CAD$"),
+        ("dies", r"damaged: the CAD kernel crashes on it: export it again from CAD, or repair it there$"),
+        ("loops", r"the CAD kernel did not finish it within 1 s: export the part alone, or repair it in CAD$"),
         ("grows", r"the CAD kernel needs more than 4 GiB"),
         ("faults", r"damaged: the CAD kernel fails on it: RuntimeError Standard_Failure"),
     ],
