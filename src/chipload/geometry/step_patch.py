@@ -74,8 +74,8 @@ def patch_of(face: Face, key: str, fit: float) -> ReadFace:
     InputError
         The face has holes, does not have four sides, or the fit deviates by more than ``fit``.
     """
-    knots_u, knots_v, control, side, kept, off = face.part.call("step_patch.taken", face.number, key, fit)
-    return ReadFace(BSplinePatch(knots_u, knots_v, control, side), kept, off)
+    knots_u, knots_v, control, side, from_file, off = face.part.call("step_patch.patch_data", face.number, key, fit)
+    return ReadFace(BSplinePatch(knots_u, knots_v, control, side), from_file, off)
 
 
 def four_sided(face: Face) -> bool:
@@ -93,7 +93,7 @@ def has_four(part: Part, number: int) -> bool:
     return face.holes == 0 and (len(loop) == 4 or len(_corners(loop)) == 4)
 
 
-def taken(part: Part, number: int, key: str, fit: float) -> tuple[Floats, Floats, Floats, int, bool, float]:
+def patch_data(part: Part, number: int, key: str, fit: float) -> tuple[Floats, Floats, Floats, int, bool, float]:
     """Knots, poles and side of the patch of a face, whether they are those of the file, and its deviation [mm]."""
     made = _patch_of(kernel_face(part, number), key, fit)
     return made.patch.knots_u, made.patch.knots_v, made.patch.control, made.patch.side, made.kept, made.off
