@@ -110,7 +110,7 @@ ON_PLUS = ", ".join(f"{x:.9f}" for x in IMPELLER.blade.plus.at(0.05, 0.0)[0])
          "job.toml: impeller.step.plus = [1.0, 2.0]: must be the number of a face or a point [x, y, z] on it, in mm "
          "(side of a blade that faces a growing angle about the axis, seen against the flow)"),
         ("plus = 1", "plus = [0.0, 0.0, 25.0]",
-         "impeller.step.plus = [0, 0, 25]: lies 49.51 mm off the nearest face, 2: must be within 0.01 mm of a face "
+         "impeller.step.plus = [0, 0, 25]: lies 49.51 mm from the nearest face, 2: must be within 0.01 mm of a face "
          "(mm, in the frame of the file)"),
         ("plus = 1\nminus = 2", "plus = 2\nminus = 1",
          "impeller.step.plus and minus: metal fills 31.26 deg of the pitch of 32.73 deg from minus to plus: must be "
@@ -147,7 +147,7 @@ def test_names(job, old, new, message):
 
 def test_a_point_on_an_edge(job):
     text = refused(job, "plus = 1", f"plus = [{ON_PLUS}]")
-    assert text.endswith(": lies on faces 1 and 3: take a point within one of them")
+    assert text.endswith(": lies on faces 1 and 3: state a point inside one of them")
 
 
 def test_inches_taken_for_millimetres(job):
@@ -165,19 +165,19 @@ def test_inches_taken_for_millimetres(job):
 def test_a_file_without_a_unit(job):
     path = job.parent / "impeller.step"
     path.write_text(path.read_text().replace("LENGTH_UNIT", "LENGTH_UNIX"))
-    assert refused(job) == "impeller.step.file = impeller.step: states no unit of length: write it again with its unit"
+    assert refused(job) == "impeller.step.file = impeller.step: states no unit of length: export it again with its unit"
 
 
 def test_a_face_with_a_hole(job):
     written(job.parent / "impeller.step", holed(IMPELLER.blade.plus), *FACES[1:])
-    assert refused(job) == "impeller.step.plus: face 1 has a hole: must be one piece without any"
+    assert refused(job) == "impeller.step.plus: face 1 has a hole: must have none"
 
 
 def test_a_face_with_three_sides(job):
     written(job.parent / "impeller.step", three_sided(), *FACES[1:])
     assert refused(job) == (
-        "impeller.step.plus: face 1: no edge along the shroud, nearest 24.4 mm: state all faces of the side, or check "
-        "shroud"
+        "impeller.step.plus: face 1: no edge lies along the shroud, the nearest is 24.4 mm away: "
+        "state all faces of the side, or check shroud"
     )
 
 
@@ -189,8 +189,8 @@ def test_a_part_of_a_side(job):
     text = refused(
         job, "plus = 1\nminus = 2\nhub = [3]\nshroud = [4]", "plus = [1, 2]\nminus = 3\nhub = [4]\nshroud = [5]"
     )
-    assert text.startswith("impeller.step.plus: faces 1, 2: no edge along the shroud, nearest ")
-    assert text.endswith(" mm: state all faces of the side, or check shroud")
+    assert text.startswith("impeller.step.plus: faces 1, 2: no edge lies along the shroud, the nearest is ")
+    assert text.endswith(" mm away: state all faces of the side, or check shroud")
 
 
 def test_a_face_of_a_side_twice(job):
@@ -285,7 +285,7 @@ def slot():
          "the edge that is clamped"),
         (None, FRONT, BACK, [0.0, 3.0, 0.0], "",
          "wall.clamp = [0, 3, 0]: lies at a corner of face 4: take a point within the edge"),
-        (bore, FRONT, BACK, 5, "", "wall.front: face 4 has a hole: must be one piece without any"),
+        (bore, FRONT, BACK, 5, "", "wall.front: face 4 has a hole: must have none"),
         (slot, [7.0, 1.0, 20.0], [7.0, 2.0, 20.0], [20.0, 1.0, 10.0], "",
          "wall between faces 3 and 5 of wall.step: no material between them: state the two sides of a wall, not of a "
          "slot"),

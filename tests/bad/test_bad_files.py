@@ -151,10 +151,10 @@ def box(count: int = 12) -> bytes:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (box()[:-7], r"its header states 12 triangles, which are 684 bytes, and it has 677: export it again$"),
-        (box(13), r"its header states 13 triangles, which are 734 bytes, and it has 684: export it again$"),
+        (box()[:-7], r"its header states 12 triangles, which are 684 bytes, but the file has 677: export it again$"),
+        (box(13), r"its header states 13 triangles, which are 734 bytes, but the file has 684: export it again$"),
         (b"x" * 50, r"50 bytes: not an STL file: export it again$"),
-        (bytes(84), r"no triangles in it"),
+        (bytes(84), r"the file has no triangles"),
         (b"solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0\nendloop\nendfacet\nendsolid\n", r"0 vertices of three"),
         (b"solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 0 1 0\nendloop\nendfacet\n",
          r"truncated: no endsolid"),
@@ -206,8 +206,8 @@ class Dying:
 @pytest.mark.parametrize(
     ("function", "message"),
     [
-        ("dies", r"damaged: the CAD kernel crashes on it: write it again from CAD, or check it there$"),
-        ("loops", r"the CAD kernel did not finish it within 1 s: write the part alone, or check it in CAD$"),
+        ("dies", r"damaged: the CAD kernel crashes on it: export it again from CAD, or repair it there$"),
+        ("loops", r"the CAD kernel did not finish it within 1 s: export the part alone, or repair it in CAD$"),
         ("grows", r"the CAD kernel needs more than 4 GiB"),
         ("faults", r"damaged: the CAD kernel fails on it: RuntimeError Standard_Failure"),
     ],

@@ -84,7 +84,7 @@ def test_another_outer_diameter(hecc):
 def test_columns_that_no_line_names(hecc):
     changed(hecc, 'columns = "X R*THETA R"\n', "")
     assert refused(hecc) == (
-        "impeller.sections.blade: main_07.txt: no line names the columns: state them, as X R*THETA R"
+        "impeller.sections.blade: main_07.txt: no line names the columns: state them, for example X R*THETA R"
     )
 
 

@@ -55,7 +55,7 @@ def test_units_are_overridden_with_a_finding_and_taken_where_unsaid(draw):
     over = draw(fill, header=4, units="inch")
     assert over.contours[0].radii[0] == pytest.approx(25.4)
     assert [(f.code, f.text) for f in over.findings] == [
-        ("dxf-units", "the header states mm; read as inch, as part.units says")
+        ("dxf-units", "the header states mm; read as inch, as part.units states")
     ]
     unsaid = draw(fill, header=0, units_if_unstated="cm")
     assert unsaid.contours[0].radii[0] == pytest.approx(10.0)

@@ -148,10 +148,10 @@ def test_a_random_body_is_cut_as_brute_force_says():
             "a.stl",
             bytes(80) + struct.pack("<I", 9) + bytes(60),
             {"unit": "mm"},
-            "its header states 9 triangles, which are 534 bytes, and it has 144",
+            "its header states 9 triangles, which are 534 bytes, but the file has 144",
         ),
         ("a.step", b"hello", {"chord_mm": 0.1}, "a.step: not a STEP file"),
-        ("a.step", b"hello", {}, "state how far a triangle may leave a surface"),
+        ("a.step", b"hello", {}, "state chord_mm above 0, the greatest deviation of a triangle from a surface"),
         ("a.obj", b"", {}, "must be .stl, .stp or .step"),
     ],
 )

@@ -120,7 +120,7 @@ def test_a_face_at_no_height(tmp_path: Path) -> None:
 
 
 def test_a_blade_bent_too_far() -> None:
-    with pytest.raises(InputError, match=r"^wall\.camber_deg = 95: must be below 90 in size$"):
+    with pytest.raises(InputError, match=r"^wall\.camber_deg = 95: must be between -90 and 90$"):
         blade((30.0, 20.0), 40.0, (2.0, 1.0), 0.5, math.radians(95.0), (0.0, 0.0))
 
 

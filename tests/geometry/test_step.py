@@ -67,7 +67,7 @@ def test_the_topmost_face_is_taken_and_said(part):
 
 def test_refusals(part, tmp_path):
     with pytest.raises(
-        InputError, match=r"^part\.z_mm = 7: no horizontal planar face there; faces are at 0, 10, 14 mm$"
+        InputError, match=r"^part\.z_mm = 7: no horizontal planar face at this height; faces are at 0, 10, 14 mm$"
     ):
         read_step_face(part, z_mm=7.0)
     rubbish = tmp_path / "rubbish.step"

@@ -77,5 +77,5 @@ def test_refused():
         plate(10.0, 10.0, 0.0)
     with pytest.raises(InputError, match=r"wall\.edge_share = 1\.5: must be above 0 and at most 1"):
         blade((20.0, 20.0), 10.0, (2.0, 2.0), 1.5, 0.1, (0.0, 0.0))
-    with pytest.raises(InputError, match=r"wall\.camber_deg = 95: must be below 90"):
+    with pytest.raises(InputError, match=r"wall\.camber_deg = 95: must be between -90 and 90"):
         blade((20.0, 20.0), 10.0, (2.0, 2.0), 0.5, math.radians(95.0), (0.0, 0.0))

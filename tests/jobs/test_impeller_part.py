@@ -154,7 +154,7 @@ def test_sides_and_hub_are_named(tmp_path):
     sides = [p.turned(k * IMPELLER.pitch) for k in range(3) for p in (IMPELLER.blade.plus, IMPELLER.blade.minus)]
     path = written(tmp_path / "three.step", *map(face, sides[:2]), turned(IMPELLER.hub), *map(face, sides[2:]))
     lines = roles_of(read_faces(path))
-    assert lines[0].startswith("6 like faces of 23")
+    assert lines[0].startswith("6 similar faces of 23")
     assert lines[0].endswith(" mm2: sides of blades?: 1, 2, 4, 5, 6, 7")
     assert lines[1] == "face 3: of revolution about z, r 45.88 to 111.5 mm: the hub?"
     path = written(tmp_path / "one.step", *map(face, sides[:2]), turned(IMPELLER.hub))

@@ -1,9 +1,9 @@
-"""Smooth curves as chains of arcs and lines within a tolerance.
+"""Approximation of smooth curves by chains of arcs and lines within a tolerance.
 
 Notation: c(t) the curve, c'(t) its derivative, p and q the ends of a span, T0 and T1 the unit tangents there. A
-**biarc** is two arcs that leave p along T0, reach q along T1 and share a tangent where they meet; of the many the one
-with equal tangent lengths l is taken: with v = q - p and s = T0 + T1, ``l^2 (2 - 2 T0.T1) + 2 l v.s = v.v``. A span
-whose biarc leaves the curve by more than the tolerance is halved.
+**biarc** is two arcs that leave p along T0, reach q along T1 and share a tangent where they meet. Of the family
+of biarcs, the one with equal tangent lengths l is used: with v = q - p and s = T0 + T1,
+``l^2 (2 - 2 T0.T1) + 2 l v.s = v.v``. A span whose biarc deviates from the curve by more than the tolerance is halved.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from chipload.geometry.distance import distance
 
 Curve = Callable[[float], tuple[Floats, Floats]]
 
-#: a span is halved at most so often
+#: greatest number of times that a span is halved
 DEPTH = 14
 
 
 def arcs_along(curve: Curve, spans: ArrayLike, tolerance_mm: float) -> Contour | None:
-    """Arcs and lines that follow a curve to within ``tolerance_mm``, measured at seven places a span.
+    """Arcs and lines that follow a curve to within ``tolerance_mm``, measured at seven places of each span.
 
     Parameters
     ----------
     curve : t -> point (2,) [mm] and derivative (2,)
-    spans : (k,) increasing parameters, where the curve may be less smooth (knots)
+    spans : (k,) increasing parameters; at these the curve may be less smooth (knots)
     tolerance_mm : greatest distance [mm] of the curve from its arcs
 
     Returns
     -------
-    The contour, or None where the curve has no length.
+    The contour, or None if the curve has no length.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""A shape in the CAD kernel's own format (`.brp`, as FreeCAD keeps it) written as STEP, in mm.
+"""Conversion of a shape in the CAD kernel's own format (`.brp`, as in files of FreeCAD) to STEP, in mm.
 
-The kernel runs in a process of its own, see :mod:`chipload.geometry.isolated`.
+The kernel runs in a separate process, see :mod:`chipload.geometry.isolated`.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from chipload.geometry.step import LARGEST_FILE, Part
 
 
 def step_of_brep(data: bytes, name: str) -> bytes:
-    """The shape as a STEP text.
+    """The shape as the text of a STEP file.
 
     Raises
     ------
     InputError
-        It is no shape that the kernel reads, or has no faces.
+        The data are too large, the kernel cannot read them, or the shape has no faces.
     """
     if len(data) > LARGEST_FILE:
         raise InputError(f"{name}: {len(data)} bytes: must be at most {LARGEST_FILE}")
@@ -44,7 +44,7 @@ def read_shape(path: str, key: str) -> Part:
     Raises
     ------
     InputError
-        The kernel cannot read it.
+        The kernel cannot read the file, or the shape has no faces.
     """
     from OCP.BRep import BRep_Builder
     from OCP.BRepTools import BRepTools
@@ -65,7 +65,7 @@ def write_step(part: Part, path: str) -> bool:
     Raises
     ------
     InputError
-        The kernel cannot.
+        The kernel cannot write the shape.
     """
     import OCP.IFSelect
     from OCP.Message import Message, Message_Fail

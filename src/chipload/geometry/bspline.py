@@ -1,8 +1,8 @@
-"""Surfaces through a grid of points: tensor products of B-splines, with normals and curvatures.
+"""B-spline surfaces (tensor products) through a grid of points, with normals and curvatures.
 
 Notation: S(u, v) = sum of N_i(u) M_j(v) P_ij with basis functions N, M of degrees p, q over knots in 0..1, P_ij control
 points [mm]. E, F, G and L, M, N first and second fundamental form; K curvature tensor in space (3, 3) [1/mm],
-K = J I^-1 II I^-1 J^T with J = (S_u, S_v): K applied to a unit tangent twice is the normal curvature, above 0 where the
+K = J I^-1 II I^-1 J^T with J = (S_u, S_v): t K t is the normal curvature along a unit tangent t, positive where the
 surface bends towards its normal.
 
 Reference: [Piegl1997] ch. 2, 9.
@@ -21,7 +21,7 @@ from chipload.geometry import _bspline
 
 Floats = NDArray[np.float64]
 
-_NO_NORMAL = "patch: no normal where S_u and S_v are parallel: leave that edge out"
+_NO_NORMAL = "patch: no normal where S_u and S_v are parallel: exclude that edge"
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +30,14 @@ class BSplinePatch:
 
     Parameters
     ----------
-    knots_u, knots_v : (n + p + 1,), (m + q + 1,) float, ascending, the ends p + 1 and q + 1 times
-    control : P (n, m, 3) float [mm]
-    side : 1 or -1, the normal is ``side`` S_u x S_v
+    knots_u, knots_v : (n + p + 1,), (m + q + 1,) float, ascending; the end knots are repeated p + 1 and q + 1 times
+    control : control points P, (n, m, 3) float [mm]
+    side : 1 or -1; the normal has the direction of ``side`` S_u x S_v
+
+    Raises
+    ------
+    InputError
+        ``control`` has another shape, or ``side`` another value.
     """
 
     knots_u: Floats
@@ -52,12 +57,12 @@ class BSplinePatch:
 
     @property
     def degrees(self) -> tuple[int, int]:
-        """(p, q)."""
+        """Degrees (p, q) in u and v."""
         n, m = self.control.shape[:2]
         return len(self.knots_u) - n - 1, len(self.knots_v) - m - 1
 
     def at(self, u: ArrayLike, v: ArrayLike, du: int = 0, dv: int = 0) -> Floats:
-        """Points, or derivatives of order ``du``, ``dv`` in 0..2.
+        """Points, or derivatives of order ``du`` in u and ``dv`` in v, each in 0..2.
 
         Parameters
         ----------
@@ -66,6 +71,11 @@ class BSplinePatch:
         Returns
         -------
         (k, 3) float [mm]
+
+        Raises
+        ------
+        InputError
+            A parameter is outside the range of the knots.
         """
         a, b = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64))
         p, q = self.degrees
@@ -92,7 +102,7 @@ class BSplinePatch:
         return out
 
     def facing(self, u: ArrayLike, v: ArrayLike) -> tuple[Floats, Floats]:
-        """Points and unit normals (k, 3): the same as :meth:`at` and :meth:`normal`, in a third of the time.
+        """Points [mm] and unit normals (k, 3): as :meth:`at` and :meth:`normal`, in a third of the time.
 
         Raises
         ------
@@ -112,7 +122,7 @@ class BSplinePatch:
         return points, normals
 
     def curvature(self, u: ArrayLike, v: ArrayLike) -> Floats:
-        """K (k, 3, 3) [1/mm] towards :meth:`normal`."""
+        """Curvature tensors K (k, 3, 3) [1/mm], positive towards :meth:`normal`."""
         N = self.normal(u, v)
         J = np.stack([self.at(u, v, 1, 0), self.at(u, v, 0, 1)], axis=-1)
         second = [np.einsum("kd,kd->k", self.at(u, v, *d), N) for d in ((2, 0), (1, 1), (0, 2))]
@@ -134,20 +144,20 @@ class BSplinePatch:
         return np.stack([mean - spread, mean + spread], axis=-1)
 
     def turned(self, angle: float) -> BSplinePatch:
-        """The patch turned about z by an angle [rad]."""
+        """The patch rotated about z by an angle [rad]."""
         c, s = np.cos(angle), np.sin(angle)
         return replace(self, control=self.control @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
 
     def rotated(self, R: Floats) -> BSplinePatch:
-        """The patch turned by a rotation (3, 3)."""
+        """The patch rotated by a matrix R (3, 3)."""
         return replace(self, control=self.control @ R.T)
 
     def swapped(self) -> BSplinePatch:
-        """The same surface with u and v changed, its normal kept."""
+        """The same surface, with the same normal, with u and v exchanged."""
         return BSplinePatch(self.knots_v, self.knots_u, np.swapaxes(self.control, 0, 1), -self.side)
 
     def reversed(self, u: bool, v: bool) -> BSplinePatch:
-        """The same surface with u, v or both counted from their other ends, its normal kept.
+        """The same surface, with the same normal, with u, v or both reversed.
 
         >>> flat = through([[[0, 0, 0], [0, 2, 0]], [[3, 0, 0], [3, 2, 0]]], [0, 1], [0, 1])
         >>> flat.reversed(True, False).at(0.0, 1.0).tolist()
@@ -162,7 +172,7 @@ class BSplinePatch:
 
 
 def _within(knots: Floats, degree: int, x: Floats) -> None:
-    """Refuse parameters that are not on the surface."""
+    """Refuse parameters outside the range of the knots."""
     if (x < knots[degree]).any() or (x > knots[-degree - 1]).any():
         raise InputError(f"patch: parameter out of {knots[degree]:g}..{knots[-degree - 1]:g}")
 
@@ -180,16 +190,16 @@ def basis(knots: Floats, degree: int, x: Floats, derivative: int = 0) -> tuple[N
     values = np.ones((len(x), 1))
     for d in range(1, degree + 1):
         low, high = knots[span[:, None] + np.arange(1 - d, 1)], knots[span[:, None] + np.arange(1, d + 1)]
-        grown = np.zeros((len(x), d + 1))
+        raised = np.zeros((len(x), d + 1))
         if d > degree - derivative:
             part = d * values / (high - low)
-            grown[:, :-1] -= part
+            raised[:, :-1] -= part
         else:
             part = values / (high - low)
-            grown[:, :-1] += part * (high - x[:, None])
+            raised[:, :-1] += part * (high - x[:, None])
             part = part * (x[:, None] - low)
-        grown[:, 1:] += part
-        values = grown
+        raised[:, 1:] += part
+        values = raised
     return span - degree, values if derivative <= degree else np.zeros_like(values)
 
 
@@ -203,7 +213,7 @@ def through(
     Raises
     ------
     InputError
-        The parameters do not ascend from 0 to 1, or there are fewer than two of either.
+        The parameters do not ascend from 0 to 1, or there are fewer than two in u or in v.
     """
     grid = np.asarray(points, dtype=np.float64)
     a, b = np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64)
@@ -214,5 +224,5 @@ def through(
     p, q = min(degrees[0], len(a) - 1), min(degrees[1], len(b) - 1)
     first = make_interp_spline(a, grid, k=p, axis=0)
     second = make_interp_spline(b, first.c, k=q, axis=1)
-    # of the coefficients the axis of v comes first
+    # the first axis of the coefficients is that of v
     return BSplinePatch(first.t, second.t, np.swapaxes(second.c, 0, 1), side)

@@ -1,9 +1,9 @@
 """Joining of loose lines and arcs to contours.
 
-Notation: a **part** is a contour as the file has it, often a single segment; it has two **ends**, numbered 2 k (start)
-and 2 k + 1. Ends are joined in pairs, the nearest first: those that coincide, then those within ever wider gaps up to
-``join_mm``. Where three or more ends come together it is not for us to say how the drawing goes on: nothing is joined
-there, and it is reported.
+Notation: a **part** is a contour as it stands in the file, often a single segment. Part k has two **ends**, numbered
+2 k (start) and 2 k + 1. Ends are joined in pairs, the nearest first: coincident ends, then ends within increasing gaps
+up to ``join_mm``. Where three or more ends meet, the continuation is ambiguous: none of them is joined, and a finding
+reports the place.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from chipload.geometry.contour import JOIN_MM, Contour, Floats
 from chipload.geometry.offset import true_centres
 from chipload.geometry.split import swept
 
-#: a gap [mm] that is a rounding and not worth a word
+#: greatest gap [mm] that counts as rounding and is not reported
 SILENT_MM = 1e-6
-#: no more findings of one kind than this are listed one by one
+#: greatest number of findings of one kind that are listed individually
 LISTED = 20
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """What a reader found: contours [mm], the layer of each, the unit of the file, and what was noticed."""
+    """The result of a reader: contours [mm], the layer of each, the unit of the file, and findings."""
 
     contours: tuple[Contour, ...]
     layers: tuple[str, ...]
@@ -41,12 +41,18 @@ class Drawing:
 def chained(
     parts: Sequence[Floats], join_mm: float, where: str = ""
 ) -> tuple[tuple[Contour, ...], tuple[Finding, ...]]:
-    """Contours from parts (each (n, 7) float [mm, rad], a chain), closed or open, in the order of the file.
+    """Closed and open contours from parts, in the order of the file. O(n log n).
 
-    The first part of a contour keeps its direction, a closed contour begins with it. Joined ends meet half-way; an arc
-    slides its centre along its chord. Findings: ``chain-empty`` a part without length, dropped; ``chain-double`` drawn
-    twice, dropped once; ``chain-joined`` a gap that was closed, with its place; ``chain-branch`` three or more ends at
-    one place, left open. ``where`` begins each text. O(n log n).
+    The first part of a contour keeps its direction; a closed contour begins with it. Joined ends are moved to the
+    middle of their gap; the centre of an arc moves along its chord. Findings: ``chain-empty``, a part without length
+    was dropped; ``chain-double``, a part drawn twice was dropped once; ``chain-joined``, a gap was closed, with its
+    place; ``chain-branch``, three or more ends meet and were left open.
+
+    Parameters
+    ----------
+    parts : (n, 7) float [mm, rad] each, a chain of segments
+    join_mm : widest gap [mm] that is closed
+    where : text that begins each finding
 
     Raises
     ------
@@ -63,8 +69,8 @@ def chained(
     if not (np.isfinite(join_mm) and join_mm >= 0.0):
         raise InputError(f"part.join_mm = {join_mm:g}: must be a finite number of at least 0")
     findings: list[Finding] = []
-    rows = [np.array(p, dtype=np.float64) for p in _worth(parts, where, findings)]
-    rows = [r for r, once in zip(rows, _once(rows, where, findings), strict=True) if once]
+    rows = [np.array(p, dtype=np.float64) for p in _with_length(parts, where, findings)]
+    rows = [r for r, first in zip(rows, _is_first(rows, where, findings), strict=True) if first]
     if not rows:
         return (), tuple(findings)
     mate = _mates(rows, join_mm, where, findings)
@@ -74,14 +80,14 @@ def chained(
     for k in range(len(rows)):
         if used[k]:
             continue
-        # back from the start of the first part, then on from its end
+        # backwards from the start of the first part, then forwards from its end
         back: list[int] = []
         end = int(mate[2 * k])
         while end >= 0 and end != 2 * k + 1:
             back.append(end)
             end = int(mate[end ^ 1])
         chain = [2 * k + 1]
-        if end >= 0:  # a ring: all of it was found
+        if end >= 0:  # a closed ring, complete
             chain += back[::-1]
         else:
             chain = back[::-1] + chain
@@ -96,7 +102,7 @@ def chained(
 
 
 def _turned(rows: Floats) -> Floats:
-    """A part travelled the other way."""
+    """A part in the opposite sense."""
     seg = rows[::-1]
     return np.column_stack([seg[:, 2:4], seg[:, 0:2], seg[:, 4:6], -seg[:, 6]])
 
@@ -107,8 +113,8 @@ def _length(rows: Floats) -> float:
     return float(np.where(rows[:, 6] == 0.0, chord, r * np.abs(rows[:, 6])).sum())
 
 
-def _worth(parts: Sequence[Floats], where: str, findings: list[Finding]) -> list[Floats]:
-    """Parts that have a length."""
+def _with_length(parts: Sequence[Floats], where: str, findings: list[Finding]) -> list[Floats]:
+    """The parts that have a length."""
     good, texts = [], []
     for p in parts:
         if _length(p) > JOIN_MM:
@@ -119,8 +125,8 @@ def _worth(parts: Sequence[Floats], where: str, findings: list[Finding]) -> list
     return good
 
 
-def _once(rows: list[Floats], where: str, findings: list[Finding]) -> NDArray[np.bool_]:
-    """Which parts (n,) are the first of their like: same ends, either way round, and same middle."""
+def _is_first(rows: list[Floats], where: str, findings: list[Finding]) -> NDArray[np.bool_]:
+    """Whether each part (n,) is the first of those with the same ends, in either order, and the same middle."""
     keep = np.ones(len(rows), dtype=np.bool_)
     if len(rows) < 2:
         return keep
@@ -139,7 +145,7 @@ def _once(rows: list[Floats], where: str, findings: list[Finding]) -> NDArray[np
 
 
 def _middle(rows: Floats) -> Floats:
-    """(2,) the point half-way along the middle segment of a part."""
+    """(2,) midpoint [mm] of the middle segment of a part."""
     x0, y0, x1, y1, xc, yc, sweep = rows[len(rows) // 2]
     if len(rows) % 2 == 0:
         return np.array([x0, y0])
@@ -151,7 +157,7 @@ def _middle(rows: Floats) -> Floats:
 
 
 def _mates(rows: list[Floats], join_mm: float, where: str, findings: list[Finding]) -> NDArray[np.int64]:
-    """(2 n,) the end that each end is joined to, -1: none; the parts' ends are moved together."""
+    """(2 n,) the end to which each end is joined, or -1; joined ends of the parts are moved together."""
     ends = np.array([p for r in rows for p in (r[0, 0:2], r[-1, 2:4])])
     mate = np.full(len(ends), -1, dtype=np.int64)
     for k, r in enumerate(rows):
@@ -204,4 +210,4 @@ def _move_end(rows: Floats, last: int, at: Floats) -> None:
 def _list(code: str, texts: list[str], findings: list[Finding]) -> None:
     findings += [Finding(code, 0, t) for t in texts[:LISTED]]
     if len(texts) > LISTED:
-        findings.append(Finding(code, 0, f"and {len(texts) - LISTED} more like it"))
+        findings.append(Finding(code, 0, f"and {len(texts) - LISTED} more of this kind"))

@@ -3,7 +3,7 @@
 Notation: a **segment** is a row ``[x0, y0, x1, y1, xc, yc, sweep]``: start, end, centre [mm] and the signed angle
 [rad] that the arc turns through, positive counter-clockwise; ``sweep == 0`` is a line (its centre is 0, 0).
 T is the unit tangent in the direction of travel, n = Rot(+90 deg) T the left normal, kappa [1/mm] the curvature,
-positive where the contour turns left. s [mm] is the length travelled from the start.
+positive where the contour turns left. s [mm] is the arc length from the start.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
 
-#: two ends nearer than this [mm] are one point
+#: ends nearer to each other than this [mm] are one point
 JOIN_MM = 1e-7
-#: an arc flatter than this [mm] is a line
+#: an arc whose height above its chord is less than this [mm] is a line
 FLAT_MM = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class Contour:
-    """A chain of lines and arcs, each starting where the one before it ends.
+    """A chain of lines and arcs; each segment starts where the previous one ends.
 
     Parameters
     ----------
@@ -67,18 +67,18 @@ class Contour:
             k = int(self.lengths.argmin())
             raise InputError(f"contour: segment {k} at ({seg[k, 0]:.6g}, {seg[k, 1]:.6g}) has no length")
 
-    # -- making ---------------------------------------------------------------------------------------------
+    # -- construction ---------------------------------------------------------------------------------------------
     @staticmethod
     def polyline(points: ArrayLike, closed: bool = False) -> Contour:
-        """Straight lines through ``points`` (m, 2) [mm]; ``closed`` adds the line back to the first."""
+        """Straight lines through ``points`` (m, 2) [mm]; ``closed`` adds a line from the last point to the first."""
         p = np.asarray(points, dtype=np.float64)
         return Contour.from_bulges(p, np.zeros(len(p)), closed)
 
     @staticmethod
     def from_bulges(points: ArrayLike, bulges: ArrayLike, closed: bool = False) -> Contour:
         """Vertices (m, 2) [mm] and bulges (m,) as in a DXF polyline: bulge = tan(sweep / 4) of the segment that
-        leaves the vertex. Vertices nearer than ``JOIN_MM`` are one; an arc that rises less than ``FLAT_MM`` above its
-        chord is a line, for its centre would be too far away to be told exactly.
+        starts at the vertex. Neighbouring vertices nearer than ``JOIN_MM`` are merged. An arc that rises less than
+        ``FLAT_MM`` above its chord becomes a line, because its distant centre could not be computed accurately.
         """
         p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         b = np.asarray(bulges, dtype=np.float64)
@@ -87,21 +87,21 @@ class Contour:
             p, q, b = p[:-1], q[:-1], b[: len(p) - 1]
         keep = np.hypot(*(q - p).T) > JOIN_MM
         p, q, b = p[keep], q[keep], b[keep]
-        q[:-1] = p[1:]  # where a short one was dropped its neighbours meet
+        q[:-1] = p[1:]  # the neighbours of a dropped short segment meet
         if closed and len(q):
             q[-1] = p[0]
         sweep = 4.0 * np.arctan(b)
         arc = 0.5 * np.abs(b) * np.hypot(*(q - p).T) > FLAT_MM
         bb = np.where(arc, b, 1.0)
         chord = q - p
-        left = np.column_stack([-chord[:, 1], chord[:, 0]])
-        centre = 0.5 * (p + q) + left * ((1.0 - bb**2) / (4.0 * bb))[:, None]
+        normal = np.column_stack([-chord[:, 1], chord[:, 0]])
+        centre = 0.5 * (p + q) + normal * ((1.0 - bb**2) / (4.0 * bb))[:, None]
         centre[~arc] = 0.0
         return Contour(np.column_stack([p, q, centre, np.where(arc, sweep, 0.0)]))
 
     @staticmethod
     def circle(centre: tuple[float, float], radius: float, sense: int = 1) -> Contour:
-        """A full circle from its rightmost point, ``sense`` +1 counter-clockwise, -1 clockwise."""
+        """A full circle [mm] from its rightmost point; ``sense`` +1 is counter-clockwise, -1 clockwise."""
         x, y = centre
         return Contour(np.array([[x + radius, y, x + radius, y, x, y, sense * 2.0 * np.pi]]))
 
@@ -110,7 +110,7 @@ class Contour:
         """One contour from parts that follow one another."""
         return Contour(np.vstack([part.segments for part in parts]))
 
-    # -- what it is -----------------------------------------------------------------------------------------
+    # -- properties -----------------------------------------------------------------------------------------
     @cached_property
     def radii(self) -> Floats:
         """(n,) radius of each segment [mm], 0 for a line."""
@@ -127,12 +127,12 @@ class Contour:
 
     @cached_property
     def knots(self) -> Floats:
-        """(n + 1,) length travelled at the segment ends [mm]."""
+        """(n + 1,) arc length at the ends of the segments [mm]."""
         return np.concatenate([[0.0], np.cumsum(self.lengths)])
 
     @property
     def length(self) -> float:
-        """Whole length [mm]."""
+        """Total length [mm]."""
         return float(self.knots[-1])
 
     @property
@@ -172,13 +172,13 @@ class Contour:
         p = np.vstack(pts)
         return float(p[:, 0].min()), float(p[:, 1].min()), float(p[:, 0].max()), float(p[:, 1].max())
 
-    # -- along it -------------------------------------------------------------------------------------------
+    # -- points and parts -------------------------------------------------------------------------------------------
     def at(self, s: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """Point, unit tangent and curvature at the lengths ``s``.
+        """Points, unit tangents and curvatures at the arc lengths ``s``.
 
         Parameters
         ----------
-        s : (m,) float [mm], 0 <= s <= length; at a joint the segment that leaves it is meant.
+        s : (m,) float [mm], 0 <= s <= length; at a joint the segment that starts there counts
 
         Returns
         -------
@@ -203,26 +203,26 @@ class Contour:
         return p, tangent, unit
 
     def reversed(self) -> Contour:
-        """The same contour travelled the other way."""
+        """The same contour in the opposite sense."""
         seg = self.segments[::-1]
         return Contour(np.column_stack([seg[:, 2:4], seg[:, 0:2], seg[:, 4:6], -seg[:, 6]]))
 
     def started_at(self, s: float) -> Contour:
-        """A closed contour started at the length ``s`` [mm] along it."""
+        """The same closed contour, started at the arc length ``s`` [mm]."""
         s = s % self.length
         if s <= JOIN_MM or self.length - s <= JOIN_MM:
             return self
         return Contour.join([self.part(s, self.length), self.part(0.0, s)])
 
     def part(self, s0: float, s1: float) -> Contour:
-        """The part between the lengths s0 < s1 [mm]."""
+        """The part between the arc lengths s0 < s1 [mm]."""
         if not 0.0 <= s0 < s1 <= self.length + JOIN_MM:
             raise InputError(f"contour: part {s0:.6g}..{s1:.6g} mm: need 0 <= s0 < s1 <= {self.length:.6g}")
         inner = self.knots[(self.knots > s0 + JOIN_MM) & (self.knots < s1 - JOIN_MM)]
         cut = np.concatenate([[s0], inner, [min(s1, self.length)]])
         k = np.clip(np.searchsorted(self.knots, 0.5 * (cut[:-1] + cut[1:]), side="right") - 1, 0, None)
         p = self.at(cut)[0]
-        # exact ends where the cut is an end
+        # a cut at a joint gets the exact point of the joint
         for i, s in enumerate(cut):
             j = int(np.abs(self.knots - s).argmin())
             if abs(self.knots[j] - s) <= JOIN_MM:
@@ -231,7 +231,7 @@ class Contour:
         return Contour(np.column_stack([p[:-1], p[1:], self.segments[k, 4:6], sweep]))
 
     def moved(self, dx: float, dy: float, turn: float = 0.0, scale: float = 1.0) -> Contour:
-        """Scaled and turned [rad] about the origin, then moved by (dx, dy) [mm]."""
+        """The contour scaled and rotated by ``turn`` [rad] about the origin, then translated by (dx, dy) [mm]."""
         c, s = np.cos(turn) * scale, np.sin(turn) * scale
         R = np.array([[c, s], [-s, c]])
         seg = self.segments.copy()
@@ -241,7 +241,7 @@ class Contour:
         return Contour(seg)
 
     def flatten(self, chord_mm: float) -> Floats:
-        """(m, 2) points of a polyline that leaves the contour by at most ``chord_mm`` (vertices on the contour)."""
+        """(m, 2) points [mm] on the contour whose polyline deviates from it by at most ``chord_mm``."""
         out = [self.segments[:1, 0:2]]
         for (x0, y0, x1, y1, xc, yc, sweep), r in zip(self.segments, self.radii, strict=True):
             if sweep != 0.0:
@@ -277,7 +277,7 @@ class Region:
 
     @staticmethod
     def of(contours: Sequence[Contour]) -> Region:
-        """The region between contours by even-odd nesting; each is turned so that the inside lies on its left.
+        """The region between contours by even-odd nesting; each is oriented so that the inside lies on its left.
 
         The contours must not cross one another. O(n^2) in the number of contours.
         """
@@ -305,7 +305,7 @@ class Region:
         return float(b[:, 0].min()), float(b[:, 1].min()), float(b[:, 2].max()), float(b[:, 3].max())
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """(m,) whether each of ``points`` (m, 2) [mm] lies inside; on the boundary either answer is given."""
+        """(m,) whether each of ``points`` (m, 2) [mm] lies inside; points on the boundary may count as either."""
         p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         total = np.zeros(len(p), dtype=np.int64)
         for c in self.contours:
@@ -313,16 +313,16 @@ class Region:
         return total > 0
 
     def flatten(self, chord_mm: float) -> Any:
-        """The region as a shapely polygon whose chords leave the arcs by at most ``chord_mm``.
+        """The region as a shapely polygon whose chords deviate from the arcs by at most ``chord_mm``.
 
-        The contours are laid from the greatest to the least, so that an island in a hole stands.
+        The contours are applied from the largest to the smallest, so that an island in a hole is retained.
         """
         import shapely
 
         ordered = sorted(self.contours, key=lambda c: -abs(c.area))
         out = shapely.Polygon()
-        for filled, alike in groupby(ordered, key=lambda c: c.area > 0.0):
-            rings = shapely.union_all([shapely.polygons(c.flatten(chord_mm)) for c in alike])
+        for filled, group in groupby(ordered, key=lambda c: c.area > 0.0):
+            rings = shapely.union_all([shapely.polygons(c.flatten(chord_mm)) for c in group])
             out = shapely.union(out, rings) if filled else shapely.difference(out, rings)
         return out
 
@@ -341,7 +341,7 @@ def winding(contour: Contour, points: Floats) -> NDArray[np.int64]:
             side = (x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)
             total += (up & (side > 0.0)).astype(np.int64) - (down & (side < 0.0)).astype(np.int64)
             continue
-        # an arc is monotone in y between its top and bottom: cut it there and test each piece by its half circle
+        # an arc is monotone in y between its top and bottom: split it there and test each piece on its half circle
         a0 = np.arctan2(y0 - yc, x0 - xc)
         a1 = a0 + sweep
         lo, hi = min(a0, a1), max(a0, a1)

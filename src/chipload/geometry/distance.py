@@ -1,7 +1,8 @@
 """Exact distance of points to lines and circular arcs.
 
 Notation: a segment is a row ``[x0, y0, x1, y1, xc, yc, sweep]`` as in ``contour.py``. The distance to a line is that to
-the nearest point between its ends; to an arc ``| |p - c| - r |`` where p lies in its sector, else that to an end.
+the nearest point between its ends. The distance to an arc is ``| |p - c| - r |`` if p lies in its sector, otherwise
+that to its nearer end.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from chipload.geometry.contour import Floats
 
 
 def distance(segments: ArrayLike, points: ArrayLike) -> Floats:
-    """Least distance of each point to any of the segments.
+    """Distance of each point from the nearest segment.
 
     Parameters
     ----------
@@ -23,7 +24,7 @@ def distance(segments: ArrayLike, points: ArrayLike) -> Floats:
 
     Returns
     -------
-    (m,) float [mm], ``inf`` where there are no segments.
+    (m,) float [mm]; ``inf`` if there are no segments.
 
     Examples
     --------
@@ -38,7 +39,7 @@ def distance(segments: ArrayLike, points: ArrayLike) -> Floats:
 
 
 def boxes(segments: Floats) -> Floats:
-    """(n, 4) ``[xmin, ymin, xmax, ymax]`` of each segment (n, 7) [mm], the bulge of the arcs included."""
+    """Bounding boxes (n, 4) ``[xmin, ymin, xmax, ymax]`` [mm] of segments (n, 7), including the bulge of arcs."""
     x0, y0, x1, y1, xc, yc, sweep = segments.T
     out = np.column_stack([np.minimum(x0, x1), np.minimum(y0, y1), np.maximum(x0, x1), np.maximum(y0, y1)])
     arc = sweep != 0.0

@@ -1,7 +1,7 @@
 """The reader of DXF drawings, which returns contours of lines and arcs in mm.
 
 Notation: OCS the frame of a flat entity, WCS that of the drawing; an entity with the extrusion (0, 0, -1) is seen from
-below: its x is mirrored and its arcs turn the other way. Bulge = tan(sweep / 4). Splines and ellipses become biarcs.
+below: its x is mirrored and its arcs are reversed. Bulge = tan(sweep / 4). Splines and ellipses become biarcs.
 
 Reference: Autodesk, DXF Reference, group codes of the ENTITIES section.
 """
@@ -24,13 +24,13 @@ from chipload.geometry.chains import Drawing, chained
 from chipload.geometry.contour import JOIN_MM, Contour, Floats
 from chipload.units import MM_PER
 
-#: $INSUNITS of the header
+#: unit of each value of $INSUNITS in the header
 INSUNITS = {1: "inch", 2: "foot", 4: "mm", 5: "cm", 6: "m", 13: "um"}
-#: [bytes]
+#: largest file that is read [bytes]
 LARGEST_FILE = 500_000_000
-#: entities that are drawn lines, all others are dropped and reported
+#: entities that are curves; all others are dropped and reported
 DRAWN = ("LINE", "ARC", "CIRCLE", "LWPOLYLINE", "POLYLINE", "SPLINE", "ELLIPSE")
-#: an entity is flat if its z stays within this [units of the drawing]
+#: greatest range of z of a flat entity [units of the drawing]
 FLAT = 1e-6
 _ENTITY = re.compile(
     rb"\n[ \t]*0[ \t]*\r?\n[ \t]*(?:LINE|ARC|CIRCLE|LWPOLYLINE|POLYLINE|VERTEX|SPLINE|ELLIPSE|INSERT|POINT|TEXT|MTEXT|"
@@ -49,21 +49,21 @@ def read_dxf(
     tolerance_mm: float = 0.001,
     max_entities: int = 200_000,
 ) -> Drawing:
-    """Contours of the model space of a DXF file, each layer joined by itself.
+    """Contours of the model space of a DXF file; the lines of each layer are joined separately.
 
     Parameters
     ----------
     path : the file, text or binary DXF
     units : unit of the numbers (``mm``, ``inch`` ...), whatever the header states; a disagreement is a finding
     units_if_unstated : unit where the header names none
-    layers : names of the layers to read, case ignored; by default all that the drawing shows: neither off nor frozen
+    layers : names of the layers to read, ignoring case; by default all layers that are neither off nor frozen
     join_mm : widest gap [mm] that is closed
-    tolerance_mm : how far [mm] arcs may leave a spline or an ellipse
-    max_entities : most entities that are read
+    tolerance_mm : greatest deviation [mm] of the arcs from a spline or an ellipse
+    max_entities : greatest number of entities that are read
 
     Returns
     -------
-    Drawing in mm. Blocks are exploded; text, dimensions, points and the like are dropped with a finding.
+    Drawing in mm. Blocks are exploded. Text, dimensions, points and other entities are dropped with a finding.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def read_dxf(
 
 
 def _hidden(layers: Sequence[Any]) -> dict[str, str]:
-    """Layers that the drawing does not show, and how it hides them."""
+    """Names of the layers that are hidden, in lower case, each with `off` or `frozen`."""
     out = {}
     for layer in layers:
         how = "off" if layer.is_off() else "frozen" if layer.is_frozen() else ""
@@ -142,7 +142,7 @@ def _hidden(layers: Sequence[Any]) -> dict[str, str]:
 
 
 def _left_out(count: Counter[str], hidden: dict[str, str]) -> Iterator[Finding]:
-    """What was not read of layers that are hidden."""
+    """A finding for each hidden layer whose entities were not read."""
     for layer, n in sorted(count.items()):
         what = f"layer {layer!r} is {hidden[layer.casefold()]}: {n} entit{'y' if n == 1 else 'ies'} not read"
         yield Finding("dxf-hidden", 0, f"{what}; part.layers = [{layer!r}] reads it")
@@ -153,7 +153,7 @@ def _too_many(file: Path, count: str, most: int, what: str = "entities") -> str:
 
 
 def _scan(file: Path, max_entities: int) -> None:
-    """Refuse by the bytes alone what is missing, is no DXF or is too large."""
+    """Refuse a file that is missing, is not DXF or is too large, without parsing it."""
     if not is_file(file):
         raise InputError(f"part.file = {file}: no such file")
     entities = points = 0
@@ -168,7 +168,7 @@ def _scan(file: Path, max_entities: int) -> None:
                 if b"SECTION" not in data or b"\0" in data[:4096]:
                     raise InputError(f"part.file = {file.name}: not a DXF drawing")
                 started = True
-            # what lies across two blocks is counted with the later one
+            # a match across two blocks is counted with the later block
             cut = data.rfind(b"\n", 0, max(len(data) - 64, 0)) if len(block) == 1 << 22 else len(data)
             cut = len(data) if cut < 0 else cut
             entities += sum(1 for m in _ENTITY.finditer(data) if m.start() < cut)
@@ -183,12 +183,12 @@ def _scan(file: Path, max_entities: int) -> None:
 
 
 def _load(file: Path, findings: list[Finding]) -> Any:
-    """The ezdxf document, recovered if it is damaged."""
+    """The ezdxf document; a damaged file is recovered."""
     import ezdxf
     from ezdxf import recover
 
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
-    # what a damaged file can make the parser raise is not limited to its own errors
+    # on a damaged file the parser also raises errors that are not its own
     try:
         return ezdxf.readfile(file)
     except Exception as err:
@@ -205,7 +205,7 @@ def _load(file: Path, findings: list[Finding]) -> Any:
 def _modelspace(doc: Any, file: Path) -> Any:
     try:
         return doc.modelspace()
-    except Exception as err:  # of the parser's own classes too
+    except Exception as err:  # errors of the parser have several base classes
         raise InputError(f"part.file = {file.name}: damaged: no model space: {_line(err)}") from None
 
 
@@ -214,43 +214,44 @@ def _line(err: Exception) -> str:
     return text[:120].rstrip(".")
 
 
-def _unit(doc: Any, file: Path, units: str | None, if_unsaid: str | None, findings: list[Finding]) -> str:
+def _unit(doc: Any, file: Path, units: str | None, if_unstated: str | None, findings: list[Finding]) -> str:
     try:
         code = int(doc.header.get("$INSUNITS", 0) or 0)
-    except Exception:  # of the parser's own classes too
+    except Exception:  # errors of the parser have several base classes
         code = 0
-    said = INSUNITS.get(code)
+    stated = INSUNITS.get(code)
     if units is not None:
-        if said is not None and said != units:
-            findings.append(Finding("dxf-units", 0, f"the header states {said}; read as {units}, as part.units says"))
+        if stated is not None and stated != units:
+            text = f"the header states {stated}; read as {units}, as part.units states"
+            findings.append(Finding("dxf-units", 0, text))
         return units
-    if said is not None:
-        return said
+    if stated is not None:
+        return stated
     if code != 0:
         raise InputError(f"part.file = {file.name}: $INSUNITS = {code} is not read: state part.units")
-    if if_unsaid is None:
+    if if_unstated is None:
         raise InputError(
             f"part.file = {file.name}: the header names no unit: state part.units_if_unstated or part.units"
         )
-    findings.append(Finding("dxf-units", 0, f"the header names no unit: read as {if_unsaid}"))
-    return if_unsaid
+    findings.append(Finding("dxf-units", 0, f"the header names no unit: read as {if_unstated}"))
+    return if_unstated
 
 
 def _entities(space: Any, inside: str | None, findings: list[Finding], depth: int = 0) -> Iterator[tuple[Any, str]]:
-    """Entities with their layer, None for a reference to a block, so that references are counted too.
+    """Entities with their layers; None stands for a reference to a block, so that references are counted too.
 
-    What a block has on layer 0 lies on the layer of its reference.
+    Entities of a block on layer 0 belong to the layer of the reference.
     """
     for entity in _sound(space, findings):
         try:
             layer = str(entity.dxf.get("layer", "0"))
             layer = inside if inside is not None and layer == "0" else layer
-            several = entity.dxftype() == "INSERT" and depth < 16
-            repeated = entity.multi_insert() if several and entity.mcount > 1 else (entity,)
+            is_block = entity.dxftype() == "INSERT" and depth < 16
+            repeated = entity.multi_insert() if is_block and entity.mcount > 1 else (entity,)
         except Exception as err:
             findings.append(Finding("dxf-skipped", 0, f"an entity is damaged, dropped: {_line(err)}"))
             continue
-        if several:
+        if is_block:
             for reference in _sound(repeated, findings):
                 yield None, layer
                 yield from _entities(reference.virtual_entities(), layer, findings, depth + 1)
@@ -259,11 +260,11 @@ def _entities(space: Any, inside: str | None, findings: list[Finding], depth: in
 
 
 def _sound(entities: Any, findings: list[Finding]) -> Iterator[Any]:
-    """Entities until the parser fails on one: what comes after it in a block is lost, and said."""
-    left = iter(entities)
+    """Entities up to the first on which the parser fails; a finding reports that the rest is dropped."""
+    remaining = iter(entities)
     while True:
         try:
-            entity = next(left)
+            entity = next(remaining)
         except StopIteration:
             return
         except Exception as err:
@@ -273,13 +274,13 @@ def _sound(entities: Any, findings: list[Finding]) -> Iterator[Any]:
 
 
 class _Reader:
-    """Entities to rows of segments in mm."""
+    """Conversion of entities to rows of segments in mm."""
 
     def __init__(self, file: Path, mm: float, tolerance_mm: float) -> None:
         self.file, self.mm, self.tolerance_mm = file, mm, tolerance_mm
 
     def rows(self, entity: Any, layer: str, findings: list[Finding]) -> Floats | None:
-        """(n, 7) segments [mm] of an entity, none if it has no length; None if it is not a line."""
+        """(n, 7) segments [mm] of an entity, n = 0 if it has no length; None if it is not a curve."""
         kind = entity.dxftype()
         if kind not in DRAWN or (kind == "POLYLINE" and not (entity.is_2d_polyline or entity.is_3d_polyline)):
             return None
@@ -288,7 +289,7 @@ class _Reader:
             made = getattr(self, "_" + kind.lower())(entity, what)
         except InputError:
             raise
-        except Exception as err:  # of the parser's own classes too, and what damaged values make of them
+        except Exception as err:  # errors of the parser, and those that damaged values cause
             findings.append(Finding("dxf-skipped", 0, f"{kind} on layer {layer!r} is damaged, dropped: {_line(err)}"))
             return np.zeros((0, 7))
         if made is None:
@@ -300,7 +301,7 @@ class _Reader:
         return rows
 
     def _flat(self, points: Sequence[Any], what: str) -> Floats:
-        """(n, 2) points of the drawing in mm, all at one height."""
+        """(n, 2) points [mm] of an entity; refuses points that are not at one height."""
         p = np.array([tuple(q) for q in points], dtype=np.float64).reshape(-1, 3)
         if not np.isfinite(p).all():
             raise InputError(f"{what} has a coordinate that is not a finite number")
@@ -310,7 +311,7 @@ class _Reader:
         return p[:, :2] * self.mm
 
     def _side(self, entity: Any, what: str) -> float:
-        """+1 seen from above, -1 from below."""
+        """1 if the entity is seen from above, -1 if from below."""
         e = np.array(tuple(entity.dxf.extrusion), dtype=np.float64)
         if not np.isfinite(e).all() or np.hypot(e[0], e[1]) > 1e-6 * abs(e[2]):
             raise InputError(
@@ -345,7 +346,7 @@ class _Reader:
         return self._bulged(v, bool(entity.closed), self._side(entity, what), what)
 
     def _polyline(self, entity: Any, what: str) -> Any:
-        # the frame of a spline fit (16) is not drawn
+        # control points of a spline fit (flag 16) are not on the curve
         vertices = [v for v in entity.vertices if not v.dxf.flags & 16]
         p = self._flat([v.dxf.location for v in vertices], what) / self.mm
         flat = bool(entity.is_2d_polyline)
@@ -400,7 +401,7 @@ class _Reader:
 
     @staticmethod
     def _ring(seg: Floats, closed: bool) -> Floats:
-        """Rows whose last end is the first start, where the curve is closed."""
+        """Segments of a curve; the end of a closed curve is set to its start."""
         out = seg.copy()
         if closed:
             out[-1, 2:4] = out[0, 0:2]

@@ -1,7 +1,7 @@
-"""Conversion of contours that cross, touch or overlap into separate contours of the same area (even-odd rule).
+"""Conversion of contours that cross, touch or overlap into separate contours that bound the same area (even-odd rule).
 
-Notation: a **piece** runs along a contour from one meeting of contours to the next; it bounds the area if it has an
-odd number of windings about the one of its sides and an even number about the other.
+Notation: a **piece** runs along a contour from one intersection of contours to the next. It bounds the area if the
+winding number is odd on one of its sides and even on the other.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from chipload.geometry.split import (
     split_segments,
 )
 
-#: how far beside a piece [mm] its sides are looked at, as a share of its length and at most
-BESIDE, BESIDE_MM = 1e-3, 1e-6
+#: distance from a piece at which its sides are tested: share of its length, and upper bound [mm]
+_PROBE, _PROBE_MM = 1e-3, 1e-6
 
 
 def even_odd(contours: Sequence[Contour]) -> tuple[tuple[Contour, ...], Floats]:
-    """Contours of the area that an odd number of windings encloses, and where the given ones met.
+    """Contours of the area that has an odd winding number, and the places where the given contours meet.
 
     Parameters
     ----------
-    contours : closed; each may cross, touch or retrace itself and others
+    contours : closed contours; each may cross, touch or retrace itself and others
 
     Returns
     -------
-    The contours, and places (k, 2) [mm]. Contours that meet nowhere are returned as they are, with no place. Otherwise
-    the inside is on the left of each; none crosses another, but they may share single points.
+    The contours, and places (k, 2) [mm]. Contours that do not meet are returned unchanged, with k = 0. Otherwise
+    the inside is on the left of each contour, and contours do not cross but may share single points.
 
     Raises
     ------
     InputError
-        A contour is open, or what is left does not close.
+        A contour is open, or the pieces that bound the area do not close.
 
     Examples
     --------
@@ -64,16 +64,16 @@ def even_odd(contours: Sequence[Contour]) -> tuple[tuple[Contour, ...], Floats]:
             return given, found
         places = found
         pieces, _ = split_segments(raw, tol, snap)
-        kept, rows = _bounding(given, raw, pieces)
-        made = chained_segments(RawSegments.plain(rows), kept, 1.0, tol)
+        bounding, rows = _bounding(given, raw, pieces)
+        made = chained_segments(RawSegments.plain(rows), bounding, 1.0, tol)
         if made and all(c.closed for c in made):
             return made, places
     x, y = places[0]
-    raise InputError(f"part: contours cross at ({x:.6g}, {y:.6g}) and enclose no definite area: draw one of them")
+    raise InputError(f"part: contours cross at ({x:.6g}, {y:.6g}) and enclose no definite area: draw only one of them")
 
 
 def _raw(contours: Sequence[Contour]) -> RawSegments:
-    """The segments of closed contours, each of which names the next of its contour."""
+    """The segments of closed contours; each segment refers to the next one of its contour."""
     rows = np.vstack([c.segments for c in contours])
     follow, first = [], 0
     for c in contours:
@@ -84,13 +84,13 @@ def _raw(contours: Sequence[Contour]) -> RawSegments:
 
 
 def _bounding(contours: Sequence[Contour], raw: RawSegments, pieces: SplitSegments) -> tuple[SplitSegments, Floats]:
-    """The pieces that bound the area, each once and turned so that it lies on their left, and their segments."""
+    """The pieces that bound the area, each once and with the area on its left, and their segments (m, 7)."""
     rows = rows_of(raw, pieces)
     middle, normal = _middles(rows)
     length = np.hypot(*(rows[:, 2:4] - rows[:, 0:2]).T)
-    step = np.minimum(np.where(length > 0.0, BESIDE * length, BESIDE_MM), BESIDE_MM)[:, None] * normal
+    step = np.minimum(np.where(length > 0.0, _PROBE * length, _PROBE_MM), _PROBE_MM)[:, None] * normal
     left, right = _odd(contours, middle + step), _odd(contours, middle - step)
-    pick = np.flatnonzero((left != right) & _first_of_its_like(pieces, middle))
+    pick = np.flatnonzero((left != right) & _is_first(pieces, middle))
     rows, node, back = rows[pick], pieces.node[pick], right[pick]
     rows[back] = np.column_stack([rows[:, 2:4], rows[:, 0:2], rows[:, 4:6], -rows[:, 6]])[back]
     node = np.where(back[:, None], node[:, ::-1], node)
@@ -98,8 +98,8 @@ def _bounding(contours: Sequence[Contour], raw: RawSegments, pieces: SplitSegmen
     return SplitSegments(np.arange(len(pick)), span, node, pieces.place), rows
 
 
-def _first_of_its_like(pieces: SplitSegments, middle: Floats) -> NDArray[np.bool_]:
-    """(m,) pieces that run between two nodes through one middle are one; which ones come first."""
+def _is_first(pieces: SplitSegments, middle: Floats) -> NDArray[np.bool_]:
+    """(m,) whether each piece is the first of those with the same end nodes and the same middle."""
     ends = np.sort(pieces.node, axis=1)
     key = np.column_stack([ends, np.round(middle, 6)])
     out = np.zeros(len(key), dtype=np.bool_)
@@ -108,7 +108,7 @@ def _first_of_its_like(pieces: SplitSegments, middle: Floats) -> NDArray[np.bool
 
 
 def _middles(rows: Floats) -> tuple[Floats, Floats]:
-    """(m, 2) middles of segments, and unit vectors to their left."""
+    """(m, 2) midpoints of segments, and the unit normals (m, 2) to their left."""
     arc = rows[:, 6:7] != 0.0
     v = rows[:, 0:2] - rows[:, 4:6]
     c, s = np.cos(0.5 * rows[:, 6:7]), np.sin(0.5 * rows[:, 6:7])
@@ -120,7 +120,7 @@ def _middles(rows: Floats) -> tuple[Floats, Floats]:
 
 
 def _odd(contours: Sequence[Contour], points: Floats) -> NDArray[np.bool_]:
-    """(m,) whether an odd number of windings goes about each point."""
+    """(m,) whether the winding number about each point is odd."""
     total = np.zeros(len(points), dtype=np.int64)
     for c in contours:
         total += winding(c, points)

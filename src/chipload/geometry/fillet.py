@@ -1,12 +1,13 @@
-"""The fillet between the side of a blade and the hub: the surface that a rolling ball leaves.
+"""The fillet of constant radius between the side of a blade and the hub: the envelope of a rolling ball.
 
 Notation: side S(u, v) with its normal N out of the metal, v = 0 at the hub; hub of revolution with its normal M into
-the channel; a [mm] radius of the ball. Its centre C(u) = S(u, v*) + a N is a from the hub; it touches the side at
-S(u, v*) and the hub at C - a M. The fillet is the arc of C from -M to -N; both are across the way of the centre, so
-that this is the canal surface of the ball. Beyond its ends the hub goes on as its spline does.
+the channel; a [mm] radius of the ball. The centre C(u) = S(u, v*) + a N of the ball is at distance a from the hub. The
+ball touches the side at S(u, v*) and the hub at C - a M. The fillet is the arc about C from -M to -N. Both directions
+are perpendicular to the path of the centre, so the fillet is the canal surface of the ball. Beyond its ends the hub is
+extrapolated by its spline.
 
-Of the fillet the parameters are u and w, from 0 at the hub to 1 at the side; the side above it is S over u and the
-share v' of what is left of v.
+The parameters of the fillet are u and w; w runs from 0 at the hub to 1 at the side. The side above the fillet is S over
+u and v', with v = v* + v' (1 - v*).
 
 Reference: [Rossignac1984].
 """
@@ -24,15 +25,15 @@ from chipload.geometry.revolve import Revolved
 
 Floats = NDArray[np.float64]
 
-#: how far the patches may leave the exact surfaces [mm]
+#: greatest deviation of the patches from the exact surfaces [mm]
 FIT = 1e-3
-#: share of its length by which a hub goes on
+#: share of its length by which the hub is extended at each end
 BEYOND = 0.2
 _COARSE, _NEWTON, _STEPS = 101, 8, 60
-_MET = 1e-11  # [mm] the ball is met
-_ARC = 13  # points of an arc
-_ROUNDS = 9  # of halving the pieces along a side
-_UP = (17, 33, 65, 129)  # points of a side above its fillet
+_MET = 1e-11  # [mm] tolerance of the contact of ball and hub
+_ARC = 13  # points along an arc of the fillet
+_ROUNDS = 9  # most refinements along u
+_UP = (17, 33, 65, 129)  # numbers of points along v above the fillet that the fit tries
 _SCAN = np.linspace(0.0, 1.0, 65)
 
 
@@ -42,10 +43,10 @@ class Filleted:
 
     Attributes
     ----------
-    side : above the fillet
-    fillet : u as of the side, v from the hub to the side; normal out of the metal
-    height : greatest length of the side under the fillet [mm]
-    off : how far the patches leave the exact surfaces [mm], as far as was looked
+    side : the side above the fillet
+    fillet : u as on the side, v from the hub to the side; the normal points out of the metal
+    height : greatest length of the side that the fillet covers [mm]
+    off : greatest measured deviation of the patches from the exact surfaces [mm]
     """
 
     side: BSplinePatch
@@ -55,12 +56,18 @@ class Filleted:
 
 
 def filleted(side: BSplinePatch, hub: Revolved, radius: float) -> Filleted:
-    """A side with a fillet of a radius [mm] at the hub.
+    """A side with a fillet at the hub.
+
+    Parameters
+    ----------
+    side : normal out of the metal, v = 0 at the hub
+    hub : normal into the channel
+    radius : of the fillet [mm]
 
     Raises
     ------
     InputError
-        No ball of that radius touches the side and the hub, or the patches leave the exact surfaces.
+        No ball of that radius touches both side and hub, or the patches deviate by more than ``FIT``.
     """
     ends = np.unique(side.knots_u)
     u, off = np.sort(np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])])), np.inf
@@ -76,7 +83,7 @@ def filleted(side: BSplinePatch, hub: Revolved, radius: float) -> Filleted:
 
 
 def _made(side: BSplinePatch, hub: Revolved, radius: float, u: Floats) -> tuple[Filleted, Floats]:
-    """Through what is exact at the places u (n,), and how far that is left between them (n - 1,) [mm]."""
+    """The patches through exact points at u (n,), and their deviation midway between these places (n - 1,) [mm]."""
     middle = 0.5 * (u[1:] + u[:-1])
     v, between = (_touched(side, hub, radius, x) for x in (u, middle))
     w = np.linspace(0.0, 1.0, _ARC)
@@ -90,25 +97,25 @@ def _made(side: BSplinePatch, hub: Revolved, radius: float, u: Floats) -> tuple[
     away = np.linalg.norm(_grid(made, middle, x) - exact, axis=2).max(axis=1)
     above = _above(side, u, v)
     share = np.linspace(0.0, 1.0, 33)
-    left = _grid(above, middle, share) - _between(side, middle, between + share[:, None] * (1.0 - between))
-    away = np.maximum(away, np.linalg.norm(left, axis=2).max(axis=1))
-    under = _between(side, u, share[:, None] * v)
-    height = float(np.linalg.norm(np.diff(under, axis=1), axis=2).sum(axis=1).max())
+    error = _grid(above, middle, share) - _between(side, middle, between + share[:, None] * (1.0 - between))
+    away = np.maximum(away, np.linalg.norm(error, axis=2).max(axis=1))
+    covered = _between(side, u, share[:, None] * v)
+    height = float(np.linalg.norm(np.diff(covered, axis=1), axis=2).sum(axis=1).max())
     return Filleted(above, made, height, float(away.max())), away
 
 
 def _grid(patch: BSplinePatch, u: Floats, v: Floats) -> Floats:
-    """(n, m, 3) points at u (n,) and v (m,)."""
+    """Points (n, m, 3) [mm] of a patch at u (n,) and v (m,)."""
     return _between(patch, u, np.repeat(v[:, None], len(u), axis=1))
 
 
 def _between(patch: BSplinePatch, u: Floats, v: Floats) -> Floats:
-    """(n, m, 3) points at u (n,), each with its own v (m, n)."""
+    """Points (n, m, 3) [mm] of a patch at u (n,), each with its own v (m, n)."""
     return patch.at(np.repeat(u, len(v)), v.T.ravel()).reshape(len(u), len(v), 3)
 
 
 def from_hub(hub: Revolved, points: Floats) -> tuple[Floats, Floats]:
-    """Distance (n,) [mm] of points (n, 3) from a hub, above 0 on the side of its normal, and that normal (n, 3)."""
+    """Distance (n,) [mm] of points (n, 3) from a hub, positive on the side of its normal, and that normal (n, 3)."""
     r, z = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
     p, s = np.stack([r, z], axis=-1), hub.nearest(r, z, _COARSE)
     for _ in range(_NEWTON):
@@ -130,7 +137,7 @@ def _centre(side: BSplinePatch, radius: float, u: Floats, v: Floats) -> Floats:
 
 
 def _touched(side: BSplinePatch, hub: Revolved, radius: float, u: Floats | list[float]) -> Floats:
-    """v* (n,): the lowest place of a side at which the ball touches the hub too."""
+    """v* (n,): the least v at which a ball that touches the side touches the hub too."""
     at = np.asarray(u, dtype=np.float64)
 
     def clearance(v: Floats) -> Floats:
@@ -153,7 +160,7 @@ def _touched(side: BSplinePatch, hub: Revolved, radius: float, u: Floats | list[
     else:
         where = at[np.isnan(high).argmax()]
         raise InputError(f"a fillet of {radius:g} mm reaches above the side at u = {where:.3g}")
-    # false position, the end that stays weighed by half
+    # false position; the value at the end that stays is halved (Illinois)
     out: Floats = high
     for _ in range(_STEPS):
         out = low - below * (high - low) / (above - below)
@@ -167,7 +174,7 @@ def _touched(side: BSplinePatch, hub: Revolved, radius: float, u: Floats | list[
 
 
 def _arcs(side: BSplinePatch, hub: Revolved, radius: float, u: Floats, v: Floats, w: Floats) -> Floats:
-    """(n, m, 3) points of the fillet at u (n,), its v* (n,), w (m,)."""
+    """Points (n, m, 3) [mm] of the fillet at u (n,) with v* (n,), and w (m,)."""
     C, N = _centre(side, radius, u, v), side.normal(u, v)
     _, M = from_hub(hub, C)
     angle = np.arctan2(np.linalg.norm(np.cross(N, M), axis=1), (N * M).sum(axis=1))[:, None]
@@ -177,7 +184,7 @@ def _arcs(side: BSplinePatch, hub: Revolved, radius: float, u: Floats, v: Floats
 
 
 def _above(side: BSplinePatch, u: Floats, v: Floats) -> BSplinePatch:
-    """The side above v* at u, through as many points up it as keep within a tenth of what it may leave it."""
+    """The side above v* at u, with the fewest points along v that keep the deviation within ``0.1 FIT``."""
     made = side
     for count in _UP:
         x = np.linspace(0.0, 1.0, count)

@@ -1,11 +1,12 @@
 """Reading of files by native code in a separate process with limits of time and memory.
 
-The CAD kernel ends the process, or never ends, on some damaged files. What is asked of it is therefore done in a child:
-the same interpreter, which reads one file and answers calls on it until it is closed. Its death is an ``InputError``.
+On some damaged files the CAD kernel crashes or does not return. Therefore it runs in a child process: the same
+interpreter, which reads one file and answers calls until it is closed. If the child ends early, the caller gets an
+``InputError``.
 
-Notation: a message is a JSON value and the arrays in it, ``length | JSON | length | npy | ...``; an array stands in the
-JSON as ``{"array": number}``. Neither side executes what the other sends: functions are named by the parent alone and
-are those of :data:`SERVED`, and arrays hold numbers.
+Notation: a message is a JSON value followed by its arrays, ``length | JSON | length | npy | ...``; the JSON refers to
+an array as ``{"array": number}``. Neither side executes what the other sends: only the parent names functions, these
+must belong to :data:`SERVED`, and arrays contain numbers only.
 """
 
 from __future__ import annotations
@@ -30,13 +31,13 @@ import numpy as np
 from chipload.errors import InputError
 from chipload.lazy import require_extra
 
-#: modules whose functions a child may be asked for, each a function of the shape and of plain values
+#: modules whose functions a child executes; their parameters are the shape and plain values
 SERVED = ("brep", "step", "step_faces", "step_meridian", "step_patch", "step_roles", "step_side")
-#: time of the processor [s] for each call, and more for each MB of the file
+#: limit of processor time [s] for each call, and addition for each MB of the file
 CALL_S, MB_S = 10.0, 10.0
-#: a call may take so many times as long by the clock, for the processor may be shared
+#: limit of elapsed time over that of processor time, since the processor may be shared
 PATIENCE = 8.0
-#: address space of a child [bytes]
+#: limit of the address space of a child [bytes]
 MEMORY = 4 << 30
 #: largest message [bytes]
 LARGEST = 1 << 30
@@ -44,13 +45,13 @@ _END = struct.Struct("<Q")
 
 
 class Isolated:
-    """A child that has read one file, or will when it is first asked.
+    """A child process that reads one file, at the first call, and answers calls on it.
 
     Parameters
     ----------
     file : the file
-    key : what a message calls it, as ``part.file``
-    reader : ``module.function`` of :data:`SERVED` that reads it
+    key : job key that names the file, for messages, such as ``part.file``
+    reader : function that reads it, ``module.name`` with a module of :data:`SERVED`
     """
 
     def __init__(self, file: Path, key: str, reader: str) -> None:
@@ -71,12 +72,12 @@ class Isolated:
             self._process = None
 
     def call(self, function: str, *values: Any) -> Any:
-        """What a function, ``module.name``, says of the file; ``values`` and the answer are plain, or arrays.
+        """The result of a function, ``module.name``, on the file; ``values`` and the result are plain values or arrays.
 
         Raises
         ------
         InputError
-            That of the function; or the CAD kernel is not installed, or the child has ended, took too long or too
+            The function raised it, the CAD kernel is not installed, or the child ended, took too long or needed too
             much memory.
         """
         try:
@@ -109,7 +110,7 @@ class Isolated:
         return answer
 
     def _why(self, process: subprocess.Popen[bytes]) -> str:
-        """How the child ended, in words."""
+        """The reason why the child ended, for a message."""
         try:
             code = process.wait(0.5)
         except subprocess.TimeoutExpired:
@@ -118,27 +119,33 @@ class Isolated:
             return self._slow()
         if code == -getattr(signal, "SIGKILL", 0):
             return _TOO_LARGE
-        return "damaged: the CAD kernel crashes on it: write it again from CAD, or check it there"
+        return "damaged: the CAD kernel crashes on it: export it again from CAD, or repair it there"
 
     def _slow(self) -> str:
         return (
-            f"the CAD kernel did not finish it within {self._seconds:.0f} s: write the part alone, or check it in CAD"
+            f"the CAD kernel did not finish it within {self._seconds:.0f} s: export the part alone, or repair it in CAD"
         )
 
 
-_TOO_LARGE = (
-    f"the CAD kernel needs more than {MEMORY >> 30} GiB for it: write the part alone, or take a larger chord_mm"
-)
+_TOO_LARGE = f"the CAD kernel needs more than {MEMORY >> 30} GiB for it: export the part alone, or raise chord_mm"
 
 
 class _Timed:
-    """Reads from a pipe until a moment of the monotonic clock."""
+    """Reader of a pipe with a deadline of the monotonic clock [s]."""
 
     def __init__(self, pipe: IO[bytes], until: float) -> None:
         self.pipe, self.until = pipe, until
 
     def read(self, count: int) -> bytes:
-        """``count`` bytes; TimeoutError where they do not come, EOFError where the other side has ended."""
+        """``count`` bytes.
+
+        Raises
+        ------
+        TimeoutError
+            They do not arrive before the deadline.
+        EOFError
+            The other side has closed the pipe.
+        """
         out = bytearray()
         with selectors.DefaultSelector() as ready:
             ready.register(self.pipe, selectors.EVENT_READ)
@@ -153,20 +160,20 @@ class _Timed:
 
 
 def packed(value: Any) -> bytes:
-    """A message of a value: None, numbers, texts, arrays, and lists and mappings of them."""
+    """The message for a value: None, numbers, texts, arrays, and lists and mappings of them."""
     arrays: list[bytes] = []
 
-    def plain(held: Any) -> Any:
-        if isinstance(held, np.ndarray):
+    def plain(item: Any) -> Any:
+        if isinstance(item, np.ndarray):
             out = io.BytesIO()
-            np.save(out, np.ascontiguousarray(held), allow_pickle=False)
+            np.save(out, np.ascontiguousarray(item), allow_pickle=False)
             arrays.append(out.getvalue())
             return {"array": len(arrays) - 1}
-        if isinstance(held, np.generic):
-            return held.item()
-        if isinstance(held, dict):
-            return {"mapping": [[plain(k), plain(v)] for k, v in held.items()]}
-        return [plain(x) for x in held] if isinstance(held, (list, tuple)) else held
+        if isinstance(item, np.generic):
+            return item.item()
+        if isinstance(item, dict):
+            return {"mapping": [[plain(k), plain(v)] for k, v in item.items()]}
+        return [plain(x) for x in item] if isinstance(item, (list, tuple)) else item
 
     text = json.dumps(plain(value)).encode()
     parts = [text, *arrays]
@@ -174,7 +181,14 @@ def packed(value: Any) -> bytes:
 
 
 def unpacked(source: Any) -> Any:
-    """The value of a message that ``source.read(count)`` gives; tuples come back as lists.
+    """The value of the message that ``source.read(count)`` returns; tuples become lists.
+
+    Raises
+    ------
+    EOFError
+        The source ends within the message.
+    OSError
+        The message is larger than ``LARGEST``.
 
     >>> unpacked(io.BytesIO(packed([1, (2.5, "a"), {"x": np.arange(2)}, None])))
     [1, [2.5, 'a'], {'x': array([0, 1])}, None]
@@ -195,21 +209,21 @@ def unpacked(source: Any) -> Any:
         parts.append(source.read(size))
     arrays = [np.load(io.BytesIO(p), allow_pickle=False) for p in parts[1:]]
 
-    def whole(held: Any) -> Any:
-        if isinstance(held, dict):
-            if "array" in held:
-                return arrays[held["array"]]
-            return {whole(k): whole(v) for k, v in held["mapping"]}
-        return [whole(x) for x in held] if isinstance(held, list) else held
+    def whole(item: Any) -> Any:
+        if isinstance(item, dict):
+            if "array" in item:
+                return arrays[item["array"]]
+            return {whole(k): whole(v) for k, v in item["mapping"]}
+        return [whole(x) for x in item] if isinstance(item, list) else item
 
     return whole(json.loads(parts[0]))
 
 
 def _start() -> subprocess.Popen[bytes]:
-    """A child in a session of its own, so that Ctrl-C is its parent's to pass on."""
+    """A child process in a separate session, so that Ctrl-C reaches only the parent."""
     words = [sys.executable, "-P", "-m", "chipload.geometry.isolated"]
     pipe = subprocess.PIPE
-    # one thread of the linear algebra: a pool would take address space that is limited
+    # one thread for linear algebra: a pool would use up the limited address space
     threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
         return subprocess.Popen(
@@ -240,7 +254,7 @@ def _limit() -> None:
 
 
 def _allow(seconds: float) -> None:
-    """Let this process have so much more time of the processor."""
+    """Raise the limit of processor time to ``seconds`` from now."""
     if sys.platform != "win32":
         import resource
 
@@ -257,9 +271,10 @@ def _function(name: Any) -> Any:
 
 
 def _serve() -> None:
-    """Answer the parent until it goes: the first call reads the file, later ones get what was read before their values.
+    """Answer the parent until it closes the pipe.
 
-    What the kernel prints goes nowhere: the pipe is the parent's.
+    The first call reads the file; its result is the first argument of all later calls. Output of the kernel is
+    discarded, because standard output is the pipe to the parent.
     """
     source, target = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     nowhere = os.open(os.devnull, os.O_RDWR)

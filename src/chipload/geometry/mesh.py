@@ -1,9 +1,9 @@
-"""Closed triangle meshes: read from STL and STEP, checked, and cut by horizontal planes.
+"""Closed triangle meshes: reading from STL and STEP, checks, and sections by horizontal planes.
 
 Notation: a **ring** is a closed chain of points in a plane z = h with the solid on its left: counter-clockwise around
-solid, clockwise around a hole. A vertex on the plane counts as above it, so that a plane never meets a vertex and each
-face that it cuts has one edge that goes down through it, where the chain enters the face, and one that goes up, where
-it leaves: the rings are a matter of counting alone and close whatever the rounding.
+solid, clockwise around a hole. A vertex on the plane counts as above it, so that a plane never contains a vertex. Each
+face that the plane cuts has one edge that goes down through it, where the chain enters the face, and one that goes up,
+where the chain leaves. The rings follow from the topology alone, so they close in spite of rounding.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from chipload.geometry.step import step_triangles
 from chipload.geometry.stl import read_stl
 from chipload.units import MM_PER
 
-#: coordinates are at most this [mm]
+#: greatest absolute value of a coordinate [mm]
 FARTHEST = 1e6
 
 Floats = NDArray[np.float64]
@@ -39,15 +39,16 @@ def read_mesh(
     Parameters
     ----------
     path : .stl, .stp or .step
-    unit : what one unit of an STL file is: um, mm, cm, m, inch or foot; STL does not say it, so it is not guessed. STEP
-        files say it themselves
-    chord_mm : how far [mm] a triangle may leave a surface of a STEP part
-    key : what the file is called in a message
+    unit : unit of length of an STL file: um, mm, cm, m, inch or foot. STL files do not state it, and it is not guessed;
+        STEP files state it
+    chord_mm : greatest deviation [mm] of a triangle from the surface of a STEP part
+    key : job key that names the file, for messages
 
     Raises
     ------
     InputError
-        The file is missing, of another kind or damaged, the unit or the chord is not stated, or the mesh is not closed.
+        The file is missing, of another type or damaged, the unit or ``chord_mm`` is not stated, or the mesh is not
+        closed.
     """
     file = Path(path)
     if not is_file(file):
@@ -55,7 +56,9 @@ def read_mesh(
     kind = file.suffix.lower()
     if kind in (".stp", ".step"):
         if chord_mm is None or not chord_mm > 0.0:
-            raise InputError(f"{key} = {file.name}: state how far a triangle may leave a surface: chord_mm above 0")
+            raise InputError(
+                f"{key} = {file.name}: state chord_mm above 0, the greatest deviation of a triangle from a surface"
+            )
         vertices, faces = step_triangles(file, chord_mm, key=key)
     elif kind == ".stl":
         if unit not in MM_PER:
@@ -64,11 +67,11 @@ def read_mesh(
         vertices, faces = corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int64).reshape(-1, 3)
     else:
         raise InputError(f"{key} = {file.name}: must be .stl, .stp or .step")
-    far = float(np.abs(vertices).max(initial=0.0))
-    if not far <= FARTHEST:
+    greatest = float(np.abs(vertices).max(initial=0.0))
+    if not greatest <= FARTHEST:
         raise InputError(
-            f"{key} = {file.name}: a vertex is {far:.4g} mm from the origin: must be at most {FARTHEST:g} mm: check "
-            "the unit, or export it again"
+            f"{key} = {file.name}: a vertex is {greatest:.4g} mm from the origin: must be at most {FARTHEST:g} mm: "
+            "check the unit, or export it again"
         )
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
@@ -81,7 +84,7 @@ def read_mesh(
 
 
 def open_edges(mesh: trimesh.Trimesh) -> int:
-    """Number of edges that are not met as often along as against; four faces at an edge may close a mesh."""
+    """Number of edges that the faces do not traverse equally often in both directions; four faces may share an edge."""
     edges = np.asarray(mesh.edges)
     along = np.where(edges[:, 0] < edges[:, 1], 1, -1)
     _, which = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
@@ -94,7 +97,7 @@ def require_closed(mesh: trimesh.Trimesh, name: str) -> None:
     Raises
     ------
     InputError
-        With the number of open edges.
+        The mesh has open edges; the message states how many.
     """
     count = open_edges(mesh)
     if count:
@@ -102,9 +105,9 @@ def require_closed(mesh: trimesh.Trimesh, name: str) -> None:
 
 
 def sections(mesh: trimesh.Trimesh, heights: Sequence[float] | Floats) -> list[MultiPolygon]:
-    """Sections of a closed mesh by the planes z = ``heights`` [mm]; where faces lie in the plane, that just below it.
+    """Sections of a closed mesh by the planes z = ``heights`` [mm]; for faces in a plane, the section just below it.
 
-    Overlapping bodies are joined; a ring that crosses itself is refined by counting its crossings even and odd.
+    Overlapping bodies are joined; a ring that crosses itself is resolved by the even-odd rule.
 
     Examples
     --------
@@ -126,7 +129,7 @@ def _rings(vertices: Floats, faces: Ints, h: float) -> list[Floats]:
     enter, leave = np.argmax(up & ~up_after, axis=1), np.argmax(~up & up_after, axis=1)
     first = np.sort(np.column_stack([f[rows, enter], after[rows, enter]]), axis=1)
     last = np.sort(np.column_stack([f[rows, leave], after[rows, leave]]), axis=1)
-    # the face that a chain comes to is one that it enters by the edge by which it left; of four faces any two
+    # a chain enters the next face by the edge by which it left the last one; four faces at an edge form any two pairs
     onward_of: Ints = np.empty(len(f), dtype=np.int64)
     onward_of[np.lexsort(last.T)] = np.lexsort(first.T)
     a, b = vertices[first[:, 0]], vertices[first[:, 1]]
@@ -148,7 +151,7 @@ def _rings(vertices: Floats, faces: Ints, h: float) -> list[Floats]:
 
 
 def _filled(rings: list[Floats]) -> MultiPolygon:
-    """What the rings enclose: from the largest to the smallest, solid is joined and holes are taken away."""
+    """The area that rings enclose: from the largest to the smallest, solids are added and holes are subtracted."""
     areas = [0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) for x, y in (r.T for r in rings)]
     order = sorted((i for i, area in enumerate(areas) if area != 0.0), key=lambda i: -abs(areas[i]))
     whole = Polygon()

@@ -1,14 +1,15 @@
-"""Parallel curves of contours and regions that stay lines and arcs.
+"""Parallel curves of contours and regions, as lines and arcs.
 
 Notation: d [mm] the signed distance, positive to the LEFT of travel; theta [rad] the angle by which a contour turns
 at a vertex; kappa [1/mm] the curvature, positive to the left; a **raw** segment is the parallel of one input segment
-before trimming: a line moved by d n, an arc of the same centre and the radius ``r - d`` (left turn) or ``r + d``;
-where d exceeds the radius it is gone. A vertex that turns away from the offset side opens the parallel there; an arc of
-radius ``|d|`` about the vertex links it.
+before trimming: a line moved by d n, or an arc of the same centre with the radius ``r - d`` (left turn) or ``r + d``
+(right turn). An arc whose parallel would have no positive radius has none. At a vertex that turns away from the offset
+side the raw segments do not meet; an arc of radius ``|d|`` about the vertex joins them.
 
-Every point of the parallel that is worth keeping lies at ``|d|`` from its foot and nowhere nearer to anything. So the
-raw segments are cut wherever they cross, touch or overlap, a piece is kept if its quarter points are no nearer than
-``|d| - tol`` to all input, and the kept pieces are chained by their ends. Measured beside OCP: docs/design/offsets.md.
+Every point of the trimmed parallel lies at distance ``|d|`` from the input and no nearer to any part of it. Therefore
+the raw segments are split wherever they cross, touch or overlap; a piece is retained if its quarter points are at least
+``|d| - tol`` from all input; and the retained pieces are chained by their ends. Comparison with OCP:
+docs/design/offsets.md.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ POINT_MM = 1e-9
 
 
 def offset(contours: Sequence[Contour], distance_mm: float) -> tuple[Contour, ...]:
-    """Trimmed parallel curves of all contours together, in their sense of travel.
+    """Parallel curves of contours, trimmed against all contours, in the sense of travel of the input.
 
     Parameters
     ----------
@@ -51,16 +52,16 @@ def offset(contours: Sequence[Contour], distance_mm: float) -> tuple[Contour, ..
     Returns
     -------
     Contours whose every point lies ``|d|`` from the nearest input point (to 1e-9 mm), closed or open, in the order of
-    the input; none where nothing is left. The parallel of an open chain ends square to its ends, without caps, and is
-    trimmed against both sides of everything. Where two parallels coincide (a slot of width exactly 2 d) those that run
-    opposite ways are both dropped, of those that run the same way one is kept.
+    the input; empty if trimming leaves no curve. The parallel of an open chain ends square to the ends of the chain,
+    without caps, and is trimmed against both sides of all contours. Of two parallels that coincide (a slot of width
+    exactly 2 d) both are dropped if they run in opposite directions, one if they run in the same direction.
 
     Raises
     ------
     InputError
         ``distance_mm`` is not finite.
     ChiploadError
-        The pieces do not close up within the widest tolerance, or an input contour crosses itself.
+        The pieces do not close within the largest tolerance, or an input contour crosses itself.
 
     Examples
     --------
@@ -72,10 +73,11 @@ def offset(contours: Sequence[Contour], distance_mm: float) -> tuple[Contour, ..
 
 
 def offset_region(region: Region, distance_mm: float) -> Region:
-    """The points of a region that are ``distance_mm`` from its boundary: positive insets, negative grows.
+    """A region inset by ``distance_mm`` [mm], or grown if it is negative.
 
-    Grown by ``-d`` every point within d of the region is added. The contours must not cross. The result has
-    the inside on the left; parts of no width are not in it. Raises as :func:`offset`.
+    An inset region consists of the points at least ``distance_mm`` from the boundary; a grown one also contains every
+    point within ``-distance_mm`` of the region. The contours must not cross. The inside of the result is on the left of
+    its contours; it has no parts of zero width. Raises as :func:`offset`.
 
     Examples
     --------
@@ -132,7 +134,7 @@ def _raw(contours: Sequence[Contour], d: float, both_sides: bool) -> RawSegments
 
 
 def _parallel(contour: Contour, d: float) -> tuple[Floats, Ints]:
-    """Raw segments (n, 7) of one contour with their joining arcs, and the next smooth one (n,) of each."""
+    """Raw segments (n, 7) of a contour with their joining arcs, and the tangential successor (n,) of each or -1."""
     seg = contour.segments
     count = len(seg)
     p0, p1, sweep = seg[:, 0:2], seg[:, 2:4], seg[:, 6]
@@ -160,11 +162,11 @@ def _parallel(contour: Contour, d: float) -> tuple[Floats, Ints]:
         theta = float(np.arctan2(t1[i, 0] * t0[j, 1] - t1[i, 1] * t0[j, 0], t1[i] @ t0[j]))
         gap = float(np.hypot(*(a[j] - b[i])))
         both = bool(alive[i] and alive[j])
-        # at a cusp the curvatures say to which side the contour turns back; a retraced way is linked on both
+        # at a cusp the curvatures decide to which side the contour turns back; a retraced path is joined on both sides
         cusp = abs(theta) > np.pi - 1e-9
         if cusp and kappa[i] + kappa[j] != 0.0:
             theta = -np.copysign(np.pi, kappa[i] + kappa[j])
-        # what moving both ends along the curve to the middle of the gap costs across it
+        # lateral error of moving both ends along the curve to the middle of the gap
         bow = abs(d) * theta**2 / 4.0 + gap**2 / 8.0 * (bend[i] + bend[j])
         if gap <= LADDER[0][1] or (both and bow < 2e-10 and 4.0 * gap < min(length[i], length[j])):
             b[i] = a[j] = 0.5 * (b[i] + a[j])
@@ -194,7 +196,7 @@ def _parallel(contour: Contour, d: float) -> tuple[Floats, Ints]:
     smooth = np.array(follow, dtype=np.int64)
     smooth[smooth == len(out)] = 0 if contour.closed else -1
     out[:, 6] = swept(out, out[:, 0:2], out[:, 2:4], out[:, 6])
-    # a segment drawn shorter than a point between its snapped ends goes; its neighbours then meet
+    # a segment that its snapped ends make shorter than POINT_MM is dropped; its neighbours then meet
     keep = (np.hypot(*(out[:, 2:4] - out[:, 0:2]).T) > POINT_MM) | (np.abs(out[:, 6]) > np.pi)
     place = np.cumsum(keep) - 1
     smooth = np.where((smooth >= 0) & keep[smooth], place[smooth], -1)
@@ -204,7 +206,7 @@ def _parallel(contour: Contour, d: float) -> tuple[Floats, Ints]:
 def _corner(
     p: Floats, q: Floats, tangents: tuple[Floats, Floats], centres: tuple[Floats, Floats], radii: tuple[float, float]
 ) -> Floats:
-    """Where two raw segments cross near p (on the first) and q (on the second), by Newton's method."""
+    """Intersection (2,) of two raw segments near p (on the first) and q (on the second), by Newton's method."""
     x = 0.5 * (p + q)
     for _ in range(8):
         f = np.empty(2)
@@ -226,7 +228,7 @@ def _corner(
 
 
 def true_centres(seg: Floats) -> Floats:
-    """(n, 2) centres moved along the chord so that both ends of an arc have one radius."""
+    """Centres (n, 2) [mm] of segments (n, 7), moved along the chord so that both ends of an arc have one radius."""
     chord = seg[:, 2:4] - seg[:, 0:2]
     length = np.hypot(*chord.T)
     fit = (seg[:, 6] != 0.0) & (length > 1e-6)
@@ -240,7 +242,7 @@ def true_centres(seg: Floats) -> Floats:
 def _trimmed(
     raw: RawSegments, given: Floats, d: float, tol: float, snap: float
 ) -> tuple[tuple[Contour, ...], Floats | None]:
-    """The parallel contours, and a point of a valid piece that joins no contour (None: there is no such piece)."""
+    """The parallel contours, and a point of a valid piece that belongs to no contour (None: there is no such piece)."""
     pieces, loose = split_segments(raw, tol, snap)
     pieces = pieces[~raw.knife[pieces.raw]]
     fixed = boxes(given)

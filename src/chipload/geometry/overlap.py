@@ -1,7 +1,7 @@
 """The metal that two blades of an impeller share, such as a splitter that crosses its blade.
 
-Notation: z axis of rotation, r radius, theta angle about z. On the circle of one r and z a blade takes the arc from its
-`minus` to its `plus` side, for a side is met once on it (``sides.py``). Blades stand a pitch apart.
+Notation: z axis of rotation, r radius, theta angle about z. On a circle of constant r and z a blade occupies the arc
+from its `minus` to its `plus` side; the circle meets a side once. Blades are one pitch apart.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from chipload.geometry.sections import Blade
 
 Floats = NDArray[np.float64]
 
-#: places of a side between which its theta is linear, along and up
+#: numbers of places along u and v of a side; theta is interpolated linearly between them
 _ALONG, _UP = 101, 33
-#: how far a side is continued below its foot and above its tip, of the distance of two places
+#: extension of a side below its foot and above its tip, as a share of the distance of two places
 _BEYOND = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Overlap:
-    """What a blade has in common with another one at some places.
+    """The overlap of a blade with another one at some places.
 
     Parameters
     ----------
-    length : (n,) on the circle through each place, in the metal of both [mm]; 0: they are apart, or one ends before it
-    turn : by which the blade stands in the middle between two others [rad], the mean of all places
+    length : (n,) arc [mm] of the circle through each place that is in the metal of both; 0 if there is none
+    turn : rotation [rad] that puts the blade in the middle between two others, as the mean of all places
     """
 
     length: Floats
@@ -42,18 +42,18 @@ class Overlap:
 
 
 def overlap_of(blade: Blade, other: Blade, pitch: float, places: Floats) -> Overlap:
-    """What a blade has in common with another one and its repetitions.
+    """The overlap of a blade with another one and its repetitions.
 
     Parameters
     ----------
-    pitch : angle from one `other` to the next [rad]
-    places : (n, 3) points of the blade [mm], of which r and z count
+    pitch : angle between repetitions of `other` [rad]
+    places : (n, 3) points of the blade [mm]; only their r and z are used
     """
     where = np.stack([np.hypot(places[:, 0], places[:, 1]), places[:, 2]], axis=-1)
     low, width = _arc(blade, where)
     first, thick = _arc(other, where)
     ahead = np.mod(low - first, pitch)
-    # with the arc behind, with the next one
+    # overlap with the arc that begins before, and with the next one
     common = np.maximum(np.minimum(thick - ahead, width), np.minimum(ahead + width - pitch, thick))
     length = np.where(common > 0.0, where[:, 0] * common, 0.0)
     off = 0.5 * (pitch + thick) - (ahead + 0.5 * width)
@@ -63,16 +63,17 @@ def overlap_of(blade: Blade, other: Blade, pitch: float, places: Floats) -> Over
 
 
 def splitter_apart(splitter: Blade, blade: Blade, pitch: float, sections: Sequence[Floats] = ()) -> None:
-    """Refuse a splitter that has metal in common with a blade.
+    """Refuse a splitter that overlaps a blade.
 
     Parameters
     ----------
-    sections : (n, 3) each [mm], of which it was made; none: the heights at which it does are named
+    pitch : angle between blades [rad]
+    sections : (n, 3) [mm] each, of the splitter; without them the message states heights instead of section numbers
 
     Raises
     ------
     InputError
-        It has, in whichever channel.
+        They overlap.
     """
     u, v = np.linspace(0.0, 1.0, _ALONG), np.linspace(0.0, 1.0, _UP)
     U, V = (x.ravel() for x in np.meshgrid(u, v, indexing="ij"))
@@ -95,17 +96,17 @@ def splitter_apart(splitter: Blade, blade: Blade, pitch: float, sections: Sequen
 
 
 def _arc(blade: Blade, where: Floats) -> tuple[Floats, Floats]:
-    """Theta at which the arcs of a blade begin and how long they are (n,) [rad]; not a number: it is not there."""
+    """Start theta (n,) and length (n,) [rad] of the arcs of a blade; NaN where the blade is absent."""
     low, high = (_theta(side, where) for side in (blade.minus, blade.plus))
     return low, np.maximum(np.angle(np.exp(1j * (high - low))), 0.0)
 
 
 def _theta(side: BSplinePatch, where: Floats) -> Floats:
-    """Theta (n,) [rad] of a side at r and z, not a number where it is not met."""
+    """Theta (n,) [rad] of a side at (r, z) (n, 2); NaN where the side is absent."""
     u, v = np.linspace(0.0, 1.0, _ALONG), np.linspace(0.0, 1.0, _UP)
     U, V = np.meshgrid(u, v, indexing="ij")
     p = side.at(U.ravel(), V.ravel()).reshape(_ALONG, _UP, 3)
-    # straight on a little below the foot and above the tip, on which first and last section lie
+    # extend the side a little below the foot and above the tip, on which the first and last sections lie
     foot, tip = (p[:, k] + _BEYOND * (p[:, k] - p[:, j]) for k, j in ((0, 1), (-1, -2)))
     p = np.concatenate([foot[:, None], p, tip[:, None]], axis=1)
     theta = np.unwrap(np.unwrap(np.arctan2(p[..., 1], p[..., 0]), axis=1), axis=0)

@@ -23,7 +23,7 @@ class Revolved:
 
     Parameters
     ----------
-    meridian : (n, 2) float [mm], r >= 0 and z, n >= 2, no point twice running
+    meridian : (n, 2) float [mm], r >= 0 and z, n >= 2, no two consecutive points equal
     side : 1: the normal lies to the left of the curve in the (r, z) plane, -1: to the right
 
     Raises
@@ -54,36 +54,36 @@ class Revolved:
 
     @property
     def knots(self) -> Floats:
-        """Places s (k,) between which the curve is a polynomial of at most third degree."""
+        """Parameters s (k,) between which the curve is a polynomial of at most third degree."""
         return np.unique(self._curve.t)
 
     def curve(self, s: ArrayLike, derivative: int = 0) -> Floats:
-        """(k, 2) r and z [mm] at s, or a derivative."""
+        """(k, 2) r and z [mm] at s (k,), or their derivative of the given order with respect to s."""
         out: Floats = self._curve(np.asarray(s, dtype=np.float64), nu=derivative)
         return out
 
     def at(self, s: ArrayLike, theta: ArrayLike) -> Floats:
-        """Points (k, 3) [mm]."""
+        """Points (k, 3) [mm] at s and theta [rad] (k,)."""
         r, z = self.curve(s).T
         return np.stack([r * np.cos(theta), r * np.sin(theta), z], axis=-1)
 
     def normal(self, s: ArrayLike, theta: ArrayLike) -> Floats:
-        """Unit normals (k, 3)."""
+        """Unit normals (k, 3) at s and theta [rad] (k,)."""
         d = self.curve(s, 1)
         n = self.side * np.stack([-d[:, 1], d[:, 0]], axis=-1) / np.linalg.norm(d, axis=1)[:, None]
         return np.stack([n[:, 0] * np.cos(theta), n[:, 0] * np.sin(theta), n[:, 1]], axis=-1)
 
     def curvature(self, s: ArrayLike, theta: ArrayLike) -> Floats:
-        """K (k, 3, 3) [1/mm]: along the meridian that of the curve, around -n_r / r.
+        """Curvature tensors K (k, 3, 3) [1/mm]: along the meridian the curvature of the curve, across it -n_r / r.
 
         Raises
         ------
         InputError
-            On the axis, r = 0.
+            A point is on the axis, r = 0.
         """
         p, d, e = self.curve(s), self.curve(s, 1), self.curve(s, 2)
         if (p[:, 0] <= 0.0).any():
-            raise InputError("meridian: no curvature on the axis: leave r = 0 out")
+            raise InputError("meridian: no curvature on the axis: exclude r = 0")
         speed = np.linalg.norm(d, axis=1)
         n = self.side * np.stack([-d[:, 1], d[:, 0]], axis=-1) / speed[:, None]
         along = (e * n).sum(axis=1) / speed**2

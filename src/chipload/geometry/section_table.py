@@ -1,8 +1,9 @@
-"""Tables with all sections of a blade, both sides beside each other, as pyturbo-aero writes them.
+"""The reader of pyturbo-aero tables, which have all sections of a blade with both sides in one row.
 
 Format: a line of names, ``span_index,ss_x,ss_y,ss_z,ps_x,ps_y,ps_z`` or ``span_index,ss_x,ss_r,ss_th,ps_x,ps_r,ps_th``,
-then for each section, from hub to shroud, a line for each place from leading to trailing edge: the point of the suction
-side (ss), that of the pressure side (ps). x is along the axis, th [rad] goes from z towards y. No unit is stated.
+then, for each section from hub to shroud, one line for each place from leading to trailing edge, with the points of the
+suction side (ss) and of the pressure side (ps). x is along the axis; th [rad] is measured from z towards y. The file
+states no unit.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ Floats = NDArray[np.float64]
 
 #: names of the columns after the first, in lower case
 _XYZ, _XRTH = ["ss_x", "ss_y", "ss_z", "ps_x", "ps_y", "ps_z"], ["ss_x", "ss_r", "ss_th", "ps_x", "ps_r", "ps_th"]
-#: points of a meridian are at least so far apart, of its length: nearer ones differ by the rounding of the file
+#: least distance of points of a meridian as a share of its length; nearer points differ by rounding only
 _APART = 0.01
 
 
 def sections_of_table(text: str, path: Path) -> tuple[Floats, ...] | None:
-    """Closed sections (n, 3) in the file's unit, z along the axis; None: the text is not such a table.
+    """Closed sections (n, 3) in the unit of the file, z along the axis; None if the text is not such a table.
 
     Raises
     ------
@@ -35,12 +36,15 @@ def sections_of_table(text: str, path: Path) -> tuple[Floats, ...] | None:
     parts = _parts(text, path)
     if parts is None:
         return None
-    # from the leading edge along one side and back along the other, both ends once
+    # from the leading edge along one side and back along the other, with both ends once
     return tuple(np.concatenate([ss, ps[-2:0:-1]]) for ss, ps in parts)
 
 
 def meridian_of_table(text: str, path: Path, last: bool) -> Floats | None:
-    """(n, 2) r and z of the surface on which the first section lies, or the ``last``; None: not such a table."""
+    """(n, 2) r and z of the surface of revolution through the first section, or with ``last`` through the last one.
+
+    None if the text is not such a table. Raises as :func:`sections_of_table`.
+    """
     parts = _parts(text, path)
     if parts is None:
         return None
@@ -49,11 +53,11 @@ def meridian_of_table(text: str, path: Path, last: bool) -> Floats | None:
     chord = (p[-1] - p[0]) / np.linalg.norm(p[-1] - p[0])
     p = p[np.argsort((p - p[0]) @ chord, kind="stable")]
     least = _APART * float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum())
-    kept = [p[0]]
+    out = [p[0]]
     for point in p[1:-1]:
-        if min(np.linalg.norm(point - kept[-1]), np.linalg.norm(point - p[-1])) >= least:
-            kept.append(point)
-    return np.array([*kept, p[-1]])
+        if min(np.linalg.norm(point - out[-1]), np.linalg.norm(point - p[-1])) >= least:
+            out.append(point)
+    return np.array([*out, p[-1]])
 
 
 def _parts(text: str, path: Path) -> list[tuple[Floats, Floats]] | None:
@@ -87,7 +91,7 @@ def _row(words: list[str], path: Path, line: int) -> list[float]:
 
 
 def _points(p: Floats, names: list[str]) -> Floats:
-    """The part's frame: z along the file's x."""
+    """Points (n, 3) in the frame of the part, whose z is along x of the file."""
     if names[1:] == _XYZ:
         return np.stack([p[:, 1], p[:, 2], p[:, 0]], axis=-1)
     return np.stack([p[:, 1] * np.sin(p[:, 2]), p[:, 1] * np.cos(p[:, 2]), p[:, 0]], axis=-1)

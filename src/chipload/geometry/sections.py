@@ -1,13 +1,13 @@
-"""Blade sections: files of points, checked, and lofted to the two sides of a blade.
+"""Blade sections: reading of point files, checks, and lofting to the two sides of a blade.
 
 Notation: a section is a closed profile (n, 3) float [mm] in the part's frame, z the axis of rotation; sections go from
-hub to shroud. A blade has the side that faces a growing theta (`plus`) and the one that faces a falling one (`minus`).
+hub to shroud. A blade has a side that faces increasing theta (`plus`) and one that faces decreasing theta (`minus`).
 u in 0..1 runs along a section from its leading to its trailing edge, v from the first section to the last.
 
-Formats: a table of three columns whose first line names them, `X R*THETA R`, `X R THETA_DEG` or `X Y Z`, a section a
-file (NASA's HECC); TurboGrid `.curve` and `.crv`, x y z, sections divided by lines that begin with #; tables of
-pyturbo-aero with all sections (``section_table.py``). X of the first two is along the axis. Files say no unit: it is
-asked for.
+Formats: tables of three columns, one section per file, whose first line names the columns `X R*THETA R`,
+`X R THETA_DEG` or `X Y Z` (NASA's HECC; X of the first two is along the axis); TurboGrid `.curve` and `.crv` with
+columns x y z and sections separated by lines that begin with #; tables of pyturbo-aero with all sections
+(``section_table.py``). The files do not state a unit, so the caller states it.
 """
 
 from __future__ import annotations
@@ -34,44 +34,46 @@ Floats = NDArray[np.float64]
 _Half = tuple[BSpline, float, float]
 
 _LARGEST_FILE = 20_000_000
-#: coordinates are at most this [mm]
+#: greatest absolute value of a coordinate [mm]
 FARTHEST = 1e6
 _LEAST_POINTS = 12
-_EDGE = 0.03  # of its length: a profile that begins so near an end begins at that edge
-_OUTER = 0.02  # the outer diameter may differ from the stated one by this share
+_EDGE = 0.03  # share of its length: a profile whose first point is this near to an end begins at that edge
+_OUTER = 0.02  # greatest relative difference of the outer diameter from the stated one
 
 
 @dataclass(frozen=True, eq=False)
 class Blade:
-    """The two sides of a blade, normals out of the metal."""
+    """The two sides of a blade; their normals point out of the metal."""
 
     plus: BSplinePatch
     minus: BSplinePatch
 
     def turned(self, angle: float) -> Blade:
-        """The blade turned about z by an angle [rad]."""
+        """The blade rotated about z by an angle [rad]."""
         return Blade(self.plus.turned(angle), self.minus.turned(angle))
 
 
 def read_sections(
     paths: Sequence[str | Path], unit: str, over: bool = False, columns: str | None = None
 ) -> tuple[Floats, ...]:
-    """Sections of one blade, from files in the order hub to shroud; one file of TurboGrid or pyturbo-aero may hold all.
+    """Sections of one blade from files in order from hub to shroud.
+
+    A file of TurboGrid or pyturbo-aero may contain all sections.
 
     Parameters
     ----------
-    unit : of the files, a key of ``units.MM_PER``
-    over : the part is turned over about x, so that a flow along +x comes down the z axis
-    columns : of files whose first line does not name them, as section 7 of HECC's main blade; the others must agree
+    unit : unit of length of the files, a key of ``units.MM_PER``
+    over : rotate the part by 180 deg about x, so that a flow along +x in the file runs along -z
+    columns : names of the columns of files whose first line does not state them; other files must agree
 
     Returns
     -------
-    sections (n, 3) float [mm], z along the axis
+    sections : (n, 3) float [mm] each, z along the axis
 
     Raises
     ------
     InputError
-        A file cannot be read, a line is not three numbers, the columns or the unit are not known.
+        A file cannot be read, a line does not have three numbers, or the columns or the unit are unknown.
     """
     out: list[Floats] = []
     for path in paths:
@@ -80,9 +82,16 @@ def read_sections(
 
 
 def read_meridian(path: str | Path, unit: str, over: bool = False, shroud: bool = False) -> Floats:
-    """(n, 2) float [mm] r and z of a hub or shroud: two columns `x r`, or TurboGrid's x y z with z along the axis.
+    """Meridional curve of a hub or shroud, (n, 2) float [mm] r and z.
 
-    A table of all sections is the hub on which its first one lies, or the ``shroud`` of its last.
+    The file has two columns `x r`, or three columns x y z with z along the axis (TurboGrid). From a table of all
+    sections (pyturbo-aero), the first section gives the hub; with ``shroud`` the last one gives the shroud. ``unit``
+    and ``over`` are as in :func:`read_sections`.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, its columns are inconsistent, or the unit is unknown.
     """
     scale = _scale(unit)
     found = meridian_of_table(_text(Path(path)), Path(path), shroud)
@@ -103,13 +112,13 @@ def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -
 
     Parameters
     ----------
-    outer_diameter : of the blade [mm], as the drawing states it; finds a wrong unit. None: not checked
+    outer_diameter : outer diameter of the blade on the drawing [mm], to detect a wrong unit; None: not checked
 
     Raises
     ------
     InputError
-        There are fewer than two, one has too few points or crosses itself, they are out of order, or the diameter is
-        another.
+        There are fewer than two sections, one has too few points or crosses itself, they are out of order, or the
+        diameter differs from the stated one.
     """
     if len(sections) < 2:
         raise InputError(f"sections: {len(sections)}: must be at least 2, from hub to shroud")
@@ -135,7 +144,7 @@ def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -
 
 
 def checked_diameter(found: float, stated: float, what: str) -> None:
-    """Refuse an outer diameter [mm] that is not the stated one, and say which unit was probably taken for which."""
+    """Refuse an outer diameter [mm] that differs from the stated one; the message names the units probably confused."""
     if abs(found / stated - 1.0) > _OUTER:
         factor = stated / found
         pairs = [
@@ -148,9 +157,14 @@ def checked_diameter(found: float, stated: float, what: str) -> None:
 def loft(sections: tuple[Floats, ...], count: int = 61) -> Blade:
     """Both sides of a blade through its sections.
 
-    Each section is interpolated over its chord length and cut where it is longest (leading edge: the end of greater z;
-    one that begins at an edge is cut at that beginning); each half is read at ``count`` places, closer at the edges,
-    and the patch goes through those.
+    Each section is interpolated over its chord length and split at its two most distant points; the leading edge is the
+    one of greater z. A section that begins at an edge is split at its first point. Each half is sampled at ``count``
+    places, closer together at the edges, and the patch interpolates these points.
+
+    Raises
+    ------
+    InputError
+        A point of a section is repeated.
     """
     u = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
     u[0], u[-1] = 0.0, 1.0
@@ -171,19 +185,19 @@ def _side(grid: Floats, u: Floats, v: Floats, sign: float) -> BSplinePatch:
 
 
 def facing(patch: BSplinePatch, sign: float) -> BSplinePatch:
-    """The patch with its normal towards a growing theta (sign 1) or a falling one (-1)."""
+    """The patch with its normal towards increasing theta (sign 1) or decreasing theta (-1)."""
     at = patch.at(0.5, 0.5)[0]
     towards = sign * np.array([-at[1], at[0], 0.0])
     return patch if patch.normal(0.5, 0.5)[0] @ towards > 0.0 else replace(patch, side=-patch.side)
 
 
 def _halves(p: Floats) -> tuple[_Half, _Half]:
-    """Both ways round from the leading to the trailing edge: (curve, from, to)."""
+    """The two halves from the leading to the trailing edge: curve, first and last parameter."""
     ring = p[:-1] if np.allclose(p[0], p[-1], rtol=0.0, atol=1e-9 * np.abs(p).max()) else p
     apart = ((ring[:, None] - ring[None]) ** 2).sum(axis=2)
     i, j = sorted(int(x) for x in np.unravel_index(apart.argmax(), apart.shape))
     length = np.sqrt(apart.max())
-    # a profile that begins at an edge is cut there, in every section at the same place
+    # a profile that begins at an edge is split there, at the same place in every section
     begins = min(apart[0, i], apart[0, j]) < (_EDGE * length) ** 2
     if not begins:
         ring, i, j = np.roll(ring, -i, axis=0), 0, j - i
@@ -193,7 +207,7 @@ def _halves(p: Floats) -> tuple[_Half, _Half]:
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
     if not (np.diff(s) > 0.0).all():
         row = int((np.diff(s) <= 0.0).argmax()) + 1
-        raise InputError(f"sections: point {row} of a section is repeated: leave one out")
+        raise InputError(f"sections: point {row} of a section is repeated: remove one")
     curve = make_interp_spline(s, ring, k=3)
     last = len(s) - 2
     found = minimize_scalar(
@@ -208,14 +222,14 @@ def _halves(p: Floats) -> tuple[_Half, _Half]:
 
 
 def _read(half: _Half, u: Floats) -> Floats:
-    """Points (n, 3) at the shares u of the length of a half."""
+    """Points (n, 3) [mm] at the shares u (n,) of the length of a half."""
     curve, first, last = half
     out: Floats = curve(first + u * (last - first))
     return out
 
 
 def _crossing(p: Floats) -> bool:
-    """Whether the profile crosses itself as seen in every one of three ways: a twisted one may seem to in some."""
+    """Whether a profile crosses itself in each of three projections; a twisted profile may seem to in one of them."""
     ring = p[:-1] if np.array_equal(p[0], p[-1]) else p
     _, _, axes = np.linalg.svd(ring - ring.mean(axis=0), full_matrices=False)
     r, theta = np.hypot(ring[:, 0], ring[:, 1]), np.unwrap(np.arctan2(ring[:, 1], ring[:, 0]))
@@ -224,7 +238,7 @@ def _crossing(p: Floats) -> bool:
 
 
 def _centre(p: Floats) -> Floats:
-    """Centre [mm] of the closed line round a section, whatever the distances of its points."""
+    """Centroid (3,) [mm] of the closed polyline of a section, independent of the spacing of its points."""
     ring = np.concatenate([p, p[:1]])
     length = np.linalg.norm(np.diff(ring, axis=0), axis=1)
     out: Floats = (length[:, None] * 0.5 * (ring[1:] + ring[:-1])).sum(axis=0) / length.sum()
@@ -251,7 +265,7 @@ def _sections_of(path: Path, scale: float, columns: str | None) -> list[Floats]:
             raise InputError(f"{path}: {p.shape[1]} columns: must be 3")
         found = " ".join(names) or stated
         if found is None:
-            raise InputError(f"{path}: no line names the columns: state them, as X R*THETA R")
+            raise InputError(f"{path}: no line names the columns: state them, for example X R*THETA R")
         if columns is not None and found != columns:
             raise InputError(f"{path}: columns {found}: must be {columns} as stated")
         if found == "X Y Z":
@@ -270,9 +284,9 @@ def _sections_of(path: Path, scale: float, columns: str | None) -> list[Floats]:
 
 
 def _finite(p: Floats, path: Path) -> Floats:
-    far = float(np.abs(p).max())
-    if not far <= FARTHEST:
-        raise InputError(f"{path}: a coordinate is {far:.4g} mm: must be at most {FARTHEST:g}: check the unit")
+    greatest = float(np.abs(p).max())
+    if not greatest <= FARTHEST:
+        raise InputError(f"{path}: a coordinate is {greatest:.4g} mm: must be at most {FARTHEST:g}: check the unit")
     return p
 
 

@@ -1,8 +1,8 @@
-"""Two patches that are the sides of a blade of an impeller or of a wall: turned so that u and v run as they should.
+"""Orientation of two patches as the sides of a blade of an impeller, or of a wall.
 
-Notation: z axis of rotation, flow against it; u in 0..1 from the leading edge, v from hub to shroud; `plus` faces a
-growing angle theta, `minus` a falling one. Of a wall v runs from the clamp to the free edge, and u so that the front
-looks towards +y when v is z and u is x.
+Notation: z is the axis of rotation, the flow enters along -z; u in 0..1 runs from the leading edge, v from hub to
+shroud; `plus` faces increasing theta, `minus` decreasing theta. On a wall v runs from the clamp to the free edge, and u
+such that the front faces +y if u is along x and v along z.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ _FEW = np.linspace(0.0, 1.0, 17)
 
 
 def blade_of(plus: BSplinePatch, minus: BSplinePatch, hub: Revolved, shroud: Revolved, pitch: float) -> Blade:
-    """The blade that two patches are the sides of.
+    """The blade with two patches as its sides.
 
     Parameters
     ----------
-    plus, minus : either of one blade, or of the two that bound a channel; u and v in any sense
+    plus, minus : sides of one blade, or of the two blades that bound a channel; u and v in any order and sense
+    hub, shroud : surfaces between which the blade stands
     pitch : angle between two blades [rad]
 
     Raises
     ------
     InputError
-        They are the wrong way round: between them lies more than half of the pitch.
+        The sides are exchanged: the metal between them fills more than half of the pitch.
     """
     plus, minus = (_along_the_flow(p, hub, shroud) for p in (plus, minus))
     u, v = (x.ravel() for x in np.meshgrid(_FEW, _FEW, indexing="ij"))
@@ -52,12 +53,12 @@ def blade_of(plus: BSplinePatch, minus: BSplinePatch, hub: Revolved, shroud: Rev
 
 
 def wall_of(front: BSplinePatch, back: BSplinePatch, clamp: Callable[[Floats], float]) -> Blade:
-    """The sides of a wall, front as `plus`, with v from what is clamped and points of equal u, v opposite each other.
+    """The sides of a wall: front as `plus`, v from the clamp, points of equal u, v opposite each other.
 
     Parameters
     ----------
-    front, back : u and v in any sense
-    clamp : distance [mm] of points (n, 3) from what is clamped
+    front, back : patches with u and v in any order and sense
+    clamp : function that returns the distance [mm] of points (n, 3) from the clamped geometry
     """
     front = min(_orientations(front), key=lambda p: clamp(p.at(_FEW, 0.0)))
     u, v = (x.ravel() for x in np.meshgrid(_FEW, _FEW, indexing="ij"))
@@ -72,31 +73,31 @@ def wall_of(front: BSplinePatch, back: BSplinePatch, clamp: Callable[[Floats], f
 
 
 def foot_off(patch: BSplinePatch, hub: Revolved) -> float:
-    """Greatest distance [mm] of a side's foot from the hub in the meridional plane."""
+    """Greatest distance [mm] of the foot of a side (v = 0) from the hub in the meridional plane."""
     foot = patch.at(np.linspace(0.0, 1.0, 101), 0.0)
     return float(_distance(foot, hub).max())
 
 
 def radius_of(blade: Blade) -> float:
-    """Greatest radius [mm] of a blade's sides, to about 1e-4 of it."""
+    """Greatest radius [mm] of the sides of a blade, with a relative error of about 1e-4."""
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.0, 1.0, 201), _FEW, indexing="ij"))
     return max(float(np.hypot(p.at(u, v)[:, 0], p.at(u, v)[:, 1]).max()) for p in (blade.plus, blade.minus))
 
 
 def _distance(points: Floats, surface: Revolved) -> Floats:
-    """Distance (n,) [mm] of points to a meridian: to the tangent at its nearest point, beyond an end to that end."""
+    """Distance (n,) [mm] of points from the tangent of a meridian at the nearest point, beyond an end from that end."""
     r, z = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
     s = surface.nearest(r, z)
     away, tangent = np.stack([r, z], axis=-1) - surface.curve(s), surface.curve(s, 1)
     along = (away * tangent).sum(axis=1) / np.linalg.norm(tangent, axis=1)
     beyond = ((s == 0.0) & (along < 0.0)) | ((s == 1.0) & (along > 0.0))
-    far = np.linalg.norm(away, axis=1)
-    out: Floats = np.where(beyond, far, np.sqrt(np.maximum(far**2 - along**2, 0.0)))
+    size = np.linalg.norm(away, axis=1)
+    out: Floats = np.where(beyond, size, np.sqrt(np.maximum(size**2 - along**2, 0.0)))
     return out
 
 
 def _along_the_flow(patch: BSplinePatch, hub: Revolved, shroud: Revolved) -> BSplinePatch:
-    """V from hub to shroud, u from the end of greater z."""
+    """The patch with v from hub to shroud and u from the end of greater z."""
     orientations = _orientations(patch)
     off = [
         float(_distance(p.at(_FEW, 0.0), hub).mean() + _distance(p.at(_FEW, 1.0), shroud).mean()) for p in orientations
@@ -107,5 +108,5 @@ def _along_the_flow(patch: BSplinePatch, hub: Revolved, shroud: Revolved) -> BSp
 
 
 def _orientations(patch: BSplinePatch) -> list[BSplinePatch]:
-    """The patch with each of its four sides as v = 0."""
+    """The patch in four orientations, with each of its edges as v = 0."""
     return [p.reversed(False, back) for p in (patch, patch.swapped()) for back in (False, True)]

@@ -1,7 +1,7 @@
 """Splitting of segments at their intersections, and chaining of the pieces to contours.
 
-Notation: a **piece** is a part of a segment between two **nodes**; a node is a place where ends or meetings of segments
-are one point.
+Notation: a **piece** is a part of a segment between two **nodes**; a node is a group of ends and intersections of
+segments that count as one point.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from chipload.geometry.distance import boxes
 
 Ints = NDArray[np.int64]
 
-#: what is forgiven [mm]: (clearance, ends that are one point); the next pair where the kept pieces do not close
+#: tolerances [mm] of the clearance and of coincident ends; the next pair is used if the pieces do not close
 LADDER = ((1e-9, 1e-8), (1e-8, 5e-8), (1e-7, 4e-7))
 #: curves that miss each other by less [mm] touch
 TOUCH_MM = 1e-10
@@ -29,8 +29,9 @@ TOUCH_MM = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class RawSegments:
-    """Raw segments (n, 7); ``smooth`` (n,) the one that follows tangentially or -1; ``knife`` (n,) those that cut
-    others but belong to no result; ``ends`` (n, 2) whether the start, the end is that of an open chain.
+    """Raw segments (n, 7). ``smooth`` (n,): number of the segment that follows tangentially, or -1. ``knife`` (n,):
+    whether a segment only splits others and is not part of the result. ``ends`` (n, 2): whether its start, and its end,
+    is the end of an open chain.
     """
 
     segments: Floats
@@ -40,7 +41,7 @@ class RawSegments:
 
     @classmethod
     def plain(cls, segments: Floats, smooth: Ints | None = None) -> RawSegments:
-        """Segments of closed contours alone, none of which is a knife."""
+        """Segments of closed contours without any knife."""
         n = len(segments)
         follow = np.full(n, -1, dtype=np.int64) if smooth is None else smooth
         return cls(segments, follow, np.zeros(n, dtype=np.bool_), np.zeros((n, 2), dtype=np.bool_))
@@ -60,7 +61,7 @@ class SplitSegments:
 
 
 def meetings(raw: RawSegments, tol: float) -> tuple[Ints, Floats]:
-    """Points in which segments cross, touch, or end on another: (k, 2) both segments, (k, 2) the points [mm]."""
+    """Points at which segments cross, touch or end on one another: segment numbers (k, 2) and points (k, 2) [mm]."""
     seg = raw.segments
     box = boxes(seg)
     order = np.argsort(box[:, 0], kind="stable")
@@ -74,7 +75,7 @@ def meetings(raw: RawSegments, tol: float) -> tuple[Ints, Floats]:
 
 
 def split_segments(raw: RawSegments, tol: float, snap: float) -> tuple[SplitSegments, NDArray[np.bool_]]:
-    """Divide the segments at their crossings: all pieces, and whether each node (k,) may end an open chain."""
+    """Split segments where they meet; returns all pieces, and whether each node (k,) may end an open chain."""
     seg = raw.segments
     n = len(seg)
     who, where = meetings(raw, tol)
@@ -98,13 +99,13 @@ def split_segments(raw: RawSegments, tol: float, snap: float) -> tuple[SplitSegm
     whole = (np.abs(seg[owner[a], 6]) > np.pi) & (t[b] - t[a] > 0.5)
     real = (owner[a] == owner[b]) & ((label[a] != label[b]) | whole)
     a, b = a[real], b[real]
-    # a piece that was dropped between two others is a single point: the next piece begins where the last one ended
+    # a piece dropped between two others is a single point: the next piece begins where the previous one ends
     span = np.column_stack([t[a], t[b]])
     return SplitSegments(owner[a], span, np.column_stack([label[a], label[b]]), place), loose
 
 
 def _parameter(seg: Floats, p: Floats) -> Floats:
-    """(m,) share of the length of each segment (m, 7) at a point (m, 2) on it; rounding may put it outside 0..1."""
+    """(m,) shares of the lengths of segments (m, 7) at points (m, 2) on them; may be outside 0..1 by rounding."""
     chord = seg[:, 2:4] - seg[:, 0:2]
     arc = seg[:, 6] != 0.0
     line = np.sum((p - seg[:, 0:2]) * chord, axis=1) / np.where(arc, 1.0, np.sum(chord**2, axis=1))
@@ -134,7 +135,7 @@ def lengths_of(seg: Floats) -> Floats:
 
 
 def chained_segments(raw: RawSegments, pieces: SplitSegments, d: float, tol: float) -> tuple[Contour, ...]:
-    """Contours from pieces; at a node of many the sharpest turn to the offset side is taken."""
+    """Contours from pieces; at a node with several outgoing pieces the sharpest turn to the offset side is chosen."""
     seg = raw.segments[pieces.raw]
     heading, bend = [], []
     for t in pieces.span.T:
@@ -184,7 +185,7 @@ def chained_segments(raw: RawSegments, pieces: SplitSegments, d: float, tol: flo
 
 
 def _contour(raw: RawSegments, pieces: SplitSegments, chain: list[int]) -> Contour:
-    """One contour; pieces of a raw segment that follow one another become one segment again."""
+    """One contour from a chain of pieces; consecutive pieces of one raw segment are merged again."""
     runs: list[list[int]] = []
     for k in chain:
         if runs and pieces.raw[k] == pieces.raw[runs[-1][-1]] and pieces.node[k, 0] == pieces.node[runs[-1][-1], 1]:
@@ -203,7 +204,7 @@ def _contour(raw: RawSegments, pieces: SplitSegments, chain: list[int]) -> Conto
 
 
 def rows_of(raw: RawSegments, pieces: SplitSegments) -> Floats:
-    """(m, 7) the pieces as segments."""
+    """The pieces as segments (m, 7)."""
     rows = raw.segments[pieces.raw].copy()
     p, q = pieces.place[pieces.node[:, 0]], pieces.place[pieces.node[:, 1]]
     rows[:, 6] = swept(rows, p, q, rows[:, 6] * (pieces.span[:, 1] - pieces.span[:, 0]))
@@ -212,7 +213,7 @@ def rows_of(raw: RawSegments, pieces: SplitSegments) -> Floats:
 
 
 def swept(seg: Floats, p: Floats, q: Floats, near: Floats) -> Floats:
-    """(n,) sweep from p to q about the centres of the segments, of the whole turns that come nearest to ``near``."""
+    """(n,) sweeps [rad] from p to q about the centres of segments, with the whole turns nearest to ``near``."""
     u, v = p - seg[:, 4:6], q - seg[:, 4:6]
     turn = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.sum(u * v, axis=1))
     turn += 2.0 * np.pi * np.round((near - turn) / (2.0 * np.pi))
@@ -221,5 +222,5 @@ def swept(seg: Floats, p: Floats, q: Floats, near: Floats) -> Floats:
 
 
 def left_of(v: Floats) -> Floats:
-    """Rot(+90 deg) of vectors (..., 2)."""
+    """Vectors (..., 2) rotated by +90 deg."""
     return np.stack([-v[..., 1], v[..., 0]], axis=-1)

@@ -1,8 +1,8 @@
 """The reader of STEP parts: contours of a planar horizontal face, and triangles of the whole part.
 
-Notation: z [mm] the height of a face whose normal is along Z. Lines and circles stay what they are, other edges become
-biarcs. The CAD kernel converts the file's unit to mm; it runs in a process of its own, see
-:mod:`chipload.geometry.isolated`: functions that begin with a :class:`Part` are executed there.
+Notation: z [mm] the height of a face whose normal is along Z. Lines and circles are retained, other edges become
+biarcs. The CAD kernel converts the file's unit to mm. It runs in a separate process, see
+:mod:`chipload.geometry.isolated`: functions whose first parameter is a :class:`Part` are executed there.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from chipload.files import is_file, open_regular
 from chipload.geometry.contour import Contour, Floats
 from chipload.geometry.isolated import Isolated
 
-# biarc and chains are imported where they are used: their libraries take as long to start as the CAD kernel, and the
-# process of the kernel seldom needs them
+# biarc and chains are imported where they are used: importing their libraries takes as long as starting the CAD kernel,
+# and the process of the kernel seldom needs them
 if TYPE_CHECKING:
     from chipload.geometry.chains import Drawing
 
-#: a plane is horizontal if its normal leaves Z by less [rad], and two heights are one within the same [mm]
+#: greatest angle of the normal of a horizontal plane from Z [rad]; also the distance of coincident ends [mm]
 LEVEL = 1e-6
-#: [bytes]
+#: largest file that is read [bytes]
 LARGEST_FILE = 200_000_000
 
 
@@ -41,23 +41,24 @@ def read_step_face(
     path : the STEP file
     z_mm : height [mm] of the face, to 0.001 mm; the topmost horizontal face by default
     join_mm : widest gap [mm] between edges that is closed
-    tolerance_mm : how far [mm] arcs may leave an edge that is neither line nor circle
+    tolerance_mm : greatest deviation [mm] of the arcs from an edge that is neither line nor circle
 
     Returns
     -------
-    Drawing in mm; the layer of each contour is its height, as in ``z=12.5``.
+    Drawing in mm; the layer of each contour is its height, such as ``z=12.5``.
 
     Raises
     ------
     InputError
-        The file is missing or no STEP file, or has no horizontal planar face (at ``z_mm``); the heights are named.
+        The file is missing or not a STEP file, or has no horizontal planar face (at ``z_mm``); the message lists the
+        heights.
     """
     return read_step_level(path, z_mm=z_mm, join_mm=join_mm, tolerance_mm=tolerance_mm).drawing
 
 
 @dataclass(frozen=True, eq=False)
 class StepLevel:
-    """The drawing of the horizontal faces at one height of a part, that height, and the greatest of the part [mm]."""
+    """The drawing of the horizontal faces at one height of a part, that height, and that of the top [mm]."""
 
     drawing: Drawing
     level: float
@@ -67,7 +68,7 @@ class StepLevel:
 def read_step_level(
     path: str | Path, *, z_mm: float | None = None, join_mm: float = 0.001, tolerance_mm: float = 0.001
 ) -> StepLevel:
-    """As :func:`read_step_face`, with the heights of the face and of the part."""
+    """As :func:`read_step_face`, with the heights of the face and of the top of the part."""
     file = Path(path)
     if z_mm is not None and not np.isfinite(z_mm):
         raise InputError(f"part.z_mm = {z_mm:g}: must be a finite number")
@@ -81,7 +82,7 @@ def read_step_level(
         top: float = part.call("step.highest")
     if not chosen:
         named = ", ".join(f"{z:g}" for z in heights)
-        raise InputError(f"part.z_mm = {level:g}: no horizontal planar face there; faces are at {named} mm")
+        raise InputError(f"part.z_mm = {level:g}: no horizontal planar face at this height; faces are at {named} mm")
     from chipload.geometry.chains import Drawing, chained
 
     findings: list[Finding] = []
@@ -104,18 +105,19 @@ def step_triangles(
 
     Parameters
     ----------
-    chord_mm : how far [mm] a triangle may leave its surface
-    angle : most turn [rad] of the surface from one vertex to the next
-    key : what the file is called in a message
+    chord_mm : greatest deviation [mm] of a triangle from its surface
+    angle : greatest turn [rad] of the surface from one vertex to the next
+    key : job key that names the file, for messages
 
     Returns
     -------
-    (n, 3) vertices [mm] and (m, 3) their numbers; vertices on an edge of the part come once with each of its faces.
+    (n, 3) vertices [mm] and (m, 3) vertex numbers of the triangles; a vertex on an edge of the part occurs once for
+    each adjacent face.
 
     Raises
     ------
     InputError
-        The file is missing or no STEP file, or has no faces.
+        The file is missing or not a STEP file, or has no faces.
     """
     with opened(Path(path), key) as part:
         points, corners = part.call("step.triangles", chord_mm, angle)
@@ -125,16 +127,16 @@ def step_triangles(
 
 
 def opened(file: Path, key: str = "part.file") -> Isolated:
-    """A STEP file whose part is asked for in a process of its own; it is read when it is first asked.
+    """A STEP file in a separate process of the CAD kernel, which reads it at the first call.
 
     Raises
     ------
     InputError
-        The file is missing, too large or no STEP file.
+        The file is missing, too large or not a STEP file.
     """
     if not is_file(file):
         raise InputError(f"{key} = {file}: no such file")
-    with open_regular(file, f"{key} = {file.name}", LARGEST_FILE, "write the part alone") as stream:
+    with open_regular(file, f"{key} = {file.name}", LARGEST_FILE, "export the part alone") as stream:
         if b"ISO-10303-21" not in stream.read(4096):
             raise InputError(f"{key} = {file.name}: not a STEP file")
     return Isolated(file, key, "step.read_part")
@@ -177,7 +179,7 @@ def read_part(path: str, key: str) -> Part:
 
 
 def triangles(part: Part, chord_mm: float, angle: float) -> tuple[Floats, NDArray[np.int64]]:
-    """What :func:`step_triangles` gives; none: no face has any."""
+    """As :func:`step_triangles`; empty arrays if no face has triangles."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.TopAbs import TopAbs_REVERSED

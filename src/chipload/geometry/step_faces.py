@@ -1,8 +1,8 @@
 """The faces of a STEP part, named by number or by a point on them.
 
-Notation: a face is a piece of a surface S(u, v) [mm] of the CAD kernel, trimmed by loops of edges; its first loop goes
-round it, others are holes. Faces are numbered from 1 in the order of the file. The kernel converts the file's unit to
-mm; it runs in a process of its own: functions that begin with a :class:`Part` are executed there.
+Notation: a face is a piece of a surface S(u, v) [mm] of the CAD kernel, trimmed by loops of edges; its first loop is
+the outer one, the others are holes. Faces are numbered from 1 in the order of the file. The kernel converts the file's
+unit to mm. It runs in a separate process: functions whose first parameter is a :class:`Part` are executed there.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ Floats = NDArray[np.float64]
 #: a face, by its number or by a point [mm] on it
 Name = int | tuple[float, float, float]
 
-#: a point names a face if it is nearer to it than this [mm]
+#: greatest distance of a point from the face that it names [mm]
 ON = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A face.
+    """A face of a STEP part.
 
     Attributes
     ----------
     number : from 1, in the order of the file
-    kind : of its surface, as `plane` or `b-spline`
-    area : [mm^2]
-    low, high : (3,) corners of its box [mm]
-    holes, edges : how many
-    part : the process of the CAD kernel that holds it
+    kind : kind of its surface, such as `plane` or `b-spline`
+    area : area [mm^2]
+    low, high : (3,) corners of its bounding box [mm]
+    holes, edges : numbers of holes and of edges
+    part : the process of the CAD kernel that has read the part
     """
 
     number: int
@@ -59,20 +59,20 @@ class Face:
         return f"face {self.number}: {self.kind}, {self.area:.5g} mm2, {self.edges} edges{holes}; {box} mm"
 
     def distance(self, point: Sequence[float]) -> float:
-        """From a point [mm]."""
+        """Distance [mm] of the face from a point (3,) [mm]."""
         return float(self.part.call("step_faces.distances", [self.number], [float(x) for x in point])[0])
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A part with its faces; ``solid``: all of them bound solids, so that their normals look out of the metal."""
+    """A part with its faces; ``solid``: all faces bound solids, so that their normals point out of the metal."""
 
     file: Path
     faces: tuple[Face, ...]
     solid: bool
 
     def face(self, name: Name, key: str) -> Face:
-        """The face of a name; ``key`` says who asks.
+        """The face with a name; ``key`` is the job key that names it, for messages.
 
         Raises
         ------
@@ -86,7 +86,7 @@ class Model:
                     f"chipload check {self.file.name} lists the faces"
                 )
             return self.faces[name - 1]
-        said = f"{key} = [{', '.join(f'{x:g}' for x in name)}]"
+        place = f"{key} = [{', '.join(f'{x:g}' for x in name)}]"
         p = np.asarray(name, dtype=np.float64)
         near = [f for f in self.faces if (p >= f.low - ON).all() and (p <= f.high + ON).all()]
         away = self._away(near, name)
@@ -95,11 +95,11 @@ class Model:
             return self.faces[on[0] - 1]
         if on:
             faces = " and ".join(str(n) for n in on)
-            raise InputError(f"{said}: lies on faces {faces}: take a point within one of them")
+            raise InputError(f"{place}: lies on faces {faces}: state a point inside one of them")
         away = self._away(self.faces, name)
         number = min(away, key=lambda n: away[n])
         raise InputError(
-            f"{said}: lies {away[number]:.4g} mm off the nearest face, {number}: must be within {ON:g} mm of a face "
+            f"{place}: lies {away[number]:.4g} mm from the nearest face, {number}: must be within {ON:g} mm of a face "
             "(mm, in the frame of the file)"
         )
 
@@ -110,7 +110,7 @@ class Model:
         return dict(zip(numbers, found, strict=True))
 
     def lines(self) -> list[str]:
-        """What the faces are, a line for each."""
+        """A heading and one line of text for each face."""
         return [f"{self.file.name}: {len(self.faces)} faces", *(str(f) for f in self.faces)]
 
 
@@ -119,12 +119,12 @@ def read_faces(path: str | Path, key: str = "part.file") -> Model:
 
     Parameters
     ----------
-    key : what the file is called in a message
+    key : job key that names the file, for messages
 
     Raises
     ------
     InputError
-        The file is missing or no STEP file, states no unit of length, or has no faces.
+        The file is missing or not a STEP file, states no unit of length, or has no faces.
     """
     file = Path(path)
     part = opened(file, key)
@@ -134,7 +134,7 @@ def read_faces(path: str | Path, key: str = "part.file") -> Model:
         part.close()
         raise
     if b"LENGTH_UNIT" not in read_regular(file, f"{key} = {file.name}", LARGEST_FILE):
-        raise InputError(f"{key} = {file.name}: states no unit of length: write it again with its unit")
+        raise InputError(f"{key} = {file.name}: states no unit of length: export it again with its unit")
     if not rows:
         raise InputError(f"{key} = {file.name}: no faces in this STEP file")
     return Model(file, tuple(Face(*(*row, part)) for row in rows), solid)
@@ -143,7 +143,7 @@ def read_faces(path: str | Path, key: str = "part.file") -> Model:
 # -- in the process of the CAD kernel ---------------------------------------------------------------------------
 @dataclass(frozen=True, eq=False)
 class KernelFace:
-    """A face in the CAD kernel: its number, the kind of its surface, how many holes, the shape."""
+    """A face in the CAD kernel: its number, the kind of its surface, its number of holes, its shape."""
 
     number: int
     kind: str
@@ -192,7 +192,7 @@ def distances(part: Part, numbers: list[int], point: list[float]) -> list[float]
 
 
 def _all(shape: Any, what: Any) -> list[Any]:
-    """The parts of a kind, in their order."""
+    """The subshapes of a kind, in the order of the file."""
     from OCP.TopExp import TopExp_Explorer
 
     out: list[Any] = []

@@ -1,8 +1,8 @@
 """Conversion of faces of revolution of a STEP part into the meridional curve of a hub or a shroud.
 
-Notation: the axis is z after a rotation R of the file's frame; r, z [mm] of a point. Of a face of revolution either the
-lines of equal u or those of equal v are its meridians; a plane across the axis has straight ones. Where blades stand on
-a face, or holes go through it, does not matter.
+Notation: the axis is z after a rotation R of the file's frame; r, z [mm] of a point. The meridians of a face of
+revolution are its lines of equal u, or those of equal v; those of a plane normal to the axis are straight. Blades on a
+face, and holes through it, have no influence.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from chipload.geometry.step_faces import Face, KernelFace, kernel_face
 
 Floats = NDArray[np.float64]
 
-#: faces of one curve meet within this [mm]
+#: greatest gap between successive faces of a curve [mm]
 JOIN = 1e-2
-#: and at a smaller angle than this [rad]
+#: greatest angle between successive faces of a curve [rad]
 SMOOTH = np.radians(10.0)
-#: a face is of revolution if the radius and the height round it change by less [mm]
+#: greatest change of radius and height around a face of revolution [mm]
 ROUND = 1e-3
-#: the long edges of the tip of a blade are nearer than this in radius and height [mm]
+#: greatest distance between the long edges of the tip of a blade, in radius and height [mm]
 TIP = 1.0
-#: points of a face's meridian
+#: number of points of the meridian of a face
 COUNT = 201
 
 
 def meridian_of(faces: Sequence[Face], R: Floats, key: str, tips: bool = False) -> Floats:
-    """The meridional curve of faces, from the inlet to the outlet: from the end that lies high and near to the axis.
+    """The meridional curve of faces from inlet to outlet; the inlet is the end with the greatest z - r.
 
     Parameters
     ----------
-    faces : in any order, each going on where another ends
-    R : (3, 3) rotation from the frame of the file to that whose axis is z
-    key : who asks, for a message
-    tips : a face that is not of revolution counts as the tip of a blade: its meridian is the middle of its long edges
+    faces : adjacent faces, in any order
+    R : (3, 3) rotation from the frame of the file to the frame with z along the axis of rotation
+    key : job key that names the faces, for messages
+    tips : treat a face that is not of revolution as the tip of a blade, with the mean of its long edges as meridian
 
     Returns
     -------
@@ -47,7 +47,7 @@ def meridian_of(faces: Sequence[Face], R: Floats, key: str, tips: bool = False) 
     Raises
     ------
     InputError
-        A face is not of revolution about the axis, or they do not go on smoothly one after another.
+        A face is not of revolution about the axis, or the faces do not join smoothly.
     """
     out: Floats = faces[0].part.call("step_meridian.joined", [f.number for f in faces], R, key, tips)
     return out
@@ -55,19 +55,19 @@ def meridian_of(faces: Sequence[Face], R: Floats, key: str, tips: bool = False) 
 
 # -- in the process of the CAD kernel ---------------------------------------------------------------------------
 def joined(part: Part, numbers: Sequence[int], R: Floats, key: str, tips: bool) -> Floats:
-    """What :func:`meridian_of` gives of the faces of these numbers."""
+    """As :func:`meridian_of`, for the faces with these numbers."""
     rest = [kernel_face(part, number) for number in numbers]
-    left = [meridian_in(f, R, key, tips) for f in rest]
-    # begin with the piece that has the first of all ends
-    ends = [max(_first(p[0]), _first(p[-1])) for p in left]
+    curves = [meridian_in(f, R, key, tips) for f in rest]
+    # begin with the curve that has the end nearest to the inlet
+    ends = [max(_first(p[0]), _first(p[-1])) for p in curves]
     k = int(np.argmax(ends))
-    out, number = left.pop(k), rest.pop(k).number
+    out, number = curves.pop(k), rest.pop(k).number
     if _first(out[-1]) > _first(out[0]):
         out = out[::-1]
-    while left:
-        gap = [min(np.linalg.norm(p[0] - out[-1]), np.linalg.norm(p[-1] - out[-1])) for p in left]
+    while curves:
+        gap = [min(np.linalg.norm(p[0] - out[-1]), np.linalg.norm(p[-1] - out[-1])) for p in curves]
         k = int(np.argmin(gap))
-        piece, next_number = left.pop(k), rest.pop(k).number
+        piece, next_number = curves.pop(k), rest.pop(k).number
         if gap[k] > JOIN:
             raise InputError(
                 f"{key}: face {next_number} begins {gap[k]:.4g} mm from the end of face {number}: state the faces "
@@ -87,12 +87,18 @@ def joined(part: Part, numbers: Sequence[int], R: Floats, key: str, tips: bool) 
 
 
 def _first(p: Floats) -> float:
-    """Greater for what the flow meets first: it comes down along the axis and goes outwards."""
+    """Order z - r [mm] of a point (2,), which falls along the flow: it enters along -z and leaves outwards."""
     return float(p[1] - p[0])
 
 
 def meridian_in(face: KernelFace, R: Floats, key: str, tips: bool) -> Floats:
-    """(n, 2) r and z of one face, in either sense."""
+    """(n, 2) r and z [mm] of the meridian of one face, in either sense.
+
+    Raises
+    ------
+    InputError
+        The face is not of revolution about the axis and, with ``tips``, not the tip of a blade.
+    """
     from OCP.BRep import BRep_Tool
     from OCP.BRepTools import BRepTools
 
@@ -125,7 +131,7 @@ def meridian_in(face: KernelFace, R: Floats, key: str, tips: bool) -> Floats:
 
 
 def _tip(face: KernelFace, R: Floats, key: str) -> Floats:
-    """Half-way between the two longest edges of the tip of a blade, by shares of their length."""
+    """Mean (n, 2) of r and z of the two longest edges of the tip of a blade, at equal shares of their lengths."""
     rows = sorted(_edges(face, R), key=lambda e: -float(np.linalg.norm(np.diff(e, axis=0), axis=1).sum()))[:2]
     curves = []
     for p in rows:
@@ -150,14 +156,14 @@ def _tip(face: KernelFace, R: Floats, key: str) -> Floats:
 
 
 def _across(face: KernelFace, R: Floats) -> Floats:
-    """Of a plane across the axis: from its least to its greatest radius along its edges."""
+    """Meridian (n, 2) of a plane normal to the axis, from the least to the greatest radius of its edges."""
     p = np.concatenate(_edges(face, R))
     r = np.hypot(p[:, 0], p[:, 1])
     return np.stack([np.linspace(r.min(), r.max(), COUNT), np.full(COUNT, p[:, 2].mean())], axis=-1)
 
 
 def _edges(face: KernelFace, R: Floats) -> list[Floats]:
-    """Points (n, 3) of each edge of a face."""
+    """Points (n, 3) [mm] of each edge of a face, rotated by R."""
     from OCP.BRepAdaptor import BRepAdaptor_Curve
     from OCP.TopAbs import TopAbs_EDGE
     from OCP.TopExp import TopExp_Explorer

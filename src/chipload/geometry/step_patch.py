@@ -1,12 +1,11 @@
 """A four-sided face of a STEP part as a B-spline patch.
 
-Notation: face S(u, v) [mm] of the CAD kernel; its loop of edges as curves in (u, v). Where the loop is a box of
-parameter lines and S is polynomial, poles and knots are taken as they are, once, and the kernel is not asked again.
-Elsewhere (s, t) in 0..1 runs over the face: the four sides of its loop, each by its length, are blended to
-(u, v)(s, t), and a patch goes through the points of a grid, which is made finer until it keeps within the tolerance.
-Where the lines of equal u or v of a file lie more than :data:`UNEVEN` times closer in one place than in another, the
-patch is made anew over shares of length, for whoever goes over it in even steps of u and v. Patches are made in the
-process of the CAD kernel.
+Notation: face S(u, v) [mm] of the CAD kernel; its loop of edges as curves in (u, v). If the loop is a box
+of parameter lines and S is polynomial, the patch has the poles and knots of S. Otherwise parameters (s, t) in 0..1 are
+laid over the face: the four sides of its loop, parametrised by length, are blended to (u, v)(s, t). The patch
+interpolates the points of a grid in (s, t), and the grid is refined until the patch is within the tolerance. If lines
+of equal u or v lie more than :data:`UNEVEN` times closer in one place than in another, the patch is reparametrised by
+length, because its users sample it in even steps of u and v. Patches are made in the process of the CAD kernel.
 
 Reference: [Piegl1997] ch. 9, 10.6 (blended boundaries).
 """
@@ -29,13 +28,13 @@ from chipload.geometry.step_faces import Face, KernelFace, kernel_face
 
 Floats = NDArray[np.float64]
 
-#: a loop has a corner where two edges meet at more than this [rad]
+#: two edges that meet at more than this angle [rad] form a corner of their loop
 CORNER = np.radians(20.0)
-#: points of a grid that is fitted, along each side
+#: numbers of grid points along each side that the fit tries
 COUNTS = (17, 33, 65, 129)
-#: pieces of a span of knots that is put over lengths
+#: numbers of pieces per knot span that the reparametrisation by length tries
 PIECES = (2, 4, 8, 16)
-#: greatest change of the distance of parameter lines that is kept
+#: greatest ratio of the distances of parameter lines that needs no reparametrisation
 UNEVEN = 2.0
 _SAMPLES = 201
 POLYNOMIAL = ("plane", "b-spline", "Bezier", "of extrusion")
@@ -43,13 +42,13 @@ POLYNOMIAL = ("plane", "b-spline", "Bezier", "of extrusion")
 
 @dataclass(frozen=True, eq=False)
 class ReadFace:
-    """What a face became.
+    """The patch that represents a face.
 
     Attributes
     ----------
-    patch : normal out of the metal, where the part is a solid
-    kept : its poles and knots are those of the file
-    off : how far it or its rim leaves the face [mm], as far as was looked
+    patch : its normal points out of the metal if the part is a solid
+    kept : whether its poles and knots are those of the file
+    off : greatest measured deviation of the patch and of its rim from the face [mm]
     """
 
     patch: BSplinePatch
@@ -63,30 +62,30 @@ class ReadFace:
 
 
 def patch_of(face: Face, key: str, fit: float) -> ReadFace:
-    """The patch of a face.
+    """The patch of a four-sided face.
 
     Parameters
     ----------
-    key : who asks, for a message
-    fit : how far [mm] the patch may leave the face
+    key : job key that names the face, for messages
+    fit : greatest deviation [mm] of the patch from the face
 
     Raises
     ------
     InputError
-        The face has holes, no four sides, or the fit leaves it by more.
+        The face has holes, does not have four sides, or the fit deviates by more than ``fit``.
     """
-    knots_u, knots_v, control, side, kept, off = face.part.call("step_patch.taken", face.number, key, fit)
-    return ReadFace(BSplinePatch(knots_u, knots_v, control, side), kept, off)
+    knots_u, knots_v, control, side, from_file, off = face.part.call("step_patch.patch_data", face.number, key, fit)
+    return ReadFace(BSplinePatch(knots_u, knots_v, control, side), from_file, off)
 
 
 def four_sided(face: Face) -> bool:
-    """Whether a face is one piece with four corners, which :func:`patch_of` takes."""
+    """Whether :func:`patch_of` accepts a face: it has four corners and no holes."""
     return bool(face.part.call("step_patch.has_four", face.number))
 
 
 # -- in the process of the CAD kernel ---------------------------------------------------------------------------
 def has_four(part: Part, number: int) -> bool:
-    """As :func:`four_sided`, of the face of that number."""
+    """As :func:`four_sided`, for the face with this number."""
     from OCP.BRep import BRep_Tool
 
     face = kernel_face(part, number)
@@ -94,35 +93,35 @@ def has_four(part: Part, number: int) -> bool:
     return face.holes == 0 and (len(loop) == 4 or len(_corners(loop)) == 4)
 
 
-def taken(part: Part, number: int, key: str, fit: float) -> tuple[Floats, Floats, Floats, int, bool, float]:
-    """Knots, poles and side of the patch of a face, whether they are those of the file, and how far it leaves it."""
-    made = _taken(kernel_face(part, number), key, fit)
+def patch_data(part: Part, number: int, key: str, fit: float) -> tuple[Floats, Floats, Floats, int, bool, float]:
+    """Knots, poles and side of the patch of a face, whether they are those of the file, and its deviation [mm]."""
+    made = _patch_of(kernel_face(part, number), key, fit)
     return made.patch.knots_u, made.patch.knots_v, made.patch.control, made.patch.side, made.kept, made.off
 
 
-def _taken(face: KernelFace, key: str, fit: float) -> ReadFace:
+def _patch_of(face: KernelFace, key: str, fit: float) -> ReadFace:
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_REVERSED
 
     if face.holes:
-        said = "a hole" if face.holes == 1 else f"{face.holes} holes"
-        raise InputError(f"{key}: face {face.number} has {said}: must be one piece without any")
+        holes = "a hole" if face.holes == 1 else f"{face.holes} holes"
+        raise InputError(f"{key}: face {face.number} has {holes}: must have none")
     surface = BRep_Tool.Surface_s(face.shape)
     side = -1 if face.shape.Orientation() == TopAbs_REVERSED else 1
     loop = loop_of(face, surface)
     rim, low, high = box_of(loop, surface)
     if rim <= fit and face.kind in POLYNOMIAL:
-        kept = kept_of(surface, low, high, side)
-        if kept is not None:
-            off = max(rim, off_of(kept, lambda s, t: low + np.stack([s, t], axis=-1) * (high - low), surface, 17))
+        patch = kept_of(surface, low, high, side)
+        if patch is not None:
+            off = max(rim, off_of(patch, lambda s, t: low + np.stack([s, t], axis=-1) * (high - low), surface, 17))
             if off <= fit:
-                return _even(ReadFace(kept, True, off), face, key, fit)
+                return _even(ReadFace(patch, True, off), face, key, fit)
     return _fitted(face, surface, loop, side, key, fit)
 
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """An edge of a loop in the sense of the loop: (u, v) of its parameter; samples t, (u, v), points, length so far."""
+    """An edge in the sense of its loop: (u, v) at a parameter; samples of t, (u, v), point, length from the start."""
 
     at: Callable[[float], tuple[float, float]]
     t: Floats
@@ -132,13 +131,13 @@ class _Piece:
 
 
 def points_of(surface: Any, uv: Floats) -> Floats:
-    """Points (..., 3) [mm] of a surface of the kernel at u and v (..., 2)."""
+    """Points (..., 3) [mm] of a kernel surface at the parameters (u, v) (..., 2)."""
     out = [surface.Value(float(u), float(v)) for u, v in uv.reshape(-1, 2)]
     return np.array([(p.X(), p.Y(), p.Z()) for p in out]).reshape(*uv.shape[:-1], 3)
 
 
 def loop_of(face: KernelFace, surface: Any) -> list[_Piece]:
-    """The edges round the face, those without length left out."""
+    """The edges of the outer loop of a face, without those of no length."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Curve2d
     from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
@@ -168,7 +167,7 @@ def loop_of(face: KernelFace, surface: Any) -> list[_Piece]:
 
 
 def box_of(loop: list[_Piece], surface: Any) -> tuple[float, Floats, Floats]:
-    """How far [mm] the loop is from the box of parameter lines round it, and the box."""
+    """Greatest distance [mm] of a loop from its bounding box in (u, v); lower and upper corner (2,) of the box."""
     uv = np.concatenate([p.uv for p in loop])
     low, high = uv.min(axis=0), uv.max(axis=0)
     natural = np.array(surface.Bounds()).reshape(2, 2)
@@ -188,7 +187,7 @@ def box_of(loop: list[_Piece], surface: Any) -> tuple[float, Floats, Floats]:
 
 
 def kept_of(surface: Any, low: Floats, high: Floats, side: int) -> BSplinePatch | None:
-    """Poles and knots of the kernel's surface within a box; None: it is rational."""
+    """The patch with the poles and knots of a kernel surface within a box; None if the surface is rational."""
     from OCP.Geom import Geom_RectangularTrimmedSurface
     from OCP.GeomConvert import GeomConvert
 
@@ -216,7 +215,7 @@ def _unit(knots: Floats) -> Floats:
 
 
 def off_of(patch: BSplinePatch, uv_of: Callable[[Floats, Floats], Floats], surface: Any, count: int) -> float:
-    """Greatest distance [mm] of patch and surface at the middles between ``count`` places and along the sides."""
+    """Greatest distance [mm] between patch and surface on a grid of ``2 count - 1`` places in each direction."""
     x = np.linspace(0.0, 1.0, 2 * count - 1)
     s, t = np.meshgrid(x, x, indexing="ij")
     points = points_of(surface, uv_of(s, t))
@@ -248,7 +247,7 @@ def _fitted(face: KernelFace, surface: Any, loop: list[_Piece], side: int, key: 
         sense = e[..., 0] * f[..., 1] - e[..., 1] * f[..., 0]
         if (sense <= 0.0).any() and (sense >= 0.0).any():
             raise InputError(
-                f"{key}: face {face.number} folds between its four sides: state it in parts, or as sections"
+                f"{key}: face {face.number} folds over between its four sides: split it in CAD, or state sections"
             )
         patch = through(points_of(surface, uv), x, x, side=int(np.sign(sense[0, 0])) * side)
         middles = np.sort(np.concatenate([x, 0.5 * (x[1:] + x[:-1])]))
@@ -258,32 +257,32 @@ def _fitted(face: KernelFace, surface: Any, loop: list[_Piece], side: int, key: 
         best = min(best, off)
         if off <= fit:
             return _even(ReadFace(patch, False, off), face, key, fit)
-    raise _left(face, key, best, fit)
+    raise _deviation(face, key, best, fit)
 
 
-def _left(face: KernelFace, key: str, best: float, fit: float) -> InputError:
+def _deviation(face: KernelFace, key: str, best: float, fit: float) -> InputError:
     return InputError(
         f"{key}: the fit of face {face.number} deviates by {best:.4g} mm: must be at most fit_mm = {fit:g}: raise it, "
         "or export the face in smooth parts"
     )
 
 
-def _even(taken: ReadFace, face: KernelFace, key: str, fit: float) -> ReadFace:
-    """The same surface over shares of length, if its own parameters are uneven."""
-    out = taken
+def _even(face_patch: ReadFace, face: KernelFace, key: str, fit: float) -> ReadFace:
+    """The same surface, reparametrised by length if its parameter lines are uneven."""
+    out = face_patch
     for _ in range(2):
         out = _even_u(out, face, key, fit)
         out = ReadFace(out.patch.swapped(), out.kept, out.off)
     return out
 
 
-def _even_u(taken: ReadFace, face: KernelFace, key: str, fit: float) -> ReadFace:
-    """The curves that go with the basis functions of v, each over shares of length instead of u."""
-    patch, x, few = taken.patch, np.linspace(0.0, 1.0, 2 * _SAMPLES), np.linspace(0.0, 1.0, 9)
+def _even_u(face_patch: ReadFace, face: KernelFace, key: str, fit: float) -> ReadFace:
+    """The same surface with u replaced by the share of length along u, if the lines of equal u are uneven."""
+    patch, x, few = face_patch.patch, np.linspace(0.0, 1.0, 2 * _SAMPLES), np.linspace(0.0, 1.0, 9)
     grid = patch.at(*_mesh(x, few)).reshape(len(x), len(few), 3)
     step = np.linalg.norm(np.diff(grid, axis=0), axis=2).mean(axis=1)
     if step.max() <= UNEVEN * step.min():
-        return taken
+        return face_patch
     u_of = CubicSpline(np.concatenate([[0.0], step.cumsum()]) / step.sum(), x)
     s_of = CubicSpline(x, np.concatenate([[0.0], step.cumsum()]) / step.sum())
     ends = np.clip(s_of(np.unique(patch.knots_u)), 0.0, 1.0)
@@ -297,9 +296,9 @@ def _even_u(taken: ReadFace, face: KernelFace, key: str, fit: float) -> ReadFace
         made = BSplinePatch(spline.t, patch.knots_v, spline.c, patch.side)
         S, V = _mesh(np.sort(np.concatenate([s, 0.5 * (s[1:] + s[:-1])])), few)
         off = float(np.linalg.norm(made.at(S, V) - patch.at(np.clip(u_of(S), 0.0, 1.0), V), axis=1).max())
-        if taken.off + off <= fit:
-            return ReadFace(made, False, taken.off + off)
-    raise _left(face, key, taken.off + off, fit)
+        if face_patch.off + off <= fit:
+            return ReadFace(made, False, face_patch.off + off)
+    raise _deviation(face, key, face_patch.off + off, fit)
 
 
 def _mesh(u: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -308,13 +307,19 @@ def _mesh(u: Floats, v: Floats) -> tuple[Floats, Floats]:
 
 
 def _at_shares(side: Callable[[Floats], Floats], shares: Floats) -> Floats:
-    """(u, v) (n, 2) at shares (n,), each different one asked for once."""
+    """(u, v) (n, 2) at shares (n,); each distinct share is computed once."""
     x, back = np.unique(shares, return_inverse=True)
     return side(x)[back]
 
 
 def _four(face: KernelFace, loop: list[_Piece], key: str) -> list[list[_Piece]]:
-    """The loop as four sides."""
+    """The edges of a loop, grouped into four sides.
+
+    Raises
+    ------
+    InputError
+        The loop has neither four edges nor four corners.
+    """
     if len(loop) == 4:
         return [[p] for p in loop]
     starts = _corners(loop)
@@ -322,9 +327,9 @@ def _four(face: KernelFace, loop: list[_Piece], key: str) -> list[list[_Piece]]:
         at = ", ".join("(" + ", ".join(f"{x:.4g}" for x in loop[k].points[0]) + ")" for k in starts.tolist()[:6])
         raise InputError(
             f"{key}: face {face.number} has {len(loop)} edges and {len(starts)} corners of more than "
-            f"{np.degrees(CORNER):.0f} deg{f', at {at} mm' if at else ''}: must have four sides: hub, shroud and two "
-            "edges of a blade, or those of a wall: cut the face in CAD along the edge that is missing, or state "
-            "sections instead of faces"
+            f"{np.degrees(CORNER):.0f} deg{f', at {at} mm' if at else ''}: must have four sides: along the "
+            "hub, the shroud and two edges of a blade, or around a wall: split the face in CAD along the missing edge, "
+            "or state sections instead of faces"
         )
     ring = loop[starts[0] :] + loop[: starts[0]]
     ends = [*(starts - starts[0]).tolist(), len(loop)]
@@ -332,7 +337,7 @@ def _four(face: KernelFace, loop: list[_Piece], key: str) -> list[list[_Piece]]:
 
 
 def _corners(loop: list[_Piece]) -> NDArray[np.int64]:
-    """Which edges of a loop begin at a corner."""
+    """Numbers (k,) of the edges of a loop that begin at a corner."""
     corner = []
     for before, after in zip([loop[-1], *loop[:-1]], loop, strict=True):
         a, b = before.points[-1] - before.points[-2], after.points[1] - after.points[0]
@@ -342,7 +347,7 @@ def _corners(loop: list[_Piece]) -> NDArray[np.int64]:
 
 
 def _side(pieces: list[_Piece]) -> Callable[[Floats], Floats]:
-    """(u, v) (n, 2) of shares (n,) of the length of a side."""
+    """The function from shares (n,) of the length of a side to its (u, v) (n, 2)."""
     ends = np.concatenate([[0.0], np.cumsum([p.length[-1] for p in pieces])])
     inverse = [CubicSpline(p.length, p.t) for p in pieces]
 

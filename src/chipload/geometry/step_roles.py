@@ -1,8 +1,8 @@
-"""Guesses of the role of each face of an impeller: sides of its blades, tips, hub.
+"""Guesses which faces of an impeller are the sides of its blades and which is its hub.
 
-Faces of one kind whose areas are nearly the same, as many as blades or twice as many, are faces of the blades: those of
-the largest area the sides. The largest other face that is of revolution about an axis of the file, and neither a plane
-nor a cylinder, is the hub.
+At least :data:`FEWEST` faces of one kind with nearly equal areas are taken as faces of the blades; the group with the
+largest total area is the sides. The hub is the largest other face of revolution about an axis of the file that is
+neither a plane nor a cylinder.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from chipload.geometry.step import Part
 from chipload.geometry.step_faces import Face, Model, kernel_face
 from chipload.geometry.step_meridian import meridian_in
 
-#: areas of like faces differ by less than this share
+#: greatest relative difference of successive areas in a group of similar faces
 LIKE = 0.01
-#: so many like faces at least are faces of blades
+#: least number of similar faces that are faces of blades
 FEWEST = 3
-#: faces that are looked at for a hub, the largest first
+#: number of faces tested for the hub, the largest first
 _LOOKED = 4
 _AXES = {"x": np.roll(np.eye(3), -1, axis=0), "y": np.roll(np.eye(3), 1, axis=0), "z": np.eye(3)}
 
 
 def roles_of(model: Model) -> list[str]:
-    """A line for the sides of the blades and one for the hub; none: nothing tells that it is an impeller."""
-    groups = [g for g in _like(model.faces) if len(g) >= FEWEST and g[0].kind not in ("plane", "cylinder")]
+    """A line of text for the sides of the blades and one for the hub; none if the part is not like an impeller."""
+    groups = [g for g in _similar(model.faces) if len(g) >= FEWEST and g[0].kind not in ("plane", "cylinder")]
     if not groups:
         return []
     sides = max(groups, key=lambda g: sum(f.area for f in g))
@@ -43,11 +43,11 @@ def roles_of(model: Model) -> list[str]:
         return []
     numbers = ", ".join(str(f.number) for f in sides)
     low, high = min(f.area for f in sides), max(f.area for f in sides)
-    return [f"{len(sides)} like faces of {low:.4g} to {high:.4g} mm2: sides of blades?: {numbers}", hub]
+    return [f"{len(sides)} similar faces of {low:.4g} to {high:.4g} mm2: sides of blades?: {numbers}", hub]
 
 
-def _like(faces: Sequence[Face]) -> list[list[Face]]:
-    """Faces of one kind whose areas, in order, differ by less than :data:`LIKE`."""
+def _similar(faces: Sequence[Face]) -> list[list[Face]]:
+    """Groups of faces of one kind whose successive areas, in ascending order, differ by at most :data:`LIKE`."""
     out: list[list[Face]] = []
     for face in sorted(faces, key=lambda f: (f.kind, f.area)):
         last = out[-1][-1] if out else None
@@ -60,7 +60,7 @@ def _like(faces: Sequence[Face]) -> list[list[Face]]:
 
 # -- in the process of the CAD kernel ---------------------------------------------------------------------------
 def round_about(part: Part, number: int, R: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> list[float]:
-    """Least and greatest radius [mm] of a face that is of revolution about z after a rotation; else nothing."""
+    """Least and greatest radius [mm] of a face of revolution about z after a rotation R; empty for another face."""
     try:
         curve = meridian_in(kernel_face(part, number), R, "", tips=False)
     except InputError:

@@ -1,12 +1,12 @@
-"""A side of a blade from faces of a STEP part that are not one four-sided face: several faces, or one of any outline.
+"""A side of a blade from several faces of a STEP part, or from one face that is not four-sided.
 
-Notation: the axis is z after a rotation R of the file's frame; r, z [mm] of a point are its meridional place, theta its
-angle. The outlines of the faces, put together in (r, z) and cut off at hub and shroud, are the region of the side. Its
-four edges lie on the hub, on the shroud, and between them; blended by shares of length they give a grid of rulings from
-hub to tip. At each place of the grid the point of the faces is found, and a patch goes through the points; the grid is
-made finer until the patch keeps within the tolerance between them.
+Notation: z is the axis of rotation after a rotation R of the file's frame; a point has meridional coordinates r, z [mm]
+and the angle theta. The region of the side is the union of the outlines of the faces in (r, z), trimmed at hub and
+shroud. Its four edges lie on the hub, on the shroud, and between them. Parametrised by length and blended, they give a
+grid of rulings from hub to tip. The faces are intersected at each place of the grid, and a patch interpolates the
+points. The grid is refined until the patch is within the tolerance between the points.
 
-Limits: round the axis the side is met once at each place. The deviation is measured at the middles of the grid.
+Limits: a circle about the axis meets the side at most once. The deviation is measured midway between grid points.
 
 Reference: [Piegl1997] ch. 9, 10.6 (blended boundaries).
 """
@@ -29,15 +29,15 @@ from chipload.geometry.step_faces import Face, kernel_face
 
 Floats = NDArray[np.float64]
 
-#: points of a grid that is fitted, along each edge
+#: numbers of grid points along each edge that the fit tries
 COUNTS = (17, 33, 65, 129)
-#: faces of one side meet within this [mm]
+#: greatest gap between adjacent faces of a side [mm]
 JOIN = 0.02
-#: how far an edge of the region may be from hub or shroud [mm], tried one after the other
+#: greatest distance of an edge of the region from hub or shroud [mm]; the values are tried in this order
 REACHED = (0.01, 0.03, 0.1, 0.3, 0.8)
-#: a tip within this of the shroud is taken as it is [mm]
-BESIDE = 0.7
-#: a place of the grid is met by a face within this [mm]: at the edges of the side
+#: a tip within this distance of the shroud is not trimmed [mm]
+NEAR_SHROUD = 0.7
+#: greatest distance of a grid point at the edges of the side from the nearest face [mm]
 MET = 0.1
 _SAMPLES, _CURVE, _NEWTON = 81, 401, 12
 
@@ -48,10 +48,10 @@ class SampledSide:
 
     Parameters
     ----------
-    patch : v from hub to shroud, normal out of the metal where the part is a solid
-    faces : their numbers
-    off : how far it leaves the surfaces of the faces [mm], at ``looked`` points
-    edge : how far it goes beyond the edges of the faces [mm]
+    patch : v runs from hub to shroud; the normal points out of the metal if the part is a solid
+    faces : numbers of the faces
+    off : greatest deviation from the surfaces of the faces [mm], measured at ``looked`` points
+    edge : greatest extension beyond the edges of the faces [mm]
     """
 
     patch: BSplinePatch
@@ -71,7 +71,7 @@ class SampledSide:
 
 @dataclass(frozen=True, eq=False)
 class _Trimmed:
-    """A face as a patch over its box, turned; its outline (n, 2) of u and v; samples: u, v (k, 2) and r, z (k, 2)."""
+    """A face as a rotated patch over its (u, v) box; outline and samples (k, 2) in (u, v), a tree of their (r, z)."""
 
     patch: BSplinePatch
     outline: Any
@@ -84,14 +84,15 @@ def side_of(faces: Sequence[Face], key: str, fit: float, R: Floats, hub: Revolve
 
     Parameters
     ----------
-    key : who asks, for a message
-    fit : how far [mm] the side may leave the faces
-    R : (3, 3) rotation from the frame of the file to that whose axis is z
+    key : job key that names the faces, for messages
+    fit : greatest deviation [mm] of the side from the faces
+    R : (3, 3) rotation from the frame of the file to the frame with z along the axis of rotation
+    hub, shroud : surfaces that bound the side
 
     Raises
     ------
     InputError
-        A face has a hole, they do not meet, do not reach hub or shroud, or the fit leaves them by more.
+        A face has a hole, the faces do not meet or do not reach hub or shroud, or the fit deviates by more.
     """
     numbers = tuple(f.number for f in faces)
     names = f"face {numbers[0]}" if len(numbers) == 1 else f"faces {', '.join(map(str, numbers))}"
@@ -106,7 +107,7 @@ def side_of(faces: Sequence[Face], key: str, fit: float, R: Floats, hub: Revolve
         x = np.linspace(0.0, 1.0, count)
         grid, sense, edge = _met(parts, _blended(edges, x), key, names)
         patch = through(grid.reshape(count, count, 3), x, x)
-        # a normal of the faces tells which side is the metal's
+        # orient the patch by a normal of the faces
         at = patch.normal(0.5, 0.5)[0]
         if at @ sense[len(sense) // 2] < 0.0:
             patch = through(grid.reshape(count, count, 3), x, x, side=-1)
@@ -153,10 +154,10 @@ def _region(parts: Sequence[_Trimmed], hub: Revolved, shroud: Revolved, key: str
         raise InputError(f"{key}: {names}: do not meet within {JOIN:g} mm: state the faces between them")
     s = np.linspace(0.0, 1.0, _CURVE)
     band = shapely.Polygon(np.concatenate([hub.curve(s), shroud.curve(s)[::-1]])).buffer(0.0)
-    # a tip that keeps near the shroud is the edge itself; one that goes beyond it is cut off there
+    # a tip near the shroud is the edge of the side; a side that extends beyond the shroud is trimmed there
     line = shapely.LineString(shroud.curve(s))
-    wider = band.union(line.buffer(BESIDE))
-    if whole.difference(wider).intersection(line.buffer(1.1 * BESIDE)).area < BESIDE**2:
+    wider = band.union(line.buffer(NEAR_SHROUD))
+    if whole.difference(wider).intersection(line.buffer(1.1 * NEAR_SHROUD)).area < NEAR_SHROUD**2:
         band = wider
     cut = whole.intersection(band)
     if cut.geom_type != "Polygon":
@@ -167,7 +168,7 @@ def _region(parts: Sequence[_Trimmed], hub: Revolved, shroud: Revolved, key: str
 
 
 def _edges(region: Any, hub: Revolved, shroud: Revolved, key: str, names: str) -> list[Floats]:
-    """The edges of the region: on the hub, on the shroud, the one where hub and shroud begin, the other (n, 2)."""
+    """The four edges (n, 2) of the region: along the hub, along the shroud, at their start, at their end."""
     import shapely
     from shapely.ops import linemerge, substring
 
@@ -186,8 +187,8 @@ def _edges(region: Any, hub: Revolved, shroud: Revolved, key: str, names: str) -
         else:
             away = float(shapely.distance(ring, line))
             raise InputError(
-                f"{key}: {names}: no edge along the {what}, nearest {away:.3g} mm: state all faces of the side, or "
-                f"check {what}"
+                f"{key}: {names}: no edge lies along the {what}, the nearest is {away:.3g} mm away: state all "
+                f"faces of the side, or check {what}"
             )
         spans.append(ends)
 
@@ -201,13 +202,13 @@ def _edges(region: Any, hub: Revolved, shroud: Revolved, key: str, names: str) -
 
     (h0, h1), (t0, t1) = spans
     if (t0 - h1) % ring.length > (h0 - h1) % ring.length:
-        raise InputError(f"{key}: {names}: hub and shroud meet on it: check hub and shroud")
+        raise InputError(f"{key}: {names}: their edges along hub and shroud overlap: check hub and shroud")
     low, right, high, left = chain(h0, h1), chain(h1, t0), chain(t0, t1), chain(t1, h0)
     return [low, right, high[::-1], left[::-1]]
 
 
 def _joined(ring: Any, pieces: list[Any]) -> tuple[float, float] | None:
-    """From where to where [mm] along a ring the longest of ``pieces`` goes, with those within a millimetre of it."""
+    """Start and end [mm] along a ring of the longest of ``pieces``, joined with those within 1 mm of it."""
     import shapely
 
     if not pieces:
@@ -235,7 +236,7 @@ def _joined(ring: Any, pieces: list[Any]) -> tuple[float, float] | None:
 
 
 def _blended(edges: list[Floats], x: Floats) -> Floats:
-    """(n n, 2) r and z of a grid: the four edges, each by shares of its length, blended."""
+    """(n n, 2) r and z of the grid that blends the four edges, each parametrised by length."""
     low, right, high, left = (_by_length(e, x) for e in edges)
     a, b = (q[..., None] for q in np.meshgrid(x, x, indexing="ij"))
     plane = (1 - b) * ((1 - a) * low[0] + a * low[-1]) + b * ((1 - a) * high[0] + a * high[-1])
@@ -249,7 +250,7 @@ def _by_length(points: Floats, x: Floats) -> Floats:
 
 
 def _met(parts: Sequence[_Trimmed], places: Floats, key: str, names: str) -> tuple[Floats, Floats, float]:
-    """Points (n, 3) of the faces at places (n, 2) of r and z, their normals, how far off one is at most [mm]."""
+    """Points (n, 3) of the faces at (r, z) (n, 2), their normals (n, 3), and the greatest distance of one [mm]."""
     import shapely
 
     best = np.full(len(places), np.inf)
@@ -284,7 +285,7 @@ def _met(parts: Sequence[_Trimmed], places: Floats, key: str, names: str) -> tup
 
 # -- in the process of the CAD kernel ---------------------------------------------------------------------------
 def trimmed(part: Part, number: int, key: str) -> tuple[Floats, Floats, Floats, int, float, Floats]:
-    """Knots, poles and side of a face over its box, how far they leave it, its outline (n, 2) in 0..1."""
+    """Knots, poles and side of the patch over the (u, v) box of a face, its deviation [mm], its outline (n, 2)."""
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_REVERSED
 
@@ -292,7 +293,7 @@ def trimmed(part: Part, number: int, key: str) -> tuple[Floats, Floats, Floats, 
 
     face = kernel_face(part, number)
     if face.holes:
-        raise InputError(f"{key}: face {number} has a hole: must be one piece without any")
+        raise InputError(f"{key}: face {number} has a hole: must have none")
     surface = BRep_Tool.Surface_s(face.shape)
     side = -1 if face.shape.Orientation() == TopAbs_REVERSED else 1
     loop = loop_of(face, surface)

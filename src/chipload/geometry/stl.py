@@ -1,9 +1,9 @@
-"""Triangles of an STL file, binary or text, whose length and form are checked before anything is made of them.
+"""The reader of STL files, binary or text, which checks length and format before it returns triangles.
 
-Format: binary is a head of 80 bytes, the number n of triangles (uint32, little-endian) and 50 bytes a triangle: normal
-and three corners in float32, and two bytes more. Text is ``solid``, triangles as ``facet normal``, ``outer loop``,
-three ``vertex`` with three numbers, ``endloop``, ``endfacet``, and ``endsolid``. Normals are left out: the corners say
-where they point.
+Format: a binary file has a header of 80 bytes, the number n of triangles (uint32, little-endian) and 50 bytes per
+triangle: normal and three corners in float32, and two more bytes. A text file has ``solid``; for each triangle ``facet
+normal``, ``outer loop``, three ``vertex`` with three numbers, ``endloop``, ``endfacet``; and ``endsolid``. Normals are
+ignored: the order of the corners defines them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from chipload.files import read_regular
 
 Floats = NDArray[np.float64]
 
-#: [bytes]
+#: largest file that is read [bytes]
 LARGEST_FILE = 200_000_000
 _HEAD, _EACH = 84, 50
 _VERTEX = re.compile(rb"\bvertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*\r?[\n\r]", re.IGNORECASE)
@@ -27,11 +27,11 @@ _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more",
 
 
 def read_stl(path: Path, key: str) -> Floats:
-    """(n, 3, 3) corners of the triangles, in the file's unit.
+    """Corners (n, 3, 3) of the triangles, in the unit of the file.
 
     Parameters
     ----------
-    key : what the file is called in a message
+    key : job key that names the file, for messages
 
     Raises
     ------
@@ -50,10 +50,10 @@ def read_stl(path: Path, key: str) -> Floats:
     else:
         raise InputError(
             f"{label}: not an STL file, or damaged: its header states {count} triangles, which are "
-            f"{_HEAD + _EACH * count} bytes, and it has {len(data)}: export it again"
+            f"{_HEAD + _EACH * count} bytes, but the file has {len(data)}: export it again"
         )
     if len(corners) == 0:
-        raise InputError(f"{label}: no triangles in it: export it again")
+        raise InputError(f"{label}: the file has no triangles: export it again")
     if not np.isfinite(corners).all():
         raise InputError(f"{label}: damaged: a number is not finite: export it again")
     return corners
@@ -66,8 +66,8 @@ def _text(data: bytes, label: str) -> Floats:
     found = _VERTEX.findall(data)
     if words[b"endloop"] != facets or words[b"vertex"] != 3 * facets or len(found) != 3 * facets:
         raise InputError(
-            f"{label}: damaged: {len(found)} vertices of three numbers, {words[b'endloop']} loops and {facets} facets "
-            "end: each facet has one loop of three: export it again"
+            f"{label}: damaged: {len(found)} vertices of three numbers, {words[b'endloop']} endloop and {facets} "
+            "endfacet: each facet must have one loop of three vertices: export it again"
         )
     if not re.search(rb"\bendsolid\b", lower):
         raise InputError(f"{label}: truncated: no endsolid: export it again")

@@ -1,15 +1,15 @@
-"""Thin walls by their two finished sides: a plate, a blade by numbers, a blade through sections.
+"""Thin walls, described by their two finished sides: a plate, a parametric blade, a blade through sections.
 
 Notation: u in 0..1 along the wall (of a blade: from its leading to its trailing edge), v in 0..1 from the clamp to the
-free edge; x along u, z along v, the clamp at z = 0. The sides are ``k-`` and ``k+``: u, v and the way from k- to k+
-are right-handed, so that k+ looks towards -y. N unit normals out of the wall, a [mm] stock on a side.
+free edge; x along u, z along v, the clamp at z = 0. The sides are ``k-`` and ``k+``. The directions of u,
+of v, and from k- to k+ are right-handed, so that k+ faces -y. N unit normals out of the wall, a [mm] stock on a side.
 
-A blade by numbers: chord c, thickness t, stagger linear in v; the camber line is an arc that turns by the camber angle,
-the thickness over u is t (e + (1 - e) (1 - (2 u - 1)^2)), e its share at the edges.
+Parametric blade: chord c, thickness t and stagger are linear in v. The camber line is an arc that turns by the camber
+angle. The thickness over u is t (e + (1 - e) (1 - (2 u - 1)^2)), where e is the share of the thickness at the edges.
 
-A blade through sections is turned so that the way from the middle of its first section to that of its last is z and the
-chord of its middle section lies in the plane of x and z. Its edges are left out: of u only a part from ``edge`` to
-1 - ``edge`` is the wall.
+A blade through sections is rotated so that the line from the middle of its first section to that of its last is along z
+and the chord of its middle section lies in the xz plane. Its edges are not part of the wall: u covers the range from
+``edge`` to 1 - ``edge`` of a section.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from chipload.geometry.sections import Blade
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: step of the differences that normals are made from, in u and v
+#: step in u and v of the differences from which normals are calculated
 STEP = 1e-5
-#: most angle [rad] between the lines across a wall and the normals of its sides
+#: greatest angle [rad] between the lines across a wall and the normals of its sides
 LEAN = math.radians(45.0)
 
 
@@ -40,8 +40,8 @@ class ThinWall:
 
     Attributes
     ----------
-    name : what it is, in words
-    at : (n,) u, (n,) v -> points (n, 3) [mm] of k- and of k+
+    name : description for messages and reports
+    at : function of u (n,), v (n,) that returns points (n, 3) [mm] of k- and of k+
     """
 
     name: str
@@ -65,7 +65,7 @@ class ThinWall:
         return out[0], out[1]
 
     def offset(self, u: ArrayLike, v: ArrayLike, stock: tuple[ArrayLike, ArrayLike]) -> tuple[Floats, Floats]:
-        """Points (..., 3) [mm] of k- and of k+ under stock (...) [mm]."""
+        """Points (..., 3) [mm] on the stock (...) [mm] of k- and of k+, measured along the normals."""
         made = [
             p + np.asarray(a, dtype=np.float64)[..., None] * n
             for p, n, a in zip(self.sides(u, v), self.normals(u, v), stock, strict=True)
@@ -73,7 +73,7 @@ class ThinWall:
         return made[0], made[1]
 
     def thickness(self, u: ArrayLike, v: ArrayLike) -> Floats:
-        """Distance (...) [mm] of the sides."""
+        """Distance (...) [mm] between the sides at equal u, v."""
         minus, plus = self.sides(u, v)
         return np.asarray(np.linalg.norm(plus - minus, axis=-1))
 
@@ -87,16 +87,16 @@ class ThinWall:
         return length, height, float(self.thickness(u, v).min())
 
     def mesh(self, counts: tuple[int, int], stock: tuple[float, float], low: float = 0.0) -> trimesh.Trimesh:
-        """Closed triangles of the wall from v = ``low`` to the free edge under stock of both sides [mm]; ``counts``
-        pieces along u and v.
+        """Closed triangle mesh of the wall with ``stock`` [mm] on k- and k+, from v = ``low`` to the free edge, with
+        ``counts`` quads along u and v.
         """
         u, v = np.meshgrid(np.linspace(0.0, 1.0, counts[0] + 1), np.linspace(low, 1.0, counts[1] + 1), indexing="ij")
         return closed_between(*self.offset(u, v, stock))
 
 
 def closed_between(minus: Floats, plus: Floats) -> trimesh.Trimesh:
-    """Closed triangles between two grids of points (n, m, 3); their first axis, their second one and the way from
-    ``minus`` to ``plus`` are right-handed.
+    """Closed triangle mesh between two grids of points (n, m, 3) [mm]. The directions of their first axis, of their
+    second axis, and from ``minus`` to ``plus`` must be right-handed.
     """
     n, m = minus.shape[:2]
     number = np.arange(n * m).reshape(n, m)
@@ -107,13 +107,18 @@ def closed_between(minus: Floats, plus: Floats) -> trimesh.Trimesh:
 
 
 def _quads(number: Ints) -> Ints:
-    """Two triangles for each four neighbours of a grid of vertices, seen right-handed along both."""
+    """Two triangles (k, 3) for each quad of a grid of vertex numbers (n, m), right-handed in the order of its axes."""
     a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
     return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
 
 
 def plate(length: float, height: float, thickness: float) -> ThinWall:
-    """An upright plate, its middle over the origin.
+    """An upright plate of length, height and thickness [mm], centred over the origin.
+
+    Raises
+    ------
+    InputError
+        A dimension is not a finite number above 0.
 
     Examples
     --------
@@ -140,20 +145,20 @@ def blade(
     camber: float,
     stagger: tuple[float, float],
 ) -> ThinWall:
-    """A blade by numbers, root and tip.
+    """A blade with given values at root and tip.
 
     Parameters
     ----------
-    chord, thickness : [mm] at the clamp and at the free edge; the thickness in the middle of the chord
-    height : [mm]
-    edge : share of the thickness at the edges, above 0, at most 1
+    chord, thickness : chord, and thickness at mid-chord, at the clamp and at the free edge [mm]
+    height : height [mm]
+    edge : thickness at the edges as a share of that at mid-chord, above 0, at most 1
     camber : angle by which the camber line turns [rad], below pi / 2
     stagger : angle of the chord about z [rad] at the clamp and at the free edge
 
     Raises
     ------
     InputError
-        A number is out of range.
+        A value is out of range.
 
     Examples
     --------
@@ -173,7 +178,7 @@ def blade(
     if not 0.0 < edge <= 1.0:
         raise InputError(f"wall.edge_share = {edge:g}: must be above 0 and at most 1")
     if not abs(camber) < 0.5 * math.pi:
-        raise InputError(f"wall.camber_deg = {math.degrees(camber):g}: must be below 90 in size")
+        raise InputError(f"wall.camber_deg = {math.degrees(camber):g}: must be between -90 and 90")
 
     def at(u: Floats, v: Floats) -> tuple[Floats, Floats]:
         c = chord[0] + v * (chord[1] - chord[0])
@@ -199,19 +204,19 @@ def blade(
 def through_sections(
     made: Blade, edge: float, span: tuple[float, float] = (0.0, 1.0), name: str = "blade through sections"
 ) -> ThinWall:
-    """A blade through sections, turned so that it stands upright, its edges left out.
+    """A blade through sections as an upright wall, without its edges.
 
     Parameters
     ----------
-    made : its two sides
-    edge : share of u that is left out at each edge, from 0 to below 0.5
-    span : part of v that is the wall
-    name : what it is, in words
+    made : the two sides of the blade
+    edge : share of u that is excluded at each edge, from 0 to below 0.5
+    span : range of v that belongs to the wall
+    name : description for messages and reports
 
     Raises
     ------
     InputError
-        A share is out of range.
+        ``edge`` or ``span`` is out of range.
     """
     if not 0.0 <= edge < 0.5:
         raise InputError(f"wall.edge_share = {edge:g}: must be from 0 to below 0.5")
@@ -234,7 +239,7 @@ def through_sections(
     turned = np.stack([x, np.cross(z, x), z])
     foot = middle(0.5, 0.0)
     low, high = raw(np.array([0.5]), np.array([0.5]))
-    swap = float((turned @ (high - low)[0])[1]) > 0.0  # k+ looks towards -y
+    swap = float((turned @ (high - low)[0])[1]) > 0.0  # k+ faces -y
 
     def at(u: Floats, v: Floats) -> tuple[Floats, Floats]:
         one, other = ((p - foot) @ turned.T for p in raw(u, v))
@@ -244,27 +249,29 @@ def through_sections(
 
 
 def opposite(wall: ThinWall) -> ThinWall:
-    """The wall, if its sides lie opposite each other: lines across it lean by at most :data:`LEAN` from its normals.
+    """The wall, after a check that its sides lie opposite each other.
+
+    Lines across the wall, between points of equal u, v, must lean by at most :data:`LEAN` from the normals.
 
     Raises
     ------
     InputError
-        Says by how much they lean, or that there is no metal between the sides.
+        The lines lean by more, or the sides meet.
     """
     u, v = np.meshgrid(np.linspace(0.0, 1.0, 33), np.linspace(0.0, 1.0, 17), indexing="ij")
     minus, plus = wall.sides(u, v)
     across = plus - minus
     thick = np.linalg.norm(across, axis=-1)
-    there = thick > 0.0
+    apart = thick > 0.0
     least = min(
-        float((sign * (across * n).sum(axis=-1)[there] / thick[there]).min(initial=1.0))
+        float((sign * (across * n).sum(axis=-1)[apart] / thick[apart]).min(initial=1.0))
         for sign, n in zip((-1.0, 1.0), wall.normals(u, v), strict=True)
     )
     lean = math.acos(max(-1.0, min(1.0, least)))
-    if lean > LEAN or not there.all():
-        said = f"lines across lean by {math.degrees(lean):.3g} deg from the normals" if lean > LEAN else "they meet"
+    if lean > LEAN or not apart.all():
+        reason = f"lines across lean by {math.degrees(lean):.3g} deg from the normals" if lean > LEAN else "they meet"
         raise InputError(
-            f"{wall.name}: not opposite each other: {said}: must be at most {math.degrees(LEAN):g} deg, and apart: "
+            f"{wall.name}: not opposite each other: {reason}: must be at most {math.degrees(LEAN):g} deg, and apart: "
             "state the two sides of one wall, or a greater edge_share"
         )
     return wall
