@@ -1,4 +1,4 @@
-"""The machine: its limits and how fast it can follow a path."""
+"""Machines: axes, limits, kinematics, and speed along a path."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
-"""One axis of a machine: what it moves, how far, how fast, how hard.
+"""One axis of a machine: its side, direction, travel, speed and acceleration.
 
 Notation: q [mm or rad] the axis's own coordinate, d its unit direction, c [mm] a point that a rotary axis turns about.
 
-The sign, once for all machines (ISO 841): a growing q moves the tool along d, or turns it right-handed about d, **as
-the workpiece sees it**. A table axis carries the workpiece and so goes the other way itself. A rotary table whose
-letter follows the standard has d = (0, 0, 1) for C; where the table itself turns right-handed about +Z for a growing C
-(LinuxCNC's `xyzac-trt-kins` and `xyzbc-trt-kins`, whose documentation says so), d = (0, 0, -1).
+Sign convention of all machines (ISO 841): a growing q moves the tool along d, or turns it right-handed about d, **as
+the workpiece sees it**. A table axis carries the workpiece, so the table itself moves in the opposite direction. A
+rotary table with the standard's sign has d = (0, 0, 1) for C. Where the table itself turns right-handed about +Z for a
+growing C, as documented for LinuxCNC's `xyzac-trt-kins` and `xyzbc-trt-kins`, d = (0, 0, -1).
 
-Directions and points hold with every axis at zero, in the machine's frame.
+Directions and points are those with every axis at zero, in the machine's frame.
 """
 
 from __future__ import annotations
@@ -30,15 +30,14 @@ class Axis:
     Parameters
     ----------
     letter : one of X Y Z A B C U V W
-    rotary : turns, in rad; else slides, in mm. A B C turn, the others slide
-    head : carries the tool; else it is in the table and carries the workpiece
-    direction : d, of any length above 0; kept as a unit vector
+    head : whether it carries the tool; else it is in the table and carries the workpiece
+    direction : d, of any length above 0; stored as a unit vector
     pivot : c [mm] of a rotary axis
     low, high : limits [mm or rad], low < high; -inf and inf: endless
     rate : greatest speed [mm/s or rad/s], > 0
     acceleration : [mm/s^2 or rad/s^2], > 0
-    indexed : set between cuts only
-    step : of an indexed axis: it stands at multiples of this alone [mm or rad]; None: anywhere
+    indexed : whether it moves between cuts only
+    step : increment of an indexed axis, which stands only at multiples of it [mm or rad]; None: at any position
 
     Raises
     ------
@@ -91,15 +90,15 @@ class Axis:
 
     @property
     def rotary(self) -> bool:
-        """Turns (A B C) or slides (X Y Z U V W)."""
+        """Whether it is rotary (A B C), with positions in rad, or linear (X Y Z U V W), in mm."""
         return self.letter in "ABC"
 
     @property
     def column(self) -> int:
-        """Its column among axis positions, 0 to 8."""
+        """Its column in arrays of axis positions, 0 to 8."""
         return LETTERS.index(self.letter)
 
     @property
     def endless(self) -> bool:
-        """Has no limit on one side or on either."""
+        """Whether it has no limit on at least one side."""
         return math.isinf(self.low) or math.isinf(self.high)

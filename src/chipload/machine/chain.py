@@ -1,8 +1,8 @@
-"""The kinematic chain of a machine: its axes in order from the workpiece to the tool, and what lies at both ends.
+"""The kinematic chain of a machine: its axes in order from the workpiece to the tool, spindle and work frame.
 
 Notation: s unit direction of the spindle with every axis at zero, from the tip to the spindle; N [mm] the nose of the
-spindle, where tools are measured from, in the machine's frame with every axis at zero; W [mm] origin of the work frame
-there. The tip is N - L s for a tool of length L.
+spindle, from which tool lengths are measured, in the machine's frame with every axis at zero; W [mm] origin of the work
+frame in the same position. The tip is N - L s for a tool of length L.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from chipload.machine.axis import LETTERS, Axis, Vector
 
 Floats = NDArray[np.float64]
 
-_SMALL = 1e-9  # of a unit vector: below it, none
+_SMALL = 1e-9  # greatest component of one unit vector along another at right angles
 
 
 def _unit(key: str, vector: Vector) -> Vector:
@@ -35,16 +35,17 @@ class Chain:
 
     Parameters
     ----------
-    axes : X, Y and Z among them, in independent directions; those of the table come first
-    spindle : s, of any length above 0; kept as a unit vector
+    axes : include X, Y and Z, in independent directions; axes of the table come first
+    spindle : s, of any length above 0; stored as a unit vector
     nose : N [mm]
-    work_zero : W [mm], where a job does not say otherwise
+    work_zero : W [mm], unless the job states another
     work_x, work_z : directions of the work frame's X and Z, at right angles, in the machine's frame
 
     Raises
     ------
     InputError
-        An axis is missing, appears twice or in the wrong place, a direction depends on others.
+        An axis is missing, appears twice or is in the wrong place, directions are not independent, or a vector is not
+        finite.
     """
 
     axes: tuple[Axis, ...]
@@ -93,18 +94,17 @@ class Chain:
 
     @property
     def R_machine_work(self) -> Floats:
-        """(3, 3) whose columns are the work frame's directions in the machine's frame."""
+        """Rotation (3, 3) from the work frame to the machine's frame; columns: directions of the work frame."""
         x, z = np.array(self.work_x), np.array(self.work_z)
         return np.column_stack([x, np.cross(z, x), z])
 
     def free(self, letters: str | None = None) -> tuple[Axis, ...]:
-        """Rotary axes to be solved for: those of ``letters``; None: all that are not indexed.
+        """Rotary axes to be solved for, at most two: those of ``letters``; None: all that are not indexed.
 
         Raises
         ------
         InputError
-            A letter is no rotary axis of the chain, there are more than two, or two that do not turn the tool
-            independently.
+            A letter is not that of a rotary axis of the chain, or there are more than two axes.
         """
         for letter in letters or "":
             if letter not in LETTERS or letter not in "".join(axis.letter for axis in self.rotary):

@@ -1,11 +1,11 @@
-"""How fast a machine goes along a path that wants a speed at every place.
+"""Speed and time of a machine along a path with a wanted speed at every point.
 
-Notation: s [mm] length along the path, v [mm/s] speed, a [mm/s^2] acceleration, kappa [1/mm] curvature, theta [rad] the
-angle that the path turns by at a corner, delta [mm] how far the corner may be rounded off.
+Notation: s [mm] length along the path, v [mm/s] speed, a [mm/s^2] acceleration, kappa [1/mm] curvature, theta [rad]
+change of direction at a corner, delta [mm] greatest deviation from the corner.
 
 Between two samples the acceleration is constant, so v^2 is linear in s: v1^2 = v0^2 + 2 a (s1 - s0), and the time
-is dt = 2 (s1 - s0) / (v0 + v1). The fastest speed is then the greatest v^2 below wanted^2 whose slope is at most 2 a:
-one pass forwards, one backwards.
+is dt = 2 (s1 - s0) / (v0 + v1). The fastest speed is then the greatest v^2 below wanted^2 whose slope is at most 2 a.
+One forward and one backward pass find it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from chipload.machine.machine import Machine
 
 Floats = NDArray[np.float64]
 
-#: a joint that turns by less [rad] is passed without slowing: at 100 mm/s a jump of 0.1 mm/s across the path
+#: change of direction [rad] below which a corner does not limit the speed: a jump of 0.1 mm/s at 100 mm/s
 TANGENT = 1e-3
 
 
@@ -40,21 +40,22 @@ def limited_speed(
     Parameters
     ----------
     s : (n,) float [mm]
-        Length along the path, never falling. Two equal values are a jump of ``wanted`` at one place: the lesser counts.
+        Length along the path, never falling. Two equal values are a jump of ``wanted`` at one point: the lesser
+        applies.
     wanted : (n,) float [mm/s]
         Greatest speed at each sample, >= 0 and finite or inf. 0 inside the path is a stop.
     acceleration : float or (n - 1,) float [mm/s^2]
-        Greatest |dv/dt|, > 0, or that of each piece between samples.
+        Greatest |dv/dt|, > 0, of the path or of each interval between samples.
     start_speed, end_speed : float [mm/s]
         Speed at the ends, >= 0; lowered where ``wanted`` or the acceleration does not allow it.
     between : float or (n - 1,) float [mm/s], > 0
-        Greatest speed within each piece, which is then run as :func:`move_time` does: up from the speed at its
-        beginning and down to that at its end. None: the acceleration within a piece is constant.
+        Greatest speed within each interval, whose motion is then that of :func:`move_time`: up from the speed at its
+        beginning and down to that at its end. None: the acceleration within an interval is constant.
 
     Returns
     -------
-    v : (n,) float [mm/s], t : (n,) float [s] from 0; without ``between``, inf from where the path cannot be left
-    (v = 0 at both ends of a piece that has length).
+    v : (n,) float [mm/s], t : (n,) float [s] from 0; without ``between``, inf from the first point that is never
+    left (v = 0 at both ends of an interval of length above 0).
 
     Raises
     ------
@@ -104,7 +105,7 @@ def limited_speed(
 
 
 def curvature_speed(kappa: ArrayLike, acceleration: float) -> Floats:
-    """Speed at which a curve needs the whole acceleration: sqrt(a / |kappa|) [mm/s], inf on a line.
+    """Speed sqrt(a / |kappa|) [mm/s] at which a curve needs the acceleration a [mm/s^2]; inf on a line.
 
     >>> curvature_speed([0.1, 0.0], 1000.0).tolist()
     [100.0, inf]
@@ -115,11 +116,11 @@ def curvature_speed(kappa: ArrayLike, acceleration: float) -> Floats:
 
 
 def corner_speed(theta: ArrayLike, acceleration: ArrayLike, tolerance: ArrayLike) -> Floats:
-    """Speed through a corner that turns by theta [rad], rounded off by at most ``tolerance`` [mm].
+    """Speed [mm/s] through a corner of angle theta [rad] that is rounded off by at most ``tolerance`` [mm].
 
-    The arc that touches both sides and leaves the corner by delta has the radius
+    The arc that is tangent to both sides and passes the corner at the distance delta has the radius
     delta cos(theta/2) / (1 - cos(theta/2)), and v = sqrt(a radius). Below ``TANGENT`` there is no corner: inf. A full
-    reversal, or a tolerance of 0, is a stop.
+    reversal, or a tolerance of 0, gives 0, a stop. ``acceleration`` is in mm/s^2; the arrays broadcast.
 
     >>> round(float(corner_speed(np.pi / 2, 3000.0, 0.005)), 4)
     6.0177
@@ -133,9 +134,10 @@ def corner_speed(theta: ArrayLike, acceleration: ArrayLike, tolerance: ArrayLike
 
 
 def move_time(length: ArrayLike, speed: ArrayLike, acceleration: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Floats:
-    """Time [s] of a straight trapezoid: from v0 up to at most ``speed``, on, and down to v1, at constant acceleration.
+    """Time [s] of a move with a trapezoidal speed profile: from v0 up to at most ``speed``, then down to v1.
 
-    The peak is min(speed, sqrt(a L + (v0^2 + v1^2)/2)). v0 and v1 must be reachable: |v1^2 - v0^2| <= 2 a L.
+    The peak is min(speed, sqrt(a L + (v0^2 + v1^2)/2)) for the length L [mm] and acceleration a [mm/s^2]; speeds are in
+    mm/s. v0 and v1 must be reachable: |v1^2 - v0^2| <= 2 a L.
 
     >>> float(move_time(10.0, 10.0, 100.0, 0.0, 0.0)), float(move_time(1.0, 100.0, 100.0, 0.0, 0.0))
     (1.1, 0.2)
@@ -151,15 +153,15 @@ def move_time(length: ArrayLike, speed: ArrayLike, acceleration: ArrayLike, v0: 
 
 
 def row_time_limited(machine: Machine, axes: ArrayLike, time: ArrayLike = 0.0) -> Floats:
-    """Least time of each move between rows of axis positions, every axis at its rate at most; O(n m).
+    """Least time of each move between rows of axis positions with every axis within its rate; O(n m).
 
-    t = max(time, max over axes of |q1 - q0| / rate); accelerations are not looked at.
+    t = max(time, max over axes of |q1 - q0| / rate); accelerations are ignored.
 
     Parameters
     ----------
     axes : (n, 9) float [mm, rad], columns X Y Z A B C U V W
     time : float or (n - 1,) float [s], >= 0
-        That the programmed feed asks for: length of the tip's path over the feed.
+        Time at the programmed feed: length of the tip's path over the feed.
 
     Returns
     -------
@@ -172,7 +174,7 @@ def row_time_limited(machine: Machine, axes: ArrayLike, time: ArrayLike = 0.0) -
 
     Examples
     --------
-    A at 30 deg/s by 45 degrees while X at 20 mm/s goes 10 mm: 1.5 s, or the 2 s that the feed asks for.
+    A turns by 45 degrees at 30 deg/s while X moves by 10 mm at 20 mm/s: 1.5 s, or the 2 s of the programmed feed.
 
     >>> from chipload.machine.machine import machine_named
     >>> axes = np.zeros((2, 9))
@@ -183,12 +185,12 @@ def row_time_limited(machine: Machine, axes: ArrayLike, time: ArrayLike = 0.0) -
     [2.0]
     """
     q = np.asarray(axes, dtype=np.float64)
-    asked = np.asarray(time, dtype=np.float64)
+    feed_time = np.asarray(time, dtype=np.float64)
     if q.ndim != 2 or q.shape[1] != 9 or len(q) == 0 or not np.isfinite(q).all():
         raise InputError(f"row_time_limited: axes {q.shape}: must be (n, 9) finite numbers, n >= 1")
-    if asked.shape not in ((), (len(q) - 1,)) or not (asked >= 0.0).all():
-        raise InputError(f"row_time_limited: time {asked.shape}: must be one number or (n - 1,), >= 0")
-    out = np.array(np.broadcast_to(asked, (len(q) - 1,)))
+    if feed_time.shape not in ((), (len(q) - 1,)) or not (feed_time >= 0.0).all():
+        raise InputError(f"row_time_limited: time {feed_time.shape}: must be one number or (n - 1,), >= 0")
+    out = np.array(np.broadcast_to(feed_time, (len(q) - 1,)))
     for axis in machine.chain.axes:
         out = np.maximum(out, np.abs(np.diff(q[:, axis.column])) / axis.rate)
     return out

@@ -1,15 +1,15 @@
-"""Axis positions along a path: which of the solutions, and how many whole turns, at every row.
+"""Axis positions along a path: the choice of solution, and of whole turns, at every row.
 
-Notation: free axes are the rotary ones that are solved for, m <= 2 of them; a state at a row is one of the k solutions
-of :func:`~chipload.machine.kinematics.inverse` with whole turns added to each free angle. D [rad] rotary motion of a
-step, the greatest |change| of a free angle. The path through the states with the least sum of D is found by dynamic
-programming; a row outside a limit costs more than every motion, so that limits are broken where there is no other way
-alone, those of linear axes, which another work offset may keep, before those of rotary ones. An indexed axis that moves
-where it must stand costs more still. An axis whose range is more than ``FEW`` turns has too many states: its turns are
-left out of the search and added afterwards, so that it goes the short way, and turns back (greedily as late as
-possible: the fewest times) where it meets its limit.
+Notation: free axes are the rotary axes that are solved for, m <= 2; a state at a row is one of the k solutions of
+:func:`~chipload.machine.kinematics.inverse` with whole turns added to each free angle; D [rad] is the rotary motion of
+a step, the greatest |change| of a free angle. Dynamic programming finds the path through the states with the least sum
+of D. A row outside a limit costs more than any motion, so a limit is violated only where no other path exists. Limits
+of linear axes, which another work offset may satisfy, are violated before those of rotary axes. Motion of an indexed
+axis during a cut costs more still. An axis with a range of more than ``FEW`` turns has too many states: the search
+ignores its whole turns. They are added afterwards: the axis takes the shorter direction at each step and unwinds where
+it reaches a limit, as late as possible and so the fewest times.
 
-At a pole the angle of the first free axis is arbitrary: it stays as it was.
+At a pole the angle of the first free axis is arbitrary: it keeps its last value.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ from chipload.machine.orientation import angle_between, wrapped
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: turns of an axis's range up to which the search looks at every one of them
+#: greatest range of an axis, in turns, for which the search includes every turn
 FEW = 4
-#: a tool's axis out of reach by less [rad] is in reach
+#: angle [rad] by which a tool axis may be out of reach and still counts as reached
 REACH = 1e-6
-#: a free angle that goes this many times as far as the tool's axis turns, and further than SWING [rad], is reported
+#: a free angle that turns more than GAIN times as far as the tool axis, and more than SWING [rad], is reported
 GAIN, SWING = 10.0, math.radians(30.0)
 
-#: [rad] what a row outside a limit of a linear axis costs, of a rotary one, what a radian costs that an index table
-#: moves where it must stand
-_OUTSIDE, _TURNED_OUT, _SET = 1e6, 1e9, 1e12
-_STILL = 1e-6  # [rad] by which an axis that stands may seem to move
-_TIE = 1e-6  # weight of the sum of all free motions, beside the greatest
-_CHUNK = 1 << 18  # steps that are held at once
-_AHEAD = 4096  # rows that the choice of a wide axis's turns looks ahead
-_TURNS = 1000  # whole turns that it goes back by, at most
+#: cost [rad] of a row outside a limit of a linear axis and of a rotary axis; cost of each radian that an indexed axis
+#: moves during a cut
+_OUTSIDE_LINEAR, _OUTSIDE_ROTARY, _INDEXED_IN_CUT = 1e6, 1e9, 1e12
+_STILL = 1e-6  # [rad] motion up to which an axis counts as standing
+_TIE = 1e-6  # weight of the sum of all free motions, relative to the greatest
+_CHUNK = 1 << 18  # steps in memory at once
+_AHEAD = 4096  # rows of look-ahead when the turns of a wide axis are chosen
+_TURNS = 1000  # greatest number of whole turns that it unwinds
 
 
 def follow(
@@ -60,28 +60,34 @@ def follow(
     line: ArrayLike | None = None,
     stand: ArrayLike | None = None,
 ) -> tuple[Floats, tuple[Finding, ...]]:
-    """Axis positions for every row of a path: the least rotary motion within the limits; O(n S^2) for S states a row.
+    """Axis positions for every row of a path: least rotary motion within the limits; O(n S^2) for S states per row.
 
     Parameters
     ----------
     tip : (n, 3) float [mm], axis : (n, 3) float
         In the work frame, as in ``inverse``.
     start : (9,) float [mm, rad]
-        Where the axes stand before row 0; axes that are not solved for stay there. None: these at 0, the others free.
+        Axis positions before row 0; axes that are not solved for stay there. None: they are at 0.
     tool_length, work_zero, free, pole_tolerance : as in ``inverse``
     line : (n,) int, line of each row in its source; None: 0
-    stand : (n,) bool, rows to which indexed axes must not move, as cuts; None: there are none
+    stand : (n,) bool, rows during which indexed axes must stand, such as cuts; None: no such row
 
     Returns
     -------
     axes : (n, 9) float [mm, rad]
     findings
-        ``machine-limit``, ``machine-index``, ``machine-reach`` (a tool's axis out of reach: the nearest is taken),
-        ``machine-rewind`` (whole turns back), ``machine-singular`` (rows at a pole; a swing past one).
+        ``machine-limit``, ``machine-index``, ``machine-reach`` (a tool axis is out of reach and replaced by the
+        nearest direction), ``machine-rewind`` (whole turns back), ``machine-singular`` (rows at a pole; a swing near
+        one).
+
+    Raises
+    ------
+    InputError
+        ``start`` is not nine finite numbers, or ``inverse`` refuses the path.
 
     Examples
     --------
-    An axis that goes twice round the cone of 45 degrees: C turns twice, A stays.
+    A tool axis that travels twice around a cone of 45 degrees: C makes two turns, A stays.
 
     >>> from chipload.machine.machine import machine_named
     >>> t = np.linspace(0.0, 4.0 * np.pi, 9)
@@ -103,12 +109,12 @@ def follow(
         return np.zeros((0, 9)), ()
     axes = np.array(found.axes[:, 0])
     if found.free:
-        found = _kept(machine, found, singular, begin, tip, tool_length, work_zero)
+        found = _with_poles(machine, found, singular, begin, tip, tool_length, work_zero)
         wide = [not one.high - one.low <= FEW * math.tau + SLACK for one in found.free]
         values, branch = _shortest(machine, found, wide, begin, stand)
         for k, one in enumerate(found.free):
             if wide[k]:
-                values[:, k] = _wound(one, values[:, k], None if begin is None else float(begin[one.column]))
+                values[:, k] = _with_turns(one, values[:, k], None if begin is None else float(begin[one.column]))
         axes = np.take_along_axis(found.axes, branch[:, None, None], axis=1)[:, 0]
         axes[:, [one.column for one in found.free]] = values
     directions = np.asarray(axis, dtype=np.float64)
@@ -116,7 +122,7 @@ def follow(
     return axes, (*findings, *_rewinds(found.free, axes, lines), *limit_findings(machine, axes, lines))
 
 
-def _kept(
+def _with_poles(
     machine: Machine,
     found: Solutions,
     singular: NDArray[np.bool_],
@@ -125,7 +131,7 @@ def _kept(
     tool_length: ArrayLike,
     work_zero: ArrayLike | None,
 ) -> Solutions:
-    """The solutions with the first free angle at a pole as it was in the row before, and X Y Z after it."""
+    """The solutions with the first free angle at each pole equal to that of the row before, and X Y Z to match."""
     known = np.flatnonzero(~singular)
     last = np.maximum.accumulate(np.where(singular, -1, np.arange(len(singular))))
     if begin is None and len(known):
@@ -146,7 +152,7 @@ def _kept(
 def _shortest(
     machine: Machine, found: Solutions, wide: list[bool], begin: Floats | None, stand: ArrayLike | None
 ) -> tuple[Floats, Ints]:
-    """Values (n, m) of the free angles, those of wide axes less whole turns, and the solution (n,) that they are of."""
+    """Values (n, m) of the free angles, without the whole turns of wide axes, and the number (n,) of their solution."""
     angles = found.axes[:, :, [one.column for one in found.free]]
     n, k, m = angles.shape
     states = angles[:, :, None, :]  # (n, k, turns, m)
@@ -157,15 +163,15 @@ def _shortest(
         some = math.floor((0.5 * (one.high - one.low) + math.pi) / math.tau + SLACK)
         turns = np.arange(-some, some + 1) * math.tau
         near = middle + wrapped(states[..., i] - middle)
-        wound = np.repeat(states, len(turns), axis=2)
-        wound[..., i] = (near[..., None] + turns).reshape(n, k, -1)
-        states = wound
-    each = states.shape[2]
-    states = states.reshape(n, k * each, m)
+        with_turns = np.repeat(states, len(turns), axis=2)
+        with_turns[..., i] = (near[..., None] + turns).reshape(n, k, -1)
+        states = with_turns
+    turned_states = states.shape[2]
+    states = states.reshape(n, k * turned_states, m)
     penalty = _outside(machine, found, states, wide)
     loose, indexed = np.array(wide), np.array([one.indexed for one in found.free])
-    stands = np.zeros(n) if stand is None else np.where(np.asarray(stand, dtype=np.bool_), _SET, 0.0)
-    count = k * each
+    stands = np.zeros(n) if stand is None else np.where(np.asarray(stand, dtype=np.bool_), _INDEXED_IN_CUT, 0.0)
+    count = k * turned_states
 
     def moved(a: Floats, b: Floats) -> Floats:
         change = np.abs(np.where(loose, wrapped(b - a), b - a))
@@ -179,7 +185,7 @@ def _shortest(
         cost = penalty[0] + _TIE * moved(np.zeros(m), states[0])
     else:
         cost = penalty[0] + moved(begin[[one.column for one in found.free]], states[0])
-    came = np.zeros((n, count), dtype=np.int64)
+    previous = np.zeros((n, count), dtype=np.int64)
     rows = max(1, _CHUNK // (count * count * m))
     for low in range(1, n, rows):
         high = min(low + rows, n)
@@ -190,35 +196,35 @@ def _shortest(
             )
         for i in range(low, high):
             total = cost[:, None] + steps[i - low]
-            came[i] = total.argmin(axis=0)
-            cost = total[came[i], np.arange(count)] + penalty[i]
+            previous[i] = total.argmin(axis=0)
+            cost = total[previous[i], np.arange(count)] + penalty[i]
         cost = cost - cost.min()
     chosen = np.empty(n, dtype=np.int64)
     chosen[-1] = int(cost.argmin())
     for i in range(n - 1, 0, -1):
-        chosen[i - 1] = came[i, chosen[i]]
-    return states[np.arange(n), chosen], chosen // each
+        chosen[i - 1] = previous[i, chosen[i]]
+    return states[np.arange(n), chosen], chosen // turned_states
 
 
 def _outside(machine: Machine, found: Solutions, states: Floats, wide: list[bool]) -> Floats:
-    """(n, states) what being outside the limits costs [rad]."""
+    """Cost (n, states) [rad] of positions outside the limits."""
     turned, away = np.zeros(states.shape[:2]), np.zeros(states.shape[:2])
     for i, one in enumerate(found.free):
         if not wide[i]:
             turned += beyond(one, states[..., i])
-    each = states.shape[1] // found.axes.shape[1]
+    turned_states = states.shape[1] // found.axes.shape[1]
     for one in machine.chain.axes:
         if one not in found.free:
             out = turned if one.rotary else away
-            out += np.repeat(beyond(one, found.axes[:, :, one.column]), each, axis=1)
-    return np.where(turned > SLACK, _TURNED_OUT + turned, 0.0) + np.where(away > SLACK, _OUTSIDE + away, 0.0)
+            out += np.repeat(beyond(one, found.axes[:, :, one.column]), turned_states, axis=1)
+    return np.where(turned > SLACK, _OUTSIDE_ROTARY + turned, 0.0) + np.where(away > SLACK, _OUTSIDE_LINEAR + away, 0.0)
 
 
-def _wound(axis: Axis, q: Floats, begin: float | None) -> Floats:
-    """Angles (n,) of a wide axis with whole turns added: the short way from row to row, back where a limit is met."""
+def _with_turns(axis: Axis, q: Floats, begin: float | None) -> Floats:
+    """Angles (n,) of a wide axis with whole turns added: shortest from row to row, unwound where it reaches a limit."""
     first = 0.0 if begin is None else begin
     path = first + np.cumsum(wrapped(np.diff(q, prepend=first)))
-    path = q + math.tau * np.round((path - q) / math.tau)  # no rounding is summed up
+    path = q + math.tau * np.round((path - q) / math.tau)  # rounding errors do not accumulate
     out = path.copy()
     i, turn = 0, 0
     while i < len(path):
@@ -226,13 +232,13 @@ def _wound(axis: Axis, q: Floats, begin: float | None) -> Floats:
         most, least = np.maximum.accumulate(seen), np.minimum.accumulate(seen)
 
         def rows(t: int, most: Floats = most, least: Floats = least) -> int:
-            """Rows from i on within the limits with t turns added."""
+            """Number of rows from i on that lie within the limits with t turns added."""
             over = np.searchsorted(most, axis.high + SLACK - math.tau * t, "right")
             under = np.searchsorted(-least, math.tau * t + SLACK - axis.low, "right")
             return int(min(over, under))
 
         def choice(t: int, turn: int = turn, lasts: Callable[[int], int] = rows) -> tuple[int, int]:
-            """The longest way on, then the fewest turns back."""
+            """Most rows within the limits, then fewest turns back."""
             return lasts(t), -abs(t - turn)
 
         ahead = rows(turn)
@@ -249,7 +255,7 @@ def _wound(axis: Axis, q: Floats, begin: float | None) -> Floats:
     return out
 
 
-def _text(rows: NDArray[np.intp], worst: int, text: str) -> str:
+def _row_text(rows: NDArray[np.intp], worst: int, text: str) -> str:
     more = f" ({len(rows)} rows, the first is {rows[0]})" if len(rows) > 1 else ""
     return f"row {worst}: {text}{more}"
 
@@ -263,19 +269,19 @@ def _reach(found: Solutions, lines: Ints) -> list[Finding]:
     verb = "reaches" if len(found.free) == 1 else "reach"
     means = f"{names} {verb} no nearer one" if found.free else "there is no rotary axis to reach it"
     text = f"the tool's axis is out of reach by {math.degrees(found.miss[worst]):.6g} deg: {means}"
-    return [Finding("machine-reach", int(lines[worst]), _text(rows, worst, text))]
+    return [Finding("machine-reach", int(lines[worst]), _row_text(rows, worst, text))]
 
 
 def _singular(
     found: Solutions, singular: NDArray[np.bool_], axes: Floats, directions: Floats, lines: Ints
 ) -> list[Finding]:
-    """Rows at a pole, and steps in which a free axis swings far while the tool's axis hardly turns."""
+    """Rows at a pole, and steps in which a free axis swings far while the tool axis hardly turns."""
     out = []
     rows = np.flatnonzero(singular)
     if len(rows):
         letter = found.free[0].letter
         text = f"the tool's axis lies along that of {letter}: {letter} is free and stays as it was"
-        out.append(Finding("machine-singular", int(lines[rows[0]]), _text(rows, int(rows[0]), text)))
+        out.append(Finding("machine-singular", int(lines[rows[0]]), _row_text(rows, int(rows[0]), text)))
     turned = angle_between(directions[1:], directions[:-1])
     for one in found.free:
         swing = np.abs(np.diff(axes[:, one.column]))
@@ -286,12 +292,12 @@ def _singular(
                 f"{one.letter} swings by {math.degrees(swing[worst - 1]):.6g} deg while the tool's axis turns by "
                 f"{math.degrees(turned[worst - 1]):.6g} deg: retract before it, or go round the pole"
             )
-            out.append(Finding("machine-singular", int(lines[worst]), _text(rows, worst, text)))
+            out.append(Finding("machine-singular", int(lines[worst]), _row_text(rows, worst, text)))
     return out
 
 
 def _rewinds(free: tuple[Axis, ...], axes: Floats, lines: Ints) -> list[Finding]:
-    """Steps that are whole turns longer than the shortest way."""
+    """Steps that are longer than the shortest rotation by whole turns."""
     out = []
     for one in free:
         change = np.diff(axes[:, one.column])

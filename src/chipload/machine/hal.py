@@ -10,20 +10,20 @@ from pathlib import Path
 from chipload.errors import Finding, InputError
 from chipload.files import read_regular
 
-#: of a file that is read [bytes]
+#: largest file that is read [bytes]
 MOST_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
 class Ini:
-    """Values by section and key, in the order of the file; a key may stand more than once."""
+    """Values by section and key, in the order of the file; a key may occur more than once."""
 
     label: str
     folder: Path
     sections: dict[str, dict[str, list[str]]]
 
     def value(self, section: str, key: str) -> str | None:
-        """The first value of a key; None where there is none."""
+        """The first value of a key; None: the key is missing or empty."""
         values = self.sections.get(section, {}).get(key)
         return values[0] if values and values[0] else None
 
@@ -33,7 +33,7 @@ class Ini:
 
 
 def read_sections(path: str | Path) -> tuple[Ini, list[Finding]]:
-    """The sections of an `.ini` file; a trailing backslash joins lines, # and ; begin a line of comment.
+    """The sections of an `.ini` file; a trailing backslash joins lines, # and ; begin a comment line.
 
     Raises
     ------
@@ -60,10 +60,10 @@ def read_sections(path: str | Path) -> tuple[Ini, list[Finding]]:
 
 
 def hal_pins(ini: Ini, findings: list[Finding]) -> dict[str, float]:
-    """Numbers that the HAL commands of a configuration give to pins, by ``setp`` or through a signal's ``sets``.
+    """Numbers that the HAL commands of a configuration assign to pins, by ``setp`` or by ``sets`` on a signal.
 
-    Files of `HALFILE` and `POSTGUI_HALFILE` are read where they lie in the folder of the `.ini` and are no Tcl; others
-    are findings.
+    Files of `HALFILE` and `POSTGUI_HALFILE` are read if they are `.hal` files in the folder of the `.ini`. Each other
+    file adds a finding to ``findings``.
     """
     commands = list(ini.values("HAL", "HALCMD"))
     for name in [*ini.values("HAL", "HALFILE"), *ini.values("HAL", "POSTGUI_HALFILE")]:
@@ -78,16 +78,16 @@ def hal_pins(ini: Ini, findings: list[Finding]) -> dict[str, float]:
     for command in commands:
         words = [word for word in command.split("#")[0].replace("=>", " ").replace("<=", " ").split() if word != "="]
         if words[:1] == ["setp"] and len(words) == 3:
-            _put(pins, words[1], words[2])
+            _store(pins, words[1], words[2])
         elif words[:1] == ["sets"] and len(words) == 3:
-            _put(signals, words[1], words[2])
+            _store(signals, words[1], words[2])
         elif words[:1] == ["net"] and len(words) > 2:
             nets |= dict.fromkeys(words[2:], words[1])
     return {**pins, **{pin: signals[signal] for pin, signal in nets.items() if signal in signals}}
 
 
-def _put(values: dict[str, float], key: str, text: str) -> None:
-    """A number under a key; a bit is 0 or 1; anything else is left out."""
+def _store(values: dict[str, float], key: str, text: str) -> None:
+    """Store a number under a key; a bit is 0 or 1; any other text is ignored."""
     try:
         value = {"true": 1.0, "false": 0.0}.get(text.lower())
         value = float(text) if value is None else value

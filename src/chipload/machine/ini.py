@@ -1,15 +1,16 @@
-"""A machine from the configuration of LinuxCNC: its `.ini` file, and what that sets in HAL.
+"""A machine from the configuration of LinuxCNC: its `.ini` file and the values that it sets in HAL.
 
-Notation: a joint is a motor, numbered; an axis is a coordinate, lettered. Under trivial kinematics they are the same;
-otherwise the joints are the machine's axes and `[AXIS_X]` limits a coordinate of the tip, so `[JOINT_0]` counts.
+Notation: a joint is a motor and has a number; an axis is a coordinate and has a letter. Under trivial kinematics they
+are the same. Otherwise the joints are the axes of the machine: `[JOINT_0]` is used, for `[AXIS_X]` limits a coordinate
+of the tip.
 
-What is looked at: `[EMC] MACHINE`; `[TRAJ] LINEAR_UNITS`, `ANGULAR_UNITS`, `COORDINATES`, `MAX_LINEAR_VELOCITY`,
+Keys that are read: `[EMC] MACHINE`; `[TRAJ] LINEAR_UNITS`, `ANGULAR_UNITS`, `COORDINATES`, `MAX_LINEAR_VELOCITY`,
 `MAX_ANGULAR_VELOCITY`, `MAX_LINEAR_ACCELERATION`, `MAX_ANGULAR_ACCELERATION`; `[KINS] KINEMATICS`; `MIN_LIMIT`,
 `MAX_LIMIT`, `MAX_VELOCITY`, `MAX_ACCELERATION`, `WRAPPED_ROTARY` of `[AXIS_<letter>]` and `[JOINT_<number>]`;
 `[EMCMOT] SERVO_PERIOD`, `[DISPLAY] MAX_FEED_OVERRIDE` and `[TRAJ] ARC_BLEND_*` of the trajectory planner;
 `[SPINDLE_0] MIN_FORWARD_VELOCITY`, `MAX_FORWARD_VELOCITY`; `setp`, `sets` and `net` in `[HAL] HALCMD` and in the files
-of `HALFILE` and `POSTGUI_HALFILE` that lie beside the `.ini`. What is not said is a finding; what is not supported is
-refused. The geometry of each kinematics module follows its documentation, "5-Axis Kinematics".
+of `HALFILE` and `POSTGUI_HALFILE` in the folder of the `.ini`. A missing value is reported as a finding; an unsupported
+value is refused. The geometry of each kinematics module follows its documentation, "5-Axis Kinematics".
 """
 
 from __future__ import annotations
@@ -50,21 +51,22 @@ _MODULES = {
     "xyzab_tdr_kins": _Module("ABXYZ", "XYZAB", (*_ROT, "x-offset", "z-offset")),
     "5axiskins": _Module("XYZCBW", "XYZBCW", ("pivot-length",)),
 }
-_PIVOT_LENGTH = 250.0  # what 5axiskins takes where nothing sets the pin, in units of the machine
+_PIVOT_LENGTH = 250.0  # default of 5axiskins for a pin that is not set, in units of the machine
 
 
 def read_ini(path: str | Path) -> tuple[Machine, tuple[Finding, ...]]:
-    """The machine of a LinuxCNC configuration, and what the configuration does not say.
+    """The machine of a LinuxCNC configuration, and a finding for each value that the configuration does not state.
 
     Codes of findings: ``ini-limit``, ``ini-velocity``, ``ini-acceleration``, ``ini-spindle``, ``ini-kinematics``
-    (geometry that is taken, not given), ``ini-hal`` and ``ini-include`` (files not read).
+    (geometry that is assumed), ``ini-hal`` and ``ini-include`` (files not read).
     No file outside the folder of ``path`` is opened.
 
     Raises
     ------
     InputError
-        The file cannot be read, a unit, a velocity or an acceleration is missing, a value is no number, the kinematics
-        are not trivkins, xyzac-trt-kins, xyzbc-trt-kins, xyzab_tdr_kins or 5axiskins, or X, Y or Z is missing.
+        The file cannot be read, a unit, a velocity or an acceleration is missing, a value is not a number, the
+        kinematics are not trivkins, xyzac-trt-kins, xyzbc-trt-kins, xyzab_tdr_kins or 5axiskins, or X, Y or Z is
+        missing.
     """
     ini, findings = read_sections(path)
     try:
@@ -80,12 +82,12 @@ def _machine(ini: Ini, findings: list[Finding], path: Path) -> Machine:
     if not words:
         raise InputError(f"{ini.label}: [KINS] KINEMATICS is missing: must be given")
     name = words[0]
-    said = dict(word.split("=", 1) for word in words[1:] if "=" in word)
+    parameters = dict(word.split("=", 1) for word in words[1:] if "=" in word)
     module = _MODULES.get(name)
     if module is None and name != "trivkins":
         raise InputError(f"{ini.label}: KINEMATICS = {name}: must be trivkins, {', '.join(_MODULES)}")
     default = module.coordinates if module else ini.value("TRAJ", "COORDINATES") or ""
-    joints = "".join(said.get("coordinates", default).upper().split())
+    joints = "".join(parameters.get("coordinates", default).upper().split())
     letters = "".join(dict.fromkeys(joints))
     order = module.chain if module else "".join(sorted(letters, key=lambda c: (c not in "ABC", LETTERS.find(c))))
     for letter in order:
@@ -107,8 +109,8 @@ def _machine(ini: Ini, findings: list[Finding], path: Path) -> Machine:
                 pivot=pivots.get(letter, (0.0, 0.0, 0.0)),
                 low=low,
                 high=high,
-                rate=_most(ini, letter, joint, "VELOCITY", findings) * unit,
-                acceleration=_most(ini, letter, joint, "ACCELERATION", findings) * unit,
+                rate=_rate_limit(ini, letter, joint, "VELOCITY", findings) * unit,
+                acceleration=_rate_limit(ini, letter, joint, "ACCELERATION", findings) * unit,
             )
         )
     rapid = _number(ini, "TRAJ", "MAX_LINEAR_VELOCITY") or _number(ini, "TRAJ", "MAX_VELOCITY")
@@ -138,7 +140,7 @@ def _machine(ini: Ini, findings: list[Finding], path: Path) -> Machine:
 
 
 def _planner(ini: Ini) -> TrajectoryPlanner:
-    """Settings of the trajectory planner; what is left out is LinuxCNC's own default."""
+    """Settings of the trajectory planner; a missing setting has the default of LinuxCNC."""
     default = TrajectoryPlanner()
     period = _number(ini, "EMCMOT", "SERVO_PERIOD")
     depth = _number(ini, "TRAJ", "ARC_BLEND_OPTIMIZATION_DEPTH")
@@ -148,13 +150,13 @@ def _planner(ini: Ini) -> TrajectoryPlanner:
         "kink_ratio": _number(ini, "TRAJ", "ARC_BLEND_KINK_RATIO"),
         "override": _number(ini, "DISPLAY", "MAX_FEED_OVERRIDE"),
     }
-    given = {key: value for key, value in numbers.items() if value is not None}
-    given["override"] = max(given.get("override", 1.0), 1.0)
+    values = {key: value for key, value in numbers.items() if value is not None}
+    values["override"] = max(values.get("override", 1.0), 1.0)
     return TrajectoryPlanner(
         cycle=default.cycle if period is None else 1e-9 * period,
         blend_arcs=_number(ini, "TRAJ", "ARC_BLEND_ENABLE") != 0.0,
         lookahead=default.lookahead if depth is None else int(depth),
-        **given,
+        **values,
     )
 
 
@@ -182,15 +184,15 @@ def _geometry(
         pivot = (0.0, 0.0, values["pivot-length"])
         return {"B": pivot, "C": pivot}, {"B": (0.0, -1.0, 0.0), "W": (0.0, 0.0, -1.0)}, origin
     x, y, z = (values[pin] for pin in _ROT)
-    far = (x + values.get("x-offset", 0.0), y + values.get("y-offset", 0.0), z + values["z-offset"])
+    offset_pivot = (x + values.get("x-offset", 0.0), y + values.get("y-offset", 0.0), z + values["z-offset"])
     if name == "xyzab_tdr_kins":
-        return {"A": far, "B": (x, y, z)}, {}, origin
+        return {"A": offset_pivot, "B": (x, y, z)}, {}, origin
     tilt = order[1]
     sign = 1.0 if pins.get(f"{name}.conventional-directions") else -1.0
     directions = {
         letter: (sign * _OWN[letter][0], sign * _OWN[letter][1], sign * _OWN[letter][2]) for letter in order[:2]
     }
-    return {"C": (x, y, z), tilt: far}, directions, origin
+    return {"C": (x, y, z), tilt: offset_pivot}, directions, origin
 
 
 def _unit(ini: Ini, key: str, known: dict[str, float]) -> float:
@@ -202,7 +204,7 @@ def _unit(ini: Ini, key: str, known: dict[str, float]) -> float:
 
 
 def _number(ini: Ini, section: str, key: str) -> float | None:
-    """A number of the file; None where it is not given."""
+    """A number of the file; None: the key is missing."""
     text = ini.value(section, key)
     if text is None:
         return None
@@ -216,30 +218,30 @@ def _number(ini: Ini, section: str, key: str) -> float | None:
 
 
 def _limits(ini: Ini, letter: str, joint: int, same: bool, unit: float, findings: list[Finding]) -> tuple[float, float]:
-    """Limits [mm or rad] of a machine's axis: the joint's; where joint and axis are the same, the narrower of both."""
+    """Limits [mm or rad] of a machine axis: those of its joint; narrower of joint and axis in trivkins."""
     if (ini.value(f"AXIS_{letter}", "WRAPPED_ROTARY") or ini.value(f"JOINT_{joint}", "WRAPPED_ROTARY") or "0") != "0":
         return -math.inf, math.inf
     both = (f"JOINT_{joint}", f"AXIS_{letter}")
     limits = []
     for key, narrower in (("MIN_LIMIT", max), ("MAX_LIMIT", min)):
-        given = [value for section in both if (value := _number(ini, section, key)) is not None]
-        if not given:
+        values = [value for section in both if (value := _number(ini, section, key)) is not None]
+        if not values:
             findings.append(Finding("ini-limit", 0, f"{letter}: {key} is missing: no limit on that side"))
             limits.append(math.inf if narrower is min else -math.inf)
         else:
-            limits.append((narrower(given) if same or letter in "ABC" else given[0]) * unit)
+            limits.append((narrower(values) if same or letter in "ABC" else values[0]) * unit)
     return limits[0], limits[1]
 
 
-def _most(ini: Ini, letter: str, joint: int, what: str, findings: list[Finding]) -> float:
-    """Greatest velocity or acceleration [units of the machine] of an axis and its joint, the lesser."""
+def _rate_limit(ini: Ini, letter: str, joint: int, what: str, findings: list[Finding]) -> float:
+    """Greatest velocity or acceleration [units of the machine] of an axis: the lesser of axis and joint."""
     sections = (f"JOINT_{joint}", f"AXIS_{letter}")
-    given = [value for section in sections if (value := _number(ini, section, f"MAX_{what}")) is not None]
-    if not given:
+    values = [value for section in sections if (value := _number(ini, section, f"MAX_{what}")) is not None]
+    if not values:
         key = f"MAX_{'ANGULAR' if letter in 'ABC' else 'LINEAR'}_{what}"
         value = _number(ini, "TRAJ", key)
         if value is None:
             raise InputError(f"{ini.label}: [AXIS_{letter}] MAX_{what} is missing: must be given")
         findings.append(Finding(f"ini-{what.lower()}", 0, f"{letter}: MAX_{what} is missing: [TRAJ] {key} is taken"))
-        given = [value]
-    return min(given)
+        values = [value]
+    return min(values)

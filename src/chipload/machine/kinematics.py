@@ -1,16 +1,16 @@
-"""From a machine's axes to the tip and axis of the tool in the work frame, and back.
+"""Kinematics of a machine: from axis positions to the tip and axis of the tool in the work frame, and back.
 
 Notation: q axis positions, columns X Y Z A B C U V W [mm, rad]; d, c direction and pivot of an axis; s, N, L direction
 of the spindle, its nose and the tool's length; W, R origin and directions of the work frame. Axes 1 .. m stand in order
-from the workpiece to the tool and E_i is what axis i does: E_i p = p + q_i d_i, or c_i + R(d_i, q_i)(p - c_i). Then
+from the workpiece to the tool and E_i is the motion of axis i: E_i p = p + q_i d_i, or c_i + R(d_i, q_i)(p - c_i). Then
 
     tip = R' (E_1 E_2 .. E_m (N - L s) - W),   axis = R' R_1 R_2 .. R_m s
 
-a product of exponentials: every direction and pivot is that of the machine with all axes at zero. Backwards, the axis
-of the tool gives the rotary axes, two solutions of :func:`~chipload.machine.orientation.two_turns`; with them known,
-the tip is linear in X, Y, Z.
+a product of exponentials: every direction and pivot is that of the machine with all axes at zero. In the inverse, the
+tool axis determines the rotary axes (two solutions, :func:`~chipload.machine.orientation.two_turns`); for given rotary
+axes the tip is linear in X, Y, Z.
 
-The work frame is fixed to what the table carries; W is where its origin stands with the rotary axes at zero.
+The work frame moves with the table; W is the position of its origin with the rotary axes at zero.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from chipload.machine.orientation import angle_between, azimuth, rotated, two_tu
 
 Floats = NDArray[np.float64]
 
-_PARALLEL = 1e-6  # [rad] nearer than this two axes turn the tool the same way
-_FLAT = 1e-6  # volume of three unit directions that lie in a plane
+_PARALLEL = 1e-6  # [rad] angle below which two axes count as parallel
+_FLAT = 1e-6  # volume below which three unit directions count as coplanar
 
 
 def forward(
@@ -40,20 +40,25 @@ def forward(
     Parameters
     ----------
     axes : (n, 9) float [mm, rad]
-        Of the machine's own axes; columns of axes that it lacks are not looked at.
+        Positions of the machine's axes; columns of axes that it lacks are ignored.
     tool_length : float or (n,) float [mm]
         From the spindle's nose to the tip.
     work_zero : (3,) float [mm]
-        Origin of the work frame in the machine's frame, rotary axes at zero; None: the machine's own.
+        Origin of the work frame in the machine's frame, rotary axes at zero; None: that of the machine.
 
     Returns
     -------
     tip : (n, 3) float [mm], axis : (n, 3) float, unit, from the tip to the spindle.
 
+    Raises
+    ------
+    InputError
+        An array has a wrong shape or a value that is not finite.
+
     Examples
     --------
-    A cradle tilted by A = 90 degrees about its pivot at (0, 0, 77.5), the work's origin: what now lies 5 mm from the
-    pivot along Y lay 5 mm below it, and the tool stands along the work's Y.
+    A cradle tilted by A = 90 degrees about its pivot at (0, 0, 77.5), the origin of the work frame. A point that is now
+    5 mm from the pivot along Y was 5 mm below it before, and the tool points along Y of the work frame.
 
     >>> from chipload.machine.machine import machine_named
     >>> axes = np.zeros((1, 9))
@@ -64,7 +69,7 @@ def forward(
     """
     chain = machine.chain
     q = _columns("axes", axes)
-    p, _ = _pushed(chain, q, tool_length, "")
+    p, _ = _tip_in_machine(chain, q, tool_length, "")
     a = np.broadcast_to(np.array(chain.spindle), p.shape)
     for axis in reversed(chain.axes):
         if axis.rotary:
@@ -82,10 +87,11 @@ class Solutions:
     axes : (n, k, 9) float [mm, rad]
         k = 2 solutions where two rotary axes are free, else 1; free angles in (-pi, pi].
     miss : (n,) float [rad]
-        How far the tool's axis is out of reach; 0 in reach. Then ``axes`` give the nearest direction, at the same tip.
+        Angle by which the tool axis is out of reach; 0: in reach. Where it is above 0, ``axes`` give the nearest
+        direction at the same tip.
     pole : (n,) float [rad]
-        Between the tool's axis and the line about which a free rotary axis turns it in itself; pi/2 where there is
-        none. 0: singular, the angle of that axis is arbitrary.
+        Angle between the tool axis and the line about which a free rotary axis only spins it; pi/2 where there is no
+        such line. 0: singular, the angle of that axis is arbitrary.
     free : tuple of Axis
         The rotary axes that were solved for, from the workpiece to the tool.
     """
@@ -106,22 +112,23 @@ def inverse(
     free: str | None = None,
     pole_tolerance: float = 1e-9,
 ) -> Solutions:
-    """Axis positions that bring the tool to a tip and an axis, all solutions; O(n m), closed form.
+    """All solutions for the axis positions that bring the tool to a tip and an axis; closed form, O(n m).
 
     Parameters
     ----------
     tip : (n, 3) float [mm], axis : (n, 3) float, of any length above 0
     tool_length, work_zero : as in ``forward``
     held : (9,) or (n, 9) float [mm, rad]
-        Positions of the axes that are not solved for: indexed ones, U V W; and of the free angle at a pole. None: 0.
+        Positions of the axes that are not solved for (indexed axes, U, V, W), and of the free angle at a pole. None: 0.
     free : letters of the rotary axes to be solved for; None: all that are not indexed
     pole_tolerance : float [rad]
-        Nearer to the pole than this the free angle is that of ``held``; the axis is then off by as much at most.
+        Within this angle of the pole the free angle is that of ``held``; the tool axis is then off by at most this
+        angle.
 
     Raises
     ------
     InputError
-        A shape or a value is wrong, more than two rotary axes are free or two that turn the tool alike, X Y Z do not
+        A shape or a value is wrong, more than two rotary axes are free, two free axes are parallel, or X, Y, Z do not
         reach every point at some row.
 
     Examples
@@ -155,13 +162,13 @@ def inverse(
 def with_tip(
     machine: Machine, axes: ArrayLike, tip: ArrayLike, tool_length: ArrayLike = 0.0, work_zero: ArrayLike | None = None
 ) -> Floats:
-    """Axis positions with X, Y, Z such that the tip is at ``tip``, the other axes as they are; O(n m).
+    """Axis positions with X, Y, Z that put the tip at ``tip`` while the other axes stay; O(n m).
 
-    What a controller does under G43.4, where a text gives the tip and the angles.
+    A controller does the same under G43.4, where the program states the tip and the angles.
 
     Parameters
     ----------
-    axes : (n, 9) float [mm, rad], of which X Y Z are not looked at
+    axes : (n, 9) float [mm, rad]; X, Y, Z are ignored
     tip : (n, 3) float [mm], in the work frame
     tool_length, work_zero : as in ``forward``
 
@@ -176,7 +183,7 @@ def with_tip(
     """
     chain = machine.chain
     out = np.array(_columns("axes", axes))
-    point, columns = _pushed(chain, out, tool_length, "XYZ")
+    point, columns = _tip_in_machine(chain, out, tool_length, "XYZ")
     flat = np.abs(np.linalg.det(columns)) < _FLAT
     if flat.any():
         row = int(np.flatnonzero(flat)[0])
@@ -193,7 +200,7 @@ def _orientation(
 ) -> tuple[Floats, Floats, Floats]:
     """Free angles (n, k, len(free)) that turn the spindle to a (n, 3) in the machine's frame; miss, pole (n,)."""
     w = np.broadcast_to(np.array(chain.spindle), a.shape)
-    turns: list[Floats] = []  # directions of the free axes, those held turned in
+    turns: list[Floats] = []  # directions of the free axes after the rotations of the fixed axes
     for axis in reversed(chain.rotary):
         d = np.broadcast_to(np.array(axis.direction), a.shape)
         if axis in free:
@@ -224,9 +231,9 @@ def _orientation(
     return angles, miss, pole
 
 
-def _pushed(chain: Chain, q: Floats, tool_length: ArrayLike, solved: str) -> tuple[Floats, Floats]:
-    """The tip (n, 3) in the machine's frame with the axes ``solved`` at zero, and what each of them adds to it, in the
-    columns of (n, 3, len(solved)).
+def _tip_in_machine(chain: Chain, q: Floats, tool_length: ArrayLike, solved: str) -> tuple[Floats, Floats]:
+    """The tip (n, 3) in the machine's frame with the axes ``solved`` at zero, and its motion per unit of each of them
+    as the columns of (n, 3, len(solved)).
     """
     n = len(q)
     length = np.asarray(tool_length, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Rows of axis positions that a machine cannot take up, or not without stopping.
+"""Checks of axis positions against the limits and index steps of a machine.
 
 Notation: q axis positions, columns X Y Z A B C U V W [mm, rad].
 """
@@ -16,12 +16,12 @@ from chipload.machine.machine import Machine
 
 Floats = NDArray[np.float64]
 
-#: beyond a limit by less is within it [mm or rad]
+#: distance beyond a limit that still counts as within it [mm or rad]
 SLACK = 1e-9
 
 
 def beyond(axis: Axis, q: Floats) -> Floats:
-    """How far positions [mm or rad] of an axis lie outside its limits; 0 inside.
+    """Distance [mm or rad] of positions of an axis outside its limits; 0 inside.
 
     >>> beyond(Axis("X", True, (1.0, 0.0, 0.0), low=-1.0, high=1.0), np.array([0.5, 3.0])).tolist()
     [0.0, 2.0]
@@ -30,7 +30,7 @@ def beyond(axis: Axis, q: Floats) -> Floats:
 
 
 def written(axis: Axis, q: float) -> str:
-    """A position of an axis as people read it: in mm or deg.
+    """A position of an axis as text, in mm or deg.
 
     >>> written(Axis("C", False, (0.0, 0.0, 1.0)), math.pi)
     '180 deg'
@@ -41,10 +41,10 @@ def written(axis: Axis, q: float) -> str:
 def limit_findings(
     machine: Machine, axes: ArrayLike, line: ArrayLike | None = None, placed: bool = True
 ) -> tuple[Finding, ...]:
-    """Axis limits and index steps, one finding an axis and code: the worst row, how many, the first; O(n m).
+    """Findings on axis limits and index steps, one for each axis and code, with the worst and the first row; O(n m).
 
-    Codes: ``machine-limit``; ``machine-index``, an indexed axis that stands off its step; ``machine-offset``, a linear
-    axis that is beyond a limit, but would not be with another work offset.
+    Codes: ``machine-limit``; ``machine-index``, an indexed axis that is not at a multiple of its step;
+    ``machine-offset``, a linear axis that is beyond a limit but fits within its travel with another work offset.
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
-"""Moves cut into pieces, so that what is straight for the workpiece and what is straight for the axes agree.
+"""Moves divided into segments, so that linear motion of the axes stays near the straight path on the workpiece.
 
-Notation: x(t) [mm] tip and a(t) unit axis of the tool in the work frame, q(t) axis positions; h length of a piece as a
-part of its move, e [mm or rad] greatest distance of a piece from what it stands for.
+Notation: x(t) [mm] tip and a(t) unit axis of the tool in the work frame, q(t) axis positions; h length of a segment as
+a fraction of its move, e [mm or rad] greatest deviation of a segment from its part of the move.
 
-A machine moves its axes in straight proportion from row to row, the tip then leaves the straight line. The law: e is
-h^2/8 times the second derivative of the tip, to the leading order, so a piece that is off by e is cut into
-ceil(sqrt(e / tolerance)) parts. The law only estimates: every piece is measured at ``PLACES`` places between its ends,
-with the rest of the tolerance left for what lies between them, and cut again until it holds.
+A machine interpolates its axes linearly from row to row, and the tip leaves the straight line. To leading order e is
+h^2/8 times the second derivative of the tip, so a segment with deviation e is divided into ceil(sqrt(e / tolerance))
+parts. This is only an estimate: the deviation of every segment is measured at ``PLACES`` points between its ends, with
+a margin for the deviation between these points, and the segment is divided again until it is within the tolerance.
 """
 
 from __future__ import annotations
@@ -27,32 +27,33 @@ from chipload.machine.orientation import angle_between
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: places inside a piece where it is measured
+#: points inside a segment at which its deviation is measured
 PLACES = 7
-#: of a parabola's height its samples at eighths miss 1/64 at most; the rest is for its skew
+#: samples at eighths miss at most 1/64 of the height of a parabola; the rest of the margin is for its skew
 _MARGIN = 1.05
-_PARTS = 256  # parts that a piece is cut into in one round, at most
-_MORE = 1.1  # more parts than the law asks for, so that one round is mostly enough
-_JUMP, _JUMPS = 16, 3  # parts of a piece in which a rotary axis goes over a quarter turn; rounds in which it is cut
-_ROUNDS = 12  # in all
-_TURN = math.pi / 4.0  # [rad] no rotary axis of a traced piece goes further
-_CHUNK = 1 << 15  # pieces that are measured at once
+_PARTS = 256  # greatest number of parts of a segment in one round
+_PARTS_FACTOR = 1.1  # factor on the estimated number of parts, so that one round is mostly enough
+_JUMP, _JUMPS = 16, 3  # parts of a segment with over a quarter turn; rounds in which it is divided
+_ROUNDS = 12  # greatest number of rounds
+_TURN = math.pi / 4.0  # [rad] greatest rotation of an axis in a traced segment
+_CHUNK = 1 << 15  # segments that are measured at once
 _ROTARY = [LETTERS.index(letter) for letter in "ABC"]
 
 
 @dataclass(frozen=True, eq=False)
 class AxisSegments:
-    """Moves cut into pieces.
+    """Moves divided into segments.
 
     Parameters
     ----------
     tip : (m, 3) float [mm], axis : (m, 3) float
-        In the work frame; the first is that of row 0.
+        Ends of the segments in the work frame; the first row is row 0 of the path.
     axes : (m, 9) float [mm, rad]
+        Axis positions at these ends.
     row : (m,) int
-        Row of the path whose move a piece belongs to; never falls.
+        Row of the path at the end of the move to which a segment belongs; never falls.
     part : (m,) float
-        How far along that move the piece ends, in (0, 1]; 1 at the path's own rows.
+        Fraction of that move at which the segment ends, in (0, 1]; 1 at the rows of the path.
     """
 
     tip: Floats
@@ -75,31 +76,33 @@ def linearise(
     pole_tolerance: float = 1e-9,
     max_rows: int = 1_000_000,
 ) -> tuple[AxisSegments, tuple[Finding, ...]]:
-    """Segments between which the axes may go straight: the tip on its line, the tool's axis on its great circle.
+    """Divide moves until linear motion of the axes keeps the tip on its line and the tool axis on its great circle.
 
-    Between the rows given the tip goes straight and the axis along the great circle. O(m) for m pieces, times the
-    rounds, of which two or three are enough at h^2.
+    From row to row of the path, the tip moves on a straight line and the tool axis on a great circle. O(m) for m
+    segments and each round; two or three rounds are usually enough.
 
     Parameters
     ----------
     tip : (n, 3) float [mm], axis : (n, 3) float
+        In the work frame, n >= 1.
     tolerance : float [mm], > 0
         Greatest distance of the tip from the straight line.
     angle_tolerance : float [rad], > 0
-        Greatest angle of the tool's axis to the plane of the great circle.
+        Greatest angle of the tool axis to the plane of the great circle.
     start, work_zero, free, pole_tolerance : as in ``follow``
     tool_length : float [mm]
-    max_rows : pieces that may be made
+        From the spindle's nose to the tip.
+    max_rows : greatest number of rows of the result
 
     Returns
     -------
-    The segments, and the findings of ``follow`` on their rows, besides ``machine-linear``: a move on which the rotary
-    axes jump, so that no cutting helps.
+    The segments, and the findings of ``follow`` for their rows. A further finding, ``machine-linear``, is a move in
+    which the rotary axes jump, so that no division helps.
 
     Raises
     ------
     InputError
-        A tolerance is not above 0, the axis turns by 180 degrees in a move, more than ``max_rows`` pieces are needed.
+        A tolerance is not above 0, the axis turns by 180 degrees in a move, or more than ``max_rows`` rows are needed.
 
     Examples
     --------
@@ -130,14 +133,16 @@ def linearise(
         e = np.zeros(len(row) - 1)
         for k in range(0, len(e), _CHUNK):
             some = slice(k, k + _CHUNK + 1)
-            e[k : k + _CHUNK] = _excess(
+            e[k : k + _CHUNK] = _deviation(
                 machine, axes[some], x[some], d[some], tool_length, work_zero, tolerance, angle_tolerance
             )
-        parts = np.where(np.isinf(e), _JUMP if count < _JUMPS else 1, np.minimum(np.ceil(np.sqrt(e) * _MORE), _PARTS))
+        parts = np.where(
+            np.isinf(e), _JUMP if count < _JUMPS else 1, np.minimum(np.ceil(np.sqrt(e) * _PARTS_FACTOR), _PARTS)
+        )
         parts = np.where(e > 1.0, parts, 1.0).astype(np.int64)
         if (parts == 1).all() or count == _ROUNDS - 1:
             break
-        row, part = _cut(row, part, parts, max_rows)
+        row, part = _divided(row, part, parts, max_rows)
     jumps = sorted(set(row[1:][e > 1.0].tolist()))
     text = "row {}: the rotary axes jump: no piece is short enough for the tolerance: retract before it"
     found = tuple(Finding("machine-linear", 0, text.format(k)) for k in jumps)
@@ -152,10 +157,10 @@ def traced(
     work_zero: ArrayLike | None = None,
     max_rows: int = 1_000_000,
 ) -> AxisSegments:
-    """The path in the work frame when every axis goes in straight proportion from row to row.
+    """The path in the work frame of a machine that interpolates its axes linearly from row to row.
 
-    The straight lines between the tips of the pieces leave the path by at most ``tolerance`` (each place against the
-    same share of its chord); no rotary axis turns by more than 45 degrees in a piece. O(m).
+    The chords of the segments deviate from the path by at most ``tolerance`` (each point is compared with the same
+    fraction of its chord); no rotary axis turns by more than 45 degrees in a segment. O(m).
 
     Parameters
     ----------
@@ -163,10 +168,16 @@ def traced(
     tolerance : float [mm], > 0
     tool_length, work_zero, max_rows : as in ``linearise``
 
+    Raises
+    ------
+    InputError
+        The tolerance is not above 0, ``axes`` has a wrong shape or a value that is not finite, or more than
+        ``max_rows`` rows are needed.
+
     Examples
     --------
-    A quarter turn of a table with the tip 50 mm off its axis: an arc 0.01 mm deep is 2 acos(1 - 0.01/50) = 2.29
-    degrees, so 39.3 of them.
+    A quarter turn of a table with the tip 50 mm off its axis: a chord 0.01 mm off its arc spans
+    2 acos(1 - 0.01/50) = 2.29 degrees, so at least 39.3 segments are needed.
 
     >>> from chipload.machine.machine import machine_named
     >>> axes = np.zeros((2, 9))
@@ -187,8 +198,8 @@ def traced(
         raise InputError(f"traced: more than {max_rows} pieces: raise the tolerance or max_rows")
     parts = np.maximum(np.ceil(turns / _TURN), 1.0).astype(np.int64)
     while True:
-        row, part = _cut(row, part, parts, max_rows)
-        at = _share(q, row, part)
+        row, part = _divided(row, part, parts, max_rows)
+        at = _interpolated(q, row, part)
         x, d = forward(machine, at, tool_length, work_zero)
         e = np.zeros(len(row) - 1)
         for k in range(0, len(e), _CHUNK):
@@ -196,13 +207,13 @@ def traced(
             tips, _, share = _between(machine, at[some], tool_length, work_zero)
             chord = x[some][:-1, None] + share[:, None] * np.diff(x[some], axis=0)[:, None]
             e[k : k + _CHUNK] = _MARGIN * np.linalg.norm(tips - chord, axis=2).max(axis=1) / tolerance
-        parts = np.where(e > 1.0, np.minimum(np.ceil(np.sqrt(e) * _MORE), _PARTS), 1.0).astype(np.int64)
+        parts = np.where(e > 1.0, np.minimum(np.ceil(np.sqrt(e) * _PARTS_FACTOR), _PARTS), 1.0).astype(np.int64)
         if (parts == 1).all():
             return AxisSegments(x, d, at, row, part)
 
 
-def _share(values: Floats, row: Ints, part: Floats) -> Floats:
-    """Rows of ``values`` (n, c) in straight proportion along their moves; its own rows to the last bit."""
+def _interpolated(values: Floats, row: Ints, part: Floats) -> Floats:
+    """Rows of ``values`` (n, c) interpolated linearly along their moves; exact at the rows themselves."""
     end, begin = values[row], values[np.maximum(row - 1, 0)]
     return np.asarray(np.where(part[:, None] == 1.0, end, begin + part[:, None] * (end - begin)))
 
@@ -215,13 +226,13 @@ def _along(p: Floats, a: Floats, row: Ints, part: Floats) -> tuple[Floats, Float
     small = turn < 1e-12
     over = np.where(small, 1.0, np.sin(turn))
     d = np.where(small, end, (np.sin((1.0 - u) * turn) * begin + np.sin(u * turn) * end) / over)
-    return _share(p, row, part), np.where(u == 1.0, end, d)
+    return _interpolated(p, row, part), np.where(u == 1.0, end, d)
 
 
 def _between(
     machine: Machine, axes: Floats, tool_length: float, work_zero: ArrayLike | None
 ) -> tuple[Floats, Floats, Floats]:
-    """Tips and axes (k, PLACES, 3) at places inside the k pieces whose axes go straight, and the places' shares."""
+    """Tips and axes (k, PLACES, 3) at points inside k segments of linear axis motion, and their fractions."""
     share = np.arange(1, PLACES + 1) / (PLACES + 1.0)
     q = axes[:-1, None] + share[:, None] * np.diff(axes, axis=0)[:, None]
     tips, directions = forward(machine, q.reshape(-1, 9), tool_length, work_zero)
@@ -229,7 +240,7 @@ def _between(
     return tips.reshape(shape), directions.reshape(shape), share
 
 
-def _excess(
+def _deviation(
     machine: Machine,
     axes: Floats,
     x: Floats,
@@ -239,7 +250,7 @@ def _excess(
     tolerance: float,
     angle_tolerance: float,
 ) -> Floats:
-    """Distance (k,) of pieces from line and great circle, in tolerances; inf where an axis goes over a quarter turn."""
+    """Deviation (k,) of segments from line and great circle, in tolerances; inf where an axis turns over 90 degrees."""
     tips, directions, _ = _between(machine, axes, tool_length, work_zero)
     chord = np.diff(x, axis=0)
     square = (chord**2).sum(axis=1)
@@ -256,8 +267,8 @@ def _excess(
     return np.asarray(np.where(half, math.inf, e))
 
 
-def _cut(row: Ints, part: Floats, parts: Ints, max_rows: int) -> tuple[Ints, Floats]:
-    """Every piece cut into so many equal parts."""
+def _divided(row: Ints, part: Floats, parts: Ints, max_rows: int) -> tuple[Ints, Floats]:
+    """Every segment divided into its number of equal parts."""
     total = int(parts.sum()) + 1
     if total > max_rows:
         raise InputError(f"{total} pieces are more than max_rows = {max_rows}: raise the tolerance or max_rows")

@@ -1,6 +1,6 @@
-"""A machine: how far, how fast and how hard its axes go, what its spindle gives, how its controller reads.
+"""A machine: travel, speed and acceleration of its axes, torque and power of its spindle, dialect of its controller.
 
-Read from TOML with the unit in every key; a number that is missing is named, never invented. Its axes form a
+It is read from TOML with the unit in every key; a missing number is an error, never a guess. Its axes form a
 :class:`~chipload.machine.chain.Chain`; :mod:`chipload.machine.axis` states the sign of an axis.
 """
 
@@ -32,22 +32,23 @@ class Machine:
 
     Parameters
     ----------
-    name : as the job calls it
+    name : name by which a job refers to it
     chain : its axes from the workpiece to the tool
     rapid : greatest speed along the path in G0 [mm/s], > 0
     feed_max : greatest speed along the path in G1, G2, G3 [mm/s], > 0
     spindle_min, spindle_max : [rad/s], 0 <= spindle_min <= spindle_max, spindle_max > 0; inf: not known
-    corner_tolerance : how far the path may be rounded off at a corner [mm], >= 0; 0 stops at every corner
+    corner_tolerance : greatest deviation of the path at a corner [mm], 0 to 1; 0: an exact stop at every corner
     dialect : `linuxcnc` or `fanuc`
-    decimals : of a written position [mm], 3 to 6
+    decimals : number of decimals of a position in a program [mm], 3 to 6
     power_w : power of the spindle [W]; None: not known
     torque : torque of the spindle [N mm]; None: not known
-    torque_curve : (speed [rad/s], torque [N mm]) of the spindle, rising speeds that hold its range, straight between
+    torque_curve : (speed [rad/s], torque [N mm]) of the spindle at rising speeds that cover its range, linear between
         them; empty: not known
-    note : where its numbers come from and which are assumed
-    jerk : greatest jerk along the path [mm/s^3], > 0; None: not known. A feed schedule keeps it; the clock has none
+    note : source of its numbers, and which of them are assumed
+    jerk : greatest jerk along the path [mm/s^3], > 0; None: not known. A feed schedule respects it; the
+        cycle time ignores it
     planner : settings of LinuxCNC's trajectory planner; None: another controller, judged by its corner tolerance
-    table : the block under the work; None: not known
+    table : the block under the workpiece; None: not known
     tcp_words : blocks that begin and end tool centre point control, ``{tool}`` for the tool's number; None: it has none
 
     Raises
@@ -75,34 +76,36 @@ class Machine:
     table: MachineTable | None = None
 
     def __post_init__(self) -> None:
-        def need(ok: bool, key: str, value: object, limit: str) -> None:
+        def require(ok: bool, key: str, value: object, limit: str) -> None:
             if not ok:
                 shown = f"{value:g}" if isinstance(value, float) else repr(value)
                 raise InputError(f"machine.{key} = {shown}: {limit}")
 
-        need(0.0 < self.rapid < math.inf, "rapid_mm_min", self.rapid * 60.0, "must be above 0")
-        need(0.0 < self.feed_max < math.inf, "feed_max_mm_min", self.feed_max * 60.0, "must be above 0")
+        require(0.0 < self.rapid < math.inf, "rapid_mm_min", self.rapid * 60.0, "must be above 0")
+        require(0.0 < self.feed_max < math.inf, "feed_max_mm_min", self.feed_max * 60.0, "must be above 0")
         per_rpm = 60.0 / math.tau
-        need(self.spindle_max > 0.0, "spindle.max_rpm", self.spindle_max * per_rpm, "must be above 0")
-        need(
+        require(self.spindle_max > 0.0, "spindle.max_rpm", self.spindle_max * per_rpm, "must be above 0")
+        require(
             0.0 <= self.spindle_min <= self.spindle_max,
             "spindle.min_rpm",
             self.spindle_min * per_rpm,
             f"must be from 0 to max_rpm = {self.spindle_max * per_rpm:g}",
         )
-        need(
+        require(
             0.0 <= self.corner_tolerance <= 1.0, "corner_tolerance_mm", self.corner_tolerance, "must be from 0 to 1 mm"
         )
-        need(self.dialect in DIALECTS, "dialect", self.dialect, "must be linuxcnc or fanuc")
-        need(3 <= self.decimals <= 6, "decimals", self.decimals, "must be from 3 to 6")
+        require(self.dialect in DIALECTS, "dialect", self.dialect, "must be linuxcnc or fanuc")
+        require(3 <= self.decimals <= 6, "decimals", self.decimals, "must be from 3 to 6")
         for key, value, factor in (("power_w", self.power_w, 1.0), ("torque_nm", self.torque, 1e-3)):
-            need(value is None or 0.0 < value < math.inf, f"spindle.{key}", (value or 0.0) * factor, "must be above 0")
+            require(
+                value is None or 0.0 < value < math.inf, f"spindle.{key}", (value or 0.0) * factor, "must be above 0"
+            )
 
-        need(self.jerk is None or 0.0 < self.jerk < math.inf, "jerk_mm_s3", self.jerk, "must be above 0")
+        require(self.jerk is None or 0.0 < self.jerk < math.inf, "jerk_mm_s3", self.jerk, "must be above 0")
         self._check_curve()
 
     def _check_curve(self) -> None:
-        """Refuse a curve of torque that does not rise in speed, is not above 0, or leaves a part of the range open."""
+        """Refuse a torque curve whose speeds do not rise or do not cover the range, or with a torque of 0 or less."""
         if not self.torque_curve:
             return
         speed, torque = np.array(self.torque_curve).T
@@ -120,7 +123,7 @@ class Machine:
             )
 
     def torque_at(self, speed: ArrayLike) -> NDArray[np.float64]:
-        """Torque that the spindle gives at speeds [rad/s], by its greatest torque and its curve [N mm]; inf: not known.
+        """Torque [N mm] of the spindle at speeds [rad/s], limited by its greatest torque and its curve; inf: not known.
 
         >>> machine_named("vmc").torque_at([100.0, 1000.0]).tolist()
         [70000.0, 70000.0]
@@ -139,7 +142,7 @@ class Machine:
 
     @property
     def acceleration(self) -> tuple[float, float, float]:
-        """Of X, Y, Z [mm/s^2]."""
+        """Accelerations of X, Y and Z [mm/s^2]."""
         x, y, z = (self.chain.axis(letter).acceleration for letter in "XYZ")
         return x, y, z
 
@@ -180,7 +183,7 @@ def _from_table(label: str, table: Row) -> Machine:
 
 
 def _planner(label: str, top: Row) -> TrajectoryPlanner | None:
-    """The settings of `[trajectory_planner]`; what is left out is LinuxCNC's own default."""
+    """The settings of `[trajectory_planner]`; a missing setting has the default of LinuxCNC."""
     if "trajectory_planner" not in top:
         return None
     given = checked(label, top["trajectory_planner"], "trajectory_planner")
@@ -216,24 +219,25 @@ def read_machine(path: str | Path) -> Machine:
     """Read a machine from a TOML file.
 
     Keys: ``name``, ``dialect``, ``decimals``, ``rapid_mm_min``, ``feed_max_mm_min``, ``corner_tolerance_mm``, optional
-    ``note``, ``jerk_mm_s3`` (along the path; kept by feed schedules), ``tcp_on`` and ``tcp_off`` (the words of tool
-    centre point control), and ``chain``, the letters of the axes from the workpiece to the tool (XYZ if left out).
+    ``note``, ``jerk_mm_s3`` (along the path, for feed schedules), ``tcp_on`` and ``tcp_off`` (words that begin and end
+    tool centre point control), and ``chain``, the letters of the axes from the workpiece to the tool (XYZ if left out).
 
-    In ``[axis.x]`` and the other linear ones: ``min_mm``, ``max_mm``, ``acceleration_mm_s2``, optional
+    In ``[axis.x]`` and the tables of the other linear axes: ``min_mm``, ``max_mm``, ``acceleration_mm_s2``, optional
     ``rate_mm_min`` (else the rapid rate), ``direction`` (else the letter's own), ``side`` (`table` or `head`, else
     head), ``indexed``, ``step_mm``. In ``[axis.a]``, b, c: ``side``, ``direction``, ``pivot_mm``, ``min_deg`` and
     ``max_deg`` or ``endless = true``, ``rate_deg_min``, ``acceleration_deg_s2``, optional ``indexed``, ``step_deg``.
 
     In ``[trajectory_planner]``, for a machine under LinuxCNC: ``cycle_ms`` (period of the servo thread), optional
     ``blend_arcs``, ``lookahead``, ``gap_cycles``, ``ramp_frequency_hz``, ``kink_ratio``, ``override_max``. Without the
-    table corners are passed by ``corner_tolerance_mm``.
+    table, ``corner_tolerance_mm`` sets the speed at corners.
 
     In ``[spindle]``: ``min_rpm``, ``max_rpm``, optional ``power_w``, ``torque_nm``, ``torque_curve`` (pairs of rpm and
-    N m), ``direction`` (from the tip to the spindle; else +Z), and ``nose_mm`` or ``gauge_mm``: the nose is so far from
-    the pivot of the head's last rotary axis. In ``[work]``, which may be left out: ``zero_mm``, ``x_axis``, ``z_axis``.
+    N m), ``direction`` (from the tip to the spindle; else +Z), and ``nose_mm`` or ``gauge_mm``, the distance of the
+    nose from the pivot of the head's last rotary axis. In ``[work]``, which may be left out: ``zero_mm``,
+    ``x_axis``, ``z_axis``.
 
-    In ``[table]``, which may be left out: ``low_mm`` and ``high_mm``, corners of the block under the work in the
-    coordinates of the work, optional ``spacing_mm``. A job that simulates a program compares its tools with that block,
+    In ``[table]``, which may be left out: ``low_mm`` and ``high_mm``, corners of the block under the workpiece in
+    work coordinates, optional ``spacing_mm``. A job that simulates a program compares its tools with that block,
     unless it states a ``[machine_table]`` of its own.
 
     Raises
@@ -259,7 +263,7 @@ def machine_named(name: str) -> Machine:
     Raises
     ------
     InputError
-        There is none; the message names the nearest.
+        No shipped machine has that name; the message gives the nearest one.
 
     Examples
     --------

@@ -1,13 +1,13 @@
-"""A machine that an MTConnect agent describes, and the samples of its spindle.
+"""Description of a machine by an MTConnect agent, and samples of its spindle.
 
-An agent answers ``/probe`` with what the device is (MTConnectDevices) and ``/sample`` with what it measured
-(MTConnectStreams); either may also be a file. What is read: of a device its linear axes with the limits of their
-position, of the component that turns as spindle the limits of its speed, the greatest path feed; of samples the
-spindle's speed, current, power and torque and the path feed. Values have the units of the standard (ANSI/MTC1.4,
+An agent answers ``/probe`` with the description of the device (MTConnectDevices) and ``/sample`` with measured values
+(MTConnectStreams); either may also be a file. From a description this module reads the limits of the linear axes, the
+limits of the spindle's speed and the greatest path feed; from samples the speed, current, power and torque of the
+spindle, and the path feed. Values have the units of the standard (ANSI/MTC1.4,
 Part 2: millimetre, revolution/minute, ampere, watt, newton metre, millimetre/second).
 
-A description does not say how fast axes accelerate, how rotary axes are mounted, nor what the controller reads: keys of
-the machine's file that it leaves open are written as comments, and the file is refused until they are filled in.
+A description does not state the acceleration of axes, the mounting of rotary axes or the dialect of the controller. The
+machine's file holds such keys as comments, and it is refused until they are filled in.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from chipload.files import read_regular
 
 Element = ElementTree.Element
 
-#: of a document [bytes], and seconds that an agent may take to answer
+#: largest document [bytes], and longest wait for an agent's answer [s]
 MOST_BYTES, WAIT_S = 1 << 26, 20.0
-#: most samples in an answer, and most answers that are asked for
+#: greatest number of samples in an answer, and of answers that are requested
 COUNT, ANSWERS = 10_000, 1_000
 #: types of samples -> column of the log and the factor to its unit
 TYPES = {
@@ -45,7 +45,7 @@ TYPES = {
 }
 #: the columns in their order
 COLUMNS = ("speed_rpm", "current_a", "power_w", "torque_nm", "feed_mm_min")
-#: kinds of values that were asked for and not measured
+#: subtypes of values that are commanded, not measured
 WANTED = ("COMMANDED", "PROGRAMMED", "OVERRIDE", "TARGET", "JOG", "RAPID")
 #: components that may be the spindle
 TURNING = ("Rotary", "Spindle")
@@ -53,7 +53,7 @@ TURNING = ("Rotary", "Spindle")
 
 @dataclass(frozen=True)
 class Described:
-    """What a device says of itself.
+    """Description of a device.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Described:
     travel : least and greatest position [mm] of each linear axis by its letter; None: not stated
     speed : least and greatest speed of the spindle [rpm]; None: not stated
     feed : greatest path feed [mm/min]; None: not stated
-    rotary : names of the other axes that turn
+    rotary : names of the rotary axes other than the spindle
     """
 
     name: str
@@ -77,12 +77,12 @@ def document(source: str, path: str = "", query: str = "") -> Element:
     Parameters
     ----------
     source : a file, or the address of an agent, as ``http://127.0.0.1:5000``
-    path, query : that an agent is asked for, as ``probe``
+    path, query : request to the agent, such as ``probe``
 
     Raises
     ------
     InputError
-        It cannot be read, is no XML of MTConnect, or the agent reports an error.
+        The document cannot be read or is not XML of MTConnect, or the agent reports an error.
     """
     if source.startswith(("http://", "https://")):
         address = f"{source.rstrip('/')}/{path}{query}"
@@ -104,8 +104,8 @@ def document(source: str, path: str = "", query: str = "") -> Element:
     except ElementTree.ParseError as err:
         raise InputError(f"{label}: not XML: {err}") from None
     if _kind(root) == "MTConnectError":
-        said = "; ".join((e.text or "").strip() for e in root.iter() if _kind(e) == "Error")
-        raise InputError(f"{label}: the agent reports: {said or 'an error'}")
+        reported = "; ".join((e.text or "").strip() for e in root.iter() if _kind(e) == "Error")
+        raise InputError(f"{label}: the agent reports: {reported or 'an error'}")
     if not _kind(root).startswith("MTConnect"):
         raise InputError(f"{label}: the document is a {_kind(root)}: MTConnectDevices or MTConnectStreams is read")
     return root
@@ -122,7 +122,7 @@ def described(root: Element, name: str | None = None) -> Described:
     Raises
     ------
     InputError
-        There is no such device, or several and none is named.
+        There is no such device, or there are several and ``name`` is None.
     """
     devices = [e for e in root.iter() if _kind(e) == "Device"]
     if not devices:
@@ -154,7 +154,7 @@ def described(root: Element, name: str | None = None) -> Described:
 
 
 def machine_text(found: Described) -> str:
-    """The machine's file (TOML): what is known stands, what is not is a comment to be filled in."""
+    """The machine's file (TOML); a value that is not known is a comment to be filled in."""
 
     def line(key: str, value: float | None, what: str = "") -> str:
         return f"{key} = {value!r}" if value is not None else f"# {key} =        # not stated by the agent{what}"
@@ -192,47 +192,47 @@ def samples(source: str, device: str | None = None, component: str | None = None
 
     Parameters
     ----------
-    source : a file with streams, or the address of an agent, all of whose buffer is asked for
+    source : a file with streams, or the address of an agent, whose whole buffer is read
     device : its name; None: the only one
-    component : name or id of what turns as spindle; None: the only one that states a speed
+    component : name or id of the spindle's component; None: the only one that states a speed
 
     Raises
     ------
     InputError
-        There is no speed of a spindle, none of current and power, or more than one spindle and none is named.
+        There is no spindle speed, neither current nor power, or more than one spindle and ``component`` is None.
 
     Notes
     -----
-    A row is written where the current (or the power) is reported; the other columns have their last value. Rows before
-    all columns are known, and where one is unavailable, are left out: finding ``mtconnect-unavailable``.
+    A row is written where the current (or the power) is reported; the other columns have their last value. Rows with
+    a column that is not yet known or is unavailable are omitted, with a finding ``mtconnect-unavailable``.
     """
     found = sorted(_events(source, device, component))
     if not found:
         raise InputError(f"MTConnect {source}: no sample of a spindle: its speed and its current or power are needed")
-    there = [c for c in COLUMNS if any(e[2] == c and e[3] is not None for e in found)]
-    load = next((c for c in ("current_a", "power_w") if c in there), None)
-    if load is None or "speed_rpm" not in there:
+    known = [c for c in COLUMNS if any(e[2] == c and e[3] is not None for e in found)]
+    load = next((c for c in ("current_a", "power_w") if c in known), None)
+    if load is None or "speed_rpm" not in known:
         missing = "speed (RotaryVelocity)" if load is not None else "current (Amperage) or power (Wattage)"
         raise InputError(f"MTConnect {source}: no sample of the spindle's {missing}: add it to the agent's device file")
     out = io.StringIO()
     rows = csv.writer(out, lineterminator="\n")
-    rows.writerow(["time_s", *there])
+    rows.writerow(["time_s", *known])
     last: dict[str, float | None] = {}
-    first, left, written = found[0][0], 0, -math.inf
+    first, omitted, written = found[0][0], 0, -math.inf
     for time, _, column, value in found:
         last[column] = value
         if column != load:
             continue
-        values = [last.get(c) for c in there]
+        values = [last.get(c) for c in known]
         if any(v is None for v in values) or time <= written:
-            left += 1
+            omitted += 1
             continue
         written = time
         rows.writerow([f"{time - first:.6f}", *(f"{v:.9g}" for v in values if v is not None)])
     if written == -math.inf:
-        raise InputError(f"MTConnect {source}: at no time are {', '.join(there)} known together")
-    text = f"{left} samples are left out: a column is not yet known or unavailable, or time does not rise"
-    return out.getvalue(), [Finding("mtconnect-unavailable", 0, text)] if left else []
+        raise InputError(f"MTConnect {source}: at no time are {', '.join(known)} known together")
+    text = f"{omitted} samples are left out: a column is not yet known or unavailable, or time does not rise"
+    return out.getvalue(), [Finding("mtconnect-unavailable", 0, text)] if omitted else []
 
 
 def _events(source: str, device: str | None, component: str | None) -> Iterator[tuple[float, int, str, float | None]]:
@@ -283,7 +283,7 @@ def _time(item: Element, source: str) -> float:
 
 
 def _value(item: Element, factor: float) -> float | None:
-    """None: unavailable."""
+    """The value of an element times ``factor``; None: unavailable."""
     try:
         value = factor * float((item.text or "").strip())
     except ValueError:
@@ -297,7 +297,7 @@ def _kind(element: Element) -> str:
 
 
 def _own(part: Element) -> Iterator[Element]:
-    """What belongs to a component and not to one inside it."""
+    """Elements of a component, without those of the components inside it."""
     for child in part:
         if _kind(child) != "Components":
             yield child

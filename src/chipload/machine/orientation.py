@@ -1,17 +1,17 @@
-"""Two turns, one after the other, that bring one direction onto another.
+"""Two successive rotations that bring one direction onto another.
 
 Notation: u, v unit directions of the first and second rotary axis (u nearer to the workpiece), w unit direction that
-both carry, a unit direction wanted: R(u, q1) R(v, q2) w = a. chi, phi, psi [rad] angles of a and u, w and v, u and v.
+both rotate, a unit target direction: R(u, q1) R(v, q2) w = a. chi, phi, psi [rad] angles of a and u, w and v, u and v.
 c = R(v, q2) w lies where two cones meet, at chi from u and at phi from v: u, v and c are the corners of a spherical
-triangle whose sides are known, so its angle E at v is too:
+triangle with known sides, which determine its angle E at v:
 
     tan(E/2)^2 = sin(S - psi) sin(S - phi) / (sin S sin(S - chi)),  S = (chi + phi + psi) / 2
 
-and c stands at E on one side of the plane of u and v or on the other: two solutions. The half-angle form keeps its
-digits where chi is small, next to the pole, where an arc cosine loses half of them. No triangle: `a` is out of reach,
-by chi - (phi + psi), |phi - psi| - chi or chi - (2 pi - phi - psi), the greatest; the nearest direction is taken.
+and c lies on either side of the plane of u and v: two solutions. The half-angle form stays accurate where chi is small,
+next to the pole, where an arc cosine loses half of its digits. Without a triangle, `a` is out of reach by the greatest
+of chi - (phi + psi), |phi - psi| - chi and chi - (2 pi - phi - psi), and the nearest direction is used.
 
-References: [Paden1986] subproblem 2 for the problem; the triangle's half-angle formula is of any book of spherical
+References: [Paden1986] subproblem 2 for the problem; the half-angle formula is in any textbook of spherical
 trigonometry.
 """
 
@@ -57,7 +57,7 @@ def azimuth(d: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def wrapped(q: Floats) -> Floats:
-    """An angle [rad] less whole turns, in (-pi, pi]; exact where it already is."""
+    """Angles [rad] without whole turns, in (-pi, pi]; unchanged if already in that range."""
     return np.asarray(q - 2.0 * np.pi * np.ceil((q - np.pi) / (2.0 * np.pi)))
 
 
@@ -71,13 +71,13 @@ def two_turns(u: Floats, v: Floats, w: Floats, a: Floats) -> tuple[Floats, Float
 
     Returns
     -------
-    q1, q2 : (n, 2) float [rad], in (-pi, pi]; q1 is 0 where a lies on u: free.
-    miss : (n,) float [rad], by which ``a`` is out of reach, 0 in reach; then q1, q2 give the nearest direction.
-    pole : (n,) float [rad], between the line of u and the direction that is reached: 0 where q1 is free.
+    q1, q2 : (n, 2) float [rad], in (-pi, pi]; q1 is 0 where a lies along u and q1 is arbitrary.
+    miss : (n,) float [rad], angle by which ``a`` is out of reach; q1, q2 then give the nearest direction.
+    pole : (n,) float [rad], angle between the line of u and the direction reached; 0 where q1 is arbitrary.
 
     Examples
     --------
-    A horizontal from the vertical, with u = z and v = x: turn by 90 degrees about x, then about z.
+    From vertical to horizontal with u = z and v = x: a rotation by 90 degrees about x, then one about z.
 
     >>> z, x = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
     >>> q1, q2, miss, pole = two_turns(z, x, z, np.array([[1.0, 0.0, 0.0]]))

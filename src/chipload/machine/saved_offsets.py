@@ -1,6 +1,6 @@
-"""Work offsets that LinuxCNC saved: the parameter file that a machine's `.ini` names.
+"""Work offsets that LinuxCNC has saved in the parameter file named in the `.ini` of a machine.
 
-A line is the number of a parameter and its value, lengths in the unit of the machine. G54 to G59.3 begin at 5221,
+Each line holds the number and value of a parameter; lengths are in the unit of the machine. G54 to G59.3 begin at 5221,
 20 parameters apart: X Y Z A B C U V W, then the rotation about Z.
 Reference: LinuxCNC 2.9, "Parameters", numbered parameters.
 """
@@ -15,16 +15,16 @@ from chipload.files import is_file, read_regular
 from chipload.machine.hal import read_sections
 from chipload.machine.ini import UNITS_MM
 
-#: first parameter of G54, parameters a work offset, numbers of one, work offsets
+#: first parameter of G54, parameters per work offset, axis values of a work offset, number of work offsets
 FIRST, STRIDE, NUMBERS, COUNT = 5221, 20, 9, 9
-#: [bytes]
+#: largest parameter file [bytes]
 LARGEST_FILE = 1_000_000
 
 
 def saved_offsets(path: Path) -> dict[str, list[float]]:
-    """Origin of each work offset in the machine, X Y Z A B C U V W [mm, deg] by its code; empty without the file.
+    """Origin of each work offset in the machine, X Y Z A B C U V W [mm, deg] by its code; empty if there is no file.
 
-    A work offset that turns the coordinates is left out.
+    A work offset with a rotation of the coordinates is omitted.
 
     Raises
     ------

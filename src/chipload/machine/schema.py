@@ -1,4 +1,4 @@
-"""What a machine's TOML file may hold: its tables, their keys, what each key takes."""
+"""Schema of the TOML file of a machine: its tables, their keys and the type of each value."""
 
 from __future__ import annotations
 
@@ -72,9 +72,9 @@ _ROTARY = {
     "indexed?": _FLAG,
     "step_deg?": _NUMBER,
 }
-#: keys of the tables that are no axes
+#: keys of the tables other than those of axes
 _KEYS = {"spindle": _SPINDLE, "work": _WORK, "table": _TABLE, "trajectory_planner": _PLANNER}
-#: tables in the file's top: "?" may be left out
+#: tables at the top level of the file; "?": optional
 _TABLES = ("axis", "spindle", "work?", "table?", "trajectory_planner?")
 
 
@@ -95,12 +95,13 @@ def _is(kind: str, value: object) -> bool:
 
 
 def checked(label: str, data: Row, where: str, letters: str = "XYZ") -> Row:
-    """The table ``where`` of the file, after a look at its keys: all known, none missing, of the right kind.
+    """The table ``where`` of the file, with its keys checked: all known, none missing, each of the right type.
 
     Raises
     ------
     InputError
-        As above; the message begins with ``label`` and names the nearest known key.
+        A key is unknown, missing or of the wrong type; the message begins with ``label`` and names the nearest known
+        key.
     """
     tables: tuple[str, ...] = ()
     if where == "":

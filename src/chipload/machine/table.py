@@ -1,4 +1,4 @@
-"""The table of a machine: the block under the work, which moves with it."""
+"""The table of a machine: the block under the workpiece, which moves with it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from chipload.machine.axis import Vector
 
 @dataclass(frozen=True)
 class MachineTable:
-    """A block in the coordinates of the work, as the travel of the axes; the work lies on its upper face.
+    """A block in work coordinates, like the travel of the axes; the workpiece lies on its upper face.
 
     Parameters
     ----------
-    low, high : corners [mm], each of ``low`` below that of ``high``
+    low, high : opposite corners [mm], each coordinate of ``low`` below that of ``high``
     spacing : longest side of the triangles whose corners are compared with the tool [mm], > 0
 
     Raises

@@ -1,4 +1,4 @@
-"""Settings of LinuxCNC's trajectory planner, as a configuration gives them."""
+"""Settings of LinuxCNC's trajectory planner, as stated in a configuration."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ class TrajectoryPlanner:
     Parameters
     ----------
     cycle : period of the servo thread [s], > 0 (`[EMCMOT] SERVO_PERIOD`)
-    blend_arcs : whether corners get blend arcs (`[TRAJ] ARC_BLEND_ENABLE`); without them they are parabolic
-    lookahead : segments that are looked ahead, >= 2 (`ARC_BLEND_OPTIMIZATION_DEPTH`)
-    gap_cycles : a line that a blend leaves shorter than so many cycles becomes part of it (`ARC_BLEND_GAP_CYCLES`)
-    ramp_frequency : a segment shorter than one period of it changes its speed evenly [1/s], > 0 (`ARC_BLEND_RAMP_FREQ`)
-    kink_ratio : share of the acceleration that a kink may need and count as smooth (`ARC_BLEND_KINK_RATIO`)
-    override : greatest feed override that the planner must be ready for, >= 1 (`[DISPLAY] MAX_FEED_OVERRIDE`)
+    blend_arcs : whether corners have blend arcs (`[TRAJ] ARC_BLEND_ENABLE`); else they have parabolic blends
+    lookahead : number of segments of look-ahead, >= 2 (`ARC_BLEND_OPTIMIZATION_DEPTH`)
+    gap_cycles : cycles; the rest of a line that takes less time becomes part of the blend (`ARC_BLEND_GAP_CYCLES`)
+    ramp_frequency : a segment shorter than one period of it has a linear speed ramp [1/s], > 0 (`ARC_BLEND_RAMP_FREQ`)
+    kink_ratio : greatest share of the acceleration at a kink that counts as smooth (`ARC_BLEND_KINK_RATIO`)
+    override : greatest feed override for which the planner plans, >= 1 (`[DISPLAY] MAX_FEED_OVERRIDE`)
 
     Raises
     ------

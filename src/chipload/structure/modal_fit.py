@@ -1,11 +1,11 @@
 """Modes from a measured receptance of the tool's tip.
 
 Notation: f [Hz], w = 2 pi f; the model is H = sum over modes of c_k / (1 - (w / w_k)^2 + 2 i z_k w / w_k) + C with the
-modal compliance c_k = 1 / k_k [mm/N], real as that of a passive structure at its own point, and C the compliance of the
-modes that are left out.
+modal compliance c_k = 1 / k_k [mm/N], real because the structure is passive and force and response are at one
+point, and C the compliance of the omitted modes.
 
-The fit is a variable projection: frequencies and damping ratios are searched by least squares, c_k and C follow from
-them linearly. Modes are added where most of the receptance is left, until little is.
+The fit is a variable projection: least squares finds frequencies and damping ratios, and c_k and C follow from them
+linearly. Modes are added where the residual is largest, until it is small.
 
 Reference: [Golub1973] for the projection; [Ewins2000] for the model.
 """
@@ -22,7 +22,7 @@ from chipload.errors import InputError
 from chipload.structure.hexa import Array
 from chipload.structure.receptance import Receptance
 
-#: most modes of a receptance; a mode is added while more than this share of the peak is left and it takes a third of it
+#: greatest number of modes; a mode is added while the residual is above ENOUGH of the peak and falls by a third
 MOST_MODES, ENOUGH, GAIN = 8, 0.005, 0.67
 #: greatest residual of a fit as a share of the peak, without the worst hundredth of the frequencies
 LEFT = 0.05
@@ -42,9 +42,9 @@ class ModalFit:
     frequency : (M,) float [Hz], rising
     damping : (M,) float, damping ratio
     stiffness : (M,) float [N/mm]
-    compliance : of the modes that are left out [mm/N]
-    left : share of the peak that the fit leaves
-    coherence : (M,) float, mean about each mode; None: not measured
+    compliance : of the omitted modes [mm/N]
+    left : residual of the fit as a share of the peak
+    coherence : (M,) float, mean near each mode; None: not measured
     """
 
     frequency: Array
@@ -56,7 +56,7 @@ class ModalFit:
 
 
 def fit_modes(measured: Receptance, band: tuple[float, float], coherence: Array | None = None) -> ModalFit:
-    """Modes between two frequencies.
+    """Fit the modes of a receptance between two frequencies.
 
     Parameters
     ----------
@@ -66,8 +66,9 @@ def fit_modes(measured: Receptance, band: tuple[float, float], coherence: Array 
     Raises
     ------
     InputError
-        Too few frequencies, more than 5 % of the peak is left, a mode has a stiffness or a damping that is none of a
-        tool's tip (a wrong unit shows here), lies at the end of the band, or was not measured coherently.
+        There are too few frequencies, the residual is above 5 % of the peak, or a mode has a stiffness or damping ratio
+        that is implausible for a tool's tip (as with a wrong unit), lies at the end of the band, or was not measured
+        coherently.
 
     Examples
     --------
@@ -102,14 +103,14 @@ def fit_modes(measured: Receptance, band: tuple[float, float], coherence: Array 
     frequency, damping = np.exp(best[0::2]), np.exp(best[1::2])
     order = np.argsort(frequency)
     frequency, damping, modal = frequency[order], damping[order], c[:-1][order]
-    # what a mode beside the others adds must be seen
+    # modes within the residual of the fit are dropped
     seen = np.abs(modal) / (2.0 * damping) > max(2.0 * left, ENOUGH) * peak
     frequency, damping, modal = frequency[seen], damping[seen], modal[seen]
     _check(frequency, damping, modal, band)
     about = None
     if coherence is not None:
         whole = np.asarray(coherence, dtype=np.float64)[inside]
-        about = np.array([_about(f, whole, a, z) for a, z in zip(frequency, damping, strict=True)])
+        about = np.array([_coherence_near(f, whole, a, z) for a, z in zip(frequency, damping, strict=True)])
         if (about < COHERENT).any():
             k = int(np.argmin(about))
             raise InputError(
@@ -120,7 +121,7 @@ def fit_modes(measured: Receptance, band: tuple[float, float], coherence: Array 
 
 
 def _check(frequency: Array, damping: Array, modal: Array, band: tuple[float, float]) -> None:
-    """Refuse modes that are none of a tool's tip."""
+    """Refuse modes that are implausible for a tool's tip."""
     if not len(frequency):
         raise InputError("receptance: no mode was found: take another band (--from-hz, --to-hz)")
     for f, z, c in zip(frequency.tolist(), damping.tolist(), modal.tolist(), strict=True):
@@ -144,7 +145,7 @@ def _check(frequency: Array, damping: Array, modal: Array, band: tuple[float, fl
 
 
 def _basis(f: Array, x: Array) -> NDArray[np.complex128]:
-    """(n, M + 1) what a unit of each compliance makes; ``x``: logarithms of frequency and damping, mode by mode."""
+    """(n, M + 1) receptance per unit of each compliance; ``x``: logarithms of frequency and damping, mode by mode."""
     r = f[:, None] / np.exp(x[0::2])
     modes = 1.0 / (1.0 - r**2 + 2j * np.exp(x[1::2]) * r)
     return np.column_stack([modes, np.ones(len(f))])
@@ -161,19 +162,19 @@ def _model(f: Array, H: NDArray[np.complex128], x: Array) -> tuple[NDArray[np.co
 def _search(f: Array, H: NDArray[np.complex128], start: Array) -> Array:
     scale = float(np.abs(H).max())
 
-    def off(x: Array) -> Array:
+    def residual(x: Array) -> Array:
         rest = (H - _model(f, H, x)[0]) / scale
         return np.concatenate([rest.real, rest.imag])
 
     low = np.tile([np.log(0.5 * f[0]), np.log(1e-4)], len(start) // 2)
     high = np.tile([np.log(2.0 * f[-1]), np.log(0.9)], len(start) // 2)
-    found = least_squares(off, np.clip(start, low + 1e-6, high - 1e-6), bounds=(low, high), x_scale=0.02)
+    found = least_squares(residual, np.clip(start, low + 1e-6, high - 1e-6), bounds=(low, high), x_scale=0.02)
     return np.asarray(found.x, dtype=np.float64)
 
 
 def _next_mode(f: Array, rest: NDArray[np.complex128]) -> tuple[float, float]:
-    """Logarithms of frequency and damping where most is left."""
-    # a few frequencies together, so that noise is no mode
+    """Logarithms of frequency and damping where the residual is largest."""
+    # a moving mean over a few frequencies, so that noise does not count as a mode
     width = max(3, len(f) // 200)
     smooth = np.convolve(np.abs(rest), np.ones(width) / width, mode="same")
     k = int(np.argmax(smooth))
@@ -187,7 +188,7 @@ def _next_mode(f: Array, rest: NDArray[np.complex128]) -> tuple[float, float]:
     return float(np.log(f[k])), float(np.log(z))
 
 
-def _about(f: Array, coherence: Array, at: float, z: float) -> float:
+def _coherence_near(f: Array, coherence: Array, at: float, z: float) -> float:
     """Mean coherence within two half-widths of a mode."""
     near = np.abs(f - at) <= max(2.0 * z * at, 2.0 * float(np.diff(f).max()))
     return float(coherence[near].mean())

@@ -1,4 +1,4 @@
-"""Places at which a force acts on the workpiece: a local place in an element, found from a point or from a side.
+"""Places at which a force acts on the workpiece: local coordinates in an element, found from a point or on a side.
 
 Notation: (xi, eta, zeta) in [-1, 1]^3 local place in an element; N shape functions; x the point [mm].
 """
@@ -39,7 +39,7 @@ class MeshPlaces:
 
 
 def on_side(grid: Grid, side: str, u: ArrayLike, v: ArrayLike) -> MeshPlaces:
-    """Places of a side at the shares u, v of its two directions.
+    """Places on a side at the fractions u, v along its two directions.
 
     Parameters
     ----------
@@ -82,8 +82,8 @@ def locate(grid: Grid, side: str, points: ArrayLike, tolerance: float) -> MeshPl
 
     Notes
     -----
-    The four nearest faces (by their middles and corners) are tried for each point: right for faces that are not much
-    longer than the mesh is coarse. O(p log m).
+    The four nearest faces (by their middles and corners) are tried for each point. This suits faces whose sides have
+    similar lengths. O(p log m).
     """
     x = np.atleast_2d(np.asarray(points, dtype=np.float64))
     axis, end = side_axis(side)
@@ -109,27 +109,27 @@ def locate(grid: Grid, side: str, points: ArrayLike, tolerance: float) -> MeshPl
         d = np.linalg.norm(np.einsum("pn,pnc->pc", shape(xi), xyz) - x, axis=1)
         better = d < best
         best[better], element[better], local[better] = d[better], e[better], xi[better]
-    far = int(np.argmax(best)) if len(x) else 0
-    if len(x) and not best[far] <= tolerance:
+    farthest = int(np.argmax(best)) if len(x) else 0
+    if len(x) and not best[farthest] <= tolerance:
         raise InputError(
-            f"point {far} ({x[far, 0]:g}, {x[far, 1]:g}, {x[far, 2]:g}) lies {best[far]:g} mm from side {side}: must "
-            f"be within {tolerance:g} mm"
+            f"point {farthest} ({', '.join(f'{c:g}' for c in x[farthest])}) lies {best[farthest]:g} mm from "
+            f"side {side}: must be within {tolerance:g} mm"
         )
     return MeshPlaces(element, local)
 
 
 def on_cut(places: MeshPlaces, kept: Array, side: str) -> MeshPlaces:
-    """The same places on the faces that a cut left, along the thickness.
+    """The same places moved along the thickness to the faces after a cut.
 
     Parameters
     ----------
-    kept : (m, 2) float, as of :class:`chipload.structure.solid.Solid`
-    side : ``"k+"`` or ``"k-"``, the side from which was cut
+    kept : (m, 2) float, as of :class:`chipload.structure.solid.SolidWorkpiece`
+    side : ``"k+"`` or ``"k-"``, the side that was cut
 
     Raises
     ------
     InputError
-        Another side, or an element that is gone.
+        ``side`` is another side, or an element is removed.
     """
     if side not in ("k-", "k+"):
         raise InputError(f"on_cut: side = {side!r}: must be k- or k+")
@@ -148,7 +148,7 @@ def points_of(grid: Grid, places: MeshPlaces) -> Array:
 
 
 def normals_of(grid: Grid, places: MeshPlaces, side: str) -> Array:
-    """Unit normals (p, 3) of the faces in which places lie, out of the body.
+    """Unit normals (p, 3) of the faces in which places lie, pointing out of the body.
 
     Examples
     --------
@@ -164,8 +164,8 @@ def normals_of(grid: Grid, places: MeshPlaces, side: str) -> Array:
 
 
 def weights(grid: Grid, places: MeshPlaces) -> csr_array:
-    """Shape functions at the places, sparse (p, n): they carry a force at a place to its nodes, and the motion of the
-    nodes to the place.
+    """Shape functions at the places, sparse (p, n): they distribute a force at a place to nodes and interpolate the
+    motion of the nodes at the place.
     """
     N = shape(places.local)
     rows = np.repeat(np.arange(len(places)), 20)

@@ -5,7 +5,7 @@ Elements that were cut since the base touch the degrees of freedom A, which belo
 they share with the rest; b = |B| is the rank. S = K_BB - K_BA K_AA^-1 K_AB of the cut elements alone, before (S) and
 after (S'); D = S' - S. P_B unit columns; W = K^-1 P_B, G = P_B^T W; F forces, U = K^-1 F; M = (I + D G)^-1 D.
 
-The cut elements are condensed on B, so whatever happened to them (thinned, gone) is a change of rank b. By Woodbury,
+The cut elements are condensed on B, so any change of them (thinned or removed) has rank b. By Woodbury,
 without an inverse of D, forces away from A have
 
     F^T K'^-1 F = F^T U - U_B^T M U_B,
@@ -14,13 +14,14 @@ and a force on the cut elements, f_A and f_B, is carried to B: g = f_B - K'_BA K
 
     F^T K'^-1 F = f_A^T K'_AA^-1 f_A + g^T (G - G M G) g,
 
-with no solution in the base at all. A column of W costs one solution, and is kept. After that a state costs
-O(b^3 + b^2 q) for q forces, whatever f is. ``prepare`` gets the columns ahead, so that the path of a pass is followed
-by dense algebra alone. When b passes ``limit`` the workpiece is factored again.
+without any solution in the base. Each column of W costs one solution and is stored. After that a state costs
+O(b^3 + b^2 q) for q forces, independent of f. ``prepare`` solves the columns in advance, so that the states along a
+pass require dense algebra only. When b exceeds ``limit`` the workpiece is factored again.
 
-Valid while pieces stay held (checked at each cut). A slice thinner than a thousandth of its element loses digits: the
-shape functions of the element are then stretched a thousand times. Let such an element be gone. Neighbours share their
-nodes whatever is left of them: two that are cut from opposite sides until their slices do not meet still hold together.
+Valid while every piece is supported (checked at each cut). A slice thinner than a thousandth of its element loses
+digits: the shape functions of the element are then stretched a thousand times. Remove such an element. Neighbours
+share their nodes whatever remains of them: two that are cut from opposite sides until their slices do not meet are
+still connected.
 
 Reference: [Hager1989] for the formula and its history.
 """
@@ -45,7 +46,7 @@ from chipload.structure.solid import Factored, SolidWorkpiece, check_clamped, el
 #: rank at which the workpiece is factored again, over sqrt(f); see benchmarks/structure.py
 LIMIT_FACTOR = 5.0
 
-#: smallest pivot of I + D G that is not taken for zero: a cut makes nothing a thousand million times softer
+#: pivot of I + D G below which it counts as zero: no cut makes a workpiece 10^9 times softer
 SMALLEST_PIVOT = 1e-9
 
 
@@ -69,12 +70,12 @@ class SolvedColumns:
 
 @dataclass(frozen=True, eq=False)
 class CutElements:
-    """The cut elements in themselves.
+    """The cut elements, condensed on their shared degrees of freedom.
 
     Attributes
     ----------
-    A : (a,) int, free degrees of freedom of the base that only cut elements have and that still are on material
-    gone : (g,) int, those that are on none
+    A : (a,) int, free degrees of freedom of the base that belong to cut elements only and still lie on material
+    gone : (g,) int, those that no longer lie on material
     elements : (e,) int, the elements that were cut since the base
     K_BA : (b, a) sparse, K' between B and A
     factors : of K'_AA; None: A is empty
@@ -97,16 +98,16 @@ class StructureRemoval:
 
     Attributes
     ----------
-    solid : the workpiece as it is now
+    solid : the workpiece in its present state
     base : its last factorisation
     region : (e,) int, elements that may be cut
-    columns : what is known of K^-1
+    columns : the known columns of K^-1
     B : (b,) int, rows of ``columns``
     D : (b, b) float [N/mm]
     lu : factors of I + D G, as :func:`scipy.linalg.lu_factor` gives them
     interior : the cut elements
     limit : greatest rank before the workpiece is factored again
-    factorisations : how many there were
+    factorisations : number of factorisations so far
     """
 
     solid: SolidWorkpiece
@@ -133,18 +134,18 @@ class StructureRemoval:
 def start(
     solid: SolidWorkpiece | Factored, region: ArrayLike | None = None, limit: int | None = None
 ) -> StructureRemoval:
-    """Begin with a workpiece as it stands.
+    """Start the removal with the present state of a workpiece.
 
     Parameters
     ----------
-    solid : the workpiece, factored already or not
-    region : (e,) int, elements that may be cut; None: all. Fewer need less memory: (e 60) a column
+    solid : the workpiece, factored or not
+    region : (e,) int, elements that may be cut; None: all. Fewer elements need less memory: 60 e values per column
     limit : greatest rank before the workpiece is factored again; None: 5 sqrt(f)
 
     Raises
     ------
     InputError
-        The workpiece is not held, or an element of ``region`` does not exist.
+        The workpiece can move as a rigid body, or an element of ``region`` does not exist.
     """
     base = solid if isinstance(solid, Factored) else factorise(solid)
     m = len(base.solid.grid.elements)
@@ -176,7 +177,7 @@ def _fresh(base: Factored, region: Indices, limit: int, factorisations: int) -> 
 
 
 def _rows(base: Factored, elements: Indices) -> Indices:
-    """Free degrees of freedom, as numbers among the free ones, of elements."""
+    """Free degrees of freedom of elements, as indices into ``base.free``."""
     number = np.full(3 * len(base.solid.grid.nodes), -1, dtype=np.int64)
     number[base.free] = np.arange(len(base.free))
     found = np.unique(number[element_dofs(base.solid.grid.elements[elements])])
@@ -186,7 +187,7 @@ def _rows(base: Factored, elements: Indices) -> Indices:
 def prepare(
     state: StructureRemoval, elements: ArrayLike | None = None, progress: Progress = silent
 ) -> StructureRemoval:
-    """Solve the columns of elements ahead of their cutting; None: of the whole region."""
+    """Solve the columns of elements before they are cut. ``elements``: (e,) int; None: the whole region."""
     chosen = state.region if elements is None else np.asarray(elements, dtype=np.int64)
     wanted = np.searchsorted(state.columns.rows, _rows(state.base, chosen))
     return replace(state, columns=_with_columns(state.columns, state.base, wanted, progress))
@@ -213,13 +214,13 @@ def _with_columns(
 def cut(
     state: StructureRemoval, elements: ArrayLike, kept: ArrayLike = (0.0, 0.0), progress: Progress = silent
 ) -> StructureRemoval:
-    """Take material from elements.
+    """Remove material from elements.
 
     Parameters
     ----------
     elements : (e,) int, in the region
-    kept : (2,) or (e, 2) float, the part lo .. hi of the thickness (along k, 0 .. 1) that stays; thinned by x from
-        the side k+ it is (0, 1 - x); (0, 0): the element is gone
+    kept : (2,) or (e, 2) float, the part lo .. hi of the thickness (along k, 0 .. 1) that remains: (0, 1 - x) for
+        an element thinned by x from the side k+; (0, 0): the element is removed
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Deflection and stress of a thin tube or cone under the cutting force, by a Fourier-Ritz shell.
 
-Notation: s [mm] along the meridian from 0 to the length; theta round; r = r0 + s sin f the radius of the middle
+Notation: s [mm] along the meridian from 0 to the length; theta around the axis; r = r0 + s sin f radius of the middle
 surface, f [rad] the half angle of the cone (f > 0: wider away from s = 0); t thickness; u, v, w displacements along s,
 along theta and along the outward normal; E modulus [MPa], m Poisson's ratio; C = E t / (1 - m^2) and
 D = E t^3 / (12 (1 - m^2)). With ' for d/ds and the index th for d/dtheta the strains of the middle surface and the
@@ -11,12 +11,12 @@ changes of curvature are
     tw = 2 (-w'_th / r + sin f w_th / r^2 + cos f v' / r - sin f cos f v / r^2).
 
 The energy is minimal over u = sum u_n(s) cos n theta, v = sum v_n(s) sin n theta, w = sum w_n(s) cos n theta, with u_n,
-v_n, w_n integrals of Legendre polynomials that hold the ends. The harmonics do not mix: each is factored once, for all
-loads.
+v_n, w_n integrals of Legendre polynomials that satisfy the end conditions. The harmonics are independent: each is
+factored once, for all loads.
 
-Valid for t / r below about 1/10, small displacements, one thickness. Too stiff, never too soft (Ritz); under a point
-load the deflection converges as 1 / harmonics^2 and 1 / terms^2 (:func:`left_out` says what is missing), the stress
-under it not at all: it needs the area on which the load acts.
+Valid for t / r below about 1/10, small displacements and constant thickness. The solution is never too soft (Ritz).
+Under a point load the deflection converges as 1 / harmonics^2 and 1 / terms^2; :func:`left_out` gives the missing part.
+The stress under a point load does not converge: it requires the area on which the load acts.
 
 Reference: [Leissa1973] ch. 1 (Donnell's and Novozhilov's relations for cones); [Timoshenko1959] ch. 15.
 """
@@ -52,8 +52,8 @@ class Shell:
     modulus : E [MPa]
     poisson : Poisson's ratio, 0 .. below 0.5
     cone_angle : f [rad], within +-80 deg; 0: a tube
-    ends : ``clamped`` at s = 0 and free at the length; ``diaphragms`` (v = w = 0, u free) at both; ``free`` at both,
-        for loads that are in balance
+    ends : ``clamped``: at s = 0, the other end is free; ``diaphragms``: v = w = 0 and u free at both ends; ``free``:
+        both ends are free, for loads in equilibrium
 
     Raises
     ------
@@ -103,11 +103,11 @@ class Ritz:
 
     Parameters
     ----------
-    shell : what it was made from
-    harmonics : (h,) int, the n that are in it
-    terms : polynomials for each displacement
+    shell : the wall
+    harmonics : (h,) int, the orders n of the harmonics
+    terms : number of polynomials for each displacement
     inverse : (h, 3 m, 3 m) float; inverse[i].T @ inverse[i] is the flexibility of harmonic i [mm/N], m = terms
-    repeat : forces stand ``repeat`` times round, evenly
+    repeat : number of equal forces, evenly spaced around the axis
     """
 
     shell: Shell
@@ -124,13 +124,14 @@ def ritz(shell: Shell, harmonics: int = 80, terms: int = 40, repeat: int = 1) ->
     ----------
     shell : the wall
     harmonics : greatest n, at least 2
-    terms : polynomials for each of u, v, w, 4 .. 80
-    repeat : the loads stand so many times round (2: a pair across the diameter); only multiples of it are kept
+    terms : number of polynomials for each of u, v, w, 4 .. 80
+    repeat : number of equal loads, evenly spaced around the axis (2: a pair across the diameter); only harmonics that
+        are multiples of it occur
 
     Raises
     ------
     InputError
-        A number is out of range, or the shell is free and the load stands alone.
+        A number is out of range, or the shell is free and ``repeat`` is 1.
     """
     if harmonics < 2:
         raise InputError(f"shell.harmonics = {harmonics}: must be at least 2, with fewer nothing ovalises")
@@ -152,13 +153,13 @@ def ritz(shell: Shell, harmonics: int = 80, terms: int = 40, repeat: int = 1) ->
         weight = (math.tau if n == 0 else math.pi) * area
         flat = (len(s) * 6, 3 * terms)
         stiffness = b.reshape(flat).T @ (law @ b * weight[:, None, None]).reshape(flat)
-        held = _rigid_motions(shell, terms, int(n))
-        stiffness[held, :] = stiffness[:, held] = 0.0
-        stiffness[held, held] = 1.0
+        rigid = _rigid_motions(shell, terms, int(n))
+        stiffness[rigid, :] = stiffness[:, rigid] = 0.0
+        stiffness[rigid, rigid] = 1.0
         scale = 1.0 / np.sqrt(np.diag(stiffness))
         lower = np.linalg.cholesky(stiffness * scale[:, None] * scale)
         inverse[i] = solve_triangular(lower, np.diag(scale), lower=True)
-        inverse[i][:, held] = 0.0
+        inverse[i][:, rigid] = 0.0
     for array in (orders, inverse):
         array.setflags(write=False)
     return Ritz(shell, orders, terms, inverse, repeat)
@@ -180,20 +181,22 @@ def compliance(
     s_force : float [mm], (k,) or a number, where the force acts, at theta = 0
     s_point : float [mm], place of the displacement; None: at the force
     theta : float [rad], angle from the force to the point
-    length, width : the force is spread evenly over so much along s and round [mm]; 0: a point. The displacement is that
-        of the middle of the patch, or of s_point.
+    length, width : patch over which the force is spread evenly, along s and around the axis [mm]; 0: a point. The
+        displacement is that at the middle of the patch, or at s_point.
 
     Returns
     -------
-    (k, 3, 3) float [mm/N], row: displacement, column: force. A number for ``s_force`` and all others gives (3, 3).
+    (k, 3, 3) float [mm/N], row: displacement, column: force; (3, 3) if all arguments are numbers.
 
     Raises
     ------
     InputError
         A point or the patch lies outside the wall.
 
-    Nothing holds a tube between diaphragms along s, and nothing a free one: columns of forces that are not in balance
-    are then for a mean of u (and of v, where free) that is held at 0.
+    Notes
+    -----
+    A tube between diaphragms can move along s, and a free tube can also rotate. For forces that are not in equilibrium,
+    the mean of u (and of v, if the tube is free) is then set to 0.
     """
     force, point, angle = np.broadcast_arrays(
         np.asarray(s_force, dtype=np.float64),
@@ -210,7 +213,7 @@ def compliance(
         right = left if rows is loads else modes.inverse[i] @ loads
         block = left.transpose(0, 2, 1) @ right * spread[:, None, None]
         c, d = np.cos(n * angle.ravel()), np.sin(n * angle.ravel())
-        # u and w of forces along u and w go with cos; v with sin; a force along v makes the pattern a quarter wave on
+        # u and w of forces along u and w go with cos; v with sin; a force along v shifts the pattern by a quarter wave
         even = np.stack([c, d, c], axis=1)[:, :, None] * block
         odd = np.stack([-d, c, -d], axis=1) * block[:, :, 1]
         out[:, :, 0] += even[:, :, 0]
@@ -222,9 +225,9 @@ def compliance(
 def left_out(modes: Ritz, s: ArrayLike) -> Floats:
     """Contribution of the omitted harmonics and terms to the normal compliance under a point force [mm/N].
 
-    They are short waves, to which the wall is an infinite plate: [s (L - s) / terms^2 + r^2 / n_max^2] / (8 pi D). The
+    For these short waves the wall acts like an infinite plate: [s (L - s) / terms^2 + r^2 / n_max^2] / (8 pi D). The
     first part is exact for many terms; near a free edge the second is too small by a factor of 2 to 3. The two
-    overlap by a little.
+    overlap slightly.
 
     Parameters
     ----------
@@ -253,18 +256,18 @@ def stress(
     ----------
     modes : from :func:`ritz`
     s_force : where the force acts, at theta = 0 [mm]
-    s_point, theta : where it is asked, float [mm], [rad], shapes that broadcast to (k,)
+    s_point, theta : point of the stress, float [mm], [rad], shapes that broadcast to (k,)
     outside : on the outer face; False: on the inner one
-    length, width : area over which the force is spread [mm]; without it the stress under the force has no limit
+    length, width : area over which the force is spread [mm]; without it the stress under the force is infinite
 
     Returns
     -------
-    (k, 3) float [MPa/N], along s, round, shear.
+    (k, 3) float [MPa/N]: along s, circumferential, shear.
 
     Raises
     ------
     InputError
-        A point or the patch lies outside the wall, or the stress is asked at the place of a point force.
+        A point or the patch lies outside the wall, or ``s_point`` is the place of a point force.
     """
     point, angle = np.broadcast_arrays(np.asarray(s_point, dtype=np.float64), np.asarray(theta, dtype=np.float64))
     shape, at, angle = point.shape, point.ravel(), angle.ravel()
@@ -292,7 +295,7 @@ def _strains_under_force(
 
 
 def _stress_of(shell: Shell, strains: Floats, outside: bool) -> Floats:
-    """(k, 3) stress along s, round, shear on a face [MPa/N]."""
+    """(k, 3) stress along s, circumferential and shear stress on a face [MPa/N]."""
     z = 0.5 * shell.thickness if outside else -0.5 * shell.thickness
     es, et, g = (strains[:, j] + z * strains[:, 3 + j] for j in range(3))
     plane = shell.modulus / (1.0 - shell.poisson**2)
@@ -303,7 +306,7 @@ def _stress_of(shell: Shell, strains: Floats, outside: bool) -> Floats:
 
 
 def equivalent(stresses: ArrayLike) -> Floats:
-    """Von Mises's stress of (..., 3) stresses along s, round, shear; the shape without the last axis.
+    """Von Mises stress (...) of stresses (..., 3): along s, circumferential, shear.
 
     >>> float(equivalent([3.0, 0.0, 0.0])), round(float(equivalent([0.0, 0.0, 1.0])), 6)
     (3.0, 1.732051)
@@ -315,8 +318,9 @@ def equivalent(stresses: ArrayLike) -> Floats:
 def greatest_stress(modes: Ritz, s_force: float, length: float, width: float, angles: int = 181) -> tuple[float, float]:
     """Greatest equivalent stress at the clamp and under the patch, for a unit normal force [MPa/N].
 
-    Both faces are asked, at ``angles`` places round at s = 0 (half the circle, the rest is its mirror image) and at the
-    middle and the ends of the patch. An end with diaphragms or free counts like the clamp.
+    The stress is evaluated on both faces, at ``angles`` places on half the circle at s = 0 (the other half is its
+    mirror image) and at the middle and the ends of the patch. With diaphragms or free ends, the first value is
+    that of the end at s = 0. ``s_force``, ``length`` and ``width`` are in mm, as in :func:`stress`.
     """
     theta = np.concatenate([np.linspace(0.0, math.pi, angles), np.zeros(3)])
     at = np.concatenate([np.zeros(angles), s_force + 0.5 * length * np.array([-1.0, 0.0, 1.0])])
@@ -334,10 +338,10 @@ class Ovalisation:
     Parameters
     ----------
     harmonics : (h,) int
-    share : (h,) float [mm/N], normal deflection at the force that harmonic n gives
-    beam : the same of a beam with shear [mm/N]; None: for a cone there is none
+    share : (h,) float [mm/N], contribution of each harmonic to the normal deflection at the force
+    beam : deflection of a beam with shear [mm/N]; None for a cone
     theta : (k,) float [rad]
-    rim : (k,) float [mm/N], normal displacement round at the height of the force
+    rim : (k,) float [mm/N], normal displacement around the wall at the height of the force
     """
 
     harmonics: NDArray[np.int64]
@@ -393,7 +397,7 @@ def _law(shell: Shell) -> Floats:
 
 @lru_cache(maxsize=64)
 def _polynomials(ends: str, which: int, terms: int) -> Floats:
-    """(terms, terms + 2) Legendre coefficients of the functions of u, v or w (``which``) that hold the ends."""
+    """(terms, terms + 2) Legendre coefficients of the functions of u, v or w (``which``) that fit the ends."""
     unit = np.eye(terms + 1)
     if ends == "clamped":
         times, made = (2 if which == 2 else 1), unit[:terms]
@@ -441,7 +445,7 @@ def _strains(shell: Shell, basis: tuple[Floats, ...], s: Floats, n: int) -> Floa
 
 
 def _rigid_motions(shell: Shell, terms: int, n: int) -> NDArray[np.int64]:
-    """Coefficients that are 0: the rigid motions that nothing holds and no load moves."""
+    """Coefficients that are set to 0: rigid motions without support."""
     if n > 0 or shell.ends == "clamped":
         return np.empty(0, dtype=np.int64)
     along = [0] if shell.cone_angle == 0.0 or shell.ends == "free" else []

@@ -1,4 +1,4 @@
-"""Compliance of a clamped workpiece by finite elements: one factorisation for all forces.
+"""Compliance of a clamped workpiece by finite elements: one factorisation serves all forces.
 
 Notation: n nodes, K stiffness [N/mm] over the free degrees of freedom (3 node + c), f force [N], u displacement [mm],
 K u = f. N_p shape functions at a place p; compliance C_p = N_p K^-1 N_p^T (3, 3) [mm/N]; C_nn = normal . C_p normal.
@@ -6,8 +6,8 @@ K u = f. N_p shape functions at a place p; compliance C_p = N_p K^-1 N_p^T (3, 3
 K is symmetric and positive definite, so it is factored without pivots (:mod:`chipload.structure.factors`). A plate of
 35,000 degrees of freedom takes about 2 s; every right-hand side after that about 10 ms.
 
-A force at a point is a limit: on ever finer meshes the displacement under it grows without bound, about 1 / (E h) with
-element size h. For a thin wall that is far below its bending, t^3 / (h a^2) of it or so.
+Under a point force the displacement grows without bound as the mesh is refined, by about 1 / (E h) with the element
+size h. For a thin wall this is a small part of the bending, about t^3 / (h a^2) of it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ RIGID_MOTIONS = ("along x", "along y", "along z", "about x", "about y", "about z
 
 @dataclass(frozen=True, eq=False)
 class SolidWorkpiece:
-    """A workpiece: mesh, material, what holds it, and what is left of it.
+    """A workpiece: mesh, material, supports and remaining material.
 
     Parameters
     ----------
@@ -43,10 +43,11 @@ class SolidWorkpiece:
     modulus : E [MPa], 100 .. 2e6
     poisson : nu, 0 <= nu < 0.5
     density : [tonne/mm^3], 1e-10 .. 3e-8
-    fixed : (n, 3) bool, directions in which nodes are held; (n,) bool: in all three; or a list of node numbers
-    kept : (m, 2) float, the part lo .. hi of each element's thickness (along k, 0 .. 1) that is there; (0, 0): the
-        element is gone. (2,) float: the same of every element
-    rule : points of integration of the stiffness, 8, 14 or 27
+    fixed : (n, 3) bool, directions in which nodes are fixed; (n,) bool, nodes fixed in all three; or (k,) int, their
+        numbers
+    kept : (m, 2) float, the part lo .. hi of each element's thickness (along k, 0 .. 1) that remains; (0, 0): the
+        element is removed. (2,) float: the same for every element
+    rule : number of integration points for the stiffness, 8, 14 or 27
 
     Raises
     ------
@@ -82,13 +83,13 @@ class SolidWorkpiece:
             raise InputError(f"workpiece.poisson = {self.poisson:g}: must be at least 0 and below 0.5")
         n, m = len(self.grid.nodes), len(self.grid.elements)
         fixed = np.asarray(self.fixed)
-        held = np.zeros((n, 3), dtype=np.bool_)
+        constrained = np.zeros((n, 3), dtype=np.bool_)
         if fixed.dtype == np.bool_ and fixed.shape in ((n,), (n, 3)):
-            held[:] = fixed if fixed.ndim == 2 else fixed[:, None]
+            constrained[:] = fixed if fixed.ndim == 2 else fixed[:, None]
         elif fixed.ndim == 1 and (fixed.size == 0 or np.issubdtype(fixed.dtype, np.integer)):
             if fixed.size and not (fixed.min() >= 0 and fixed.max() < n):
                 raise InputError(f"workpiece.fixed: a node outside 0 .. {n - 1}")
-            held[fixed.astype(np.int64)] = True
+            constrained[fixed.astype(np.int64)] = True
         else:
             raise InputError(f"workpiece.fixed of shape {fixed.shape}: must be node numbers, ({n},) or ({n}, 3) bool")
         kept = np.array(self.kept, dtype=np.float64)
@@ -100,13 +101,13 @@ class SolidWorkpiece:
             e = int(np.flatnonzero(bad)[0])
             raise InputError(f"workpiece.kept of element {e} = {kept[e].tolist()}: must be 0 <= lo <= hi <= 1")
         kept.setflags(write=False)
-        held.setflags(write=False)
+        constrained.setflags(write=False)
         object.__setattr__(self, "kept", kept)
-        object.__setattr__(self, "constrained", held)
+        object.__setattr__(self, "constrained", constrained)
 
     @property
     def there(self) -> Indices:
-        """Numbers of the elements that are not gone."""
+        """Numbers of the elements that are not removed."""
         return np.flatnonzero(self.kept[:, 1] > self.kept[:, 0])
 
 
@@ -122,7 +123,7 @@ def _sum(blocks: Array, dofs: Indices, size: int) -> csc_array:
 
 
 def assemble(solid: SolidWorkpiece) -> csc_array:
-    """Stiffness (3 n, 3 n) [N/mm] of the workpiece as if nothing held it."""
+    """Stiffness (3 n, 3 n) [N/mm] of the workpiece without its supports."""
     e = solid.there
     elements = solid.grid.elements[e]
     K = stiffness(solid.grid.nodes[elements], solid.modulus, solid.poisson, solid.rule, solid.kept[e], e)
@@ -143,7 +144,7 @@ def assemble_mass(solid: SolidWorkpiece) -> csc_array:
 
 
 def free_dofs(solid: SolidWorkpiece) -> Indices:
-    """Degrees of freedom that are neither held nor of a node without an element."""
+    """Degrees of freedom that are not fixed and belong to a node of at least one element."""
     used = np.zeros(len(solid.grid.nodes), dtype=np.bool_)
     used[solid.grid.elements[solid.there]] = True
     return np.flatnonzero((used[:, None] & ~solid.constrained).ravel())
@@ -155,7 +156,8 @@ def check_clamped(solid: SolidWorkpiece) -> None:
     Raises
     ------
     InputError
-        Names the rigid motions that are free of the piece with the lowest element number.
+        No element remains, or a piece can move; the message names the free rigid motions of the piece with the lowest
+        element number.
     """
     e = solid.there
     if not len(e):
@@ -191,7 +193,7 @@ def check_clamped(solid: SolidWorkpiece) -> None:
 
 
 def _motions(loose: Array) -> list[str]:
-    """Names of free rigid motions (6, k): directions of those that do not turn, axes of the rest, wherever they lie."""
+    """Names of free rigid motions (6, k): directions of the translations and axes of the rotations."""
     _, sizes, turned = np.linalg.svd(loose[3:])
     still = np.ones(loose.shape[1], dtype=np.bool_)
     still[: len(sizes)] = sizes <= 1e-6
@@ -210,7 +212,7 @@ class Factored:
     solid : the workpiece
     free : (f,) int, degrees of freedom that are solved for
     stiffness : (f, f) sparse
-    factors : of that
+    factors : factors of ``stiffness``
     """
 
     solid: SolidWorkpiece
@@ -261,7 +263,7 @@ def displacement(factored: Factored, force: ArrayLike) -> Array:
 
 
 def checked_normals(places: MeshPlaces, normals: ArrayLike) -> Array:
-    """Normals as an array, refused unless they are unit vectors, one a place."""
+    """Normals as an array (p, 3); refused unless they are unit vectors, one for each place."""
     n = np.asarray(normals, dtype=np.float64)
     if n.shape != (len(places), 3) or not np.isclose(np.linalg.norm(n, axis=1), 1.0, rtol=0.0, atol=1e-6).all():
         raise InputError(f"normals of shape {n.shape}: must be unit vectors of shape ({len(places)}, 3)")
@@ -271,12 +273,12 @@ def checked_normals(places: MeshPlaces, normals: ArrayLike) -> Array:
 def compliance(factored: Factored, places: MeshPlaces, normals: ArrayLike, progress: Progress = silent) -> Array:
     """Normal compliance C_nn (p,) [mm/N] at places: normal displacement under a unit normal force.
 
-    One solution a place. ``normals`` is (p, 3) float, unit vectors.
+    It takes one solution for each place. ``normals`` is (p, 3) float, unit vectors.
 
     Raises
     ------
     InputError
-        The normals are not unit vectors, one a place.
+        The normals are not unit vectors, one for each place.
     """
     n = checked_normals(places, normals)
     F = loads(factored, places, n)

@@ -1,14 +1,15 @@
 """Compliance of the tool tip with holder and spindle: a chain of bars and joints.
 
 Notation: z [mm] height above the tip; E I [N mm^2] of each bar, from the tip upwards; a joint at height z_j has the
-compliances c_ff [mm/N] under a force, c_mm [rad/(N mm)] under a moment, and c_fm [1/N] of each under the other.
+compliances c_ff [mm/N] for a force, c_mm [rad/(N mm)] for a moment, and the cross compliance c_fm [1/N].
 
-The chain is held at its end and statically determinate, so the joints add to the bending (unit load method):
+The chain is clamped at its upper end and statically determinate, so the compliances of joints and bending add up (unit
+load method):
 
     C(a, b) = integral from max(a, b) of (z - a)(z - b) / (E I) dz
               + sum over joints above both of c_ff + c_fm (z_j - a + z_j - b) + c_mm (z_j - a)(z_j - b).
 
-Shear is left out, as in :mod:`chipload.structure.beam`; a clamped cutter agrees with that module to the last digits.
+Shear is neglected, as in :mod:`chipload.structure.beam`; a clamped cutter agrees with that module to rounding.
 
 Reference: [Altintas2012] ch. 2 and 4; [Schmitz2009] ch. 9 for the joint between cutter and holder.
 """
@@ -35,7 +36,7 @@ class Joint:
     Raises
     ------
     InputError
-        The compliances are not those of something passive (c_ff, c_mm >= 0, c_fm^2 <= c_ff c_mm).
+        The compliances are not those of a passive joint (c_ff, c_mm >= 0, c_fm^2 <= c_ff c_mm).
     """
 
     c_ff: float = 0.0
@@ -69,7 +70,7 @@ def springs(translation: float = math.inf, rotation: float = math.inf) -> Joint:
 
 
 def bearings(front: float, rear: float, span: float, bending: float = math.inf) -> Joint:
-    """Spindle on two bearings, as a joint at the front one.
+    """Spindle on two bearings, as a joint at the front bearing.
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ def cutter_bars(cutter: Cutter, joint: Joint = RIGID, fluted_factor: float | Non
 
 
 def tool_bars(cutter: Cutter) -> tuple[Bar, ...]:
-    """Bars of the cutter, and of what the machine adds at the tip where that was measured.
+    """Bars of the cutter, with the additional compliance of the machine if the tip was measured.
 
     Raises
     ------
@@ -136,10 +137,10 @@ def tool_bars(cutter: Cutter) -> tuple[Bar, ...]:
 
 
 def as_measured(bars: tuple[Bar, ...], compliance: float) -> tuple[Bar, ...]:
-    """The chain with the compliance that a measured tip has in addition, e.g. by holder and spindle.
+    """The chain with the additional compliance of a measured tip, e.g. that of holder and spindle.
 
-    The difference goes into the last joint as a translation: right at the tip whatever it comes from; loads higher up
-    are given as much of it, rather too much where holder and spindle tilt.
+    The difference is added to the last joint as a translation. This is exact at the tip whatever its cause. Loads
+    higher up receive the same addition, which is too large where holder and spindle tilt.
 
     Parameters
     ----------
@@ -150,7 +151,7 @@ def as_measured(bars: tuple[Bar, ...], compliance: float) -> tuple[Bar, ...]:
     Raises
     ------
     InputError
-        The measured tip is stiffer than the chain by itself.
+        The measured tip is stiffer than the chain alone.
 
     Examples
     --------
@@ -171,11 +172,11 @@ def as_measured(bars: tuple[Bar, ...], compliance: float) -> tuple[Bar, ...]:
 def chain_compliance(bars: tuple[Bar, ...], z_force: ArrayLike, z_point: ArrayLike) -> Array:
     """Lateral deflection at one height under a unit lateral force at another, [mm/N].
 
-    O(bars) a pair.
+    O(bars) for each pair.
 
     Parameters
     ----------
-    bars : from the tip upwards; what the last joint is fastened to does not move
+    bars : from the tip upwards; the last joint is fastened to a rigid base
     z_force, z_point : float [mm], any shapes that broadcast, 0 .. length of the chain
 
     Raises

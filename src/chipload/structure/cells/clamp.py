@@ -1,4 +1,4 @@
-"""Clamps of a workpiece: regions in which its material is held, rigidly or by springs.
+"""Clamps of a workpiece: regions in which its material is fixed, rigidly or by springs.
 
 Notation: a clamp holds the material of the stock within an upright prism, in some of the directions x, y, z. Springs
 are spread over that material: k_v = k / V [N/mm per mm^3], with the stiffness k of the whole clamp in each direction
@@ -6,8 +6,9 @@ and the volume V that it holds of the stock before the first cut. A stiff clamp 
 the longest side h of a cell and its own least side d, at most h: far stiffer than the material beneath it. A face is a
 thin slab of the stock along it.
 
-Rigid motions: S (6, 6) the stiffness of all clamps, each with a total of 1, against translations and rotations about
-the middle of the held material, lengths over the diagonal of the stock. A motion with less than :data:`LOOSE` is free.
+Rigid motions: S (6, 6) is the stiffness of all clamps, each scaled to a total of 1, against translations and rotations
+about the middle of the clamped material, with lengths divided by the diagonal of the stock. A motion with a stiffness
+below :data:`LOOSE` is free.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from chipload.structure.cells.moments import StockRegion, stock_moments
 
 #: k_v h d / E of a stiff clamp
 STIFF = 1e4
-#: smallest eigenvalue of S of a workpiece that is held
+#: least eigenvalue of S of a clamped workpiece
 LOOSE = 1e-8
 #: names of the rigid motions
 MOTIONS = tuple(f"{kind} {axis}" for kind in ("motion along", "rotation about") for axis in "xyz")
@@ -35,13 +36,13 @@ MOTIONS = tuple(f"{kind} {axis}" for kind in ("motion along", "rotation about") 
 
 @dataclass(frozen=True, eq=False)
 class Clamp:
-    """Region of the stock that is held.
+    """Region of the stock that is fixed.
 
     Parameters
     ----------
-    name : as messages name it
-    region : of the stock
-    directions : (3,) bool, x, y, z that are held
+    name : name of the clamp in messages
+    region : region of the stock
+    directions : (3,) bool, fixed directions among x, y, z
     stiffness : [N/mm] of the whole clamp in each of them; inf: stiff
     """
 
@@ -65,7 +66,7 @@ class ClampStiffness:
     matrix : (3 u, 3 u) sparse [N/mm]
     volumes : (c,) float [mm^3] that each clamp holds now
     rigid : (6, 6) float, S
-    cells : (nx, ny, nz) bool, cells that are held
+    cells : (nx, ny, nz) bool, cells with clamped material
     """
 
     matrix: csr_array
@@ -82,12 +83,12 @@ def clamp_stiffness(
     modulus: float,
     first: Sequence[float] | None = None,
 ) -> ClampStiffness:
-    """The springs of clamps.
+    """Stiffness of the springs of all clamps in the modes of a workpiece.
 
     Parameters
     ----------
     modulus : [MPa] of the workpiece
-    first : [mm^3] what each held before the first cut; None: what it holds now
+    first : (c,) [mm^3] volume in each clamp before the first cut; None: the present volume
 
     Raises
     ------
@@ -108,12 +109,12 @@ def clamp_stiffness(
                 f"({x0:g}, {y0:g}, {clamp.region.low:g}) and ({x1:g}, {y1:g}, {clamp.region.high:g}) mm: place it on "
                 f"{'what is left of the stock' if cut else 'the stock'}"
             )
-        held = np.diag(clamp.directions.astype(np.float64))
+        fixed = np.diag(clamp.directions.astype(np.float64))
         size = grid.widest
         per_volume = STIFF * modulus / (size * min(size, clamp.region.thickness(stock)))
         if np.isfinite(clamp.stiffness):
             per_volume = clamp.stiffness / (volume if first is None else first[k])
-        one = springs(grid, modes, moments, held)
+        one = springs(grid, modes, moments, fixed)
         whole = whole + per_volume * one
         cells |= moments[..., 0, 0, 0] > 0.0
         volumes.append(volume)
@@ -130,7 +131,7 @@ def require_clamped(S: Array) -> None:
     Raises
     ------
     InputError
-        A motion has no stiffness; it is named.
+        A rigid motion has no stiffness; the message names it.
     """
     values, vectors = np.linalg.eigh(S)
     free = vectors[:, values < LOOSE]
@@ -159,7 +160,7 @@ def rigid_motions(grid: CellGrid, modes: CellModes, about: Array) -> Array:
 
 
 def _middle(grid: CellGrid, cells: NDArray[np.bool_]) -> Array:
-    """Middle [mm] of the held cells."""
+    """Middle [mm] of the clamped cells."""
     at = np.argwhere(cells)
     ends = zip(grid.planes, at.min(axis=0).tolist(), at.max(axis=0).tolist(), strict=True)
     return np.array([0.5 * (v[a] + v[b + 1]) for v, a, b in ends])
