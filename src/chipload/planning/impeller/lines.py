@@ -166,17 +166,17 @@ class Lines:
         scene = self.scene.at_contacts(S, N, K, self.number)
         step = np.linalg.norm(np.diff(S, axis=0), axis=1)
         widths = partial(self._widths, N, K, d)
-        pieces = self._line_pieces(scene, step, before, widths)
+        pieces = self._line_sections(scene, step, before, widths)
         if np.isfinite(before).any() and any(a.last == b.first for a, b in itertools.pairwise(pieces)):
             # other angles than those of the line before may give a line with fewer pieces
             free = np.full(len(q), np.nan)
-            pieces = min((pieces, self._line_pieces(scene, step, free, widths)), key=len)
+            pieces = min((pieces, self._line_sections(scene, step, free, widths)), key=len)
         pallet = np.full(len(q), np.nan)
         for piece in pieces:
             pallet[piece.first : piece.last] = piece.pallet
         return Line(q, at, S, N, K, d, pieces, pallet)
 
-    def _line_pieces(
+    def _line_sections(
         self, scene: Scene, step: Floats, before: Floats, widths: Callable[[Ints, Floats], Floats]
     ) -> tuple[Turned, ...]:
         """Pieces of a line with their pallet angles, near those ``before``, from the ranges at the check points.
