@@ -1,7 +1,7 @@
 """chipload simulates, checks and plans CNC milling of parts that are hard to mill.
 
-The public names are those of ``__all__``. Each is imported when it is asked for, so that ``import chipload`` stays
-light. Units stand in the names of keys and columns, as in the job file: ``Cutter(diameter_mm=10, ...)``.
+The public names are those of ``__all__``. Each is imported on first access, so that ``import chipload`` stays
+light. The names of keys and columns state their units, as in the job file: ``Cutter(diameter_mm=10, ...)``.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ _FUNCTIONS = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is asked for."""
+    """Import a public name on first access."""
     if name == "__version__":
         from importlib.metadata import version
 

@@ -1,4 +1,4 @@
-"""What can go wrong: one root error, refused input, output that cannot be written, and findings of a reader."""
+"""Errors and findings: one root error, refused input, output that cannot be written, and findings of a reader."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class InputError(ChiploadError):
 
 
 class InputErrors(InputError):
-    """Several errors of one input, a line each.
+    """Several errors of one input, one line for each.
 
     >>> str(InputErrors("a: missing", "b = 3: must be below 2")).splitlines()
     ['a: missing', 'b = 3: must be below 2']
@@ -28,7 +28,7 @@ class InputErrors(InputError):
 
 
 class OutputError(ChiploadError):
-    """What was asked for is right, but its result cannot be written; what is kept of the work stays."""
+    """The input is valid, but the result cannot be written; checkpoints remain."""
 
 
 class Cancelled(ChiploadError):

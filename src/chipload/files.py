@@ -1,7 +1,7 @@
 """Files: one that is read is a regular file of limited size; one that is written appears whole or not at all.
 
-Notation: what is being written lies beside its place under a name that begins with :data:`FRESH` and is locked as long
-as its writer lives. What lies there unlocked is of a writer that was killed: :func:`sweep` removes it.
+Notation: a file or folder that is being written has a temporary name, which begins with :data:`FRESH`, in the same
+folder, and is locked while its writer runs. An unlocked one was left by a killed writer: :func:`sweep` removes it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from chipload.errors import InputError, OutputError
 if sys.platform != "win32":
     import fcntl
 
-#: beginning of the name of what is being written
+#: beginning of the temporary name of a file or folder that is being written
 FRESH = ".chipload-"
 _OURS = re.compile(r"\.chipload-[a-z0-9_]{8}")
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -37,7 +37,7 @@ _KINDS = (
 
 
 def is_file(path: str | Path) -> bool:
-    """Whether there is a regular file; a name that no file can have is of none.
+    """Whether a path leads to a regular file; False for a name that no file can have.
 
     >>> is_file("a" * 5000), is_file("a" + chr(0))
     (False, False)
@@ -50,11 +50,11 @@ def is_file(path: str | Path) -> bool:
 
 @contextmanager
 def open_regular(path: str | Path, label: str, most: int, remedy: str = "split it") -> Iterator[IO[bytes]]:
-    """A regular file of at most ``most`` bytes, opened to be read; a pipe or a device is not waited for.
+    """A regular file of at most ``most`` bytes, opened for reading; it never waits for a pipe or a device.
 
     Parameters
     ----------
-    label : what a message calls the file
+    label : name of the file in messages
     most : greatest size [bytes]; a file that grows while it is read is the reader's to limit
     remedy : what to do with a larger one
 
@@ -112,12 +112,12 @@ def hash_of(path: str | Path) -> str:
 
 
 def is_full(err: OSError) -> bool:
-    """Whether it says that there is no space left."""
+    """Whether an error means that no space is left."""
     return err.errno in _FULL
 
 
 def cannot_write(target: str | Path, err: OSError) -> OutputError:
-    """What is said where ``target`` cannot be written.
+    """The error for a ``target`` that cannot be written.
 
     >>> str(cannot_write("a.nc", OSError(errno.ENOSPC, "No space left on device")))
     'a.nc: cannot be written: No space left on device: free space; the same command continues'
@@ -127,7 +127,7 @@ def cannot_write(target: str | Path, err: OSError) -> OutputError:
 
 
 def write_whole(path: str | Path, data: bytes) -> None:
-    """Write beside the target and rename; what was there stays until the new file is whole.
+    """Write a temporary file in the same folder and rename it; the old file remains until the new one is complete.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def write_whole(path: str | Path, data: bytes) -> None:
 
 @contextmanager
 def fresh_folder(above: Path) -> Iterator[Path]:
-    """A new hidden folder in ``above``, held by this process; what is left of it goes with the context.
+    """A new hidden folder in ``above``, locked by this process and removed at the end of the context.
 
     Raises
     ------
@@ -178,7 +178,7 @@ def fresh_folder(above: Path) -> Iterator[Path]:
 
 
 def sweep(above: Path) -> None:
-    """Remove from a folder what killed writers left there: hidden, ours by name and user, and held by no process."""
+    """Remove what killed writers left in a folder: entries with our prefix, of this user, locked by no process."""
     if sys.platform == "win32":
         return
     with contextlib.suppress(OSError):
@@ -198,7 +198,7 @@ def sweep(above: Path) -> None:
 
 
 def exchanged(a: Path, b: Path) -> bool:
-    """Let two folders change names at one moment; False where the system cannot."""
+    """Exchange the names of two folders atomically; False where the system cannot."""
     if not sys.platform.startswith("linux"):
         return False
     change = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)

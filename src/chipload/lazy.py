@@ -1,5 +1,5 @@
-"""Late imports: names of a package when they are asked for (PEP 562), compiled functions when the first of them is
-called, and libraries that an extra installs.
+"""Late imports: names of a package on first access (PEP 562), compiled functions when the first of them is called,
+and libraries that an extra installs.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def require_extra(extra: str, module: str = "") -> None:
     Parameters
     ----------
     extra : name of the extra
-    module : that is needed; empty: the first that the extra installs
+    module : the module that is needed; empty: that of the extra
 
     Raises
     ------
@@ -69,10 +69,10 @@ def attach(package: str, places: Mapping[str, str]) -> tuple[Callable[[str], Any
 
 
 class LateModule:
-    """A module of compiled functions that is imported when a name of it is first asked for.
+    """A module of compiled functions that is imported on first access to one of its names.
 
     Functions with stated types are compiled when their module is imported: on a new machine that takes seconds, which
-    a job that does not call them need not wait.
+    a job that does not call them saves.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Return of free memory to the system: what one phase of a long run leaves is then no part of the peak of the next."""
+"""Return of free memory to the system: what one phase of a run has freed does not add to the peak of the next."""
 
 from __future__ import annotations
 

@@ -12,15 +12,15 @@ from typing import Any
 from chipload.errors import InputError
 from chipload.files import read_regular
 
-#: how alike a name must be to be suggested: another metal is no slip of the pen
+#: least similarity of a name that is suggested; greater for materials, as another metal is not a typing error
 ALIKE = {"material": 0.6}
-#: [bytes]
+#: greatest size of a file [bytes]
 LARGEST_FILE = 10_000_000
 #: greatest whole number
 LARGEST = (1 << 63) - 1
-#: tables and lists within one another
+#: greatest depth of nested tables and lists
 DEEPEST = 50
-#: what a message calls the table, and its values
+#: name of a table in messages, and its values
 Labelled = tuple[str, dict[str, Any]]
 
 
@@ -47,7 +47,7 @@ def shipped_table(kind: str, name: str) -> Labelled:
     Raises
     ------
     InputError
-        There is none; the message names those that are like it, and all.
+        There is none; the message lists similar names and all known ones.
     """
     shipped = _shipped(kind)
     if name not in shipped:
@@ -61,7 +61,7 @@ def shipped_table(kind: str, name: str) -> Labelled:
 
 
 def nearest(name: str, known: list[str]) -> str:
-    """The known name that ``name`` is most like.
+    """The known name most similar to ``name``.
 
     >>> nearest("diametr", ["diameter", "flutes"])
     'diameter'
@@ -75,7 +75,7 @@ def _shipped(kind: str) -> dict[str, Traversable]:
 
 
 def parsed(label: str, data: bytes) -> dict[str, Any]:
-    """The table of a TOML text in UTF-8; ``label`` is what a message calls it.
+    """The table of a TOML text in UTF-8; ``label`` is its name in messages.
 
     Raises
     ------

@@ -16,7 +16,7 @@ import typer
 from chipload.errors import Cancelled, InputError, InputErrors, OutputError
 from chipload.files import cannot_write, is_full
 
-#: [s] between two lines of progress in a log, and after which a run is long
+#: interval of progress lines in a log, and duration from which a run counts as long [s]
 LOG_S = 60.0
 FAULT, WRONG, EXCEEDED, UNWRITTEN, STOPPED = 1, 2, 3, 4, 130
 
@@ -36,7 +36,7 @@ def guarded(work: Callable[[], int], debug: bool) -> NoReturn:
         write_line(str(err))
         code = UNWRITTEN
     except BrokenPipeError:
-        _let_go_of_output()
+        _discard_output()
         code = UNWRITTEN
     except OSError as err:
         if is_full(err):
@@ -79,7 +79,7 @@ def _stdout_refused() -> Iterator[None]:
     except BrokenPipeError:
         raise
     except OSError as err:
-        _let_go_of_output()
+        _discard_output()
         raise cannot_write("stdout", err) from None
 
 
@@ -114,7 +114,7 @@ def write_bytes(data: bytes) -> None:
 
 
 def plain(text: str) -> str:
-    r"""The text with each control character, and each that turns the direction of writing, as its code.
+    r"""The text with control characters, and those that change the direction of writing, replaced by their codes.
 
     >>> plain("M0 (\x1b[2Jgone\x07)\tend")
     'M0 (\\x1b[2Jgone\\x07)\tend'
@@ -133,18 +133,18 @@ def _code(c: str) -> str:
 
 
 def _flushed() -> bool:
-    """Whether all that was said has left the process."""
+    """Whether all output has left the process."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
     except (OSError, ValueError):
-        _let_go_of_output()
+        _discard_output()
         return False
     return True
 
 
-def _let_go_of_output() -> None:
-    """Nobody reads stdout any more: what is left in it goes nowhere, so that the interpreter ends in silence."""
+def _discard_output() -> None:
+    """Discard the rest of the output after stdout was closed, so that the interpreter ends without an error."""
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
@@ -152,13 +152,14 @@ def _let_go_of_output() -> None:
 
 
 def log_lines(clock: Callable[[], float], every_s: float = LOG_S) -> Callable[[float, str], None]:
-    """A progress function that says how far a run is, and about how much time is left, every so many seconds.
+    """A progress function that writes the share of a run that is done and an estimate of the time left.
 
     Parameters
     ----------
     clock : time now [s]
+    every_s : least time between two lines [s]
     """
-    begun = last = clock()
+    start = last = clock()
 
     def report(done: float, what: str) -> None:
         nonlocal last
@@ -166,7 +167,7 @@ def log_lines(clock: Callable[[], float], every_s: float = LOG_S) -> Callable[[f
         if now - last < every_s or not 0.0 < done < 1.0:
             return
         last = now
-        left = (now - begun) * (1.0 - done) / done
+        left = (now - start) * (1.0 - done) / done
         shown = f"{left / 60.0:.0f} min" if left >= 90.0 else f"{left:.0f} s"
         write_line(f"{100.0 * done:.0f} %, about {shown} left: {what}")
 
@@ -176,30 +177,30 @@ def log_lines(clock: Callable[[], float], every_s: float = LOG_S) -> Callable[[f
 def with_note(
     report: Callable[[float, str], None], note: str, clock: Callable[[], float]
 ) -> Callable[[float, str], None]:
-    """A progress function that writes a note once, where a run turns out to be long.
+    """A progress function that also writes a note, once, if a run is long.
 
     Parameters
     ----------
-    note : empty: nothing is written
+    note : the text; empty: nothing is written
     clock : time now [s]
     """
-    begun, said = clock(), not note
+    start, written = clock(), not note
 
-    def noted(done: float, what: str) -> None:
-        nonlocal said
-        if not said and clock() - begun >= LOG_S and done < 1.0:
+    def report_with_note(done: float, what: str) -> None:
+        nonlocal written
+        if not written and clock() - start >= LOG_S and done < 1.0:
             write_line(note)
-            said = True
+            written = True
         report(done, what)
 
-    return noted
+    return report_with_note
 
 
 @contextmanager
 def bar(note: str = "") -> Iterator[Callable[[float, str], None]]:
-    """A progress bar on stderr where that is a terminal, else a line a minute, as in the log of a batch job.
+    """A progress bar on stderr where that is a terminal, else one line a minute, as in the log of a batch job.
 
-    ``note`` is written once, where the run is long.
+    ``note`` is written once, if the run is long.
     """
     with _bar() as report:
         yield with_note(report, note, time.monotonic)
@@ -207,7 +208,7 @@ def bar(note: str = "") -> Iterator[Callable[[float, str], None]]:
 
 @contextmanager
 def _bar() -> Iterator[Callable[[float, str], None]]:
-    """The bar or the lines of a log."""
+    """The bar, or progress lines in a log."""
     if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
         yield log_lines(time.monotonic)
         return

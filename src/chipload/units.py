@@ -1,4 +1,4 @@
-"""Conversions at the doors: inside chipload a length is in mm, a time in s, a force in N, an angle in rad."""
+"""Unit conversions at the interfaces: inside chipload a length is in mm, a time in s, a force in N, an angle in rad."""
 
 from __future__ import annotations
 

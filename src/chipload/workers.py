@@ -1,7 +1,7 @@
-"""Tasks on this process, on a pool of processes or on a Dask cluster; what a killed worker had is done again.
+"""Tasks in this process, in a pool of processes or on a Dask cluster; the task of a killed worker is repeated.
 
 A task is a picklable function and its arguments; its result is yielded as it comes, with its number. A team stays for
-many groups of tasks; it shares a value that all of them need, which goes to each worker once.
+many groups of tasks; it sends a value that all of them need to each worker once.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from chipload.errors import ChiploadError, InputError
 from chipload.lazy import require_extra
 
 Task = tuple[Any, ...]
-#: processes of one computer
+#: greatest number of processes on one computer
 MOST_PROCESSES = 1024
-#: how often a task is begun again where its worker died
+#: greatest number of times that a task is repeated after its worker died
 RETRIES = 2
-#: how long a cluster may be without any worker [s]
+#: longest time that a cluster may have no worker [s]
 PATIENCE_S = 30.0
-#: how long a scheduler may take to answer first [s]
+#: longest time until the first answer of a scheduler [s]
 ANSWER_S = 10.0
-#: how often the cluster is asked [s]
+#: interval at which the cluster is polled [s]
 POLL_S = 0.02
 
 
@@ -61,13 +61,13 @@ class Workers:
     dask: str | None = None
 
     def __post_init__(self) -> None:
-        """Refuse numbers that mean nothing."""
+        """Refuse a number of processes out of range."""
         if not 1 <= self.processes <= MOST_PROCESSES:
             raise InputError(f"--workers = {self.processes}: must be from 1 to {MOST_PROCESSES}")
 
     @property
     def alone(self) -> bool:
-        """Whether this process does all."""
+        """Whether this process does all tasks."""
         return self.processes == 1 and self.dask is None
 
     def completed(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
@@ -102,10 +102,10 @@ class Team(Protocol):
 
     @property
     def size(self) -> int:
-        """How many tasks are done at the same time, at least 1."""
+        """Number of tasks that run at the same time, at least 1."""
 
     def share(self, value: Any) -> None:
-        """Give the workers what the functions of :meth:`completed_shared` have as their first argument from now on."""
+        """Send the workers the first argument of the functions of :meth:`completed_shared` from now on."""
 
     def completed(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
         """As :func:`completed`."""
@@ -115,11 +115,11 @@ class Team(Protocol):
 
 
 class WorkerDied(ChiploadError):
-    """A worker died each time that it had a task."""
+    """The worker of a task died at every attempt."""
 
 
 class _Lost(WorkerDied):
-    """What a task on a cluster needs is on no worker."""
+    """No worker of the cluster has the shared value of a task."""
 
 
 def completed(
@@ -144,7 +144,7 @@ def completed(
 
 
 class _Alone:
-    """The process itself."""
+    """The calling process as the only worker."""
 
     def __init__(self) -> None:
         self._value: Any = None
@@ -165,7 +165,7 @@ class _Alone:
 
 
 class _Pool(_Alone):
-    """Processes of this computer; a single task is done by this one. What they share is a file in ``folder``."""
+    """Processes of this computer; a single task is done by this one. The shared value is a file in ``folder``."""
 
     def __init__(self, processes: int, folder: Path) -> None:
         super().__init__()
@@ -207,7 +207,7 @@ class _Pool(_Alone):
                 if self._closed:
                     raise
                 self._end()
-                # which of those that ran ended the worker is not known
+                # it is not known which of the running tasks ended the worker
                 for k in {*running.values()} & set(waiting):
                     waiting[k] += 1
                     if waiting[k] > RETRIES:
@@ -223,7 +223,7 @@ class _Pool(_Alone):
         numbers: Sequence[int],
         running: dict[Future[Any], int],
     ) -> Iterator[tuple[int, Any]]:
-        """The tasks of these numbers, two of each worker at a time in ``running``."""
+        """Results of the tasks ``numbers``; at most two tasks for each worker are in ``running`` at a time."""
         if self._executor is None:
             _single_threaded()
             # spawned: a fork would copy threads of the libraries in an unknown state
@@ -242,7 +242,7 @@ class _Pool(_Alone):
                     running[self._executor.submit(function, *tasks[following])] = following
 
     def close(self) -> None:
-        """End the processes; also what another thread waits for."""
+        """End the processes, even while another thread waits for a result."""
         self._closed = True
         self._end()
 
@@ -257,7 +257,7 @@ class _Pool(_Alone):
 
 
 class _Process(SpawnProcess):
-    """A process that does not run the script of the caller again, as one without a guard of its main part would."""
+    """A process that does not run the script of the caller again, even if that has no ``__main__`` guard."""
 
     @staticmethod
     def _Popen(process_obj: Any) -> Any:
@@ -274,7 +274,7 @@ class _Context(SpawnContext):
 
 
 def _begin() -> None:
-    """The first of a process: Ctrl-C is for the caller, which ends it, and it does not outlive the caller."""
+    """Prepare a process: it ignores Ctrl-C, which the caller handles, and ends with the caller."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if (caller := multiprocessing.parent_process()) is not None:
         threading.Thread(target=_end_with, args=(caller.sentinel,), daemon=True).start()
@@ -292,13 +292,13 @@ def _single_threaded() -> None:
 
 
 def _with_file(file: str, function: Callable[..., Any], *task: Any) -> Any:
-    """A task with the value that a file holds; this is what a worker executes."""
+    """Execute a task in a worker, with the value that a file holds as first argument."""
     return function(_read(file), *task)
 
 
 @lru_cache(maxsize=1)
 def _read(file: str) -> Any:
-    """What a file holds, read once by each worker."""
+    """The value that a file holds, read once by each worker."""
     return pickle.loads(Path(file).read_bytes())
 
 
@@ -319,7 +319,7 @@ def _client(address: str) -> Iterator[Any]:
 
 
 class _Cluster(_Alone):
-    """Workers of a cluster; what they share is data of the cluster, copied to each."""
+    """Workers of a cluster; the shared value is data of the cluster, copied to each."""
 
     def __init__(self, client: Any, address: str) -> None:
         super().__init__()
@@ -343,7 +343,7 @@ class _Cluster(_Alone):
                     waiting.remove(numbers[k])
                     yield numbers[k], value
             except _Lost:
-                # the workers that had what is shared are gone
+                # the workers that had the shared value are gone
                 tries += 1
                 if tries > RETRIES:
                     raise

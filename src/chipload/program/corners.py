@@ -1,9 +1,9 @@
-"""Roundings and chamfers between two elements of a contour in the plane, of all controllers.
+"""Roundings and chamfers between two elements of a contour in the plane, for all controllers.
 
-Notation: points of the plane are complex numbers [mm]; an element leads from its start to its end, straight or about a
+Notation: points of the plane are complex numbers [mm]; an element runs from its start to its end, straight or about a
 centre, counter-clockwise where ``sense`` is 1. At the corner P the contour turns to the side o, 1 to the left. The
 centre of a rounding of radius r lies on both elements shifted by r to that side: a line by r along its normal, an arc
-of radius R to the radius R - o sense r. A chamfer of length l leaves each line l before and behind P; one that is
+of radius R to the radius R - o sense r. A chamfer of length l begins l before P and ends l after P; one that is
 stated by the length s of its own edge has l = s / |a + b|, with a and b the unit vectors of the lines.
 
 Reference: Heidenhain, iTNC 530 User's Manual HEIDENHAIN Conversational, "Inserting a chamfer between two straight
@@ -34,16 +34,16 @@ class Element:
 
     @property
     def radius(self) -> float:
-        """Of an arc."""
+        """Radius of an arc."""
         return abs(self.start - self.centre)
 
     def along(self, point: complex) -> complex:
-        """Unit vector of the motion at a point of it."""
+        """Unit vector of the motion at a point of the element."""
         tangent = self.end - self.start if self.sense == 0 else 1j * self.sense * (point - self.centre)
         return tangent / abs(tangent)
 
     def share(self, point: complex) -> float:
-        """How far along a point lies, 0 at the start, 1 at the end."""
+        """Position of a point along the element, 0 at the start, 1 at the end."""
         if self.sense == 0:
             vector = self.end - self.start
             return ((point - self.start) / vector).real
@@ -58,7 +58,7 @@ class Element:
 
 @dataclass(frozen=True)
 class CornerArc:
-    """What a rounding puts between its elements."""
+    """Arc that a rounding inserts between two elements."""
 
     start: complex
     end: complex
@@ -67,7 +67,7 @@ class CornerArc:
 
 
 def rounding(before: Element, after: Element, radius: float) -> CornerArc | None:
-    """The arc of a radius that touches both elements; None: there is none that ends on them.
+    """The arc of a radius that touches both elements; None: no such arc ends on them.
 
     >>> rounding(Element(0j, 10 + 0j), Element(10 + 0j, 10 + 10j), 2.0)
     CornerArc(start=(8+0j), end=(10+2j), centre=(8+2j), sense=1)
@@ -92,7 +92,7 @@ def rounding(before: Element, after: Element, radius: float) -> CornerArc | None
 
 
 def chamfer(before: Element, after: Element, length: float) -> tuple[complex, complex] | None:
-    """Start and end of a chamfer between two lines; None: one is shorter than it or not straight.
+    """Start and end of a chamfer between two lines; None: a line is too short, or an element is not straight.
 
     >>> chamfer(Element(0j, 10 + 0j), Element(10 + 0j, 10 + 10j), 3.0)
     ((7+0j), (10+3j))
@@ -117,7 +117,7 @@ class Piece:
 
     @property
     def element(self) -> Element:
-        """The motion in the plane."""
+        """The element of the motion in the plane."""
         start, end = complex(*self.start[:2]), complex(*self.end[:2])
         return Element(start, end, complex(*self.centre), self.turns if self.motion == ARC else 0)
 
@@ -136,7 +136,7 @@ class Corner:
 
 
 def turns(before: Piece, after: Piece) -> bool:
-    """Whether the contour has a corner between two pieces: both move in the plane and do not run into one another."""
+    """Whether the contour has a corner between two pieces: both move in the plane, and they are not tangent."""
     first, second = before.element, after.element
     if any(e.sense == 0 and abs(e.end - e.start) <= SAME for e in (first, second)):
         return False
@@ -145,7 +145,7 @@ def turns(before: Piece, after: Piece) -> bool:
 
 
 def joined(before: Piece, after: Piece, corner: Corner) -> tuple[Piece, Piece, Piece] | None:
-    """Two pieces and what a corner puts between them; None: the corner cannot be made."""
+    """Two trimmed pieces with the rounding or chamfer between them; None: it does not fit."""
     level = all(a[2:] == b[2:] for a, b in ((before.start, before.end), (after.start, after.end)))
     flat = any(e.sense == 0 and abs(e.end - e.start) <= SAME for e in (before.element, after.element))
     if not level or flat or max(abs(before.turns), abs(after.turns)) > 1 or after.motion not in (LINE, ARC):
@@ -159,10 +159,10 @@ def joined(before: Piece, after: Piece, corner: Corner) -> tuple[Piece, Piece, P
     else:
         size = corner.size
         if corner.edge:
-            apart = abs(before.element.along(before.element.end) + after.element.along(after.element.start))
-            if apart < 1e-9:
+            total = abs(before.element.along(before.element.end) + after.element.along(after.element.start))
+            if total < 1e-9:
                 return None
-            size /= apart
+            size /= total
         found = chamfer(before.element, after.element, size)
         if found is None:
             return None
@@ -205,14 +205,14 @@ def _intersections(one: Shifted, two: Shifted) -> list[complex]:
         at = (q - p) / direction
         under = r1**2 - at.imag**2
         return [] if under < 0.0 else [p + direction * (at.real + s * math.sqrt(under)) for s in (-1.0, 1.0)]
-    apart = abs(q - p)
-    if apart <= SAME:
+    distance = abs(q - p)
+    if distance <= SAME:
         return []
-    x = (apart**2 + r0**2 - r1**2) / (2.0 * apart)
+    x = (distance**2 + r0**2 - r1**2) / (2.0 * distance)
     under = r0**2 - x**2
-    return [] if under < 0.0 else [p + (q - p) / apart * complex(x, s * math.sqrt(under)) for s in (-1.0, 1.0)]
+    return [] if under < 0.0 else [p + (q - p) / distance * complex(x, s * math.sqrt(under)) for s in (-1.0, 1.0)]
 
 
 def _line_intersection(p: complex, direction: complex, q: complex, other: complex) -> complex:
-    """Where two lines cross that are not parallel."""
+    """Intersection of two lines that are not parallel."""
     return p + direction * ((q - p) / other).imag / (direction / other).imag

@@ -1,13 +1,13 @@
-"""Compiled loops of the planar stock: what a rim meets, and what a capsule takes away.
+"""Compiled loops of the planar stock: the uncut arcs of a rim, and the removal of capsules.
 
 Notation: R [mm] cutter radius; a **capsule** is the disc of radius R swept along an axis from A to B, a line or an
 arc. A row of ``axis`` is ``ax, ay, bx, by, xc, yc, rho, t0, sweep``: the ends, and for an arc its centre, radius, the
 angle [rad] of A about the centre and the sweep [rad], 0 < sweep <= pi / 2; sweep = 0 is a line. The plane is
 cut into square cells; ``head[cell]`` is FULL (no capsule reaches it), EMPTY (it is wholly cleared) or the first entry
 of a chain ``link[:, 0]`` (next entry or -1), ``link[:, 1]`` (capsule). ``grid`` is
-``[x0, y0, h, nx, ny, reach, piece, room]``: origin, cell side, cells each way, the radius of the disc about a cell's
-centre that its status speaks for, the angle [rad] of the pieces that a rim is looked at in, and the most entries that
-one capsule makes. Entries never change, so that the heads alone say what the stock is.
+``[x0, y0, h, nx, ny, reach, piece, room]``: origin, cell side, cells along x and y, the radius of the disc about a
+cell's centre for which its status holds, the angle [rad] of the pieces in which a rim is examined, and the greatest
+number of entries of one capsule. Entries never change, so that the heads alone define the stock.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ import numpy as np
 from numba import njit
 
 FULL, EMPTY = -1, -2
-#: most separate arcs that a rim is given back in
+#: greatest number of separate arcs of a rim
 ARCS = 24
-#: capsules whose part of a rim is remembered while it is looked at
+#: number of capsules whose arcs of a rim are stored while it is examined
 KNOWN = 64
-#: rows of the array in which a rim is given back: its arcs, then the room to work in: what is left of a piece and what
-#: is left after the next capsule, the remembered capsules with their number of arcs, and the ends of these
+#: rows of the array of the arcs of a rim, and of the workspace after them: the uncut parts of a piece and those after
+#: the next capsule, the stored capsules with their number of arcs, and the ends of these
 LEFT, NEXT, SEEN, ENDS = ARCS, ARCS + 16, ARCS + 50, ARCS + 50 + KNOWN
 RIM = ENDS + 2 * KNOWN
-#: capsules that enter a cell before it is pruned for the first time, at least
+#: least number of capsules that enter a cell before it is pruned for the first time
 MORE = 12
-#: parts that a cell is pruned in, each way, and those of a part that no one capsule holds
+#: number of parts of a cell along x and y in pruning, and of a part that no single capsule covers
 PARTS, FINER = 8, 4
 #: capsules of a cell above which its parts are cut more finely
 LONG = 40
@@ -245,7 +245,7 @@ def uncut_between(ox, oy, tx, ty, r, R, begin, end, grid, head, link, axis, out)
     """Uncut arcs of some pieces of the circle of radius r about O, as of :func:`uncut`; piece k begins at
     ``-pi/2 + k grid[6]``.
 
-    ``out`` (RIM, 2) is also the room that the loop works in: allocating it took longer than looking at the rim.
+    ``out`` (RIM, 2) is also the workspace of the loop: its allocation took longer than the calculation.
     """
     x0, y0, h, piece = grid[0], grid[1], grid[2], grid[6]
     nx, ny = int(grid[3]), int(grid[4])
@@ -345,7 +345,7 @@ def keep_all(px, py, hd, near, m, axis, R, keep):
 def keep_fine(px, py, hd, near, m, axis, R, keep):
     """Mark what the square part needs, cut into FINER x FINER; whether it is cleared.
 
-    Of a chain of over LONG capsules, as where passes take next to nothing again and again, each of these that no one
+    Of a chain of over LONG capsules, as left by repeated passes of very small depth, each of these that no one
     capsule holds is cut once more: fewer capsules reach a smaller part.
     """
     whole = True
@@ -372,8 +372,8 @@ def keep_fine(px, py, hd, near, m, axis, R, keep):
 def prune(cell, grid, head, link, used, axis, R):
     """A new chain of a cell with what its cleared part needs; returns the number of chain entries used.
 
-    The square about what the cell speaks for is cut into parts. A part inside one capsule needs that one only; in any
-    other part every capsule that reaches it stays. Nothing is forgotten of the union. O(capsules x parts).
+    The square about the disc of the cell is cut into parts. A part inside one capsule needs that one only; in any
+    other part every capsule that reaches it stays. The union does not change. O(capsules x parts).
     """
     x0, y0, h, reach = grid[0], grid[1], grid[2], grid[5]
     nx = int(grid[3])

@@ -1,4 +1,4 @@
-"""Areas in the plane as rings of points, which compiled loops read, and their polygons.
+"""Plane areas as rings of points for the compiled loops, and their conversion from and to polygons.
 
 Notation: rings as in :mod:`chipload.stock.clip._kernels`: not closed by repeating a point, the area on their left.
 """
@@ -23,13 +23,13 @@ Shapes = NDArray[np.object_]
 
 @dataclass(frozen=True, eq=False)
 class PlaneAreas:
-    """Some areas, each bounded by rings.
+    """Plane areas, each bounded by rings.
 
     Parameters
     ----------
     points : (n, 2) float [mm]
     rings : (k, 2) int, first point and number of points of each ring, in the order of the points
-    first : (a, 2) int, first ring of each area, and the one after its last
+    first : (a, 2) int, first ring of each area, and the ring after its last
     """
 
     points: Floats
@@ -41,7 +41,7 @@ class PlaneAreas:
 
     @cached_property
     def boxes(self) -> Floats:
-        """(a, 4) float [mm]: least x and y, greatest x and y; 0 of an area without rings."""
+        """(a, 4) float [mm]: least x and y, greatest x and y; 0 for an area without rings."""
         out = np.zeros((len(self), 4))
         if not len(self.rings):
             return out
@@ -55,7 +55,7 @@ class PlaneAreas:
         return out
 
     def polygon(self, k: int) -> Polygon | MultiPolygon:
-        """Return an area as a polygon or several."""
+        """Return an area as a polygon or a multipolygon."""
         return polygon_of([self.points[a : a + n] for a, n in self.rings[slice(*self.first[k])].tolist()])
 
 
@@ -66,9 +66,9 @@ def areas_of(shapes: Sequence[shapely.Geometry] | Shapes) -> PlaneAreas:
     >>> areas.first.tolist(), areas.boxes[0].tolist()
     ([[0, 1], [1, 1]], [0.0, 0.0, 2.0, 1.0])
     """
-    given = np.empty(len(shapes), dtype=object)
-    given[:] = list(shapes)
-    parts, of = shapely.get_parts(given, return_index=True)
+    geometries = np.empty(len(shapes), dtype=object)
+    geometries[:] = list(shapes)
+    parts, of = shapely.get_parts(geometries, return_index=True)
     lines, part = shapely.get_rings(parts, return_index=True)
     points, line = shapely.get_coordinates(lines, return_index=True)
     count = np.bincount(line, minlength=len(lines)).astype(np.int64)
@@ -79,37 +79,37 @@ def areas_of(shapes: Sequence[shapely.Geometry] | Shapes) -> PlaneAreas:
     back = np.flatnonzero(shapely.is_ccw(lines) != outer)
     for k in back.tolist():
         points[start[k] : end[k]] = points[start[k] : end[k]][::-1]
-    kept = np.ones(len(points), dtype=np.bool_)
-    kept[end - 1] = False
+    keep = np.ones(len(points), dtype=np.bool_)
+    keep[end - 1] = False
     number = np.arange(len(lines), dtype=np.int64)
     rings = np.column_stack([start - number, count - 1])
-    rings_of = np.bincount(of[part], minlength=len(given)).astype(np.int64)
+    rings_of = np.bincount(of[part], minlength=len(geometries)).astype(np.int64)
     last = np.cumsum(rings_of)
-    return PlaneAreas(np.ascontiguousarray(points[kept]), rings, np.column_stack([last - rings_of, last]))
+    return PlaneAreas(np.ascontiguousarray(points[keep]), rings, np.column_stack([last - rings_of, last]))
 
 
 def polygon_of(rings: Sequence[Floats]) -> Polygon | MultiPolygon:
-    """Return the polygon of some rings, or several; what touches itself is taken apart so that it is valid."""
+    """Return the polygon or multipolygon that rings bound; rings that touch themselves are split to make it valid."""
     made = [Polygon(r) for r in rings]
     area = [signed_area(r) for r in rings]
     outer: list[tuple[Polygon, list[Floats]]] = [(p, []) for p, a in zip(made, area, strict=True) if a > 0.0]
     for r, a in zip(rings, area, strict=True):
         if a > 0.0 or not outer:
             continue
-        # rings touch, so that not each point of a hole is inside
+        # rings may touch: not every point of a hole need lie inside the outer ring
         inside = shapely.points(r)
         around = [o for o in outer if o[0].area >= -a] or outer
-        held = [int(shapely.contains(o[0], inside).sum()) if len(around) > 1 else 1 for o in around]
-        most = max(held)
-        of = min((o for o, n in zip(around, held, strict=True) if n == most), key=lambda o: float(o[0].area))
-        of[1].append(r)
+        points_inside = [int(shapely.contains(o[0], inside).sum()) if len(around) > 1 else 1 for o in around]
+        most = max(points_inside)
+        owners = (o for o, n in zip(around, points_inside, strict=True) if n == most)
+        min(owners, key=lambda o: float(o[0].area))[1].append(r)
     parts = [Polygon(p.exterior, holes) for p, holes in outer]
     whole = parts[0] if len(parts) == 1 else MultiPolygon(parts)
     return whole if shapely.is_valid(whole) else valid_of(made, area)
 
 
 def valid_of(rings: Sequence[Polygon], area: Sequence[float]) -> Polygon | MultiPolygon:
-    """Return the area of rings that touch or cross themselves: outer ones less holes, each made valid."""
+    """Return the area of rings that touch or cross themselves: outer rings minus holes, each made valid."""
     good = [_even_odd(p) for p in rings]
     outer = shapely.union_all([p for p, a in zip(good, area, strict=True) if a > 0.0])
     holes = shapely.union_all([p for p, a in zip(good, area, strict=True) if a <= 0.0])

@@ -19,8 +19,8 @@ OVERLAP_MM = 2e-3
 def blank_mesh(stock: LayeredStock) -> trimesh.Trimesh:
     """Return the initial stock as a closed mesh [mm], from which a removal mesh can begin.
 
-    Neighbouring layers of one section are one prism; of more than :data:`PRISMS` different ones as many are joined as
-    needed, with the section of the middle one.
+    Neighbouring layers with the same section form one prism. If there would be more than :data:`PRISMS`, the layers
+    form that many groups instead, each a prism with the section of its middle layer.
 
     Examples
     --------
@@ -42,8 +42,8 @@ def blank_mesh(stock: LayeredStock) -> trimesh.Trimesh:
     if len(groups) > PRISMS:
         groups = [part.tolist() for part in np.array_split(np.arange(stock.layers), PRISMS) if len(part)]
     out = []
-    for own in groups:
-        last = own[-1] == stock.layers - 1
-        ends = [stock.bounds[own[0]], stock.bounds[own[-1] + 1] + (0.0 if last else OVERLAP_MM)]
-        out.append(prisms([polygons(sections[own[len(own) // 2]])], np.array(ends)))
+    for group in groups:
+        last = group[-1] == stock.layers - 1
+        ends = [stock.bounds[group[0]], stock.bounds[group[-1] + 1] + (0.0 if last else OVERLAP_MM)]
+        out.append(prisms([polygons(sections[group[len(group) // 2]])], np.array(ends)))
     return trimesh.util.concatenate([part for part in out if len(part.faces)])

@@ -1,12 +1,13 @@
-"""The workpiece as dexels: rays along the axes that keep the intervals in which they are in solid.
+"""The workpiece as dexels: rays along the axes with the intervals over which they lie in material.
 
 Notation: along each axis k in use there is a grid of rays in the middles of equal cells, no wider than the pitch. A
-ray keeps (lo, hi) [mm] of its solid intervals in order. The cutter is the solid of revolution of the APT numbers (d, r,
-e, f, alpha, beta, h), of a barrel cutter with the arc of its flank (E, F, R, kappa where it begins); T is its tip, A
-its unit axis. On a move a ray loses, for each passage of the cutter, the interval from the least to the greatest
-coordinate that it covers. Passages are found at **instants** along the move, their beginning, end and extremes between
-the instants by halving and golden section. A passage that falls between two instants is lost: of a surface with radius
-of curvature q at most s^2 / (8 q), s the distance between instants.
+ray stores the ends (lo, hi) [mm] of its solid intervals in ascending order. The cutter is the solid of revolution of
+the APT numbers (d, r, e, f, alpha, beta, h), of a barrel cutter with the arc of its flank (E, F, R, kappa where it
+begins); T is its tip, A its unit axis. On a move a ray loses, for each passage of the cutter, the interval from the
+least to the greatest coordinate that it covers. Passages are found at **instants** along the move; bisection and
+golden section find their beginning, end and extremes between instants. A passage that falls between two instants is
+missed: on a surface with radius of curvature q the loss is at most s^2 / (8 q), where s is the distance between
+instants.
 
 This is an independent calculation of the removed volume: it uses neither the engagement nor the layers.
 """
@@ -32,9 +33,9 @@ _kernels = LateModule("chipload.stock.dexels._kernels")
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: most rays in one direction
+#: greatest number of rays in one direction
 RAY_LIMIT = 50_000_000
-#: attempts to move rays that run along an edge of a mesh aside, and the step of each as a share of the pitch
+#: attempts to shift rays that run along an edge of a mesh, and the shift of each as a share of the pitch
 TRIES, ASIDE = 8, 1e-4
 
 
@@ -47,7 +48,7 @@ class Rays:
     k : axis, 0 to 2
     grid : [u0, v0, du, dv, nu, nv] [mm]: first ray, distances and numbers along the axes (k + 1) % 3 and (k + 2) % 3
     ends : (nu nv, room, 2) float [mm] solid intervals
-    count : (nu nv,) int, how many there are
+    count : (nu nv,) int, number of solid intervals of each ray
     """
 
     k: int
@@ -91,8 +92,8 @@ class TriDexel:
 
         Parameters
         ----------
-        pitch : widest distance of rays [mm]
-        directions : axes that have rays; ``"z"`` is enough for drafts of three-axis work
+        pitch : greatest distance between rays [mm]
+        directions : axes that have rays; ``"z"`` suffices for drafts of three-axis milling
         """
         a, b = (np.asarray(corner, dtype=np.float64) for corner in (low, high))
         if a.shape != (3,) or b.shape != (3,) or not np.isfinite([a, b]).all() or not (b > a).all():
@@ -112,14 +113,14 @@ class TriDexel:
         Raises
         ------
         InputError
-            The mesh is not closed, or rays find no way through it that enters as often as it leaves.
+            The mesh is not closed, or rays do not leave it as often as they enter it.
         """
         if len(mesh.faces) == 0:
             raise InputError("stock: the mesh has no triangles")
         require_closed(mesh, "stock")
         caster = RayMeshIntersector(mesh)
         low, high = (np.asarray(b, dtype=np.float64) for b in mesh.bounds)
-        return cls([_loaded(mesh, caster, k, grid) for k, grid in _grids(low, high, pitch, directions)])
+        return cls([_rays_of_mesh(mesh, caster, k, grid) for k, grid in _grids(low, high, pitch, directions)])
 
     def volume_by_direction(self) -> dict[str, float]:
         """Return the solid volume [mm^3] by the rays along each axis."""
@@ -141,17 +142,17 @@ class TriDexel:
         error_mm: float | None = None,
         tol: float | None = None,
     ) -> None:
-        """Take what the cutter covers from (tip0, axis0) to (tip1, axis1): tip linear, axis on the arc between.
+        """Remove the volume that the cutter sweeps: its tip on the line and its axis on the arc between two poses.
 
         Parameters
         ----------
         tip0, tip1 : (3,) float [mm]
         axis0, axis1 : (3,) float, from the tip to the holder, not opposite
-        apt : (d, r, e, f, alpha, beta, h) [mm, rad] of a cutter; h is as far up as it takes material
-        samples : number of instants, at least 2; or
-        error_mm : most that is lost between instants of a surface that is as round as the corner, or as the cutter
-            where it has none. A sharp bottom edge that leaves its own plane at an angle w loses s sin(w) at most.
-        tol : how far [mm] the extremes of a ray within one passage may be missed; None: a fiftieth of ``error_mm``, and
+        apt : (d, r, e, f, alpha, beta, h) [mm, rad] of a cutter; it cuts up to the height h
+        samples : number of instants, at least 2; state either this or ``error_mm``
+        error_mm : greatest loss between instants on a surface with the radius of the corner, or of the cutter where it
+            has no corner radius. At a sharp bottom edge that leaves its own plane at an angle w it is s sin(w) at most
+        tol : greatest error [mm] of the extremes of a ray within one passage; None: a fiftieth of ``error_mm``, and
             1e-6 mm where ``samples`` are given
 
         Raises
@@ -185,7 +186,7 @@ class TriDexel:
         else:
             axes = (np.sin(angle * (1.0 - t)) * a0 + np.sin(angle * t) * a1) / math.sin(angle)
         axes /= np.linalg.norm(axes, axis=1)[:, None]
-        # parts about as long as the cutter is wide look at few rays that they miss
+        # parts about as long as the cutter is wide test few rays that they do not reach
         parts = min(samples - 1, max(1, math.ceil(travel / big)))
         borders = np.linspace(0, samples - 1, parts + 1).round().astype(int)
         tips = t0 * (1.0 - t) + t1 * t
@@ -193,9 +194,9 @@ class TriDexel:
             self._remove(tips[a : b + 1], axes[a : b + 1], shape, tol)
 
     def remove_poses(self, tips: ArrayLike, axes: ArrayLike, apt: Sequence[float], *, tol: float = 1e-6) -> None:
-        """Take what the cutter covers through the poses (n, 3), (n, 3), n >= 2, which are the instants.
+        """Remove the volume that the cutter sweeps through the poses (n, 3), (n, 3), n >= 2, which are the instants.
 
-        Between two of them the tip is linear and the axis the normalised mean; ``tol`` as for :meth:`remove_move`.
+        Between two poses tip and axis are interpolated linearly, the axis normalised; ``tol`` as :meth:`remove_move`.
         """
         p = np.ascontiguousarray(tips, dtype=np.float64)
         a = np.array([_unit(axis) for axis in np.asarray(axes, dtype=np.float64)])
@@ -254,8 +255,8 @@ def _grids(low: Floats, high: Floats, pitch: float, directions: str) -> list[tup
     return made
 
 
-def _loaded(mesh: trimesh.Trimesh, caster: RayMeshIntersector, k: int, grid: Floats) -> Rays:
-    """Rays through a mesh. A ray that does not enter as often as it leaves runs along an edge, and is moved aside."""
+def _rays_of_mesh(mesh: trimesh.Trimesh, caster: RayMeshIntersector, k: int, grid: Floats) -> Rays:
+    """Rays through a mesh. A ray that does not leave it as often as it enters runs along an edge and is shifted."""
     u, v = Rays(k, grid, np.zeros((0, 1, 2)), np.zeros(0, dtype=np.int64)).places()
     n = len(u)
     low, high = mesh.bounds[:, k]
@@ -272,16 +273,16 @@ def _loaded(mesh: trimesh.Trimesh, caster: RayMeshIntersector, k: int, grid: Flo
         ahead[:, k] = 1.0
         where, ray, face = caster.intersects_location(origins, ahead)
         order = np.lexsort((where[:, k], ray))
-        s, ray, way = where[order, k], ray[order], np.where(normals[face[order]] < 0.0, 1, -1)
-        depth = np.cumsum(way)
+        s, ray, sense = where[order, k], ray[order], np.where(normals[face[order]] < 0.0, 1, -1)
+        depth = np.cumsum(sense)
         first = np.flatnonzero(np.diff(ray, prepend=-1))
-        before = np.repeat(depth[first] - way[first], np.diff([*first, len(ray)]))
+        before = np.repeat(depth[first] - sense[first], np.diff([*first, len(ray)]))
         depth -= before
         bad = np.zeros(len(left), dtype=bool)
         bad[ray[depth < 0]] = True
         bad[ray[np.append(first[1:], len(ray)) - 1][depth[np.append(first[1:], len(ray)) - 1] != 0]] = True
         good = ~bad[ray]
-        enter, leave = good & (depth == 1) & (way == 1), good & (depth == 0) & (way == -1)
+        enter, leave = good & (depth == 1) & (sense == 1), good & (depth == 0) & (sense == -1)
         rows = left[ray[enter]]
         at = np.arange(len(rows)) - np.repeat(*_runs(rows)) if len(rows) else rows
         if len(rows) and int(at.max()) >= ends.shape[1]:

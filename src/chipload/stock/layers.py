@@ -1,9 +1,9 @@
 """The workpiece as a stack of horizontal layers, each a set of polygons from which covered areas are removed.
 
-Notation: layer i is the prism between ``bounds[i]`` and ``bounds[i + 1]`` [mm]; its section S_i is taken at its middle,
-``heights[i]``. The plane is cut into rectangular **tiles** (columns x rows); a layer keeps one geometry a tile, so
-that a removal of area C reads only the tiles under C and costs the same after many moves as after none. Volume = sum
-of area(S_i) times thickness; for a smooth body cut at the middles its error is O(dz^2).
+Notation: layer i is the prism between ``bounds[i]`` and ``bounds[i + 1]`` [mm]; its section S_i is that at its middle,
+``heights[i]``. The plane is cut into rectangular **tiles** (columns x rows); a layer stores one geometry for each
+tile, so that the removal of an area C reads only the tiles under C, at a cost that does not grow with the number of
+earlier moves. Volume = sum of area(S_i) times thickness; for a smooth body cut at the middles its error is O(dz^2).
 
 Reference: [Chips2017] (the pile of layers).
 """
@@ -57,20 +57,20 @@ ROOM = 128
 class LayeredStock:
     """A stock of solid layers from which polygons are removed.
 
-    :meth:`remove`, :meth:`remove_many`, :meth:`refine`, :meth:`refine_at` and :meth:`restore` change the stock; all
-    else reads. Splitting layers shifts the numbers of those above. Polygons are values and are never changed.
+    :meth:`remove`, :meth:`remove_many`, :meth:`refine`, :meth:`refine_at` and :meth:`restore` change the stock; the
+    other methods only read it. Splitting layers shifts the numbers of those above. Polygons are never changed.
 
     Parameters
     ----------
     bounds : (n + 1,) float [mm], ascending
     xs, ys : (columns + 1,), (rows + 1,) float [mm], ascending: borders of the tiles
     tiles : (n, rows, columns) polygons, multipolygons or empty geometries, each within its tile
-    part : closed mesh that layers are cut from again when they are split and nothing was removed from them
+    part : closed mesh, sectioned again where layers are split from which nothing was removed
 
     Notes
     -----
-    Besides these it keeps ``tidied`` [mm^3], what it has gained by edges that were made simpler, and for every tile the
-    number of points (``room``) beyond which that is done next. ``by_geos`` is the number of tiles that
+    ``tidied`` [mm^3] is the volume that the stock has gained by the simplification of edges, ``room`` the number of
+    points of each tile above which it is simplified next. ``by_geos`` is the number of tiles that
     :class:`chipload.stock.tile_rings.TileRings` left to GEOS, since the stock was made or loaded. ``sections`` of the
     part by height [mm] are shared by copies and parts of a stock, which are split at the same heights again and again.
 
@@ -131,7 +131,7 @@ class LayeredStock:
 
     @classmethod
     def of_mesh(cls, mesh: trimesh.Trimesh, bounds_or_layer_mm: ArrayLike, tile_mm: float) -> LayeredStock:
-        """Return the layers of a closed mesh, cut at their middles; the mesh is kept for :meth:`refine`.
+        """Return the layers of a closed mesh, cut at their middles; the mesh is stored for :meth:`refine`.
 
         Parameters
         ----------
@@ -169,7 +169,7 @@ class LayeredStock:
 
     @property
     def heights(self) -> Floats:
-        """(n,) float [mm]: the middle of each layer, where its section is taken."""
+        """(n,) float [mm]: the middle of each layer, at which its section lies."""
         return 0.5 * (self.bounds[:-1] + self.bounds[1:])
 
     def layers_between(self, z0: float, z1: float) -> range:
@@ -179,7 +179,7 @@ class LayeredStock:
         return range(max(first, 0), max(min(last, self.layers), first, 0))
 
     def section(self, layer: int, low: ArrayLike | None = None, high: ArrayLike | None = None) -> MultiPolygon:
-        """Return the remaining section of a layer; with ``low`` and ``high`` (2,) [mm] of tiles under a rectangle."""
+        """Return the remaining section of a layer; with ``low`` and ``high`` (2,) [mm] only under a rectangle."""
         tiles = self.tiles[self._layer(layer)]
         if low is not None and high is not None:
             (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
@@ -192,7 +192,7 @@ class LayeredStock:
         return math.fsum(shapely.area(self.tiles[self._layer(layer)]).ravel())
 
     def edges(self, layers: range, low: ArrayLike, high: ArrayLike) -> tuple[Floats, Ints, Floats]:
-        """Return the rings in the tiles of neighbouring layers under a rectangle.
+        """Return the edges of the rings in the tiles of neighbouring layers under a rectangle.
 
         Parameters
         ----------
@@ -235,40 +235,40 @@ class LayeredStock:
 
         Parameters
         ----------
-        tidy : edges cut again and again along the same wall come out as many short ones; where those of a tile
-            have doubled, vertices are left out that move its edge by at most this [mm]. What the stock gains by it
-            (mm^3, signed) is added to ``tidied``; 0: nothing is left out
+        tidy : greatest displacement [mm] of an edge by simplification; 0: none. Repeated cuts along the same wall leave
+            many short edges; a tile is simplified when its number of points has doubled. The volume that the stock
+            gains (mm^3, signed) is added to ``tidied``
 
         Returns
         -------
-        For each k the pieces that were there and were taken, joined over the tiles; none: an empty list. What is taken
-        and what is left add up to what was there but for rounding. Pieces as thin as rounding come back like others.
+        For each k the removed pieces, joined over the tiles; an empty list if there are none. The removed and the
+        remaining area add up to the previous area except for rounding. Pieces as thin as rounding are returned too.
 
         Raises
         ------
         InputError
-            A layer is not there, or a shape crosses itself or is no polygon; nothing is removed.
+            A layer does not exist, or a shape crosses itself or is not a polygon; nothing is removed.
         """
         rows = np.asarray(layers, dtype=np.int64)
-        given = np.empty(len(shapes), dtype=object)
-        given[:] = list(shapes)
-        if rows.shape != given.shape:
-            raise InputError(f"stock: {len(rows)} layers for {len(given)} polygons: one layer a polygon")
+        geometries = np.empty(len(shapes), dtype=object)
+        geometries[:] = list(shapes)
+        if rows.shape != geometries.shape:
+            raise InputError(f"stock: {len(rows)} layers for {len(geometries)} polygons: one layer a polygon")
         for i in rows.tolist():
             self._layer(i)
-        kind = shapely.get_type_id(given)
-        if not (((kind == POLYGON) | (kind == MULTIPOLYGON)) & shapely.is_valid(given)).all():
+        kind = shapely.get_type_id(geometries)
+        if not (((kind == POLYGON) | (kind == MULTIPOLYGON)) & shapely.is_valid(geometries)).all():
             raise InputError("stock: a shape to remove is no polygon or crosses itself: repair it first")
         chips: list[list[Polygon]] = [[] for _ in rows]
         for turn in turns_of(rows):
-            self._take(turn, rows, given, chips, tidy)
+            self._remove_turn(turn, rows, geometries, chips, tidy)
         return chips
 
     def refine(self, z0: float, z1: float, layer_mm: float) -> None:
         """Split the layers that reach into z0 < z < z1 [mm] into equal ones until none is thicker than ``layer_mm``.
 
         A layer from which nothing was removed is cut from the mesh again at the new middles; where there is no mesh, or
-        something was removed, the new layers have the polygons of the old one, and the volume stays.
+        something was removed, the new layers get the polygons of the old one, and the volume does not change.
         """
         if not layer_mm > 0.0:
             raise InputError(f"stock.layer_mm = {layer_mm:g}: must be above 0")
@@ -315,8 +315,8 @@ class LayeredStock:
         return out
 
     def cropped(self, low: ArrayLike, high: ArrayLike) -> LayeredStock | None:
-        """The tiles under a rectangle between ``low`` and ``high`` (2,) [mm], cut to it, as a stock of its own; None:
-        it has none there.
+        """Return the part under a rectangle between ``low`` and ``high`` (2,) [mm] as a stock of its own; None: the
+        rectangle does not overlap the tiles.
         """
         (x0, y0), (x1, y1) = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
         x0, y0 = max(x0, float(self.xs[0])), max(y0, float(self.ys[0]))
@@ -403,14 +403,14 @@ class LayeredStock:
         stock.tidied = float(a["tidied"][0])
         return stock
 
-    def _take(self, turn: Ints, rows: Ints, given: Shapes, chips: list[list[Polygon]], tidy: float) -> None:
-        """Remove the shapes numbered ``turn``, no two of one layer."""
-        k, row, j, i = self._met(turn, rows, given)
+    def _remove_turn(self, turn: Ints, rows: Ints, geometries: Shapes, chips: list[list[Polygon]], tidy: float) -> None:
+        """Remove the shapes numbered ``turn``, each from a different layer."""
+        k, row, j, i = self._tiles_under(turn, rows, geometries)
         which = list(zip(k.tolist(), row.tolist(), j.tolist(), i.tolist(), strict=True))
-        # layers that were cut alike so far share their tiles, and what is alike is cut once
+        # layers with the same removals so far share their tiles; equal pairs of tile and shape are cut once
         seen: dict[tuple[int, int], int] = {}
         before, shape, same = [], [], []
-        for tile, cutting in zip(self.tiles[row, j, i].tolist(), given[k].tolist(), strict=True):
+        for tile, cutting in zip(self.tiles[row, j, i].tolist(), geometries[k].tolist(), strict=True):
             key = (id(tile), id(cutting))
             if key not in seen:
                 seen[key] = len(seen)
@@ -445,11 +445,12 @@ class LayeredStock:
                 joined[alike] = flat if len(several) == 1 else polygons(shapely.union_all(flat))
             chips[at] = list(joined[alike])
 
-    def _met(self, turn: Ints, rows: Ints, given: Shapes) -> tuple[Ints, Ints, Ints, Ints]:
-        """Tiles whose boxes the boxes of the shapes numbered ``turn`` reach into: of each the shape, the layer, row and
-        column. A tile without an area has no box.
+    def _tiles_under(self, turn: Ints, rows: Ints, geometries: Shapes) -> tuple[Ints, Ints, Ints, Ints]:
+        """Shape, layer, row and column of each tile whose bounding box overlaps that of a shape numbered ``turn``.
+
+        An empty tile has no bounding box.
         """
-        x0, y0, x1, y1 = shapely.bounds(given[turn]).reshape(-1, 4).T
+        x0, y0, x1, y1 = shapely.bounds(geometries[turn]).reshape(-1, 4).T
         i0, j0 = (np.maximum(np.searchsorted(b, low, "right") - 1, 0) for b, low in ((self.xs, x0), (self.ys, y0)))
         i1, j1 = (
             np.minimum(np.searchsorted(b, high, "left"), len(b) - 1) for b, high in ((self.xs, x1), (self.ys, y1))

@@ -1,9 +1,10 @@
 """Stock in the plane from which capsules are removed, with the exact engagement of the cutter's rim.
 
-Notation: R [mm] cutter radius; a **capsule** is the disc of radius R swept along a straight step from A to B. What is
-cleared is the union of the capsules. The rim of a cutter at O is covered by each capsule over ONE arc, in closed form;
-what no capsule covers is uncut. A grid of cells keeps, for each place, only the capsules that end there: a cell wholly
-cleared keeps none. No boundary is built, so that tangencies cause no errors: an error of 1e-12 mm stays that small.
+Notation: R [mm] cutter radius; a **capsule** is the disc of radius R swept along a straight step from A to B. The
+cleared area is the union of the capsules. The rim of a cutter at O is covered by each capsule over ONE arc, in closed
+form; the rest of the rim is uncut. A grid stores, for each cell, only the capsules that its cleared part needs; a cell
+that is wholly cleared stores none. No boundary is built, so that tangencies cause no errors: an error of 1e-12 mm stays
+that small.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ class PlanarStock:
     >>> arcs = stock.arcs((0.5, 0.0), (1.0, 0.0))
     >>> float(round(np.degrees(arcs[0, 1] - arcs[0, 0]), 9))  # a slot: the disc at the end covers nothing ahead
     180.0
-    >>> arcs = stock.arcs((-1.0, 1.0), (1.0, 0.0))  # half the cutter beside the slot
+    >>> arcs = stock.arcs((-1.0, 1.0), (1.0, 0.0))  # the centre on the wall of the slot
     >>> float(round(np.degrees(arcs[0, 1] - arcs[0, 0]), 9))
     90.0
     """
@@ -76,7 +77,7 @@ class PlanarStock:
         self.used = 0
         self.axis: Floats = np.zeros((1 << 12, 9))
         self.capsules = 0
-        #: a rim is given back here, and looked at
+        #: arcs of a rim, and the workspace of their calculation
         self.rim: Floats = np.zeros((_kernels.RIM, 2))
 
     def reserve(self, capsules: int) -> None:

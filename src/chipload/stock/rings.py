@@ -1,9 +1,9 @@
-"""The stock of a tube or a cone as layers: rings about Z, their outer edge off its centre if need be, bosses on it.
+"""Layered stock of a tube or a cone: rings about Z, with an outer edge that may be eccentric and have bosses.
 
 Notation: r_i(z), r_o(z) [mm] inner and outer radius of a layer at half its height z; c (2,) [mm] centre of the outer
 edge; a boss is the sector between two angles, counter-clockwise from +X, out to r_o + b.
 
-A circle is a polygon of 512 corners on it: at 25 mm it lies within 0.5 um.
+A circle is a polygon with its 512 corners on the circle; at a radius of 25 mm the error is below 0.5 um.
 """
 
 from __future__ import annotations
@@ -51,20 +51,20 @@ def ring_stock(
 
     Parameters
     ----------
-    bounds : (n + 1,) float [mm], heights between which the layers are, rising
-    inner, outer : r_i and r_o of heights [mm], both about Z
-    centre : c; the inner edge stays about Z
+    bounds : (n + 1,) float [mm], ascending heights of the bounds of the layers
+    inner, outer : r_i and r_o as functions of the height [mm], both about Z
+    centre : c; the inner edge remains centred on Z
     bosses : on the outer edge
     tile_mm : longest side of a tile
 
     Raises
     ------
     InputError
-        A ring has no width somewhere.
+        A ring has no width at some angle.
 
     Examples
     --------
-    Between 9 and 10 mm, 2 mm high: 2 pi (100 - 81), but for the chords.
+    A tube from 9 to 10 mm radius, 2 mm high: 2 pi (100 - 81) mm^3, except for the error of the chords.
 
     >>> tube = ring_stock(np.array([0.0, 2.0]), lambda z: 0 * z + 9.0, lambda z: 0 * z + 10.0)
     >>> round(tube.volume() / (2.0 * math.pi * 19.0), 4)
@@ -103,7 +103,7 @@ def surface_off(
     for i in range(stock.layers):
         if stock.bounds[i] < low - 1e-9 or stock.bounds[i + 1] > high + 1e-9:
             continue
-        # tiles that touch are joined, so that their borders are no edges
+        # touching tiles are joined, so that their borders are not edges
         whole = polygons(stock.section(i).buffer(TOUCH))
         edge = np.concatenate([np.asarray(p.exterior.coords)[:, :2] for p in whole])
         off = np.hypot(*edge.T) - TOUCH - float(outer(np.array([stock.heights[i]]))[0])

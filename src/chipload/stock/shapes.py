@@ -1,7 +1,7 @@
 """Arrays and plane geometries in one ``.npz`` file that executes nothing when it is read.
 
 Notation: geometries are well-known binary (WKB, little-endian), one after the other in ``wkb`` as bytes; geometry i is
-``wkb[ends[i - 1]:ends[i]]``. ``kind`` names the kind of the file. Coordinates are kept bit for bit.
+``wkb[ends[i - 1]:ends[i]]``. ``kind`` names the kind of the file. Coordinates are stored bit for bit.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ UNREADABLE = (
 
 
 def shape_bytes(kind: str, arrays: dict[str, NDArray[Any]], shapes: NDArray[np.object_]) -> bytes:
-    """Return a file of named arrays and (n,) geometries; equal values give equal bytes."""
+    """Return the bytes of a file of named arrays and (n,) geometries; equal values give equal bytes."""
     binary = shapely.to_wkb(shapes, byte_order=1)
     out = io.BytesIO()
     np.savez_compressed(
@@ -52,14 +52,14 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
     stream = io.BytesIO(data)
     if np.lib.format.read_magic(stream) != (1, 0):
         raise ValueError(name)
-    shape, turned, dtype = np.lib.format.read_array_header_1_0(stream)
+    shape, column_major, dtype = np.lib.format.read_array_header_1_0(stream)
     if dtype.kind not in "biuf" or min(shape, default=0) < 0:
         raise ValueError(name)
     count = math.prod(shape)
     if count * dtype.itemsize != len(data) - stream.tell():
         raise ValueError(name)
     out = np.frombuffer(data, dtype=dtype, count=count, offset=stream.tell())
-    return out.reshape(shape, order="F" if turned else "C").copy()
+    return out.reshape(shape, order="F" if column_major else "C").copy()
 
 
 def read_shapes(
@@ -87,8 +87,8 @@ def read_shapes(
                     f"stock.file = {file.name}: holds {size} bytes unpacked: must be at most {LARGEST}: take larger "
                     "layers or tiles"
                 )
-            said = _array(archive, "kind")
-            if said.dtype != np.uint8 or said.tobytes() != kind.encode():
+            stored_kind = _array(archive, "kind")
+            if stored_kind.dtype != np.uint8 or stored_kind.tobytes() != kind.encode():
                 raise InputError(f"stock.file = {file.name}: not a file of the kind '{kind}'")
             arrays = {key: _array(archive, key) for key in names}
             wkb, ends = _array(archive, "wkb"), _array(archive, "ends")
@@ -101,11 +101,11 @@ def read_shapes(
     if (ends < starts).any() or (starts < 0).any() or (int(ends[-1]) if len(ends) else 0) != len(wkb):
         raise damaged
     whole = wkb.tobytes()
-    # what is alike becomes one object, as it was
-    alike: dict[bytes, int] = {}
-    same = [alike.setdefault(whole[a:b], len(alike)) for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
-    binary = np.empty(len(alike), dtype=object)
-    binary[:] = list(alike)
+    # equal geometries become one object, as before saving
+    index: dict[bytes, int] = {}
+    same = [index.setdefault(whole[a:b], len(index)) for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
+    binary = np.empty(len(index), dtype=object)
+    binary[:] = list(index)
     try:
         shapes: NDArray[np.object_] = shapely.from_wkb(binary)[np.array(same, dtype=np.int64)]
     except shapely.errors.ShapelyError:

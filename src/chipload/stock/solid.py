@@ -1,9 +1,10 @@
-"""Prisms over polygons as one closed triangle mesh, and that as glTF.
+"""Prisms over polygons as one closed triangle mesh, and export of a mesh as glTF.
 
 Notation: a polygon between z0 and z1 [mm] becomes a bottom, a top and walls. Its triangles (constrained Delaunay, whose
-vertices are those of the polygon) meet in inner edges; what is used once is the boundary and gets a wall. A **corner**
-is a triangle at one of its vertices; corners that meet across inner edges are one vertex of the mesh. Where a ring
-touches another in a point the corners on either side stay apart, so that every edge of the mesh has two faces.
+vertices are those of the polygon) meet in inner edges; an edge of only one triangle is on the boundary and gets a wall.
+A **corner** is a triangle at one of its vertices; corners that meet across inner edges are one vertex of the mesh.
+Where two rings touch at a point, the corners on either side remain separate, so that every edge of the mesh has two
+faces.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def _prism(part: Polygon, z0: float, z1: float) -> tuple[Floats, Ints]:
     places, number = np.unique(xy.reshape(-1, 2), axis=0, return_inverse=True)
     tri = number.reshape(-1, 3)
     corner = np.arange(tri.size).reshape(-1, 3)
-    # directed edges and the corners at their ends; an inner edge is met once in each direction
+    # directed edges and the corners at their ends; an inner edge occurs once in each direction
     start, end = tri.ravel(), np.roll(tri, -1, axis=1).ravel()
     at, to = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
     n = len(places)

@@ -6,7 +6,7 @@ between eight points that has such edges gets one vertex, the mean of its crossi
 gets a quad through the vertices of the four cells around it. The lattice has a border of points outside, so that the
 surface is closed.
 
-Reference: [Gibson1998] (surface nets). Differs from source: vertices stay the means, they are not relaxed.
+Reference: [Gibson1998] (surface nets). Differs from source: vertices remain at the means; they are not relaxed.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ NEVER = 65_535
 
 
 class SurfaceNet:
-    """Quads of a stock that changes; :meth:`update` changes it.
+    """Quads of the surface of a stock; :meth:`update` replaces those that material removal changed.
 
     Parameters
     ----------
-    stock : with rays along x, y and z
+    stock : dexels with rays along x, y and z
 
     Notes
     -----
@@ -89,14 +89,14 @@ class SurfaceNet:
         if (b < 0).any() or (a > self.count + 1).any():
             return
         self._solids(np.clip(a, 0, self.count), np.clip(b, 0, self.count))
-        # edges of changed points are in cells beside them, and these in quads of edges farther out
+        # edges of changed points lie in neighbouring cells, whose vertices belong to quads of edges farther out
         a, b = np.clip(a - 2, 0, self.count + 1), np.clip(b + 3, 0, self.count + 2)
         if (b - a < 2).any():
             return
         self._quads(a, b, frame)
 
     def _solids(self, a: Ints, b: Ints) -> None:
-        """Set the points from number a to before b, the border not counted."""
+        """Set which of the points a to b - 1, numbered without the border, are solid."""
         rays, (_, ny, nz) = self.rays[2], self.count.tolist()
         if (b <= a).any():
             return
@@ -111,7 +111,7 @@ class SurfaceNet:
         self.solid[box] = here.reshape(b[0] - a[0], b[1] - a[1], len(z))
 
     def _quads(self, a: Ints, b: Ints, frame: int) -> None:
-        """Compare the quads in the window of points from a to before b with what is there now."""
+        """Update the quads in the window of the points a to b - 1."""
         while (many := _surface_net.changed_edges(self.solid, a, b, self._edges)) > len(self._edges):
             self._edges = np.zeros((2 * many, 4), dtype=np.int64)
         edges, rays = self._edges[:many], self.rays

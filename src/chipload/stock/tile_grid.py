@@ -27,7 +27,7 @@ Shapes = NDArray[np.object_]
 LAYER_LIMIT = 200_000
 #: most tiles times layers
 TILE_LIMIT = 20_000_000
-#: most points of the sections of a mesh that are kept
+#: greatest number of points of the sections of a mesh that are stored for later use
 KEPT = 200_000
 #: type numbers of GEOS
 POLYGON, MULTIPOLYGON = 3, 6
@@ -53,7 +53,7 @@ def areas_alone(shapes: Shapes) -> Shapes:
 
 
 def cut_up(part: trimesh.Trimesh, heights: Floats, boxes: Shapes, known: dict[float, MultiPolygon]) -> Shapes:
-    """(n, rows, columns) tiles of the sections of a mesh; ``known`` are sections by height [mm], and become more."""
+    """(n, rows, columns) tiles of the sections of a mesh; new sections are added to ``known``, by height [mm]."""
     found = {h: known.get(h) for h in heights.tolist()}
     fresh = [h for h, section in found.items() if section is None]
     made = dict(zip(fresh, sections(part, fresh), strict=True))
@@ -69,7 +69,7 @@ def cut_up(part: trimesh.Trimesh, heights: Floats, boxes: Shapes, known: dict[fl
 
 
 def turns_of(rows: Ints) -> list[Ints]:
-    """Numbers 0 .. len(rows) - 1 in groups, so that no layer comes twice in a group."""
+    """Numbers 0 .. len(rows) - 1 in groups, none of which has a layer twice."""
     if len(set(rows.tolist())) == len(rows):
         return [np.arange(len(rows))] if len(rows) else []
     order = np.argsort(rows, kind="stable")
@@ -80,7 +80,7 @@ def turns_of(rows: Ints) -> list[Ints]:
 
 
 def span(borders: Sequence[float], low: float, high: float) -> range:
-    """Tiles that the open interval low < x < high reaches into; not a number: none."""
+    """Tiles that overlap the open interval low < x < high; none if a bound is not a number."""
     if not high > low:
         return range(0)
     return range(max(bisect_right(borders, low) - 1, 0), min(bisect_left(borders, high), len(borders) - 1))
@@ -117,7 +117,7 @@ def _parts(low: float, high: float, longest: float, key: str, most: int) -> int:
 
 
 def boxes_of(xs: Floats, ys: Floats, layers: int) -> Shapes:
-    """(rows, columns) squares of the tiles."""
+    """(rows, columns) rectangles of the tiles."""
     if layers * len(xs) * len(ys) > TILE_LIMIT:
         raise InputError(
             f"stock: {layers} layers of {len(xs) - 1} x {len(ys) - 1} tiles: at most {TILE_LIMIT} in all: "

@@ -24,19 +24,19 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 T = TypeVar("T", bound=np.generic)
 
-#: room at first: points and rings of tiles, tiles, points and rings of chips, crossings, operations
+#: initial room: points and rings of tiles, tiles, points and rings of chips, crossings, operations
 POINTS, RINGS, SLOTS, CHIP, CHIP_RINGS, CROSSINGS, OPERATIONS = 1 << 16, 1 << 13, 1 << 12, 1 << 13, 1 << 10, 512, 256
 
 
 @dataclass(frozen=True, eq=False)
 class Taken:
-    """What the entries of a step took.
+    """Areas that the entries of a step removed.
 
     Parameters
     ----------
     area : (e,) float [mm^2]
-    parts : (e,) int, pieces joined over the tiles that are no films
-    least, whole : (e,) float [mm^2], the smallest of these pieces and their sum
+    parts : (e,) int, number of pieces, joined over the tiles, that are not films
+    least, whole : (e,) float [mm^2], the smallest of these pieces, and their sum
     """
 
     area: Floats
@@ -46,14 +46,14 @@ class Taken:
 
 
 class TileRings:
-    """The tiles of a stock as rings; :meth:`finish` puts those that changed back into it.
+    """The tiles of a stock as rings; :meth:`finish` writes those that changed back to it.
 
-    A tile is read when it is needed first. Until it is finished the stock itself does not change, but for what it
-    gains where edges are made simpler (``stock.tidied``).
+    A tile is read when it is first needed. Before :meth:`finish` the stock itself does not change, except for the
+    volume that it gains by the simplification of edges (``stock.tidied``).
 
     Parameters
     ----------
-    stock : from which steps are removed
+    stock : layers from which steps are removed
 
     Notes
     -----
@@ -68,7 +68,7 @@ class TileRings:
         self.read_slot = self.slot_of.copy()
         self.points, self.rings = np.empty((POINTS, 2)), np.empty((RINGS, 2), dtype=np.int64)
         self.slots, self.boxes = np.zeros((SLOTS, 3), dtype=np.int64), np.zeros((SLOTS, 4))
-        # points, rings, slots, why a removal stopped; slot 0 is empty
+        # numbers of points, rings and slots, reason for which a removal stopped; slot 0 is empty
         self.used = np.array([0, 0, 1, 0], dtype=np.int64)
         self.chip, self.chip_rings = np.empty((CHIP, 2)), np.empty((CHIP_RINGS, 2), dtype=np.int64)
         self.chip_used = np.zeros(2, dtype=np.int64)
@@ -76,23 +76,23 @@ class TileRings:
         self.x, self.cross = np.empty((CROSSINGS, 4)), np.empty((CROSSINGS, 11), dtype=np.int64)
         self.edge = np.empty((1024, 4))
         self.count = 0
-        self._alike: dict[int, int] = {}
+        self._slot_of_tile: dict[int, int] = {}
 
     def read(self, layers: range, j: range, i: range) -> None:
         """Read the tiles of some layers, rows and columns that were not read yet."""
         at = (slice(layers.start, layers.stop), slice(j.start, j.stop), slice(i.start, i.stop))
         some = self.slot_of[at] == kernels.NONE
         tiles = self.stock.tiles[at][some].tolist()
-        fresh = list({id(tile): tile for tile in tiles if id(tile) not in self._alike}.values())
+        fresh = list({id(tile): tile for tile in tiles if id(tile) not in self._slot_of_tile}.values())
         if fresh:
-            for tile, slot in zip(fresh, self._entered(fresh), strict=True):
-                self._alike[id(tile)] = slot
-        slots = np.array([self._alike[id(tile)] for tile in tiles], dtype=np.int64)
+            for tile, slot in zip(fresh, self._add(fresh), strict=True):
+                self._slot_of_tile[id(tile)] = slot
+        slots = np.array([self._slot_of_tile[id(tile)] for tile in tiles], dtype=np.int64)
         self.slot_of[at][some] = slots
         self.read_slot[at][some] = slots
 
-    def _entered(self, shapes: list[shapely.Geometry]) -> list[int]:
-        """Slots of some polygons."""
+    def _add(self, shapes: list[shapely.Geometry]) -> list[int]:
+        """Add polygons; return their slots."""
         areas = areas_of(shapes)
         n, r, s = self.used[:3].tolist()
         self._grow(len(areas.points), len(areas.rings), len(areas))
@@ -116,7 +116,7 @@ class TileRings:
         self.slots, self.boxes = _larger(self.slots, s, s + slots), _larger(self.boxes, s, s + slots)
 
     def edges(self, layers: range, low: Floats, high: Floats) -> tuple[Floats, Ints, Floats]:
-        """Return the rings in the tiles of neighbouring layers under a rectangle, as :meth:`LayeredStock.edges`."""
+        """Return the edges in the tiles of neighbouring layers under a rectangle, as :meth:`LayeredStock.edges`."""
         (x0, y0), (x1, y1) = low.tolist(), high.tolist()
         i, j = span(self._x, x0, x1), span(self._y, y0, y1)
         start = np.zeros(len(layers) + 1, dtype=np.int64)
@@ -138,7 +138,7 @@ class TileRings:
 
         Parameters
         ----------
-        film : a piece whose width is at most about this is a film [mm]
+        film : approximate greatest width of a piece that counts as a film [mm]
         tidy : as of :meth:`LayeredStock.remove_many`
         """
         while True:
@@ -163,7 +163,7 @@ class TileRings:
             if at == n:
                 break
             if self.used[3] == kernels.FULL:
-                self._more()
+                self._enlarge()
             else:
                 self._cut_by_geos(at, areas.polygon(int(shape[self.ops[at, kernels.ENTRY]])))
                 at += 1
@@ -171,7 +171,7 @@ class TileRings:
         kernels.removed_areas(
             len(layers), n, self.ops, self.stock.xs, self.stock.ys, self.chip, self.chip_rings, film, out
         )
-        self._changed(tidy)
+        self._mark_changed(tidy)
         return Taken(out[:, 0], out[:, 1].astype(np.int64), out[:, 2], out[:, 3])
 
     def _read_under(self, layers: Ints, boxes: Floats) -> None:
@@ -180,8 +180,8 @@ class TileRings:
         (x0, y0), (x1, y1) = boxes[some, :2].min(axis=0).tolist(), boxes[some, 2:].max(axis=0).tolist()
         self.read(range(int(layers.min()), int(layers.max()) + 1), span(self._y, y0, y1), span(self._x, x0, x1))
 
-    def _more(self) -> None:
-        """More room for what may be full."""
+    def _enlarge(self) -> None:
+        """Enlarge the arrays that may be full."""
         self._grow(len(self.points), len(self.rings), len(self.slots))
         n, r = self.chip_used.tolist()
         self.chip = _larger(self.chip, n, 2 * len(self.chip))
@@ -190,7 +190,7 @@ class TileRings:
         self.cross = np.empty((2 * len(self.cross), 11), dtype=np.int64)
 
     def _cut_by_geos(self, k: int, shape: Polygon | MultiPolygon) -> None:
-        """Do operation k by GEOS."""
+        """Carry out operation k with GEOS."""
         self.stock.by_geos += 1
         op = self.ops[k]
         old = self.polygon(int(op[kernels.OLD]))
@@ -202,12 +202,12 @@ class TileRings:
         self.chip[n : n + len(found.points)] = found.points
         self.chip_rings[r : r + len(found.rings)] = found.rings + np.array([n, 0])
         self.chip_used += [len(found.points), len(found.rings)]
-        op[kernels.NEW] = self._entered(list(areas_alone(np.array([left], dtype=object))))[0]
+        op[kernels.NEW] = self._add(list(areas_alone(np.array([left], dtype=object))))[0]
         op[kernels.CHIP_0], op[kernels.CHIP_1], op[kernels.AS] = r, r + len(found.rings), k
         self.slot_of[op[kernels.LAYER], op[kernels.J], op[kernels.I]] = op[kernels.NEW]
 
-    def _changed(self, tidy: float) -> None:
-        """Mark the layers that lost something, and make the tiles simpler that have too many points."""
+    def _mark_changed(self, tidy: float) -> None:
+        """Mark the layers from which material was removed, and simplify the tiles that have too many points."""
         ops = self.ops[: self.count]
         ops = ops[ops[:, kernels.NEW] != ops[:, kernels.OLD]]
         if not len(ops):
@@ -224,7 +224,7 @@ class TileRings:
         which, of = np.unique(slot, return_inverse=True)
         old = np.array([self.polygon(s) for s in which.tolist()], dtype=object)
         new = areas_alone(shapely.simplify(old, tidy, preserve_topology=True))
-        self.slot_of[layer, j, i] = np.array(self._entered(new.tolist()), dtype=np.int64)[of]
+        self.slot_of[layer, j, i] = np.array(self._add(new.tolist()), dtype=np.int64)[of]
         self.stock.room[layer, j, i] = np.maximum(2 * shapely.get_num_coordinates(new)[of], ROOM)
         gained = (shapely.area(new) - shapely.area(old))[of] * self.stock.thickness[layer]
         self.stock.tidied += float(gained.sum())
@@ -236,7 +236,7 @@ class TileRings:
         return polygon_of([self.points[a : a + n] for a, n in rings]) if rings else Polygon()
 
     def parts_of(self, entry: int) -> list[Polygon]:
-        """Return what an entry of the last removal took, joined over the tiles."""
+        """Return the pieces that an entry of the last removal removed, joined over the tiles."""
         flat = list[Polygon]()
         ops = self.ops[: self.count]
         for op in ops[ops[:, kernels.ENTRY] == entry]:
@@ -272,7 +272,7 @@ class TileRings:
         return False
 
     def finish(self) -> None:
-        """Put the tiles that changed into the stock as polygons."""
+        """Write the tiles that changed back to the stock as polygons."""
         layer, j, i = np.nonzero(self.slot_of != self.read_slot)
         if not len(layer):
             return
@@ -291,10 +291,10 @@ class TileRings:
         self.read_slot[layer, j, i] = self.slot_of[layer, j, i]
 
 
-def _larger(array: NDArray[T], kept: int, needed: int) -> NDArray[T]:
-    """Return an array with room for ``needed`` rows, the first ``kept`` as they are."""
+def _larger(array: NDArray[T], used: int, needed: int) -> NDArray[T]:
+    """Return an array with room for ``needed`` rows, the first ``used`` as they are."""
     if needed <= len(array):
         return array
     out = np.empty((max(needed, 2 * len(array)), *array.shape[1:]), dtype=array.dtype)
-    out[:kept] = array[:kept]
+    out[:used] = array[:used]
     return out

@@ -1,19 +1,19 @@
 """Flank passes (swarf milling) of a blade's side, one pass with the flank of the cutter on five simultaneous axes.
 
-Notation: S(u, v) the side with its normal N out of the metal, u along it, v up it from v0 to v1; R radius of the
+Notation: S(u, v) the side with its outward normal N, u along it, v up it from v0 to v1; R radius of the
 cutter. At a place u the cutter's axis goes through a0 = S(u, v0) + (R + x0) N and a1 = S(u, v1) + (R + x1) N + x2 D,
 with D the direction along the side at v1. d(v) [mm] the least distance of S(u', v) from the axis over the u' near u,
-less R: the excess that the cutter leaves at the height v, below 0 a gouge. Deviation: the greatest size of d over v.
+less R: the excess that the cutter leaves at the height v, below 0 a gouge. Deviation: the greatest abs(d) over v.
 
-The three numbers x of every place are those of the least deviation. A change of x moves the axis by delta(v) and d by
-N.delta(v), to first order, so the best change within a step is a linear program. Programs are solved one after another
-until none finds less. The value of the last one is a lower bound for any small change. A developable surface has the
-deviation 0; a twisted one does not, and its deviation is less with a thinner cutter.
+The three numbers x of each place minimise the deviation. A change of x moves the axis by delta(v) and d by N.delta(v),
+to first order, so the best change within a step is a linear program. Programs are solved one after another until the
+deviation no longer decreases. The value of the last one is a lower bound for any small change. A developable surface
+has the deviation 0; a twisted one does not, and its deviation is less with a thinner cutter.
 
-Between two places tip and axis are interpolated evenly; places are added until the deviation in the middle is that of
-the places.
+Between two places tip and axis are interpolated linearly; places are added until the deviation half-way is within the
+chord of that at the places.
 
-Reference: [Liu1995] for the two offset points to begin with. Differs from source: they are only the first guess.
+Reference: [Liu1995] for the two offset points. Differs from source: they are only the initial guess.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.scene import Floats
 
-#: heights at which d is taken, places u' on either side of u, how far these go in radii of the cutter
-_HEIGHTS, _BESIDE, _WIDE = 17, 40, 0.6
-#: linear programs of a place at most, and the step of the first [mm]
+#: number of heights of d, number of places u' on either side of u, and their range in radii of the cutter
+_HEIGHTS, _EITHER_SIDE, _RANGE = 17, 40, 0.6
+#: greatest number of linear programs of a place, and the step of the first [mm]
 _ROUNDS, _STEP = 12, 0.5
-#: a linear program that finds less by no more than this [mm] is the last
-_STILL = 2e-5
-#: distance of the first places [mm], how often places are added
-_APART, _FINER = 3.0, 4
+#: a linear program that reduces the deviation by no more than this [mm] is the last
+_CONVERGED = 2e-5
+#: distance between the first places [mm], greatest number of refinements
+_SPACING, _REFINEMENTS = 3.0, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +47,10 @@ class FlankPass:
     ----------
     u : (n,) places
     tip, axis : (n, 3) [mm], unit
-    normal : (n, 3) of the side half way up
+    normal : (n, 3) of the side at half its height
     left, gouge : (n,) greatest and least d at each place [mm]
-    least : (n,) [mm] what no small change of the axis comes below
-    touches : (n, 2) least and greatest u' at which the cutter comes nearest to the side, over the heights
+    least : (n,) [mm] lower bound of the deviation for small changes of the axis
+    touches : (n, 2) least and greatest u' of the points at which the cutter is nearest to the side, over the heights
     """
 
     u: Floats
@@ -90,7 +90,7 @@ def flank_pass(
     Parameters
     ----------
     along, up : range of u, of v, ascending within 0 to 1
-    chord : [mm] by which the deviation between two places may be above that of the places
+    chord : greatest difference [mm] between the deviation between two places and that at the places
 
     Raises
     ------
@@ -99,7 +99,7 @@ def flank_pass(
 
     Examples
     --------
-    A plane wall 30 mm long and 10 mm high: nothing is left.
+    A plane wall 30 mm long and 10 mm high: the deviation is 0.
 
     >>> from chipload.geometry.bspline import through
     >>> wall = through([[[0, 0, 0], [0, 0, 10]], [[30, 0, 0], [30, 0, 10]]], [0, 1], [0, 1])
@@ -115,9 +115,9 @@ def flank_pass(
     job = _Side(surface, np.linspace(*up, _HEIGHTS), 0.5 * cutter.diameter)
     edge = surface.at(np.linspace(*along, 65), up[1])
     length = float(np.linalg.norm(np.diff(edge, axis=0), axis=1).sum())
-    u = np.linspace(*along, max(math.ceil(length / _APART), 4) + 1)
+    u = np.linspace(*along, max(math.ceil(length / _SPACING), 4) + 1)
     ends, least = _fitted(job, u)
-    for _ in range(_FINER):
+    for _ in range(_REFINEMENTS):
         middle = 0.5 * (u[1:] + u[:-1])
         half = np.array([job.deviations(m, 0.5 * (ends[k] + ends[k + 1])) for k, m in enumerate(middle)])
         own = np.array([np.abs(job.deviations(x, e)).max() for x, e in zip(u, ends, strict=True)])
@@ -158,7 +158,7 @@ def offset_pass(
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """A side, the heights (m,) at which d is taken, the radius of the cutter."""
+    """A side, the heights (m,) of d, the radius of the cutter."""
 
     surface: BSplinePatch
     heights: Floats
@@ -179,54 +179,54 @@ class _Side:
         return out
 
     def nearest(self, u: float, ends: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Distance (m,) of the side from the axis at every height, the unit way from the axis, how far along it, u'."""
+        """Distance (m,) of the side from the axis at every height, its direction, the place along the axis, u'."""
         speed = float(np.linalg.norm(self.surface.at(u, float(self.heights.mean()), 1, 0)))
-        wide = _WIDE * self.radius / speed
-        place, share = np.full(len(self.heights), u), np.linspace(-1.0, 1.0, 2 * _BESIDE + 1)
+        wide = _RANGE * self.radius / speed
+        place, share = np.full(len(self.heights), u), np.linspace(-1.0, 1.0, 2 * _EITHER_SIDE + 1)
         for _ in range(2):
             U = np.clip(place[:, None] + wide * share, 0.0, 1.0)
             V = np.broadcast_to(self.heights[:, None], U.shape)
             P = self.surface.at(U.ravel(), V.ravel()).reshape(*U.shape, 3)
-            away, _ = _from_line(P, ends)
-            far = np.linalg.norm(away, axis=-1)
-            k = far.argmin(axis=1)
+            vectors, _ = _from_line(P, ends)
+            distance = np.linalg.norm(vectors, axis=-1)
+            k = distance.argmin(axis=1)
             rows = np.arange(len(k))
-            place, wide = U[rows, k], 2.0 * wide / _BESIDE
+            place, wide = U[rows, k], 2.0 * wide / _EITHER_SIDE
         vector, at = _from_line(P[rows, k], ends)
-        return far[rows, k], vector / far[rows, k][:, None], at, place
+        return distance[rows, k], vector / distance[rows, k][:, None], at, place
 
     def deviations(self, u: float, ends: Floats) -> Floats:
         """(m,) d of an axis through ``ends`` (2, 3)."""
         return self.nearest(u, ends)[0] - self.radius
 
     def fitted(self, u: float, x: Floats) -> tuple[Floats, float]:
-        """The x (3,) of least deviation from those to begin with, and the bound of the last linear program."""
+        """The x (3,) of least deviation near initial ones, and the bound of the last linear program."""
         step, least = _STEP, 0.0
-        far, direction, at, _ = self.nearest(u, self.ends(u, x))
-        now = float(np.abs(far - self.radius).max())
+        distance, direction, at, _ = self.nearest(u, self.ends(u, x))
+        now = float(np.abs(distance - self.radius).max())
         _, N, D = self.frame(u)
         for _ in range(_ROUNDS):
             J = np.column_stack([-(1.0 - at) * (direction @ N[0]), -at * (direction @ N[1]), -at * (direction @ D)])
-            d, one = far - self.radius, np.ones((len(far), 1))
+            d, one = distance - self.radius, np.ones((len(distance), 1))
             found = linprog(
                 [0.0, 0.0, 0.0, 1.0], np.vstack([np.hstack([J, -one]), np.hstack([-J, -one])]), np.concatenate([-d, d]),
                 bounds=[(-step, step)] * 3 + [(0.0, None)], method="highs",
             )  # fmt: skip
             least = float(found.fun)
-            if now - least <= _STILL:
+            if now - least <= _CONVERGED:
                 break
             new = x + found.x[:3]
             got = self.nearest(u, self.ends(u, new))
             there = float(np.abs(got[0] - self.radius).max())
             if there < now:
-                x, now, (far, direction, at, _) = new, there, got
+                x, now, (distance, direction, at, _) = new, there, got
             else:
                 step *= 0.25
         return x, least
 
 
 def _from_line(points: Floats, ends: Floats) -> tuple[Floats, Floats]:
-    """The way (..., 3) from the line through ``ends`` to points, and how far along it they lie, 0 to 1 between them."""
+    """Vectors (..., 3) from the line through ``ends`` to points, and their places along it, 0 to 1 between the ends."""
     A = ends[1] - ends[0]
     y = points - ends[0]
     at = (y @ A) / float(A @ A)
@@ -234,7 +234,7 @@ def _from_line(points: Floats, ends: Floats) -> tuple[Floats, Floats]:
 
 
 def _fitted(job: _Side, u: Floats) -> tuple[Floats, Floats]:
-    """Ends (n, 2, 3) of the axes at places (n,), and the bounds (n,); each begins with the numbers of the last."""
+    """Ends (n, 2, 3) of the axes at places (n,), and the bounds (n,); each begins with the x of the one before."""
     x: Floats = np.zeros(3)
     ends, least = [], []
     for place in u.tolist():

@@ -1,4 +1,4 @@
-"""Finished parts of a long plan, kept so that a resumed run does not plan them again.
+"""Finished parts of a long plan, stored so that a resumed run does not plan them again.
 
 Parts that do not depend on one another are announced in advance. Where there are other processes, they are planned in
 parallel.
@@ -21,9 +21,9 @@ class PlanTask:
 
     Parameters
     ----------
-    key : as of :class:`Keep`
-    make : a function of a module or class; its first argument is what all processes share
-    arguments : the others
+    key : as for :class:`Keep`
+    make : a function of a module or class; its first argument is the data that all processes share
+    arguments : its other arguments
     """
 
     key: tuple[object, ...]
@@ -31,12 +31,12 @@ class PlanTask:
     arguments: tuple[Any, ...]
 
     def of(self, shared: Any, keep: Keep) -> Any:
-        """The part, from the kept ones or planned with the data that all processes share."""
+        """The part, stored or planned with the data that all processes share."""
         return keep(self.key, lambda: self.make(shared, *self.arguments))
 
 
 class Keep(Protocol):
-    """Source of the parts of a plan: a kept part, or the one that ``make`` plans.
+    """Source of the parts of a plan: a stored part, or the one that ``make`` plans.
 
     ``key``: numbers, texts, arrays and dataclasses of them that identify the part of the run and its inputs.
     """
@@ -51,7 +51,7 @@ class Keep(Protocol):
 
 
 class Anew:
-    """A :class:`Keep` that keeps nothing: the default of every ``keep=`` argument.
+    """A :class:`Keep` that stores nothing: the default of every ``keep=`` argument.
 
     >>> anew(("sum",), lambda: 1 + 1)
     2

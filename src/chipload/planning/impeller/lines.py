@@ -1,7 +1,7 @@
 """Lines on a surface: their places, the valid pallet angles on them, their tracks, and the spans that are not reached.
 
 Notation: a line runs along one parameter p of the surface, at fixed stations, at q(p) of the other. The pallet angles
-come from the exact ranges at its stations (``pallet.py``), searched near those of the line before first. Where a line
+come from the exact ranges at its stations (``pallet.py``), searched first near those of the line before. Where a line
 comes to a point that is not reached, its end is found by bisection. Points are added where a straight row would leave
 the path (``refinement.py``).
 """
@@ -31,11 +31,11 @@ from chipload.planning.impeller.track import ToolTrack, posed, written
 
 #: points of a line whose pallet angles are searched together, and greatest distance from those of the line before [rad]
 _GROUP, _WINDOW = 6, math.radians(10.0)
-#: how far about an angle that meets a wall ranges are taken exactly, and the narrowest range [rad]
+#: width about an angle that meets a wall within which ranges are exact, and the narrowest range [rad]
 _EXACT, _LEAST = math.radians(12.0), 1e-9
 #: stations and bisections in the search for the first line that is reached
 _KNOTS, _BISECT = 17, 4
-#: n within this of 1: the axis stands along the normal, there is no step-over
+#: where n is within this of 1, the axis is along the normal and there is no step-over
 _FLAT = 1e-9
 
 
@@ -46,11 +46,11 @@ class LineMotion:
     Parameters
     ----------
     chord : greatest distance of the tip from its path between two points [mm]
-    feed : of the tip [mm/s]
-    rate : greatest of the pallet [rad/s]
+    feed : feed of the tip [mm/s]
+    rate : greatest angular speed of the pallet [rad/s]
     clearance : of neck, shank and holder [mm]
-    wanted : [rad] by which the pallet keeps away from the ends of its ranges, where they are wide enough
-    scallop : height [mm] at which the pallet is led to a wide step-over; None: it is not, as in roughing
+    wanted : distance [rad] of the pallet from the ends of its ranges, where they are wide enough
+    scallop : height [mm] for which angles with a wide step-over are preferred; None: no preference, as in roughing
     """
 
     chord: float
@@ -91,8 +91,8 @@ class Tracks:
     Parameters
     ----------
     tracks : in the order of the lines
-    missed : what is not reached, and where lines are split
-    lines : how many lines there are
+    missed : spans that are not reached, and places at which lines are split
+    lines : number of lines
     """
 
     tracks: tuple[ToolTrack, ...]
@@ -125,8 +125,8 @@ class Lines:
 
     Parameters
     ----------
-    surface, along, scene, number, cutter, table, pallets : as :func:`finishing`
-    p : (n,) the stations, of the parameter ``along``
+    surface, along, scene, number, cutter, table, pallets : as for :func:`finishing`
+    p : (n,) the stations, values of the parameter ``along``
     sign : 1; -1: all places q are those of the surface with the sign turned, so that lines follow each other from its
         high border to its low one
     """
@@ -161,28 +161,28 @@ class Lines:
         )
 
     def line(self, q: Floats, before: Floats) -> Line:
-        """The line at q, with pallet angles near those of the line ``before`` if there are any."""
+        """The line at q, with pallet angles near those (n,) of the line ``before`` where these are known."""
         S, N, K, d, at = self.on(q)
         scene = self.scene.at_contacts(S, N, K, self.number)
         step = np.linalg.norm(np.diff(S, axis=0), axis=1)
         widths = partial(self._widths, N, K, d)
-        pieces = self._followed(scene, step, before, widths)
+        pieces = self._line_sections(scene, step, before, widths)
         if np.isfinite(before).any() and any(a.last == b.first for a, b in itertools.pairwise(pieces)):
-            # a line that can be followed with other angles than those of the line before
+            # other angles than those of the line before may give a line with fewer pieces
             free = np.full(len(q), np.nan)
-            pieces = min((pieces, self._followed(scene, step, free, widths)), key=len)
+            pieces = min((pieces, self._line_sections(scene, step, free, widths)), key=len)
         pallet = np.full(len(q), np.nan)
         for piece in pieces:
             pallet[piece.first : piece.last] = piece.pallet
         return Line(q, at, S, N, K, d, pieces, pallet)
 
-    def _followed(
+    def _line_sections(
         self, scene: Scene, step: Floats, before: Floats, widths: Callable[[Ints, Floats], Floats]
     ) -> tuple[Turned, ...]:
-        """Pieces of a line with their pallet angles, near those ``before``: of ranges at the check points.
+        """Pieces of a line with their pallet angles, near those ``before``, from the ranges at the check points.
 
-        Where the cutter, as it then stands, meets a wall between them, the ranges about that angle are taken exactly;
-        where nothing is left of them, they are searched at all angles.
+        Where the cutter at such an angle meets a wall between check points, exact ranges replace those about that
+        angle; a station that then has no range is searched at all angles.
         """
         most = self.how.rate * step / self.how.feed
         plain = replace(scene, covering=None, known=scene.tree)
@@ -191,12 +191,12 @@ class Lines:
         whole: set[int] = set()
         while True:
             pieces = pallet_angles(tuple(ranges), step, most, self.how.wanted, before, widths)
-            met = self._met(scene.contact, scene.normal, pieces, exact)
-            if not met:
+            contacts = self._wall_contacts(scene.contact, scene.normal, pieces, exact)
+            if not contacts:
                 return pieces
-            windows = [windowed(ranges[k], B, _EXACT) for k, B in met.items()]
-            got = self._kept(scene, [*met], tuple(inside for inside, _ in windows))
-            for (k, B), (_, outside), inside in zip(met.items(), windows, got, strict=True):
+            windows = [windowed(ranges[k], B, _EXACT) for k, B in contacts.items()]
+            got = self._clear_ranges(scene, [*contacts], tuple(inside for inside, _ in windows))
+            for (k, B), (_, outside), inside in zip(contacts.items(), windows, got, strict=True):
                 ranges[k] = merged(np.vstack([outside, inside]))
                 exact[k].append(B)
                 if not len(ranges[k]) and k not in whole:
@@ -205,7 +205,7 @@ class Lines:
                     ranges[k] = self._valid(plain, np.array([k]), self.pallets)[0]
 
     def _widths(self, N: Floats, K: Floats, d: Floats, point: Ints, pallet: Floats) -> Floats:
-        """Step-overs (k,) [mm] of points (k,) of a line at pallet angles (k,); 0 where the axis has no lean to it."""
+        """Step-overs (k,) [mm] of points (k,) of a line at pallet angles (k,); 0 where there is no step-over."""
         if self.how.scallop is None:
             return np.ones(len(point))
         T = axis_at(self.table, pallet)
@@ -221,7 +221,7 @@ class Lines:
         """Places q of a line from Q[0] towards Q[1] where the cutter first reaches the surface at each station,
         smoothed.
 
-        Looked at are the stations that are in ``need``.
+        Only the stations in ``need`` are examined.
         """
         among = np.arange(len(self.p)) if need is None else np.flatnonzero(need)
         knots = among[np.unique(np.linspace(0, len(among) - 1, min(len(among), _KNOTS)).round().astype(int))]
@@ -263,10 +263,9 @@ class Lines:
     def tracks(
         self, line: Line, use: Flags, number: int, need: Flags | None = None
     ) -> tuple[list[ToolTrack], list[UnreachedSpan]]:
-        """Tracks of the parts of a line where it is in ``use``, and the spans that are missed of what they ``need`` to
-        mill.
+        """Tracks of a line at the stations in ``use``, and the spans that they miss between stations in ``need``.
 
-        A piece that ends between two stations extends from the last as far as the cutter does; where the next piece
+        A piece that ends between two stations extends from the last one as far as the cutter reaches; if the next piece
         begins so far back that they meet, nothing is missed.
         """
         tracks: list[ToolTrack] = []
@@ -277,7 +276,7 @@ class Lines:
         owner = np.full(len(use), -1)
         for k, piece in enumerate(line.sections):
             owner[piece.first : piece.last] = k
-        shares: dict[tuple[int, int], float] = {}  # (first station, towards the next 1 or back -1): how far [share]
+        shares: dict[tuple[int, int], float] = {}  # (first station, towards the next 1 or back -1): share of the step
         for mine, piece in enumerate(line.sections):
             for a, b in runs(use[piece.first : piece.last]):
                 i, j = piece.first + a, piece.first + b
@@ -337,7 +336,7 @@ class Lines:
             np.column_stack([u, v]),
         )
 
-    def _met(
+    def _wall_contacts(
         self, S: Floats, N: Floats, pieces: tuple[Turned, ...], exact: Sequence[Sequence[float]]
     ) -> dict[int, float]:
         """Stations and angles at which the cutter meets a wall between the check points; none that are ``exact``."""
@@ -354,15 +353,15 @@ class Lines:
                     out[at] = B
         return out
 
-    def _kept(self, scene: Scene, points: Sequence[int], ranges: tuple[Floats, ...]) -> tuple[Floats, ...]:
-        """What of ranges of points is clear of the walls between the check points."""
+    def _clear_ranges(self, scene: Scene, points: Sequence[int], ranges: tuple[Floats, ...]) -> tuple[Floats, ...]:
+        """Parts of the ranges of points that are clear of the walls between the check points."""
         if scene.covering is None:
             return ranges
-        kept, _ = scene.covering.clear_ranges(
+        clear, _ = scene.covering.clear_ranges(
             scene, self.cutter, np.full(len(points), self.table), self.how.clearance, np.array(points), ranges, _LEAST,
             self.workers,
         )  # fmt: skip
-        return kept
+        return clear
 
     def _ranges(self, scene: Scene, before: Floats) -> tuple[Floats, ...]:
         """Ranges of every point, near the angles of the line ``before`` first, else everywhere."""
@@ -419,7 +418,7 @@ def stations(
 def stretched(
     surface: BSplinePatch, along: str, P: tuple[float, float], Q: tuple[float, float], count: int, overrun: float
 ) -> Floats:
-    """Stations from P[0] to P[1], even, and beyond them by ``overrun`` [mm] where the surface extends so far."""
+    """Even stations from P[0] to P[1], and more beyond by ``overrun`` [mm] where the surface extends so far."""
     p = np.linspace(*P, count)
     lines = np.linspace(*Q, 5)
     size = np.linalg.norm(
@@ -435,7 +434,7 @@ def stretched(
 
 
 def windowed(ranges: Floats, angle: float, width: float) -> tuple[Floats, Floats]:
-    """Parts of ranges (k, 2) within a width of an angle, whole turns from it too, and the other parts.
+    """Parts of ranges (k, 2) within a width of an angle, modulo whole turns, and the remaining parts.
 
     >>> inside, outside = windowed(np.array([[0.0, 2.0], [3.0, 4.0]]), 1.0 + math.tau, 0.5)
     >>> inside.round(9).tolist(), outside.round(9).tolist()
@@ -458,7 +457,7 @@ def windowed(ranges: Floats, angle: float, width: float) -> tuple[Floats, Floats
 
 
 def merged(ranges: Floats) -> Floats:
-    """Ranges (k, 2) ascending, those that end where another begins as one.
+    """Ranges (k, 2) in ascending order, joined where one ends and the next begins.
 
     >>> merged(np.array([[1.5, 2.0], [0.0, 0.5], [0.5, 1.0]])).tolist()
     [[0.0, 1.0], [1.5, 2.0]]
@@ -473,7 +472,7 @@ def merged(ranges: Floats) -> Floats:
 
 
 def _within(low: float, high: float, pallets: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-    """Parts of low..high, taken round by whole turns, that lie in the ``pallets``."""
+    """Parts of low..high, shifted by whole turns, that lie in the ``pallets``."""
     out = []
     for a, b in pallets:
         first = math.ceil((a - high) / math.tau)

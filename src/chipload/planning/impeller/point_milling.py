@@ -7,10 +7,10 @@ Line follows line from one border to the other: the next one lies at w from the 
 w is first that of two neighbouring passes (``scallop_width.py``). Then it is corrected by the scallop between the poses
 of both lines (``scallop_height.py``): w times sqrt(h / scallop), repeatedly, without jumps along the line
 (``steps.py``). A line is milled as far as the one before it does not cover the border: where the surface needs fewer
-lines, lines end. The outermost lines lie inside the border, as far as their pass stays below h there.
+lines, lines end. The outermost lines lie inside the border, so far that the scallop of their pass stays below h there.
 
-From line to line the cutter stays on the surface. Between two rows the tip goes straight and the axis turns evenly;
-rows are added until the tip of the middle is within the chord.
+From line to line the cutter stays on the surface. Between two rows the tip moves straight and the axis turns
+uniformly; rows are added until the tip half-way is within the chord.
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ from chipload.planning.impeller.scallop_width import reaches
 from chipload.planning.impeller.scene import Floats
 from chipload.planning.impeller.steps import Flags, even_steps, runs, straightened
 
-#: distance of the stations of a line [mm]
-_APART = 0.5
-#: of how far a pass reaches below the scallop, how far inside the border the outermost lines lie
+#: distance between the stations of a line [mm]
+_SPACING = 0.5
+#: distance of the outermost lines from the border, as a share of the reach of a pass below the scallop
 _INSIDE = 0.85
 #: share of the scallop that steps are laid out for, and that no station is above
 _AIM, _MOST = 0.945, 0.97
 #: rounds in which a step is corrected, and the share by which it may still change; rounds more while a scallop is too
 #: high, and the share of it that is aimed at from one of them to the next
-_ROUNDS, _STILL, _MORE, _LESS = 8, 0.01, 12, 0.985
+_ROUNDS, _CONVERGED, _MORE, _LESS = 8, 0.01, 12, 0.985
 #: smoothness of borders and steps along a line [mm]
 _SMOOTH = 1.5
-#: stations beside each other of which the narrowest step counts, before steps are smoothed
+#: number of neighbouring stations whose narrowest step counts, before steps are smoothed
 _NEAR = 5
-#: lines at most, halvings of a row
+#: greatest number of lines, and of halvings of a row
 _LINES, _HALVINGS = 5000, 6
 #: how far a line extends where the one before it covers the border [mm]; of a step, how far inside it that one may lie
 _BEYOND, _COVERS = 1.0, 0.05
-#: by how much a line may lie beside its rows [mm]
+#: greatest distance of a line from the chords between its rows [mm]
 _BEND = 0.01
 
 
@@ -104,8 +104,8 @@ class PointPath:
         """Greatest turn of the axis per millimetre of the contact's path [rad/mm]."""
         angle = np.arccos(np.clip((self.axis[1:] * self.axis[:-1]).sum(axis=1), -1.0, 1.0))
         size = np.linalg.norm(np.diff(self.tip, axis=0), axis=1)
-        far = size > 1e-3
-        return float((angle[far] / size[far]).max()) if far.any() else 0.0
+        moving = size > 1e-3
+        return float((angle[moving] / size[moving]).max()) if moving.any() else 0.0
 
     def back(self) -> PointPath:
         """The same path from its end to its beginning."""
@@ -126,7 +126,7 @@ def point_path(
     Parameters
     ----------
     along : `u` or `v`, the parameter that the lines run along
-    box : (low, high) of u, of v; lines run over all of the field, which may be longer
+    box : (low, high) of u, of v; lines run over the whole field, which may be longer
     scallop, chord : h [mm], greatest deviation of the tip between two rows [mm]
 
     Raises
@@ -142,10 +142,10 @@ def point_path(
     middle = np.linspace(*P, 200)
     S = surface.at(middle, np.full(200, 0.5 * sum(Q))) if along == "u" else surface.at(0.5 * sum(Q), middle)
     length = float(np.linalg.norm(np.diff(S, axis=0), axis=1).sum())
-    job = _Lines(surface, along, np.linspace(*P, max(math.ceil(length / _APART), 8) + 1), field, cutter, scallop)
+    job = _Lines(surface, along, np.linspace(*P, max(math.ceil(length / _SPACING), 8) + 1), field, cutter, scallop)
     low, high = job.border(Q[0], 1.0), job.border(Q[1], -1.0)
     inner = box[0] if along == "u" else box[1]
-    # between the last station inside and the next one too
+    # also between the last station inside and the next one
     need = binary_dilation((job.p >= inner[0] - 1e-9) & (job.p <= inner[1] + 1e-9))
     paths = [_joined(job, laid, chord) for laid in job.laid_out(low, high, need)]
     return min(paths, key=lambda path: path.length)
@@ -199,7 +199,7 @@ class _Lines:
         return out
 
     def reach(self, q: Floats) -> tuple[Floats, Floats]:
-        """How far (n,), (n,) [mm] the pass of a line stays below the scallop towards a growing q, and against it."""
+        """Widths (n,), (n,) [mm] over which a pass stays below the scallop, towards greater and smaller q."""
         u, v = self.places(self.p, q)
         N, d, sign = self.across(q)
         r, e, _ = self.cutter.contact_arc
@@ -218,7 +218,7 @@ class _Lines:
         return np.clip(q + w / np.abs(size), *ends)
 
     def border(self, q: float, sign: float) -> Floats:
-        """The outermost line: inside the border q by how far its pass stays below the scallop."""
+        """The outermost line: inside the border q by a share of the reach of its pass below the scallop."""
         line = np.full(len(self.p), q)
         out = line
         for _ in range(3):
@@ -230,7 +230,7 @@ class _Lines:
     @property
     def smooth(self) -> float:
         """Stations over which borders and steps are smoothed."""
-        return _SMOOTH / _APART
+        return _SMOOTH / _SPACING
 
     def laid_out(self, low: Floats, high: Floats, need: Flags) -> tuple[tuple[_LinePiece, ...], ...]:
         """Pieces of lines between ``low`` and ``high`` (n,): from the middle on, from either border on.
@@ -278,7 +278,7 @@ class _Lines:
                 if len(lines) == len(out) + 1 and all(len(piece.p) == len(line) for piece in out):
                     out = [_LinePiece(k, self.p, q) for k, q in enumerate(_spread(lines, whole)[1:], 1)]
                 return out
-            on = binary_dilation(on, iterations=round(_BEYOND / _APART))
+            on = binary_dilation(on, iterations=round(_BEYOND / _SPACING))
             w = self.step(line, high, on, need, w)
             full = self.after(line, w)
             new = np.minimum(full, high)
@@ -289,7 +289,7 @@ class _Lines:
         raise InputError(f"scallop = {self.scallop:g} mm: more than {_LINES} lines: raise it")
 
     def step(self, line: Floats, high: Floats, on: Flags, need: Flags, known: Floats | None) -> Floats:
-        """Step (n,) [mm] to the next line, at which the scallop between both is as high as aimed at."""
+        """Step (n,) [mm] to the next line, at which the scallop between both has the height aimed for."""
         size = self.sizes(line)
         use = on & need if (on & need).any() else on
         w = self.even(np.add(*self.reach(line)), size, use) if known is None else known
@@ -303,7 +303,7 @@ class _Lines:
             # a line at the border does not show a wider step
             wider = np.where(free, ratio, np.minimum(ratio, 1.0))
             then = self.even(w * wider, size, use)
-            still = float(np.abs(then / w - 1.0)[use].max()) < _STILL
+            still = float(np.abs(then / w - 1.0)[use].max()) < _CONVERGED
             if highest <= most and (still or turn >= _ROUNDS):
                 return w
             if turn >= _ROUNDS:
@@ -356,13 +356,13 @@ def _spread(lines: list[Floats], last: Floats) -> Floats:
 
 
 def _joined(job: _Lines, laid: tuple[_LinePiece, ...], chord: float) -> PointPath:
-    """All lines there and back, from one to the next on the surface, with as many rows as the chord requires."""
+    """All lines in alternate directions, joined on the surface, with as many rows as the chord requires."""
     p: list[Floats] = []
     q: list[Floats] = []
     number: list[NDArray[np.int64]] = []
-    for k, forth in _order(job, laid):
+    for k, forward in _order(job, laid):
         piece = laid[k]
-        order = slice(None) if forth else slice(None, None, -1)
+        order = slice(None) if forward else slice(None, None, -1)
         if p:
             share = np.linspace(0.0, 1.0, 6)[1:-1]
             p.append(p[-1][-1] + share * (piece.p[order][0] - p[-1][-1]))
@@ -402,9 +402,9 @@ def _needed(P: Floats, Q: Floats, of: NDArray[np.int64], size: Floats) -> Flags:
     at = np.arange(len(P))
     keep: Flags = ends | (at % 4 == 0)
     for every in (2, 1):
-        kept = np.flatnonzero(keep)
-        interval = np.searchsorted(kept, at, side="right") - 1
-        first, last = kept[interval], kept[np.minimum(interval + 1, len(kept) - 1)]
+        rows = np.flatnonzero(keep)
+        interval = np.searchsorted(rows, at, side="right") - 1
+        first, last = rows[interval], rows[np.minimum(interval + 1, len(rows) - 1)]
         share = (P - P[first]) / np.where(P[last] != P[first], P[last] - P[first], 1.0)
         off = np.abs(Q - Q[first] - share * (Q[last] - Q[first])) * size
         bent = np.zeros(len(P), dtype=np.bool_)
@@ -414,8 +414,8 @@ def _needed(P: Floats, Q: Floats, of: NDArray[np.int64], size: Floats) -> Flags:
 
 
 def _order(job: _Lines, laid: tuple[_LinePiece, ...]) -> list[tuple[int, bool]]:
-    """Pieces of lines in the order with the shortest ways between them, each with whether it is milled forth."""
+    """Pieces of lines in the order of the shortest links, each with whether it is milled forward."""
     both = [job.poses(piece.p[[0, -1]], piece.q[[0, -1]]) for piece in laid]
     tips, axes = (np.array([x[k] for x in both]) for k in (0, 1))
-    # the cutter stays down: no way leads over the part
+    # the cutter stays on the surface: no link leads over the part
     return pass_order(tips, axes, math.inf, math.inf, 1.0, 1.0)

@@ -1,9 +1,9 @@
 """Roughing of every channel: its cutters, their table angles, and the programs.
 
-Notation: alpha table angle, D diameter. A channel is searched at points of its layers (``floor.py``) beside walls
-thicker by their allowances. The roughing cutter is the largest that, by the proved search, fits at a stated share of
-these points; its table angle is the one at which it fits at most of them. Points that it does not reach are roughed at
-a second angle where that adds enough, and so on; rows there are only where those before did not reach.
+Notation: alpha table angle, D diameter. A channel is searched at points of its layers (``floor.py``) between walls that
+are thicker by their allowances. The roughing cutter is the largest that, by the proved search, fits at a stated share
+of these points; its table angle is the one at which it fits at most of them. Points that it does not reach are roughed
+at a second angle where that adds enough, and so on; its rows cover only what earlier rows do not reach.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ class RoughingSetting:
 
     Parameters
     ----------
-    index : of the body on whose plus side the channel is
-    cutter, table : which, alpha [rad]
-    layers : how many
-    tracks : rows, and what is missed of them
+    index : number of the body on whose plus side the channel lies
+    cutter, table : the cutter, alpha [rad]
+    layers : number of layers
+    tracks : rows, and the spans that they miss
     linked : all moves
     program : in the frame of the impeller
-    stopped : rows that are left out, for what is above the cutting part met uncut blank there
-    walls, top, how, link, spindle, tool : what the moves were made with
+    stopped : rows that are left out because the tool above its cutting part would meet uncut blank
+    walls, top, how, link, spindle, tool : inputs of the moves
     """
 
     index: int
@@ -72,12 +72,12 @@ class RoughingSetting:
     def without(self, numbers: Sequence[int]) -> RoughingSetting:
         """The setting without some of its rows, with new links."""
         removed = set(numbers)
-        keep = tuple(t for k, t in enumerate(self.tracks.tracks) if k not in removed)
-        out = tuple(t for k, t in enumerate(self.tracks.tracks) if k in removed)
-        tracks = replace(self.tracks, tracks=keep)
-        linked = _linked(keep, self.walls, self.cutter, self.table, self.how, self.link, self.top)
+        remaining = tuple(t for k, t in enumerate(self.tracks.tracks) if k not in removed)
+        left_out = tuple(t for k, t in enumerate(self.tracks.tracks) if k in removed)
+        tracks = replace(self.tracks, tracks=remaining)
+        linked = _linked(remaining, self.walls, self.cutter, self.table, self.how, self.link, self.top)
         program = program_of(linked.moves, self.spindle, self.tool)
-        return replace(self, tracks=tracks, linked=linked, program=program, stopped=(*self.stopped, *out))
+        return replace(self, tracks=tracks, linked=linked, program=program, stopped=(*self.stopped, *left_out))
 
     def numbered(self, tool: int) -> RoughingSetting:
         """The setting with another tool number."""
@@ -100,14 +100,14 @@ def roughed(
 
     Parameters
     ----------
-    stated : the cutter; None: the largest of the catalogue that goes at the ``share`` of the points of the channels
+    stated : the cutter; None: the largest of the catalogue that fits at the ``share`` of the points of the channels
     spindle : [rad/s]
     ahead : length of the hub ahead of the blade's leading edge [mm]
 
     Raises
     ------
     InputError
-        No cutter goes at the share of the points.
+        No cutter fits at the share of the points.
     """
     scenes = [_channel_scene(impeller, k, how, ahead) for k in range(len(impeller.bodies))]
     cutter = stated
@@ -116,20 +116,20 @@ def roughed(
     spans = tuple((float(a), float(b)) for a, b in table.spans)
     plans: list[tuple[int, float]] = []
     for index, scene in enumerate(scenes):
-        goes = keep(("rough tables", index, cutter), partial(_reached_at, scene, cutter, how, table, workers))
-        if not goes.any():
+        fits = keep(("rough tables", index, cutter), partial(_reached_at, scene, cutter, how, table, workers))
+        if not fits.any():
             raise InputError(
                 f"operation.0.rough: {cutter.label} mm fits nowhere in the channel "
                 f"on the plus side of the {'splitter' if index else 'blade'}: state a smaller one"
             )
-        done = np.zeros(goes.shape[1], dtype=np.bool_)
+        done = np.zeros(fits.shape[1], dtype=np.bool_)
         while True:
-            gain = (goes & ~done).sum(axis=1)
+            gain = (fits & ~done).sum(axis=1)
             best = int(gain.argmax())
             if done.any() and gain[best] < _WORTH * len(done):
                 break
             plans.append((index, float(table.angle[best])))
-            done |= goes[best]
+            done |= fits[best]
             if done.all():
                 break
     out: list[RoughingSetting] = []
@@ -193,7 +193,7 @@ def _channel_scene(impeller: Impeller, index: int, how: RoughingSettings, ahead:
 def _largest(
     scenes: Sequence[Scene], catalogue: Catalogue, how: RoughingSettings, table: IndexTable, share: float, workers: int
 ) -> CatalogueCutter:
-    """The largest cutter that goes at the share of the points, each at its own table angle."""
+    """The largest cutter that fits at the share of the points, each at its own table angle."""
     found = np.concatenate(
         [
             largest_cutters(
@@ -209,14 +209,14 @@ def _largest(
             f"the points of the channels, at most at {float((found > 0.0).mean()):.3g} of them: lower it, or "
             "state a cutter"
         )
-    able = [c for c in catalogue.cutters if c.diameter <= most]
-    return max(able, key=lambda c: (c.diameter, c.corner_radius))
+    candidates = [c for c in catalogue.cutters if c.diameter <= most]
+    return max(candidates, key=lambda c: (c.diameter, c.corner_radius))
 
 
 def _reached_at(
     scene: Scene, cutter: CatalogueCutter, how: RoughingSettings, table: IndexTable, workers: int
 ) -> NDArray[np.bool_]:
-    """(t, c) at which points of a channel a cutter goes at each table angle."""
+    """(t, c) whether a cutter fits at each point of a channel, at each table angle."""
     return np.array([_fits_at(scene, cutter, float(alpha), how, table, workers) for alpha in table.angle])
 
 

@@ -1,8 +1,8 @@
-"""Sinumerik's dialect where it differs from LinuxCNC's in what matters.
+"""The Sinumerik dialect, where it differs from LinuxCNC's.
 
 Notation: ``X=10``, ``X=IC(5)`` and ``I=AC(3)`` give values; ``CR=`` the radius of an arc, ``TURN=`` its whole turns;
-``R1=..`` sets a parameter, kept as #1. TRAORI begins and TRAFOOF ends tip control. G70 and G700 are inches, G71 and
-G710 mm.
+``R1=..`` sets a parameter, stored as #1. TRAORI begins tip control and TRAFOOF ends it. G70 and G700 are inches, G71
+and G710 mm.
 
 CYCLE81 to CYCLE86, with MCALL too, are carried out (:mod:`~chipload.program.gcode.sinumerik_cycles`).
 
@@ -12,7 +12,7 @@ TRANS, ATRANS, ROT and AROT about Z are carried out (:mod:`~chipload.program.gco
 Jumps and loops are in :mod:`~chipload.program.gcode.sinumerik_flow`. Left out, so that the result is unproven: motions
 in mirrored or scaled coordinates until they end, tool vectors (A3 B3 C3), cycles that are not drilling,
 calls of other programs, curves (CIP, CT, splines), values of names that nothing defines. Noted and left out: what does
-not concern the path. G331 and G332 are G33 with the spindle one way and back.
+not concern the path. G331 is read as G33, G332 as G33 with the spindle reversed.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ _TOKEN = re.compile(
     )""",
     re.VERBOSE,
 )
-_WAY = re.compile(r"(AC|IC|DC|ACP|ACN)\((.*)\)\Z", re.DOTALL)
+_DIMENSION = re.compile(r"(AC|IC|DC|ACP|ACN)\((.*)\)\Z", re.DOTALL)
 _R = re.compile(r"R([0-9]+)(?![0-9A-Z_])")
 _LABEL = re.compile(r"^(N[0-9]+\s*)?[A-Z_][A-Z0-9_]*\s*:(?!=)\s*")
 _NAMED = re.compile(r"[A-Z_$][A-Z0-9_$]*")
@@ -79,10 +79,10 @@ _WORDS = frozenset("XYZABCUVWIJKFSTDH")
 
 @dataclass(frozen=True)
 class Sinumerik(Dialect):
-    """See above."""
+    """The Sinumerik dialect; see the module."""
 
     def begin(self, c: Controller, text: str) -> None:
-        """Nothing differs at power on."""
+        """Nothing: the state at power on is that of LinuxCNC."""
 
     def jump(self, flow: Flow, raw: str) -> bool:
         """Jumps and loops."""
@@ -126,7 +126,7 @@ class Sinumerik(Dialect):
         return lenient(block, c)
 
     def _holes(self, block: Block, c: Controller) -> None:
-        """A drilling cycle where the tool stands, or, after MCALL, behind each block that moves in the plane."""
+        """A drilling cycle at the position of the tool or, with MCALL, after each block that moves in the plane."""
         moves = {"x", "y", "z"} - {NORMAL.get(c.state.plane, "z")}
         if block.modal:
             c.modal_hole = block.hole
@@ -136,7 +136,7 @@ class Sinumerik(Dialect):
             block.after = hole_blocks(*c.modal_hole, c)
 
     def _resolve(self, block: Block, c: Controller, values: list[tuple[str, str, float]]) -> None:
-        """AC and IC, in the way that the block gives values."""
+        """Convert AC and IC values to the mode (absolute or incremental) of the block."""
         state, words = c.state, block.words
         absolute = 910 not in block.g and (state.absolute or 900 in block.g)
         scale = 25.4 if 200 in block.g else 1.0 if 210 in block.g else state.scale
@@ -284,7 +284,7 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
     elif name == "RPL":
         _put(block, "p", _value(text, c))
     elif len(name) == 1 and name in _WORDS:
-        dimension = _WAY.match(text)
+        dimension = _DIMENSION.match(text)
         value = _value(dimension[2] if dimension is not None else text, c)
         if dimension is not None and name in "XYZABCUVWIJK":
             values.append((name.lower(), dimension[1], value))
@@ -297,11 +297,11 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
 
 
 def _corner(c: Controller, name: str, text: str) -> None:
-    """A rounding or chamfer behind the motion of the block; RNDM behind every motion until RNDM=0."""
-    size, said = _value(text, c) * c.state.scale, f"{name}={text.strip()[:20]}"
+    """A rounding or chamfer after the motion of the block; RNDM: after every motion until RNDM=0."""
+    size, label = _value(text, c) * c.state.scale, f"{name}={text.strip()[:20]}"
     if not 0.0 <= size <= LARGEST_CORNER:
-        raise InputError(f"{said}: must be from 0 to {LARGEST_CORNER:g} mm")
-    corner = Corner(name.startswith("RND"), size, None, said, edge=name == "CHF") if size > 0.0 else None
+        raise InputError(f"{label}: must be from 0 to {LARGEST_CORNER:g} mm")
+    corner = Corner(name.startswith("RND"), size, None, label, edge=name == "CHF") if size > 0.0 else None
     if name == "RNDM":
         c.round_all(corner)
     elif corner is not None:
@@ -345,7 +345,7 @@ def _define(kind: str, names: str, c: Controller) -> None:
 
 
 def _frame(block: Block, c: Controller) -> None:
-    """TRANS, ROT and the like, with their axes; without any they end all of it."""
+    """TRANS, ROT and the like, with their axes; without any axis they end all frames."""
     word, words = block.frame, block.words
     tilted = c.state.datum.tilt is not None
     given = {x: words.pop(x) for x in "xyzabcpijk" if x in words}
@@ -390,7 +390,7 @@ def _keyword(block: Block, c: Controller, word: str, body: str = "") -> None:
     elif word in FRAMES:
         block.frame = word
     elif word in JUMPS:
-        # what begins a block is read by sinumerik_flow
+        # sinumerik_flow reads the jumps that begin a block
         raise NotReadError(f"{word}: is not read here")
     elif word in CURVES or word.startswith(("CYCLE", "POCKET", "SLOT", "HOLES")):
         _left_out(block, c, word)

@@ -1,12 +1,12 @@
 """Jumps and loops of a Sinumerik: GOTO, IF, ELSE, WHILE, FOR, LOOP, REPEAT and REPEATB.
 
-Notation: lines count from 0. A jump leads to a label (``NAME:`` at the begin of a block) or a block number: GOTOF
+Notation: lines count from 0. A jump leads to a label (``NAME:`` at the beginning of a block) or a block number: GOTOF
 forward, GOTOB backward, GOTO and GOTOC forward and, where there is none, from the start of the text. IF, WHILE, FOR,
-LOOP and REPEAT without a label open a loop or a branch that their own word closes. REPEAT with labels repeats a section
-of the text, REPEATB one block.
+LOOP and REPEAT without a label open a loop or a branch, which a word of its own closes. REPEAT with labels repeats a
+section of the text, REPEATB one block.
 
-A comparison binds least of all, so that ``R1 > 5 AND R2 < 3`` needs brackets; without them it is not read. A condition
-on a value that only the controller knows counts as false, and the result is unproven. Blocks are counted by
+Comparisons have the lowest precedence, so that ``R1 > 5 AND R2 < 3`` needs brackets; without them it is not read. A
+condition on a value that only the controller knows counts as false, and the result is unproven. Blocks are counted by
 :mod:`~chipload.program.gcode.flow`: a loop without an end is refused.
 
 Reference: Siemens, SINUMERIK 840D sl / 828D, Programming Manual Job Planning, "Program jumps", "Check structures",
@@ -42,11 +42,11 @@ _FOR = re.compile(r"([A-Z_][A-Z0-9_]*)\s*=\s*(.+?)\s+TO\s+(.+)\Z")
 _TIMES = re.compile(r"\bP\s*=?\s*(.+)\Z")
 _SIGNS = re.compile(r"==|<>|>=|<=|>|<")
 _JOINS = re.compile(r"(?<![A-Z0-9_])(AND|OR|XOR)(?![A-Z0-9_])")
-#: what closes what opens
+#: closing word: the word that opens
 CLOSES = {"ENDIF": "IF", "ENDWHILE": "WHILE", "ENDFOR": "FOR", "ENDLOOP": "LOOP", "UNTIL": "REPEAT"}
 #: two numbers are equal within this share
 EQUAL = 1e-12
-#: times that a section is repeated
+#: greatest number of repeats of a section
 MOST_TIMES = 9999
 _TESTS: dict[str, Callable[[float, float], bool]] = {
     "==": lambda a, b: abs(a - b) <= EQUAL * max(abs(a), abs(b)),
@@ -60,14 +60,14 @@ _TESTS: dict[str, Callable[[float, float], bool]] = {
 
 @dataclass(frozen=True)
 class Statement:
-    """A line that says which block comes next: its word and what follows it."""
+    """A line that controls which block comes next: its word and the text after it."""
 
     word: str
     rest: str
 
     @property
     def opens(self) -> bool:
-        """Whether a word further on closes it."""
+        """Whether it needs a closing word."""
         if self.word == "IF":
             return _GOTO.search(self.rest) is None
         return self.word in ("WHILE", "FOR", "LOOP") or (self.word == "REPEAT" and not self.rest)
@@ -75,15 +75,15 @@ class Statement:
 
 @dataclass(eq=False)
 class Statements:
-    """What a text has of them.
+    """Control statements and labels of a program.
 
     Parameters
     ----------
-    at : by line
+    at : statement by line
     labels : lines of each label or block number
-    partner : of a line that opens the one that closes it, and the other way round
-    other : line of ELSE by the lines of its IF
-    left : repeats that are left, by line
+    partner : closing line of each opening line, and opening line of each closing line
+    other : line of ELSE by line of its IF
+    left : remaining repeats, by line
     """
 
     at: dict[int, Statement] = field(default_factory=dict)
@@ -136,16 +136,16 @@ def statements_of(source: Source) -> Statements:
 
 
 def flow_step(flow: Flow, raw: str, value: Value) -> bool:
-    """Carry out a line that says which block comes next; whether it is one.
+    """Carry out a line that controls which block comes next; False if it is not one.
 
     Parameters
     ----------
-    value : of an expression
+    value : function that evaluates an expression
 
     Raises
     ------
     InputError
-        It cannot be read, or what it leads to is not there.
+        The line cannot be read, or its target does not exist.
     """
     source = flow.source
     if source.statements is None:
@@ -322,7 +322,7 @@ def _closing(text: str) -> int:
 
 
 def _split(text: str, pattern: re.Pattern[str]) -> list[str]:
-    """Parts of a text outside brackets and what stands between them, in turn."""
+    """Parts of a text and the separators between them that are outside brackets, alternately."""
     depths, depth = list[int](), 0
     for character in text:
         depth += {"(": 1, ")": -1}.get(character, 0)

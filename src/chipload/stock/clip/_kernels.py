@@ -38,11 +38,11 @@ from chipload.stock.clip.crossings._kernels import (
     shifted_holds,
 )
 
-#: results of :func:`clip` beside DEGENERATE and FULL (no room for the result): A and C do not meet, they were cut
+#: results of :func:`clip` other than DEGENERATE and FULL (no room for the result): A and C do not meet, they were cut
 APART, CUT = 0, 1
 #: a ring narrower than this is none [mm]
 WIDTH = 1e-12
-#: difference and intersection together have the area of A but for this [mm^2] and this share of it
+#: greatest difference between the area of A and the sum of both results [mm^2], and as a share of that area
 BALANCE = 1e-9
 
 
@@ -239,8 +239,8 @@ def whole_rings(P, A, a0, a1, Q, C, c0, c1, box, left, left_rings, left_used, ch
 def clip(P, A, a0, a1, Q, C, c0, c1, box, left, left_rings, left_used, chip, chip_rings, chip_used, X, cross, areas):
     """Cut C out of A: APART, CUT, DEGENERATE or FULL.
 
-    ``left`` takes what is left of A, and ``chip`` what both have; ``left`` and ``P`` may be one array. ``areas`` takes
-    the areas of A, of what is left, and of what both have. Unless CUT, nothing is entered.
+    ``left`` receives the difference, ``chip`` the intersection; ``left`` and ``P`` may be one array. ``areas`` receives
+    the areas of A, of the difference and of the intersection. Unless CUT, nothing is entered.
     """
     n = crossings(P, A, a0, a1, Q, C, c0, c1, box, X, cross)
     if n < 0:

@@ -1,4 +1,4 @@
-"""Compiled loops of the dexels: where a ray is in a cutter, and what a moving cutter leaves of it.
+"""Compiled loops of the dexels: where a ray is in a cutter, and which parts a moving cutter removes from it.
 
 Notation: a ray runs along the axis k of the grid, s [mm] is its coordinate k; its others are at u = (k + 1) % 3 and
 v = (k + 2) % 3. The cutter stands with its tip at T and its unit axis A; z [mm] is the height above the tip, rho [mm]
@@ -24,7 +24,7 @@ NEWTON = 60
 #: halvings of the moment at which a ray is met, and most steps to the deepest moment
 HALVINGS, GOLDEN = 14, 40
 STEP = 1e-4
-#: part of the way by which a pose may be off the middle of its neighbours, where a path goes on evenly
+#: greatest distance of a pose from the middle of its neighbours on an even path, as a share of their distance
 EVEN = 1e-3
 RATIO = 0.6180339887498949
 
@@ -190,7 +190,7 @@ def signed(k, u, v, t, sign, tips, axes, shape, tip, axis):
 
 @njit(cache=True, nogil=True)
 def deepest(k, u, v, ta, tb, sign, tol, tips, axes, shape, tip, axis):
-    """Least :func:`signed` between two moments, by golden section until chords say that it is within ``tol``."""
+    """Least :func:`signed` between two moments, by golden section until chords prove that it is within ``tol``."""
     fa = signed(k, u, v, ta, sign, tips, axes, shape, tip, axis)
     fb = signed(k, u, v, tb, sign, tips, axes, shape, tip, axis)
     # at an end from which it rises it is least, but for what a short first step may hide
@@ -309,11 +309,11 @@ def turns(tips, axes, h):
 
 @njit(cache=True, nogil=True)
 def cut(k, grid, tol, tips, axes, shape, ends, count):
-    """Take what the cutter covers on its way through the poses from the rays along axis k.
+    """Remove what the cutter covers on its path through the poses from the rays along axis k.
 
     ``grid`` is ``[u0, v0, du, dv, nu, nv]``: the first ray, the distances, the numbers; ray (i, j) is i * nv + j.
-    ``tol`` [mm] is how far the extremes may be missed. Returns False where a ray had no room for its intervals: then
-    call again with more; what is taken stays taken.
+    ``tol`` [mm] is the greatest error of the extremes. Returns False where a ray had no room for its intervals: call
+    it again with more room; intervals already removed stay removed.
     """
     u0, v0, du, dv = grid[0], grid[1], grid[2], grid[3]
     nu, nv = int(grid[4]), int(grid[5])

@@ -19,7 +19,7 @@ from chipload.stock.clip._kernels import CUT, clip, ring_size
 from chipload.stock.clip.crossings._kernels import FULL
 
 NONE = -1
-#: result of :func:`list_operations` besides the number and FULL: a tile was not read
+#: result of :func:`list_operations` other than the number and FULL: a tile was not read
 MISSING = -3
 #: columns of an operation: entry, layer, row, column, slot before and after, first ring of the chip and the one after
 #: the last, and the earlier operation with the same result, or itself

@@ -85,10 +85,10 @@ def holds_shifted(x, y, points, rings, first, last):
     nogil=True,
 )
 def place(px, py, qx, qy, ux, uy, vx, vy, s1, s2, s3, s4, row):
-    """Place of a crossing of P to Q with U to V into ``row``: the ways to it from P and from U, and x, y.
+    """Place of a crossing of P to Q with U to V into ``row``: its distances from P and from U, and x, y.
 
     ``s1`` to ``s4`` are the determinants of U and V against P to Q, and of P and Q against U to V. Where the edges are
-    almost parallel the place is on the shorter one, and the ways are those of that place.
+    almost parallel the place is on the shorter one, and the distances are those of that place.
     """
     dx, dy, ex, ey = qx - px, qy - py, vx - ux, vy - uy
     a, c = math.sqrt(dx * dx + dy * dy), math.sqrt(ex * ex + ey * ey)
@@ -120,7 +120,7 @@ def comes_before(way, cross, k, b, column, points, rings, left_first):
 
     Parameters
     ----------
-    way : from b to k along the edge
+    way : distance from b to k along the edge
     column : RING_A or RING_C of the other area, whose ``points`` and ``rings`` follow
     left_first : what ENTERS is of the crossing that comes first where the other area turns left between the two
     """
