@@ -221,8 +221,9 @@ def highest(part: Part) -> float:
 
 
 def edges_at(part: Part, level: float, tolerance_mm: float) -> list[list[Floats]]:
-    """(n, 7) segments [mm] of each edge of each horizontal face at a height that looks up; where none does, of those that
-    look down, such as the underside of a part.
+    """(n, 7) segments [mm] of each edge of each horizontal face at a height that looks up.
+
+    Where none looks up: of those that look down, such as the underside of a part.
     """
     faces = [(up, face) for z, up, face in _level_faces(part) if abs(z - level) <= 1e-3]
     any_up = any(up for up, _ in faces)
