@@ -160,14 +160,14 @@ def test_a_stream_is_answered_with_commands_of_halcmd(tmp_path):
     assert (speed, windows) == (150.0, ((175.0, 12500.0 / 60.0),))
     signal = Cut(3.0).sampled(4.0, 9000.0)
     lines = ["overrun", *(f"{k} {x:.6f} 150.0" for k, x in enumerate(signal))]
-    found = list(answers(lines, RULES, speed, windows, halui=True))
+    found = [text for _, text in answers(lines, RULES, speed, windows, halui=True)]
     assert found[:4] == [
         "setp halui.spindle.0.override.scale 0.001", "setp halui.spindle.0.override.direct-value 1",
         "setp halui.spindle.0.override.counts 1000", "setp halui.spindle.0.override.count-enable 1",
     ]  # fmt: skip
     # 10 % inside of the window: 10700 rpm; the input still turns at 9000 rpm, where it stays: a stop
     assert found[4:] == ["setp halui.spindle.0.override.counts 1188", "setp halui.program.pause 1"]
-    said = list(answers(lines, RULES, speed, windows))
+    said = [text for _, text in answers(lines, RULES, speed, windows)]
     assert said[0].startswith("chatter at ")
     assert said[0].endswith(": 10700 rpm")
 

@@ -309,3 +309,12 @@ def test_linuxcnc_reads_the_programs(done):
             assert len(moves) >= len(done.variants[name[2:-4]].program) - 2
             # rotary axes move
             assert len({words[4] for words in moves}) > 3
+
+
+def test_without_refinement_the_first_plan_that_holds_is_taken(tmp_path):
+    """The first plan holds and leaves a tenth of the limit unused; with refinement five are simulated."""
+    change = ("operation.0.least_error=false", "operation.0.compensate_um=0.0", "operation.0.refine=false")
+    path = copy_example("plate", tmp_path / "plate") / "job.toml"
+    quick = run_job(load_job(path, (*SMALL, *change, "limits.deflection_workpiece_um=46.0"))).outcome
+    assert quick.settings["simulated_tries"] == 1
+    assert quick.variants["variable"].over_with_error(modelled=True) < 0.95

@@ -39,16 +39,16 @@ def chatter(
     """
 
     def work() -> int:
-        from chipload.control.chatter import ListeningRules
+        from chipload.control.chatter import ChatterAnswer, ListeningRules
         from chipload.control.chatter_stream import answers, quiet_speeds_of
 
         rules = ListeningRules(rate_hz, floor, share, window_s, least=least, most=most)
         programmed, windows = quiet_speeds_of(summary, rpm)
         stopped = False
-        for text in answers(sys.stdin, rules, programmed, windows, halui):
+        for kind, text in answers(sys.stdin, rules, programmed, windows, halui):
             typer.echo(text)
             sys.stdout.flush()
-            stopped = stopped or "program.pause" in text or "stopped" in text
+            stopped = kind is ChatterAnswer.STOP
         return 3 if stopped else 0
 
     guarded(work, debug)

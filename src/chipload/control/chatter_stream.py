@@ -55,9 +55,9 @@ def answers(
     programmed: float,
     windows: Sequence[tuple[float, float]],
     halui: bool = False,
-) -> Iterator[str]:
-    """Yield the answers to a stream of lines ``signal speed``, windows half over one another; empty lines, and others
-    than two numbers, as halsampler writes where samples were lost, start a new window.
+) -> Iterator[tuple[ChatterAnswer, str]]:
+    """Yield the answers to a stream of lines ``signal speed``, each with a line of output. Windows overlap by half;
+    empty lines, and others than two numbers, as halsampler writes where samples were lost, start a new window.
 
     Parameters
     ----------
@@ -66,9 +66,8 @@ def answers(
     guard = ChatterGuard(rules, programmed, windows)
     count, pending = rules.samples, []  # type: int, list[tuple[float, float]]
     if halui:
-        yield from (f"setp {OVERRIDE}.scale {1.0 / COUNTS:g}", f"setp {OVERRIDE}.direct-value 1")
-        yield f"setp {OVERRIDE}.counts {COUNTS}"
-        yield f"setp {OVERRIDE}.count-enable 1"
+        begin = (f"scale {1.0 / COUNTS:g}", "direct-value 1", f"counts {COUNTS}", "count-enable 1")
+        yield from ((ChatterAnswer.KEEP, f"setp {OVERRIDE}.{pin}") for pin in begin)
     for line in lines:
         sample = _sample(line)
         if sample is None:
@@ -80,7 +79,8 @@ def answers(
         signal, speed = np.array(pending).T
         answer = guard.answer(signal, np.abs(speed))
         pending = pending[count // 2 :] if answer.kind is ChatterAnswer.KEEP else []
-        yield from _halcmd_lines(answer, halui)
+        if answer.kind is not ChatterAnswer.KEEP:
+            yield answer.kind, _line_of(answer, halui)
         if answer.kind is ChatterAnswer.STOP:
             return
 
@@ -95,12 +95,10 @@ def _sample(line: str) -> tuple[float, float] | None:
     return (values[0], values[1]) if len(values) == 2 and all(map(math.isfinite, values)) else None
 
 
-def _halcmd_lines(answer: SpeedAnswer, halui: bool) -> Iterator[str]:
-    if answer.kind is ChatterAnswer.KEEP:
-        return
+def _line_of(answer: SpeedAnswer, halui: bool) -> str:
+    """Sentence, or command for halcmd, of a change of the speed or a stop."""
     if not halui:
-        yield answer.text
-    elif answer.kind is ChatterAnswer.SPEED:
-        yield f"setp {OVERRIDE}.counts {math.floor(COUNTS * answer.override)}"
-    else:
-        yield f"setp {PAUSE} 1"
+        return answer.text
+    if answer.kind is ChatterAnswer.SPEED:
+        return f"setp {OVERRIDE}.counts {math.floor(COUNTS * answer.override)}"
+    return f"setp {PAUSE} 1"

@@ -85,28 +85,20 @@ def rubbing(
     feed = float(columns["feed_mm_min"][k])
     rpm = 60.0 / math.tau * float(columns["power_w"][k]) / float(columns["torque_mean_nm"][k])
     tooth = feed / (rpm * cutters[number].flutes)
+    least, most = _two_digits(high * feed, True), _two_digits(rpm / high, False)
     return (
         f"the edge rubs at a feed per tooth of {tooth:.2g} mm: its force bends the cutter by more than {of_feed:g} "
-        f"times that, so the loads are not known: raise the feed from {feed:.4g} to at least {_upwards(high * feed):g} "
-        f"mm/min, or lower the spindle speed from {rpm:.5g} to at most {_downwards(rpm / high):g} 1/min"
+        f"times that, so the loads are not known: raise the feed from {feed:.4g} to at least {least:g} "
+        f"mm/min, or lower the spindle speed from {rpm:.5g} to at most {most:g} 1/min"
     )
 
 
-def _upwards(value: float) -> float:
-    """Two digits of a value, rounded up.
+def _two_digits(value: float, up: bool) -> float:
+    """Two digits of a value, rounded up or down.
 
-    >>> _upwards(231.2), _upwards(0.0911)
-    (240.0, 0.092)
+    >>> _two_digits(231.2, True), _two_digits(0.0911, True), _two_digits(231.2, False), _two_digits(0.0911, False)
+    (240.0, 0.092, 230.0, 0.091)
     """
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return float(f"{math.ceil(value / unit * (1.0 - 1e-9)) * unit:.2g}")
-
-
-def _downwards(value: float) -> float:
-    """Two digits of a value, rounded down.
-
-    >>> _downwards(231.2), _downwards(0.0911)
-    (230.0, 0.091)
-    """
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return float(f"{math.floor(value / unit * (1.0 + 1e-9)) * unit:.2g}")
+    count = math.ceil(value / unit * (1.0 - 1e-9)) if up else math.floor(value / unit * (1.0 + 1e-9))
+    return float(f"{count * unit:.2g}")
