@@ -101,7 +101,7 @@ function choices(view: View, doc: Document, shared: Document, bar: HTMLElement, 
   if (header.path.axes) check("tool upright", false, (on) => view.stands(on));
   if (view.stock) check("values on stock", false, (on) => view.drape(on));
   if (!maps.length) return;
-  const chosen = made("select", "", "surface map"), bent = made("input", "", "how far the map is bent");
+  const chosen = made("select", "", "surface map"), bent = made("input", "", "scale of the deflection");
   chosen.append(new Option("no map", ""), ...maps.map((m) => new Option(`map: ${m.name}, ${m.label}`, m.name)));
   Object.assign(bent, { type: "range", min: "0", max: "1", step: "any", value: "0" });
   bent.style.flex = "0 1 120px";
