@@ -3,7 +3,7 @@
 Notation: z [mm] height above the tip; l overhang and l_f flute length [mm]; d diameter; E modulus [MPa];
 I = pi D^4 / 64 [mm^4] with D = fluted_factor d (0.8 d unless stated) in the fluted part, the shank's diameter above it.
 
-Valid for bending of slender cutters (l > 4 d, or so): shear, the holder and its clamping are taken as rigid.
+Valid for bending of slender cutters (l above about 4 d): shear, the holder and its clamping are taken as rigid.
 
 Reference: [Kops1990] measured an equivalent diameter of about 0.8 d for two and four flutes; [Altintas2012] ch. 2.
 """

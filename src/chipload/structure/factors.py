@@ -5,7 +5,8 @@ diagonal; B right-hand sides (f, q).
 
 SuperLU factors without pivots. Its own solution processes the columns one after the other through 100 MB of factors.
 :func:`chipload.structure._kernels.solve_triangular` processes 64 together, skips rows that are still zero in forward
-substitution and rows that are not needed in back substitution: ten times as many a second (benchmarks/structure.py).
+substitution and rows that are not needed in back substitution: ten times as many in the same time
+(benchmarks/structure.py).
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ class Factors:
         return out
 
 
-#: smallest pivot over the diagonal that is not taken for zero; thin plates of 1:1000 reach 1e-10, hinges 1e-12
+#: smallest pivot over the diagonal that does not count as zero; thin plates of 1:1000 reach 1e-10, hinges 1e-12
 SMALLEST_PIVOT = 1e-11
 
 

@@ -1,7 +1,7 @@
 """Shape functions, stiffness and mass of 20-node hexahedra, many elements at once.
 
 Notation: m elements, 20 nodes each, (xi, eta, zeta) in [-1, 1]^3 the local place, N_i shape functions, J = dx/dxi;
-g_i = dN_i/dx [1/mm]; lambda, mu [MPa] Lame's constants; kept (lo, hi) the part of the thickness that is there, as
+g_i = dN_i/dx [1/mm]; lambda, mu [MPa] Lame's constants; kept (lo, hi) the remaining part of the thickness, as
 fractions 0 .. 1 along zeta. Degrees of freedom of an element are node by node: 3 i + c.
 
 Nodes: 0-3 corners at zeta = -1 counter-clockwise from (-1, -1), 4-7 those at zeta = 1, 8-11 and 12-15 the middles of
@@ -9,7 +9,7 @@ the edges after each corner at zeta = -1 and 1, 16-19 those of the edges along z
 
 The shape functions of the element span the same space under zeta -> a zeta + b. So an element that has lost a slice of
 its thickness is integrated over the rest with its first shape functions. For a flat plate this is the thinner element
-exactly; beside an uncut neighbour it is a step, still conforming. No node moves.
+exactly; next to an uncut neighbour there is a step, still conforming. No node moves.
 
 Reference: [Zienkiewicz2005] ch. 4 to 6; the rule of 14 points is that of [Irons1971].
 """
@@ -143,7 +143,7 @@ def gradients(
 ) -> tuple[Array, Array]:
     """Gradients g (m, points, 20, 3) [1/mm] and weight times det J (m, points) [mm^3] of elements (m, 20, 3) [mm].
 
-    ``numbers`` (m,) int is what a message calls them; None: 0, 1, ..
+    ``numbers`` (m,) int are their numbers in messages; None: 0, 1, ..
     """
     local, weights, alike = _integration(kept, len(xyz), rule)
     if alike:
@@ -166,15 +166,15 @@ def stiffness(
     """Stiffness of every element.
 
     K[ia, jb] = lambda H[ia, jb] + mu H[ib, ja] + mu delta_ab sum_c H[ic, jc] with H[ia, jb] = integral of g_ia g_jb.
-    O(m 60^2 points): 0.15 ms an element.
+    O(m 60^2 points): 0.15 ms for each element.
 
     Parameters
     ----------
     xyz : (m, 20, 3) float [mm]
     modulus, poisson : E [MPa], nu
     rule : points of integration, 8, 14 or 27
-    kept : (m, 2) float, part of the thickness that is there; None: all of it. (0, 0) gives zeros
-    numbers : (m,) int, what a message calls the elements; None: 0, 1, ..
+    kept : (m, 2) float, remaining part of the thickness; None: all of it. (0, 0) gives zeros
+    numbers : (m,) int, of the elements in messages; None: 0, 1, ..
 
     Returns
     -------

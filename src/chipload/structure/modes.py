@@ -25,7 +25,7 @@ def modes(part: SolidWorkpiece | Factored, count: int, shift: float = 0.0) -> tu
     Parameters
     ----------
     part : the workpiece; factored if it is held
-    count : how many modes, at least 1 and fewer than degrees of freedom
+    count : number of modes, at least 1 and fewer than degrees of freedom
     shift : s [1/s^2], above 0 for a part that is not held; of the order of w^2 of its first elastic mode
 
     Returns

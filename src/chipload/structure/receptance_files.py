@@ -1,7 +1,7 @@
 """Files of measured receptances: columns of numbers, and the universal file (dataset 58).
 
 Columns are frequency [Hz], real and imaginary part and, where there is a fourth, coherence; lines without numbers are
-passed over. The unit stands in the file as ``m/N``, ``mm/N`` or ``um/N``, or the caller states it. A velocity or an
+skipped. The file states the unit as ``m/N``, ``mm/N`` or ``um/N``, or the caller states it. A velocity or an
 acceleration becomes a displacement by 1 / (i w) once or twice.
 
 Reference: [UFF58], the universal file datasets 58.

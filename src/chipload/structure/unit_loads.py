@@ -1,7 +1,7 @@
 """Compliance of places of a workpiece in one state of removal.
 
 Notation: as in :mod:`chipload.structure.removal`: A and B degrees of freedom of cut elements, W columns of K^-1,
-G = W at the rows B, M the correction; F forces, U = K^-1 F; d = 1 or 3 forces a place, p places, q = p d.
+G = W at the rows B, M the correction; F forces, U = K^-1 F; d = 1 or 3 forces at each place, p places, q = p d.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class UnitLoads:
     Attributes
     ----------
     base : the factorisation that they belong to
-    F : (f, p d) sparse, forces; d = 1 direction a place, or 3
+    F : (f, p d) sparse, forces; d = 1 direction at each place, or 3
     U : (r, p d) float, displacements at the rows of the region
     own : (p, d, d) float, F^T U of the forces of each place
     """
@@ -39,7 +39,7 @@ class UnitLoads:
 
 
 def _forces(base: Factored, places: MeshPlaces, normals: ArrayLike | None) -> tuple[csc_array, int]:
-    """Unit forces along the normals, or along x, y, z; and how many a place."""
+    """Unit forces along the normals, or along x, y, z; and their number at each place."""
     if normals is not None:
         return loads(base, places, checked_normals(places, normals)), 1
     thrice = MeshPlaces(np.repeat(places.element, 3), np.repeat(places.local, 3, axis=0))
@@ -56,7 +56,7 @@ def watch(
 ) -> UnitLoads:
     """Solve unit forces at places once, for many states: one solution each.
 
-    ``normals`` is (p, 3) float, unit vectors: then the forces are along them. None: three forces a place, x, y, z.
+    ``normals`` is (p, 3) float, unit vectors along which the forces act. None: three forces at each place, x, y, z.
     """
     F, d = _forces(state.base, places, normals)
     rows = state.columns.rows

@@ -2,7 +2,7 @@
 
 Notation as there. Half the wall, theta from 0 to pi, is meshed. On both cuts the displacement along y is 0, so loads
 that are even in theta are those of the whole. Elements are short near theta = 0, where the cutter is, and grow evenly
-from there. The solid uses nothing of the shell's theory; it includes shear through the thickness and the thickness
+from there. The solid does not use the theory of the shell; it includes shear through the thickness and the thickness
 itself.
 """
 
@@ -22,9 +22,9 @@ from chipload.structure.solid import Factored, SolidWorkpiece, factorise, loads
 
 Floats = NDArray[np.float64]
 
-#: of a workpiece whose mass is not asked [tonne/mm^3]
+#: density of a workpiece whose mass is not used [tonne/mm^3]
 DENSITY = 2.7e-9
-#: how far a place may lie from the mesh's curved faces, in thicknesses
+#: greatest distance of a place from the curved faces of the mesh, in thicknesses
 NEAR = 0.05
 #: places on the area of a force, along s and round
 SPREAD = (7, 7)
@@ -50,7 +50,7 @@ def wall_solid(shell: Shell, counts: tuple[int, int, int] = (28, 24, 1), growth:
     ----------
     shell : clamped at s = 0, free at its length
     counts : elements round (half), along, through
-    growth : the last element round is so many times as wide as the first one
+    growth : width of the last element round over that of the first
 
     Raises
     ------
@@ -81,7 +81,7 @@ def normal_compliance(wall: WallSolid, s_force: float, s_point: float, length: f
     ----------
     wall : from :func:`wall_solid`
     s_force : middle of the area, at theta = 0 [mm]
-    s_point : where the displacement is asked, at theta = 0, the mean of both faces [mm]
+    s_point : where the displacement is calculated, at theta = 0, the mean of both faces [mm]
     length, width : of the area, along s and round [mm]
 
     Raises
@@ -105,8 +105,8 @@ def normal_compliance(wall: WallSolid, s_force: float, s_point: float, length: f
     for side, z in (("k-", -0.5), ("k+", 0.5)):
         point = _place(shell, np.array([[0.0, s_point, z * shell.thickness]]))
         normal = np.array([[math.cos(shell.cone_angle), 0.0, -math.sin(shell.cone_angle)]])
-        asked = loads(wall.factored, locate(grid, side, point, NEAR * shell.thickness), normal)
-        answer += 0.5 * float((asked.T @ moved)[0])
+        load = loads(wall.factored, locate(grid, side, point, NEAR * shell.thickness), normal)
+        answer += 0.5 * float((load.T @ moved)[0])
     return answer
 
 

@@ -78,7 +78,7 @@ def _joined(rows: Array) -> tuple[Array, Array]:
 
 
 def grid_on_faces(stock: LayeredStock, faces: Faces, cell_mm: float, order: int = 2) -> CellGrid:
-    """The grid over a stock, with planes on the largest of the flat faces of what will be left of it.
+    """The grid over a stock, with planes on the largest of the flat faces that it will have after the program.
 
     Parameters
     ----------

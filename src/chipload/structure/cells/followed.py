@@ -40,7 +40,7 @@ class FollowedModes:
     removed : (s,) float [mm^3] removed in these
     state_frequency : (s, m) float [Hz]
     error : relative, of the frequencies: by the cells, and by interpolation between states
-    alike : least |x_a^T M_b x_b| of modes that were taken for one another
+    alike : least |x_a^T M_b x_b| of modes that were matched
     """
 
     step: Indices
@@ -76,7 +76,7 @@ class ModesOfStates:
     ----------
     steps : where the program cuts
     count : modes of each state
-    spacing : least distance [mm] of contact lines at which shapes are looked up
+    spacing : least distance [mm] of contact lines at which shapes are evaluated
     """
 
     def __init__(self, steps: StepLines, count: int, spacing: float) -> None:

@@ -7,7 +7,7 @@ Mode a of cell i has the lattice number i p + a in its direction, so that neighb
 face. P_m is the Legendre polynomial of degree m.
 
 Any set of lattice modes is continuous over the cells. That allows cells deep inside thick material to keep only the
-modes of their corners (order 1) beside cells of a higher order, without any constraint.
+modes of their corners (order 1) next to cells of a higher order, without any constraint.
 
 Reference: [Szabo1991] for the modes, [Parvizian2007] for the cells.
 """

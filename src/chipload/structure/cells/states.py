@@ -7,7 +7,7 @@ volume, until none differs by more than the tolerance times the greatest deflect
 
 Some contact lines are solved, at most :data:`LINES`, no nearer to one another than they must be; a step between two of
 them takes the mean by distance. Then the step whose deflection may be greatest, by the greater of both states, is
-solved in the states just before and after it, again and again until it is one that was.
+solved in the states just before and after it, until the worst step is one that was solved so.
 """
 
 from __future__ import annotations
@@ -74,12 +74,12 @@ class StepCompliances:
     step : (c,) int, rising
     lines : (c, 2, 3) float [mm]
     compliance : (c, s, 3, 3) float [mm/N] at the stations of the line
-    uncertainty : (c,) float, how far the compliance of each may lie from that of its own state, relative
+    uncertainty : (c,) float, greatest relative difference of the compliance of each from that of its own state
     worst : (w,) int, rows that were solved themselves, the greatest deflection first
     after : (w,) int, number of the state that was solved after each of them
     after_compliance : (w, s, 3, 3) float [mm/N] in that state
     states : steps before which a state was solved
-    loose : [mm^3] greatest volume that hung on nothing
+    loose : [mm^3] greatest volume without a connection to a clamp
     """
 
     step: Indices
@@ -97,7 +97,7 @@ class StepCompliances:
         return np.asarray(self.compliance[self._rows(steps)])
 
     def at_points(self, steps: Indices, points: Array) -> Array:
-        """Compliance of steps at points (n, 3) [mm] beside their contact, (n, 3, 3): by a parabola along its line."""
+        """Compliance of steps at points (n, 3) [mm] near their contact, (n, 3, 3): by a parabola along its line."""
         rows = self._rows(steps)
         low, along = self.lines[rows, 0], self.lines[rows, 1] - self.lines[rows, 0]
         length = np.einsum("ni,ni->n", along, along)
@@ -279,7 +279,7 @@ def spaced_rows(lines: Array, spacing: float, most: int) -> Indices:
 
 
 def between_rows(lines: Array, own: Indices, rows: Indices, values: Array) -> Array:
-    """Values of rows ``own`` from those of some of them, the mean of the two beside each by distance."""
+    """Values of rows ``own`` from those of some of them, by distance between the two neighbours of each."""
     middle = lines.mean(axis=1)
     before = np.clip(np.searchsorted(rows, own, side="right") - 1, 0, len(rows) - 1)
     after = np.minimum(before + 1, len(rows) - 1)
@@ -290,7 +290,7 @@ def between_rows(lines: Array, own: Indices, rows: Indices, values: Array) -> Ar
 
 
 def _in_state(removed: Array, low: float, high: float, first: Array, last: Array) -> tuple[Array, Array]:
-    """Compliance between two states by the volume removed, and how far it may be off, relative."""
+    """Compliance between two states by the volume removed, and its greatest relative error."""
     t = np.clip((removed - low) / (high - low), 0.0, 1.0) if high > low else np.zeros(len(removed))
     a, b = size_of(first), size_of(last)
     size = a ** (1.0 - t) * b**t

@@ -37,7 +37,7 @@ def greatest_stress(work: CellWorkpiece, elastic: Elastic, line: Array, force: A
     ----------
     line : (2, 3) float [mm], contact over which the force is spread
     force : (3,) float [N]
-    away : [mm] least distance from the contact of what counts
+    away : [mm] least distance from the contact at which stress counts
     """
     weight = line_means(work, np.asarray(line, dtype=np.float64).reshape(1, 2, 3)).toarray()[0]
     u = work.solve((weight[:, None] * np.asarray(force, dtype=np.float64)).reshape(-1, 1)).reshape(-1, 3)

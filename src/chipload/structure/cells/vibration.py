@@ -3,7 +3,7 @@
 Notation: K (3 u, 3 u) stiffness, M (3 u, 3 u) mass of the material, of the same moments; K x = w^2 M x, w [rad/s],
 x^T M x = 1 t. Lanczos on K^-1 M uses the factors that the compliance has already.
 
-A clamp holds without mass and without damping. Modes above those that are asked for count as rigid.
+A clamp has no mass and no damping. Modes above those requested count as rigid.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def vibration_modes(work: CellWorkpiece, count: int) -> VibrationModes:
     Raises
     ------
     InputError
-        The workpiece has no density, or fewer modes than asked for.
+        The workpiece has no density, or fewer modes than requested.
     """
     if work.mass is None:
         raise InputError("workpiece.density_kg_m3: missing: modes need the mass of the workpiece")

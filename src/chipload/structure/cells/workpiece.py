@@ -7,7 +7,7 @@ compliance at a **station** of the line with the modes' values v is C = (v x I)^
 
 K is factored in an order of nested dissection: planes of the lattice cut the workpiece in halves again and again, the
 modes of a plane come after those of both sides. A line touches few of the factors, those from its cells to the last
-plane; lines that lie near one another are solved abreast.
+plane; lines that lie near one another are solved together.
 
 Reference: [George1973] for the order.
 """
