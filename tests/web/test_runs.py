@@ -1,9 +1,13 @@
 """Jobs run from the page: to their end, stopped half way, and ended with the page."""
 
+import asyncio
 import json
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from chipload.examples import copy_example
+from chipload.web.runs import JobRun
 from web_served import Served
 
 
@@ -83,6 +87,25 @@ def test_a_job_is_refused_run_shown_and_stopped(window, folder) -> None:
         job.write_text(text)
     assert not (folder / "contour" / "again").exists()
     assert not list((folder / "contour").glob(".chipload-*"))
+
+
+def test_a_run_that_is_stopped_before_its_process_is_there_ends(tmp_path) -> None:
+    job = copy_example("contour", tmp_path / "contour") / "job.toml"
+
+    async def stopped_at_once() -> JobRun:
+        run = JobRun("contour/job.toml", "result")
+        work = asyncio.create_task(run.work(job, tmp_path / "result"))
+        await asyncio.sleep(0)
+        await run.stop()
+        assert run.state == "stopping"
+        await asyncio.wait_for(work, 60.0)
+        return run
+
+    # the thread of the browser has a loop of its own
+    with ThreadPoolExecutor(1) as pool:
+        run = pool.submit(asyncio.run, stopped_at_once()).result()
+    assert (run.state, run.message) == ("stopped", "stopped: nothing was written")
+    assert not (tmp_path / "result").exists()
 
 
 def test_a_wrong_job_says_why(window, folder) -> None:

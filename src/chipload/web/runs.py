@@ -60,6 +60,8 @@ class JobRun:
             self.state, self.code, self.message = "failed", 1, f"no process could be started: {err.strerror}"
             return
         self._process = process
+        # it may be stopped while its process is started
+        stop = asyncio.create_task(_end(process)) if self.state == "stopping" else None
         output, warned = process.stdout, process.stderr
         if output is None or warned is None:
             self.state, self.code, self.message = "failed", 1, "the process has no input or output"
@@ -69,6 +71,8 @@ class JobRun:
             self._take(line)
         code = await process.wait()
         fault = await faults
+        if stop is not None:
+            await stop
         stopped = self.state == "stopping"
         if self.code is None:
             self.code = code
@@ -80,15 +84,11 @@ class JobRun:
 
     async def stop(self) -> None:
         """Ask it to stop, and end it where it does not."""
-        process = self._process
-        if process is None or self.ended or process.returncode is not None:
+        if self.ended:
             return
         self.state = "stopping"
-        _signal(process.pid, signal.SIGTERM)
-        try:
-            await asyncio.wait_for(process.wait(), PATIENCE)
-        except TimeoutError:
-            _signal(process.pid, signal.SIGKILL)
+        if self._process is not None:
+            await _end(self._process)
 
     def _take(self, line: bytes) -> None:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
@@ -97,6 +97,17 @@ class JobRun:
                 self.code, self.message = int(values["code"]), str(values["message"])
             else:
                 self.done, self.what = float(values["done"]), str(values["what"])
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    """Ask a process to stop, and kill it where it does not."""
+    if process.returncode is not None:
+        return
+    _signal(process.pid, signal.SIGTERM)
+    try:
+        await asyncio.wait_for(process.wait(), PATIENCE)
+    except TimeoutError:
+        _signal(process.pid, signal.SIGKILL)
 
 
 def _signal(pid: int, number: int) -> None:
