@@ -20,8 +20,8 @@ import numpy as np
 from chipload.cutter.catalogue import CatalogueCutter, catalogue_named
 from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.closed_form import axis_at
+from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
-from chipload.planning.impeller.ranges.ranges import valid_ranges
 from chipload.planning.impeller.step_over import step_over
 from chipload.planning.impeller.surfaces import ContactSampling, surface_of
 

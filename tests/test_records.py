@@ -89,7 +89,6 @@ def test_functions_fit_on_a_screen():
 
 
 def test_files_are_short():
-    # by the path: many packages have a _kernels.py
     lines = {p.relative_to(SOURCE).as_posix(): len(p.read_text().splitlines()) for p in SOURCE.rglob("*.py")}
     assert {name for name, count in lines.items() if count > FILE} == set()
 

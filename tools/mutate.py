@@ -71,18 +71,18 @@ FILES = (
 )
 #: compiled kernels of physics
 KERNELS = (
-    "structure/_kernels.py",
-    "cutting/_kernels.py",
+    "structure/_beam.py",
+    "cutting/_tooth_force.py",
     "cutting/_strength.py",
-    "cutting/revolution/_kernels.py",
-    "cutting/bending/_kernels.py",
-    "stability/_kernels.py",
-    "stability/directional/_kernels.py",
-    "stability/location/_kernels.py",
+    "cutting/_revolution.py",
+    "cutting/_wall_error.py",
+    "stability/_tooth_period.py",
+    "stability/_directional.py",
+    "stability/_surface_location.py",
     "control/_estimator.py",
     "control/_override.py",
     "control/_plant.py",
-    "engagement/_kernels.py",
+    "engagement/_contact.py",
 )
 #: tests that are collected
 TESTS = (

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.levers.levers import greatest_height, has_lever_loads, lever_loads
+from chipload.cutting.levers import greatest_height, has_lever_loads, lever_loads
 from chipload.cutting.strength import cutter_stress, normal_stress, section_loads, sections_of, von_mises_stress
 from chipload.engagement.tooth_engagement import with_runout
-from chipload.simulation.bending._kernels import loads_of_teeth
+from chipload.simulation._form_error import loads_of_teeth
 from chipload.structure.spindle import Bar, Joint, chain_compliance, tip_compliance
 from cutting.test_revolution import STEEL, some_engagement
 

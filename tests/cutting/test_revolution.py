@@ -13,7 +13,7 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn
 from chipload.cutting.material import Material
-from chipload.cutting.revolution.revolution import _one_by_one, loads_over_turn, rotations
+from chipload.cutting.revolution import _one_by_one, loads_over_turn, rotations
 from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
 
 STEEL = Material("steel", 1800.0, 700.0, 250.0, 25.0, 18.0, 6.0, source="made up")

@@ -13,7 +13,7 @@ import pytest
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.planning.impeller.compare import clear_somewhere, gouges
-from chipload.planning.impeller.ranges.ranges import valid_ranges
+from chipload.planning.impeller.pallet_ranges import valid_ranges
 
 ROOT = Path(__file__).parents[2]
 # by its path: other benchmarks are named as folders of tests are

@@ -12,7 +12,7 @@ from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.simulation.bending import _kernels
+from chipload.simulation import _form_error
 from chipload.simulation.chips import remove
 from chipload.simulation.clearance.body import cutting_part
 from chipload.simulation.deflection import _shape
@@ -152,7 +152,7 @@ def test_distances_from_the_body_and_its_foot_are_those_of_dense_points(name: st
         rho, up = rng.uniform(0.0, 9.0), rng.uniform(0.0, cutter.flute_length - 3.0)
         far = np.hypot(*(line - [rho, up]).T).min() * (-1.0 if rho < cutter.radius_at([up])[0] else 1.0)
         assert body.distance(rho, up) == pytest.approx(far, abs=2e-4)
-        _kernels.foot(rho, up, shape, out)
+        _form_error.foot(rho, up, shape, out)
         assert out[0] == pytest.approx(far, abs=2e-4)
         assert (
             abs(cutter.radius_at([out[2]])[0] - (rho - out[0] * out[3])) < 1e-6

@@ -11,7 +11,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.geometry.bspline import through
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
-from chipload.simulation.channel import _kernels
+from chipload.simulation.channel import _ray_cuts
 from chipload.simulation.channel.channel import left_on, tool_parts, wall
 from chipload.simulation.channel.gouges import deepest_gouge
 from chipload.simulation.channel.stock import taken_from
@@ -59,7 +59,7 @@ def test_no_part_is_nearer_than_it_is_said(cutter):
     w = np.clip((x * side).sum(axis=-1) / (side**2).sum(axis=1), 0.0, 1.0)
     far = np.sqrt(((x - w[..., None] * side) ** 2).sum(axis=-1)).min(axis=1)
     inside = (h > 0.0) & (h < cutter.cutting_length) & (d < cutter.shape.radius_at(np.maximum(h, 0.0)))
-    said = np.array([_kernels.part_distance(z, rho, starts[0], shapes[0]) for z, rho in zip(h, d, strict=True)])
+    said = np.array([_ray_cuts.part_distance(z, rho, starts[0], shapes[0]) for z, rho in zip(h, d, strict=True)])
     assert (said <= np.where(inside, 0.0, far) + 2e-4).all()
     # and not so far below it that nothing is left out
     assert (said[far > 2.0] > 0.0).mean() > 0.9 * (~inside[far > 2.0]).mean()

@@ -10,13 +10,13 @@ import pytest
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
 from chipload.errors import InputError
-from chipload.stability import _kernels
+from chipload.stability import _tooth_period
+from chipload.stability._directional import G3, W3, matrices
+from chipload.stability._spectrum import greatest
 from chipload.stability.chart import critical_depth, stability_chart
 from chipload.stability.cuts import dynamic_cuts
-from chipload.stability.directional._kernels import G3, W3, matrices
 from chipload.stability.margin import MOST_MARGIN, largest_multipliers, stability_margins
 from chipload.stability.modes import Modes
-from chipload.stability.spectrum._kernels import greatest
 from stability.stability_oracles import (
     KR,
     KT,
@@ -418,4 +418,4 @@ def test_quiet_speeds_have_the_least_margin_of_all_cuts():
 
 
 def test_the_greatest_margin_is_the_last_factor_that_is_looked_at():
-    assert _kernels.ABOVE[-1] == MOST_MARGIN
+    assert _tooth_period.ABOVE[-1] == MOST_MARGIN

@@ -13,10 +13,10 @@ from chipload.cutting.force import mean_forces
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
 from chipload.errors import InputError
+from chipload.stability._several_delays import matrices3
 from chipload.stability.cuts import dynamic_cuts
 from chipload.stability.margin import largest_multipliers, stability_margins
 from chipload.stability.modes import Modes
-from chipload.stability.several._kernels import matrices3
 from stability.stability_oracles import HALF, METAL, TAU, TWO, down, in_time_by_teeth, mill
 
 THRUST = Material("thrust", 700.0, 210.0, 150.0, 0.0, 0.0, 0.0, source="made up for tests")

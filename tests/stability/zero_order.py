@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.stability import _directional
 from chipload.stability.cuts import DynamicCuts
-from chipload.stability.directional import _kernels
 
 Floats = NDArray[np.float64]
 
@@ -32,8 +32,8 @@ def zero_order_margin(cuts: DynamicCuts) -> tuple[Floats, Floats]:
     margin, hz = np.full(len(cuts), np.inf), np.zeros(len(cuts))
     for i in range(len(cuts)):
         mean = np.zeros((16, 3, 4))
-        _kernels.matrices(cuts.rows, cuts.start[i], cuts.start[i + 1], cuts.pitch, 16, cuts.exponents, mean)
-        A = (mean * _kernels.W3[None, :, None]).sum(axis=(0, 1)).reshape(2, 2) / 16.0
+        _directional.matrices(cuts.rows, cuts.start[i], cuts.start[i + 1], cuts.pitch, 16, cuts.exponents, mean)
+        A = (mean * _directional.W3[None, :, None]).sum(axis=(0, 1)).reshape(2, 2) / 16.0
         if not A.any():
             continue
         omega = cuts.omega[i]

@@ -10,10 +10,10 @@ import pytest
 import shapely
 from numpy.typing import NDArray
 
+from chipload.stock import _clip as kernels
+from chipload.stock import _crossings as crossings
+from chipload.stock._orientation import orient
 from chipload.stock.areas import PlaneAreas, areas_of, polygon_of
-from chipload.stock.clip import _kernels as kernels
-from chipload.stock.clip.crossings import _kernels as crossings
-from chipload.stock.clip.orient._kernels import orient
 from chipload.stock.tile_grid import polygons
 
 Floats = NDArray[np.float64]

@@ -12,8 +12,8 @@ import trimesh
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
+from chipload.stock import _dexels
 from chipload.stock.dexel import TriDexel, cutter_shape
-from chipload.stock.dexels import _kernels
 
 FLAT = Cutter(10.0, 4, 0.5, 30.0, 40.0, 6e5)
 BALL = Cutter(10.0, 2, 0.5, 30.0, 40.0, 6e5, corner_radius=5.0)
@@ -52,7 +52,7 @@ def test_a_ray_is_in_the_cutter_where_its_profile_says(name: str) -> None:
         k = int(rng.integers(3))
         tip = rng.uniform(-20.0, 20.0, 3)
         inner = tip + rng.uniform(-0.2, 1.1) * cutter.flute_length * a + rng.uniform(-4.0, 4.0, 3)
-        lo, hi = _kernels.pierce(k, inner[(k + 1) % 3], inner[(k + 2) % 3], tip, a, shape)
+        lo, hi = _dexels.pierce(k, inner[(k + 1) % 3], inner[(k + 2) % 3], tip, a, shape)
 
         s = np.linspace(inner[k] - 60.0, inner[k] + 60.0, 6001)
         there = s[inside(s, inner, k, tip, a, cutter)]
@@ -189,11 +189,11 @@ def test_few_instants_take_what_many_moments_cover(name: str, direction: str) ->
     (rays,) = stock.rays
     more = []
     for n, (u, v) in enumerate(zip(*rays.places(), strict=True)):
-        spans = np.array([_kernels.pierce(k, u, v, tip, axis, shape) for tip, axis in moments[::40]])
+        spans = np.array([_dexels.pierce(k, u, v, tip, axis, shape) for tip, axis in moments[::40]])
         met = spans[:, 0] <= spans[:, 1]
         if met.sum() < 14 or np.count_nonzero(np.diff(met)) > 2:
             continue  # less than a fourth of the move, or two passages: five instants may miss one
-        spans = np.array([_kernels.pierce(k, u, v, tip, axis, shape) for tip, axis in moments])
+        spans = np.array([_dexels.pierce(k, u, v, tip, axis, shape) for tip, axis in moments])
         spans = np.clip(spans[spans[:, 0] <= spans[:, 1]], 0.0, 30.0)
         lo, hi = spans[:, 0].min(), spans[:, 1].max()
         left = rays.ends[n, : rays.count[n]]

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.structure import _kernels
+from chipload.structure import _beam
 from chipload.structure.beam import compliance, flexibilities
 
 MILL = Cutter(10.0, 4, 0.5, 22.0, 40.0, 5.8e5, shank_diameter=12.0)
@@ -72,7 +72,7 @@ def test_reciprocity_and_the_compiled_twin():
     ours = compliance(MILL, z[:, 0], z[:, 1])
     np.testing.assert_array_equal(ours, compliance(MILL, z[:, 1], z[:, 0]))
     flex = flexibilities(MILL)
-    twin = [_kernels.beam_deflection(a, b, MILL.overhang, MILL.flute_length, *flex) for a, b in z]
+    twin = [_beam.beam_deflection(a, b, MILL.overhang, MILL.flute_length, *flex) for a, b in z]
     np.testing.assert_allclose(twin, ours, rtol=1e-12)
 
 

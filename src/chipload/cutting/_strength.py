@@ -1,6 +1,6 @@
 """Compiled loop of the loads in sections of a cutter; arrays and scalars only.
 
-Notation as in :mod:`chipload.cutting.strength` and :mod:`chipload.cutting._kernels`. Oracles: closed forms and a sum
+Notation as in ``strength.py`` and :mod:`chipload.cutting._tooth_force`. Oracles: closed forms and a sum
 over slices in tests/cutting/test_strength.py.
 """
 
@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit, types
 
-from chipload.cutting._kernels import TAU, edge, engaged_part, first_turn
+from chipload.cutting._tooth_force import TAU, edge, engaged_part, first_turn
 
 #: longest piece of immersion that is integrated at once [rad]
 PIECE = 0.6
@@ -30,7 +30,7 @@ def points_of(angle):
 
 @njit(cache=True, nogil=True)
 def edge_at(phi, linear, along, offset, across, sine, cosine, c):
-    """:func:`chipload.cutting._kernels.edge` at one immersion; ``linear``: the law has no exponents."""
+    """:func:`chipload.cutting._tooth_force.edge` at one immersion; ``linear``: the law has no exponents."""
     if not linear:
         return edge(phi, 0.0, along, offset, across, sine, cosine, c)
     s = math.sin(phi)
@@ -121,7 +121,7 @@ def greatest_stress(loads, heights, diameters, brittle, out):
     """Greatest equivalent stress of each step in sections above all that cuts: out (n,).
 
     ``loads`` (n, 8, m): axial force, torque, moments of the axial force, lateral force and its moment about the tip, as
-    :func:`chipload.cutting.levers.levers.lever_loads` of the levers 1 and z gives them.
+    :func:`chipload.cutting.levers.lever_loads` of the levers 1 and z gives them.
     """
     for i in range(len(loads)):
         own = loads[i]

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting import _kernels
-from chipload.cutting.bases import _kernels as bases
+from chipload.cutting import _tooth_force
+from chipload.cutting import _unit_loads as bases
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement
 
@@ -70,7 +70,7 @@ def mean_basis(
     else:
         for k, law in enumerate(_unit_laws(material)):
             out = np.zeros((len(engagement), 4))
-            _kernels.means(*rows, cutter.flutes, law, out)
+            _tooth_force.means(*rows, cutter.flutes, law, out)
             basis[:, :, k] = out
     return basis if frame is None else turned_basis(basis, frame)
 
@@ -101,7 +101,7 @@ def band_over_turn(
     for k, law in enumerate(_unit_laws(material)):
         out = np.zeros((len(engagement), len(angles), 4))
         rows = (engagement.start, engagement.rows, engagement.tooth, engagement.slice, engagement.slices)
-        _kernels.turn_of(*rows, angles, cutter.flutes, law, out)
+        _tooth_force.turn_of(*rows, angles, cutter.flutes, law, out)
         basis[..., k] = out
     deviation = deviations(basis if frame is None else turned_basis(basis, frame), material)
     return deviation[..., :3], deviation[..., 3]
@@ -169,7 +169,7 @@ def _bases_at(engagement: ToothEngagement, cutter: Cutter, material: Material, t
     if not any(material.exponents):
         bases.bases_at(*rows, angles, cutter.flutes, out)
     else:
-        _kernels.bases_at(*rows, angles, cutter.flutes, _unit_laws(material), out)
+        _tooth_force.bases_at(*rows, angles, cutter.flutes, _unit_laws(material), out)
     return out
 
 

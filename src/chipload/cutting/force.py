@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting import _kernels
+from chipload.cutting import _tooth_force
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
 from chipload.errors import InputError
@@ -87,7 +87,7 @@ def forces_over_turn(
     """
     angles = np.ascontiguousarray(theta, dtype=np.float64)
     out = np.zeros((len(engagement), len(angles), 4))
-    _kernels.turn_of(*_arrays(engagement, cutter), angles, cutter.flutes, np.array(material.law), out)
+    _tooth_force.turn_of(*_arrays(engagement, cutter), angles, cutter.flutes, np.array(material.law), out)
     return out[..., :3], out[..., 3]
 
 
@@ -102,7 +102,7 @@ def mean_forces(engagement: ToothEngagement, cutter: Cutter, material: Material)
     Reference: [Altintas2012] ch. 2, average forces.
     """
     out = np.zeros((len(engagement), 4))
-    _kernels.means(*_arrays(engagement, cutter), cutter.flutes, np.array(material.law), out)
+    _tooth_force.means(*_arrays(engagement, cutter), cutter.flutes, np.array(material.law), out)
     return out[:, :3], out[:, 3]
 
 
@@ -133,7 +133,7 @@ def greatest_forces(
         raise InputError(f"sample_step = {math.degrees(sample_step):g} deg: must be above 0 and at most 15")
     out = np.zeros((len(engagement), 5))
     exact = len(engagement.rows) if exact_rows is None else exact_rows
-    _kernels.greatest(*_arrays(engagement, cutter), cutter.flutes, np.array(material.law), sample_step, exact, out)
+    _tooth_force.greatest(*_arrays(engagement, cutter), cutter.flutes, np.array(material.law), sample_step, exact, out)
     names = ("force_t", "force_n", "theta", "torque", "force_axis")
     return dict(zip(names, out.T, strict=True))
 

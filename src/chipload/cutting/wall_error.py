@@ -38,7 +38,7 @@ from chipload.errors import InputError
 from chipload.lazy import LateModule
 from chipload.structure.beam import flexibilities
 
-_kernels = LateModule("chipload.cutting.bending._kernels")
+_wall_error = LateModule("chipload.cutting._wall_error")
 
 Floats = NDArray[np.float64]
 Milling = Literal["up", "down"]
@@ -125,7 +125,7 @@ def wall_profile(
     _check_teeth(cutter)
     phi_wall = _wall_immersion(milling)
     out = np.zeros((len(engagement), len(heights)))
-    _kernels.wall_profiles(
+    _wall_error.wall_profiles(
         engagement.start,
         _straight(engagement, cutter),
         engagement.tooth,
@@ -198,7 +198,7 @@ def wall_error_along(
     )
     made = _makes_wall(engagement, phi_wall, reach)
     out = np.zeros((len(engagement), 2))
-    _kernels.wall_worst(
+    _wall_error.wall_worst(
         engagement.start,
         engagement.rows,
         engagement.tooth,

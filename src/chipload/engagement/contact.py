@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipload.engagement import _kernels
+from chipload.engagement import _contact
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -89,7 +89,7 @@ def engagement(
     m = len(o)
     seg = stock.segments
     box = np.empty((len(seg), 4))
-    _kernels.boxes(seg, box)
+    _contact.boxes(seg, box)
     angle = np.zeros(m)
     count = np.zeros(m, dtype=np.int64)
     phi = np.zeros((m, PIECES, 2))
@@ -97,7 +97,7 @@ def engagement(
     with ThreadPoolExecutor(max(workers, 1)) as pool:
         list(
             pool.map(
-                lambda k: _kernels.engage(o, t, radius, seg, box, cut[k], cut[k + 1], angle, count, phi),
+                lambda k: _contact.engage(o, t, radius, seg, box, cut[k], cut[k + 1], angle, count, phi),
                 range(len(cut) - 1),
             )
         )

@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
-from chipload.engagement import _kernels
+from chipload.engagement import _contact
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -192,12 +192,12 @@ def with_runout(engagement: ToothEngagement, cutter: Cutter) -> ToothEngagement:
     sine = engagement.slices[engagement.slice, 3]
     sizes = np.zeros(len(engagement.rows), dtype=np.int64)
     none = np.empty((0, 7))
-    _kernels.runout_engagement(
+    _contact.runout_engagement(
         engagement.rows, engagement.tooth, sine, radii, turns, sizes, none, np.empty(0, np.int64), False
     )
     rows = np.empty((int(sizes.sum()), 7))
     tooth = np.empty(len(rows), dtype=np.int64)
-    _kernels.runout_engagement(engagement.rows, engagement.tooth, sine, radii, turns, sizes, rows, tooth, True)
+    _contact.runout_engagement(engagement.rows, engagement.tooth, sine, radii, turns, sizes, rows, tooth, True)
     start = np.concatenate([[0], np.cumsum(sizes)])[engagement.start]
     own, slices = np.repeat(engagement.slice, sizes), engagement.slices
     if cutter.pitch:

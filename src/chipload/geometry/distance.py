@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chipload.geometry import _kernels
+from chipload.geometry import _segments
 from chipload.geometry.contour import Floats
 
 
@@ -34,7 +34,7 @@ def distance(segments: ArrayLike, points: ArrayLike) -> Floats:
     seg = np.ascontiguousarray(segments, dtype=np.float64).reshape(-1, 7)
     p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 2)
     out = np.empty(len(p))
-    _kernels.distance(seg, boxes(seg), p, out)
+    _segments.distance(seg, boxes(seg), p, out)
     return out
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import ChiploadError, InputError
-from chipload.geometry import _kernels
+from chipload.geometry import _segments
 from chipload.geometry.contour import Contour, Floats, Region
 from chipload.geometry.distance import boxes
 from chipload.geometry.split import (
@@ -249,7 +249,7 @@ def _trimmed(
 
     def too_near(some: SplitSegments, limit: float) -> NDArray[np.bool_]:
         out = np.empty(len(some.raw), dtype=np.bool_)
-        _kernels.within_distance(given, fixed, _samples(raw, some), limit, out)
+        _segments.within_distance(given, fixed, _samples(raw, some), limit, out)
         return out
 
     pieces = pieces[~too_near(pieces, abs(d) - tol)]

@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from chipload.geometry import _kernels
+from chipload.geometry import _segments
 from chipload.geometry.contour import Contour, Floats
 from chipload.geometry.distance import boxes
 
@@ -68,7 +68,7 @@ def meetings(raw: RawSegments, tol: float) -> tuple[Ints, Floats]:
     room = 16 * len(seg) + 64
     while True:
         pairs, places = np.empty((room, 2), dtype=np.int64), np.empty((room, 2))
-        count = _kernels.crossings(seg, box, order, raw.smooth, tol, TOUCH_MM, pairs, places)
+        count = _segments.crossings(seg, box, order, raw.smooth, tol, TOUCH_MM, pairs, places)
         if count <= room:
             return pairs[:count], places[:count]
         room = count

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
-from chipload.machine._kernels import limit_acceleration
+from chipload.machine._acceleration import limit_acceleration
 from chipload.machine.machine import Machine
 
 Floats = NDArray[np.float64]

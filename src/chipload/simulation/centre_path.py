@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.errors import InputError
 from chipload.geometry.contour import Region
 from chipload.program.program import ARC_CCW, ARC_CW, Program
-from chipload.simulation import _kernels
+from chipload.simulation import _centre_path
 from chipload.simulation.material import strips
 
 Floats = NDArray[np.float64]
@@ -108,7 +108,7 @@ class CentrePath:
 
     @cached_property
     def motions(self) -> Floats:
-        """Motions (n, 9) as rows of :mod:`chipload.simulation._kernels`."""
+        """Motions (n, 9) as rows of :mod:`chipload.simulation._centre_path`."""
         return motion_rows(self.segments)
 
     @cached_property
@@ -119,7 +119,7 @@ class CentrePath:
 
     @cached_property
     def grid(self) -> tuple[float, float, float, int, int, Ints, Ints, NDArray[np.int32]]:
-        """Cells with the motions that can reach them, see :mod:`chipload.simulation._kernels`."""
+        """Cells with the motions that can reach them, see :mod:`chipload.simulation._centre_path`."""
         mot, active = self.motions, np.asarray(self.active)
         seg = self.segments[active]
         bulge = 2.0 * np.where(seg[:, 6] == 0.0, 0.0, mot[active, 7])[:, None]
@@ -134,16 +134,16 @@ class CentrePath:
         start = np.zeros(nx * ny + 1, dtype=np.int64)
         box = (float(low[0]), float(low[1]), h, nx, ny)
         none = np.zeros(0, dtype=np.int64)
-        _kernels.fill_grid(mot, active, self.radius, DISPLACED_MM, *box, cover, count, start, none, False)
+        _centre_path.fill_grid(mot, active, self.radius, DISPLACED_MM, *box, cover, count, start, none, False)
         start[1:] = np.cumsum(count)
         items = np.empty(start[-1], dtype=np.int64)
         count[:] = 0
-        _kernels.fill_grid(mot, active, self.radius, DISPLACED_MM, *box, cover, count, start, items, True)
+        _centre_path.fill_grid(mot, active, self.radius, DISPLACED_MM, *box, cover, count, start, items, True)
         return (*box, start, items, cover)
 
     @cached_property
     def rows(self) -> tuple[float, float, int, Ints, Ints, Floats]:
-        """The stock's boundary by strips of y, see :mod:`chipload.simulation._kernels`."""
+        """The stock's boundary by strips of y, see :mod:`chipload.simulation._centre_path`."""
         _, gy, h, _, ny = self.grid[:5]
         return strips(self.stock, gy, gy + ny * h)
 
@@ -151,7 +151,7 @@ class CentrePath:
         """Return centres (m, 2) [mm] and unit headings (m, 2) at moments; heading 0, 0 if a motion has no length."""
         k, w = self._moments(motion, share)
         centre, heading = np.empty((len(k), 2)), np.empty((len(k), 2))
-        _kernels.places(self.motions, k, w, centre, heading)
+        _centre_path.places(self.motions, k, w, centre, heading)
         return centre, heading
 
     def uncut(self, points: ArrayLike, motion: ArrayLike, share: ArrayLike) -> Bools:
@@ -163,7 +163,7 @@ class CentrePath:
         k, w = self._moments(motion, share)
         k, w = np.broadcast_to(k, len(p)).copy(), np.broadcast_to(w, len(p)).copy()
         out = np.empty(len(p), dtype=np.bool_)
-        _kernels.uncut_many(p, k, w, self.radius - TOUCH_MM, self.motions, self.grid, self.rows, out)
+        _centre_path.uncut_many(p, k, w, self.radius - TOUCH_MM, self.motions, self.grid, self.rows, out)
         return out
 
     def distance(self, points: ArrayLike) -> Floats:
@@ -172,7 +172,7 @@ class CentrePath:
         """
         p = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 2)
         out = np.empty(len(p))
-        _kernels.centre_path_distance(p, self.radius, TOUCH_MM, self.motions, self.active, self.grid, out)
+        _centre_path.centre_path_distance(p, self.radius, TOUCH_MM, self.motions, self.active, self.grid, out)
         return out
 
     def _moments(self, motion: ArrayLike, share: ArrayLike) -> tuple[Ints, Floats]:
@@ -255,7 +255,7 @@ def rim_engagement(
     own = np.maximum(np.searchsorted(begins, behind, side="right") - 1, away[k])
 
     def run(i: int) -> Any:
-        _kernels.rim(
+        _centre_path.rim(
             k, w, centre, heading, radius, radius - TOUCH_MM, own, displacement_mm, immersions, precision, mot, grid,
             rows, cut[i], cut[i + 1], angle, count, phi,
         )  # fmt: skip

@@ -43,7 +43,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.levers.levers import greatest_height, has_lever_loads, lever_loads, lever_loads_in_blocks
+from chipload.cutting.levers import greatest_height, has_lever_loads, lever_loads, lever_loads_in_blocks
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import tooth_radii
 from chipload.errors import InputError
@@ -53,7 +53,7 @@ from chipload.simulation.loads import GRAZES, ONE_SIDE, Cuts
 from chipload.simulation.removal import Removal
 from chipload.structure.spindle import Bar, tip_compliance
 
-_kernels = LateModule("chipload.simulation.bending._kernels")
+_form_error = LateModule("chipload.simulation._form_error")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -361,7 +361,7 @@ def form_error(
     all_cuts = _kept(removal) if isinstance(removal, Removal) else removal
     least = np.full(len(q), np.inf)
     for cuts in all_cuts:
-        _kernels.least_distances(q, n, cuts.ends, _shape(cuts.cutter), near, facing, least)
+        _form_error.least_distances(q, n, cuts.ends, _shape(cuts.cutter), near, facing, least)
     rigid, cutter, yielded, force = (np.zeros(len(q)) for _ in range(4))
     out = FormError(np.full(len(q), -1), rigid, cutter, yielded, force, np.zeros(len(q), dtype=np.bool_))
     best = np.full(len(q), np.inf)
@@ -392,7 +392,7 @@ def _made_by(
     room = 16 * len(q) + 64
     while True:
         owner, moment = np.empty((room, 2), dtype=np.int64), np.empty((room, 14))
-        count = _kernels.contacts(q, n, cuts.ends, shape, most, model.facing, owner, moment)
+        count = _form_error.contacts(q, n, cuts.ends, shape, most, model.facing, owner, moment)
         if count <= room:
             break
         room = count
@@ -410,7 +410,7 @@ def _made_by(
     for j in range(1 if cuts.cutter.teeth_alike else cuts.cutter.flutes):
         there, made = np.empty(count), np.empty(count, dtype=np.bool_)
         b = cuts.engagement
-        _kernels.nearest_engaged_many(
+        _form_error.nearest_engaged_many(
             k, s, phi, b.start, b.rows, b.tooth, b.slice, b.slices, j, model.reach, there, made
         )
         if lag > 0.0:
@@ -490,7 +490,7 @@ def _bent(
     out = np.empty((len(k), 5))
     b = cuts.engagement
     law = np.array(material.law)
-    _kernels.loads_of_teeth(
+    _form_error.loads_of_teeth(
         k, theta, z, b.start, b.rows, b.tooth, b.slice, b.slices, cuts.cutter.flutes, law, chain, out
     )
     return out

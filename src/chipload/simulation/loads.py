@@ -17,7 +17,7 @@ from chipload.cutter.slices import Slices
 from chipload.cutting.band import mean_band, peak_band
 from chipload.cutting.force import forces_over_turn, in_work, mean_forces
 from chipload.cutting.material import Material
-from chipload.cutting.revolution.revolution import first_greatest
+from chipload.cutting.revolution import first_greatest
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
 from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
@@ -25,7 +25,7 @@ from chipload.errors import InputError
 from chipload.lazy import LateModule
 from chipload.simulation.steps import Steps
 
-chips = LateModule("chipload.engagement.chips._kernels")
+chips = LateModule("chipload.engagement.chips._section")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -78,7 +78,7 @@ def _to_circle(p: Floats, direction: Floats, centre: Floats, radius: float) -> F
 def strips(stock: Region | None, low: float, high: float) -> tuple[float, float, int, Ints, Ints, Floats]:
     """Return the boundary of ``stock`` in pieces monotone in y, by strips of y between ``low`` and ``high`` [mm].
 
-    The form is that of ``rows`` in :mod:`chipload.simulation._kernels`. Ends of neighbours are made one, so that no
+    The form is that of ``rows`` in :mod:`chipload.simulation._centre_path`. Ends of neighbours are made one, so that no
     ray slips between them.
     """
     if stock is None:

@@ -23,7 +23,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
 from chipload.cutting.band import deviations, force_deviation, torque_deviation, turned_basis
 from chipload.cutting.material import Material
-from chipload.cutting.revolution.revolution import loads_over_turn
+from chipload.cutting.revolution import loads_over_turn
 from chipload.engagement.bricks.stock import BrickStock
 from chipload.engagement.moves.stock import Engaged, MoveStock, cutter_row
 from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
@@ -35,7 +35,7 @@ from chipload.simulation.steps import ROWS, Steps, steps_in_blocks
 from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
 
-skew = LateModule("chipload.engagement.moves.skew._kernels")
+skew = LateModule("chipload.engagement.moves._skew_slices")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -17,7 +17,7 @@ from chipload.errors import Cancelled, InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
 from chipload.progress import Progress, silent
-from chipload.simulation import _kernels
+from chipload.simulation import _centre_path
 from chipload.simulation.centre_path import LEVEL_MM, CentrePath, flat_motions, motion_rows, rim_engagement
 from chipload.simulation.wall_distance import GreatestDistance, excess, gouge
 
@@ -338,7 +338,7 @@ def _compare(
     mot = motion_rows(flat_motions(program))
     z0, z1 = _heights(program)
     k, w = np.zeros(m, dtype=np.int64), np.zeros(m)
-    found = int(_kernels.locate(points, np.ascontiguousarray(z), mot, z0, z1, MATCH_MM, LEVEL_MM, k, w))
+    found = int(_centre_path.locate(points, np.ascontiguousarray(z), mot, z0, z1, MATCH_MM, LEVEL_MM, k, w))
     if found < m:
         failed.append(f"history row {found} at ({x[found]:.4f}, {y[found]:.4f}, {z[found]:.4f}) is not on the path")
     wanted = np.ones(m, dtype=np.bool_) if passes is None else np.isin(columns["pass"].astype(str), list(passes))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour
-from chipload.simulation import _kernels
+from chipload.simulation import _centre_path
 from chipload.simulation.centre_path import CentrePath, motion_rows
 
 Floats = NDArray[np.float64]
@@ -66,7 +66,7 @@ def gouge(centres: CentrePath, wall: Sequence[Contour], material: str, step_mm: 
 
     def depth(k: Ints, w: Floats) -> Floats:
         out = np.empty(len(k))
-        _kernels.signed_distance(centres.places(k, w)[0], rows, loose, side, out)
+        _centre_path.signed_distance(centres.places(k, w)[0], rows, loose, side, out)
         return centres.radius - out
 
     g = depth(k, w)
@@ -88,8 +88,8 @@ def gouge(centres: CentrePath, wall: Sequence[Contour], material: str, step_mm: 
         if found[j] > best_g:
             best_k, best_w, best_g = k[high][j], float(middle[j]), float(found[j])
     o = centres.places([best_k], [best_w])[0][0]
-    near = min((*_kernels.nearest(rows, i, 0.0, 1.0, o[0], o[1]), i) for i in range(len(rows)))
-    x, y, _, _ = _kernels.place(rows, near[2], near[1])
+    near = min((*_centre_path.nearest(rows, i, 0.0, 1.0, o[0], o[1]), i) for i in range(len(rows)))
+    x, y, _, _ = _centre_path.place(rows, near[2], near[1])
     return GreatestDistance(max(best_g, 0.0), (float(x), float(y)), len(k))
 
 

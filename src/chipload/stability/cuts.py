@@ -1,11 +1,11 @@
 """Cuts in the form that the stability kernels need: tooth engagement, force coefficients, speed, modes.
 
-Notation: as in :mod:`chipload.stability.directional._kernels`. On a slice whose outward normal makes the angle kappa
+Notation: as in :mod:`chipload.stability._directional`. On a slice whose outward normal makes the angle kappa
 with the axis, a displacement r across the axis changes the chip thickness by sin(kappa) u.r, and the force across the
 axis is -dFt e - (sin(kappa) dFr + cos(kappa) dFa) u. So kt = sin(kappa) Ktc, kr = sin(kappa)^2 Krc,
 ka = sin(kappa) cos(kappa) Kac; with an exponent m each is (1 - m) times that at a thickness of 1 mm, the slope of the
 force at the nominal thickness. Edge forces do not depend on the thickness. In two directions thrust is rigid, see
-:mod:`chipload.stability.several._kernels` for three. Each tooth cuts what the one before it left, but for runout: see
+:mod:`chipload.stability._several_delays` for three. Each tooth cuts what the one before it left, but for runout: see
 :mod:`chipload.stability.delays`.
 
 Reference: [Altintas1995]; [Engin2001] for kappa.

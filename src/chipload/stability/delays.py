@@ -24,7 +24,7 @@ from chipload.engagement.tooth_engagement import ToothEngagement, tooth_radii, t
 from chipload.errors import InputError
 from chipload.lazy import LateModule
 
-_kernels = LateModule("chipload.stability.several._kernels")
+_several_delays = LateModule("chipload.stability._several_delays")
 
 if TYPE_CHECKING:
     from chipload.stability.cuts import DynamicCuts
@@ -104,7 +104,7 @@ def several_multipliers(
         angles = np.array([cuts.pitch])
 
     def part(first: int, last: int) -> None:
-        _kernels.multipliers(
+        _several_delays.multipliers(
             first, last, start, rows, number, angles, cuts.exponents, time, angle, cuts.omega,
             np.array(cuts.damping), cuts.U, gain, per_wave, most, still, out,
         )  # fmt: skip

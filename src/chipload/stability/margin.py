@@ -22,7 +22,7 @@ from chipload.lazy import LateModule
 from chipload.stability.cuts import DynamicCuts
 from chipload.stability.delays import several_multipliers
 
-_kernels = LateModule("chipload.stability._kernels")
+_tooth_period = LateModule("chipload.stability._tooth_period")
 
 Floats = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def largest_multipliers(
     pitch = np.full(len(cuts), cuts.pitch)
 
     def part(first: int, last: int) -> None:
-        _kernels.multipliers(
+        _tooth_period.multipliers(
             first, last, cuts.start, cuts.rows, cuts.damped, cuts.exponents, cuts.period, pitch, cuts.omega,
             np.array(cuts.damping), cuts.U, factor, per_wave, dimension, still, out,
         )  # fmt: skip
@@ -137,27 +137,27 @@ def _several_margins(cuts: DynamicCuts) -> StabilityMargins:
 
     def growth(which: NDArray[np.int64], gain: Floats) -> Floats:
         last[which] = several_multipliers(cuts.chosen(which), gain, PER_WAVE, most, STILL, shared)
-        return np.asarray(np.log(np.maximum(last[which, 0], _kernels.TINY)) / teeth)
+        return np.asarray(np.log(np.maximum(last[which, 0], _tooth_period.TINY)) / teeth)
 
     every = np.arange(n)
     at_one = growth(every, np.ones(n))
     low, high = np.ones(n), np.ones(n)
     g_low, g_high = at_one.copy(), at_one.copy()
     stable, count = at_one < 0.0, 0
-    for factor in (*_kernels.ABOVE.tolist(),):
+    for factor in (*_tooth_period.ABOVE.tolist(),):
         which = np.flatnonzero(stable & (g_high < 0.0))
         if len(which):
             low[which], g_low[which] = high[which], g_high[which]
             high[which] = factor
             g_high[which] = growth(which, high[which])
-    while count < _kernels.DOWN and (g_low >= 0.0).any():
+    while count < _tooth_period.DOWN and (g_low >= 0.0).any():
         which = np.flatnonzero(g_low >= 0.0)
         high[which], g_high[which] = low[which], g_low[which]
-        low[which] *= _kernels.BELOW
+        low[which] *= _tooth_period.BELOW
         g_low[which] = growth(which, low[which])
         count += 1
     open_ = (g_low < 0.0) & (g_high >= 0.0)
-    for k in range(_kernels.CLOSING):
+    for k in range(_tooth_period.CLOSING):
         which = np.flatnonzero(open_ & (high - low > CLOSED * high))
         if not len(which):
             break
@@ -176,7 +176,7 @@ def _several_margins(cuts: DynamicCuts) -> StabilityMargins:
         mode[found] = last[found, 3].astype(np.int64)
         for k in found.tolist():
             omega = float(cuts.omega[k, mode[k]])
-            frequency[k] = _kernels.chatter_hz(last[k, 1], teeth * float(cuts.period[k]), omega)
+            frequency[k] = _tooth_period.chatter_hz(last[k, 1], teeth * float(cuts.period[k]), omega)
     return StabilityMargins(margin, frequency, mode, at_one)
 
 
@@ -186,7 +186,7 @@ def _margins(cuts: DynamicCuts, per_wave: float) -> Floats:
     pitch = np.full(len(cuts), cuts.pitch)
 
     def part(first: int, last: int) -> None:
-        _kernels.margins(
+        _tooth_period.margins(
             first, last, cuts.start, cuts.rows, cuts.damped, cuts.exponents, cuts.period, pitch, cuts.omega,
             np.array(cuts.damping), cuts.U, per_wave, 2 * len(cuts.damping) + SPARE, STILL, out,
         )  # fmt: skip

@@ -26,7 +26,7 @@ from chipload.stability.cuts import DynamicCuts, dynamic_cuts
 from chipload.stability.margin import shared
 from chipload.stability.modes import Modes
 
-_kernels = LateModule("chipload.stability.location._kernels")
+_surface_location = LateModule("chipload.stability._surface_location")
 
 Floats = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def wall_errors(cuts: DynamicCuts, rows: Floats) -> tuple[Floats, NDArray[np.boo
     teeth = round(math.tau / cuts.pitch)
 
     def part(first: int, last: int) -> None:
-        _kernels.wall_errors(
+        _surface_location.wall_errors(
             first, last, cuts.start, rows, cuts.period, teeth, cuts.omega, np.array(cuts.damping), cuts.U,
             out,
         )  # fmt: skip

@@ -1,6 +1,6 @@
 """Plane areas as rings of points for the compiled loops, and their conversion from and to polygons.
 
-Notation: rings as in :mod:`chipload.stock.clip._kernels`: not closed by repeating a point, the area on their left.
+Notation: rings as in :mod:`chipload.stock._clip`: not closed by repeating a point, the area on their left.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from chipload.errors import InputError
 from chipload.geometry.mesh import require_closed
 from chipload.lazy import LateModule
 
-_kernels = LateModule("chipload.stock.dexels._kernels")
+_dexels = LateModule("chipload.stock._dexels")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -208,7 +208,7 @@ class TriDexel:
 
     def _remove(self, tips: Floats, axes: Floats, shape: Floats, tol: float) -> None:
         for rays in self.rays:
-            while not _kernels.cut(rays.k, rays.grid, tol, tips, axes, shape, rays.ends, rays.count):
+            while not _dexels.cut(rays.k, rays.grid, tol, tips, axes, shape, rays.ends, rays.count):
                 rays.ends = np.concatenate([rays.ends, np.zeros_like(rays.ends)], axis=1)
 
 

@@ -23,7 +23,7 @@ from shapely import MultiPolygon, Polygon
 from chipload.errors import InputError
 from chipload.files import write_whole
 from chipload.geometry.mesh import require_closed
-from chipload.stock.edges._kernels import ring_edges
+from chipload.stock._ring_edges import ring_edges
 from chipload.stock.shapes import read_shapes, shape_bytes
 from chipload.stock.solid import glb, prisms
 from chipload.stock.tile_grid import (

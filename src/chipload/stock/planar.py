@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
-from chipload.stock import _kernels
+from chipload.stock import _planar
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -29,7 +29,7 @@ CELL_LIMIT = 8_000_000
 #: least depth of a contact of rim and material, as a share of R
 TOUCH = 1e-9
 #: status of a cell that is wholly cleared
-EMPTY = _kernels.EMPTY
+EMPTY = _planar.EMPTY
 
 
 class PlanarStock:
@@ -71,14 +71,14 @@ class PlanarStock:
         side = (2.5 * radius + 2.0 * reach) / h + 2.0
         room = math.ceil(side * ((2.0 * radius + 2.0 * reach) / h + 2.0))
         self.grid: Floats = np.array([x0 - margin, y0 - margin, h, nx, ny, reach, piece, room])
-        self.head = np.full(nx * ny, _kernels.FULL, dtype=np.int64)
-        self.count = np.full(nx * ny, _kernels.MORE, dtype=np.int64)
+        self.head = np.full(nx * ny, _planar.FULL, dtype=np.int64)
+        self.count = np.full(nx * ny, _planar.MORE, dtype=np.int64)
         self.link = np.zeros((1 << 16, 2), dtype=np.int64)
         self.used = 0
         self.axis: Floats = np.zeros((1 << 12, 9))
         self.capsules = 0
         #: arcs of a rim, and the workspace of their calculation
-        self.rim: Floats = np.zeros((_kernels.RIM, 2))
+        self.rim: Floats = np.zeros((_planar.RIM, 2))
 
     def reserve(self, capsules: int) -> None:
         """Reserve memory for a number of further capsules."""
@@ -110,7 +110,7 @@ class PlanarStock:
             if row[6] != 0.0:
                 length = abs(row[6]) * math.hypot(row[0] - row[4], row[1] - row[5])
             self.reserve(2 + math.ceil(2.0 * length / self.radius) + math.ceil(4.0 * abs(row[6]) / math.pi))
-            self.capsules, self.used = _kernels.remove_segment(
+            self.capsules, self.used = _planar.remove_segment(
                 *row, self.capsules, self.radius, self.grid, self.head, self.count, self.link, self.used, self.axis
             )
 
@@ -121,7 +121,7 @@ class PlanarStock:
         """
         (ox, oy), (tx, ty) = np.asarray(centre, dtype=np.float64), np.asarray(heading, dtype=np.float64)
         r = self.radius * (1.0 - TOUCH)
-        n = _kernels.uncut(ox, oy, tx, ty, r, self.radius, whole, self.grid, self.head, self.link, self.axis, self.rim)
+        n = _planar.uncut(ox, oy, tx, ty, r, self.radius, whole, self.grid, self.head, self.link, self.axis, self.rim)
         return self.rim[:n].copy()
 
     def engagement(self, centre: ArrayLike, heading: ArrayLike) -> float:

@@ -1,6 +1,6 @@
 """Tiles of a layered stock as rings of numbers while steps are removed, without an object for each tile.
 
-Notation: as in :mod:`chipload.stock.tiles._kernels`.
+Notation: as in :mod:`chipload.stock._tiles`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from chipload.stock.areas import PlaneAreas, areas_of, polygon_of
 from chipload.stock.layers import ROOM, LayeredStock
 from chipload.stock.tile_grid import areas_alone, polygons, span
 
-kernels = LateModule("chipload.stock.tiles._kernels")
+kernels = LateModule("chipload.stock._tiles")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -4,7 +4,7 @@ Notation: A (f, f) = P^T L D L^T P with P a permutation (minimum degree on A + A
 diagonal; B right-hand sides (f, q).
 
 SuperLU factors without pivots. Its own solution processes the columns one after the other through 100 MB of factors.
-:func:`chipload.structure._kernels.solve_triangular` processes 64 together, skips rows that are still zero in forward
+:func:`chipload.structure._triangular.solve_triangular` processes 64 together, skips rows that are still zero in forward
 substitution and rows that are not needed in back substitution: ten times as many in the same time
 (benchmarks/structure.py).
 """
@@ -22,7 +22,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from chipload.errors import InputError
 from chipload.lazy import LateModule
 
-_kernels = LateModule("chipload.structure._kernels")
+_triangular = LateModule("chipload.structure._triangular")
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -72,13 +72,13 @@ class Factors:
         wanted = np.ones(len(order), dtype=np.bool_) if rows is None else np.zeros(len(order), dtype=np.bool_)
         if rows is not None:
             wanted[order[rows]] = True
-            _kernels.mark_ancestors(indptr, indices, wanted)
+            _triangular.mark_ancestors(indptr, indices, wanted)
         out = np.empty((len(order) if rows is None else len(rows), right.shape[1]))
         for at in range(0, right.shape[1], ABREAST):
             part = slice(at, at + ABREAST)
             work = np.empty((len(order), right[:, part].shape[1]))
             work[order] = right[:, part]
-            _kernels.solve_triangular(indptr, indices, data, inverse, wanted, work)
+            _triangular.solve_triangular(indptr, indices, data, inverse, wanted, work)
             out[:, part] = work[order if rows is None else order[rows]]
         return out
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from chipload.engagement.bricks.front._kernels import areas_of
+from chipload.engagement.bricks._contact import areas_of
 
 TAU = 2.0 * math.pi
 #: slices 1 mm long, one after the other along a profile at 5 mm from the axis

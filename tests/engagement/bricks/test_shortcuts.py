@@ -9,13 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.bricks._kernels import WAIT, estimated_least, least, swept
-from chipload.engagement.bricks.chain._kernels import joined
-from chipload.engagement.bricks.circle._kernels import crossing, swept_at
-from chipload.engagement.bricks.index._kernels import what_is
+from chipload.engagement.bricks._circle import crossing, swept_at
+from chipload.engagement.bricks._index import what_is
+from chipload.engagement.bricks._line_chain import joined
+from chipload.engagement.bricks._sweep import WAIT, estimated_least, least, swept
 from chipload.engagement.bricks.stock import BrickStock, cutter_row, move_rows
-from chipload.engagement.moves._kernels import MATERIAL
-from chipload.engagement.moves.border._kernels import BESIDE
+from chipload.engagement.moves._border import BESIDE
+from chipload.engagement.moves._sweep import MATERIAL
 from engagement.bricks.programs import take, turned, unit, volumes
 from engagement.bricks.test_turning_volumes import HIGH, LOW, five_axes
 from engagement.moves.field import BULL, CUTTERS, FLAT

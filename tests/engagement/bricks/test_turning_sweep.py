@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from chipload.engagement.bricks._kernels import WAIT, least, outside, swept
+from chipload.engagement.bricks._sweep import WAIT, least, outside, swept
 from chipload.engagement.bricks.stock import cutter_row, move_rows
 from engagement.bricks.programs import inside, turned, unit
 from engagement.moves.field import CUTTERS

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.chips._kernels import instant
+from chipload.engagement.chips._grazing_points import MAX_ROOTS, NODES, roots
+from chipload.engagement.chips._section import instant
 from chipload.engagement.chips.move import Move
 from chipload.engagement.chips.section import cutter_numbers
-from chipload.engagement.chips.zeros._kernels import MAX_ROOTS, NODES, roots
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.moves import _kernels
+from chipload.engagement.moves import _sweep
 from chipload.engagement.moves.stock import MoveStock
 
 GRID = np.array([0.0, 0.0, 1.0, 1.0, -10.0, 100.0])
@@ -31,7 +31,7 @@ def test_packed_lists_hold_the_moves_below_the_ceiling_in_their_order() -> None:
         low = -10.0 + reach[own] / 100.0 < level[cell, 1] + 1e-4
         wanted.append(list(zip(kept[own][low].tolist(), reach[own][low].tolist(), strict=True)))
     order = np.argsort(lists[:, 0], kind="stable")
-    total = _kernels.packed(order, GRID, lists, kept, reach, level)
+    total = _sweep.packed(order, GRID, lists, kept, reach, level)
     assert total == sum(map(len, wanted))
     for cell, pairs in enumerate(wanted):
         own = slice(lists[cell, 0], lists[cell, 0] + lists[cell, 1])
@@ -42,9 +42,9 @@ def test_a_reach_in_two_bytes_is_never_above_the_height() -> None:
     random = np.random.default_rng(8)
     z = random.uniform(-10.0, 0.0, 500)
     for least in random.uniform(-12.0, 0.0, 500):
-        steps = min(max(int(np.floor((least - GRID[4]) * GRID[5])), 0), _kernels.HEIGHTS)
+        steps = min(max(int(np.floor((least - GRID[4]) * GRID[5])), 0), _sweep.HEIGHTS)
         over = z[z > least - 1e-8]
-        assert all(steps < _kernels.above(h, GRID) for h in over)
+        assert all(steps < _sweep.above(h, GRID) for h in over)
 
 
 def test_lists_grow_where_they_are_and_the_index_is_dropped() -> None:

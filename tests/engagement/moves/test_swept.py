@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.moves._kernels import from_ball, off_ball, swept
-from chipload.engagement.moves.border._kernels import crossing
+from chipload.engagement.moves._border import crossing
+from chipload.engagement.moves._sweep import from_ball, off_ball, swept
 from chipload.engagement.moves.stock import MoveStock, cutter_row
 from engagement.moves.field import BALL, CUTTERS, FLAT, least_height
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.planning.impeller import _kernels
+from chipload.planning.impeller import _largest_cutter
 from chipload.planning.impeller.closed_form import axis_at, contact_limit, rho_limits
-from chipload.planning.impeller.ranges.ranges import valid_ranges
+from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.scene import Scene
 from chipload.planning.impeller.search import limits
 
@@ -30,7 +30,9 @@ def one(rng, check, bend=0.0):
 def arcs_of(s, point, table, rho, r):
     out = np.empty((64, 2))
     cone = np.array([math.sin(table), math.cos(table)])
-    count = _kernels.point_arcs(s.check, point, s.rows[0], cone, rho, r, PLAIN, 0.0, 2.0 * math.pi, LEAST, out, 0)
+    count = _largest_cutter.point_arcs(
+        s.check, point, s.rows[0], cone, rho, r, PLAIN, 0.0, 2.0 * math.pi, LEAST, out, 0
+    )
     return out[:count]
 
 
@@ -104,7 +106,7 @@ def test_hollow(seed):
     tree, cone, tool = s.tree, np.array([math.sin(table), math.cos(table)]), np.array([r, math.inf, 0.0])
     points, own = s.check[tree.order], s.check_surface[tree.order]
     for k in np.flatnonzero(np.isfinite(bound))[::7]:
-        one_limit, _ = _kernels.largest_at(
+        one_limit, _ = _largest_cutter.largest_at(
             points, own, tree.nodes, tree.spans, tree.leaves, s.rows[0], cone, tool, B[k], 1e9, -1,
             np.zeros(1, int), 0,
         )  # fmt: skip

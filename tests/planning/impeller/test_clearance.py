@@ -3,7 +3,7 @@
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.planning.impeller.clearance.clearance import clearance, interpolated_axes, moves_clear
+from chipload.planning.impeller.clearance import clearance, interpolated_axes, moves_clear
 from chipload.planning.impeller.scene import Scene
 
 CUTTER = CatalogueCutter(10.0, 2.0, 12.0, neck_diameter=8.0, neck_length=20.0, reach=30.0, holder_diameter=24.0)

@@ -13,8 +13,8 @@ from chipload.geometry.revolve import Revolved
 from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.covering.covering import covering_of, depth_of
 from chipload.planning.impeller.covering.nodes import hub_nodes, patch_nodes
+from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
-from chipload.planning.impeller.ranges.ranges import valid_ranges
 from chipload.planning.impeller.surfaces import ContactSampling, hub_range, surface_of
 
 TOLERANCE = 0.05

@@ -16,9 +16,9 @@ from tests.planning.impeller.test_point_milling import (
 )
 
 from chipload.cutter.catalogue import CatalogueCutter
+from chipload.planning.impeller import _clearance
 from chipload.planning.impeller.axis_field import AxisField, axis_field, clear_field, pose
-from chipload.planning.impeller.clearance import _kernels
-from chipload.planning.impeller.clearance.clearance import clearance
+from chipload.planning.impeller.clearance import clearance
 from chipload.planning.impeller.point_milling import point_path
 from chipload.planning.impeller.profile import contact_band, profile_numbers, support
 from chipload.planning.impeller.scallop_height import profile_scallops
@@ -77,7 +77,7 @@ def test_the_distance_is_that_of_the_profile_in_chords(cutter):
     rng = np.random.default_rng(3)
     d, z = rng.uniform(0.0, 14.0, 4000), rng.uniform(-4.0, cutter.cutting_length, 4000)
     numbers, stages = profile_numbers(cutter), cutter.stages(0.0)[:1]
-    got = np.array([_kernels.profile_distance(b, a, numbers, stages) for a, b in zip(d, z, strict=True)])
+    got = np.array([_clearance.profile_distance(b, a, numbers, stages) for a, b in zip(d, z, strict=True)])
     want = gaps(cutter, d, z)
     out = want > 0.0
     # a point that is nearest to the rim of the top is looked at as if the flank went on

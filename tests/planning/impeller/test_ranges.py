@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named
+from chipload.planning.impeller import _pallet_ranges
 from chipload.planning.impeller.answer import largest_cutters, one_cutter
 from chipload.planning.impeller.closed_form import axis_at, contact_limit
-from chipload.planning.impeller.ranges import _kernels
-from chipload.planning.impeller.ranges.ranges import valid_ranges
+from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.scene import Scene
 
 PLAIN = CatalogueCutter(20.0, 2.0)
@@ -158,7 +158,7 @@ def test_a_point_that_bounds_prove_clear_is_clear_at_every_angle(cutter):
         low = rng.uniform(-1.2, 1.0)
         part = low, low + math.radians(8.0)
         goes = all(clear(one, 0, cutter, table, B, 0.5) for B in np.linspace(*part, 41))
-        if _kernels.clear_within(
+        if _pallet_ranges.clear_within(
             s.check, i, s.rows[0], cone, cutter.corner_radius, cutter.rho, stages, *part, math.radians(0.5)
         ):
             assert goes

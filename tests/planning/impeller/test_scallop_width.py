@@ -9,7 +9,7 @@ from chipload.geometry.bspline import through
 from chipload.planning.impeller import _scallop
 from chipload.planning.impeller.scallop_height import distance, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
-from chipload.stock.dexels._kernels import pierce
+from chipload.stock._dexels import pierce
 
 R, r = 6.0, 2.0
 SHAPE = np.array([r, R - r, r, 0.0, 0.0, r, R, 0.0, 60.0, R, 0.0, R - r, r, r])

@@ -12,8 +12,8 @@ from chipload.errors import InputError
 from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.axis_field import pose
 from chipload.planning.impeller.covering.covering import covering_of
+from chipload.planning.impeller.pallet_ranges import corner_ranges, valid_ranges
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
-from chipload.planning.impeller.ranges.ranges import corner_ranges, valid_ranges
 from chipload.planning.impeller.scene import Scene
 from chipload.planning.impeller.surfaces import ContactSampling, hub_range, surface_of
 

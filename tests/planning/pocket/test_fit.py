@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from chipload.planning.pocket._fit import engagement_along
-from chipload.planning.pocket._kernels import angle_at
-from chipload.stock._kernels import RIM
+from chipload.planning.pocket._pass_steps import angle_at
+from chipload.stock._planar import RIM
 from chipload.stock.planar import TOUCH, PlanarStock
 
 #: thickness [mm] of a wall that two slots leave

@@ -9,9 +9,9 @@ import pytest
 import shapely
 
 from chipload.geometry.contour import Contour, Region
-from chipload.planning.pocket import _kernels
+from chipload.planning.pocket import _pass_steps
 from chipload.planning.pocket.reach import reach_of
-from chipload.stock._kernels import uncut_between
+from chipload.stock._planar import uncut_between
 from chipload.stock.planar import TOUCH, PlanarStock
 
 
@@ -24,7 +24,7 @@ def test_no_edge_is_nearer_than_the_room_about_a_place() -> None:
     inside = shapely.polygons(corners)
     rng = np.random.default_rng(5)
     places = rng.uniform([-2.0, -2.0], [42.0, 26.0], (20_000, 2))
-    room = np.array([_kernels.room(x, y, stock.grid, reach.flag) for x, y in places.tolist()])
+    room = np.array([_pass_steps.room(x, y, stock.grid, reach.flag) for x, y in places.tolist()])
     far = shapely.distance(shapely.points(places), inside.exterior)
     free = room > 0.0
     assert (far[free] >= room[free]).all()

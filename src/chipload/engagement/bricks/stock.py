@@ -1,6 +1,6 @@
 """The stock as the moves that cut it, for a cutter whose axis leans or turns: an index of bricks.
 
-Notation: as in :mod:`chipload.engagement.bricks._kernels`. A brick is ``BRICK`` of the smallest cutter radius wide, or
+Notation: as in :mod:`chipload.engagement.bricks._sweep`. A brick is ``BRICK`` of the smallest cutter radius wide, or
 as much wider as memory requires; it decides which moves are searched at a point and what that costs, not the answer.
 Bricks are kept in blocks of 8 x 8 x 8 where moves left a surface: memory follows the surface. A cutter ends where its
 flutes end; a step with material there is reported.
@@ -23,13 +23,13 @@ from chipload.engagement.moves.stock import INSTANT, Engaged, corner_parts, face
 from chipload.engagement.moves.stock import cutter_row as upright_row
 from chipload.lazy import LateModule
 
-_kernels = LateModule("chipload.engagement.bricks._kernels")
-front = LateModule("chipload.engagement.bricks.front._kernels")
-index = LateModule("chipload.engagement.bricks.index._kernels")
-outline = LateModule("chipload.engagement.bricks.outline._kernels")
-moves = LateModule("chipload.engagement.moves._kernels")
-moves_front = LateModule("chipload.engagement.moves.front._kernels")
-initial = LateModule("chipload.engagement.moves.initial._kernels")
+_sweep = LateModule("chipload.engagement.bricks._sweep")
+front = LateModule("chipload.engagement.bricks._contact")
+index = LateModule("chipload.engagement.bricks._index")
+outline = LateModule("chipload.engagement.bricks._outline")
+moves = LateModule("chipload.engagement.moves._sweep")
+moves_front = LateModule("chipload.engagement.moves._contact")
+initial = LateModule("chipload.engagement.moves._initial_faces")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -230,7 +230,7 @@ class BrickStock:
         room = int(math.tau / (apart * min(front.SLICES / pieces, 1.0))) + 8
         return (
             np.empty((room, 2)), np.empty(5), np.empty(9), np.empty(9), np.empty((3, 2)), np.zeros((3, RANGES, 7)),
-            np.empty((_kernels.WAIT, 6)), np.empty(18), np.zeros(1), np.empty(2, dtype=np.int64),
+            np.empty((_sweep.WAIT, 6)), np.empty(18), np.zeros(1), np.empty(2, dtype=np.int64),
             np.zeros(3, dtype=np.int64),
         )  # fmt: skip
 

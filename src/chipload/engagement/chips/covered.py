@@ -36,11 +36,11 @@ from chipload.errors import InputError
 from chipload.lazy import LateModule
 from chipload.stock.areas import PlaneAreas, areas_of
 
-_kernels = LateModule("chipload.engagement.chips._kernels")
-faces = LateModule("chipload.engagement.chips.faces._kernels")
-loop = LateModule("chipload.engagement.chips.loop._kernels")
-straight = LateModule("chipload.engagement.chips.straight._kernels")
-trace = LateModule("chipload.engagement.chips.trace._kernels")
+_section = LateModule("chipload.engagement.chips._section")
+faces = LateModule("chipload.engagement.chips._diagram_faces")
+loop = LateModule("chipload.engagement.chips._boundary")
+straight = LateModule("chipload.engagement.chips._straight_move")
+trace = LateModule("chipload.engagement.chips._grazing_trace")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -364,7 +364,7 @@ def _candidates(move: Move, K: Floats, h: float, tolerance: float, knots: int) -
 def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -> Floats:
     """Edges (n, 12) of the section at t, counter-clockwise; none where the layer isn't cut."""
     S, C, buffer = np.empty(27), np.empty((8, 5)), np.empty((2048, 12))
-    if not _kernels.instant(move.tip, move.axis, K, h, t, S, C):
+    if not _section.instant(move.tip, move.axis, K, h, t, S, C):
         return np.empty((0, 12))
     n = trace.ring(S, K, C, tolerance, trace.FIRST, buffer, 0)
     while n < 0:

@@ -17,7 +17,7 @@ from chipload.engagement.chips.move import Move
 from chipload.engagement.chips.section import cutter_numbers
 from chipload.lazy import LateModule
 
-_kernels = LateModule("chipload.engagement.chips._kernels")
+_section = LateModule("chipload.engagement.chips._section")
 
 Floats = NDArray[np.float64]
 
@@ -53,8 +53,8 @@ def diagram(
     V = np.full((times, angles), np.nan)
     corners = []
     for i, at in enumerate(t):
-        if _kernels.instant(move.tip, move.axis, K, float(height), at, S, C):
-            V[i] = [_kernels.point(S, K, angle, row) for angle in theta]
+        if _section.instant(move.tip, move.axis, K, float(height), at, S, C):
+            V[i] = [_section.point(S, K, angle, row) for angle in theta]
             corners += [(float(angle), float(at)) for angle in C[: int(S[20]), 0]]
     edges = candidates(move, cutter, height, tolerance)
     made = np.array(corners, dtype=np.float64).reshape(-1, 2)

@@ -23,7 +23,7 @@ from chipload.engagement.chips.move import Move
 from chipload.errors import InputError
 from chipload.lazy import LateModule
 
-_kernels = LateModule("chipload.engagement.chips._kernels")
+_section = LateModule("chipload.engagement.chips._section")
 
 Floats = NDArray[np.float64]
 
@@ -82,12 +82,12 @@ def section(move: Move, cutter: Cutter, height: float, t: float, theta: ArrayLik
     if not 0.0 <= t <= 1.0:
         raise InputError(f"section: t = {t:g}: must be from 0 to 1")
     K, S, C = cutter_numbers(cutter), np.empty(27), np.empty((8, 5))
-    if not _kernels.instant(move.tip, move.axis, K, float(height), float(t), S, C):
+    if not _section.instant(move.tip, move.axis, K, float(height), float(t), S, C):
         return None
     angles = np.atleast_1d(np.asarray(theta, dtype=np.float64))
     rows, V = np.empty((len(angles), 7)), np.empty(len(angles))
     for i, angle in enumerate(angles):
-        V[i] = _kernels.point(S, K, angle, rows[i])
+        V[i] = _section.point(S, K, angle, rows[i])
     return SectionEdge(angles, rows[:, :2], V, rows[:, 4:6], rows[:, 6].astype(np.int64))
 
 

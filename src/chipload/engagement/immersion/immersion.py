@@ -36,7 +36,7 @@ from chipload.cutter.slices import Slices
 from chipload.errors import InputError
 from chipload.lazy import LateModule
 
-_kernels = LateModule("chipload.engagement.immersion._kernels")
+_immersion = LateModule("chipload.engagement.immersion._immersion")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -133,7 +133,7 @@ def immersed(
     room = 4 * len(table) + 16
     while True:
         rows, owner = np.empty((room, 7)), np.empty(room, dtype=np.int64)
-        count = _kernels.immersed(
+        count = _immersion.immersed(
             np.asarray(tip, dtype=np.float64),
             R,
             np.asarray(feed, dtype=np.float64),

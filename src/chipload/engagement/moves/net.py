@@ -13,7 +13,7 @@ from shapely import MultiPolygon
 from chipload.lazy import LateModule
 from chipload.stock.tile_grid import polygons
 
-_kernels = LateModule("chipload.engagement.moves.outline._kernels")
+_outline = LateModule("chipload.engagement.moves._outline")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -46,7 +46,7 @@ def rings(inside: NDArray[np.bool_]) -> tuple[Ints, Ints]:
     onward, room = np.empty(2 * inside.size, dtype=np.int64), 4096
     while True:
         sides, first = np.empty(room, dtype=np.int64), np.zeros(room, dtype=np.int64)
-        count = int(_kernels.traced(inside, onward, sides, first))
+        count = int(_outline.traced(inside, onward, sides, first))
         if count >= 0:
             return sides[: first[count]], first[: count + 1]
         room *= 4

@@ -1,6 +1,6 @@
 """The stock as the moves that cut it: an initial body less the volumes that earlier moves swept.
 
-Notation: as in :mod:`chipload.engagement.moves._kernels`. A cell of the index is ``CELL`` of the smallest cutter radius
+Notation: as in :mod:`chipload.engagement.moves._sweep`. A cell of the index is ``CELL`` of the smallest cutter radius
 wide, or as much wider as memory requires; it decides which moves are searched at a point and what that costs, not the
 answer. The axis stands along z; a cutter is open above: what lies above its flutes counts as swept, and a step with
 material there is reported.
@@ -22,11 +22,11 @@ from chipload.cutter.cutter import Cutter
 from chipload.engagement.moves.net import area_of, nodes_of, rings
 from chipload.lazy import LateModule
 
-_kernels = LateModule("chipload.engagement.moves._kernels")
-edge = LateModule("chipload.engagement.moves.edge._kernels")
-front = LateModule("chipload.engagement.moves.front._kernels")
-initial = LateModule("chipload.engagement.moves.initial._kernels")
-outline = LateModule("chipload.engagement.moves.outline._kernels")
+_sweep = LateModule("chipload.engagement.moves._sweep")
+edge = LateModule("chipload.engagement.moves._edge")
+front = LateModule("chipload.engagement.moves._contact")
+initial = LateModule("chipload.engagement.moves._initial_faces")
+outline = LateModule("chipload.engagement.moves._outline")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -82,7 +82,7 @@ def corner_parts(count: int) -> Floats:
 
 
 def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tuple[NDArray[Any], ...]:
-    """Arrays that :func:`chipload.engagement.moves.front._kernels.run` works in.
+    """Arrays that :func:`chipload.engagement.moves._contact.run` works in.
 
     Parameters
     ----------
@@ -91,10 +91,10 @@ def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tupl
     """
     cells, most, samples = 0, 0, 0
     for c, longest in zip(cutters, flank, strict=True):
-        cells = max(cells, (int(2.0 * c[_kernels.WIDE] / grid[2]) + 3) * (int(2.0 * c[_kernels.WIDE] / grid[3]) + 3))
-        sk = math.cos(math.atan(c[_kernels.TB]))
-        most = max(most, 3 * pieces + front.LEVELS + edge.ROUND + int(c[_kernels.FLUTE] / sk / longest) + 4)
-        samples = max(samples, int(math.tau / min(min(grid[2], grid[3]) / c[_kernels.WIDE], front.APART)) + 4)
+        cells = max(cells, (int(2.0 * c[_sweep.WIDE] / grid[2]) + 3) * (int(2.0 * c[_sweep.WIDE] / grid[3]) + 3))
+        sk = math.cos(math.atan(c[_sweep.TB]))
+        most = max(most, 3 * pieces + front.LEVELS + edge.ROUND + int(c[_sweep.FLUTE] / sk / longest) + 4)
+        samples = max(samples, int(math.tau / min(min(grid[2], grid[3]) / c[_sweep.WIDE], front.APART)) + 4)
     spans = most * (samples + 1)
     return (
         np.empty((cells, 6)), np.empty(front.LEVELS), np.empty((most, 11)), np.empty((spans, 2)),
@@ -194,7 +194,7 @@ class MoveStock:
         self.shape = count.astype(np.int64)
         # of a stock that is thinner than a cell the one cell reaches beyond it: what cutters cover is counted in cells
         self.grid = np.array(
-            [*self.low[:2], *np.maximum(size[:2] / count, THIN * side), self.low[2], _kernels.HEIGHTS / size[2]]
+            [*self.low[:2], *np.maximum(size[:2] / count, THIN * side), self.low[2], _sweep.HEIGHTS / size[2]]
         )
         cells = int(self.shape.prod())
         self.level = np.empty((cells, 3))
@@ -252,7 +252,7 @@ class MoveStock:
     def _grow(self) -> None:
         """Pack the lists where they are, less what is no longer needed, and make room for more of them."""
         order = np.argsort(self.lists[:, 0], kind="stable")
-        used = int(_kernels.packed(order, self.grid, self.lists, self.kept, self.reach, self.level))
+        used = int(_sweep.packed(order, self.grid, self.lists, self.kept, self.reach, self.level))
         need = used + ROOM[0] + max(used // 8, min(used // 2, ROOM[1]))
         if need > len(self.kept):
             # one after the other: the old array of the first is free when the second is made

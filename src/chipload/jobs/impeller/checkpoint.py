@@ -13,8 +13,8 @@ from chipload.planning.impeller.five_axis_program import LinkedPath
 from chipload.planning.impeller.flank import FlankPass
 from chipload.planning.impeller.lines import Tracks, UnreachedSpan
 from chipload.planning.impeller.links import Linked, Moves
+from chipload.planning.impeller.pallet_ranges import Ranges
 from chipload.planning.impeller.point_milling import PointPath
-from chipload.planning.impeller.ranges.ranges import Ranges
 from chipload.planning.impeller.rest_machining import RestPasses
 from chipload.planning.impeller.search import SearchLimits
 from chipload.planning.impeller.track import ToolTrack

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.jobs.impeller.outcome import Searched
-from chipload.planning.impeller.ranges.ranges import valid_ranges
+from chipload.planning.impeller.pallet_ranges import valid_ranges
 
 #: table angles of the source [deg]
 ANGLES = (35.0, 45.0, 55.0)

@@ -19,7 +19,7 @@ from chipload.jobs.impeller.five_axis import all_channels, five_axis_machine, pr
 from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, NoFiveAxisPath
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.tables import FlankTable, PathsTable, SurfaceTable
-from chipload.planning.impeller.clearance.clearance import clearance
+from chipload.planning.impeller.clearance import clearance
 from chipload.planning.impeller.five_axis_program import LinkedPath, five_axis_program, lifted, outline_of
 from chipload.planning.impeller.flank import FlankPass, flank_pass, offset_pass
 from chipload.planning.impeller.kept import Keep, PlanTask, anew

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.machine.machine import Machine
-from chipload.planning.impeller.clearance.clearance import nearest
+from chipload.planning.impeller.clearance import nearest
 from chipload.planning.impeller.tree import tree_of
 from chipload.program.program import Program
 from chipload.program.read import times_on

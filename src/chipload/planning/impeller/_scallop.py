@@ -1,7 +1,7 @@
 """Compiled: the excess that a straight cutter leaves at points of a surface, from its poses on passes.
 
 Notation: as in ``scallop_height.py``. D [mm] distance of a point from the cutting part, which has no upper end; rho and
-``corner`` as in ``clearance/_kernels.py``. The least D between three successive poses of a line is that of a parabola;
+``corner`` as in ``_clearance.py``. The least D between three successive poses of a line is that of a parabola;
 the excess along the normal follows from it by one secant step.
 """
 

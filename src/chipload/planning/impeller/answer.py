@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.planning.impeller.blocks import BLOCK
-from chipload.planning.impeller.ranges.ranges import FULL, valid_ranges
+from chipload.planning.impeller.pallet_ranges import FULL, valid_ranges
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.search import CURVATURE, Sampling, SearchLimits, limits
 from chipload.progress import Progress, silent

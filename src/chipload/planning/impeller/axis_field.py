@@ -28,7 +28,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch
 from chipload.machine.kinematics import inverse
 from chipload.machine.machine import Machine
-from chipload.planning.impeller.clearance.clearance import clearance
+from chipload.planning.impeller.clearance import clearance
 from chipload.planning.impeller.profile import contact_band
 from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.step_over import step_over

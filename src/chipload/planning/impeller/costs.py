@@ -24,9 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.cutter.catalogue import Catalogue
 from chipload.errors import InputError
 from chipload.planning.impeller.answer import Answer, left_open, shortest
-from chipload.planning.impeller.grid.grid import largest_on_grid
 from chipload.planning.impeller.kept import Keep, anew
-from chipload.planning.impeller.ranges.ranges import FULL, Ranges, valid_ranges
+from chipload.planning.impeller.pallet_grid import largest_on_grid
+from chipload.planning.impeller.pallet_ranges import FULL, Ranges, valid_ranges
 from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.step_over import Contact, contact_of, width
 

@@ -21,7 +21,7 @@ from scipy.spatial import ConvexHull
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.machine.machine import Machine
-from chipload.planning.impeller.clearance.clearance import clearance, interpolated_axes
+from chipload.planning.impeller.clearance import clearance, interpolated_axes
 from chipload.planning.impeller.links import Link, Moves
 from chipload.planning.impeller.programs import program_of
 from chipload.planning.impeller.scene import Floats, Scene

@@ -22,7 +22,7 @@ from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.pallet import Turned, pallet_angles
-from chipload.planning.impeller.ranges.ranges import valid_ranges
+from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.refinement import Refinement
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.step_over import contact_of, width

@@ -28,7 +28,7 @@ import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
-from chipload.planning.impeller.clearance.clearance import clearance, interpolated_axes, moves_clear
+from chipload.planning.impeller.clearance import clearance, interpolated_axes, moves_clear
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.pass_order import pass_order
 from chipload.planning.impeller.passes import Joint, Pass, joined, single

@@ -26,8 +26,8 @@ from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.lines import Line, LineMotion, Lines, Tracks, UnreachedSpan, stations, stretched
+from chipload.planning.impeller.pallet_ranges import FULL
 from chipload.planning.impeller.patch import Begin
-from chipload.planning.impeller.ranges.ranges import FULL
 from chipload.planning.impeller.scallop_height import pose_distance, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
 from chipload.planning.impeller.scene import Floats, Scene

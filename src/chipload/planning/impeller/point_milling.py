@@ -28,7 +28,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.axis_field import AxisField, pose
-from chipload.planning.impeller.clearance.clearance import interpolated_axes
+from chipload.planning.impeller.clearance import interpolated_axes
 from chipload.planning.impeller.pass_order import pass_order
 from chipload.planning.impeller.scallop_height import profile_scallops, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches

@@ -16,8 +16,8 @@ import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch
-from chipload.planning.impeller.clearance.clearance import clearance, interpolated_axes
-from chipload.planning.impeller.ranges.ranges import valid_ranges
+from chipload.planning.impeller.clearance import clearance, interpolated_axes
+from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.track import ToolTrack, posed, track_of
 

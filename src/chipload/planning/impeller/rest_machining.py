@@ -23,7 +23,7 @@ from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller import _scallop
 from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import LineMotion, Lines, stretched
-from chipload.planning.impeller.ranges.ranges import valid_ranges
+from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.scallop_height import pose_distance
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.track import ToolTrack

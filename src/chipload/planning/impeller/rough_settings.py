@@ -23,8 +23,8 @@ from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import Tracks
 from chipload.planning.impeller.links import Link, Linked, linked
+from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.programs import program_of
-from chipload.planning.impeller.ranges.ranges import valid_ranges
 from chipload.planning.impeller.roughing import RoughingSettings, layers, roughing, thickened, uncut
 from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.tables import IndexTable

@@ -21,7 +21,7 @@ from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.floor import layer_of, meridian
 from chipload.planning.impeller.impeller import ARC, SUNK, Impeller
 from chipload.planning.impeller.lines import LineMotion, Lines, Tracks, UnreachedSpan
-from chipload.planning.impeller.ranges.ranges import FULL
+from chipload.planning.impeller.pallet_ranges import FULL
 from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.surfaces import hub_range
 from chipload.planning.impeller.track import ToolTrack

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
-from chipload.planning.impeller import _kernels
+from chipload.planning.impeller import _largest_cutter
 from chipload.planning.impeller.blocks import BLOCK, in_blocks
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.progress import Progress, silent
@@ -149,7 +149,7 @@ def limits(
     tool = np.array([corner_radius, cut, scene.near**2])
 
     def block(first: int) -> None:
-        _kernels.search(
+        _largest_cutter.search(
             points, own, tree.nodes, tree.spans, tree.leaves, rows, cones, tool, spans, floor, cap, how.eps, how.least,
             how.step, every, first, min(first + BLOCK, len(rows)), *part,
         )  # fmt: skip

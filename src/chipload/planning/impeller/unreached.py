@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chipload.planning.impeller.answer import Answer, Unreachable, shortest
-from chipload.planning.impeller.ranges.ranges import FULL
+from chipload.planning.impeller.pallet_ranges import FULL
 from chipload.planning.impeller.scene import Scene
 from chipload.planning.impeller.search import limits
 

@@ -1,6 +1,6 @@
 """Compiled loop that writes a pass as lines and arcs, and measures the engagement along them.
 
-Notation: as in ``_kernels``; tau [mm] the greatest distance of the vertices of a pass from its lines and arcs.
+Notation: as in ``_pass_steps``; tau [mm] the greatest distance of the vertices of a pass from its lines and arcs.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import math
 
 from numba import njit
 
-from chipload.planning.pocket._kernels import allowed, angle_at, room
-from chipload.stock._kernels import remove_segment
+from chipload.planning.pocket._pass_steps import allowed, angle_at, room
+from chipload.stock._planar import remove_segment
 
 #: radii of arcs / R, least and greatest
 LEAST, GREATEST = 0.35, 2000.0

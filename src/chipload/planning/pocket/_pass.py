@@ -1,6 +1,6 @@
 """Compiled loop of one pass: steps into the stock, which are written as lines and arcs at once.
 
-Notation: as in ``_kernels``.
+Notation: as in ``_pass_steps``.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ import math
 
 from numba import njit
 
-from chipload.engagement.moves.borrowed._kernels import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrowed
 from chipload.planning.pocket._fit import write_segments
-from chipload.planning.pocket._kernels import (
+from chipload.planning.pocket._pass_steps import (
     LONGER,
     SHARP,
     arc_place,
@@ -19,7 +19,7 @@ from chipload.planning.pocket._kernels import (
     chord_step,
     wall_heading,
 )
-from chipload.stock._kernels import uncut
+from chipload.stock._planar import uncut
 
 RUNNING, LOST, BLOCKED = 0, 1, 2
 #: steps are written at the latest when they are so long / R, or turn by so much [rad]

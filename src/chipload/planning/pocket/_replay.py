@@ -6,9 +6,9 @@ import math
 
 from numba import njit
 
-from chipload.engagement.moves.borrowed._kernels import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrowed
 from chipload.planning.pocket._fit import place
-from chipload.stock._kernels import remove_segment, uncut
+from chipload.stock._planar import remove_segment, uncut
 from chipload.stock.planar import TOUCH
 
 #: curvature x R above which the cutter meets what the same arc has just cut

@@ -1,6 +1,6 @@
 """Compiled loop of a trochoid: the engagement along a circle of the centre path.
 
-Notation: as in ``_kernels``.
+Notation: as in ``_pass_steps``.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import math
 
 from numba import njit
 
-from chipload.engagement.moves.borrowed._kernels import borrowed
-from chipload.planning.pocket._kernels import angle_at
+from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.planning.pocket._pass_steps import angle_at
 
 
 @njit(cache=True, nogil=True)

@@ -47,7 +47,7 @@ from chipload.planning.result import Event
 from chipload.progress import Progress, silent
 from chipload.stock.planar import TOUCH, PlanarStock
 
-_kernels = LateModule("chipload.planning.pocket._kernels")
+_pass_steps = LateModule("chipload.planning.pocket._pass_steps")
 _pass = LateModule("chipload.planning.pocket._pass")
 
 Floats = NDArray[np.float64]
@@ -359,7 +359,7 @@ class _Run:
     def _clear_line(self, p: Floats, q: Floats) -> bool:
         s = self.stock
         return bool(
-            _kernels.line_clear(
+            _pass_steps.line_clear(
                 p[0],
                 p[1],
                 q[0],

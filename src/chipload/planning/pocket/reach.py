@@ -19,7 +19,7 @@ from chipload.geometry.contour import Contour, Region
 from chipload.geometry.offset import offset_region
 from chipload.lazy import LateModule
 
-_kernels = LateModule("chipload.planning.pocket._kernels")
+_pass_steps = LateModule("chipload.planning.pocket._pass_steps")
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ STARTS = 20
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """The centre region as edges (n, 4) [mm], and its cells for the kernels (see ``_kernels``)."""
+    """The centre region as edges (n, 4) [mm], and its cells for the kernels (see ``_pass_steps``)."""
 
     edges: Floats
     rows: NDArray[np.int64]
@@ -42,7 +42,7 @@ class Reach:
 
     def holds(self, x: float, y: float, grid: Floats) -> bool:
         """Whether the centre may be at a place."""
-        return bool(_kernels.allowed(x, y, grid, *self.arguments()))
+        return bool(_pass_steps.allowed(x, y, grid, *self.arguments()))
 
     def arguments(self) -> tuple[NDArray[Any], ...]:
         """Arguments of the kernels."""
@@ -88,7 +88,7 @@ def reach_of(centres: Region, grid: Floats, chord: float) -> Reach:
     rows = np.searchsorted(row[order], np.arange(ny + 1)).astype(np.int64)
     flag = np.zeros(nx * ny, dtype=np.int8)
     row_edges = edge[order].astype(np.int64)
-    _kernels.mark(grid, edges, rows, row_edges, flag)
+    _pass_steps.mark(grid, edges, rows, row_edges, flag)
     return Reach(edges, rows, row_edges, flag)
 
 

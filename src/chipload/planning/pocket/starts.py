@@ -18,7 +18,7 @@ from chipload.lazy import LateModule
 from chipload.planning.pocket.reach import Reach
 from chipload.stock.planar import TOUCH, PlanarStock
 
-_kernels = LateModule("chipload.planning.pocket._kernels")
+_pass_steps = LateModule("chipload.planning.pocket._pass_steps")
 
 Floats = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ class Starts:
         """
         searched = np.flatnonzero(self.fresh)
         out = np.zeros(len(searched), dtype=bool)
-        _kernels.open_sides(
+        _pass_steps.open_sides(
             self.p, self.normal, self.live[searched], depth * self.radius, LEAST, self.radius, TOUCH,
             stock.grid, stock.head, stock.link, stock.axis, stock.rim, *reach.arguments(), out,
         )  # fmt: skip

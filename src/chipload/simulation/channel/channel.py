@@ -28,7 +28,7 @@ from chipload.geometry.bspline import BSplinePatch
 from chipload.program.motions import is_arc
 from chipload.program.program import LINE, Program
 from chipload.progress import Progress, silent
-from chipload.simulation.channel import _kernels
+from chipload.simulation.channel import _ray_cuts
 from chipload.stock.dexel import cutter_shape
 
 Floats = NDArray[np.float64]
@@ -217,7 +217,7 @@ def left_on(
             first: int, w: SurfacePoints = w, frames: Floats = frames, rest: Floats = rest, rest_row: Ints = rest_row,
             gouge: Floats = gouge, row: Ints = row, part: Ints = part,
         ) -> None:  # fmt: skip
-            _kernels.rest_and_gouge(
+            _ray_cuts.rest_and_gouge(
                 w.points, frames, tips, axes, groups, GROUP, starts, shapes, cutting, depth, height, step, tol, first,
                 min(first + _BLOCK, len(w.points)), rest, rest_row, gouge, row, part,
             )  # fmt: skip
@@ -245,9 +245,9 @@ def parted_moves(program: Program) -> tuple[Floats, Floats, Ints]:
 
 
 def move_groups(tips: Floats, axes: Floats) -> Floats:
-    """(g, 8) float: bounds of every :data:`GROUP` moves, as :func:`_kernels.bound_groups`."""
+    """(g, 8) float: bounds of every :data:`GROUP` moves, as :func:`_ray_cuts.bound_groups`."""
     out = np.empty((max(0, math.ceil((len(tips) - 1) / GROUP)), 8))
-    _kernels.bound_groups(tips, axes, GROUP, out)
+    _ray_cuts.bound_groups(tips, axes, GROUP, out)
     return out
 
 

@@ -27,7 +27,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.program.motions import is_arc
 from chipload.program.program import Program
-from chipload.simulation.channel import _kernels
+from chipload.simulation.channel import _ray_cuts
 from chipload.simulation.channel.channel import (
     GROUP,
     PARTS,
@@ -169,7 +169,7 @@ def deepest_gouge(
         ) -> None:  # fmt: skip
             last = min(first + _BLOCK, len(points))
             frames = frames_of(normals[first:last])
-            _kernels.lowest_of_kinds(
+            _ray_cuts.lowest_of_kinds(
                 points[first:last], frames, tips, axes, groups, GROUP, starts, shapes, kinds, depth, height, step, tol,
                 low[first:last], row[first:last], part[first:last],
             )  # fmt: skip

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.lazy import LateModule
 
-_kernels = LateModule("chipload.simulation.clearance._kernels")
+_body_distance = LateModule("chipload.simulation.clearance._body_distance")
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ class Body:
 
     def distance(self, rho: float, z: float) -> float:
         """Signed distance [mm] of a point from the surface, below 0 inside."""
-        return float(_kernels.meridian(rho, z, self.lines, self.arcs, self.top))
+        return float(_body_distance.meridian(rho, z, self.lines, self.arcs, self.top))
 
 
 def cutting_part(cutter: Cutter) -> Body:

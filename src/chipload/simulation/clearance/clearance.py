@@ -25,7 +25,7 @@ from chipload.lazy import LateModule
 from chipload.simulation.clearance.body import Body
 from chipload.simulation.steps import Steps
 
-_kernels = LateModule("chipload.simulation.clearance._kernels")
+_body_distance = LateModule("chipload.simulation.clearance._body_distance")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -116,7 +116,7 @@ class LeastDistance:
 
         def lowered(span: Ints) -> tuple[Floats, Ints, Ints, Floats]:
             out = self.distance.copy(), self.step.copy(), self.first.copy(), deepest.copy()
-            _kernels.nearest(
+            _body_distance.nearest(
                 self.points, *grid, tips[span], axes[span], rows[span], *meridian, self.far, self.tolerance, self.done,
                 out[0], out[1], out[3], out[2],
             )  # fmt: skip

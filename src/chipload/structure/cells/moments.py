@@ -24,7 +24,7 @@ from chipload.lazy import LateModule
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.grid import Array, CellGrid
 
-_kernels = LateModule("chipload.structure.cells._kernels")
+_moments = LateModule("chipload.structure.cells._moments")
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ def section_moments(shapes: NDArray[np.object_], grid: CellGrid) -> Array:
     hole = np.append(False, part[1:] == part[:-1])
     sign = np.where(hole, -1.0, 1.0) * np.where(area < 0.0, -1.0, 1.0)
     at, weight = legendre.leggauss(n)
-    _kernels.ring_moments(points, start, sign, x, y, at, weight, out)
+    _moments.ring_moments(points, start, sign, x, y, at, weight, out)
     return out
 
 

@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.planning.impeller.blocks import BLOCK, in_blocks
-from chipload.planning.impeller.clearance.clearance import nearest
-from chipload.planning.impeller.covering import _kernels
+from chipload.planning.impeller.clearance import nearest
+from chipload.planning.impeller.covering import _clear_parts
 from chipload.planning.impeller.covering.nodes import Nodes, grid_of, hub_nodes, patch_nodes, turn_nodes
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.scene import Scene
@@ -147,7 +147,7 @@ class Covering:
         stages, tree, size = self.stages(cutter, clearance), self.tree, len(self.points)
 
         def block(first: int) -> None:
-            _kernels.clear_parts(
+            _clear_parts.clear_parts(
                 self.ordered, tree.nodes, tree.spans, tree.leaves, rows, cones, tool, stages, parts, count, _NEAR**2,
                 _WIDTH, least, first, min(first + BLOCK, len(rows)), np.zeros(size, dtype=np.int64),
                 np.empty(_LISTS * size + 64, dtype=np.int64), clear, number,

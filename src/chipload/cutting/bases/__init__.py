@@ -1,1 +1,0 @@
-"""Loads for 1 of each coefficient of a linear law."""

@@ -1,1 +1,0 @@
-"""The loops of the cutter that bends and of the wall that it leaves."""

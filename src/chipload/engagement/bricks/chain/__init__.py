@@ -1,1 +1,0 @@
-"""Steps of one line as one move of the index."""

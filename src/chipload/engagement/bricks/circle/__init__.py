@@ -1,1 +1,0 @@
-"""Contact on a circle of a cutter in any direction."""

@@ -1,1 +1,0 @@
-"""Outlines of what moves swept, from bricks."""

@@ -1,1 +1,0 @@
-"""Places of a cutter's profile that are in contact at an instant."""

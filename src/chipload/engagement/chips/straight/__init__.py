@@ -1,1 +1,0 @@
-"""Area of a layer that a cutter covers on a straight way with a fixed axis, compiled."""

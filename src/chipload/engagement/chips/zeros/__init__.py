@@ -1,1 +1,0 @@
-"""Grazing points of a section."""

@@ -1,0 +1,405 @@
+"""Compiled loops of the engaged front of a cutter that moves along a line; arrays and scalars only.
+
+Notation: psi [rad] angle in the plan from the direction of the motion, counter-clockwise; v the motion of a step, n the
+outward normal of the cutter; the front is where v.n > 0: sin(kappa) |v_xy| cos(psi) > cos(kappa) v_z. A slice of the
+edge is a circle rho at a height z on the cutter's surface; a candidate is a cell of the index in which the surface may
+be in material: least and greatest distance from the axis, angle and half the angle that it takes, height of its
+``ceil`` above the tip.
+Oracle: sampling of the front by brute force, in tests/engagement/moves.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit, types
+
+from chipload.engagement.moves._border import border, ridge
+from chipload.engagement.moves._edge import add_slice, candidates, sliced, windows
+from chipload.engagement.moves._sweep import AIR, FLUTE, MATERIAL, WIDE, keep, swept_by, what_is
+from chipload.engagement.moves._uncounted_arrays import borrowed
+
+PI = math.pi
+TAU = 2.0 * math.pi
+#: distance from the end of the front at which the contact is tested [rad]
+BESIDE = 1e-4
+#: greatest angle between two samples [rad]
+APART = 0.35
+#: greatest number of heights of the stock at which the flank is divided; above it the slices are equally thick
+LEVELS = 16
+#: greatest relative change of the volume per length between two steps that cut alike, and least change of one that
+#: enters or leaves the material
+STEADY, JUMP = 0.03, 0.3
+#: cosine of the least angle between two moves that make a corner
+CORNER = 0.985
+#: least sine of the angle at which the front ends
+ALONG = 1e-9
+
+
+@njit(cache=True, nogil=True, inline="always")
+def intervals(p, T, rho, z, low, high, end, apart, index, out, begin):
+    """Find the ranges of psi in material on the circle of a slice.
+
+    Parameters
+    ----------
+    p : (3,) tip [mm]; T : (2,) unit vector of psi = 0
+    rho, z : radius and height of the circle [mm]
+    low, high, end : range that is searched; end of the front, near which the contact is tested just inside [rad]
+    apart : greatest angle between two samples [rad]
+    index : see :func:`chipload.engagement.moves._sweep.what_is`
+    out : (m, 2) the ranges (from, to), written from row ``begin`` on
+
+    Returns
+    -------
+    Number of ranges
+    """
+    count = begin
+    first = max(low, BESIDE - end) if end < PI else low
+    last = min(high, end - BESIDE) if end < PI else high
+    n = max(math.ceil((last - first) / apart), 1) if last > first else -1
+    d = (last - first) / n
+    c = math.cos(first)
+    s = math.sin(first)
+    cd = math.cos(d)
+    sd = math.sin(d)
+    before = AIR
+    inside = False
+    c0 = c
+    s0 = s
+    x0 = 0.0
+    y0 = 0.0
+    for i in range(n + 1):
+        x = p[0] + rho * (c * T[0] - s * T[1])
+        y = p[1] + rho * (c * T[1] + s * T[0])
+        f = what_is(x, y, z, index, before)
+        # directions of which one is in material, and the borders on both of its sides or on one
+        cm = c0 if inside else c
+        sm = s0 if inside else s
+        borders = 0
+        if (f == MATERIAL) != inside:
+            if i > 0:
+                borders = 1
+            else:
+                out[count, 0] = -end if first < 2.0 * BESIDE - end else first
+                inside = True
+        elif i > 0 and f != MATERIAL and f != before:
+            # the move that swept one of both places may have swept the other, and all between
+            alone = swept_by(f, x0, y0, z, index) if f >= 0 else swept_by(before, x, y, z, index)
+            if not alone:
+                found, cm, sm = ridge(p[0], p[1], z, rho, T, c0, s0, c, s, before, f, index)
+                borders = 2 if found else 0
+        for _ in range(borders):
+            # towards the sample before, but where the material ends
+            back = not inside
+            psi = border(
+                p[0], p[1], z, rho, T, cm, sm, c0 if back else c, s0 if back else s, before if back else f, index
+            )
+            if inside:
+                out[count, 1] = psi
+                count += 1
+            else:
+                out[count, 0] = psi
+            inside = not inside
+        x0 = x
+        y0 = y
+        if f != MATERIAL:
+            before = f
+        c0 = c
+        s0 = s
+        c, s = c * cd - s * sd, c * sd + s * cd
+    if inside:
+        out[count, 1] = end if last > end - 2.0 * BESIDE else last
+        count += 1
+    return count - begin
+
+
+@njit(cache=True, nogil=True)
+def parts_of(spans, slice_of, first, count, room):
+    """Number of connected areas that are engaged: overlapping spans of consecutive slices are one area.
+
+    Parameters
+    ----------
+    spans : (count, 2) from and to [rad]
+    slice_of : numbers of their slices, from row ``first`` on
+    room : (count,) working array
+    """
+    for i in range(count):
+        room[i] = i
+    pieces = count
+    for i in range(count):
+        for j in range(i - 1, -1, -1):
+            apart = slice_of[first + i] - slice_of[first + j]
+            if apart > 1:
+                break
+            if apart < 1:
+                continue
+            if spans[i, 0] < spans[j, 1] and spans[j, 0] < spans[i, 1]:
+                a = i
+                while room[a] != a:
+                    a = room[a]
+                b = j
+                while room[b] != b:
+                    b = room[b]
+                if a != b:
+                    room[a] = b
+                    pieces -= 1
+    return pieces
+
+
+@njit(cache=True, nogil=True)
+def engaged(p, u, c, T, parts, flank, index, near, levels, scratch, spans, mine, room, slices, rows, owner, at, out):
+    """Find the engagement at a tip position; False: no room in ``rows`` or ``slices``.
+
+    Parameters
+    ----------
+    p, u : (3,) tip, and motion of the step [mm]
+    c : (12,) cutter; T : (2,) unit vector of psi = 0
+    parts, flank : slices of a corner; longest slice of the flank [mm]
+    near, levels, scratch, spans, mine, room : working arrays, see ``WORK``
+    slices, rows, owner : slices; spans (psi from, to) [rad]; slice of each span; from ``at[1]`` and ``at[0]`` on
+    out : (10,) volume of the step [mm^3], number of areas, least and greatest height of a slice [mm], sum of the
+        normals at ends of the front times their length (x, y, z), that length [mm], 1 if there is material above the
+        flutes, length of the edge [mm]
+    """
+    # what a call passes counts again
+    index = borrowed(index)
+    p, u, c, T, near, levels, scratch, spans = borrowed((p, u, c, T, near, levels, scratch, spans))
+    out[:] = 0.0
+    hu = math.hypot(u[0], u[1])
+    grid = index[0]
+    count = candidates(p, T, u[2] >= 0.0, c, grid, index[1], index[2], near)
+    if count == 0:
+        return True
+    number = sliced(c, near, count, u, parts, flank, levels, scratch)
+    apart = 2.5 * min(grid[2], grid[3])
+    # above the flutes
+    add_slice(scratch, number, 0.0, 0.0, c[WIDE], c[FLUTE], 1.0, 0.0, c[FLUTE], c[WIDE], c[WIDE])
+    windows(near, count, 0.5 * math.hypot(grid[2], grid[3]), scratch, number + 1)
+    row = at[0]
+    have = at[1]
+    total = 0
+    out[2] = math.inf
+    out[3] = -math.inf
+    for k in range(number + 1):
+        probe = k == number
+        rho = scratch[k, 2]
+        sk = scratch[k, 4]
+        ck = scratch[k, 5]
+        side = sk * hu
+        rise = ck * u[2]
+        if side <= rise + ALONG * (hu + abs(u[2])):
+            continue
+        end = PI if rise <= -side else math.acos(rise / side)
+        low = max(scratch[k, 9], -end)
+        high = min(scratch[k, 10], end)
+        if low >= high:
+            continue
+        found = intervals(p, T, rho, p[2] + scratch[k, 6], low, high, end, min(apart / rho, APART), index, spans, total)
+        if found == 0:
+            continue
+        if probe:
+            out[8] = 1.0
+            break
+        if have == len(slices) or row + found > len(rows):
+            return False
+        ds = scratch[k, 1] - scratch[k, 0]
+        for i in range(total, total + found):
+            a = spans[i, 0]
+            b = spans[i, 1]
+            out[0] += (side * (math.sin(b) - math.sin(a)) - rise * (b - a)) * rho * ds
+            rows[row, 0] = a
+            rows[row, 1] = b
+            owner[row] = have
+            mine[i] = k
+            row += 1
+            for e in (a, b):
+                if end < PI and abs(abs(e) - end) < 1e-12:
+                    out[4] += ds * sk * (math.cos(e) * T[0] - math.sin(e) * T[1])
+                    out[5] += ds * sk * (math.cos(e) * T[1] + math.sin(e) * T[0])
+                    out[6] -= ds * ck
+                    out[7] += ds
+        total += found
+        for i in range(6):
+            slices[have, i] = scratch[k, i]
+        have += 1
+        out[2] = min(out[2], p[2] + scratch[k, 3])
+        out[3] = max(out[3], p[2] + 2.0 * scratch[k, 6] - scratch[k, 3])
+        out[9] += ds
+    if total > 0:
+        out[1] = parts_of(spans, mine, 0, total, room)
+    at[0] = row
+    at[1] = have
+    return True
+
+
+_F1, _F2, _I1, _I2, _S = (
+    types.float64[::1],
+    types.float64[:, ::1],
+    types.int64[::1],
+    types.int64[:, ::1],
+    types.int32[::1],
+)
+#: room for :func:`run`: candidates, levels, slices, spans, their slices, pieces, place, rows and slices so far
+WORK = types.Tuple((_F2, _F1, _F2, _F2, _I1, _I1, _F1, _I1))
+INDEX = types.Tuple((_F1, _I1, _F2, _I2, _S, types.uint16[::1], _F2, _I1, _F2, _F1, _F1, _I1, _S, _F2))
+
+
+@njit(cache=True, nogil=True)
+def turns(moves, q, end):
+    """Whether move q is the last before number ``end``, or makes a corner with the next one."""
+    if q + 1 >= end:
+        return True
+    dot = 0.0
+    one = 0.0
+    two = 0.0
+    for d in range(3, 6):
+        dot += moves[q, d] * moves[q + 1, d]
+        one += moves[q, d] ** 2
+        two += moves[q + 1, d] ** 2
+    return dot < CORNER * math.sqrt(one * two)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def put_tip(m, t, p):
+    """Write the tip of a move m (6,) at a time t of 0..1 into p (3,) [mm]."""
+    for d in range(3):
+        p[d] = m[d] + t * m[3 + d]
+
+
+@njit(cache=True, nogil=True)
+def step_engaged(k, frame, instants, state, index, work, parts, flank, slices, rows, owner, entry, out):
+    """Find what step k engages at its instants, and count it in ``state``; False: no room.
+
+    Parameters: see :func:`run`.
+    """
+    # what a call passes counts again
+    index = borrowed(index)
+    near, levels, scratch, spans, mine, room, p, at = borrowed(work)
+    frame, instants, state, parts, flank = borrowed((frame, instants, state, parts, flank))
+    slices, rows, owner, entry, out = borrowed((slices, rows, owner, entry, out))
+    q = state[0] + k
+    m = index[6][q]
+    c = index[8][index[7][q]]
+    longest = flank[index[7][q]]
+    at[0] = state[2]
+    at[1] = state[3]
+    entries = state[4]
+    length = math.sqrt(m[3] * m[3] + m[4] * m[4] + m[5] * m[5])
+    count = instants[k]
+    rate = 0.0
+    least = math.inf
+    most = 0.0
+    i = 0
+    while i < count:
+        # the middle first: where a step of one instant cuts unlike the one before it, others beside the middle too
+        j = (i + count // 2) % count
+        put_tip(m, (j + 0.5) / count, p)
+        if entries == len(out):
+            return False
+        before = at[0]
+        if not engaged(
+            p, m[3:], c, frame[k], parts, longest, index, near, levels, scratch, spans, mine, room,
+            slices, rows, owner, at, out[entries],
+        ):  # fmt: skip
+            return False
+        if i == 0 and length > 0.0:
+            rate = out[entries, 0] / length
+            change = abs(rate - p[3]) / max(rate, p[3]) if rate != p[3] else 0.0
+            if instants[k] == 1 and change > STEADY:
+                count = state[5] if change < JUMP else state[6]
+                j = count // 2
+        now = out[entries, 0] / length if length > 0.0 else 0.0
+        if at[0] > before or out[entries, 8] > 0.0:
+            entry[entries, 0] = k
+            entry[entries, 1] = j
+            entry[entries, 2] = before
+            entries += 1
+        if instants[k] > 1 and count == instants[k] and length > 0.0:
+            least = min(least, now)
+            most = max(most, now)
+        last = i == count - 1 if instants[k] > 1 else i == 0
+        if last and count == instants[k] and length > 0.0 and turns(index[6], q, state[0] + len(instants)):
+            # a step that ends in a corner may meet the material at its very end
+            put_tip(m, 1.0 - 0.5 / (count * state[6]), p)
+            if entries == len(out):
+                return False
+            rows_before = at[0]
+            slices_before = at[1]
+            if not engaged(
+                p, m[3:], c, frame[k], parts, longest, index, near, levels, scratch, spans, mine,
+                room, slices, rows, owner, at, out[entries],
+            ):  # fmt: skip
+                return False
+            end = out[entries, 0] / length
+            at[0] = rows_before
+            at[1] = slices_before
+            if instants[k] > 1:
+                least = -math.inf if out[entries, 8] > 0.0 else min(least, end)
+                most = max(most, end)
+            elif abs(end - rate) > STEADY * max(end, rate) or out[entries, 8] > 0.0:
+                count = state[6]
+                if entries > state[4]:
+                    entry[entries - 1, 1] = count // 2
+        i += 1
+        if i == count == instants[k] and state[5] > 1 and most - least > STEADY * most:
+            # a long step that does not cut alike all along: again from its beginning, each part as a step
+            count *= state[5] if most - least < JUMP * most else state[6]
+            at[0] = state[2]
+            at[1] = state[3]
+            entries = state[4]
+            i = 0
+    if length > 0.0 and count > 0:
+        p[3] = rate
+    instants[k] = count
+    state[2] = at[0]
+    state[3] = at[1]
+    state[4] = entries
+    state[1] = 1
+    return True
+
+
+@njit(
+    types.int64(types.int64, _F2, _I1, _I1, INDEX, WORK, _F2, _F1, _F2, _F2, _I1, _I2, _F2, _I1),
+    cache=True,
+    nogil=True,
+)
+def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, owner, entry, out, used):
+    """Find what each step from ``begin`` on engages at its instants and enter it into the index.
+
+    Parameters
+    ----------
+    frame : (n, 2) unit vector in the plan from which psi is counted, of each step
+    instants : (n,) number of instants of each step: the middles of so many equal parts of it; a step of one instant
+        that does not cut as the step before it gets more, and so does a longer one whose instants differ
+    state : (7,) number of the move that is the first step; 1 where the engagement of step ``begin`` is known; rows,
+        slices and entries so far; number of instants, or of parts of each instant, where the volume a length changes
+        by more than ``STEADY``, and by more than ``JUMP``
+    index : see :func:`chipload.engagement.moves._sweep.what_is`; the moves of these steps are in it
+    work : working arrays, see ``WORK``
+    parts, flank : slices of a corner; longest slice of the flank of each cutter [mm]
+    slices, rows, owner, out : see :func:`engaged`
+    entry : (m, 3) step, instant and first row of each instant that cuts
+    used : (1,) room taken of the lists of the index
+
+    Returns
+    -------
+    The number of steps, or the one at which room ran out: ``state[1]`` 0: of rows, 1: of lists.
+    """
+    # the caller keeps all of them
+    index = borrowed(index)
+    work = borrowed(work)
+    frame, instants, state, parts, flank = borrowed((frame, instants, state, parts, flank))
+    slices, rows, owner = borrowed((slices, rows, owner))
+    entry, out, used = borrowed((entry, out, used))
+    n = len(instants)
+    for k in range(begin, n):
+        if state[1] == 0 and not step_engaged(
+            k, frame, instants, state, index, work, parts, flank, slices, rows, owner, entry, out
+        ):
+            return k
+        q = state[0] + k
+        c = index[8][index[7][q]]
+        if not keep(q, index[6][q], c, index[0], index[1], index[2], index[3], index[4], index[5], used):
+            return k
+        state[1] = 0
+    return n

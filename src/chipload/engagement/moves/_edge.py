@@ -1,0 +1,246 @@
+"""Compiled loops that cut the part of the edge that may be in material into slices; arrays and scalars only.
+
+Notation: as in :mod:`chipload.engagement.moves._contact`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from chipload.engagement.moves._sweep import CORNER, FLUTE, RHO1, RHO2, TA, TB, WIDE, Z1, Z2, E, F, profile
+
+PI = math.pi
+#: heights closer than this count as one [mm]
+SAME = 1e-6
+#: number of slices of the part of a corner that cuts all round in a downward motion
+ROUND = 2
+
+
+@njit(cache=True, nogil=True)
+def candidates(p, T, narrow, c, grid, shape, level, near):
+    """Cells in which the surface of the cutter at p may be in material: rows of ``near``; their number."""
+    half = 0.5 * math.hypot(grid[2], grid[3])
+    wide = c[WIDE]
+    i0 = max(0, math.floor((p[0] - wide - grid[0]) / grid[2]))
+    i1 = min(shape[0] - 1, math.floor((p[0] + wide - grid[0]) / grid[2]))
+    j0 = max(0, math.floor((p[1] - wide - grid[1]) / grid[3]))
+    j1 = min(shape[1] - 1, math.floor((p[1] + wide - grid[1]) / grid[3]))
+    count = 0
+    for i in range(i0, i1 + 1):
+        dx = grid[0] + (i + 0.5) * grid[2] - p[0]
+        rest = (wide + half) ** 2 - dx * dx
+        if rest <= 0.0:
+            continue
+        rest = math.sqrt(rest)
+        first = max(j0, math.floor((p[1] - rest - grid[1]) / grid[3]))
+        last = min(j1, math.floor((p[1] + rest - grid[1]) / grid[3]))
+        for j in range(first, last + 1):
+            ceil = level[i * shape[1] + j, 1] - p[2]
+            if ceil <= 0.0:
+                continue
+            dy = grid[1] + (j + 0.5) * grid[3] - p[1]
+            ahead = dx * T[0] + dy * T[1]
+            if narrow and ahead < -half:
+                continue
+            d2 = dx * dx + dy * dy
+            if d2 > (wide + half) ** 2:
+                continue
+            d = math.sqrt(d2)
+            if profile(c, max(d - half, 0.0)) >= ceil:
+                continue
+            near[count, 0] = max(d - half, 0.0)
+            near[count, 1] = d + half
+            near[count, 2] = ahead
+            near[count, 3] = dy * T[0] - dx * T[1]
+            near[count, 4] = ceil
+            near[count, 5] = level[i * shape[1] + j, 0] - p[2]
+            count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def direction(x, y):
+    """Angle of a vector within 2e-5 rad, in -pi .. pi.
+
+    Reference: [Abramowitz1964] 4.4.47.
+    """
+    ax = abs(x)
+    ay = abs(y)
+    q = min(ax, ay) / max(ax, ay)
+    s = q * q
+    a = q * (0.9998660 + s * (-0.3302995 + s * (0.1801410 + s * (-0.0851330 + s * 0.0208351))))
+    if ay > ax:
+        a = 0.5 * PI - a
+    if x < 0.0:
+        a = PI - a
+    return a if y >= 0.0 else -a
+
+
+@njit(cache=True, nogil=True)
+def windows(near, count, half, out, slices):
+    """Range of psi [rad] in which candidates touch each slice, into columns 9 and 10 of ``out``: the first is above the
+    second if none does; both are infinite if candidates lie all round.
+    """
+    for k in range(slices):
+        out[k, 9] = math.inf
+        out[k, 10] = -math.inf
+    for i in range(count):
+        d0 = near[i, 0]
+        d1 = near[i, 1]
+        # slices rise and widen: the first that reaches as far as the cell does
+        a = 0
+        b = slices
+        while a < b:
+            k = (a + b) // 2
+            if out[k, 8] < d0:
+                a = k + 1
+            else:
+                b = k
+        if a == slices or out[a, 7] > d1 or out[a, 3] >= near[i, 4]:
+            continue
+        low = -math.inf
+        high = math.inf
+        if d0 > 0.0:
+            # no less than asin(q), exact at 0 and 1
+            q = half / (d0 + half)
+            wide = q * (1.0 + 0.5708 * q * q) + 2e-4
+            at = direction(near[i, 2], near[i, 3])
+            if at - wide >= -PI and at + wide <= PI:
+                low = at - wide
+                high = at + wide
+        for k in range(a, slices):
+            if out[k, 7] > d1 or out[k, 3] >= near[i, 4]:
+                break
+            if low < out[k, 9]:
+                out[k, 9] = low
+            if high > out[k, 10]:
+                out[k, 10] = high
+
+
+@njit(cache=True, nogil=True)
+def add_slice(out, k, s0, s1, rho, z0, sk, ck, z, rho0, rho1):
+    """Row k of the slices: s from, s to, rho, z from, sin, cos kappa, z of the circle, least and greatest rho."""
+    out[k, 0] = s0
+    out[k, 1] = s1
+    out[k, 2] = rho
+    out[k, 3] = z0
+    out[k, 4] = sk
+    out[k, 5] = ck
+    out[k, 6] = z
+    out[k, 7] = rho0
+    out[k, 8] = rho1
+    return k + 1
+
+
+@njit(cache=True, nogil=True)
+def add_corner(out, k, c, alpha, k0, k1, mid):
+    """:func:`add_slice` of the corner from the angle k0 of its normal to k1 [rad], with the circle at ``mid``."""
+    r = c[CORNER]
+    return add_slice(
+        out, k, r * (k0 - alpha), r * (k1 - alpha), c[E] + r * math.sin(mid), c[F] - r * math.cos(k0), math.sin(mid),
+        math.cos(mid), c[F] - r * math.cos(mid), c[E] + r * math.sin(k0), c[E] + r * math.sin(k1),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def sliced(c, near, count, u, parts, flank, levels, out):
+    """Cut the part of the profile that the candidates touch into slices; their number."""
+    pieces = len(parts)
+    inner = math.inf
+    outer = 0.0
+    top = 0.0
+    for i in range(count):
+        inner = min(inner, near[i, 0])
+        outer = max(outer, near[i, 1])
+        top = max(top, near[i, 4])
+    outer = min(outer, c[WIDE])
+    top = min(top, c[FLUTE])
+    k = 0
+    r = c[CORNER]
+    if c[RHO1] > 0.0 and inner < c[RHO1] and (u[2] < 0.0 or c[TA] > 0.0):
+        a = inner
+        b = min(outer, c[RHO1])
+        if c[TA] > 0.0:
+            b = min(b, top / c[TA])
+        n = max(pieces // 2, 1)
+        size = math.hypot(1.0, c[TA])
+        for i in range(n):
+            r0 = a + (b - a) * i / n
+            r1 = a + (b - a) * (i + 1) / n
+            mid = 0.5 * (r0 + r1)
+            k = add_slice(
+                out, k, (r0 - c[RHO1]) * size, (r1 - c[RHO1]) * size, mid, r0 * c[TA], c[TA] / size, 1.0 / size,
+                mid * c[TA], r0, r1,
+            )  # fmt: skip
+    if r > 0.0 and outer > c[RHO1] and inner < c[RHO2] and top > c[Z1]:
+        alpha = math.atan(c[TA])
+        a = alpha if inner <= c[RHO1] else max(alpha, math.asin((inner - c[E]) / r))
+        end = 0.5 * PI - math.atan(c[TB])
+        b = end if outer >= c[RHO2] else min(end, math.asin((outer - c[E]) / r))
+        if top < c[Z2]:
+            b = min(b, math.acos((c[F] - top) / r))
+        # where the normal leans against the motion the front ends: none below on the way up, all round on the way down
+        turn = math.atan2(abs(u[2]), math.hypot(u[0], u[1]))
+        if u[2] > 0.0:
+            a = max(a, turn)
+        elif a < turn < b:
+            for i in range(ROUND):
+                k0 = a + (turn - a) * i / ROUND
+                k1 = a + (turn - a) * (i + 1) / ROUND
+                k = add_corner(out, k, c, alpha, k0, k1, 0.5 * (k0 + k1))
+            a = turn
+        for i in range(pieces if b > a else 0):
+            k = add_corner(
+                out, k, c, alpha, a + (b - a) * parts[i, 0], a + (b - a) * parts[i, 1], a + (b - a) * parts[i, 2]
+            )
+    if outer >= c[RHO2] and top > c[Z2]:
+        k = flanked(c, near, count, top, pieces, flank, levels, out, k)
+    return k
+
+
+@njit(cache=True, nogil=True)
+def flanked(c, near, count, top, pieces, flank, levels, out, k):
+    """Slices of the flank: between the heights of the stock beside it, none longer than ``flank``."""
+    n = 2
+    levels[0] = c[Z2]
+    levels[1] = top
+    many = False
+    for i in range(count):
+        if near[i, 1] < c[RHO2]:
+            continue
+        for h in (near[i, 4], near[i, 5]):
+            if not c[Z2] < h < top:
+                continue
+            fresh = True
+            for j in range(n):
+                if abs(levels[j] - h) < SAME:
+                    fresh = False
+            if fresh and n == len(levels):
+                many = True
+            elif fresh:
+                levels[n] = h
+                n += 1
+    if many:
+        # no level floors around: a surface that rises and falls
+        n = 2
+        flank = min(flank, (top - c[Z2]) / pieces)
+    levels[:n].sort()
+    beta = math.atan(c[TB])
+    sk = math.cos(beta)
+    ck = math.sin(beta) if c[TB] > 0.0 else 0.0
+    start = c[CORNER] * (0.5 * PI - beta - math.atan(c[TA]))
+    for j in range(n - 1):
+        parts = max(1, math.ceil((levels[j + 1] - levels[j]) / sk / flank - 1e-9))
+        for i in range(parts):
+            z0 = levels[j] + (levels[j + 1] - levels[j]) * i / parts
+            z1 = levels[j] + (levels[j + 1] - levels[j]) * (i + 1) / parts
+            mid = 0.5 * (z0 + z1)
+            rho0 = c[RHO2] + (z0 - c[Z2]) * c[TB]
+            rho1 = c[RHO2] + (z1 - c[Z2]) * c[TB]
+            k = add_slice(
+                out, k, start + (z0 - c[Z2]) / sk, start + (z1 - c[Z2]) / sk, 0.5 * (rho0 + rho1), z0, sk, ck, mid,
+                rho0, rho1,
+            )  # fmt: skip
+    return k

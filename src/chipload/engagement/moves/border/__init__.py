@@ -1,1 +1,0 @@
-"""Where the material ends on a circle of the cutter."""

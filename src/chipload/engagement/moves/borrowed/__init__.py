@@ -1,1 +1,0 @@
-"""Arrays that compiled loops use without counting their references."""

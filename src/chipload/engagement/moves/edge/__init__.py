@@ -1,1 +1,0 @@
-"""Slices of the part of the edge that may be in material."""

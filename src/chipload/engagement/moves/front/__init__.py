@@ -1,1 +1,0 @@
-"""Compiled search of the engaged part of the cutting edge."""

@@ -1,1 +1,0 @@
-"""Compiled loops over the faces of the initial body."""

@@ -1,1 +1,0 @@
-"""Compiled outlines of what moves swept at a height."""

@@ -1,1 +1,0 @@
-"""Pallet angles that one check point forbids to one cutter, exactly."""

@@ -1,1 +1,0 @@
-"""Compiled loops of :mod:`chipload.simulation.deflection`."""

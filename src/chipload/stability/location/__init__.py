@@ -1,1 +1,0 @@
-"""Harmonics of the cutting force."""

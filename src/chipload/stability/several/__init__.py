@@ -1,1 +1,0 @@
-"""The map of a period with several delays, in two or three directions."""

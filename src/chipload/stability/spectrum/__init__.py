@@ -1,1 +1,0 @@
-"""Greatest eigenvalue of a small Hessenberg matrix."""

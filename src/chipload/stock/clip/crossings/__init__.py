@@ -1,1 +1,0 @@
-"""Crossings of the boundaries of two areas, compiled."""

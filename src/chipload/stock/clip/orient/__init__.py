@@ -1,1 +1,0 @@
-"""Side of a line on which a point lies, compiled."""

@@ -1,1 +1,0 @@
-"""Edges of the rings of a layered workpiece, as rows of numbers."""
