@@ -13,8 +13,8 @@ import pytest
 import chipload
 from chipload.errors import InputError
 from chipload.geometry.isolated import Isolated
-from chipload.jobs.provenance import versions
 from chipload.lazy import EXTRAS, require_extra
+from chipload.result.provenance import versions
 from chipload.web.serve import serve
 
 ROOT = Path(__file__).parents[1]

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chipload.checking.workpiece import stock_points
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.moves.stock import MoveStock, work_room
 from chipload.errors import InputError
 from chipload.examples import copy_example
 from chipload.jobs import check_job, load_job
-from chipload.jobs.simulation.workpiece import stock_points
 from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, Program
 from chipload.simulation.chips import counted

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import chipload
+from chipload.checking.default_checks import DefaultChecks, upper_loads
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.strength import ToolStrength
 from chipload.cutting.force import forces_over_turn
@@ -17,7 +18,6 @@ from chipload.cutting.material import material_named
 from chipload.cutting.strength import cutter_stress
 from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import InputError
-from chipload.jobs.checks import DefaultChecks, upper_loads
 from chipload.jobs.program.history import History
 from chipload.jobs.tables import ChecksTable
 from chipload.program.build import plunge, rapid

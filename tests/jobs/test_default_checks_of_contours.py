@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chipload.checking.default_checks import DefaultChecks, _could_be_greatest
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named
 from chipload.engagement.contact import Engagement
 from chipload.jobs import load_job, run_job
-from chipload.jobs.checks import DefaultChecks, _could_be_greatest
 from chipload.planning.cost import CutConditions, cost
 from chipload.result import Verdict
 

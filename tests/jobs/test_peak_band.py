@@ -9,12 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chipload.checking.default_checks import PEAKS, DefaultChecks, with_peaks
+from chipload.checking.limits import program_limits
 from chipload.cutting.material import material_named, material_text, read_material
 from chipload.errors import InputError
 from chipload.jobs import load_job, run_job
-from chipload.jobs.checks import PEAKS, DefaultChecks, with_peaks
 from chipload.jobs.fit.run import peak_excess
-from chipload.jobs.simulation.limits import program_limits
 from chipload.result import COLUMNS, LimitCheck, Verdict
 
 PROGRAM = "G21 G90 G94 G17 G54\nT1 M6\nS3000 M3\nG0 X-10 Y5 Z5\nG1 Z-1 F100\nX30 F400\nG0 Z5\nM2\n"

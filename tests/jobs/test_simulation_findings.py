@@ -5,9 +5,9 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+from chipload.checking.outcome import CollisionCheck
+from chipload.checking.result import simulation_findings
 from chipload.errors import Finding, Severity
-from chipload.jobs.simulation.outcome import CollisionCheck
-from chipload.jobs.simulation.result import simulation_findings
 
 
 def test_a_rapid_that_cuts_exceeds_and_a_program_that_was_handed_over_is_noted() -> None:

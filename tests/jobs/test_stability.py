@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chipload.checking.dynamics import Dynamics
+from chipload.checking.stability import StabilityResult
+from chipload.checking.stability_watch import StabilityWatch
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
 from chipload.errors import InputError
 from chipload.jobs import FinishedJob, load_job, run_job
-from chipload.jobs.simulation.dynamics import Dynamics
-from chipload.jobs.simulation.stability import StabilityResult
-from chipload.jobs.simulation.stability_watch import StabilityWatch
 from chipload.machine.machine import machine_named
 from chipload.program.gcode.speed_words import SpeedWord, speed_words, with_speeds
 from chipload.report.page import page_bytes

@@ -14,10 +14,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chipload.checking.stiffness import deflecting, stiffness_of
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.jobs.simulation.stiffness import deflecting, stiffness_of
 from chipload.jobs.simulation.tables import StiffnessTable
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from chipload.checking.dynamics import read_modes
 from chipload.cutting.material import material_named, material_text
 from chipload.errors import InputError
-from chipload.jobs.simulation.dynamics import read_modes
 from chipload.jobs.simulation.dynamics_tables import DynamicsTable, ModeTable
 from chipload.sweep.cases import Samples
 from chipload.sweep.run import run_sweep

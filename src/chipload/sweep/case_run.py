@@ -11,11 +11,11 @@ from typing import Any
 from chipload.errors import InputError, InputErrors
 from chipload.files import read_regular, write_whole
 from chipload.jobs import load_job, run_job
-from chipload.jobs.provenance import sources
 from chipload.progress import Progress, silent
 from chipload.report.folder import write_files
 from chipload.result import Result
 from chipload.result.history import write_history
+from chipload.result.provenance import sources
 from chipload.result.summary import summary_bytes
 
 #: version of the records

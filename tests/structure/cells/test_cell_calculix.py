@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import shapely
 
-from chipload.jobs.simulation.workpiece_compliance import COARSER, CORNER, FLOOR
+from chipload.checking.workpiece_compliance import COARSER, CORNER, FLOOR
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import Clamp
 from chipload.structure.cells.moments import StockRegion

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.default_checks import DefaultChecks, default_limits
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.engagement.contact import PIECES, Engagement
 from chipload.errors import InputError
-from chipload.jobs.checks import DefaultChecks, default_limits
 from chipload.jobs.contour.tables import OperationTable
 from chipload.machine.machine import Machine
 from chipload.planning.cost import CutConditions, cost

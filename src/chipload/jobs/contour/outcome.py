@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from chipload.checking.default_checks import DefaultChecks
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
-from chipload.jobs.checks import DefaultChecks
 from chipload.machine.machine import Machine
 from chipload.planning.result import OperationResult
 from chipload.result import Provenance, Verdict

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.default_checks import default_limits, ramp_findings, range_findings, unchecked_checks, with_peaks
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import default_limits, ramp_findings, range_findings, unchecked_checks, with_peaks
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.machine.machine import Machine
 from chipload.planning.result import Event, StrategyResult

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from chipload.checking.default_checks import default_checks
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, need_directions, read_material
 from chipload.errors import Finding, InputError, Severity
 from chipload.geometry.contour import Contour, Region
-from chipload.jobs.checks import default_checks
 from chipload.jobs.contour.advice import greatest_engagement
 from chipload.jobs.contour.earlier_stock import read_stock, standing_between
 from chipload.jobs.contour.estimate import clearing_estimate
@@ -32,7 +32,6 @@ from chipload.jobs.contour.job import ContourJob, left_on_walls
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.jobs.contour.part import read_part, require_within_travel
 from chipload.jobs.contour.tables import OperationTable
-from chipload.jobs.provenance import provenance_of, title_of
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.contour.plan import Finishing, check_contour, plan_contour
 from chipload.planning.pocket.plan import check_pocket, plan_pocket
@@ -42,6 +41,7 @@ from chipload.planning.result import OperationResult, StrategyResult
 from chipload.program.check import check_program
 from chipload.progress import Progress, silent
 from chipload.result import Provenance, Verdict
+from chipload.result.provenance import provenance_of, title_of
 from chipload.simulation.verify import verify_contour
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.default_checks import DefaultChecks, load_error, peak_excess, upper_loads
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.engagement.tooth_engagement import thickest_of_teeth
-from chipload.jobs.checks import DefaultChecks, load_error, peak_excess, upper_loads
 from chipload.jobs.feeds.outcome import FeedResult
 from chipload.jobs.feeds.tables import FeedsTable
 from chipload.jobs.feeds.verify import require_same, rubbing_lines, speeds_of, tooth_feeds

@@ -9,12 +9,12 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from chipload.checking.figures import program_presentation
+from chipload.checking.outcome import SimulationResult
+from chipload.checking.result import changed_name
 from chipload.jobs.feeds.numbers import COMPARED, exceeding, feed_numbers
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
 from chipload.jobs.feeds.result import result_of
-from chipload.jobs.simulation.figures import program_presentation
-from chipload.jobs.simulation.outcome import SimulationResult
-from chipload.jobs.simulation.result import changed_name
 from chipload.report.presentation import Presentation
 from chipload.report.sheet import figure, table
 from chipload.result import COLUMNS, LimitCheck

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.jobs.checks import upper_loads
+from chipload.checking.default_checks import upper_loads
+from chipload.checking.outcome import SimulationResult
 from chipload.jobs.feeds.outcome import FeedResult
-from chipload.jobs.simulation.outcome import SimulationResult
 from chipload.result import LimitCheck
 
 #: columns of loads that are compared before and after new feeds

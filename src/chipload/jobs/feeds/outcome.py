@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.jobs.simulation.outcome import ChangedText, Floats, ProgramResult, SimulationResult
+from chipload.checking.outcome import ChangedText, Floats, ProgramResult, SimulationResult
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from chipload.checking.outcome import SimulationResult
+from chipload.checking.result import changed_name, changed_tracks, program_result
+from chipload.checking.rows import step_rows
 from chipload.errors import Finding, Severity
 from chipload.jobs.feeds.numbers import feed_numbers
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
-from chipload.jobs.simulation.outcome import SimulationResult
-from chipload.jobs.simulation.result import changed_name, changed_tracks, program_result
-from chipload.jobs.simulation.rows import step_rows
 from chipload.result import Result
 from chipload.result.limits import Columns
 

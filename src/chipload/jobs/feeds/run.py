@@ -6,19 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from chipload.checking import run as simulation
+from chipload.checking.default_checks import PROGRAM_COLUMNS, default_checks, with_checks
+from chipload.checking.limits import spindle_limits
+from chipload.checking.preparation import material_of, resolution_of, timed
+from chipload.checking.program_text import read_as
+from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.checking.workpiece import stock_body
+from chipload.checking.workpiece_compliance import WorkpieceCompliance, with_compliance_error
 from chipload.cutting.material import Material
-from chipload.jobs.checks import PROGRAM_COLUMNS, default_checks, with_checks
 from chipload.jobs.feeds.allowed import FeedRequest, watching, with_new_feeds
 from chipload.jobs.feeds.job import FeedsJob
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
-from chipload.jobs.simulation import run as simulation
-from chipload.jobs.simulation.limits import spindle_limits
-from chipload.jobs.simulation.preparation import material_of, resolution_of, timed
-from chipload.jobs.simulation.program_text import read_as
-from chipload.jobs.simulation.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.jobs.simulation.tables import LOADS
-from chipload.jobs.simulation.workpiece import stock_body
-from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance, with_compliance_error
 from chipload.machine.machine import Machine
 from chipload.program.program import RAPID
 from chipload.program.read import ProgramReading, line_times

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.program_text import differing
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.jobs.feeds.tables import FeedsTable
-from chipload.jobs.simulation.program_text import differing
 from chipload.planning.feeds import LineFeeds
 from chipload.program.gcode.feed_words import DIGITS
 from chipload.program.program import DWELL, RAPID, Program

@@ -17,9 +17,9 @@ from chipload.cutting.turns import MeasuredCut, turns_of
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs.fit.job import CHANNELS, FitJob
 from chipload.jobs.fit.outcome import Comparison, FitResult, MeasuredForces
-from chipload.jobs.provenance import hashes, title_of, versions
 from chipload.progress import Progress, silent
 from chipload.result import Provenance
+from chipload.result.provenance import hashes, title_of, versions
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 Floats = NDArray[np.float64]

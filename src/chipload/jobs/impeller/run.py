@@ -29,7 +29,6 @@ from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.roughing import checked_roughing
 from chipload.jobs.impeller.surface_search import WORKERS, SearchInputs, SurfaceSearch, searched_surfaces
 from chipload.jobs.impeller.tables import ImpellerOperationTable
-from chipload.jobs.provenance import provenance_of, sources, title_of, versions
 from chipload.jobs.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.impeller.answer import Answer, one_cutter_of
@@ -42,6 +41,7 @@ from chipload.planning.impeller.surfaces import BODIES, ContactSampling, Contact
 from chipload.planning.impeller.tables import IndexTable, index_table
 from chipload.progress import Progress, part_of, silent
 from chipload.result import Provenance
+from chipload.result.provenance import provenance_of, sources, title_of, versions
 from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.workers import Team, Workers
 

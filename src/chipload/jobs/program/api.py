@@ -16,6 +16,7 @@ import trimesh
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ValidationError
 
+from chipload.checking.clamped import clamp_errors
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import CutterTable, cutter_from_table
 from chipload.cutting.material import Material, material_named, read_material
@@ -24,8 +25,6 @@ from chipload.jobs.messages import Errors, table_errors
 from chipload.jobs.program.history import History
 from chipload.jobs.program.run import simulate_read
 from chipload.jobs.program.tables import ProgramJobTable
-from chipload.jobs.provenance import provenance_of
-from chipload.jobs.simulation.clamped import clamp_errors
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.simulation.tables import FixtureTable, SolidTable, TargetTable
 from chipload.jobs.tables import Table
@@ -36,6 +35,7 @@ from chipload.program.read import ProgramReading, read_program, reading_of
 from chipload.program.setup import Setup
 from chipload.program.to_work import TOLERANCE_MM
 from chipload.progress import Progress, silent
+from chipload.result.provenance import provenance_of
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min
 

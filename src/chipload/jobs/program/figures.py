@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from chipload.checking.figures import program_presentation
+from chipload.checking.outcome import ProgramResult
+from chipload.checking.result import changed_name
 from chipload.jobs.program.outcome import SpeedsProgram
 from chipload.jobs.program.result import result_of
-from chipload.jobs.simulation.figures import program_presentation
-from chipload.jobs.simulation.outcome import ProgramResult
-from chipload.jobs.simulation.result import changed_name
 from chipload.report.presentation import Presentation
 
 

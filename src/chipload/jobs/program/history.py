@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import NDArray
 
+from chipload.checking.outcome import ProgramResult
 from chipload.errors import InputError
 from chipload.jobs.program.result import result_of
-from chipload.jobs.simulation.outcome import ProgramResult
 from chipload.result import Result, Verdict
 from chipload.result.display import message_html, table_html
 from chipload.result.tabular import pandas_of, xarray_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from chipload.jobs.simulation.outcome import SimulationResult, SpeedResult
-from chipload.jobs.simulation.stability import StabilityResult, stability_numbers
+from chipload.checking.outcome import SimulationResult, SpeedResult
+from chipload.checking.stability import StabilityResult, stability_numbers
 
 
 def speed_numbers(

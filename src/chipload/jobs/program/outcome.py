@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from chipload.jobs.simulation.outcome import ProgramResult, SimulationResult, SpeedResult
+from chipload.checking.outcome import ProgramResult, SimulationResult, SpeedResult
 
 
 @dataclass(frozen=True, eq=False)

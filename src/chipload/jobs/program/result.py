@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from chipload.errors import Finding, Severity
-from chipload.jobs.program.numbers import speed_numbers
-from chipload.jobs.program.outcome import SpeedsProgram
-from chipload.jobs.simulation.limits import program_limits
-from chipload.jobs.simulation.outcome import ProgramResult
-from chipload.jobs.simulation.result import (
+from chipload.checking.limits import program_limits
+from chipload.checking.outcome import ProgramResult
+from chipload.checking.result import (
     APT,
     changed_name,
     changed_tracks,
@@ -19,7 +16,10 @@ from chipload.jobs.simulation.result import (
     misplaced,
     program_result,
 )
-from chipload.jobs.simulation.rows import motion_rows, step_rows
+from chipload.checking.rows import motion_rows, step_rows
+from chipload.errors import Finding, Severity
+from chipload.jobs.program.numbers import speed_numbers
+from chipload.jobs.program.outcome import SpeedsProgram
 from chipload.result import Result, Track, TrackKind, in_memory
 
 #: name of the track of a program that stays as it is

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from chipload.cutting.material import Material
-from chipload.jobs.program.outcome import SpeedsProgram
-from chipload.jobs.program.speeds import new_speeds, text_with_speeds
-from chipload.jobs.provenance import title_of
-from chipload.jobs.simulation.job import ProgramJob
-from chipload.jobs.simulation.outcome import ProgramResult
-from chipload.jobs.simulation.preparation import material_of
-from chipload.jobs.simulation.run import (
+from chipload.checking.outcome import ProgramResult
+from chipload.checking.preparation import material_of
+from chipload.checking.run import (
     check_lines,
     compliance_of_workpiece,
     machine_of,
@@ -18,11 +13,16 @@ from chipload.jobs.simulation.run import (
     require_layers,
     simulated,
 )
-from chipload.jobs.simulation.workpiece import stock_body
+from chipload.checking.workpiece import stock_body
+from chipload.cutting.material import Material
+from chipload.jobs.program.outcome import SpeedsProgram
+from chipload.jobs.program.speeds import new_speeds, text_with_speeds
+from chipload.jobs.simulation.job import ProgramJob
 from chipload.machine.machine import Machine
 from chipload.program.read import ProgramReading, line_times
 from chipload.progress import Progress, part_of, silent
 from chipload.result import Provenance
+from chipload.result.provenance import title_of
 from chipload.simulation.checkpoint import Checkpoint
 from chipload.stock.layers import LayeredStock
 from chipload.workers import Workers

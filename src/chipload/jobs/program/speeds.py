@@ -12,19 +12,19 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from chipload.checking.default_checks import PROGRAM_COLUMNS, with_checks
+from chipload.checking.outcome import SpeedResult, ToolSpeed
+from chipload.checking.preparation import resolution_of, timed
+from chipload.checking.program_text import differing, read_as
+from chipload.checking.run import text_to_change
+from chipload.checking.stability import StabilityResult, rounded_rpm, stability_of, watch_of
+from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.checking.workpiece_compliance import WorkpieceCompliance
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.jobs.checks import PROGRAM_COLUMNS, with_checks
 from chipload.jobs.program.zones import row_speeds, zone_speeds
 from chipload.jobs.simulation.job import ProgramJob
-from chipload.jobs.simulation.outcome import SpeedResult, ToolSpeed
-from chipload.jobs.simulation.preparation import resolution_of, timed
-from chipload.jobs.simulation.program_text import differing, read_as
-from chipload.jobs.simulation.run import text_to_change
-from chipload.jobs.simulation.stability import StabilityResult, rounded_rpm, stability_of, watch_of
-from chipload.jobs.simulation.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.jobs.simulation.tables import SimulateTable
-from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance
 from chipload.jobs.tables import stated
 from chipload.machine.machine import Machine
 from chipload.program.gcode.feed_words import DIGITS

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.jobs.simulation.outcome import ToolSpeed
-from chipload.jobs.simulation.stability import SPEEDS, StabilityResult, rounded_rpm
-from chipload.jobs.simulation.stability_watch import engaged_edge
+from chipload.checking.outcome import ToolSpeed
+from chipload.checking.stability import SPEEDS, StabilityResult, rounded_rpm
+from chipload.checking.stability_watch import engaged_edge
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.result.limits import Columns
 from chipload.stability.cuts import joined

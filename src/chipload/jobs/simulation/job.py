@@ -9,10 +9,10 @@ from typing import Any, TypeVar
 
 import trimesh
 
+from chipload.checking.clamped import clamp_errors
+from chipload.checking.dynamics import dynamics_of
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
-from chipload.jobs.simulation.clamped import clamp_errors
-from chipload.jobs.simulation.dynamics import dynamics_of
 from chipload.jobs.simulation.tables import ProgramLimitsTable, SimulationJobTable
 from chipload.jobs.sources import Limited, cutters, sources_of
 

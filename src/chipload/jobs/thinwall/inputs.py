@@ -18,7 +18,6 @@ from chipload.errors import Finding, InputError
 from chipload.geometry.mesh import read_mesh
 from chipload.geometry.sections import checked, loft, read_sections
 from chipload.geometry.thin_wall import ThinWall, blade, plate, through_sections
-from chipload.jobs.provenance import title_of
 from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.faces import wall_of_faces
 from chipload.jobs.thinwall.job import ThinWallJob
@@ -38,6 +37,7 @@ from chipload.planning.thinwall.linking import FineSide
 from chipload.planning.thinwall.passes import ThresholdOf
 from chipload.planning.thinwall.table import read_cuts
 from chipload.planning.thinwall.threshold import Experiments, Threshold, calibrated, modelled
+from chipload.result.provenance import title_of
 from chipload.simulation.surface import fine as points_of_mesh
 from chipload.structure.grid import from_map
 from chipload.structure.solid import SolidWorkpiece

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from chipload.checking.clamped import wrong_clamps
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
-from chipload.jobs.simulation.clamped import wrong_clamps
 from chipload.jobs.sources import Limited, sources_and_cutters, unknown_cutter
 from chipload.jobs.thinwall.tables import (
     EVERY,

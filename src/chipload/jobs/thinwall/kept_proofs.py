@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.jobs.kept_parts import KeptRecords
-from chipload.jobs.provenance import sources, versions
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.outcome import Finish, Shape
 from chipload.jobs.thinwall.proof import Proof
 from chipload.planning.thinwall.passes import Plan
 from chipload.result import Provenance
+from chipload.result.provenance import sources, versions
 from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.surface import Collision
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from chipload.jobs.simulation.workpiece import stock_points
+from chipload.checking.workpiece import stock_points
 from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.planning.thinwall.pass_program import PassProgram

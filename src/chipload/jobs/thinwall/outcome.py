@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.default_checks import DefaultChecks
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
 from chipload.geometry.thin_wall import ThinWall
-from chipload.jobs.checks import DefaultChecks
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.machine.machine import Machine
 from chipload.program.commands import Commands

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
-from chipload.jobs.simulation.clamped import clamped_volumes, clamps_of, elastic_of
+from chipload.checking.clamped import clamped_volumes, clamps_of, elastic_of
+from chipload.checking.workpiece_compliance import COARSER, CORNER, FLOOR
 from chipload.jobs.simulation.tables import WorkpieceTable
-from chipload.jobs.simulation.workpiece_compliance import COARSER, CORNER, FLOOR
 from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_floor import PartFloor

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
 
-from chipload.jobs.checks import check_columns
+from chipload.checking.default_checks import check_columns
 from chipload.jobs.thinwall.floor_loads import FloorLoads, floor_finish, floor_loads
 from chipload.jobs.thinwall.floor_shape import floor_shape
 from chipload.jobs.thinwall.inputs import WallInputs

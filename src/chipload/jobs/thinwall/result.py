@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.default_checks import default_limits, range_findings, unchecked_checks, with_peaks
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import default_limits, range_findings, unchecked_checks, with_peaks
 from chipload.jobs.thinwall.chatter import FIRST_STATE, chatter_limits, chatter_numbers
 from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, remedy_text
 from chipload.jobs.thinwall.part_shape import PartShape

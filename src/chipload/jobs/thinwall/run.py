@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.default_checks import default_checks
 from chipload.cutting.material import beyond
 from chipload.errors import Finding, InputError, Severity
-from chipload.jobs.checks import default_checks
-from chipload.jobs.provenance import provenance_of, title_of
 from chipload.jobs.thinwall.inputs import WallInputs, read_wall
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.kept_proofs import kept_of
@@ -35,6 +34,7 @@ from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.result import Provenance
+from chipload.result.provenance import provenance_of, title_of
 from chipload.simulation.checkpoint import Checkpoint
 from chipload.simulation.chips import counted
 from chipload.simulation.estimate import estimate

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.preparation import with_tool
 from chipload.control.wall import Loads, two_parts
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError, Severity
-from chipload.jobs.simulation.preparation import with_tool
 from chipload.jobs.tables import stated
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable

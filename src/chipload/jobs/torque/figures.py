@@ -9,8 +9,8 @@ from html import escape
 import numpy as np
 import plotly.graph_objects as go
 
+from chipload.checking.workpiece_figures import bent_section
 from chipload.control.fuzzy import FuzzyTable
-from chipload.jobs.simulation.workpiece_figures import bent_section
 from chipload.jobs.torque import torque_figures as drawn
 from chipload.jobs.torque.files import HAL, PATH, program_files
 from chipload.jobs.torque.numbers import operation_numbers

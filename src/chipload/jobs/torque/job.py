@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from chipload.checking.clamped import wrong_clamps
 from chipload.control.spindle_file import IDENTIFIED
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
-from chipload.jobs.simulation.clamped import wrong_clamps
 from chipload.jobs.simulation.tables import WorkpieceTable
 from chipload.jobs.sources import entries_of, sources_and_cutters, unknown_cutter
 from chipload.jobs.tables import stated

@@ -15,6 +15,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.default_checks import DefaultChecks
+from chipload.checking.workpiece_compliance import WorkpieceCompliance
 from chipload.control import plant
 from chipload.control.fuzzy import FuzzyTable
 from chipload.control.linuxcnc.path import ToolPath
@@ -23,8 +25,6 @@ from chipload.control.plant import Loop
 from chipload.control.spindle_model import Spindle, SpindleDeviation
 from chipload.control.wall import PathLimit
 from chipload.errors import Finding
-from chipload.jobs.checks import DefaultChecks
-from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance
 from chipload.jobs.tables import ChecksTable
 from chipload.jobs.torque.step_checks import StepChecks
 from chipload.machine.machine import Machine

@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from chipload.checking.default_checks import default_limits, range_findings, unchecked_checks, with_peaks
 from chipload.control.override import STATUS
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import default_limits, range_findings, unchecked_checks, with_peaks
 from chipload.jobs.torque.numbers import operation_numbers
 from chipload.jobs.torque.outcome import (
     HELD,

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from chipload.checking.clamped import require_clamped
+from chipload.checking.default_checks import default_checks
 from chipload.control.fuzzy import FuzzyTable, read_fuzzy, standard
 from chipload.control.identification import aliased, bandwidth
 from chipload.control.override import Override
@@ -18,9 +20,6 @@ from chipload.control.spindle_model import Spindle
 from chipload.control.wall import Loads, WallPath
 from chipload.cutting.material import Material, material_named, need_directions, read_material
 from chipload.errors import InputError
-from chipload.jobs.checks import default_checks
-from chipload.jobs.provenance import provenance_of, title_of
-from chipload.jobs.simulation.clamped import require_clamped
 from chipload.jobs.torque.allowable import allowable, wall_of
 from chipload.jobs.torque.controllers import cases_of, controller_of, shortest
 from chipload.jobs.torque.cut import CutSteps, program_of, require_linear, resolution_of
@@ -45,6 +44,7 @@ from chipload.program.program import Program
 from chipload.progress import Progress, part_of, silent
 from chipload.report.presentation import Blank
 from chipload.result import Provenance
+from chipload.result.provenance import provenance_of, title_of
 from chipload.simulation.accuracy import energy_balance
 from chipload.simulation.chips import counted
 from chipload.simulation.estimate import estimate

@@ -18,6 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.preparation import resolution_of
+from chipload.checking.workpiece import stock_body
+from chipload.checking.workpiece_compliance import WorkpieceCompliance, workpiece_compliance
 from chipload.control.linuxcnc.path import ToolPath
 from chipload.control.wall import (
     LimitedResponse,
@@ -32,10 +35,7 @@ from chipload.control.wall import (
 from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.jobs.simulation.job import ProgramJob
-from chipload.jobs.simulation.preparation import resolution_of
 from chipload.jobs.simulation.tables import ProgramLimitsTable, SimulateTable, SimulationJobTable, SolidTable
-from chipload.jobs.simulation.workpiece import stock_body
-from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance, workpiece_compliance
 from chipload.jobs.tables import stated
 from chipload.jobs.torque.allowable import path_of, relief_of
 from chipload.jobs.torque.cut import (

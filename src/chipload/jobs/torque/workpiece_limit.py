@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from chipload.checking.preparation import resolution_of
 from chipload.control.wall import PathLimit
 from chipload.cutting.material import Material
-from chipload.jobs.simulation.preparation import resolution_of
 from chipload.jobs.tables import stated
 from chipload.jobs.torque.allowable import coarser, limit_text
 from chipload.jobs.torque.job import TorqueJob

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.outcome import ChangedText
 from chipload.errors import InputError
 from chipload.files import read_regular
-from chipload.jobs.simulation.outcome import ChangedText
 from chipload.machine.machine import Machine
 from chipload.program.gcode.feed_words import with_feeds
 from chipload.program.gcode.reader import LARGEST_FILE

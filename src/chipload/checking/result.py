@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from chipload.checking.default_checks import ramp_findings, range_findings, unchecked_checks
+from chipload.checking.limits import program_limits
+from chipload.checking.numbers import operation_numbers, program_numbers
+from chipload.checking.outcome import ChangedText, ProgramResult, SimulationResult
+from chipload.checking.rows import step_rows
+from chipload.checking.stability import StabilityResult
+from chipload.checking.workpiece import stock_box
 from chipload.errors import Finding, Severity
-from chipload.jobs.checks import ramp_findings, range_findings, unchecked_checks
-from chipload.jobs.simulation.limits import program_limits
-from chipload.jobs.simulation.numbers import operation_numbers, program_numbers
-from chipload.jobs.simulation.outcome import ChangedText, ProgramResult, SimulationResult
-from chipload.jobs.simulation.rows import step_rows
-from chipload.jobs.simulation.stability import StabilityResult
-from chipload.jobs.simulation.workpiece import stock_box
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict
 from chipload.result.limits import Columns
 from chipload.simulation.placement import nothing_cut, stock_placement

@@ -10,12 +10,12 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chipload.checking.rubbing import over_feed, rubbing, spindle_speed
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.errors import Finding, InputError, Severity
-from chipload.jobs.rubbing import over_feed, rubbing, spindle_speed
 from chipload.jobs.tables import ChecksTable
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, Verdict, check_limit

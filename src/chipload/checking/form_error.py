@@ -17,8 +17,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from chipload.checking.stiffness import Stiffness
 from chipload.cutting.material import Material
-from chipload.jobs.simulation.stiffness import Stiffness
 from chipload.simulation.deflection import form_error
 from chipload.simulation.loads import Cuts
 from chipload.simulation.surface import Difference

@@ -10,14 +10,14 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from chipload.checking.clamped import require_clamped
+from chipload.checking.default_checks import DefaultChecks, default_checks
+from chipload.checking.stiffness import Stiffness, stiffness_of
+from chipload.checking.workpiece import fixture_points, part_body, stock_points
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, read_material
-from chipload.jobs.checks import DefaultChecks, default_checks
-from chipload.jobs.simulation.clamped import require_clamped
 from chipload.jobs.simulation.job import ProgramJob
-from chipload.jobs.simulation.stiffness import Stiffness, stiffness_of
 from chipload.jobs.simulation.tables import SimulateTable
-from chipload.jobs.simulation.workpiece import fixture_points, part_body, stock_points
 from chipload.jobs.tables import stated
 from chipload.machine.machine import Machine
 from chipload.program.program import RAPID, Program

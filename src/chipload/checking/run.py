@@ -9,30 +9,30 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.cutting.material import Material
-from chipload.errors import InputError, Severity, grouped, worst_severity
-from chipload.jobs.checks import PROGRAM_COLUMNS, with_checks
-from chipload.jobs.provenance import provenance_of, sources, title_of, versions
-from chipload.jobs.simulation.form_error import forming
-from chipload.jobs.simulation.job import ProgramJob
-from chipload.jobs.simulation.outcome import CollisionCheck, ProgramResult, SimulationResult
-from chipload.jobs.simulation.preparation import bodies_of, material_of, resolution_of, timed
-from chipload.jobs.simulation.program_text import changeable, straight
-from chipload.jobs.simulation.stability import stability_of, watch_of
-from chipload.jobs.simulation.stiffness import deflecting, stiffness_of, watched, with_columns
-from chipload.jobs.simulation.tables import SimulateTable
-from chipload.jobs.simulation.workpiece import fixture_meshes, insides, stock_body, stock_box
-from chipload.jobs.simulation.workpiece_compliance import (
+from chipload.checking.default_checks import PROGRAM_COLUMNS, with_checks
+from chipload.checking.form_error import forming
+from chipload.checking.outcome import CollisionCheck, ProgramResult, SimulationResult
+from chipload.checking.preparation import bodies_of, material_of, resolution_of, timed
+from chipload.checking.program_text import changeable, straight
+from chipload.checking.stability import stability_of, watch_of
+from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.checking.workpiece import fixture_meshes, insides, stock_body, stock_box
+from chipload.checking.workpiece_compliance import (
     WorkpieceCompliance,
     with_compliance_error,
     workpiece_compliance,
 )
+from chipload.cutting.material import Material
+from chipload.errors import InputError, Severity, grouped, worst_severity
+from chipload.jobs.simulation.job import ProgramJob
+from chipload.jobs.simulation.tables import SimulateTable
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.program.read import ProgramReading, line_times, read_program, read_tools
 from chipload.program.setup import Setup
 from chipload.progress import Progress, silent
+from chipload.result.provenance import provenance_of, sources, title_of, versions
 from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks

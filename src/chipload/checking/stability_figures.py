@@ -8,14 +8,14 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from chipload.jobs.simulation.outcome import SimulationResult, SpeedResult
-from chipload.jobs.simulation.stability import (
+from chipload.checking.outcome import SimulationResult, SpeedResult
+from chipload.checking.stability import (
     SURE,
     StabilityResult,
     filled_margins,
     stability_numbers,
 )
-from chipload.jobs.simulation.stability_watch import engaged_edge
+from chipload.checking.stability_watch import engaged_edge
 from chipload.report.sheet import figure, table
 from chipload.result.limits import Columns
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chipload.jobs.checks import DIRECTED, default_limits, load_error, upper_loads, with_peaks
-from chipload.jobs.simulation.outcome import SimulationResult
-from chipload.jobs.simulation.stability import STABILITY_LIMITS, StabilityResult, stability_limits
+from chipload.checking.default_checks import DIRECTED, default_limits, load_error, upper_loads, with_peaks
+from chipload.checking.outcome import SimulationResult
+from chipload.checking.stability import STABILITY_LIMITS, StabilityResult, stability_limits
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, Verdict, check_limit, column_of, state_of
 from chipload.result.limits import Columns

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.jobs.simulation.outcome import ProgramResult, SimulationResult
-from chipload.jobs.simulation.stability import filled_margins, filled_probability
-from chipload.jobs.simulation.stability_watch import PROBABILITY
+from chipload.checking.outcome import ProgramResult, SimulationResult
+from chipload.checking.stability import filled_margins, filled_probability
+from chipload.checking.stability_watch import PROBABILITY
 from chipload.program.read import times_of
 from chipload.result.limits import Columns
 from chipload.result.motions import motion_columns

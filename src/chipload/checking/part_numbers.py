@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.jobs.simulation.limits import greatest_difference
+from chipload.checking.limits import greatest_difference
 from chipload.simulation.surface import Collision, Difference
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from chipload.jobs.simulation.bent_workpiece import BentWorkpiece
-from chipload.jobs.simulation.outcome import SimulationResult
+from chipload.checking.bent_workpiece import BentWorkpiece
+from chipload.checking.outcome import SimulationResult
 from chipload.report.sheet import figure, table
 from chipload.result.style import FONT, GRID, LIMIT, SCALE
 from chipload.structure.cells.followed import FollowedModes

@@ -12,14 +12,14 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from chipload.jobs.simulation import part_figures
-from chipload.jobs.simulation.numbers import operation_numbers, program_numbers
-from chipload.jobs.simulation.outcome import ChangedText, ProgramResult, SimulationResult, SpeedResult
-from chipload.jobs.simulation.program_text import program_text
-from chipload.jobs.simulation.result import APT
-from chipload.jobs.simulation.rows import motion_rows
-from chipload.jobs.simulation.stability_figures import stability_sections
-from chipload.jobs.simulation.workpiece_figures import workpiece_section
+from chipload.checking import part_figures
+from chipload.checking.numbers import operation_numbers, program_numbers
+from chipload.checking.outcome import ChangedText, ProgramResult, SimulationResult, SpeedResult
+from chipload.checking.program_text import program_text
+from chipload.checking.result import APT
+from chipload.checking.rows import motion_rows
+from chipload.checking.stability_figures import stability_sections
+from chipload.checking.workpiece_figures import workpiece_section
 from chipload.program.apt.writer import write_apt
 from chipload.program.program import RAPID, Program
 from chipload.report.diagram import diagram_figure

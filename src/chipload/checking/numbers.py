@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking import part_numbers
+from chipload.checking.outcome import ProgramResult, SimulationResult
+from chipload.checking.stability import stability_numbers
 from chipload.cutting.strength import allowed_stress
-from chipload.jobs.simulation import part_numbers
-from chipload.jobs.simulation.outcome import ProgramResult, SimulationResult
-from chipload.jobs.simulation.stability import stability_numbers
 from chipload.program.motions import lengths
 from chipload.program.program import DWELL, RAPID
 from chipload.units import mm_min_from_mm_s

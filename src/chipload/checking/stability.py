@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.dynamics import dynamics_of
+from chipload.checking.stability_watch import PROBABILITY, StabilityWatch, relative_covariance
+from chipload.checking.workpiece_compliance import WorkpieceCompliance
 from chipload.cutting.material import Material
-from chipload.jobs.simulation.dynamics import dynamics_of
 from chipload.jobs.simulation.job import ProgramJob
-from chipload.jobs.simulation.stability_watch import PROBABILITY, StabilityWatch, relative_covariance
-from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, check_limit
 from chipload.result.limits import Columns

@@ -10,11 +10,11 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from chipload.checking.default_checks import DefaultChecks
+from chipload.checking.stability import StabilityResult
+from chipload.checking.workpiece_compliance import WorkpieceCompliance
 from chipload.cutter.cutter import Cutter
-from chipload.jobs.checks import DefaultChecks
-from chipload.jobs.simulation.stability import StabilityResult
 from chipload.jobs.simulation.tables import ProgramLimitsTable
-from chipload.jobs.simulation.workpiece_compliance import WorkpieceCompliance
 from chipload.machine.machine import Machine
 from chipload.program.read import ProgramReading
 from chipload.result import Provenance

@@ -15,7 +15,7 @@ import plotly.graph_objects as go
 import trimesh
 from numpy.typing import NDArray
 
-from chipload.jobs.simulation import part_numbers
+from chipload.checking import part_numbers
 from chipload.report.scene import legend
 from chipload.report.sheet import table
 from chipload.simulation.surface import Collision, Difference

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.dynamics import Dynamics
+from chipload.checking.stability_state import known_cuts_bytes, read_known_cuts
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
-from chipload.jobs.simulation.dynamics import Dynamics
-from chipload.jobs.simulation.stability_state import known_cuts_bytes, read_known_cuts
 from chipload.simulation.loads import Cuts
 from chipload.stability.cuts import DynamicCuts, dynamic_cuts, joined
 from chipload.stability.grouping import grouped

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.bent_workpiece import JACK, BentWorkpiece, bent_workpiece
+from chipload.checking.clamped import clamped_volumes, clamps_of, elastic_of
+from chipload.checking.contact_lines import CutAhead, cut_ahead
 from chipload.cutting.material import Material
 from chipload.errors import Finding, Severity
-from chipload.jobs.simulation.bent_workpiece import JACK, BentWorkpiece, bent_workpiece
-from chipload.jobs.simulation.clamped import clamped_volumes, clamps_of, elastic_of
-from chipload.jobs.simulation.contact_lines import CutAhead, cut_ahead
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
