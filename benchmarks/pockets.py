@@ -50,6 +50,7 @@ from chipload.planning.pocket.motions import Heights, motions_of, programs_of
 from chipload.planning.pocket.reach import centre_region
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import Program
+from chipload.program.release import NOT_SIMULATED
 from chipload.program.time import program_time
 from chipload.simulation.centre_path import CentrePath, rim_engagement
 
@@ -219,7 +220,7 @@ def machined(rows, radius, feed_per_tooth):
     feed = feed_per_tooth * TEETH * spindle / math.tau
     motions = motions_of(path, Heights(-radius, 0.1 - radius, 0.0, 5.0), feed, MACHINE.feed_max)
     program = Program.join(programs_of(motions, feed, radius, spindle, 1))
-    text = write_gcode(program, MACHINE, title="pocket", verified=False, comments=[], number=1)
+    text = write_gcode(program, MACHINE, title="pocket", release=NOT_SIMULATED, comments=[], number=1)
     return float(program_time(program, MACHINE).sum()), len(text)
 
 

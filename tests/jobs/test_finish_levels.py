@@ -75,7 +75,7 @@ def test_a_level_each_and_one_text(between, safe, tmp_path):
     assert [t.name for t in result_of(outcome).tracks] == ["0-backward", "1-backward"]
     name, new = outcome.operations[0].inserted
     assert outcome.operations[1].inserted == ("", "")
-    assert program_files(outcome)[f"0-semifinish-{name}"] == new.encode()
+    assert program_files(outcome, result_of(outcome))[f"0-semifinish-{name}"] == new.encode()
 
     old, now = text.split("\n"), new.split("\n")
     own, k = [], 0  # the place of each old line in the new text

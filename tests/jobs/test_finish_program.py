@@ -130,7 +130,7 @@ def test_the_text_is_the_old_one_with_passes_inserted(outcome, tmp_path):
     assert added > 5
     assert new[:11] == old[:11]
     assert new[11 + added :] == old[11:]
-    assert program_files(outcome)["0-semifinish-finish.ngc"] == text.encode()
+    assert program_files(outcome, result_of(outcome))["0-semifinish-finish.ngc"] == text.encode()
     assert "0-semifinish-finish.ngc" in result_of(outcome).tracks[0].programs
 
 
@@ -160,7 +160,7 @@ def test_conversational_programs_and_cl_data(file, tmp_path):
     outcome = run(job(tmp_path, text=text, lines=lines, file=file))
     name, new = outcome.operations[0].inserted
     assert name == file
-    assert program_files(outcome)[f"0-semifinish-{file}"] == new.encode()
+    assert program_files(outcome, result_of(outcome))[f"0-semifinish-{file}"] == new.encode()
     old, now = text.split("\n"), new.split("\n")
     added = len(now) - len(old)
     assert now[:safe] == old[:safe]

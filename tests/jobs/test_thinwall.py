@@ -19,7 +19,6 @@ from chipload.jobs.thinwall.result import failures_of, result_of
 from chipload.jobs.thinwall.scene import scene_bytes
 from chipload.jobs.thinwall.tries import TRIES, Tried, unlimited_plan
 from chipload.jobs.thinwall.wall_figures import space
-from chipload.program.gcode.writer import NOT_VERIFIED, VERIFIED
 from chipload.program.read import read_program, read_tools, times_of
 from chipload.report.folder import write_result
 from chipload.result import Verdict
@@ -293,16 +292,17 @@ def test_files(folder, done):
 
 
 def test_programs(done):
-    files = program_files(done)
+    result = result_of(done)
+    files = program_files(done, result)
     assert set(files) == {f"0-{n}.{e}" for n in done.variants for e in ("ngc", "apt")}
     first = {name: text.decode().splitlines()[0] for name, text in files.items() if name.endswith(".ngc")}
-    assert VERIFIED in first["0-variable.ngc"]
-    assert NOT_VERIFIED in first["0-constant.ngc"]
+    assert ("NOT VERIFIED" not in first["0-variable.ngc"]) == (result.verdict is Verdict.HOLDS)
+    assert "NOT VERIFIED: not released: the job uses variable" in first["0-constant.ngc"]
 
 
 @pytest.mark.skipif(not rs274_installed(), reason=MISSING)
 def test_linuxcnc_reads_the_programs(done):
-    for name, text in program_files(done).items():
+    for name, text in program_files(done, result_of(done)).items():
         if name.endswith(".ngc"):
             calls = canonical(text.decode())
             moves = [words for call, words in calls if call in ("STRAIGHT_FEED", "STRAIGHT_TRAVERSE")]

@@ -23,6 +23,7 @@ from chipload.planning.thinwall.read_rows import sides_of_program
 from chipload.planning.thinwall.variants import DepthOperation, even, limited_to
 from chipload.program.apt.writer import write_apt
 from chipload.program.program import LINE, RAPID, Program
+from chipload.program.release import NOT_SIMULATED
 from chipload.progress import silent
 from chipload.report.folder import write_result
 
@@ -103,7 +104,7 @@ def test_a_program_of_constant_depth_read_back_gives_the_same_plan(folder, side)
     """Only its last pass touches the finished side; the same rows, law, places, depths and path."""
     change = (*SMALL, f"wall.allowance_mm={side}")
     own = planned(load_job(folder / "planned.toml", change).job, True)
-    text = write_apt(program(*own), {1: own[0].cut.cutter}, title="own", verified=False)
+    text = write_apt(program(*own), {1: own[0].cut.cutter}, title="own", release=NOT_SIMULATED)
     (folder / "finish.apt").write_text(text)
     asked = load_job(folder / "rows.toml", change).job
     again = planned(asked, True)

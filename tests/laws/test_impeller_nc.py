@@ -26,6 +26,7 @@ from chipload.planning.impeller.tables import index_table
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import RAPID
 from chipload.program.read import read_program
+from chipload.program.release import NOT_SIMULATED
 
 MACHINE = machine_named("horizontal-b")
 CUTTER = CatalogueCutter(12.0, 2.0, cutting_length=45.0, reach=60.0, holder_diameter=30.0)
@@ -61,7 +62,7 @@ def rough(impeller):
 @pytest.fixture(scope="module", params=[finished, rough], ids=["finishing", "roughing"])
 def written(request, impeller):
     program = request.param(impeller)
-    return program, write_gcode(program, MACHINE, title="impeller", verified=False)
+    return program, write_gcode(program, MACHINE, title="impeller", release=NOT_SIMULATED)
 
 
 def rows_of(text):
@@ -166,7 +167,7 @@ def test_linuxcnc_goes_through_every_channel(written):
     """The loop of the text, carried out by LinuxCNC: each channel is the first, turned round the part."""
     program, _ = written
     repeat = channel_repeat(program, MACHINE, index_table(MACHINE), BLADES)
-    text = write_gcode(program, MACHINE, title="impeller", verified=False, repeat=repeat)
+    text = write_gcode(program, MACHINE, title="impeller", release=NOT_SIMULATED, repeat=repeat)
     shift, rows = np.zeros(5), []
     for name, words in canonical(text):
         if name == "SET_G92_OFFSET":
@@ -196,9 +197,9 @@ def test_every_channel_is_read_back(written, tmp_path, dialect):
     machine = replace(MACHINE, dialect=dialect)
     repeat = channel_repeat(program, machine, index_table(machine), BLADES)
     path = tmp_path / "all.nc"
-    path.write_text(write_gcode(program, machine, title="impeller", verified=False, repeat=repeat))
+    path.write_text(write_gcode(program, machine, title="impeller", release=NOT_SIMULATED, repeat=repeat))
     once = tmp_path / "one.nc"
-    once.write_text(write_gcode(program, machine, title="impeller", verified=False))
+    once.write_text(write_gcode(program, machine, title="impeller", release=NOT_SIMULATED))
     q, one = (read_program(x, machine, dialect=dialect).axes for x in (path, once))
     assert len(q) == BLADES * len(one)
     turn = (q.reshape(BLADES, -1, 9) - one)[:, :, 4]

@@ -20,6 +20,7 @@ from chipload.planning.impeller.programs import pallet_rate, pallet_speed, progr
 from chipload.planning.impeller.refinement import Refinement
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import RAPID
+from chipload.program.release import NOT_SIMULATED
 from chipload.program.to_axes import to_axes
 from chipload.simulation.channel.channel import left_on, wall
 
@@ -216,7 +217,7 @@ def test_a_rapid_keeps_off_what_roughing_leaves(impeller, scene, machined):
 def test_written_axes_lead_to_the_path(machined):
     """Positions as they stand in the text, by the chain of the machine, against the CL path."""
     _, tracks, _, program = machined
-    text = write_gcode(program, MACHINE, title="finish", verified=False)
+    text = write_gcode(program, MACHINE, title="finish", release=NOT_SIMULATED)
     q, rows = np.zeros(9), []
     for line in text.splitlines():
         if line.startswith("(") or not re.search(r"[XYZAB]-?[\d.]", line):
@@ -240,7 +241,7 @@ def test_written_axes_lead_to_the_path(machined):
 @pytest.mark.skipif(not rs274_installed(), reason=MISSING)
 def test_linuxcnc_reads_it(machined):
     *_, program = machined
-    calls = canonical(write_gcode(program, MACHINE, title="finish", verified=False))
+    calls = canonical(write_gcode(program, MACHINE, title="finish", release=NOT_SIMULATED))
     ends = [w for name, w in calls if name in ("STRAIGHT_FEED", "STRAIGHT_TRAVERSE")]
     commands, _ = to_axes(program, MACHINE)
     assert len(ends) >= len(commands)

@@ -12,6 +12,7 @@ from chipload.machine.machine import machine_named
 from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, Commands, Frame, extents
 from chipload.program.gcode.reader import read_gcode
 from chipload.program.gcode.writer import write_commands
+from chipload.program.release import NOT_SIMULATED
 
 VMC, FANUC, FIVE = machine_named("vmc"), machine_named("vmc-fanuc"), machine_named("xyzac-trunnion")
 coordinate = st.floats(-300, 300).map(lambda x: round(x, 3))
@@ -100,7 +101,7 @@ def assert_same(meant, read, unit):
 @given(some_commands(rotary=False))
 @settings(max_examples=150, deadline=None)
 def test_three_axes(meant):
-    text = write_commands(meant, VMC, title="t", verified=False)
+    text = write_commands(meant, VMC, title="t", release=NOT_SIMULATED)
     assert_same(meant, read_gcode(text)[0], 1e-6)
 
 
@@ -109,12 +110,12 @@ def test_three_axes(meant):
 def test_fanuc(meant):
     rpm = np.round(meant.spindle * 60 / math.tau) * math.tau / 60
     meant = replace(meant, spindle=rpm)
-    text = write_commands(meant, FANUC, title="t", verified=False)
+    text = write_commands(meant, FANUC, title="t", release=NOT_SIMULATED)
     assert_same(meant, read_gcode(text, dialect="fanuc")[0], 1e-4)
 
 
 @given(some_commands(rotary=True))
 @settings(max_examples=150, deadline=None)
 def test_five_axes(meant):
-    text = write_commands(meant, FIVE, title="t", verified=False)
+    text = write_commands(meant, FIVE, title="t", release=NOT_SIMULATED)
     assert_same(meant, read_gcode(text)[0], 1e-6)

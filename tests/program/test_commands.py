@@ -21,6 +21,7 @@ from chipload.program.commands import (
 )
 from chipload.program.gcode.reader import read_gcode
 from chipload.program.gcode.writer import write_commands
+from chipload.program.release import NOT_SIMULATED
 from chipload.program.to_work import to_work
 
 SHIFTED = Frame(
@@ -101,7 +102,7 @@ def test_a_shift_is_written_into_the_coordinates():
     """What G92 did is in the numbers, so that the axes go to the same places without it."""
     frame = Frame(2, nine(), 0.0, nine(1.0, 2, 3))
     c = commands([(RAPID, nine(10.0, 0, 5), 0), (LINE, nine(20.0, 0, 0), 0)], (frame,))
-    text = write_commands(c, machine_named("vmc"), title="t", verified=False)
+    text = write_commands(c, machine_named("vmc"), title="t", release=NOT_SIMULATED)
     assert "\nG55\n" in text
     read, _ = read_gcode(text)
     np.testing.assert_allclose(read.machine()[-1], c.machine()[-1], atol=1e-9)
@@ -116,7 +117,7 @@ def test_the_feed_of_a_turn_alone(tcp):
         (LINE, nine(1.0, 2, 3, 0.2), 0, (0, 0), 0, 0.5, 10.0, 1, tcp, 0, 2, 0),
     ]
     c = commands_from_rows(rows, (Frame(),), ("x",))
-    text = write_commands(c, machine_named("xyzac-trunnion"), title="t", verified=False)
+    text = write_commands(c, machine_named("xyzac-trunnion"), title="t", release=NOT_SIMULATED)
     assert ("F1718.873" if tcp else "G93 A11.459156 F150") in text
     read, _ = read_gcode(text)
     assert read.feed[-1] == pytest.approx(0.5, rel=1e-6)

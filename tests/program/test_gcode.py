@@ -14,6 +14,7 @@ from chipload.program.build import dwell, follow, plunge, rapid, rows
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.motions import sweeps
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
+from chipload.program.release import NOT_SIMULATED, Release
 
 VMC, FANUC = machine_named("vmc"), machine_named("vmc-fanuc")
 SPEED = 8000 * math.tau / 60
@@ -33,7 +34,7 @@ def pocket():
 
 
 def test_linuxcnc_text():
-    assert write_gcode(pocket(), VMC, title="a slot (30 x 20)", verified=True, comments=("stock: 6082",)) == (
+    assert write_gcode(pocket(), VMC, title="a slot (30 x 20)", release=Release(""), comments=("stock: 6082",)) == (
         "(chipload: verified by independent simulation)\n(a slot [30 x 20])\n(stock: 6082)\n"
         "G17 G21 G90 G91.1 G94 G97 G40 G49 G80 G54\nG64 P0.005\n"
         "(link)\nT3 M6\nG43 H3\nS8000 M3\nG0 X0 Y0\nZ5\n"
@@ -44,7 +45,7 @@ def test_linuxcnc_text():
 
 
 def test_fanuc_text():
-    assert write_gcode(pocket(), FANUC, title="a slot", verified=False, number=12, line_step=10) == (
+    assert write_gcode(pocket(), FANUC, title="a slot", release=NOT_SIMULATED, number=12, line_step=10) == (
         "%\nO0012 (NOT VERIFIED: NO SIMULATION HAS CHECKED THIS PROGRAM)\n(A SLOT)\n"
         "N10 G21\nN20 G17 G90 G94 G40 G49 G80\nN30 G54 G64\n"
         "(LINK)\nN50 T3 M6\nN60 S8000 M3\nN70 G0 X0. Y0.\nN80 G43 H3 Z5.\n"
@@ -85,7 +86,7 @@ def test_rounded_arcs_stay_arcs(machine, unit):
     points = np.column_stack([np.stack([p0, p1], axis=1).reshape(-1, 2), np.zeros(2 * n)])
     motion = np.column_stack([np.full(n, RAPID), np.where(sweep > 0, ARC_CCW, ARC_CW)]).ravel()
     program = rows(motion, points, np.repeat(c, 2, axis=0), np.where(motion == RAPID, 0, 5.0), 100.0, 1, "cut")
-    text = write_gcode(program, machine, title="t", verified=False)
+    text = write_gcode(program, machine, title="t", release=NOT_SIMULATED)
     assert "-0 " not in text + " "
     arcs = arcs_of(text)
     assert len(arcs) > 2000
@@ -107,12 +108,14 @@ def test_rounded_arcs_stay_arcs(machine, unit):
 
 
 def test_same_program_same_bytes():
-    assert write_gcode(pocket(), VMC, title="t", verified=True) == write_gcode(pocket(), VMC, title="t", verified=True)
+    assert write_gcode(pocket(), VMC, title="t", release=Release("")) == write_gcode(
+        pocket(), VMC, title="t", release=Release("")
+    )
 
 
 def test_exact_stop_and_no_negative_zero():
     p = rows([RAPID, LINE], [[-1e-9, -0.0, -1e-12], [1, -1e-8, -1e-7]], (0, 0), [0, 5.0], 100.0, 1, "cut")
-    text = write_gcode(p, replace(VMC, corner_tolerance=0.0), title="t", verified=False)
+    text = write_gcode(p, replace(VMC, corner_tolerance=0.0), title="t", release=NOT_SIMULATED)
     assert "\nG61\n" in text
     assert "-0" not in text
     assert "\nG1 X1 F300\n" in text
@@ -137,10 +140,10 @@ def test_exact_stop_and_no_negative_zero():
 )
 def test_refused(program, message):
     with pytest.raises(InputError) as err:
-        write_gcode(program, VMC, title="t", verified=False)
+        write_gcode(program, VMC, title="t", release=NOT_SIMULATED)
     assert str(err.value) == message
 
 
 def test_number_is_refused():
     with pytest.raises(InputError, match=r"^program number = 10000: must be from 1 to 9999$"):
-        write_gcode(pocket(), FANUC, title="t", verified=False, number=10000)
+        write_gcode(pocket(), FANUC, title="t", release=NOT_SIMULATED, number=10000)

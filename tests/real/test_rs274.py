@@ -14,6 +14,7 @@ from chipload.machine.machine import machine_named
 from chipload.program.build import dwell, follow, helix, plunge, rapid, rows
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
+from chipload.program.release import NOT_SIMULATED, Release
 from rs274 import MISSING, Refused, assert_same_motions, canonical, rs274_installed, run_rs274
 
 pytestmark = pytest.mark.skipif(not rs274_installed(), reason=MISSING)
@@ -21,7 +22,7 @@ LINUXCNC, FANUC = machine_named("vmc"), machine_named("vmc-fanuc")
 
 
 def written(program, machine=LINUXCNC):
-    return write_gcode(program, machine, title="test", verified=False)
+    return write_gcode(program, machine, title="test", release=NOT_SIMULATED)
 
 
 def random_program(rng, n, *, step=1.0):
@@ -176,7 +177,7 @@ def test_the_reader_does_refuse():
 )
 def test_comments_do_nothing(text):
     program = rows([RAPID, LINE], [[0, 0, 0], [5, 0, 0]], (0, 0), [0, 5.0], 100.0, 1, text)
-    out = write_gcode(program, LINUXCNC, title=text, verified=True, comments=(text, "x" * 500))
+    out = write_gcode(program, LINUXCNC, title=text, release=Release(""), comments=(text, "x" * 500))
     assert assert_same_motions(run_rs274(out), program) == 0
     plain = written(rows([RAPID, LINE], [[0, 0, 0], [5, 0, 0]], (0, 0), [0, 5.0], 100.0, 1, "cut"))
     acts = [name for name, _ in canonical(out) if name != "COMMENT"]

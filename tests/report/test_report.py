@@ -213,7 +213,8 @@ def test_a_summary_that_contradicts_itself_is_refused(
 def test_the_same_outcome_gives_the_same_bytes(outcome: Maker) -> None:
     for make in (summary, history, report, scene_bytes):
         assert make(outcome()) == make(outcome()), make.__name__
-    assert program_files(outcome()) == program_files(outcome())
+    one, two = outcome(), outcome()
+    assert program_files(one, result_of(one)) == program_files(two, result_of(two))
 
 
 def test_the_page_loads_nothing_from_elsewhere(outcome: Maker) -> None:
@@ -347,12 +348,18 @@ def glb_parts(glb: bytes) -> tuple[dict[str, Any], bytes]:
 
 
 def test_only_the_program_in_use_that_holds_is_called_verified(outcome: Maker) -> None:
-    files = program_files(outcome("backward"))
+    done = outcome("backward")
+    files = program_files(done, result_of(done))
     assert sorted(files) == [f"0-{n}.{e}" for n in ("backward", "feed", "plain") for e in ("apt", "ngc")]
     verified = {n for n, data in files.items() if b"NOT VERIFIED" not in data}
     assert verified == {"0-backward.ngc", "0-backward.apt"}
     for made in (outcome("plain"), outcome("backward", Verdict.UNPROVEN)):
-        assert all(b"NOT VERIFIED" in data for data in program_files(made).values())
+        assert all(b"NOT VERIFIED" in data for data in program_files(made, result_of(made)).values())
+    # what is found of the whole result counts as well: a guess of a draft, or a coarse run
+    result = result_of(done)
+    coarse = replace(result, findings=(Finding("job-coarse", 0, "a first result", Severity.UNPROVEN),))
+    for name, data in program_files(done, coarse).items():
+        assert b"NOT VERIFIED: Unproven: a first result" in data or "backward" not in name
 
 
 def test_the_folder_holds_everything(outcome: Maker, tmp_path: Path) -> None:
@@ -360,4 +367,4 @@ def test_the_folder_holds_everything(outcome: Maker, tmp_path: Path) -> None:
     target = write_result(result_of(made), presentation_of(made), tmp_path / "a" / "result")
     names = sorted(p.name for p in target.iterdir())
     assert names == sorted(["summary.json", "history.parquet", "removal.npz", "report.html", "scene.glb",
-                            *program_files(outcome())])  # fmt: skip
+                            *program_files(made, result_of(made))])  # fmt: skip

@@ -85,7 +85,7 @@ def made():
 
 @pytest.fixture(scope="module")
 def folder(made, tmp_path_factory):
-    show = Presentation(lambda figures: ["<p>own section</p>"], lambda: b"glb", lambda: {"0-used.ngc": b"%\n"})
+    show = Presentation(lambda figures: ["<p>own section</p>"], lambda: b"glb", lambda result: {"0-used.ngc": b"%\n"})
     return write_result(made, show, tmp_path_factory.mktemp("round") / "result")
 
 
@@ -133,7 +133,7 @@ def test_the_history_states_unit_label_and_meaning(folder):
 
 
 def test_the_same_result_gives_the_same_bytes(made, folder, tmp_path):
-    show = Presentation(lambda figures: ["<p>own section</p>"], lambda: b"glb", lambda: {"0-used.ngc": b"%\n"})
+    show = Presentation(lambda figures: ["<p>own section</p>"], lambda: b"glb", lambda result: {"0-used.ngc": b"%\n"})
     again = write_result(made, show, tmp_path / "result")
     for name in ("summary.json", "history.parquet", "report.html"):
         assert (again / name).read_bytes() == (folder / name).read_bytes(), name

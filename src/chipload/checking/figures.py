@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from html import escape
 from types import MappingProxyType
 from typing import Any
@@ -27,7 +28,7 @@ from chipload.report.gltf import GltfScene
 from chipload.report.presentation import Blank, Content, Presentation
 from chipload.report.scene import FIXTURE
 from chipload.report.sheet import figure, table
-from chipload.result import Result, Verdict
+from chipload.result import Result, release_of
 from chipload.result.motions import chords_of
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SPACE_POINTS, STOCK
 from chipload.result.thinning import thinned
@@ -78,7 +79,7 @@ def program_presentation(
     return Presentation(
         lambda figures: [*sections(figures), *_sections(program, speeds, figures)],
         lambda: scene_bytes(program),
-        lambda: _files(program, result, changed),
+        partial(_files, program, changed),
         lambda: _blanks(program, result),
         lambda: _samples(program, result),
     )
@@ -98,15 +99,17 @@ def _samples(program: ProgramResult, result: Result) -> dict[str, EngagementSamp
     return {} if found is None else {track.name: found for track in result.tracks if track.in_use}
 
 
-def _files(program: ProgramResult, result: Result, changed: Mapping[str, ChangedText]) -> dict[str, Content]:
+def _files(program: ProgramResult, changed: Mapping[str, ChangedText], result: Result) -> dict[str, Content]:
     """Return the files of the result: CL data of the program, its remaining stock, and its text if that is new."""
     path = program.reading.program
     tools = set(np.unique(path.tool).tolist())
     known = program.cutters if tools - {0} <= set(program.cutters) else None
-    text = write_apt(path, known, title=f"{program.title}, {program.name}", verified=False)
+    text = write_apt(path, known, title=f"{program.title}, {program.name}", release=release_of(result, APT))
     files: dict[str, Content] = {APT: text.encode("ascii")}
-    why = None if result.verdict is Verdict.HOLDS else result.message
-    files |= {name: program_text(own, why).encode("utf-8", "surrogateescape") for name, own in changed.items()}
+    files |= {
+        name: program_text(own, release_of(result, name)).encode("utf-8", "surrogateescape")
+        for name, own in changed.items()
+    }
     if program.simulated is not None:
         files["stock.npz"] = program.simulated.stock.to_bytes()
     return files

@@ -15,6 +15,7 @@ from chipload.program.gcode.feed_words import with_feeds
 from chipload.program.gcode.reader import LARGEST_FILE
 from chipload.program.program import Program
 from chipload.program.read import dialect_of
+from chipload.program.release import Release
 
 #: dialects whose texts take new F and S words
 WORDS = ("linuxcnc", "fanuc", "sinumerik")
@@ -78,15 +79,15 @@ def differing(old: Program, new: Program, *names: str) -> NDArray[np.bool_]:
     return off
 
 
-def program_text(changed: ChangedText, unless: str | None) -> str:
-    """Return the text of a program; if it is not proven, ``unless`` states why, in a comment on its first line.
+def program_text(changed: ChangedText, release: Release) -> str:
+    """Return the text of a program; if it is not verified, a comment on its first line states why.
 
     A line of ``%`` alone and Sinumerik's paths do not count as the first line.
     """
-    if unless is None:
+    if release.verified:
         return changed.text
-    plain = "".join(ch if ch.isascii() and ch.isprintable() and ch not in "()" else "_" for ch in unless)
-    comment = f"; NOT VERIFIED: {plain}" if changed.dialect == "sinumerik" else f"(NOT VERIFIED: {plain})"
+    plain = "".join(ch if ch.isascii() and ch.isprintable() and ch not in "()" else "_" for ch in release.text)
+    comment = f"; {plain}" if changed.dialect == "sinumerik" else f"({plain})"
     lines = changed.text.split("\n")
     for k, line in enumerate(lines):
         body = line.rstrip()

@@ -15,6 +15,7 @@ from chipload.machine.machine import Machine
 from chipload.program.apt.writer import write_apt
 from chipload.program.gcode.writer import write_commands
 from chipload.program.program import Program
+from chipload.program.release import NOT_SIMULATED
 from chipload.program.to_axes import to_axes
 from chipload.program.to_work import TOLERANCE_MM
 
@@ -80,10 +81,10 @@ def convert_program(
     """
     ending = ending.lower()
     if ending in CL_DATA:
-        return write_apt(program, cutters, title=title, verified=False), ()
+        return write_apt(program, cutters, title=title, release=NOT_SIMULATED), ()
     if ending not in NC_TEXT:
         known = " ".join((*NC_TEXT, *CL_DATA))
         raise InputError(f"the ending {ending or 'none'} cannot be written: must be one of {known}")
     commands, findings = to_axes(program, machine, tool_lengths=tool_lengths, tcp=tcp, tolerance=tolerance)
-    text = write_commands(commands, machine, title=title, verified=False, words=carried(noticed))
+    text = write_commands(commands, machine, title=title, release=NOT_SIMULATED, words=carried(noticed))
     return text, findings

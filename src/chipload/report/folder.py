@@ -137,7 +137,7 @@ def write_result(result: Result, presentation: Presentation, out: str | Path, pr
         makers.append((ENGAGEMENT, lambda: engagement_bytes(result, samples)))
     if result.maps:
         makers.append((MAPS, lambda: maps_bytes(result)))
-    return write_files(makers, out, presentation.files, progress=progress)
+    return write_files(makers, out, lambda: presentation.files(result), progress=progress)
 
 
 def write_files(

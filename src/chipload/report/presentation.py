@@ -12,6 +12,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
+from chipload.result import Result
 from chipload.simulation.engagement_samples import EngagementSamples
 
 #: content of a file, or what writes it bit by bit
@@ -46,13 +47,13 @@ class Presentation:
     ----------
     sections : puts figures into a mapping by name and returns HTML between the limits and the findings of the report
     scene : scene.glb
-    files : programs and other files by name
+    files : makes the programs and other files by name; a program states the verdict of the result that it is given
     blanks : of tracks by their names, from which the stock is shown at every row
     samples : tooth engagement and loads over a revolution of some steps, of tracks by their names
     """
 
     sections: Callable[[dict[str, go.Figure]], list[str]]
     scene: Callable[[], bytes]
-    files: Callable[[], Mapping[str, Content]] = field(default=dict)
+    files: Callable[[Result], Mapping[str, Content]] = field(default=lambda result: {})
     blanks: Callable[[], Mapping[str, Blank]] = field(default=dict)
     samples: Callable[[], Mapping[str, EngagementSamples]] = field(default=dict)

@@ -3,6 +3,7 @@
 from chipload.result.columns import COLUMNS, Column, column_of
 from chipload.result.limits import LimitCheck, check_limit, state_of
 from chipload.result.load import load_result, read_summary
+from chipload.result.release import release_of
 from chipload.result.result import Provenance, Result, SurfaceMap
 from chipload.result.summary import SCHEMA_VERSION, Summary
 from chipload.result.track import Track, TrackKind, in_memory
@@ -25,5 +26,6 @@ __all__ = [
     "in_memory",
     "load_result",
     "read_summary",
+    "release_of",
     "state_of",
 ]

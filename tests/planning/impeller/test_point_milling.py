@@ -24,6 +24,7 @@ from chipload.planning.impeller.scene import Scene
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import LINE, RAPID
 from chipload.program.read import read_program
+from chipload.program.release import NOT_SIMULATED
 
 MACHINE = machine_named("cradle-ac")
 LIMITS = AxisLimits(math.radians(10.0), 0.01, 0.0, 0.1)
@@ -189,8 +190,8 @@ def test_all_channels_are_read_back_as_the_first_one_turned(milled, tmp_path, di
     assert every.repeat is not None
     assert (every.repeat.letter, every.repeat.count) == ("C", 5)
     one, loop = tmp_path / "one.nc", tmp_path / "all.nc"
-    one.write_text(write_gcode(program, machine, title="points", verified=False))
-    loop.write_text(write_gcode(program, machine, title="points", verified=False, repeat=every.repeat))
+    one.write_text(write_gcode(program, machine, title="points", release=NOT_SIMULATED))
+    loop.write_text(write_gcode(program, machine, title="points", release=NOT_SIMULATED, repeat=every.repeat))
     first, q = (read_program(x, machine, dialect=dialect).axes for x in (one, loop))
     each = q.reshape(5, len(first), 9)
     # but the first row, before which Z is nowhere; the table itself turns against theta

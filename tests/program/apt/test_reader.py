@@ -14,6 +14,7 @@ from chipload.program.apt.reader import read_apt, read_apt_file
 from chipload.program.apt.writer import write_apt
 from chipload.program.motions import lengths, sweeps
 from chipload.program.program import ARC_CCW, ARC_CW, DWELL, LINE, RAPID
+from chipload.program.release import NOT_SIMULATED
 from program.apt.cl_points import read_cl_points
 
 HEAD = "UNITS/MM\nSPINDL/600,RPM,CLW\nRAPID\nGOTO/0,0,10\nFEDRAT/60,MMPM\n"
@@ -98,7 +99,7 @@ def test_cutters():
 def test_cutters_that_are_written():
     mill = Cutter(16.0, 4, 0.5, 22.0, 35.0, 6e5, corner_radius=1.0, bottom=math.radians(10.0), taper=math.radians(5.0))
     start = read("GOTO/0,0,0")[0]
-    text = write_apt(start, {0: mill}, title="x", verified=False)
+    text = write_apt(start, {0: mill}, title="x", release=NOT_SIMULATED)
     np.testing.assert_allclose(read_cutters(text)[0][0], mill.apt, atol=1e-6)
 
 

@@ -18,6 +18,7 @@ from chipload.program.apt.reader import read_apt
 from chipload.program.apt.writer import write_apt
 from chipload.program.motions import is_arc, lengths, radii, starts, sweeps
 from chipload.program.program import ARC_CCW, ARC_CW, DWELL, LINE, RAPID, Program
+from chipload.program.release import NOT_SIMULATED
 
 MILLS = {n: Cutter(8.0 + n, 4, 0.5, 22.0, 35.0, 6e5) for n in (1, 2, 3)}
 UP = np.array([0.0, 0.0, 1.0])
@@ -96,7 +97,7 @@ def same(a, b):
 @given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.booleans())
 def test_read_of_written_is_the_program(seed, rows, tilted):
     program = random_program(seed, rows, tilted=tilted)
-    text = write_apt(program, MILLS, title="x", verified=False)
+    text = write_apt(program, MILLS, title="x", release=NOT_SIMULATED)
     back, findings = read_apt(text)
     assert findings == ()
     same(program, back)
@@ -107,7 +108,7 @@ def test_read_of_written_is_the_program(seed, rows, tilted):
 def test_long_arcs_keep_their_length_and_side(seed, rows):
     """Arcs of up to a turn come back as pieces: same length, ends, and middle."""
     program = random_program(seed, rows, sweep_most=1.99 * math.pi)
-    back, _ = read_apt(write_apt(program, MILLS, title="x", verified=False))
+    back, _ = read_apt(write_apt(program, MILLS, title="x", release=NOT_SIMULATED))
     assert lengths(back).sum() == pytest.approx(lengths(program).sum(), abs=1e-4 * rows)
     ends = np.linalg.norm(back.p_work[None] - program.p_work[:, None], axis=2).min(axis=1)
     assert ends.max() < 2e-6
@@ -129,7 +130,7 @@ def test_whole_turns(turns, sense):
         turns=[0, turns],
         feed=[0.0, 3.0],
     )
-    back, findings = read_apt(write_apt(one, MILLS, title="x", verified=False))
+    back, findings = read_apt(write_apt(one, MILLS, title="x", release=NOT_SIMULATED))
     assert findings == ()
     assert len(back) == 1 + 2 * (1 + turns)
     np.testing.assert_allclose(back.p_work[1::2], np.tile(-arm, (1 + turns, 1)), atol=1e-6)
@@ -150,7 +151,7 @@ def test_helix_in_a_tilted_plane_is_chords_within_tolerance():
         normal=[UP, n],
         feed=[0.0, 3.0],
     )
-    back, _ = read_apt(write_apt(helix, MILLS, title="x", verified=False, chord_mm=0.01))
+    back, _ = read_apt(write_apt(helix, MILLS, title="x", release=NOT_SIMULATED, chord_mm=0.01))
     assert set(back.motion[1:].tolist()) == {LINE}
     middle = 0.5 * (starts(back) + back.p_work)[1:]
     away = 4.0 - np.linalg.norm(middle - (middle @ n)[:, None] * n, axis=1)
@@ -169,5 +170,5 @@ def test_a_tiny_arc_does_not_become_a_turn():
         feed=[0.0, 3.0],
     )
     assert lengths(tiny).sum() == pytest.approx(3e-7, rel=1e-3)
-    back, _ = read_apt(write_apt(tiny, MILLS, title="x", verified=False))
+    back, _ = read_apt(write_apt(tiny, MILLS, title="x", release=NOT_SIMULATED))
     assert lengths(back).sum() < 1e-5

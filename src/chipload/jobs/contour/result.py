@@ -110,14 +110,6 @@ def findings_of(op: Operation, name: str) -> tuple[Finding, ...]:
     return tuple(out)
 
 
-def failures_of(machine: Machine, op: Operation, name: str) -> tuple[str, ...]:
-    """Reasons why a strategy does not hold: findings and limits that exceed or are unproven, the worst first."""
-    checks = limits_of(machine, op, op.result.strategies[name], name)
-    found = [(Verdict.of_finding(f), f.text) for f in findings_of(op, name)]
-    found += [(c.state, c.text) for c in checks]
-    return tuple(text for state in (Verdict.EXCEEDS, Verdict.UNPROVEN) for s, text in found if s is state)
-
-
 def _track(outcome: ContourResult, k: int, op: Operation, name: str) -> Track:
     strategy, track = op.result.strategies[name], track_name(outcome, k, name)
     stem = program_name(k, name)

@@ -17,6 +17,7 @@ from chipload.program.apt.writer import write_apt
 from chipload.program.gcode.blocks import decimal
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
 from chipload.program.read import Dialect
+from chipload.program.release import NOT_SIMULATED
 from chipload.units import mm_min_from_mm_s
 
 Ints = NDArray[np.int64]
@@ -131,7 +132,7 @@ def _first_rows(program: Program, count: int) -> Program:
 def _cl_data(planned: Program, rows: Ints, p: Program, k: int) -> list[str]:
     x, y, z = p.p_work[k].tolist()
     safe = max(float(planned.p_work[rows, 2].max()), z)
-    text = write_apt(_first_rows(planned, len(rows)), None, title="", verified=True)
+    text = write_apt(_first_rows(planned, len(rows)), None, title="", release=NOT_SIMULATED)
     body = [line for line in text.splitlines() if _WHOLE.match(line) is None]
 
     def rapid(to: Sequence[float]) -> list[str]:

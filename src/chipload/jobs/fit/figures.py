@@ -33,7 +33,9 @@ CLOUD, LINE = 1200, 360
 
 def presentation_of(done: FitResult) -> Presentation:
     """Return the presentation of a fit."""
-    return Presentation(lambda figures: sections(done, figures), lambda: scene_bytes(done), lambda: files_of(done))
+    return Presentation(
+        lambda figures: sections(done, figures), lambda: scene_bytes(done), lambda result: files_of(done)
+    )
 
 
 def files_of(done: FitResult) -> Mapping[str, Content]:

@@ -45,7 +45,7 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
             f"{p.setting.length:.1f}", f"{p.seconds / 60.0:.2f}", f"{p.gouge.found:.4f} to {p.gouge.bound:.4f}",
             f"{p.missed:.1f}", str(sum(len(r.tracks) for r in p.setting.rests)),
             f"{p.setting.linked.direct} + {p.setting.linked.retracts}",
-            '<span class="ok">verified</span>' if p.verified else '<span class="no">not verified</span>',
+            '<span class="ok">holds</span>' if p.verified else '<span class="no">does not hold</span>',
         ]
         for k, p in enumerate(milled.programs, 1)
     ]  # fmt: skip
@@ -151,7 +151,7 @@ def _five_axis_cells(p: CheckedFlank | CheckedPoints) -> list[str]:
         f"{p.seconds / 60.0:.2f}",
         f"{p.excess:.4f}",
         f"{p.gouge.found:.4f} to {p.gouge.bound:.4f}",
-        '<span class="ok">verified</span>' if p.verified else '<span class="no">not verified</span>',
+        '<span class="ok">holds</span>' if p.verified else '<span class="no">does not hold</span>',
     ]
 
 

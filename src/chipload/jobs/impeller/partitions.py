@@ -101,7 +101,7 @@ def _programmed(milled: ImpellerResult) -> str:
             escape(w.name), ", ".join(f"{c.label}" for c in w.cutters), f"{w.path:.0f}",
             *(f"{x / 60.0:.1f}" for x in (w.cutting, w.links, w.changes, w.seconds, w.predicted)),
             "" if w.scallop is None else f"{100.0 * w.scallop:.0f}",
-            '<span class="ok">verified</span>' if w.verified else '<span class="no">not verified</span>',
+            '<span class="ok">holds</span>' if w.verified else '<span class="no">does not hold</span>',
         ]
         for w in milled.checked or ()
     ]  # fmt: skip

@@ -16,9 +16,10 @@ from chipload.program.apt.writer import write_apt
 from chipload.program.gcode.writer import Repeat, write_gcode
 from chipload.program.program import Program
 from chipload.report.programs import ENDINGS
+from chipload.result import Result, release_of
 
 
-def program_files(milled: ImpellerResult) -> dict[str, bytes]:
+def program_files(milled: ImpellerResult, result: Result) -> dict[str, bytes]:
     """All further files by name."""
     out = {"proof.npz": proof_bytes(milled), "contact_points.parquet": contact_points_bytes(milled)}
     for stem, cutter, table, checked, program, empty in _programs(milled):
@@ -28,21 +29,22 @@ def program_files(milled: ImpellerResult) -> dict[str, bytes]:
         for name, repeat in ((stem, None), (f"{stem}{ALL}", checked.repeat)):
             if name != stem and repeat is None:
                 continue
+            file = f"{name}.{ENDINGS[milled.machine.dialect]}"
             text = write_gcode(
-                program, milled.machine, title=title, verified=checked.verified,
+                program, milled.machine, title=title, release=release_of(result, file),
                 comments=_comments(milled, checked, cutter, table, number, repeat), number=100 + number, repeat=repeat,
             )  # fmt: skip
-            out[f"{name}.{ENDINGS[milled.machine.dialect]}"] = text.encode("ascii")
-        cl = write_apt(program, None, title=title, verified=checked.verified)
+            out[file] = text.encode("ascii")
+        cl = write_apt(program, None, title=title, release=release_of(result, f"{stem}.apt"))
         out[f"{stem}.apt"] = cl.encode("ascii")
     for first, named in ((200, flank_names(milled)), (300, points_names(milled))):
         for stem, p in named:
-            out |= _five_axis_files(milled, stem, p, first)
+            out |= _five_axis_files(milled, result, stem, p, first)
     return out
 
 
 def _five_axis_files(
-    milled: ImpellerResult, stem: str, p: CheckedFlank | CheckedPoints, first: int
+    milled: ImpellerResult, result: Result, stem: str, p: CheckedFlank | CheckedPoints, first: int
 ) -> dict[str, bytes]:
     """The texts of a program on five axes: one channel, all channels, APT."""
     number, n = int(p.program.tool[0]), milled.impeller.blades
@@ -52,7 +54,6 @@ def _five_axis_files(
         what, of = f"{p.path.lines} lines, scallop at most {p.excess:.4f} mm", "point milling"
     title = f"{milled.title}, {of} of {p.name}"
     head = [
-        *(f"not verified: {f}" for f in p.fails[:3]),
         f"T{number}: {p.cutter.label} mm, tool length 0: positions of the tip",
         f"five axes at once, {what}",
     ]
@@ -65,12 +66,14 @@ def _five_axis_files(
         texts.append((ALL, p.every.program, repeat, f"all {n} channels: {by}"))
     ending, out = ENDINGS[p.machine.dialect], {}
     for more, program, repeat, line in texts:
+        file = f"{stem}{more}.{ending}"
         text = write_gcode(
-            program, p.machine, title=title, verified=p.verified, number=first + number, comments=[*head, line],
-            repeat=repeat,
+            program, p.machine, title=title, release=release_of(result, file), number=first + number,
+            comments=[*head, line], repeat=repeat,
         )  # fmt: skip
-        out[f"{stem}{more}.{ending}"] = text.encode("ascii")
-    out[f"{stem}.apt"] = write_apt(p.program, None, title=title, verified=p.verified).encode("ascii")
+        out[file] = text.encode("ascii")
+    release = release_of(result, f"{stem}.apt")
+    out[f"{stem}.apt"] = write_apt(p.program, None, title=title, release=release).encode("ascii")
     return out
 
 
@@ -95,11 +98,10 @@ def _comments(
     """Comments for the machine operator."""
     table = milled.surfaces[0].table
     position = float(table.position[np.abs(table.angle - alpha).argmin()])
-    out = [f"not verified: {f}" for f in checked.fails[:3]]
-    out.append(f"T{number}: {c.label} mm, tool length 0: positions of the tip")
-    out.append(
-        f"index table {table.index} {np.degrees(position):.6g} deg before the start, table angle of {checked.name}"
-    )
+    out = [
+        f"T{number}: {c.label} mm, tool length 0: positions of the tip",
+        f"index table {table.index} {np.degrees(position):.6g} deg before the start, table angle of {checked.name}",
+    ]
     turn = np.degrees(milled.impeller.pitch)
     if repeat is None:
         out.append(

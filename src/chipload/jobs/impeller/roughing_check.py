@@ -129,7 +129,7 @@ def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) ->
                 f"<code>{escape(name)}</code>", str(v["layers"]), str(v["rows"]), f"{v['path_mm']:.0f}",
                 f"{v['time_min']:.2f}", f"{v['taken_mm3'] / 1e3:.2f}", stands, f"{v['gouge_mm']:.3f}",
                 f"{v['rapids_take_mm3']:.2f}, {v['above_takes_mm3']:.2f}", f"{v['missed_mm']:.0f}",
-                '<span class="ok">verified</span>' if r.verified else '<span class="no">not verified</span>',
+                '<span class="ok">holds</span>' if r.verified else '<span class="no">does not hold</span>',
             ]
         )  # fmt: skip
     return [

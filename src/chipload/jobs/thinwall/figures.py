@@ -6,15 +6,15 @@ from functools import partial
 
 import trimesh
 
-from chipload.jobs.thinwall.outcome import USED, ThinWallResult
+from chipload.jobs.thinwall.outcome import ThinWallResult
 from chipload.jobs.thinwall.part_shape import PartShape
-from chipload.jobs.thinwall.result import failures_of
 from chipload.jobs.thinwall.scene import scene_bytes
 from chipload.jobs.thinwall.sections import sections_of
 from chipload.program.apt.writer import write_apt
 from chipload.program.gcode.writer import write_commands
 from chipload.report.presentation import Blank, Presentation
 from chipload.report.programs import ENDINGS, program_name
+from chipload.result import Result, release_of
 
 
 def presentation_of(walled: ThinWallResult) -> Presentation:
@@ -40,17 +40,13 @@ def _frame(walled: ThinWallResult) -> str:
     return "Z 0 is the clamp, X along the wall, its sides towards Y+ and Y-"
 
 
-def program_files(walled: ThinWallResult) -> dict[str, bytes]:
-    """The program of each variant for the machine and as CL data; verified only the one in use, where it holds."""
+def program_files(walled: ThinWallResult, result: Result) -> dict[str, bytes]:
+    """The program of each variant for the machine and as CL data; the first line states the verdict of the job."""
     out: dict[str, bytes] = {}
     cutters = walled.planning.cutters
     for k, (name, one) in enumerate(walled.variants.items()):
-        bad = failures_of(walled, one)
-        released = name == USED and not bad
         title = f"{walled.title}, operation 0, thinwall, {name}"
-        comments = [] if name == USED else [f"not released: the job uses {USED}"]
-        comments += [f"does not hold: {bad[0]}"] if bad else []
-        comments += [
+        comments = [
             f"T{c.number}: D {c.diameter:g} mm, corner {c.corner_radius:g} mm, {c.flutes} flutes, overhang "
             f"{c.overhang:g} mm"
             for c in cutters.values()
@@ -60,10 +56,12 @@ def program_files(walled: ThinWallResult) -> dict[str, bytes]:
             f"G43 H{c.number} must be the overhang of {c.overhang:g} mm: the rotary axes turn about it"
             for c in cutters.values()
         ]
-        text = write_commands(
-            one.commands, walled.planning.machine, title=title, verified=released, comments=comments, number=100 + k
-        )
         stem = program_name(0, name)
-        out[f"{stem}.{ENDINGS[walled.planning.machine.dialect]}"] = text.encode("ascii")
-        out[f"{stem}.apt"] = write_apt(one.program, cutters, title=title, verified=released).encode("ascii")
+        file, cl = f"{stem}.{ENDINGS[walled.planning.machine.dialect]}", f"{stem}.apt"
+        text = write_commands(
+            one.commands, walled.planning.machine, title=title, release=release_of(result, file), comments=comments,
+            number=100 + k,
+        )  # fmt: skip
+        out[file] = text.encode("ascii")
+        out[cl] = write_apt(one.program, cutters, title=title, release=release_of(result, cl)).encode("ascii")
     return out

@@ -158,6 +158,12 @@ def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
     return (*out, *range_findings(walled.checks, one.columns))
 
 
+def verdict_of(walled: ThinWallResult, one: Variant) -> Verdict:
+    """Return the verdict of a variant, that of its track."""
+    states = [Verdict.of_finding(f) for f in findings_of(walled, one)] + [c.state for c in limits_of(walled, one)]
+    return Verdict.worst(states)
+
+
 def failures_of(walled: ThinWallResult, one: Variant) -> tuple[str, ...]:
     """Reasons why a variant does not hold, the worst first."""
     found = [(Verdict.of_finding(f), f.text) for f in findings_of(walled, one)]

@@ -9,12 +9,11 @@ import plotly.graph_objects as go
 
 from chipload.jobs.thinwall.outcome import OVER, USED, ThinWallResult, Variant, remedy_text
 from chipload.jobs.thinwall.part_shape import PartShape
-from chipload.jobs.thinwall.result import failures_of
+from chipload.jobs.thinwall.result import verdict_of
 from chipload.jobs.thinwall.wall_figures import COLOURS, along, bars, maps, space
 from chipload.report.page import state_cell
 from chipload.report.programs import program_name
 from chipload.report.sheet import figure, items, table, value_text
-from chipload.result import Verdict
 
 #: rows that tables list
 LISTED = 40
@@ -112,8 +111,7 @@ def _variants(walled: ThinWallResult) -> str:
     head += ["force over allowable", "stress [MPa]", "limits", "program"]
     rows = []
     for name, one in walled.variants.items():
-        bad = failures_of(walled, one)
-        status = state_cell(Verdict.HOLDS if not bad else Verdict.EXCEEDS)
+        status = state_cell(verdict_of(walled, one))
         rows.append(
             [
                 f'<span class="dot" style="background:{COLOURS[name]}"></span>{name}'
@@ -127,7 +125,7 @@ def _variants(walled: ThinWallResult) -> str:
                 f"{one.columns['force_over_allowable'].max(initial=0.0):.3f}",
                 f"{one.stress:.4g}",
                 status,
-                f"<code>{program_name(0, name)}</code>" + (" verified" if name == USED and not bad else ""),
+                f"<code>{program_name(0, name)}</code>",
             ]
         )
     return table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7, 8), used=[name == USED for name in walled.variants])

@@ -6,6 +6,8 @@ allows written into it, for a machine without a controller, where nothing is mea
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,8 +20,10 @@ from chipload.jobs.torque.outcome import TorqueResult
 from chipload.program.gcode.writer import write_commands, write_gcode
 from chipload.program.motions import is_arc
 from chipload.program.program import DWELL, RAPID, Program
+from chipload.program.release import NOT_SIMULATED
 from chipload.program.to_axes import to_axes
 from chipload.report.programs import ENDINGS
+from chipload.result import Result, release_of
 
 Floats = NDArray[np.float64]
 
@@ -36,19 +40,21 @@ PATH, TABLE, HAL = "path.csv", "controller.toml", "hal.toml"
 CONTROLLER_FILES = (PATH, TABLE, HAL)
 
 
-def program_files(outcome: TorqueResult) -> dict[str, bytes]:
+def program_files(outcome: TorqueResult, result: Result) -> dict[str, bytes]:
     """All files by name."""
     machine, ending = outcome.job.machine, ENDINGS[outcome.job.machine.dialect]
     commands, _ = to_axes(outcome.job.program, machine)
     takes = [(0, "M52 P1")] if machine.dialect == "linuxcnc" else []
     title = f"{outcome.job.title}, programmed feeds, to be run with chipload hal"
-    text = write_commands(commands, machine, title=title, verified=False, words=takes)
-    out = {f"0-override.{ending}": text.encode("ascii")}
+    name = f"0-override.{ending}"
+    release = replace(release_of(result, name), condition="with chipload hal")
+    text = write_commands(commands, machine, title=title, release=release, words=takes)
+    out = {name: text.encode("ascii")}
     if not outcome.attainable or outcome.control.controller is None:
         return out
     fed = feed_forward(outcome, outcome.control.controller)
     title = f"{outcome.job.title}, feeds that the planned torque allows, nothing is measured"
-    out[f"0-feedforward.{ending}"] = write_gcode(fed, machine, title=title, verified=False).encode("ascii")
+    out[f"0-feedforward.{ending}"] = write_gcode(fed, machine, title=title, release=NOT_SIMULATED).encode("ascii")
     case = outcome.control.cases[-1]
     job = HalJob(
         path=outcome.allowable.path, override=case.runs["fuzzy_feedforward"].config, table=outcome.control.table,

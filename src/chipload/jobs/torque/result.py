@@ -126,7 +126,7 @@ def _track(outcome: TorqueResult, case: ControllerCase, name: str) -> Track:
         time_s=run.outcome.time,
         limits=limits_of(outcome, columns, track),
         findings=(*_run_findings(case, run), *range_findings(outcome.job.checks, columns)),
-        programs=(f"0-override.{ENDINGS[outcome.job.machine.dialect]}",) if used else (),
+        programs=_programs(outcome) if used else (),
         parameters={"latency_s": case.loop.latency, "override_step": case.quantum},
         energy_balance=outcome.energy_balance["real"],
         blocks=in_memory(columns),
@@ -139,7 +139,11 @@ def _not_run(outcome: TorqueResult) -> Track:
     limits = (
         LimitCheck(name, x, None, Verdict.UNPROVEN, HELD, reason=reason) for name, x in outcome.job.limits.items()
     )
-    return Track(HELD, TrackKind.CONTROLLER, True, None, tuple(limits))
+    return Track(HELD, TrackKind.CONTROLLER, True, None, tuple(limits), programs=_programs(outcome))
+
+
+def _programs(outcome: TorqueResult) -> tuple[str, ...]:
+    return (f"0-override.{ENDINGS[outcome.job.machine.dialect]}",)
 
 
 def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:

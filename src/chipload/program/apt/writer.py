@@ -21,6 +21,7 @@ from chipload.errors import InputError
 from chipload.program.build import LONGEST_ARC
 from chipload.program.motions import is_arc, lengths, radii, rises, spans, starts, straightened, sweeps
 from chipload.program.program import DWELL, RAPID, Program
+from chipload.program.release import Release
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
 #: an arc that moves further along its normal [mm] is helical
@@ -36,7 +37,7 @@ def write_apt(
     cutters: Mapping[int, Cutter] | None,
     *,
     title: str,
-    verified: bool,
+    release: Release,
     chord_mm: float = 1e-3,
 ) -> str:
     """CL data of a program.
@@ -45,7 +46,7 @@ def write_apt(
     ----------
     cutters : cutter of each tool number but 0, which is no tool; None: not known, no CUTTER is written
     title : of the part, in PARTNO
-    verified : whether an independent simulation has verified the program
+    release : whether an independent simulation has verified the program; stated in the first PPRINT
     chord_mm : greatest distance of a helical arc from its chords [mm], > 0
 
     Raises
@@ -53,8 +54,8 @@ def write_apt(
     InputError
         A tool number has no cutter.
     """
-    status = "VERIFIED BY INDEPENDENT SIMULATION" if verified else "NOT VERIFIED"
-    out = [f"PARTNO/{_text(title)}", f"PPRINT/CHIPLOAD: {status}", "UNITS/MM"]
+    status = release.text.upper() if release.verified else release.text
+    out = [f"PARTNO/{_text(title)}", f"PPRINT/{_text(f'CHIPLOAD: {status}')}", "UNITS/MM"]
     tilted = bool((np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > 1e-12).any())
     if tilted:
         out.append("MULTAX/ON")

@@ -20,10 +20,8 @@ from chipload.machine.machine import Machine
 from chipload.program.commands import Commands
 from chipload.program.gcode.blocks import Blocks, comment, decimal
 from chipload.program.program import Program
+from chipload.program.release import Release
 from chipload.program.to_axes import to_axes
-
-VERIFIED = "chipload: verified by independent simulation"
-NOT_VERIFIED = "NOT VERIFIED: no simulation has checked this program"
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ def write_gcode(
     machine: Machine,
     *,
     title: str,
-    verified: bool,
+    release: Release,
     comments: Sequence[str] = (),
     number: int = 1,
     line_step: int = 0,
@@ -62,7 +60,7 @@ def write_gcode(
     """
     commands, _ = to_axes(program, machine)
     return write_commands(
-        commands, machine, title=title, verified=verified, comments=comments, number=number, line_step=line_step,
+        commands, machine, title=title, release=release, comments=comments, number=number, line_step=line_step,
         repeat=repeat,
     )  # fmt: skip
 
@@ -72,7 +70,7 @@ def write_commands(
     machine: Machine,
     *,
     title: str,
-    verified: bool,
+    release: Release,
     comments: Sequence[str] = (),
     number: int = 1,
     line_step: int = 0,
@@ -85,7 +83,7 @@ def write_commands(
     ----------
     commands : they and every tool begin with a rapid; arcs of at most one turn
     title : what the program is, in a comment
-    verified : whether an independent simulation has found the program good; said in the first block
+    release : whether an independent simulation has verified the program; stated in the first block
     comments : lines for the reader at the machine
     number : O number of a Fanuc-like program, 1 to 9999
     line_step : step of N words; 0 writes none
@@ -102,7 +100,7 @@ def write_commands(
     fanuc = machine.dialect == "fanuc"
     if not 1 <= number <= 9999:
         raise InputError(f"program number = {number}: must be from 1 to 9999")
-    status = VERIFIED if verified else NOT_VERIFIED
+    status = f"chipload: {release.text}" if release.verified else release.text
     head = [f"O{number:04d} {comment(status, fanuc)}" if fanuc else comment(status, fanuc)]
     head += [comment(text, fanuc) for text in (title, *comments)]
     blocks = [*_modes(machine), *Blocks(commands, machine, words).text()]

@@ -1,0 +1,42 @@
+"""The statement in the first line of a program text: whether an independent simulation has verified the program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Release:
+    """Whether a program is verified.
+
+    Only :func:`chipload.result.release.release_of` makes one that is, from the verdict of the whole job.
+
+    Parameters
+    ----------
+    reason : why the program is not verified; empty: it is
+    condition : how the program must be run for this; empty: as it is
+
+    Examples
+    --------
+    >>> Release("").text, Release("force 812 N exceeds 500 N in line 12").text
+    ('verified by independent simulation', 'NOT VERIFIED: force 812 N exceeds 500 N in line 12')
+    """
+
+    reason: str
+    condition: str = ""
+
+    @property
+    def verified(self) -> bool:
+        """Whether an independent simulation has verified the program and its whole job holds."""
+        return not self.reason
+
+    @property
+    def text(self) -> str:
+        """The statement in one line."""
+        if self.reason:
+            return f"NOT VERIFIED: {self.reason}"
+        return " ".join(filter(None, ("verified by independent simulation", self.condition)))
+
+
+#: of a program that was only written
+NOT_SIMULATED = Release("no simulation has checked this program")
