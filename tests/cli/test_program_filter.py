@@ -57,8 +57,9 @@ def test_a_good_program_passes_byte_by_byte(folder: Path) -> None:
     code, out, err = call(folder, "it's good.ngc", AXIS_PROGRESS_BAR="1")
     assert (code, out) == (0, GOOD)
     assert err.splitlines()[-1] == "FILTER_PROGRESS=100"
-    # X -10 is outside the travel only with the work offset at zero, which the screen knows better: told, not held
-    assert "X = -10 mm: machine mill travels from 0 to 400 mm" in err
+    # X -10 is outside the travel of 0 to 400 mm only with the work offset at zero, and none is saved
+    assert "not checked: travel: work offset not stated" in err
+    assert "travels" not in err
 
 
 def test_a_limit_of_the_machine_holds_it_back(folder: Path) -> None:

@@ -67,7 +67,7 @@ def test_a_program_beyond_the_machine(files: Path):
     )
     code, out, _ = call("check", files / "b.ngc", "--machine", "vmc")
     assert code == 3
-    assert "line 8: row 2: X = 900 mm: machine vmc travels from -400 to 400 mm" in out
+    assert "X goes from -10 to 900 mm, 910 mm: machine vmc travels 800 mm" in out
     assert "cuts with the spindle at rest" in out
     assert out.count("[exceeds]") == 2
 

@@ -142,7 +142,7 @@ def test_a_program_beyond_the_machine_fails(history) -> None:
     far = Program.join([slot(), rapid([1000.0, 0.0, 5.0], SPEED, 1, "away")])
     found = simulated(program=far)
     assert found.verdict == "exceeds"
-    assert "X = 1000 mm: machine vmc travels from -400 to 400 mm" in found.message
+    assert "X goes from -10 to 1000 mm, 1010 mm: machine vmc travels 800 mm" in found.message
 
 
 def test_a_program_of_five_axes_is_read_for_its_machine(tmp_path: Path) -> None:

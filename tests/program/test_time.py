@@ -89,13 +89,21 @@ def test_diagonal_uses_both_axes():
 
 
 def test_what_the_machine_cannot_do():
-    slot = Contour.circle((392.0, 0.0), 10.0)
-    parts = [rapid([402, 0, 300], 800.0, 1, "link"), follow(slot, -1.0, 300.0, 1.0, 1, "cut")]
+    slot = Contour.circle((792.0, 0.0), 10.0)
+    parts = [rapid([802, 0, 600], 800.0, 1, "link"), follow(slot, -1.0, 300.0, 1.0, 1, "cut")]
     parts += [plunge([0, 0, 0], 5.0, 0.0, 1, "cut")]
     found = check_program(Program.join(parts), VMC)
     assert [(f.code, f.text) for f in found] == [
-        ("machine-limit", "row 0: X = 402 mm: machine vmc travels from -400 to 400 mm (4 rows, the first is 0)"),
-        ("machine-limit", "row 0: Z = 300 mm: machine vmc travels from -250 to 250 mm (2 rows, the first is 0)"),
+        (
+            "machine-limit",
+            "row 0: X goes from 0 to 802 mm: machine vmc travels 800 mm, wherever the work lies (4 rows, the first is "
+            "0)",
+        ),
+        (
+            "machine-limit",
+            "row 0: Z goes from -1 to 600 mm: machine vmc travels 500 mm, wherever the work lies (2 rows, the first is "
+            "0)",
+        ),
         ("machine-feed", "row 1: feed 18000 mm/min: machine vmc reaches 12000 mm/min (2 rows, the first is 1)"),
         (
             "machine-spindle",
@@ -106,8 +114,8 @@ def test_what_the_machine_cannot_do():
     assert check_program(cut([[0, 0, 0], [9, 0, 0]]), VMC) == ()
     # an arc whose ends are inside and whose bulge is not
     bulge = Contour.from_bulges([[395.0, -10.0], [395.0, 10.0]], [1.0])
-    inside = Program.join([rapid([395, -10, 0], 800.0, 1, "link"), follow(bulge, 0.0, 5.0, 800.0, 1, "cut")])
-    assert check_program(inside, VMC)[0].text == "row 1: X = 405 mm: machine vmc travels from -400 to 400 mm"
+    inside = [rapid([[-400, 0, 0], [395, -10, 0]], 800.0, 1, "link"), follow(bulge, 0.0, 5.0, 800.0, 1, "cut")]
+    assert "X goes from -400 to 405 mm" in check_program(Program.join(inside), VMC)[0].text
     assert check_program(plunge([0, 0, 0], 5.0, 100.0, 1, "cut"), VMC)[0].code == "program-start"
 
 

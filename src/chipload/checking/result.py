@@ -95,11 +95,13 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
     """Return what was not checked: limits that are not stated, and bodies that were not compared."""
     simulation = program.simulated
     if simulation is None:
-        return ("removal, engagement, forces and collisions: the program was only read, not simulated",)
+        read = "removal, engagement, forces and collisions: the program was only read, not simulated"
+        return (read, *program.reading.unchecked)
     # where modes are stated a margin of 1 is checked
     always = () if simulation.stability is None else ("stability_margin",)
     missing = [name for name in simulation.limit_table.unstated if name not in always]
     out = [*unchecked_checks(simulation.checks), *(f"limit {name}: not stated" for name in missing)]
+    out += program.reading.unchecked
     if simulation.left is None:
         out.append("gouge and excess: no [part] is stated")
     if "stock" not in simulation.collisions.compared_with:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,10 +23,12 @@ from chipload.checking.workpiece_compliance import (
     workpiece_compliance,
 )
 from chipload.cutting.material import Material
-from chipload.errors import InputError, Severity, grouped, worst_severity
+from chipload.errors import Finding, InputError, Severity, grouped, worst_severity
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.simulation.tables import SimulateTable
+from chipload.machine.ini import read_ini
 from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.machine.saved_offsets import saved_offsets
 from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.program.read import ProgramReading, line_times, read_program, read_tools
@@ -58,10 +60,18 @@ def machine_of(job: ProgramJob) -> Machine:
     return machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
 
 
+def _of_configuration(job: ProgramJob) -> tuple[dict[str, Sequence[float]], tuple[Finding, ...]]:
+    """Return the work offsets that the `.ini` of a machine leads to and what it does not state; nothing of others."""
+    if not isinstance(job.machine, Path) or job.machine.suffix.lower() != ".ini":
+        return {}, ()
+    return dict(saved_offsets(job.machine)), read_ini(job.machine)[1]
+
+
 def read_for(job: ProgramJob, machine: Machine, progress: Progress = silent, text: str | None = None) -> ProgramReading:
     """Read the program of a job for a machine; ``text`` replaces the content of its file."""
     table = job.table.program
-    return read_program(
+    offsets, found = _of_configuration(job)
+    reading = read_program(
         job.program_file,
         machine,
         dialect=table.dialect,
@@ -70,10 +80,11 @@ def read_for(job: ProgramJob, machine: Machine, progress: Progress = silent, tex
         speed=rad_s_from_rpm(table.speed_rpm) if table.speed_rpm is not None else None,
         tolerance=table.tolerance_mm,
         text=text,
-        setup=Setup(table.parameters, table.work_offsets, job.cutters, table.placed_in),
+        setup=Setup(table.parameters, {**offsets, **table.work_offsets}, job.cutters, table.placed_in),
         comments=table.tool_comments,
         progress=progress,
     )
+    return replace(reading, findings=(*found, *reading.findings)) if found else reading
 
 
 def program_of(

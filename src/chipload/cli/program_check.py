@@ -64,7 +64,7 @@ def check_program(
         raise refused[0]  # that of the simplest machine
     if machine is None:
         show(f"no machine is stated: {on.name} is assumed; name yours with --machine, as its limits and times differ")
-    for line in finding_lines(reading):
+    for line in (*finding_lines(reading), *(f"not checked: {item}" for item in reading.unchecked)):
         show(line)
     gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
     lows, highs = bounds(reading.program)

@@ -67,7 +67,7 @@ def _read(file: Path, name: str, tools: Path | None) -> Severity:
     """Read the program for its machine with the work offsets that LinuxCNC saved, and write the findings.
 
     Leaving the travel of a machine without rotary axes is reported but does not block the program: it depends on the
-    work offset, and the screen warns before the cycle starts.
+    work offset, which may have changed since LinuxCNC saved it, and the screen warns before the cycle starts.
     """
     from chipload.cli.inputs import machine_of
     from chipload.cli.program_check import TOLERANCE_MM, finding_lines
@@ -82,7 +82,7 @@ def _read(file: Path, name: str, tools: Path | None) -> Severity:
         file, on, dialect="linuxcnc", tools=read_tools(tools) if tools is not None else None, tolerance=TOLERANCE_MM,
         setup=Setup(work_offsets=offsets), progress=_progress,
     )  # fmt: skip
-    for line in finding_lines(reading):
+    for line in (*finding_lines(reading), *(f"not checked: {item}" for item in reading.unchecked)):
         _print_error(line)
     placed = bool(on.chain.rotary)
     if any(placed or f.code != "machine-limit" for f in reading.violations):

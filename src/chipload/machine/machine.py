@@ -136,7 +136,7 @@ class Machine:
 
     @property
     def limits(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
-        """((low, high) [mm],) of X, Y, Z; for a machine of three axes those of the tip in the work frame."""
+        """((low, high) [mm],) of X, Y, Z, in the coordinates of the machine."""
         x, y, z = (self.chain.axis(letter) for letter in "XYZ")
         return (x.low, x.high), (y.low, y.high), (z.low, z.high)
 
@@ -216,7 +216,7 @@ def _tcp_words(top: Row) -> tuple[str, str] | None:
 
 
 def read_machine(path: str | Path) -> Machine:
-    """Read a machine from a TOML file.
+    """Read a machine from a TOML file, or from LinuxCNC's `.ini` (:func:`chipload.machine.ini.read_ini`).
 
     Keys: ``name``, ``dialect``, ``decimals``, ``rapid_mm_min``, ``feed_max_mm_min``, ``corner_tolerance_mm``, optional
     ``note``, ``jerk_mm_s3`` (along the path, for feed schedules), ``tcp_on`` and ``tcp_off`` (words that begin and end
@@ -245,6 +245,10 @@ def read_machine(path: str | Path) -> Machine:
     InputError
         The file cannot be read, a key is unknown or missing, a value is out of range.
     """
+    if Path(path).suffix.lower() == ".ini":
+        from chipload.machine.ini import read_ini
+
+        return read_ini(path)[0]
     return _from_table(*read_table("machine", path))
 
 

@@ -17,11 +17,17 @@ from chipload.program.program import DWELL, LINE, RAPID, Program
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
 
-def check_program(program: Program, machine: Machine) -> tuple[Finding, ...]:
-    """Axis limits (arcs with their bulge), greatest feed, range of the spindle, spindle at rest in a cut, tilted axis.
+def check_program(program: Program, machine: Machine, travel: bool = True) -> tuple[Finding, ...]:
+    """Span of the axes (arcs with their bulge), greatest feed, range of the spindle, spindle at rest in a cut, tilted
+    axis.
 
-    Limits and tilt of a machine without rotary axes; with them :func:`~chipload.machine.limits.limit_findings` says
-    what the axes do.
+    Span and tilt of a machine without rotary axes; with them :func:`~chipload.machine.limits.limit_findings` says
+    what the axes do. Where the work lies in the machine is not known here: what a program spans along an axis is
+    compared with what the axis travels. :func:`~chipload.program.travel.travel_findings` compares positions.
+
+    Parameters
+    ----------
+    travel : whether the span is compared
 
     One finding a code and axis: the worst row and its value, how many rows, the first of them. Codes: `machine-limit`,
     `machine-feed`, `machine-spindle`, `machine-spindle-off`, `machine-axis`, `program-start`.
@@ -30,8 +36,8 @@ def check_program(program: Program, machine: Machine) -> tuple[Finding, ...]:
     --------
     >>> from chipload.machine.machine import machine_named
     >>> from chipload.program.build import rapid
-    >>> check_program(rapid([[0, 0, 5], [401, 0, 5]], 0.0, 1, "link"), machine_named("vmc"))[0].text
-    'row 1: X = 401 mm: machine vmc travels from -400 to 400 mm'
+    >>> check_program(rapid([[0, 0, 5], [801, 0, 5]], 0.0, 1, "link"), machine_named("vmc"))[0].text
+    'row 1: X goes from 0 to 801 mm: machine vmc travels 800 mm, wherever the work lies'
     """
     found: list[Finding] = []
 
@@ -46,12 +52,15 @@ def check_program(program: Program, machine: Machine) -> tuple[Finding, ...]:
 
     low, high = bounds(program)
     slack = 1e-9
-    for i, axis in enumerate(AXES if not machine.chain.rotary else ()):
+    for i, axis in enumerate(AXES if travel and not machine.chain.rotary and len(program) else ()):
         least, most = machine.limits[i]
-        over = np.maximum(least - low[:, i], high[:, i] - most)
-        value = np.where(least - low[:, i] > high[:, i] - most, low[:, i], high[:, i])
-        text = f"{axis.upper()} = {{:g}} mm: machine {machine.name} travels from {least:g} to {most:g} mm"
-        report("machine-limit", over > slack, over, text, value)
+        a, b, span = float(low[:, i].min()), float(high[:, i].max()), most - least
+        text = (
+            f"{axis.upper()} goes from {a:g} to {b:g} mm: machine {machine.name} travels {span:g} mm, wherever the "
+            "work lies"
+        )
+        far = high[:, i] == b
+        report("machine-limit", far & (b - a > span + slack), high[:, i], text, high[:, i])
     cuts = (program.motion == LINE) | is_arc(program)
     feed = np.where(cuts, program.feed, 0.0)
     top = f"feed {{:g}} mm/min: machine {machine.name} reaches {mm_min_from_mm_s(machine.feed_max):g} mm/min"

@@ -55,6 +55,7 @@ class Frame:
     shift : (9,) float [mm, rad], of G92 and G52
     tool : (9,) float [mm, rad], length offset of the tool
     tilt : the tilted working plane; None: none
+    stated : whether the place of the work offset in the machine is stated
     """
 
     number: int = 1
@@ -63,6 +64,7 @@ class Frame:
     shift: Floats = field(default_factory=_zeros)
     tool: Floats = field(default_factory=_zeros)
     tilt: Tilt | None = None
+    stated: bool = False
 
     def __post_init__(self) -> None:
         for name in ("offset", "shift", "tool"):

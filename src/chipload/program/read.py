@@ -32,6 +32,7 @@ from chipload.program.swivel import Swivel
 from chipload.program.time import row_times
 from chipload.program.to_axes import LIMITS, to_axes
 from chipload.program.to_work import TOLERANCE_MM, axes_of, to_work, work_frame
+from chipload.program.travel import offset_stated, travel_findings
 from chipload.progress import Progress, silent
 from chipload.units import mm_min_from_mm_s
 
@@ -83,6 +84,19 @@ class ProgramReading:
     def axes(self) -> Floats:
         """(n, 9) float [mm, rad], the machine's own axes at the end of each row of ``commands``; made at each call."""
         return axes_of(self.commands, self.machine, self.placed)
+
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """What is not compared with the travel of the machine."""
+        out = []
+        if not offset_stated(self.commands):
+            out.append(
+                "travel: work offset not stated (program.work_offsets): only what each axis spans is compared with its "
+                "travel"
+            )
+        elif not self.machine.chain.rotary and any(f.code in OF_LENGTHS for f in self.findings):
+            out.append("travel of Z: tool lengths not stated (program.tools): only what it spans is compared")
+        return tuple(out)
 
     @property
     def retractions(self) -> tuple[int, ...]:
@@ -214,10 +228,13 @@ def _checked(
     placed: int | None = None,
 ) -> ProgramReading:
     """A program held against the limits of a machine."""
-    violations = [*check_program(program, machine)]
+    violations = [*check_program(program, machine, travel=False)]
+    if not machine.chain.rotary:
+        violations += travel_findings(commands, machine, not any(f.code in OF_LENGTHS for f in findings))
     if machine.chain.rotary:
         axes = axes_of(commands, machine, placed)
-        found = limit_findings(machine, axes, commands.line, placed=bool(work_frame(commands, placed).offset.any()))
+        base = work_frame(commands, placed)
+        found = limit_findings(machine, axes, commands.line, placed=base.stated or bool(base.offset.any()))
         violations += [f for f in found if f.code != "machine-offset"]
         more += tuple(f for f in found if f.code == "machine-offset")
     problems = ("machine-reach", "machine-linear")

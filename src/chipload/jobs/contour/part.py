@@ -97,7 +97,7 @@ def require_within_travel(contours: Sequence[Contour], machine: Machine, radius:
     Raises
     ------
     InputError
-        They reach further beyond the limits of X or Y than the radius [mm].
+        The centre has farther to go than X or Y travels, wherever the work lies; radius [mm].
     """
     if machine.chain.rotary or not contours:
         return
@@ -105,16 +105,10 @@ def require_within_travel(contours: Sequence[Contour], machine: Machine, radius:
     for k, axis in enumerate("XY"):
         low, high = float(boxes[:, k].min()), float(boxes[:, 2 + k].max())
         least, most = machine.limits[k]
-        if low + radius < least or high - radius > most:
-            middle = 0.5 * (low + high) - 0.5 * (least + most)
-            remedy = (
-                f"move it by part.origin_mm, {axis} by {middle:.6g}"
-                if high - low - 2.0 * radius <= most - least
-                else "name a machine with more travel, or check part.units"
-            )
+        if high - low - 2.0 * radius > most - least:
             raise InputError(
-                f"part: {axis} from {low:.6g} to {high:.6g} mm: machine {machine.name} travels from {least:g} to "
-                f"{most:g} mm: {remedy}"
+                f"part: {axis} from {low:.6g} to {high:.6g} mm: machine {machine.name} travels {most - least:g} mm: "
+                "name a machine with more travel, or check part.units"
             )
 
 

@@ -214,9 +214,12 @@ class Controller:
             raise InputError(f"{what}{number}: must be 0 or more")
         if self.tools is not None and self.strict_tools:
             raise InputError(f"{what}{number}: tool {number} is not in the tool table: add it there")
-        where = "is not in the tool table" if self.tools is not None else "is used and no tool table is given"
-        assumed = "length is taken" if number in self.diameters else "length and diameter are taken"
-        self.once("nc-tool-unknown", f"tool {number} {where}: its {assumed} as 0")
+        if self.tools is None:
+            assumed = "lengths" if number in self.diameters else "lengths and diameters"
+            self.once("nc-tool-unknown", f"no tool table is given: {assumed} of the tools are taken as 0")
+        else:
+            assumed = "length is taken" if number in self.diameters else "length and diameter are taken"
+            self.once("nc-tool-unknown", f"tool {number} is not in the tool table: its {assumed} as 0")
         return Tool(number)
 
     def compensation_diameter(self, name: str, number: int, stated: float) -> float:

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chipload.errors import InputError, Severity
 from chipload.program.commands import ARC, LINE, RAPID, Commands
@@ -24,6 +25,8 @@ from chipload.program.gcode.state import LINEAR, ZERO, Nine, nine, put
 from chipload.program.gcode.words import Block
 
 Axes = Mapping[int, float]
+#: offsets that differ by less are one [mm]
+SAME_MM = 1e-6
 
 
 def select(c: Controller, code: int) -> None:
@@ -59,16 +62,62 @@ def note_unset_offsets(c: Controller) -> None:
         c.findings.once("nc-offset-unset", line, f"{name}: {reason}", severity)
 
 
+def with_stated_offsets(c: Controller, commands: Commands) -> Commands:
+    """The commands with the work offsets marked whose origin is stated."""
+    return replace(commands, frames=tuple(replace(f, stated=f.number in c.stated_offsets) for f in commands.frames))
+
+
 def note_missing_lengths(c: Controller, commands: Commands) -> None:
-    """Findings on tools that cut without a length offset in a text that gives one to another tool."""
-    if not c.with_length or c.dialect == "sinumerik":
+    """Findings on tools that cut without the length that the tool table states, or without a length offset in a text
+    that gives one to another tool.
+    """
+    if c.dialect == "sinumerik":
         return
     cuts = (commands.motion == LINE) | (commands.motion == ARC)
-    for number in np.unique(commands.tool[cuts]).tolist():
+    _note_stated_lengths(c, commands, cuts)
+    for number in np.unique(commands.tool[cuts]).tolist() if c.with_length else ():
         if number > 0 and number not in c.with_length:
             line = int(commands.line[cuts & (commands.tool == number)][0])
             reason = "no length offset (G43) is given for it: the machine would move it with that of another tool"
             c.findings.once("nc-length-missing", line, f"tool {number} cuts and {reason}", Severity.UNPROVEN)
+
+
+def _note_stated_lengths(c: Controller, commands: Commands, cuts: NDArray[np.bool_]) -> None:
+    """Findings on tools that cut, or go down in a rapid, without the length that the tool table states for them.
+
+    An offset that is neither 0 nor that of another tool may be meant: wear, G43.1, G43.2.
+    """
+    table = {n: np.array(t.offset[:3]) for n, t in (c.tools or {}).items() if any(t.offset[:3])}
+    used = [n for n in np.unique(commands.tool).tolist() if n in table]
+    if not used:
+        return
+    z = commands.position[:, 2]
+    same = (np.diff(commands.frame, prepend=-1) == 0) & (np.diff(commands.tool, prepend=-1) == 0)
+    down = (commands.motion == RAPID) & same & (np.diff(z, prepend=z[:1]) < 0.0)
+    for number in used:
+        others = [np.zeros(3), *(at for n, at in table.items() if n != number)]
+        wrong = np.array([
+            f.number > 0 and not _is(f.tool[:3], table[number]) and any(_is(f.tool[:3], at) for at in others)
+            for f in commands.frames
+        ])  # fmt: skip
+        rows = np.flatnonzero((cuts | down) & (commands.tool == number) & wrong[commands.frame])
+        if len(rows):
+            active, own = commands.frames[commands.frame[rows[0]]].tool, table[number]
+            lower = float(own[2] - active[2])
+            place = f"the tip is {abs(lower):g} mm {'lower' if lower > 0.0 else 'higher'}" if lower else "it is beside"
+            c.findings.add(
+                "nc-length-missing",
+                int(commands.line[rows[0]]),
+                f"tool {number} moves without its length, Z{own[2]:g} of the tool table (active is Z{active[2]:g}): "
+                f"{place} than is simulated: write G43 H{number} after the tool change, or take the length out of the "
+                "table",
+                Severity.UNPROVEN,
+            )
+
+
+def _is(offset: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Whether two offsets are one."""
+    return bool(np.abs(offset - other).max() <= SAME_MM)
 
 
 def probed(c: Controller, code: str, name: str, ends: str) -> None:
@@ -217,7 +266,12 @@ def _check_length(c: Controller, code: int, number: int) -> None:
     if number == 0:
         return
     known, tool = number in (c.tools or {}), c.state.tool
-    if not known:
+    if c.tools is None:
+        c.once(
+            "nc-length-unknown",
+            "G43: no tool length is stated, each is taken as 0: state Z of the tools in a tool table (program.tools)",
+        )
+    elif not known:
         c.once(
             "nc-length-unknown",
             f"{shown(code)} H{number}: the length of tool {number} is unknown and is taken as 0: state Z of tool "

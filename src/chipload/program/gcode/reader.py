@@ -19,7 +19,7 @@ from chipload.program.gcode.dialect import Dialect
 from chipload.program.gcode.fanuc import Fanuc
 from chipload.program.gcode.flow import Flow
 from chipload.program.gcode.interpreter import BlockInterpreter
-from chipload.program.gcode.offsets import note_missing_lengths, note_unset_offsets
+from chipload.program.gcode.offsets import note_missing_lengths, note_unset_offsets, with_stated_offsets
 from chipload.program.gcode.sinumerik import Sinumerik
 from chipload.program.gcode.source import Source, lines_of, read_source
 from chipload.program.gcode.state import nine
@@ -121,7 +121,7 @@ def read_gcode(
     source = Source(name, lines_of(text, name)) if dialect == "sinumerik" else read_source(text, name)
     Flow(BlockInterpreter(controller), source, rule, folder, most_blocks, progress).run()
     note_unset_offsets(controller)
-    commands = controller.track.commands()
+    commands = with_stated_offsets(controller, controller.track.commands())
     note_missing_lengths(controller, commands)
     return commands, controller.findings.all()
 
