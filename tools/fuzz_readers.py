@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 import struct
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -205,13 +206,22 @@ def _machine(path: Path) -> int:
 def _ini(path: Path) -> int:
     from chipload.machine.ini import read_ini
 
-    return len(read_ini(path)[1])
+    machine, findings = read_ini(path)
+    finite(
+        machine.rapid, machine.feed_max, machine.spindle_min, *((a.rate, a.acceleration) for a in machine.chain.axes)
+    )
+    if machine.planner is not None:
+        finite(machine.planner.cycle, machine.planner.kink_ratio, machine.planner.override)
+    return len(findings)
 
 
 def _material(path: Path) -> int:
     from chipload.cutting.material import read_material
 
-    read_material(path)
+    found = read_material(path)
+    finite(found.coefficients, found.exponents, found.peak_excess, found.chip or 0.0, found.speed or 0.0)
+    if found.has_band:
+        finite(found.variances)
     return 0
 
 
@@ -400,6 +410,177 @@ def _summary(path: Path) -> int:
     return 0
 
 
+def _removal_parts() -> list[bytes]:
+    sink = io.BytesIO()
+    rows = np.array([2, 5], dtype=np.int64)
+    np.savez_compressed(
+        sink, **{
+            "0-low": np.zeros(3), "0-high": np.ones(3), "0-cell": np.full(3, 0.1), "0-rows": rows,
+            "0-volumes": np.array([3.0, 2.0, 1.0]), "0-corners": np.zeros((4, 4, 3), dtype=np.uint16),
+            "0-seen": np.array([[0, 65535]] * 4, dtype=np.uint16),
+            "0-cutter-1-0-flutes": np.array([[0.0, 0.0], [5.0, 0.0], [5.0, 20.0]]),
+            "1-refused": np.frombuffer(b"the blank is not closed", dtype=np.uint8),
+        },
+    )  # fmt: skip
+    return [sink.getvalue()]
+
+
+def _removal(path: Path) -> int:
+    from chipload.report.removal import read_cutter_parts, read_refused, read_removal
+
+    stock = read_removal(path, 0)
+    if stock is not None:
+        finite(stock.low, stock.high, stock.cell, stock.volumes, stock.volume(1))
+    for parts in read_cutter_parts(path, 0).values():
+        finite(*(profile for _, profile in parts))
+    read_refused(path, 1)
+    return 0
+
+
+def _engagement_parts() -> list[bytes]:
+    sink = io.BytesIO()
+    n, m = 2, 3
+    arrays = {
+        "row": np.array([0, 4]), "tool": np.ones(n), "flutes": np.full(n, 3), "periods": np.full(n, 3),
+        "frame": np.broadcast_to(np.eye(3), (n, 3, 3)), "start": np.array([0, 1, 3]), "ranges": np.ones((3, 12)),
+        "turn": np.ones((n, m, 4)), "stride": np.array(1),
+    }  # fmt: skip
+    np.savez_compressed(sink, **{f"0-{name}": values for name, values in arrays.items()})
+    return [sink.getvalue()]
+
+
+def _engagement(path: Path) -> int:
+    from chipload.report.engagement import read_engagement
+
+    found = read_engagement(path, 0)
+    if found is not None:
+        finite(found.frame, found.ranges, found.turn)
+    return 0
+
+
+# -- logs of machines and spindles --------------------------------------------------------------------------------
+def _streams() -> list[bytes]:
+    samples = "".join(
+        f'<RotaryVelocity timestamp="2026-03-01T10:00:{k:02d}.25Z" sequence="{2 * k + 1}">{3000 + k}</RotaryVelocity>'
+        f'<Amperage timestamp="2026-03-01T10:00:{k:02d}.25Z" sequence="{2 * k + 2}">{2.0 + 0.1 * k}</Amperage>'
+        for k in range(20)
+    )
+    return [
+        (
+            '<MTConnectStreams><Header nextSequence="41" lastSequence="40"/><Streams><DeviceStream name="mill">'
+            f'<ComponentStream component="Rotary" name="S"><Samples>{samples}</Samples></ComponentStream>'
+            "</DeviceStream></Streams></MTConnectStreams>"
+        ).encode()
+    ]
+
+
+def _stream(path: Path) -> int:
+    from chipload.machine.mtconnect import samples
+
+    text, findings = samples(str(path))
+    finite(np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1, ndmin=2))
+    return len(findings)
+
+
+def _devices() -> list[bytes]:
+    return [
+        b'<MTConnectDevices><Devices><Device name="mill 7"><Components><Axes><Components><Linear name="X"><DataItems>'
+        b'<DataItem type="POSITION"><Constraints><Minimum>-305.5</Minimum><Maximum>305.5</Maximum></Constraints>'
+        b'</DataItem></DataItems></Linear><Rotary name="S"><DataItems><DataItem type="ROTARY_VELOCITY"><Constraints>'
+        b"<Maximum>12000</Maximum></Constraints></DataItem></DataItems></Rotary></Components></Axes></Components>"
+        b"</Device></Devices></MTConnectDevices>"
+    ]
+
+
+def _device(path: Path) -> int:
+    from chipload.machine.mtconnect import described, document, machine_text
+
+    found = described(document(str(path)))
+    finite([x for pair in found.travel.values() for x in pair if x is not None])
+    machine_text(found)
+    return 0
+
+
+def _modes_text() -> list[bytes]:
+    mode = b"[[mode]]\nfrequency_hz = 812.0\ndamping_ratio = 0.03\nstiffness_n_um = 12.5\ndirection = 'x'\n"
+    return [b"source = 'hammer'\n" + mode + mode.replace(b"'x'", b"[0.6, 0.8]") + b"residual_percent = 2.0\n"]
+
+
+def _modes(path: Path) -> int:
+    from chipload.checking.dynamics import read_modes
+
+    finite([(mode.frequency_hz, mode.stiffness_n_um or 0.0) for mode in read_modes(path)])
+    return 0
+
+
+def _spindle_logs() -> list[bytes]:
+    t = np.arange(600) / 50.0
+    speed = np.clip(np.interp(t, [0, 2, 4, 6, 12], [0, 3000, 3000, 6000, 6000]), 10.0, None)
+    torque = np.where((t > 7.0) & (t < 9.0), 0.8, 0.0)
+    current = 1.5 + 2e-4 * speed + 2.0 * torque + 0.01 * np.sin(37.0 * t)
+    rows = "\n".join(f"{a:.3f},{b:.6g},{c:.6g},{d:.6g}" for a, b, c, d in zip(t, speed, current, torque, strict=True))
+    return [f"time_s,speed_rpm,current_a,torque_nm\n{rows}\n".encode()]
+
+
+def _spindle_log(path: Path) -> int:
+    from chipload.control.identification import identify_spindle, run_of
+    from chipload.control.logs import read_log
+    from chipload.control.spindle_file import write_spindle
+
+    log, findings = read_log(path)
+    found = identify_spindle((run_of(log, "log", "current"),), ("log",), "current", None, None)
+    if "nan" in write_spindle(found, {}):
+        raise Nonsense("the file of the spindle has a number that is not one")
+    return len(findings)
+
+
+def _spindle_files() -> list[bytes]:
+    from chipload.control.identification import identify_spindle, run_of
+    from chipload.control.logs import read_log
+    from chipload.control.spindle_file import write_spindle
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.csv"
+        path.write_bytes(_spindle_logs()[0])
+        run = run_of(read_log(path)[0], "log", "current")
+    return [write_spindle(identify_spindle((run,), ("log",)), {"log": "sha256 0"}).encode()]
+
+
+def _spindle_file(path: Path) -> int:
+    from chipload.control.spindle_file import read_spindle
+
+    found = read_spindle(path, 600.0)
+    for value in found.values.values():
+        finite(value)
+    finite(found.torque[0], found.speed)
+    return 0
+
+
+def _document() -> list[bytes]:
+    import zipfile
+
+    sink = io.BytesIO()
+    value = '<Property name="Diameter" type="App::PropertyFloat"><Float value="6.0"/></Property>'
+    part = '<Property name="Shape" type="Part::PropertyPartShape"><Part file="a.brp"/></Property>'
+    with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(
+            "Document.xml",
+            '<Document><Objects><Object name="A" type="Part::Box"/></Objects><ObjectData><Object name="A"><Properties>'
+            f"{value}{part}</Properties></Object></ObjectData></Document>",
+        )
+        archive.writestr("a.brp", "DBRep_DrawableShape\n" * 20)
+    return [sink.getvalue()]
+
+
+def _freecad(path: Path) -> int:
+    from chipload.jobs.drafts.document import read_document
+
+    for own in read_document(path).objects.values():
+        number = own.number("Diameter")
+        finite(0.0 if number is None else number)
+    return 0
+
+
 MACHINES: Sequence[str] = ("vmc", "vmc-fanuc", "dmu50", "xyzac-trunnion")
 READERS: dict[str, Reader] = {
     "linuxcnc": Reader(
@@ -448,4 +629,12 @@ READERS: dict[str, Reader] = {
     "parquet": Reader(".parquet", _parquet, _result),
     "summary": Reader(".json", lambda: [json.dumps(SUMMARY).encode()], _summary),
     "step": Reader(".step", _step, _model),
+    "removal": Reader(".npz", _removal_parts, _removal),
+    "engagement": Reader(".npz", _engagement_parts, _engagement),
+    "streams": Reader(".xml", _streams, _stream),
+    "device": Reader(".xml", _devices, _device),
+    "modes": Reader(".toml", _modes_text, _modes),
+    "spindle-log": Reader(".csv", _spindle_logs, _spindle_log),
+    "spindle-file": Reader(".toml", _spindle_files, _spindle_file),
+    "freecad": Reader(".FCStd", _document, _freecad),
 }  # fmt: skip

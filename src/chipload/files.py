@@ -10,6 +10,7 @@ import contextlib
 import ctypes
 import errno
 import hashlib
+import io
 import os
 import re
 import shutil
@@ -19,12 +20,15 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, TYPE_CHECKING, Any
 
 from chipload.errors import InputError, OutputError
 
 if sys.platform != "win32":
     import fcntl
+
+if TYPE_CHECKING:
+    from hashlib import _Hash as Hash
 
 #: beginning of the temporary name of a file or folder that is being written
 FRESH = ".chipload-"
@@ -46,6 +50,23 @@ def is_file(path: str | Path) -> bool:
         return stat.S_ISREG(os.stat(path).st_mode)
     except (OSError, ValueError):
         return False
+
+
+def require_utf8(path: Path) -> None:
+    """Refuse a file whose name, or that of its folder, is not text in UTF-8: a result could not name it.
+
+    >>> require_utf8(Path("part-7/job.toml"))
+
+    Raises
+    ------
+    InputError
+        With the name that is meant.
+    """
+    for name in (path.name, path.absolute().parent.name):
+        try:
+            name.encode("utf-8")
+        except UnicodeEncodeError:
+            raise InputError(f"{name!a}: this name is not UTF-8, and a result cannot state it: rename it") from None
 
 
 @contextmanager
@@ -109,6 +130,26 @@ def hash_of(path: str | Path) -> str:
         while block := file.read(1 << 20):
             out.update(block)
     return out.hexdigest()
+
+
+class HashingWriter(io.RawIOBase):
+    """A binary file whose bytes go into a hash as they are written; it is not closed with this."""
+
+    def __init__(self, file: IO[bytes], digest: Hash) -> None:
+        self._file, self._digest = file, digest
+
+    def writable(self) -> bool:
+        """Whether bytes can be written: always."""
+        return True
+
+    def tell(self) -> int:
+        """Number of bytes so far."""
+        return self._file.tell()
+
+    def write(self, data: Any) -> int:
+        """Write bytes and return their number."""
+        self._digest.update(data)
+        return self._file.write(data)
 
 
 def is_full(err: OSError) -> bool:

@@ -45,6 +45,12 @@ def guarded(work: Callable[[], int], debug: bool) -> NoReturn:
         else:
             _fault(err, debug)
             code = FAULT
+    except MemoryError:
+        write_line(
+            "the memory is used up: state longer steps (step_mm) or fewer workers, or lift the "
+            "limit of the process (ulimit -v); the same command continues"
+        )
+        code = UNWRITTEN
     except (KeyboardInterrupt, Cancelled) as err:
         write_line(f"stopped: {str(err) or 'nothing was written'}")
         code = STOPPED

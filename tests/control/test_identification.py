@@ -159,3 +159,11 @@ def test_bandwidth_and_alias():
     """Two equal lags: (1 + x^2)^2 = 2; 300 Hz read 130 times a second shows as 40 Hz."""
     assert math.tau * bandwidth(0.1, 0.1) * 0.1 == pytest.approx(math.sqrt(math.sqrt(2.0) - 1.0))
     assert aliased(300.0, 130.0) == pytest.approx(40.0)
+
+
+def test_a_range_that_is_not_finite_is_refused(identified, tmp_path):
+    text = identified[0].read_text()
+    start = text.index("torque_nm = [")
+    (tmp_path / "s.toml").write_text(text[:start] + "torque_nm = [0.1, inf]" + text[text.index("]", start) + 1 :])
+    with pytest.raises(InputError, match=r"range.torque_nm = \[0.1, inf\]: must be two numbers"):
+        read_spindle(tmp_path / "s.toml", 300.0)

@@ -194,3 +194,13 @@ def test_a_material_that_is_written_is_read_as_it_was(tmp_path):
     assert first.speed == pytest.approx((1000.0, 4000.0))
     (tmp_path / "b.toml").write_text(material_text(first))
     assert read_material(tmp_path / "b.toml") == first
+
+
+def test_a_force_that_pulls_the_cutter_in_is_refused(tmp_path):
+    text = (
+        'name = "mine"\nktc_mpa = 700\nkrc_mpa = -200.0\nkac_mpa = 50.0\nkte_n_mm = 10.0\nkre_n_mm = 8.0\n'
+        'kae_n_mm = 1.0\nsource = "measured"\n'
+    )
+    (tmp_path / "m.toml").write_text(text)
+    with pytest.raises(InputError, match=r"material.krc_mpa = -200: must be from 0 to 20000 MPa"):
+        read_material(tmp_path / "m.toml")

@@ -211,3 +211,9 @@ def test_settings_of_the_trajectory_planner(tmp_path):
     )
     wanted = TrajectoryPlanner(2e-3, False, 80, 3.0, 50.0, 0.2, 1.5)
     assert read_ini(written(tmp_path, more))[0].planner == wanted
+
+
+def test_a_machine_without_linear_axes_is_refused(tmp_path):
+    text = TRIVIAL.replace("coordinates=XYZ", "coordinates=A").replace("COORDINATES = X Y Z", "COORDINATES = A")
+    with pytest.raises(InputError, match="no linear axis: X, Y and Z are needed"):
+        read_ini(written(tmp_path, text))

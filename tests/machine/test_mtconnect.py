@@ -161,3 +161,48 @@ def test_what_is_asked_for_must_be_there(agent: str, tmp_path: Path) -> None:
             samples(str(tmp_path / f"{name}.xml"))
     done = CliRunner().invoke(app, ["mtconnect", agent, "--out", str(tmp_path / "x.json")])
     assert (done.exit_code, "must end with .toml" in done.stderr) == (2, True)
+
+
+def test_numbers_and_depth_that_no_agent_sends_are_refused(tmp_path: Path) -> None:
+    for name, text, message in (
+        ("a", streams(0, 8).replace('sequence="1"', 'sequence="1e15"'), "sequence = '1e15': must be a whole number"),
+        ("b", streams(0, 8).replace('sequence="1"', f'sequence="{"9" * 5000}"'), "must be a whole number"),
+    ):
+        (tmp_path / f"{name}.xml").write_text(text)
+        with pytest.raises(InputError, match=message):
+            samples(str(tmp_path / f"{name}.xml"))
+    deep = PROBE.replace('<Linear id="x"', "<Group>" * 20_000 + '<Linear id="x"', 1)
+    deep = deep.replace("</Axes>", "</Axes>", 1).replace("</Linear>", "</Linear>" + "</Group>" * 20_000, 1)
+    (tmp_path / "deep.xml").write_text(deep)
+    found = described(document(str(tmp_path / "deep.xml")))
+    assert found.speed == (50.0, 12000.0)
+
+
+def test_an_agent_that_sends_a_byte_at_a_time_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time counts from the request, not from the last byte."""
+    monkeypatch.setattr("chipload.machine.mtconnect.WAIT_S", 0.3)
+    stop = threading.Event()
+
+    class Slow(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.end_headers()
+            while not stop.wait(0.05):
+                try:
+                    self.wfile.write(b" ")
+                except OSError:
+                    return
+
+        def log_message(self, *words: object) -> None:
+            """Nothing."""
+
+    server = HTTPServer(("127.0.0.1", 0), Slow)
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    try:
+        with pytest.raises(InputError, match=r"no answer: the answer is not complete after 0\.3 s"):
+            document(f"http://127.0.0.1:{server.server_port}", "probe")
+    finally:
+        stop.set()
+        server.shutdown()
+        server.server_close()

@@ -201,6 +201,11 @@ def test_a_history_that_is_shorter_than_its_summary_is_refused(made, folder, tmp
     for name in ("summary.json", "maps.npz"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     pq.write_table(pq.read_table(folder / "history.parquet").slice(0, N), tmp_path / "history.parquet")
+    with pytest.raises(InputError, match=r"history\.parquet: is not the history of this result, or has changed: run"):
+        load_result(tmp_path)
+    # a summary that states no hash
+    summary = json.loads((tmp_path / "summary.json").read_bytes()) | {"history_sha256": ""}
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
     back = load_result(tmp_path)
     assert len(back.tracks[0].columns["t_s"]) == N
     with pytest.raises(InputError, match=f"history.parquet: has {N} rows, the summary states {N + 70}: run the job"):

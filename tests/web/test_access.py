@@ -212,3 +212,40 @@ def test_what_cannot_be_opened_is_said_in_one_line(folder, make, message) -> Non
     assert (code, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
+
+
+def test_a_connection_without_a_request_is_closed():
+    """After its time; one that has asked stays, for the next request."""
+    import asyncio
+
+    import uvicorn
+
+    from chipload.web.serve import silent_closing_protocol
+
+    async def answer(scope, receive, send):
+        await send({"type": "http.response.start", "status": 204, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    async def closed_after():
+        config = uvicorn.Config(
+            answer, http=silent_closing_protocol(0.3), port=0, log_level="error", lifespan="off", timeout_keep_alive=30
+        )
+        server = uvicorn.Server(config)
+        task = asyncio.create_task(server.serve())
+        while not server.started:
+            await asyncio.sleep(0.01)
+        port = server.servers[0].sockets[0].getsockname()[1]
+        links = [await asyncio.open_connection("127.0.0.1", port) for _ in range(3)]
+        links[1][1].write(b"GET / HTTP/1.1\r\n")
+        links[2][1].write(b"GET / HTTP/1.1\r\nHost: a\r\n\r\n")
+        ends = [await asyncio.wait_for(reader.read(), 10.0) for reader, _ in links[:2]]
+        await asyncio.sleep(0.2)
+        asked = links[2][0]
+        open_still = not asked.at_eof() and (await asked.read(12)).startswith(b"HTTP/1.1 204")
+        for _, writer in links:
+            writer.close()
+        server.should_exit = True
+        await task
+        return ends, open_still
+
+    assert asyncio.run(closed_after()) == ([b"", b""], True)

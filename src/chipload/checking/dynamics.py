@@ -6,7 +6,6 @@ A mode without damping or stiffness is left out and its tool or workpiece is nam
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +22,7 @@ from chipload.jobs.simulation.tables import WorkpieceTable
 from chipload.stability.modes import Modes
 from chipload.stability.probability import ModeSpread
 from chipload.stability.process_damping import ProcessDamping
+from chipload.tables import parsed
 
 #: N/mm in 1 N/um, t in 1 kg
 PER_UM, PER_KG = 1000.0, 1e-3
@@ -135,10 +135,7 @@ def read_modes(path: Path) -> tuple[ModeTable, ...]:
     InputError
         It cannot be read or is no table of modes.
     """
-    try:
-        raw = tomllib.loads(read_regular(path, path.name, LARGEST_FILE).decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as err:
-        raise InputError(f"{path.name}: not a TOML file: {err}") from None
+    raw = parsed(path.name, read_regular(path, path.name, LARGEST_FILE))
     for mode in raw.get("mode", ()) if isinstance(raw.get("mode"), list) else ():
         if isinstance(mode, dict):
             for key in ("residual_percent", "coherence"):

@@ -177,6 +177,8 @@ def identify_runs(
     settled = sensor_lag if settled is None else settled
     parts = [_rows(run, sensor_lag, settled, idle_terms, scale_w, scale_t or 1.0) for run in runs]
     design, current = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+    if not len(current):
+        raise InputError("spindle: no row is valid: the logs are shorter than the lag of the sensor: log longer")
     scale_r = float(np.abs(design[:, 1]).max()) or 1.0
     design[:, 1] /= scale_r
     known = np.zeros(len(current))
@@ -251,6 +253,8 @@ def _regression(design: Floats, target: Floats, free: list[int]) -> _Regression:
         )
     left = target - design[:, free] @ found
     freedom = len(left) - len(free)
+    if freedom < 1:
+        raise InputError(f"spindle: {len(left)} rows are valid: must be more than the {len(free)} unknowns: log longer")
     power = float(left @ left)
     variance = power / freedom
     rho = min(max(float(left[1:] @ left[:-1]) / power, 0.0), 0.99) if power > 0.0 else 0.0

@@ -140,9 +140,10 @@ def _pair(label: str, table: Any, name: str) -> tuple[float, float]:
     """Return least and greatest value; the greatest torque may be missing if no cut of known torque determined it."""
     value: Any = table.get(name) if isinstance(table, dict) else None
     numbers = [float(x) for x in value if isinstance(x, int | float)] if isinstance(value, list) else []
+    finite = all(map(math.isfinite, numbers))
     if len(numbers) == 1 and name == "torque_nm":
         numbers.append(math.inf)
-    if len(numbers) != 2 or not 0.0 <= numbers[0] <= numbers[1]:
+    if len(numbers) != 2 or not finite or not 0.0 <= numbers[0] <= numbers[1]:
         raise InputError(
             f"{label}: range.{name} = {value!r}: must be two numbers, least and greatest; without a torque constant a "
             "job cannot use the file: log cuts of known torque, or state --torque-constant-nm-a"

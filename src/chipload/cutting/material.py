@@ -26,7 +26,7 @@ from chipload.units import mm_min_from_mm_s, mm_s_from_mm_min
 #: key in the file -> field, lowest and highest value that is believed
 _NUMBERS = {
     "ktc_mpa": ("Ktc", 10.0, 2e4),
-    "krc_mpa": ("Krc", -2e4, 2e4),
+    "krc_mpa": ("Krc", 0.0, 2e4),
     "kac_mpa": ("Kac", -2e4, 2e4),
     "kte_n_mm": ("Kte", 0.0, 1e3),
     "kre_n_mm": ("Kre", -1e3, 1e3),

@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from chipload.errors import Finding, InputError, InputErrors, Severity
-from chipload.files import read_regular
+from chipload.files import read_regular, require_utf8
 from chipload.jobs.confirm import guesses_of, take_confirm
 from chipload.jobs.messages import Errors, left_missing, renamed_tables, table_errors
 from chipload.jobs.override import override
@@ -131,6 +131,7 @@ def load_job(path: str | Path, overrides: Sequence[str] = ()) -> LoadedJob:
         The file cannot be read, a key is unknown or missing, a value is out of range: one line that names it.
     """
     path = Path(path).absolute()
+    require_utf8(path)
     data = read_regular(path, str(path), LARGEST_FILE, "not a job")
     raw = parsed(path.name, data)
     return _loaded(capability_of(raw, overrides), path, raw, overrides, data)

@@ -114,6 +114,8 @@ def _machine(ini: Ini, findings: list[Finding], path: Path) -> Machine:
             )
         )
     rapid = _number(ini, "TRAJ", "MAX_LINEAR_VELOCITY") or _number(ini, "TRAJ", "MAX_VELOCITY")
+    if not any(not axis.rotary for axis in axes):
+        raise InputError(f"{ini.label}: coordinates {joints or 'none'}: no linear axis: X, Y and Z are needed")
     if rapid is None:
         rapid = max(axis.rate for axis in axes if not axis.rotary) / mm
         findings.append(

@@ -13,8 +13,10 @@ machine's file holds such keys as comments, and it is refused until they are fil
 from __future__ import annotations
 
 import csv
+import http.client
 import io
 import math
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator, Mapping
@@ -88,8 +90,8 @@ def document(source: str, path: str = "", query: str = "") -> Element:
         address = f"{source.rstrip('/')}/{path}{query}"
         try:
             with urllib.request.urlopen(address, timeout=WAIT_S) as answer:
-                data = answer.read(MOST_BYTES + 1)
-        except (OSError, ValueError, urllib.error.URLError) as err:
+                data = _within(answer, time.monotonic() + WAIT_S)
+        except (OSError, ValueError, urllib.error.URLError, http.client.HTTPException) as err:
             raise InputError(f"MTConnect {address}: no answer: {err}: start the agent or give a file") from None
         if len(data) > MOST_BYTES:
             raise InputError(f"MTConnect {address}: more than {MOST_BYTES} bytes: ask for fewer samples")
@@ -109,6 +111,27 @@ def document(source: str, path: str = "", query: str = "") -> Element:
     if not _kind(root).startswith("MTConnect"):
         raise InputError(f"{label}: the document is a {_kind(root)}: MTConnectDevices or MTConnectStreams is read")
     return root
+
+
+def _within(answer: http.client.HTTPResponse, until: float) -> bytes:
+    """Return the body of an answer, at most one byte over :data:`MOST_BYTES`.
+
+    Raises
+    ------
+    TimeoutError
+        It is not complete at the time ``until`` of the monotonic clock, however often a byte comes.
+    """
+    parts, size = [], 0
+    while size <= MOST_BYTES:
+        # one call of the system at a time: a full read would wait for each byte as long as for the first
+        part = answer.read1(min(1 << 16, MOST_BYTES + 1 - size))
+        if not part:
+            break
+        parts.append(part)
+        size += len(part)
+        if time.monotonic() > until:
+            raise TimeoutError(f"the answer is not complete after {WAIT_S:g} s")
+    return b"".join(parts)
 
 
 def described(root: Element, name: str | None = None) -> Described:
@@ -219,16 +242,16 @@ def samples(source: str, device: str | None = None, component: str | None = None
     rows.writerow(["time_s", *known])
     last: dict[str, float | None] = {}
     first, omitted, written = found[0][0], 0, -math.inf
-    for time, _, column, value in found:
+    for at, _, column, value in found:
         last[column] = value
         if column != load:
             continue
         values = [last.get(c) for c in known]
-        if any(v is None for v in values) or time <= written:
+        if any(v is None for v in values) or at <= written:
             omitted += 1
             continue
-        written = time
-        rows.writerow([f"{time - first:.6f}", *(f"{v:.9g}" for v in values if v is not None)])
+        written = at
+        rows.writerow([f"{at - first:.6f}", *(f"{v:.9g}" for v in values if v is not None)])
     if written == -math.inf:
         raise InputError(f"MTConnect {source}: at no time are {', '.join(known)} known together")
     text = f"{omitted} samples are left out: a column is not yet known or unavailable, or time does not rise"
@@ -257,7 +280,7 @@ def _events(source: str, device: str | None, component: str | None) -> Iterator[
                 for item in items:
                     column, factor = TYPES[_kind(item)]
                     if turning or part.get("component") == "Path":
-                        yield _time(item, source), int(item.get("sequence", "0")), column, _value(item, factor)
+                        yield _time(item, source), _whole(item, "sequence"), column, _value(item, factor)
 
 
 def _answers(source: str) -> Iterator[Element]:
@@ -266,20 +289,32 @@ def _answers(source: str) -> Iterator[Element]:
     for _ in range(ANSWERS):
         yield root
         header = next((e for e in root if _kind(e) == "Header"), None)
-        following, last = (
-            int(header.get(k, "0")) if header is not None else 0 for k in ("nextSequence", "lastSequence")
-        )
+        following, last = (_whole(header, k) if header is not None else 0 for k in ("nextSequence", "lastSequence"))
         if not source.startswith("http") or following > last:
             return
         root = document(source, "sample", f"?from={following}&count={COUNT}")
+
+
+def _whole(element: Element, key: str) -> int:
+    """Return a whole number of an attribute, 0 where it is missing.
+
+    Raises
+    ------
+    InputError
+        It is another text, or has more than 18 digits.
+    """
+    text = element.get(key, "0")
+    if not (text.isascii() and text.isdigit() and len(text) <= 18):
+        raise InputError(f"MTConnect: {_kind(element)} {key} = {text[:40]!r}: must be a whole number from 0")
+    return int(text)
 
 
 def _time(item: Element, source: str) -> float:
     text = item.get("timestamp", "")
     try:
         return datetime.fromisoformat(text).timestamp()
-    except ValueError:
-        raise InputError(f"MTConnect {source}: timestamp {text!r}: must be a date and time of ISO 8601") from None
+    except (ValueError, OverflowError, OSError):
+        raise InputError(f"MTConnect {source}: timestamp {text[:60]!r}: must be a date and time of ISO 8601") from None
 
 
 def _value(item: Element, factor: float) -> float | None:
@@ -298,10 +333,11 @@ def _kind(element: Element) -> str:
 
 def _own(part: Element) -> Iterator[Element]:
     """Elements of a component, without those of the components inside it."""
-    for child in part:
-        if _kind(child) != "Components":
-            yield child
-            yield from _own(child)
+    waiting = [child for child in reversed(part) if _kind(child) != "Components"]
+    while waiting:
+        element = waiting.pop()
+        yield element
+        waiting += [child for child in reversed(element) if _kind(child) != "Components"]
 
 
 def _limits(part: Element, types: tuple[str, ...]) -> tuple[float | None, float | None]:

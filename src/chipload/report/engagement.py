@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.errors import InputError
+from chipload.arrays import read_arrays
 from chipload.result import Result
 from chipload.simulation.engagement_samples import EngagementSamples, samples_from
 
@@ -37,11 +38,6 @@ def read_engagement(path: Path, track: int) -> EngagementSamples | None:
     InputError
         It cannot be read.
     """
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            own = {
-                name.partition("-")[2]: archive[name] for name in archive.files if name.partition("-")[0] == str(track)
-            }
-    except (OSError, ValueError, KeyError, EOFError) as err:
-        raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
+    stored = read_arrays(path, wanted=re.compile(rf"{track}-[a-z]+").fullmatch)
+    own = {name.partition("-")[2]: values for name, values in stored.items()}
     return samples_from(own) if own else None

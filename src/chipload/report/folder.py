@@ -11,11 +11,12 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import IO
 
 from chipload.errors import InputError, OutputError
-from chipload.files import cannot_write, exchanged, fresh_folder, read_regular, sweep
+from chipload.files import HashingWriter, cannot_write, exchanged, fresh_folder, read_regular, sweep
 from chipload.memory import return_free_memory
 from chipload.progress import Progress, silent
 from chipload.report.bodies import SceneBody
@@ -109,9 +110,10 @@ def write_result(result: Result, presentation: Presentation, out: str | Path, pr
         The folder cannot be written or the disk is full; nothing is left behind, an older result stays.
     """
     rows: dict[str, int] = {}
+    digest = sha256()
 
     def history(file: IO[bytes]) -> None:
-        rows.update(write_history(result, file))
+        rows.update(write_history(result, HashingWriter(file, digest)))
 
     blanks, samples, bodies = presentation.blanks(), presentation.samples(), list[SceneBody]()
     stocks = cache(lambda: removal_meshes(result, blanks))
@@ -127,7 +129,7 @@ def write_result(result: Result, presentation: Presentation, out: str | Path, pr
 
     makers: Makers = [
         (HISTORY, lambda: history),
-        (SUMMARY, lambda: summary_bytes(result, rows)),
+        (SUMMARY, lambda: summary_bytes(result, rows, digest.hexdigest())),
         ("scene.glb", scene),
         ("report.html", lambda: page_bytes(result, presentation, view())),
     ]

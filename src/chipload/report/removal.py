@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import multiprocessing
 import os
+import re
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.arrays import read_arrays
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.report.presentation import Blank
@@ -161,7 +163,7 @@ def removal_bytes(result: Result, stocks: ShownStocks, blanks: Mapping[str, Blan
         if k in stocks.meshes:
             arrays |= {f"{k}-{name}": getattr(stocks.meshes[k], name) for name in ARRAYS}
         elif k in stocks.refused:
-            arrays[f"{k}-{REFUSED}"] = np.array(stocks.refused[k])
+            arrays[f"{k}-{REFUSED}"] = np.frombuffer(stocks.refused[k].encode(), dtype=np.uint8)
         for number, parts in shapes_of(blanks[track.name]).items():
             for n, (kind, profile) in enumerate(parts):
                 arrays[f"{k}-cutter-{number}-{n}-{kind}"] = profile
@@ -178,14 +180,11 @@ def read_cutter_parts(path: Path, track: int) -> dict[int, list[tuple[str, Float
         It cannot be read.
     """
     out: dict[int, list[tuple[int, str, Floats]]] = {}
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            for name in archive.files:
-                words = name.split("-")
-                if len(words) == 5 and words[:2] == [str(track), "cutter"]:
-                    out.setdefault(int(words[2]), []).append((int(words[3]), words[4], archive[name]))
-    except (OSError, ValueError, KeyError, EOFError) as err:
-        raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
+    for name, profile in read_arrays(path, wanted=re.compile(rf"{track}-cutter-\d+-\d+-[a-z]+").fullmatch).items():
+        _, _, tool, n, kind = name.split("-")
+        if profile.ndim != 2 or profile.shape[1] != 2 or profile.dtype.kind != "f" or not np.isfinite(profile).all():
+            raise _damaged(path)
+        out.setdefault(int(tool), []).append((int(n), kind, profile))
     return {number: [(kind, p) for _, kind, p in sorted(parts, key=lambda x: x[0])] for number, parts in out.items()}
 
 
@@ -197,12 +196,8 @@ def read_refused(path: Path, track: int) -> str:
     InputError
         It cannot be read.
     """
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            name = f"{track}-{REFUSED}"
-            return str(archive[name]) if name in archive.files else ""
-    except (OSError, ValueError, KeyError, EOFError) as err:
-        raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
+    stored = read_arrays(path, wanted=f"{track}-{REFUSED}".__eq__)
+    return "".join(text.tobytes().decode("utf-8", "replace") for text in stored.values())
 
 
 def read_removal(path: Path, track: int) -> RemovalMesh | None:
@@ -213,14 +208,25 @@ def read_removal(path: Path, track: int) -> RemovalMesh | None:
     InputError
         It cannot be read.
     """
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            if f"{track}-corners" not in archive:
-                return None
-            arrays = {name: archive[f"{track}-{name}"] for name in ARRAYS}
-    except (OSError, ValueError, KeyError, EOFError) as err:
-        raise InputError(f"{path.name}: cannot be read: {err}: run the job again") from None
-    corners, seen = arrays["corners"], arrays["seen"]
-    if corners.ndim != 3 or corners.shape[1:] != (4, 3) or seen.shape != (len(corners), 2):
-        raise InputError(f"{path.name}: damaged: its parts do not match: run the job again")
+    own = {f"{track}-{name}": name for name in ARRAYS}
+    arrays = {own[name]: values for name, values in read_arrays(path, wanted=own.__contains__).items()}
+    if "corners" not in arrays:
+        return None
+    if arrays.keys() != set(ARRAYS):
+        raise _damaged(path)
+    corners, seen, rows, volumes = (arrays[name] for name in ("corners", "seen", "rows", "volumes"))
+    boxes = [arrays[name] for name in ("low", "high", "cell")]
+    fits = (
+        corners.ndim == 3 and corners.shape[1:] == (4, 3) and corners.dtype == seen.dtype == np.uint16
+        and seen.shape == (len(corners), 2) and rows.ndim == 1 and rows.dtype.kind == "i"
+        and (np.diff(rows) >= 0).all() and (rows >= 0).all() and volumes.shape == (len(rows) + 1,)
+        and all(box.shape == (3,) for box in boxes)
+        and all(np.isfinite(values).all() for values in (*boxes, volumes))
+    )  # fmt: skip
+    if not fits:
+        raise _damaged(path)
     return RemovalMesh(**arrays)
+
+
+def _damaged(path: Path) -> InputError:
+    return InputError(f"{path.name}: damaged: its parts do not match: run the job again")

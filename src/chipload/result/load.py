@@ -11,7 +11,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pydantic import ValidationError
 
+from chipload.arrays import read_arrays
 from chipload.errors import InputError
+from chipload.files import hash_of
 from chipload.result.limits import Columns
 from chipload.result.result import Result, SurfaceMap
 from chipload.result.summary import SCHEMA_VERSION, Summary, TrackModel, finding_from, limit_from, provenance_from
@@ -65,6 +67,9 @@ def load_result(folder: str | Path) -> Result:
     """
     folder = Path(folder)
     summary = read_summary(folder)
+    history = folder / HISTORY
+    if summary.history_sha256 and history.exists() and hash_of(history) != summary.history_sha256:
+        raise InputError(f"{history}: is not the history of this result, or has changed: run the job again")
     try:
         result, limits = _result(folder, summary), tuple(map(limit_from, summary.limits))
     except ValueError as err:
@@ -140,19 +145,19 @@ def _columns(table: pa.Table) -> Columns:
 def _maps(folder: Path, summary: Summary) -> tuple[SurfaceMap, ...]:
     if not summary.maps:
         return ()
+    stored = read_arrays(folder / MAPS)
     try:
-        with np.load(folder / MAPS, allow_pickle=False) as held:
-            return tuple(
-                SurfaceMap(
-                    m.name,
-                    m.column,
-                    held[f"{k}-points"],
-                    held[f"{k}-values"],
-                    held[f"{k}-faces"],
-                    m.track,
-                    held.get(f"{k}-displacement"),
-                )
-                for k, m in enumerate(summary.maps)
+        return tuple(
+            SurfaceMap(
+                m.name,
+                m.column,
+                stored[f"{k}-points"],
+                stored[f"{k}-values"],
+                stored[f"{k}-faces"],
+                m.track,
+                stored.get(f"{k}-displacement"),
             )
-    except (OSError, KeyError, ValueError) as err:
-        raise InputError(f"{MAPS}: cannot be read: {err}: run the job again") from None
+            for k, m in enumerate(summary.maps)
+        )
+    except (KeyError, ValueError) as err:
+        raise InputError(f"{MAPS}: damaged: {err}: run the job again") from None

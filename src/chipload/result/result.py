@@ -73,9 +73,11 @@ class SurfaceMap:
 
     def __post_init__(self) -> None:
         """Refuse arrays whose shapes do not match."""
-        n = len(self.points)
+        n = len(np.atleast_1d(self.points))
         if self.points.shape != (n, 3) or self.values.shape != (n,) or self.faces.shape[1:] != (3,):
             raise ValueError(f"map {self.name}: shapes {self.points.shape}, {self.values.shape}, {self.faces.shape}")
+        if not np.isfinite(self.points).all() or (self.faces < 0).any() or (self.faces >= n).any():
+            raise ValueError(f"map {self.name}: points must be finite, and faces name {n} points")
         if self.displacement is not None and self.displacement.shape != (n, 3):
             raise ValueError(f"map {self.name}: displacement of shape {self.displacement.shape}, not {(n, 3)}")
         if self.column not in COLUMNS:

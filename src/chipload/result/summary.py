@@ -119,15 +119,17 @@ class Summary(_SummaryPart):
     unchecked: tuple[str, ...] = Field(description="limits that are not stated, and checks that are switched off")
     maps: tuple[MapModel, ...] = Field(description="surface maps")
     operations: tuple[dict[str, JsonValue], ...] = Field(description="values of this capability, by operation")
+    history_sha256: str = Field("", description="hash of history.parquet; empty: the result was not written")
     provenance: ProvenanceModel
 
 
-def summary_of(result: Result, rows: Mapping[str, int]) -> Summary:
+def summary_of(result: Result, rows: Mapping[str, int], history_sha256: str = "") -> Summary:
     """Return the summary of a result.
 
     Parameters
     ----------
     rows : rows of the history by track
+    history_sha256 : of history.parquet
 
     Raises
     ------
@@ -147,11 +149,12 @@ def summary_of(result: Result, rows: Mapping[str, int]) -> Summary:
         unchecked=result.unchecked,
         maps=tuple(map(_map, result.maps)),
         operations=tuple(plain(x) for x in result.operations),
+        history_sha256=history_sha256,
         provenance=ProvenanceModel(**vars(result.provenance)),
     )
 
 
-def summary_bytes(result: Result, rows: Mapping[str, int]) -> bytes:
+def summary_bytes(result: Result, rows: Mapping[str, int], history_sha256: str = "") -> bytes:
     """Return the bytes of summary.json; equal results give equal bytes.
 
     Raises
@@ -159,7 +162,7 @@ def summary_bytes(result: Result, rows: Mapping[str, int]) -> bytes:
     ValueError
         As :func:`summary_of`.
     """
-    values = summary_of(result, rows).model_dump(mode="json")
+    values = summary_of(result, rows, history_sha256).model_dump(mode="json")
     return (json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 

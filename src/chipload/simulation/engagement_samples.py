@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.arrays import read_arrays
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn, in_work
 from chipload.cutting.material import Material
@@ -68,6 +69,8 @@ class EngagementSamples:
     turn: Floats
 
     def __post_init__(self) -> None:
+        if self.row.ndim != 1 or self.start.ndim != 1 or self.start[:1].any():
+            raise InputError("engagement samples: rows and starts must be lists, and the first start 0")
         n = len(self.row)
         shapes = {
             "tool": (n,), "flutes": (n,), "periods": (n,), "frame": (n, 3, 3), "start": (n + 1,),
@@ -210,11 +213,7 @@ class EngagementRecorder:
 
     def restore(self, path: Path) -> None:
         """Load the samples of an earlier run."""
-        try:
-            with np.load(path, allow_pickle=False) as archive:
-                arrays = {name: archive[name] for name in archive.files}
-        except (OSError, ValueError, EOFError) as err:
-            raise InputError(f"{path}: cannot be read: {err}: remove its folder") from None
+        arrays = read_arrays(path, "remove its folder")
         if "stride" not in arrays:
             raise InputError(f"{path}: damaged: remove its folder")
         self.stride = int(arrays["stride"])

@@ -7,11 +7,7 @@ Notation: geometries are well-known binary (WKB, little-endian), one after the o
 from __future__ import annotations
 
 import io
-import math
-import struct
-import tokenize
 import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +15,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from chipload.arrays import LARGEST, UNREADABLE, array_of
 from chipload.errors import InputError
 from chipload.files import is_file, open_regular
-
-#: greatest size of a file, and of its content unpacked [bytes]
-LARGEST_FILE = LARGEST = 1 << 30
-#: exceptions of the readers for a damaged archive, array or header
-UNREADABLE = (
-    *(ValueError, TypeError, KeyError, AttributeError, EOFError, OSError, RuntimeError, SyntaxError),
-    *(ArithmeticError, MemoryError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error),
-)
 
 
 def shape_bytes(kind: str, arrays: dict[str, NDArray[Any]], shapes: NDArray[np.object_]) -> bytes:
@@ -44,22 +33,6 @@ def shape_bytes(kind: str, arrays: dict[str, NDArray[Any]], shapes: NDArray[np.o
         **arrays,
     )
     return out.getvalue()
-
-
-def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    """An array of numbers of an archive; the size in its header must equal the number of bytes that follow."""
-    data = archive.read(f"{name}.npy")
-    stream = io.BytesIO(data)
-    if np.lib.format.read_magic(stream) != (1, 0):
-        raise ValueError(name)
-    shape, column_major, dtype = np.lib.format.read_array_header_1_0(stream)
-    if dtype.kind not in "biuf" or min(shape, default=0) < 0:
-        raise ValueError(name)
-    count = math.prod(shape)
-    if count * dtype.itemsize != len(data) - stream.tell():
-        raise ValueError(name)
-    out = np.frombuffer(data, dtype=dtype, count=count, offset=stream.tell())
-    return out.reshape(shape, order="F" if column_major else "C").copy()
 
 
 def read_shapes(
@@ -78,7 +51,7 @@ def read_shapes(
     damaged = InputError(f"stock.file = {file.name}: damaged: save the stock again")
     try:
         with (
-            open_regular(file, f"stock.file = {file.name}", LARGEST_FILE, "take larger layers or tiles") as stream,
+            open_regular(file, f"stock.file = {file.name}", LARGEST, "take larger layers or tiles") as stream,
             zipfile.ZipFile(stream) as archive,
         ):
             size = sum(archive.getinfo(f"{key}.npy").file_size for key in (*names, "kind", "wkb", "ends"))
@@ -87,11 +60,11 @@ def read_shapes(
                     f"stock.file = {file.name}: holds {size} bytes unpacked: must be at most {LARGEST}: take larger "
                     "layers or tiles"
                 )
-            stored_kind = _array(archive, "kind")
+            stored_kind = array_of(archive, "kind")
             if stored_kind.dtype != np.uint8 or stored_kind.tobytes() != kind.encode():
                 raise InputError(f"stock.file = {file.name}: not a file of the kind '{kind}'")
-            arrays = {key: _array(archive, key) for key in names}
-            wkb, ends = _array(archive, "wkb"), _array(archive, "ends")
+            arrays = {key: array_of(archive, key) for key in names}
+            wkb, ends = array_of(archive, "wkb"), array_of(archive, "ends")
     except UNREADABLE:
         raise damaged from None
     numbers = all(arrays[key].ndim == n and arrays[key].dtype.kind in "biuf" for key, n in names.items())

@@ -21,6 +21,8 @@ from chipload.web.folder_access import OpenedFolder, open_path, resolve_name
 
 #: the only address that the server listens on, and the port that it tries first by default
 HOST, PORT = "127.0.0.1", 8170
+#: time that a connection may take to send its first request [s]
+SILENT_S = 20.0
 
 
 def serve(path: str | Path, port: int | None, show: bool, show_line: Callable[[str], None]) -> None:
@@ -51,7 +53,12 @@ def serve(path: str | Path, port: int | None, show: bool, show_line: Callable[[s
 
     application = _application(opened, own, token)
     config = uvicorn.Config(
-        application, log_level="error", access_log=False, timeout_graceful_shutdown=1, ws_max_size=4_000_000
+        application,
+        http=silent_closing_protocol(),
+        log_level="error",
+        access_log=False,
+        timeout_graceful_shutdown=1,
+        ws_max_size=4_000_000,
     )
     server = uvicorn.Server(config)
 
@@ -69,6 +76,26 @@ def serve(path: str | Path, port: int | None, show: bool, show_line: Callable[[s
 
     with _redirect(address) as first, contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
         asyncio.run(work())
+
+
+def silent_closing_protocol(wait_s: float = SILENT_S) -> type:
+    """Return uvicorn's protocol of HTTP, which also closes a connection without a whole request after a time [s].
+
+    Uvicorn waits for the first request without limit; each such connection holds a file handle of this process.
+    """
+    from uvicorn.protocols.http.auto import AutoHTTPProtocol
+
+    class SilentClosingProtocol(AutoHTTPProtocol):  # type: ignore[misc,valid-type]
+        def connection_made(self, transport: Any) -> None:
+            super().connection_made(transport)
+            self.loop.call_later(wait_s, self._close_silent)
+
+        def _close_silent(self) -> None:
+            # a websocket has taken the connection over, and left the set
+            if self.cycle is None and self in self.connections:
+                self.transport.close()
+
+    return SilentClosingProtocol
 
 
 def listen(port: int | None) -> tuple[socket.socket, bool]:

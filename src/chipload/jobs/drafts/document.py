@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from chipload.arrays import UNREADABLE
 from chipload.errors import InputError
 from chipload.files import open_regular
 
@@ -68,7 +69,7 @@ def read_document(path: Path) -> Document:
                     if info.file_size > LARGEST_PART:
                         raise InputError(f"{path.name}: {info.filename}: must be at most {LARGEST_PART} bytes")
                 parts = {info.filename: archive.read(info) for info in names}
-        except (zipfile.BadZipFile, OSError, RuntimeError, NotImplementedError, ValueError, EOFError) as err:
+        except UNREADABLE as err:
             raise InputError(f"{path.name}: not a FreeCAD document: {str(err)[:100]}") from None
     text = parts.get("Document.xml")
     if text is None:
@@ -117,6 +118,6 @@ def _value(element: ElementTree.Element) -> Any:
             return {k: float(inner.get(k, "0")) for k in ("Px", "Py", "Pz", "Q0", "Q1", "Q2", "Q3")}
         if tag in ("Part", "Path"):
             return inner.get("file", "") or [c.get("gcode", "") for c in inner.iterfind("Command")]
-    except (ValueError, IndexError):
+    except (ValueError, IndexError, OverflowError):
         return None
     return None

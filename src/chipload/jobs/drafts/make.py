@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from chipload.errors import InputError
-from chipload.files import is_file
+from chipload.files import is_file, require_utf8
 from chipload.jobs.drafts.draft import Draft
 
 
@@ -29,6 +29,7 @@ def draft_of(
     """
     if not is_file(file):
         raise InputError(f"{file}: no such file: name a program, a drawing, a model or sections of a blade")
+    require_utf8(file)
     ending = file.suffix.lower()
     if job is not None and ending != ".fcstd":
         raise InputError(f"--job {job}: applies to a FreeCAD document only: leave it out for {file.name}")
