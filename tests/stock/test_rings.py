@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from shapely import LineString, Point
+from shapely import LineString, Point, Polygon
 
 from chipload.errors import InputError
 from chipload.stock.rings import Boss, ring_stock, surface_off
 
 BOUNDS = np.linspace(-4.0, 0.0, 5)
+#: tolerance of the edges [mm]
+WITHIN = 0.002
 
 
 def flat(radius):
@@ -59,10 +61,33 @@ def test_distance_from_the_surface():
     """An engagement range of 0.3 mm into a wall at 20 mm, and 1.5 mm left elsewhere."""
     stock = ring_stock(BOUNDS, flat(18.0), flat(21.5))
     stock.remove(2, Point(24.7, 0.0).buffer(5.0, 256))
-    low, high = surface_off(stock, flat(20.0), -4.0, 0.0)
+    low, high = surface_off(stock, flat(20.0), -4.0, 0.0, WITHIN)
     assert low == pytest.approx(-0.3, abs=1e-3)
     assert high == pytest.approx(1.5, abs=1e-3)
-    assert surface_off(stock, flat(20.0), 5.0, 6.0) is None
+    assert surface_off(stock, flat(20.0), 5.0, 6.0, WITHIN) is None
+
+
+def test_a_slit_between_tiles_is_no_cut():
+    """As wide as twice the tolerance of the edges at most, along the border y = 0, half through the wall."""
+    for width in (0.0, 1e-9, 8.9e-6, 1.9 * WITHIN):
+        stock = ring_stock(BOUNDS, flat(18.0), flat(21.5))
+        rows, columns = stock.tiles.shape[1:]
+        assert (rows, columns) == (2, 2)
+        slit = Polygon([(-19.5, 0.0), (-22.0, width), (-22.0, 0.0)])
+        stock.tiles[1, 1, 0] = stock.tiles[1, 1, 0].difference(slit)
+        low, high = surface_off(stock, flat(20.0), -4.0, 0.0, WITHIN)
+        # 1.5 mm are left everywhere; a chord of 512 is 0.4 um inside the circle
+        assert low == pytest.approx(1.5, abs=1e-3), width
+        assert high == pytest.approx(1.5, abs=1e-3)
+
+
+def test_a_groove_of_the_smallest_cutter_is_a_cut():
+    """A cutter of 0.1 mm, 0.7 mm deep in the stock: a slit that is wider than its tolerance."""
+    stock = ring_stock(BOUNDS, flat(18.0), flat(21.5))
+    stock.remove(2, LineString([(-30.0, 0.0), (-20.85, 0.0)]).buffer(0.05, 32))
+    low, high = surface_off(stock, flat(20.0), -4.0, 0.0, WITHIN)
+    assert low == pytest.approx(0.8, abs=1e-3)
+    assert high == pytest.approx(1.5, abs=1e-3)
 
 
 def test_no_ring():
@@ -87,7 +112,7 @@ def test_distance_from_the_surface_in_one_layer():
     """The lowest layer alone, then the highest: a layer counts where both of its bounds are within the heights."""
     stock = ring_stock(BOUNDS, flat(18.0), cone(21.0, 0.5))
     for low, middle in ((-4.0, -3.5), (-1.0, -0.5)):
-        found = surface_off(stock, flat(20.0), low, low + 1.0)
+        found = surface_off(stock, flat(20.0), low, low + 1.0, WITHIN)
         assert found == pytest.approx((1.0 - 0.5 * middle, 1.0 - 0.5 * middle), abs=2e-3)
 
 

@@ -25,6 +25,7 @@ from chipload.files import write_whole
 from chipload.geometry.mesh import require_closed
 from chipload.stock._ring_edges import ring_edges
 from chipload.stock.shapes import read_shapes, shape_bytes
+from chipload.stock.simpler import simplify_tiles
 from chipload.stock.solid import glb, prisms
 from chipload.stock.tile_grid import (
     LAYER_LIMIT,
@@ -171,6 +172,10 @@ class LayeredStock:
     def heights(self) -> Floats:
         """(n,) float [mm]: the middle of each layer, at which its section lies."""
         return 0.5 * (self.bounds[:-1] + self.bounds[1:])
+
+    def borders(self, rows: Ints, columns: Ints) -> Floats:
+        """Return the borders of tiles, (n, 4) float [mm]: least x and y, greatest x and y."""
+        return np.column_stack([self.xs[columns], self.ys[rows], self.xs[columns + 1], self.ys[rows + 1]])
 
     def layers_between(self, z0: float, z1: float) -> range:
         """Return the layers that reach into the open interval z0 < z < z1 [mm]."""
@@ -475,7 +480,7 @@ class LayeredStock:
         alike: dict[int, int] = {}
         same = np.array([alike.setdefault(id(tile), len(alike)) for tile in old], dtype=np.int64)
         first = np.unique(same, return_index=True)[1]
-        new = areas_alone(shapely.simplify(old[first], tidy, preserve_topology=True))[same]
+        new = simplify_tiles(old[first], self.borders(j[first], i[first]), tidy)[same]
         self.tiles[layer, j, i] = new
         self.room[layer, j, i] = np.maximum(2 * shapely.get_num_coordinates(new), ROOM)
         self.tidied += float(((shapely.area(new) - shapely.area(old)) * self.thickness[layer]).sum())

@@ -24,8 +24,6 @@ Floats = NDArray[np.float64]
 
 #: corners of a quarter circle
 QUARTER = 128
-#: half the distance below which tiles touch [mm]
-TOUCH = 1e-6
 #: room around the stock [mm]
 ROOM = 1.0
 
@@ -94,19 +92,25 @@ def ring_stock(
 
 
 def surface_off(
-    stock: LayeredStock, outer: Callable[[Floats], Floats], low: float, high: float
+    stock: LayeredStock, outer: Callable[[Floats], Floats], low: float, high: float, within: float
 ) -> tuple[float, float] | None:
     """Least and greatest distance of the outer edges of the layers from ``outer`` between two heights [mm]: below 0 the
     wall is cut into, above 0 stock is left. None: no whole layer lies there.
+
+    A section is closed by a disc first: what the cutter took is wider than the disc and remains as it is; a slit
+    between two tiles or two cuts, into which the disc does not go, is not a cut.
+
+    Parameters
+    ----------
+    within : radius of the disc [mm]: the tolerance of the simulated edges, far below the radius of a cutter
     """
     found = []
     for i in range(stock.layers):
         if stock.bounds[i] < low - 1e-9 or stock.bounds[i + 1] > high + 1e-9:
             continue
-        # touching tiles are joined, so that their borders are not edges
-        whole = polygons(stock.section(i).buffer(TOUCH))
+        whole = polygons(stock.section(i).buffer(within).buffer(-within))
         edge = np.concatenate([np.asarray(p.exterior.coords)[:, :2] for p in whole])
-        off = np.hypot(*edge.T) - TOUCH - float(outer(np.array([stock.heights[i]]))[0])
+        off = np.hypot(*edge.T) - float(outer(np.array([stock.heights[i]]))[0])
         found.append((float(off.min()), float(off.max())))
     return (min(a for a, _ in found), max(b for _, b in found)) if found else None
 

@@ -16,6 +16,7 @@ from shapely import MultiPolygon, Polygon
 from chipload.lazy import LateModule
 from chipload.stock.areas import PlaneAreas, areas_of, polygon_of
 from chipload.stock.layers import ROOM, LayeredStock
+from chipload.stock.simpler import simplify_tiles
 from chipload.stock.tile_grid import areas_alone, polygons, span
 
 kernels = LateModule("chipload.stock._tiles")
@@ -221,9 +222,9 @@ class TileRings:
         if not len(many):
             return
         layer, j, i, slot = layer[many], j[many], i[many], slot[many]
-        which, of = np.unique(slot, return_inverse=True)
+        which, at, of = np.unique(slot, return_index=True, return_inverse=True)
         old = np.array([self.polygon(s) for s in which.tolist()], dtype=object)
-        new = areas_alone(shapely.simplify(old, tidy, preserve_topology=True))
+        new = simplify_tiles(old, self.stock.borders(j[at], i[at]), tidy)
         self.slot_of[layer, j, i] = np.array(self._add(new.tolist()), dtype=np.int64)[of]
         self.stock.room[layer, j, i] = np.maximum(2 * shapely.get_num_coordinates(new)[of], ROOM)
         gained = (shapely.area(new) - shapely.area(old))[of] * self.stock.thickness[layer]

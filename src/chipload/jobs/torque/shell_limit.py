@@ -48,7 +48,7 @@ def shell_wall(job: TorqueJob, a: Allowable) -> ShellWall:
         oval=ovalisation(a.thin, a.thin.shell.length),
         oval_s=a.thin.shell.length,
         solid=_solid_comparison(a.thin, a.width, a.planned),
-        surface=surface_off(a.real.stock, place.outer, low, high),
+        surface=surface_off(a.real.stock, place.outer, low, high, job.table.simulation.tolerance_mm),
         stock=a.real.stock,
     )
 
