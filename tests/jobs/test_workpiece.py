@@ -116,6 +116,27 @@ def test_a_floor_gives_way_along_the_axis(job_file):
     assert 1e-3 * c["deflection_workpiece_um"][middle] / -c["force_z_min_n"][middle] == pytest.approx(beam, rel=0.1)
 
 
+#: the cutter meets the wall square, in the last quarter of a step of 2 mm, and goes on along it
+SQUARE = "%\nG21 G90 G17 G54\nT1 M6\nS6000 M3\nG0 X12. Y-19. Z10.\nG0 Z-8.\nG1 Y-5. F600.\nX22.\nG0 Z10.\nM30\n%\n"
+
+
+def test_a_step_that_meets_the_wall_at_its_end_bends_it_where_it_cuts(job_file):
+    """Per force it moves as in the steps behind it, and as with steps of a quarter of the length."""
+    (job_file.parent / "wall.nc").write_text(SQUARE)
+    found = []
+    for step_mm in ("2.0", "0.5"):
+        path = changed(job_file, "step_mm = 2.0", f"step_mm = {step_mm}") if step_mm != "2.0" else job_file
+        c = run(loaded(path)).simulated.removal.columns
+        line = c["line"]
+        cuts = c["force_n"] > 0.0
+        square, along = np.flatnonzero(cuts & (line == 7)), np.flatnonzero(cuts & (line == 8))
+        assert len(square) >= 1
+        gives = c["deflection_workpiece_um"] / np.where(cuts, c["force_n"], 1.0)
+        found.append((gives[square[-1]], gives[along[0]]))
+        assert found[-1][0] == pytest.approx(found[-1][1], rel=0.5)
+    assert found[0][0] == pytest.approx(found[1][0], rel=0.1)
+
+
 def test_a_wall_gives_way_as_a_plate(job_file):
     done = run(loaded(job_file))
     simulation = done.simulated

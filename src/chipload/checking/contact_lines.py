@@ -1,13 +1,14 @@
 """The contact lines of the steps of a program, and the stock before some of them.
 
-An additional run of the program through the stock, before the simulation, finds them: contact and remaining stock of a
-step do not depend on the feed.
+Additional runs of the program, before the simulation, find them: contact and remaining stock of a step do not depend on
+the feed. The stock is that of layers, the lines are those of the engine of the simulation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +17,18 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
-from chipload.simulation.chips import counted, remove_block, setting_of
+from chipload.simulation.chips import block_of, counted, remove_block, setting_of, with_engine
 from chipload.simulation.loads import GRAZES, Cuts
-from chipload.simulation.removal import Resolution, RunningSums
+from chipload.simulation.moves import Engine, HandOver
+from chipload.simulation.removal import Resolution, RunningSums, RunSettings
 from chipload.simulation.steps import steps_in_blocks
 from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.states import StepLines
 
 Floats = NDArray[np.float64]
+#: steps (c,), their contact lines (c, 2, 3) [mm], greatest force (c,) [N] and mean force (c, 3) [N]
+_Lines = tuple[NDArray[np.int64], Floats, Floats, Floats]
 
 #: steps between two stocks that are kept
 TOGETHER = 24
@@ -53,35 +57,67 @@ def cut_ahead(
     material: Material,
     resolution: Resolution,
     interpolation: Interpolation,
+    engine: Engine,
     progress: Progress = silent,
 ) -> CutAhead:
-    """Run a program through a stock, which changes; store its contact lines, and the stock every few steps."""
+    """Run a program through a stock, which changes; store its contact lines, and the stock every few steps.
+
+    Parameters
+    ----------
+    engine : of the simulation that will use the lines: it must find its contacts where these are. A step that meets a
+        wall at its end cuts by moves, and does not by layers, which look at its middle
+    """
     count = counted(program, cutters, resolution)
     setting = setting_of(cutters, material, resolution, interpolation, None, 2)
-    sums, known = RunningSums(stock.volume()), list[tuple[NDArray[np.int64], Floats, Floats, Floats, Floats]]()
-    stocks, volume = [(0, 0.0, stock.copied())], 0.0
+    found = _lines_by_moves(program, stock, with_engine(engine, setting, program, stock)[0])
+    sums, own = RunningSums(stock.volume()), list[_Lines]()
+    stocks, before = [(0, 0.0, stock.copied())], [np.zeros(1)]
     for steps in steps_in_blocks(program, resolution.step_mm, resolution.tolerance, size=TOGETHER):
         progress(sums.steps / count, "where it cuts")
-        first = sums.steps
+        volume, first = float(before[-1][-1]), sums.steps
         sums, columns, cuts = remove_block(steps, stock, sums, setting)
-        removed = volume + np.cumsum([0.0, *columns["chip_volume_mm3"]])
-        for c in cuts:
-            row = c.step - first
-            mean = np.column_stack([columns[f"force_{x}_mean_n"][row] for x in "xyz"])
-            known.append((c.step, contact_lines(c), columns["force_n"][row], removed[row], mean))
-        if removed[-1] > volume:
-            volume = float(removed[-1])
-            stocks.append((sums.steps, volume, stock.copied()))
-    stocks.append((count, volume, stocks[-1][2]))
+        before.append(volume + np.cumsum(columns["chip_volume_mm3"]))
+        own += _lines_of(cuts, columns, first)
+        if before[-1][-1] > volume:
+            stocks.append((sums.steps, float(before[-1][-1]), stock.copied()))
+    removed = np.concatenate(before)
+    stocks.append((count, float(removed[-1]), stocks[-1][2]))
+    known = own if found is None else found
     if not known:
         none = np.zeros(0)
         return CutAhead(
             StepLines(np.zeros(0, np.int64), np.zeros((0, 2, 3)), none, none), tuple(stocks), np.zeros((0, 3))
         )
-    step, lines, force, before, means = (np.concatenate([some[k] for some in known]) for k in range(5))
+    step, lines, force, means = (np.concatenate([some[k] for some in known]) for k in range(4))
     order = np.argsort(step, kind="stable")
-    found = StepLines(step[order], lines[order], force[order], before[order])
-    return CutAhead(found, tuple(stocks), means[order])
+    step = step[order]
+    return CutAhead(StepLines(step, lines[order], force[order], removed[step]), tuple(stocks), means[order])
+
+
+def _lines_by_moves(program: Program, stock: LayeredStock, setting: RunSettings) -> list[_Lines] | None:
+    """Return the contact lines of a program by moves; None where it is simulated by layers. The stock stays."""
+    if setting.moves is None:
+        return None
+    fine, sums, out = setting.resolution, RunningSums(stock.volume()), list[_Lines]()
+    try:
+        for steps in steps_in_blocks(program, fine.step_mm, fine.tolerance, size=block_of(setting)):
+            first = sums.steps
+            sums, columns, cuts = remove_block(steps, stock, sums, setting)
+            out += _lines_of(cuts, columns, first)
+    except HandOver:
+        return None
+    return out
+
+
+def _lines_of(cuts: Sequence[Cuts], columns: Mapping[str, NDArray[Any]], first: int) -> list[_Lines]:
+    """Return steps, contact lines, greatest force and mean force of some steps that have a force."""
+    out = []
+    for c in cuts:
+        row = c.step - first
+        some = columns["force_n"][row] > 0.0
+        mean = np.column_stack([columns[f"force_{x}_mean_n"][row] for x in "xyz"])
+        out.append((c.step[some], contact_lines(c)[some], columns["force_n"][row][some], mean[some]))
+    return out
 
 
 def contact_lines(cuts: Cuts) -> Floats:

@@ -234,6 +234,8 @@ def simulated(
     errors = with_compliance_error(removal.resolution_error, removal.columns, compliance)
     changes = changes_in_stock(program, job.cutters, *stock_box(stock), reading.retractions)
     findings = (*removal.findings, *reversed_cuts(steps, removal.columns, job.cutters), *changes)
+    if compliance is not None:
+        findings += compliance.jumps(removal.columns, max(c.diameter for c in job.cutters.values()))
     removal = replace(removal, resolution_error=errors, samples=recorder.samples(), findings=findings)
     if stability_watch is not None:
         removal = with_columns(removal, stability_watch.columns)
@@ -269,7 +271,8 @@ def compliance_of_workpiece(
 ) -> WorkpieceCompliance | None:
     """Return the compliance of the workpiece where the program cuts it; None if no [workpiece] is stated."""
     program, _ = timed(reading, job, machine)
-    return workpiece_compliance(job, program, stock, material, resolution_of(job, program), progress)
+    engine = job.table.operation[0].engine
+    return workpiece_compliance(job, program, stock, material, resolution_of(job, program), engine, progress)
 
 
 def _no_holder(job: ProgramJob) -> tuple[int, ...]:

@@ -26,6 +26,8 @@ from chipload.errors import Finding, Severity
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
+from chipload.simulation.deflection_jumps import jump_findings
+from chipload.simulation.moves import Engine
 from chipload.simulation.removal import Columns, Resolution
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.followed import FollowedModes, ModesOfStates
@@ -105,6 +107,13 @@ class WorkpieceCompliance:
     modes: FollowedModes | None = None
     strained: StrainedSteps | None = None
 
+    def jumps(self, columns: Columns, reach: float) -> tuple[Finding, ...]:
+        """Return the steps of a history whose compliance is not that of their neighbours within ``reach`` [mm]."""
+        steps = self.steps
+        return jump_findings(
+            columns, steps.step, steps.lines.mean(axis=1), 1e3 * size_of(steps.compliance), reach, "force_n"
+        )
+
     @property
     def numbers(self) -> Mapping[str, Any]:
         """The numbers for summary.json."""
@@ -143,6 +152,7 @@ def workpiece_compliance(
     stock: LayeredStock,
     material: Material,
     resolution: Resolution,
+    engine: Engine,
     progress: Progress = silent,
 ) -> WorkpieceCompliance | None:
     """Return the compliance of the workpiece where its program cuts; None if the job has no [workpiece].
@@ -150,6 +160,7 @@ def workpiece_compliance(
     Parameters
     ----------
     stock : before the program; it does not change
+    engine : of the simulation that will use the compliance
 
     Raises
     ------
@@ -163,7 +174,7 @@ def workpiece_compliance(
     elastic, clamps = elastic_of(table), clamps_of(table, stock)
     clamped_parts = clamped_volumes(table, stock)
     ahead = cut_ahead(
-        program, stock.copied(), job.cutters, material, resolution, op.interpolation,
+        program, stock.copied(), job.cutters, material, resolution, op.interpolation, engine,
         lambda done, what: progress(0.4 * done, what),
     )  # fmt: skip
     grid, wall = cells_over(stock, ahead.stocks[-1][2], table.cell_mm, table.order)

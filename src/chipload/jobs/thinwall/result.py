@@ -16,6 +16,7 @@ from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.report.programs import ENDINGS, program_name
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, check_limit, in_memory, state_of
 from chipload.simulation.accuracy import energy_balance
+from chipload.simulation.deflection_jumps import jump_findings
 
 Floats = NDArray[np.float64]
 Place = tuple[float, float, float] | None
@@ -155,7 +156,16 @@ def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
     for c in one.shape.collisions:
         text = f"{c.what} goes {c.depth_mm:.3g} mm into {c.into}"
         out.append(Finding("collision", c.line, text, Severity.EXCEEDS, c.at, c.step))
-    return (*out, *range_findings(walled.checks, one.columns))
+    return (*out, *_jumps(walled, one.columns), *range_findings(walled.checks, one.columns))
+
+
+def _jumps(walled: ThinWallResult, columns: Mapping[str, NDArray[Any]]) -> tuple[Finding, ...]:
+    """Steps that bend the wall more or less per newton than their neighbours explain."""
+    step = np.flatnonzero((columns["force_normal_n"] > 0.0) & (columns["deflection_workpiece_um"] > 0.0))
+    place = np.column_stack([columns[f"contact_{x}_mm"][step] for x in "xyz"])
+    gives = columns["deflection_workpiece_um"][step] / columns["force_normal_n"][step]
+    reach = max(cutter.diameter for cutter in walled.checks.cutters.values())
+    return jump_findings(columns, step, place, gives, reach, "force_normal_n")
 
 
 def verdict_of(walled: ThinWallResult, one: Variant) -> Verdict:

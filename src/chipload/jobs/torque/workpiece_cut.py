@@ -172,7 +172,7 @@ def workpiece_cut(
     require_linear(material)
     own = simulation_of(job, solid)
     stock, fine = stock_body(own, program), resolution_of(own, program)
-    known = workpiece_compliance(own, program, stock, material, fine, part_of(progress, 0.0, 0.5))
+    known = workpiece_compliance(own, program, stock, material, fine, "layers", part_of(progress, 0.0, 0.5))
     if known is None or known.strained is None:
         raise InputError("stock: the program cuts nothing from the workpiece: check its corners and the work offset")
     less, removal = (
