@@ -15,12 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
+from chipload.api.simulation import simulate
+from chipload.checking.settings import Limits
+from chipload.checking.workpiece import Stock
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, material_names
 from chipload.errors import InputError, Severity
 from chipload.examples import copy_example
 from chipload.jobs import check_job, job_of, load_job, run_job
-from chipload.jobs.program.api import simulate
 from chipload.machine.machine import machine_named
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
@@ -78,8 +80,8 @@ def slot(cutter: Cutter, depth: float, step: float, apart: float = 0.0) -> float
     x = [-cutter.diameter, 10.0, *(10.0 + apart * np.arange(1, 50) if apart else [20.0])]
     points = [[v, 0.0, -depth] for v in x]
     path = Program.join([rapid(points[0], 300.0, 1, "a"), *(plunge(p, 20.0, 300.0, 1, "a") for p in points[1:])])
-    block = ([0.0, -16.0, -12.0], [30.0, 16.0, 0.0])
-    return simulate(path, block, cutter, NO_EDGE, "vmc", {"force_n": 1e6}, step_mm=step).energy_balance[1]
+    block = Stock.block((0.0, -16.0, -12.0), (30.0, 16.0, 0.0))
+    return simulate(path, block, cutter, NO_EDGE, "vmc", Limits(force_n=1e6), step_mm=step).energy_balance[1]
 
 
 def thin_cutter() -> tuple[str, bool]:

@@ -33,7 +33,7 @@ JOB = {
     "part": {"file": "corner.dxf", "units_if_unstated": "mm"}, "stock": {"top_mm": 0.0}, "machine": "vmc",
     "material": "al7075-carbide", "cutter": chipload.Cutter(**MILL), "operation": OPERATION, "limits": LIMITS,
 }  # fmt: skip
-BLOCK = ((0, 0, -12), (60, 40, 0))
+BLOCK = chipload.Stock.block((0, 0, -12), (60, 40, 0))
 
 
 @pytest.fixture(scope="module")
@@ -182,12 +182,12 @@ def test_a_program_runs_with_the_cutter_of_a_job(tmp_path):
     assert len(chipload.read_program(file, "vmc").program) == len(reading.program)
     runs = [
         chipload.simulate(
-            file, BLOCK, cutter, chipload.read_material("al7075-t6"), machine, {"force_n": 800}, step_mm=4
+            file, BLOCK, cutters, chipload.read_material("al7075-t6"), machine, chipload.Limits(force_n=800), step_mm=4
         )
-        for cutter in (chipload.Cutter(**MILL), MILL, {1: chipload.Cutter(**MILL)})
+        for cutters in (chipload.Cutter(**MILL), [chipload.Cutter(**MILL)])
     ]
-    assert isinstance(runs[0].result, chipload.Result)
-    assert isinstance(runs[0].stock, chipload.Stock)
+    assert isinstance(runs[0], chipload.Result)
+    assert runs[0].stock.volume() < 60.0 * 40.0 * 12.0
     for other in runs[1:]:
         assert np.array_equal(runs[0]["force_n"], other["force_n"])
     assert set(runs[0].columns) <= set(chipload.COLUMNS)
@@ -210,5 +210,5 @@ def test_every_table_of_the_job_is_a_parameter(function, capability):
 
 def test_a_check_that_is_switched_off_is_stated(folder):
     done = chipload.plan_contour(**JOB, folder=folder, checks={"cutter_strength": False})
-    assert "cutter_stress_mpa" not in {limit.name for limit in done.result.limits}
-    assert any("cutter_strength" in text for text in done.result.unchecked)
+    assert "cutter_stress_mpa" not in {limit.name for limit in done.limits}
+    assert any("cutter_strength" in text for text in done.unchecked)

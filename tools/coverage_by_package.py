@@ -31,7 +31,7 @@ PAGE, HEADING = ROOT / "docs" / "reliability.md", "## Test coverage"
 TOP = "chipload"
 #: tests of a package beside those in the folder of its name
 MORE = {
-    "api": ("tests/test_api.py", "tests/jobs/test_api.py"),
+    "api": ("tests/test_api.py", "tests/checking/test_simulate.py"),
     "cli": (
         "tests/control/test_chatter.py", "tests/control/test_identification.py", "tests/control/test_safety.py",
         "tests/machine/test_mtconnect.py", "tests/report/test_export.py", "tests/report/test_fit_page.py",

@@ -13,12 +13,17 @@ if TYPE_CHECKING:
     from chipload.api.loads import fit_coefficients, hold_torque, optimise_feeds
     from chipload.api.planning import plan_contour, plan_impeller, plan_pocket, plan_thin_wall
     from chipload.api.reading import read_machine, read_material, read_program
+    from chipload.api.simulation import simulate
+    from chipload.checking.clamped import Workpiece, WorkpieceClamp
+    from chipload.checking.dynamics import Mode, Vibration
+    from chipload.checking.history import History
+    from chipload.checking.settings import CheckSettings, Limits, SimulationSettings
+    from chipload.checking.stiffness import MachineStiffness
+    from chipload.checking.workpiece import FinishedPart, Fixture, Stock
     from chipload.cutter.table import CutterTable as Cutter
     from chipload.cutting.material import Material
     from chipload.errors import Finding, InputError
     from chipload.geometry.contour import Contour
-    from chipload.jobs.program.api import simulate
-    from chipload.jobs.program.history import History
     from chipload.machine.machine import Machine
     from chipload.program.program import Program
     from chipload.result.columns import COLUMNS
@@ -26,25 +31,34 @@ if TYPE_CHECKING:
     from chipload.result.result import Result
     from chipload.result.track import Track
     from chipload.result.verdict import Verdict
-    from chipload.stock.layers import LayeredStock as Stock
 
     __version__: str
 
 __all__ = [
     "COLUMNS",
+    "CheckSettings",
     "Contour",
     "Cutter",
     "Finding",
+    "FinishedPart",
+    "Fixture",
     "History",
     "InputError",
     "LimitCheck",
+    "Limits",
     "Machine",
+    "MachineStiffness",
     "Material",
+    "Mode",
     "Program",
     "Result",
+    "SimulationSettings",
     "Stock",
     "Track",
     "Verdict",
+    "Vibration",
+    "Workpiece",
+    "WorkpieceClamp",
     "check_job",
     "fit_coefficients",
     "hold_torque",
@@ -65,20 +79,29 @@ __all__ = [
 #: module and name of each that is not a function of ``chipload.api``
 _PLACES = {
     "COLUMNS": ("chipload.result.columns", "COLUMNS"),
+    "CheckSettings": ("chipload.checking.settings", "CheckSettings"),
     "Contour": ("chipload.geometry.contour", "Contour"),
     "Cutter": ("chipload.cutter.table", "CutterTable"),
     "Finding": ("chipload.errors", "Finding"),
-    "History": ("chipload.jobs.program.history", "History"),
+    "FinishedPart": ("chipload.checking.workpiece", "FinishedPart"),
+    "Fixture": ("chipload.checking.workpiece", "Fixture"),
+    "History": ("chipload.checking.history", "History"),
     "InputError": ("chipload.errors", "InputError"),
     "LimitCheck": ("chipload.result.limits", "LimitCheck"),
+    "Limits": ("chipload.checking.settings", "Limits"),
     "Machine": ("chipload.machine.machine", "Machine"),
+    "MachineStiffness": ("chipload.checking.stiffness", "MachineStiffness"),
     "Material": ("chipload.cutting.material", "Material"),
+    "Mode": ("chipload.checking.dynamics", "Mode"),
     "Program": ("chipload.program.program", "Program"),
     "Result": ("chipload.result.result", "Result"),
-    "Stock": ("chipload.stock.layers", "LayeredStock"),
+    "SimulationSettings": ("chipload.checking.settings", "SimulationSettings"),
+    "Stock": ("chipload.checking.workpiece", "Stock"),
     "Track": ("chipload.result.track", "Track"),
     "Verdict": ("chipload.result.verdict", "Verdict"),
-    "simulate": ("chipload.jobs.program.api", "simulate"),
+    "Vibration": ("chipload.checking.dynamics", "Vibration"),
+    "Workpiece": ("chipload.checking.clamped", "Workpiece"),
+    "WorkpieceClamp": ("chipload.checking.clamped", "WorkpieceClamp"),
 }
 
 #: module of ``chipload.api`` of each function
@@ -89,6 +112,7 @@ _FUNCTIONS = {
         "loads": "fit_coefficients hold_torque optimise_feeds",
         "planning": "plan_contour plan_impeller plan_pocket plan_thin_wall",
         "reading": "read_machine read_material read_program",
+        "simulation": "simulate",
     }.items()
     for name in names.split()
 }

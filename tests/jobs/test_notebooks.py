@@ -50,7 +50,7 @@ def test_program() -> None:
     alone, whole = said["deflection_um"]
     assert 0.0 < alone < whole < 60.0
     job = run_job(load_job(FOLDER / "job.toml"))
-    assert chipload.History(job.outcome).numbers["deflection_um"]["max"] == pytest.approx(whole, rel=1e-9)
+    assert chipload.History.of(job.outcome).numbers["deflection_um"]["max"] == pytest.approx(whole, rel=1e-9)
     assert "<table>" in out[0].data["text/html"]
     assert len(out[1].data["application/vnd.plotly.v1+json"]["data"]) >= 3
 

@@ -14,10 +14,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from chipload.api.simulation import simulate
+from chipload.checking.history import History
+from chipload.checking.settings import Limits, SimulationSettings
+from chipload.checking.workpiece import Stock
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named
-from chipload.jobs.program.api import simulate
-from chipload.jobs.program.history import History
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
 from laws.edge_sum import Sum, edge_sum
@@ -43,8 +45,9 @@ def path(points: Any, feed: float = FEED) -> Program:
 def run(
     program: Program, cutter: Cutter, high: float = 0.0, material: Material = AL, on: str = "vmc", **keys: Any
 ) -> History:
-    block = ([0.0, -16.0, -12.0], [30.0, 16.0, high])
-    return simulate(program, block, cutter, material, on, {"force_n": 1e6}, **({"engine": "layers"} | keys))
+    block = Stock.block((0.0, -16.0, -12.0), (30.0, 16.0, high), keys.pop("layer_mm", None))
+    settings = SimulationSettings(**({"engine": "layers", "step_mm": 0.25 * cutter.diameter} | keys))
+    return simulate(program, block, cutter, material, on, Limits(force_n=1e6), settings=settings)
 
 
 def per_tooth(cutter: Cutter, direction: Any) -> Floats:

@@ -30,8 +30,8 @@ def test_slot_in_a_side_face(dialect, tmp_path):
     file = tmp_path / f"slot.{ENDING[dialect]}"
     file.write_text(HEADS[dialect] + moves + TAILS[dialect])
     history = chipload.simulate(
-        file, stock=((-20, -20, -20), (20, 20, 20)), cutter=CUTTER, material="al7075-t6", machine="cradle-ac",
-        limits={"force_n": 2000.0}, dialect=dialect, step_mm=2.0,
+        file, chipload.Stock.block((-20, -20, -20), (20, 20, 20)), CUTTER, material="al7075-t6", machine="cradle-ac",
+        limits=chipload.Limits(force_n=2000.0), dialect=dialect, step_mm=2.0,
     )  # fmt: skip
     assert history["chip_volume_mm3"].sum() == pytest.approx(10.0 * 2.0 * 40.0, rel=5e-3)
     # the tool stands along X of the workpiece and cuts 2 mm deep over the whole face

@@ -9,16 +9,15 @@ and Kr = Krc f + Kre; nothing else cuts. The tip of a clamped bar of E I under w
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
-from chipload.checking.stiffness import deflecting, stiffness_of
+from chipload.checking.stiffness import MachineStiffness, deflecting, stiffness_of
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.jobs.simulation.tables import StiffnessTable
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
 from chipload.simulation.chips import remove
@@ -33,8 +32,7 @@ LOAD = math.hypot(900.0 * math.tau * FEED / (2 * SPEED) + 12.0, 400.0 * math.tau
 
 
 def slot(cutter: Cutter = MILL, workpiece: StepCompliances | None = None, **stiffness: float):
-    table = StiffnessTable.model_validate(stiffness)
-    gives = stiffness_of(table, {cutter.number: cutter}, workpiece)
+    gives = stiffness_of(MachineStiffness(**stiffness), {cutter.number: cutter}, workpiece)
     program = Program.join(
         [
             rapid([-10.0, 0.0, -DEPTH], SPEED, 1, "link"),
@@ -128,7 +126,7 @@ def test_a_measured_tip_stands_for_grip_holder_and_spindle() -> None:
 
 
 def test_what_is_stated_as_rigid_adds_nothing_and_leaves_nothing_open() -> None:
-    rigid = dict.fromkeys(StiffnessTable.model_fields, math.inf)
+    rigid = dict.fromkeys((f.name for f in fields(MachineStiffness)), math.inf)
     found, _, gives = slot(replace(MILL, holder=()), **rigid)
     assert gives.unknown == ()
     assert found["deflection_cutter_um"] == pytest.approx(1e3 * bar(), rel=1e-6)
@@ -138,7 +136,7 @@ def test_what_is_stated_as_rigid_adds_nothing_and_leaves_nothing_open() -> None:
 
 def test_a_rigid_holder_of_unknown_length_is_named_where_the_spindle_tilts() -> None:
     bare = replace(MILL, holder=())
-    rigid = dict.fromkeys(StiffnessTable.model_fields, math.inf)
+    rigid = dict.fromkeys((f.name for f in fields(MachineStiffness)), math.inf)
     assert slot(bare, **{**rigid, "spindle_nm_rad": 1e5})[2].unknown == ("holder_mm of cutter 1",)
     assert slot(bare, **{**rigid, "holder_gpa": 210.0})[2].unknown == ("holder_mm of cutter 1",)
 

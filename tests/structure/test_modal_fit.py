@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from chipload.checking.dynamics import read_modes
 from chipload.cli import app
 from chipload.errors import InputError
+from chipload.jobs.simulation.modes_file import read_modes
 from chipload.structure.modal_fit import fit_modes
 from chipload.structure.receptance import Receptance
 from chipload.structure.receptance_files import read_receptance

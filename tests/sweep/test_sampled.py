@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from chipload.checking.dynamics import read_modes
 from chipload.cutting.material import material_named, material_text
 from chipload.errors import InputError
 from chipload.jobs.simulation.dynamics_tables import DynamicsTable, ModeTable
+from chipload.jobs.simulation.modes_file import read_modes
 from chipload.sweep.cases import Samples
 from chipload.sweep.run import run_sweep
 from chipload.sweep.sampled import modes_texts

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.checking.rubbing import over_feed, rubbing, spindle_speed
+from chipload.checking.settings import CheckSettings
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.errors import Finding, InputError, Severity
-from chipload.jobs.tables import ChecksTable
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, Verdict, check_limit
 from chipload.result.limits import Columns
@@ -63,7 +63,7 @@ class DefaultChecks:
     ----------
     cutters : by tool number
     material : whose coefficients the loads have
-    off : names of checks that the job switches off, keys of ``[checks]``
+    off : names of checks that are switched off
     sigma : limits of loads are checked at the value plus so many standard deviations
     of_feed, of_depth : deflection over feed per tooth and radial depth up to which the rigid model holds
     """
@@ -88,7 +88,7 @@ class DefaultChecks:
 
 
 def default_checks(
-    table: ChecksTable, cutters: Mapping[int, Cutter], material: Material, confidence: float
+    settings: CheckSettings, cutters: Mapping[int, Cutter], material: Material, confidence: float
 ) -> DefaultChecks:
     """Checks in addition to the stated limits.
 
@@ -108,12 +108,12 @@ def default_checks(
             "state one (spread = 0.25 for a table value), or leave confidence out"
         )
     return DefaultChecks(
-        cutters, material, table.off, max(sigma, 0.0), table.deflection_of_feed, table.deflection_of_depth
+        cutters, material, settings.off, max(sigma, 0.0), settings.deflection_of_feed, settings.deflection_of_depth
     )
 
 
 def with_checks(
-    table: ChecksTable, material: Material, bends: Callable[[Cuts], Mapping[str, Floats]]
+    settings: CheckSettings, material: Material, bends: Callable[[Cuts], Mapping[str, Floats]]
 ) -> Callable[[Cuts], dict[str, Floats]]:
     """Columns of ``bends``, which has the deflection, and :data:`PROGRAM_COLUMNS`."""
 
@@ -121,7 +121,7 @@ def with_checks(
         found = dict(bends(cuts))
         found["cutter_stress_mpa"] = cutter_stress(cuts.engagement, cuts.cutter, material)
         found["deflection_share"] = deflection_share(
-            cuts.plain, found["deflection_um"], table.deflection_of_feed, table.deflection_of_depth
+            cuts.plain, found["deflection_um"], settings.deflection_of_feed, settings.deflection_of_depth
         )
         found["ramp_deg"] = ramp_angle(cuts)
         return found
@@ -130,7 +130,7 @@ def with_checks(
 
 
 def check_columns(
-    table: ChecksTable, cuts: Sequence[Cuts], material: Material, deflection_um: Floats
+    settings: CheckSettings, cuts: Sequence[Cuts], material: Material, deflection_um: Floats
 ) -> dict[str, Floats]:
     """:data:`CHECK_COLUMNS` of a removal that kept its cuts, and ``flute_fill`` where a gullet is stated.
 
@@ -148,7 +148,7 @@ def check_columns(
     for c in cuts:
         out["cutter_stress_mpa"][c.step] = cutter_stress(c.engagement, c.cutter, material)
         out["deflection_share"][c.step] = deflection_share(
-            c.plain, deflection_um[c.step], table.deflection_of_feed, table.deflection_of_depth
+            c.plain, deflection_um[c.step], settings.deflection_of_feed, settings.deflection_of_depth
         )
         if c.cutter.gullet is not None:
             out["flute_fill"][c.step] = flute_fill(c)

@@ -8,27 +8,71 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Literal
 
 import numpy as np
-from pydantic import ValidationError
 
+from chipload.checking.clamped import Workpiece
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.files import read_regular
-from chipload.jobs.messages import table_errors
-from chipload.jobs.simulation.dynamics_tables import DynamicsTable, ModesFileTable, ModeTable
-from chipload.jobs.simulation.tables import WorkpieceTable
+from chipload.ranges import choice_field, number_field, require_ranges
 from chipload.stability.modes import Modes
 from chipload.stability.probability import ModeSpread
 from chipload.stability.process_damping import ProcessDamping
-from chipload.tables import parsed
 
 #: N/mm in 1 N/um, t in 1 kg
 PER_UM, PER_KG = 1000.0, 1e-3
-#: largest file of modes [bytes]
-LARGEST_FILE = 1_000_000
 DIRECTIONS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mode:
+    """A mode of vibration at the tip of the cutter, or of the workpiece where it is cut.
+
+    Parameters
+    ----------
+    frequency_hz : natural frequency
+    direction : in machine coordinates: ``x``, ``y``, ``z``, (x, y) or (x, y, z)
+    damping_ratio : None: not known; stability is then unproven
+    stiffness_n_um, mass_kg : modal stiffness, or modal mass instead of it
+    tool : tool number; None: every tool
+    of : vibrating body; ``cutter`` includes holder and spindle
+    """
+
+    frequency_hz: float = number_field(above=0.0)
+    direction: Literal["x", "y", "z"] | tuple[float, float] | tuple[float, float, float]
+    damping_ratio: float | None = number_field(None, above=0.0, below=1.0)
+    stiffness_n_um: float | None = number_field(None, above=0.0)
+    mass_kg: float | None = number_field(None, above=0.0)
+    tool: int | None = number_field(None, least=1, most=1000, whole=True)
+    of: Literal["cutter", "workpiece"] = choice_field("cutter", "cutter", "workpiece")
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        require_ranges(self, "dynamics.mode.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vibration:
+    """Modes of vibration of cutter and workpiece. They give each step a stability margin.
+
+    Parameters
+    ----------
+    modes : of cutters and workpiece
+    frequency_percent, damping_percent, stiffness_percent : standard deviations of the modes, all or none; with them
+        each step has a probability of stability
+    process_damping : damping by worn edges; None: left out
+    """
+
+    modes: tuple[Mode, ...] = ()
+    frequency_percent: float | None = number_field(None, least=0.0, below=100.0)
+    damping_percent: float | None = number_field(None, least=0.0, below=100.0)
+    stiffness_percent: float | None = number_field(None, least=0.0, below=100.0)
+    process_damping: ProcessDamping | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        require_ranges(self, "dynamics.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +104,7 @@ class Dynamics:
         return max(self.name, default=0) + 1
 
 
-def dynamics_of(
-    table: DynamicsTable, folder: Path, cutters: Mapping[int, Cutter], workpiece: WorkpieceTable | None = None
-) -> Dynamics:
+def dynamics_of(vibration: Vibration, cutters: Mapping[int, Cutter], workpiece: Workpiece | None = None) -> Dynamics:
     """Return the modes of every tool, and the damping of the modes of the workpiece.
 
     Raises
@@ -70,12 +112,12 @@ def dynamics_of(
     InputError
         No mode is stated, one states stiffness and mass, names a tool that is not there, or its values cannot be.
     """
-    listed = [*table.mode, *(read_modes(folder / table.file) if table.file is not None else ())]
+    listed = vibration.modes
     density = None if workpiece is None else workpiece.density_kg_m3
     if not listed and density is None:
         raise InputError("dynamics: has no mode: state [[dynamics.mode]], or a file of chipload tap")
     unknown: list[str] = []
-    known: list[tuple[int, ModeTable, float]] = []
+    known: list[tuple[int, Mode, float]] = []
     for k, mode in enumerate(listed, 1):
         where = f"dynamics.mode {k}"
         if mode.tool is not None and mode.tool not in cutters:
@@ -109,45 +151,20 @@ def dynamics_of(
         if density is not None and damping is None:
             unknown.append("damping of the workpiece")
     names = {k: f"{m.of} {m.frequency_hz:g} Hz" for k, m in enumerate(listed, 1)}
-    return Dynamics(modes, number, names, tuple(dict.fromkeys(unknown)), _spread(table), damping, _process(table))
+    spread, missing = _spread(vibration), tuple(dict.fromkeys(unknown))
+    return Dynamics(modes, number, names, missing, spread, damping, vibration.process_damping)
 
 
-def _process(table: DynamicsTable) -> ProcessDamping | None:
-    """Return the damping by worn edges, if it is stated."""
-    stated = table.process_damping
-    return None if stated is None else ProcessDamping(stated.indentation_n_mm3, stated.wear_land_mm, stated.friction)
-
-
-def _spread(table: DynamicsTable) -> ModeSpread | None:
+def _spread(vibration: Vibration) -> ModeSpread | None:
     """Return the spreads of the modes, which are stated all or not at all."""
     names = ("frequency_percent", "damping_percent", "stiffness_percent")
-    stated = [0.01 * value for name in names if (value := getattr(table, name)) is not None]
+    stated = [0.01 * value for name in names if (value := getattr(vibration, name)) is not None]
     if stated and len(stated) < len(names):
         raise InputError(f"dynamics: state all of {', '.join(names)}, or none")
     return ModeSpread(*stated) if stated else None
 
 
-def read_modes(path: Path) -> tuple[ModeTable, ...]:
-    """Read the modes of a file.
-
-    Raises
-    ------
-    InputError
-        It cannot be read or is no table of modes.
-    """
-    raw = parsed(path.name, read_regular(path, path.name, LARGEST_FILE))
-    for mode in raw.get("mode", ()) if isinstance(raw.get("mode"), list) else ():
-        if isinstance(mode, dict):
-            for key in ("residual_percent", "coherence"):
-                mode.pop(key, None)
-    try:
-        return ModesFileTable.model_validate(raw).mode
-    except ValidationError as err:
-        texts = table_errors(err, ModesFileTable)
-        raise InputError(f"{path.name}: {next(iter(texts))}") from None
-
-
-def _modes(some: Iterable[tuple[int, ModeTable, float]]) -> Modes:
+def _modes(some: Iterable[tuple[int, Mode, float]]) -> Modes:
     """Return modes with directions in x, y and z if one moves along z, else in x and y."""
     rows = list(some)
     stated = [DIRECTIONS[m.direction] if isinstance(m.direction, str) else m.direction for _, m, _ in rows]

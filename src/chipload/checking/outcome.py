@@ -11,10 +11,10 @@ import trimesh
 from numpy.typing import NDArray
 
 from chipload.checking.default_checks import DefaultChecks
+from chipload.checking.settings import Limits
 from chipload.checking.stability import StabilityResult
 from chipload.checking.workpiece_compliance import WorkpieceCompliance
 from chipload.cutter.cutter import Cutter
-from chipload.jobs.simulation.tables import ProgramLimitsTable
 from chipload.machine.machine import Machine
 from chipload.program.read import ProgramReading
 from chipload.result import Provenance
@@ -52,7 +52,7 @@ class SimulationResult:
     removal : removal and loads of every step
     stock : after the program
     machine : whose spindle supplies torque and power
-    limit_table : limits of the job
+    stated_limits : limits of loads and part
     settings : the keys of the operation
     checks : made in addition to the stated limits, with the cutters and the material
     collisions : of cutter, shank and holder
@@ -66,7 +66,7 @@ class SimulationResult:
     removal: Removal
     stock: LayeredStock
     machine: Machine
-    limit_table: ProgramLimitsTable
+    stated_limits: Limits
     settings: Mapping[str, Any]
     checks: DefaultChecks
     collisions: CollisionCheck = field(default_factory=CollisionCheck)
@@ -79,7 +79,7 @@ class SimulationResult:
     @property
     def limits(self) -> Mapping[str, float]:
         """Limits that are stated, by name."""
-        return self.limit_table.stated
+        return self.stated_limits.stated
 
     @property
     def errors(self) -> Mapping[str, float]:

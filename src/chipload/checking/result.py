@@ -12,16 +12,18 @@ from chipload.checking.default_checks import ramp_findings, range_findings, unch
 from chipload.checking.limits import program_limits
 from chipload.checking.numbers import operation_numbers, program_numbers
 from chipload.checking.outcome import ChangedText, ProgramResult, SimulationResult
-from chipload.checking.rows import step_rows
+from chipload.checking.rows import motion_rows, step_rows
 from chipload.checking.stability import StabilityResult
 from chipload.checking.workpiece import stock_box
 from chipload.errors import Finding, Severity
-from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict
+from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, in_memory
 from chipload.result.limits import Columns
 from chipload.simulation.placement import nothing_cut, stock_placement
 
 #: names of the tracks of a program as it was, and with another text
 ORIGINAL, OPTIMISED = "original", "optimised"
+#: name of the track of a program that stays as it is
+PROGRAM = "program"
 #: CL data of every program
 APT = "0-program.apt"
 
@@ -50,6 +52,27 @@ def program_result(
         maps=maps_of(simulation),
         note=note,
     )
+
+
+def checked_result(program: ProgramResult) -> Result:
+    """Return the result of a program that stays as it is."""
+    return program_result("program", program, (_unchanged_track(program),), {})
+
+
+def _unchanged_track(program: ProgramResult) -> Track:
+    """Return the track of the unchanged program."""
+    time_s, simulation = float(program.seconds.sum()), program.simulated
+    if simulation is None:
+        unproven = Finding("not-simulated", 0, "the program was not simulated in its stock", Severity.UNPROVEN)
+        findings = (*(exceeding(f) for f in program.reading.violations), unproven)
+        blocks = in_memory(motion_rows(program))
+        return Track(PROGRAM, TrackKind.PROGRAM, True, time_s, (), findings, (APT,), blocks=blocks)
+    limits = program_limits(simulation, simulation.removal.columns, PROGRAM)
+    found = (*misplaced(simulation, limits), *findings_of(program, simulation))
+    return Track(
+        PROGRAM, TrackKind.PROGRAM, True, time_s, limits, found, (APT,),
+        energy_balance=simulation.removal.energy_balance, blocks=lambda: step_rows(simulation),
+    )  # fmt: skip
 
 
 def changed_tracks(
@@ -99,7 +122,7 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
         return (read, *program.reading.unchecked)
     # where modes are stated a margin of 1 is checked
     always = () if simulation.stability is None else ("stability_margin",)
-    missing = [name for name in simulation.limit_table.unstated if name not in always]
+    missing = [name for name in simulation.stated_limits.unstated if name not in always]
     out = [*unchecked_checks(simulation.checks), *(f"limit {name}: not stated" for name in missing)]
     out += program.reading.unchecked
     if simulation.left is None:

@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.checking.dynamics import dynamics_of
+from chipload.checking.inputs import CheckInputs
 from chipload.checking.stability_watch import PROBABILITY, StabilityWatch, relative_covariance
 from chipload.checking.workpiece_compliance import WorkpieceCompliance
-from chipload.cutting.material import Material
-from chipload.jobs.simulation.job import ProgramJob
 from chipload.machine.machine import Machine
 from chipload.result import LimitCheck, check_limit
 from chipload.result.limits import Columns
@@ -314,18 +313,16 @@ def rounded_rpm(speed: float) -> float:
     return ROUND_RPM * round(rpm_from_rad_s(speed) / ROUND_RPM)
 
 
-def watch_of(job: ProgramJob, material: Material, workpiece: WorkpieceCompliance | None) -> StabilityWatch | None:
-    """Return the watch that computes the margins of a job; None if no modes are stated."""
-    if job.table.dynamics is None:
+def watch_of(inputs: CheckInputs, workpiece: WorkpieceCompliance | None) -> StabilityWatch | None:
+    """Return the watch that computes the margins of a program; None if no modes are stated."""
+    if inputs.elasticity.vibration is None:
         return None
-    dynamics = dynamics_of(job.table.dynamics, job.path.parent, job.cutters, job.table.workpiece)
-    return StabilityWatch(dynamics, material, None if workpiece is None else workpiece.modes)
+    dynamics = dynamics_of(inputs.elasticity.vibration, inputs.cutters, inputs.elasticity.workpiece)
+    return StabilityWatch(dynamics, inputs.material, None if workpiece is None else workpiece.modes)
 
 
-def stability_of(job: ProgramJob, watch: StabilityWatch, machine: Machine) -> StabilityResult:
+def stability_of(inputs: CheckInputs, watch: StabilityWatch) -> StabilityResult:
     """Return the stability result of a watch that has seen every step."""
-    wanted = max(job.limits.get("stability_margin", DEFAULT_MARGIN), DEFAULT_MARGIN)
-    radii = {n: c.radius for n, c in job.cutters.items()}
-    speed_table = job.table.operation[0].speeds
-    speeds = (None, None) if speed_table is None else (speed_table.least_rpm, speed_table.most_rpm)
-    return StabilityResult(watch, machine, wanted, radii, speeds)
+    wanted = max(inputs.limits.stability_margin or DEFAULT_MARGIN, DEFAULT_MARGIN)
+    radii = {n: c.radius for n, c in inputs.cutters.items()}
+    return StabilityResult(watch, inputs.machine, wanted, radii, inputs.speeds_rpm)

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.jobs.simulation.tables import StiffnessTable
+from chipload.ranges import number_field, require_ranges
 from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.deflection import tip_deflections
 from chipload.simulation.loads import Cuts, Floats
@@ -29,6 +29,32 @@ from chipload.structure.spindle import RIGID, Bar, cutter_bars, springs, tool_ba
 PER = 1000.0
 #: moduli of holders that are believed [GPa]
 MODULI = (50.0, 1000.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MachineStiffness:
+    """Stiffness of holder, spindle and workpiece; inf is rigid.
+
+    What is not stated counts as rigid, and deflections are then unproven.
+
+    Parameters
+    ----------
+    holder_gpa : Young's modulus of the holders
+    grip_n_um, grip_nm_rad : stiffness of the cutter in its holder, across the axis and against tilting
+    spindle_n_um, spindle_nm_rad : stiffness of the spindle nose, across the axis and against tilting
+    work_n_um : stiffness of the workpiece where it is cut, the same in every direction
+    """
+
+    holder_gpa: float | None = number_field(None, above=0.0, infinite=True)
+    grip_n_um: float | None = number_field(None, above=0.0, infinite=True)
+    grip_nm_rad: float | None = number_field(None, above=0.0, infinite=True)
+    spindle_n_um: float | None = number_field(None, above=0.0, infinite=True)
+    spindle_nm_rad: float | None = number_field(None, above=0.0, infinite=True)
+    work_n_um: float | None = number_field(None, above=0.0, infinite=True)
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        require_ranges(self, "stiffness.")
 
 
 @dataclass(frozen=True)
@@ -51,7 +77,7 @@ class Stiffness:
 
 
 def stiffness_of(
-    table: StiffnessTable | None, cutters: Mapping[int, Cutter], workpiece: StepCompliances | None = None
+    stated: MachineStiffness | None, cutters: Mapping[int, Cutter], workpiece: StepCompliances | None = None
 ) -> Stiffness:
     """Return bars and joints of every cutter, and the compliance of the work.
 
@@ -63,17 +89,17 @@ def stiffness_of(
     Examples
     --------
     >>> mill = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
-    >>> stiffness_of(StiffnessTable.model_validate({"spindle_n_um": 50.0}), {1: mill}).unknown[:2]
+    >>> stiffness_of(MachineStiffness(spindle_n_um=50.0), {1: mill}).unknown[:2]
     ('stiffness.grip_n_um', 'stiffness.grip_nm_rad')
     """
-    stated = table or StiffnessTable.model_validate({})
+    stated = stated or MachineStiffness()
     modulus = stated.holder_gpa
     if modulus is not None and math.isfinite(modulus) and not MODULI[0] <= modulus <= MODULI[1]:
         raise InputError(
             f"stiffness.holder_gpa = {modulus:g}: must be from {MODULI[0]:g} to {MODULI[1]:g}, or inf for rigid holders"
         )
     chains = {n: c for n, c in cutters.items() if c.tip_stiffness is None}
-    keys = [k for k in StiffnessTable.model_fields if k != "holder_gpa"] if chains else ["work_n_um"]
+    keys = [k for k in asdict(stated) if k != "holder_gpa"] if chains else ["work_n_um"]
     missing = [f"stiffness.{k}" for k in keys if getattr(stated, k) is None]
     if workpiece is not None:
         missing = [name for name in missing if name != "stiffness.work_n_um"]

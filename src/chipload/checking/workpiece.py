@@ -1,9 +1,11 @@
-"""The bodies of a simulation: stock in layers, finished part, fixtures."""
+"""The bodies of a simulation: initial stock and its layers, finished part, fixtures."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import shapely
@@ -13,12 +15,11 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.geometry.mesh import read_mesh
-from chipload.jobs.simulation.job import ProgramJob
-from chipload.jobs.tables import stated
 from chipload.machine.machine import Machine
 from chipload.machine.table import MachineTable
 from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program
+from chipload.ranges import number_field, require_ranges
 from chipload.report.bodies import MACHINE_TABLE
 from chipload.simulation.surface import MOST_POINTS, fine
 from chipload.stock.layers import LayeredStock
@@ -30,42 +31,204 @@ LEVEL, SLOPED, THINNEST, MOST = 0.05, 0.0125, 0.0005, 400
 #: layers where no cutter comes are so many times as thick
 COARSE = 4.0
 
-
-def part_body(job: ProgramJob) -> trimesh.Trimesh | None:
-    """Return the finished part."""
-    table = job.table.part
-    if table is None or "part" in job.meshes:
-        return job.meshes.get("part")
-    return read_mesh(job.path.parent / table.file, unit=table.units, chord_mm=table.chord_mm, key="part.file")
+Corner = tuple[float, float, float]
 
 
-def machine_table_of(job: ProgramJob, machine: Machine) -> MachineTable | None:
-    """Return the table of the machine from the job, else from the machine file; None if neither states it."""
-    block = job.table.machine_table
-    return machine.table if block is None else MachineTable(block.low_mm, block.high_mm, block.spacing_mm)
+@dataclass(frozen=True, eq=False)
+class Stock:
+    """The initial stock of a program: a block, a closed mesh, or what an earlier result left.
+
+    Parameters
+    ----------
+    body : two corners of a block [mm], a mesh [mm], or layers, which do not change
+    layer_mm : thickness of the layers of a block or a mesh; None: from depths of cut and cutters
+    file : from which it was read
+
+    Examples
+    --------
+    >>> Stock.block((0, 0, -12), (60, 40, 0)).body
+    ((0.0, 0.0, -12.0), (60.0, 40.0, 0.0))
+    """
+
+    body: tuple[Corner, Corner] | trimesh.Trimesh | LayeredStock
+    layer_mm: float | None = number_field(None, above=0.0)
+    file: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a thickness out of range, and one for layers that there are."""
+        require_ranges(self, "stock.")
+        if self.layer_mm is not None and isinstance(self.body, LayeredStock):
+            raise InputError("stock.layer_mm: leave it out: the layers of an earlier result stay")
+
+    @classmethod
+    def block(cls, low_mm: Sequence[float], high_mm: Sequence[float], layer_mm: float | None = None) -> Stock:
+        """Return a block between two corners (3,) [mm].
+
+        Raises
+        ------
+        InputError
+            A corner is not three finite numbers, or ``low_mm`` is not below ``high_mm``.
+        """
+        low, high = (tuple(float(x) for x in corner) for corner in (low_mm, high_mm))
+        for key, corner in (("low_mm", low), ("high_mm", high)):
+            if len(corner) != 3 or not np.isfinite(corner).all():
+                raise InputError(f"stock.{key} = {corner}: must be three numbers, x, y and z in mm")
+        return cls(((low[0], low[1], low[2]), (high[0], high[1], high[2])), layer_mm)
+
+    @classmethod
+    def read(
+        cls, path: str | Path, *, units: str | None = None, chord_mm: float = 0.01, layer_mm: float | None = None
+    ) -> Stock:
+        """Read a mesh (STL), a model (STEP), or ``stock.npz`` of an earlier result.
+
+        Parameters
+        ----------
+        units : unit of an STL file, which does not state its unit
+        chord_mm : greatest deviation of facets from the faces of a model
+
+        Raises
+        ------
+        InputError
+            The file cannot be read.
+        """
+        path = Path(path)
+        if path.suffix.lower() == ".npz":
+            return cls(LayeredStock.load(path), layer_mm, path)
+        return cls(read_mesh(path, unit=units, chord_mm=chord_mm), layer_mm, path)
+
+    def layered(self, program: Program, cutters: Mapping[int, Cutter]) -> LayeredStock:
+        """Return the stock in layers before a program, to be cut.
+
+        Layers have the stated thickness where cutters move and are several times as thick elsewhere. They end at the
+        heights at which an upright cutter cuts level.
+        """
+        if isinstance(self.body, LayeredStock):
+            return self.body.copied()
+        # a tapered cutter is wider above its tip
+        tile = TILE * max(c.diameter + 2.0 * c.flute_length * math.tan(c.taper) for c in cutters.values())
+        if isinstance(self.body, tuple):
+            low, high = self.body
+            layer = self.layer_mm or layer_thickness(program, cutters, high[2])
+            stock = LayeredStock.block(low, high, COARSE * layer, tile)
+        else:
+            layer = self.layer_mm or layer_thickness(program, cutters, float(self.body.bounds[1, 2]))
+            stock = LayeredStock.of_mesh(self.body, COARSE * layer, tile)
+        top = float(stock.bounds[-1])
+        stock.refine(min(_lowest(program, cutters), top), top, layer)
+        stock.refine_at(_levels(program, cutters, layer))
+        return stock
 
 
-def fixture_points(job: ProgramJob, machine: Machine) -> dict[str, NDArray[np.float64]]:
-    """Return points of the fixtures by name."""
-    keys = [(table.spacing_mm, f"fixture.{k}") for k, table in enumerate(job.table.fixture)]
-    if (block := machine_table_of(job, machine)) is not None:
-        keys.append((block.spacing, "machine_table" if job.table.machine_table is not None else "machine.table"))
-    meshes = fixture_meshes(job, machine).items()
-    return {name: fine(mesh, spacing, key)[0] for (name, mesh), (spacing, key) in zip(meshes, keys, strict=True)}
+@dataclass(frozen=True, eq=False)
+class FinishedPart:
+    """The part that the program should produce. Material missing from it is a gouge, material left on it is excess.
+
+    Parameters
+    ----------
+    mesh : closed body [mm]
+    spacing_mm : longest side of the triangles whose corners are compared
+    excess_range_mm : greatest excess that is measured
+    file : from which it was read
+    """
+
+    mesh: trimesh.Trimesh
+    spacing_mm: float = number_field(above=0.0)
+    excess_range_mm: float = number_field(1.0, above=0.0)
+    file: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        require_ranges(self, "part.")
+
+    @classmethod
+    def read(
+        cls,
+        path: str | Path,
+        spacing_mm: float,
+        excess_range_mm: float = 1.0,
+        *,
+        units: str | None = None,
+        chord_mm: float = 0.01,
+    ) -> FinishedPart:
+        """Read a closed body, STL or STEP; other parameters as of :meth:`Stock.read`.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read.
+        """
+        mesh = read_mesh(path, unit=units, chord_mm=chord_mm, key="part.file")
+        return cls(mesh, spacing_mm, excess_range_mm, Path(path))
 
 
-def fixture_meshes(job: ProgramJob, machine: Machine) -> dict[str, trimesh.Trimesh]:
-    """Return the meshes of the fixtures by name, followed by that of the machine table."""
-    out = {}
-    for k, table in enumerate(job.table.fixture):
-        path, key = job.path.parent / table.file, f"fixture.{k}.file"
-        mesh = job.meshes.get(f"fixture {k}")
-        if mesh is None:
-            mesh = read_mesh(path, unit=table.units, chord_mm=table.chord_mm, key=key)
-        out[f"fixture {k}"] = mesh
-    if (block := machine_table_of(job, machine)) is not None:
-        out[MACHINE_TABLE] = trimesh.creation.box(bounds=[block.low, block.high])
-    return out
+@dataclass(frozen=True, eq=False)
+class Fixture:
+    """A fixture, which no part of a tool may touch.
+
+    Parameters
+    ----------
+    mesh : closed body [mm]
+    spacing_mm : longest side of the triangles whose corners are compared
+    file : from which it was read
+    """
+
+    mesh: trimesh.Trimesh
+    spacing_mm: float = number_field(above=0.0)
+    file: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        require_ranges(self, "fixture.")
+
+    @classmethod
+    def read(
+        cls,
+        path: str | Path,
+        spacing_mm: float,
+        *,
+        units: str | None = None,
+        chord_mm: float = 0.1,
+        key: str = "fixture.file",
+    ) -> Fixture:
+        """Read a closed body, STL or STEP; ``key`` names it in messages, other parameters as of :meth:`Stock.read`.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read.
+        """
+        return cls(read_mesh(path, unit=units, chord_mm=chord_mm, key=key), spacing_mm, Path(path))
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What the tool is compared with besides the stock.
+
+    Parameters
+    ----------
+    part : None: not stated
+    fixtures : in their order
+    machine_table : in place of that of the machine; None: that of the machine
+    """
+
+    part: FinishedPart | None = None
+    fixtures: tuple[Fixture, ...] = ()
+    machine_table: MachineTable | None = None
+
+    def fixture_meshes(self, machine: Machine) -> dict[str, trimesh.Trimesh]:
+        """Return the meshes of the fixtures by name, followed by that of the machine table."""
+        out = {f"fixture {k}": fixture.mesh for k, fixture in enumerate(self.fixtures)}
+        if (block := self.machine_table or machine.table) is not None:
+            out[MACHINE_TABLE] = trimesh.creation.box(bounds=[block.low, block.high])
+        return out
+
+    def fixture_points(self, machine: Machine) -> dict[str, NDArray[np.float64]]:
+        """Return points of the fixtures and of the machine table by name."""
+        keys = [(fixture.spacing_mm, f"fixture.{k}") for k, fixture in enumerate(self.fixtures)]
+        if (block := self.machine_table or machine.table) is not None:
+            keys.append((block.spacing, "machine.table" if self.machine_table is None else "machine_table"))
+        meshes = self.fixture_meshes(machine).items()
+        return {name: fine(mesh, spacing, key)[0] for (name, mesh), (spacing, key) in zip(meshes, keys, strict=True)}
 
 
 def stock_box(stock: LayeredStock) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -101,33 +264,6 @@ def insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.b
         return out
 
     return contains
-
-
-def stock_body(job: ProgramJob, program: Program) -> LayeredStock:
-    """Return the stock of the job in layers.
-
-    Layers have the stated thickness where cutters move and are several times as thick elsewhere. They end at the
-    heights at which an upright cutter cuts level.
-    """
-    table, folder = stated(job.table.stock, "stock"), job.path.parent
-    mesh = job.meshes.get("stock")
-    if mesh is None and table.file is not None and table.file.lower().endswith(".npz"):
-        return LayeredStock.load(folder / table.file)
-    # a tapered cutter is wider above its tip
-    tile = TILE * max(c.diameter + 2.0 * c.flute_length * math.tan(c.taper) for c in job.cutters.values())
-    if mesh is None and table.file is None:
-        low, high = stated(table.low_mm, "stock.low_mm"), stated(table.high_mm, "stock.high_mm")
-        layer = table.layer_mm or layer_thickness(program, job.cutters, high[2])
-        stock = LayeredStock.block(low, high, COARSE * layer, tile)
-    else:
-        if mesh is None:
-            mesh = read_mesh(folder / str(table.file), unit=table.units, chord_mm=table.chord_mm)
-        layer = table.layer_mm or layer_thickness(program, job.cutters, float(mesh.bounds[1, 2]))
-        stock = LayeredStock.of_mesh(mesh, COARSE * layer, tile)
-    top = float(stock.bounds[-1])
-    stock.refine(min(_lowest(program, job.cutters), top), top, layer)
-    stock.refine_at(_levels(program, job.cutters, layer))
-    return stock
 
 
 def layer_thickness(program: Program, cutters: Mapping[int, Cutter], top: float) -> float:

@@ -19,16 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.checking.bent_workpiece import JACK, BentWorkpiece, bent_workpiece
-from chipload.checking.clamped import clamped_volumes, clamps_of, elastic_of
+from chipload.checking.clamped import Workpiece, clamped_volumes, elastic_of, placed_clamps
 from chipload.checking.contact_lines import CutAhead, cut_ahead
+from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import Finding, Severity
-from chipload.jobs.simulation.job import ProgramJob
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.simulation.deflection_jumps import jump_findings
 from chipload.simulation.moves import Engine
 from chipload.simulation.removal import Columns, Resolution
+from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.followed import FollowedModes, ModesOfStates
 from chipload.structure.cells.grid import CellGrid
@@ -147,37 +148,36 @@ class WorkpieceCompliance:
 
 
 def workpiece_compliance(
-    job: ProgramJob,
+    workpiece: Workpiece,
     program: Program,
     stock: LayeredStock,
+    cutters: Mapping[int, Cutter],
     material: Material,
     resolution: Resolution,
     engine: Engine,
+    interpolation: Interpolation = "slerp",
     progress: Progress = silent,
-) -> WorkpieceCompliance | None:
-    """Return the compliance of the workpiece where its program cuts; None if the job has no [workpiece].
+) -> WorkpieceCompliance:
+    """Return the compliance of the workpiece where its program cuts.
 
     Parameters
     ----------
     stock : before the program; it does not change
     engine : of the simulation that will use the compliance
+    interpolation : how the tool axis turns within a step
 
     Raises
     ------
     InputError
         A clamp holds nothing, a rigid motion is free, or the cells do not resolve the thinnest wall.
     """
-    table = job.table.workpiece
-    if table is None:
-        return None
-    op = job.table.operation[0]
-    elastic, clamps = elastic_of(table), clamps_of(table, stock)
-    clamped_parts = clamped_volumes(table, stock)
+    elastic, clamps = elastic_of(workpiece), placed_clamps(workpiece, stock)
+    clamped_parts = clamped_volumes(workpiece, stock)
     ahead = cut_ahead(
-        program, stock.copied(), job.cutters, material, resolution, op.interpolation, engine,
+        program, stock.copied(), cutters, material, resolution, interpolation, engine,
         lambda done, what: progress(0.4 * done, what),
     )  # fmt: skip
-    grid, wall = cells_over(stock, ahead.stocks[-1][2], table.cell_mm, table.order)
+    grid, wall = cells_over(stock, ahead.stocks[-1][2], workpiece.cell_mm, workpiece.order)
     most = [0]
 
     def build(then: LayeredStock, cells: CellGrid) -> CellWorkpiece:
@@ -186,11 +186,11 @@ def workpiece_compliance(
         return made
 
     states = [RemovalState(k, v, lambda then=then: build(then, grid)) for k, v, then in ahead.stocks]  # type: ignore[misc]
-    share = table.state_change_percent / 100.0
+    share = workpiece.state_change_percent / 100.0
     spacing = SPACING * grid.widest
-    watch = None if table.density_kg_m3 is None else ModesOfStates(ahead.lines, table.modes, spacing)
+    watch = None if workpiece.density_kg_m3 is None else ModesOfStates(ahead.lines, workpiece.modes, spacing)
     found = step_compliances(
-        ahead.lines, states, tolerance=share, most=max(table.states, 2), spacing=spacing, built=watch,
+        ahead.lines, states, tolerance=share, most=max(workpiece.states, 2), spacing=spacing, built=watch,
         progress=lambda done, what: progress(0.4 + 0.5 * done, what),
     )  # fmt: skip
     deflection = size_of(found.compliance) * ahead.lines.force
@@ -201,13 +201,13 @@ def workpiece_compliance(
     modes = None
     if watch is not None:
         modes = watch.followed(
-            states, tolerance=FREQUENCY * share, most=max(table.states, 2), error=0.5 * (error + FLOOR),
+            states, tolerance=FREQUENCY * share, most=max(workpiece.states, 2), error=0.5 * (error + FLOOR),
             progress=lambda done, what: progress(0.9 + 0.05 * done, what),
         )  # fmt: skip
-    bent = _bent(found, ahead, grid, build, job) if len(found.worst) else None
+    bent = _bent(found, ahead, grid, build, cutters) if len(found.worst) else None
     strained = None
-    if table.yield_mpa is not None and len(found.step):
-        strained = _strained(found, ahead, grid, build, elastic, table.yield_mpa)
+    if workpiece.yield_mpa is not None and len(found.step):
+        strained = _strained(found, ahead, grid, build, elastic, workpiece.yield_mpa)
     findings: tuple[Finding, ...] = ()
     if found.loose > 1e-6 * stock.volume():
         text = f"{found.loose:.3g} mm3 of the workpiece are connected to nothing and carry no force"
@@ -264,12 +264,12 @@ def _bent(
     ahead: CutAhead,
     grid: CellGrid,
     build: Callable[[LayeredStock, CellGrid], CellWorkpiece],
-    job: ProgramJob,
+    cutters: Mapping[int, Cutter],
 ) -> BentWorkpiece:
     """Return the deformed workpiece in the state after its worst step, under the force of that step."""
     row, stock = int(found.worst[0]), ahead.stocks[int(found.after[0])][2]
     force = _force(ahead, row)
-    away = max(cutter.diameter for cutter in job.cutters.values())
+    away = max(cutter.diameter for cutter in cutters.values())
     return bent_workpiece(build(stock, grid), stock, int(found.step[row]), found.lines[row], force, away)
 
 

@@ -6,11 +6,14 @@ The name of a key contains its unit. A missing feed, tool, side or limit is an e
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator
 
+from chipload.checking.settings import CheckSettings
 from chipload.errors import InputError
+from chipload.ranges import bounds_of
 
 Value = TypeVar("Value")
 
@@ -56,7 +59,8 @@ NotNegative = Annotated[Number, Field(ge=0.0)]
 Point = Annotated[tuple[Number, Number, Number], Field()]
 
 
-Count = Annotated[int, BeforeValidator(_only_count), Field(ge=1, le=1000)]
+Whole = Annotated[int, BeforeValidator(_only_count)]
+Count = Annotated[Whole, Field(ge=1, le=1000)]
 LineNumber = Annotated[int, BeforeValidator(_only_count), Field(ge=1, le=10_000_000)]
 
 
@@ -103,6 +107,28 @@ class Table(BaseModel):
         return value
 
 
+def setting(kind: type, name: str, description: str) -> Any:
+    """The field of a table that has default and range of a field of a settings class.
+
+    Parameters
+    ----------
+    kind, name : the class of :mod:`chipload.checking`, and its field
+    """
+    return Field(description=description, **bounds_of(kind, name))
+
+
+def value_of(kind: type[Value], table: BaseModel, **other: Any) -> Value:
+    """A table as a value: each field of ``kind`` has the value of the key of its name.
+
+    Parameters
+    ----------
+    other : fields in place of those of the table, or that it has not
+    """
+    names = [f.name for f in fields(kind)]  # type: ignore[arg-type]
+    own = {name: getattr(table, name) for name in names if name in type(table).model_fields}
+    return kind(**{**own, **other})
+
+
 def stated(value: Value | None, key: str) -> Value:
     """The value of a key that another key makes necessary.
 
@@ -128,7 +154,7 @@ class SourceTable(Table):
     file: Text | None = None
 
 
-class Limits(Table):
+class LimitsTable(Table):
     """Limits by name. The report lists a limit that the job does not state as not checked."""
 
     @property
@@ -142,26 +168,30 @@ class Limits(Table):
         return tuple(k for k, v in self.model_dump().items() if v is None)
 
 
+def _switch(name: str, description: str) -> Any:
+    return Field(description=description, strict=True, **bounds_of(CheckSettings, name))
+
+
 class ChecksTable(Table):
     """Default checks. `false` switches a check off; the report lists the checks that are off."""
 
-    cutter_strength: bool = Field(True, strict=True, description="check the stress of the cutter against its strength")
-    flute_length: bool = Field(True, strict=True, description="check that the cutter does not cut above its flutes")
-    chip_space: bool = Field(True, strict=True, description="check the chip space, if gullet_mm2 is stated")
-    chip_range: bool = Field(
-        True,
-        strict=True,
-        description="check that chip thickness and cutting speed are within the range of the coefficients",
+    cutter_strength: bool = _switch("cutter_strength", "check the stress of the cutter against its strength")
+    flute_length: bool = _switch("flute_length", "check that the cutter does not cut above its flutes")
+    chip_space: bool = _switch("chip_space", "check the chip space, if gullet_mm2 is stated")
+    chip_range: bool = _switch(
+        "chip_range", "check that chip thickness and cutting speed are within the range of the coefficients"
     )
-    spindle: bool = Field(True, strict=True, description="check torque and power of the machine's spindle")
-    rigid_model: bool = Field(
-        True, strict=True, description="check that the deflection is within the range of the rigid force model"
+    spindle: bool = _switch("spindle", "check torque and power of the machine's spindle")
+    rigid_model: bool = _switch("rigid_model", "check that the deflection is within the range of the rigid force model")
+    deflection_of_feed: Number = setting(
+        CheckSettings,
+        "deflection_of_feed",
+        "range of the rigid model: greatest ratio of the deflection to the feed per tooth",
     )
-    deflection_of_feed: Positive = Field(
-        2.0, description="range of the rigid model: greatest ratio of the deflection to the feed per tooth"
-    )
-    deflection_of_depth: Positive = Field(
-        0.25, description="range of the rigid model: greatest ratio of the deflection to the radial depth"
+    deflection_of_depth: Number = setting(
+        CheckSettings,
+        "deflection_of_depth",
+        "range of the rigid model: greatest ratio of the deflection to the radial depth",
     )
 
     @property
@@ -173,6 +203,4 @@ class ChecksTable(Table):
 class ProgramChecksTable(ChecksTable):
     """Default checks. `false` switches a check off; the report lists the checks that are off."""
 
-    plunge: bool = Field(
-        True, strict=True, description="check that the cutters can plunge and ramp into material as the program does"
-    )
+    plunge: bool = _switch("plunge", "check that the cutters can plunge and ramp into material as the program does")

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from chipload.checking.dynamics import read_modes
 from chipload.cutting.material import Material, material_named, material_text, read_material
 from chipload.errors import InputError
 from chipload.files import hash_of, write_whole
 from chipload.jobs import LoadedJob, load_job
 from chipload.jobs.simulation.dynamics_tables import DynamicsTable, ModeTable
+from chipload.jobs.simulation.modes_file import read_modes
 from chipload.stability.probability import LEAST, MOST_DAMPED
 from chipload.sweep.cases import Case, Samples
 

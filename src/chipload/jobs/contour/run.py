@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from chipload.checking.default_checks import default_checks
+from chipload.checking.settings import CheckSettings
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, need_directions, read_material
 from chipload.errors import Finding, InputError, Severity
@@ -32,6 +33,7 @@ from chipload.jobs.contour.job import ContourJob, left_on_walls
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.jobs.contour.part import read_part, require_within_travel
 from chipload.jobs.contour.tables import OperationTable
+from chipload.jobs.tables import value_of
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.contour.plan import Finishing, check_contour, plan_contour
 from chipload.planning.pocket.plan import check_pocket, plan_pocket
@@ -255,7 +257,7 @@ def _operation(
             replace(f, severity=Severity.EXCEEDS) for f in check_program(strategy.program, inputs.machine)
         )
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
-    checks = default_checks(job.table.checks, {cutter.number: cutter}, inputs.material, 0.5)
+    checks = default_checks(value_of(CheckSettings, job.table.checks), {cutter.number: cutter}, inputs.material, 0.5)
     return Operation(
         result, settings, cutter, inputs.top, op.depth_mm or op.axial_depth_mm, verifications,
         machine_findings, job.limits, checks,
@@ -298,7 +300,9 @@ def _resolved(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[Oper
     cutter = job.cutters[op.cutter]
     found: tuple[str, ...] = ()
     if op.engagement_deg == "limit":
-        checks = default_checks(job.table.checks, {cutter.number: cutter}, inputs.material, 0.5)
+        checks = default_checks(
+            value_of(CheckSettings, job.table.checks), {cutter.number: cutter}, inputs.material, 0.5
+        )
         advice = greatest_engagement(op, cutter, inputs.material, inputs.machine, job.limits, checks, _rigid(job))
         angle, found = advice.engagement, (advice.text,)
     else:

@@ -10,7 +10,7 @@ from pydantic import Field
 from chipload.cutter.table import CutterTable
 from chipload.jobs.tables import (
     Count,
-    Limits,
+    LimitsTable,
     LineNumber,
     NotNegative,
     Number,
@@ -182,7 +182,7 @@ class OperationTable(Table):
     )
 
 
-class ContourLimitsTable(Limits):
+class ContourLimitsTable(LimitsTable):
     """Limits of a planned program."""
 
     engagement_deg: Positive | None = Field(None, le=180.0, description="greatest engagement angle")

@@ -6,20 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from chipload.checking import run as simulation
 from chipload.checking.default_checks import PROGRAM_COLUMNS, default_checks, with_checks
+from chipload.checking.inputs import CheckInputs
 from chipload.checking.limits import spindle_limits
-from chipload.checking.preparation import material_of, resolution_of, timed
+from chipload.checking.preparation import resolution_of, timed
 from chipload.checking.program_text import read_as
+from chipload.checking.run import compliance_of_workpiece, simulate_program
 from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
-from chipload.checking.workpiece import stock_body
 from chipload.checking.workpiece_compliance import WorkpieceCompliance, with_compliance_error
-from chipload.cutting.material import Material
 from chipload.jobs.feeds.allowed import FeedRequest, watching, with_new_feeds
 from chipload.jobs.feeds.job import FeedsJob
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
+from chipload.jobs.simulation import run as simulation
 from chipload.jobs.simulation.tables import LOADS
-from chipload.machine.machine import Machine
 from chipload.program.program import RAPID
 from chipload.program.read import ProgramReading, line_times
 from chipload.progress import Progress, part_of, silent
@@ -53,42 +52,37 @@ def run(
     simulation.require_layers(job, workers)
     machine, share = simulation.machine_of(job), 0.1
     reading = simulation.read_for(job, machine, part_of(progress, 0.0, share))
-    stock, material = stock_body(job, reading.program), material_of(job)
-    own = simulation.text_to_change(job, reading, stock, machine, material, "feeds")
-    compliance = simulation.compliance_of_workpiece(
-        job, reading, stock, machine, material, part_of(progress, share, 0.55)
-    )
+    inputs = simulation.inputs_of(job, machine)
+    stock = inputs.stock.layered(reading.program, inputs.cutters)
+    own = simulation.text_to_change(job, inputs, reading, stock, "feeds")
+    compliance = compliance_of_workpiece(inputs, reading, stock, part_of(progress, share, 0.55))
     share = 0.55 if compliance is not None else share
     begin = 0.5 * (1.0 + share)
-    feeds, reading = _new_feeds(
-        job, own, reading, stock, material, machine, compliance, part_of(progress, share, begin), workers
-    )
-    stock = stock_body(job, reading.program)
-    last = part_of(progress, begin, 1.0)
-    done = simulation.program_of(
-        job,
-        machine,
-        reading,
-        simulation.simulated(job, reading, stock, machine, material, checkpoint, compliance, last, workers),
-    )
-    return FeedsProgram(**vars(done), feeds=feeds)
+    feeds, reading = _new_feeds(job, inputs, own, reading, stock, compliance, part_of(progress, share, begin), workers)
+    stock = inputs.stock.layered(reading.program, inputs.cutters)
+    done = simulate_program(
+        inputs, reading, stock, compliance=compliance, checkpoint=checkpoint, workers=workers,
+        progress=part_of(progress, begin, 1.0),
+    )  # fmt: skip
+    done = replace(done, settings=simulation.operation_of(job))
+    return FeedsProgram(**vars(simulation.program_of(job, machine, reading, done)), feeds=feeds)
 
 
 def check(job: FeedsJob) -> tuple[list[str], bool]:
     """Return a line for each file of a job and for the simulations; nothing is simulated. Errors as :func:`run`."""
     machine = simulation.machine_of(job)
-    reading = simulation.read_for(job, machine)
-    simulation.text_to_change(job, reading, stock_body(job, reading.program), machine, material_of(job), "feeds")
+    reading, inputs = simulation.read_for(job, machine), simulation.inputs_of(job, machine)
+    stock = inputs.stock.layered(reading.program, inputs.cutters)
+    simulation.text_to_change(job, inputs, reading, stock, "feeds")
     return simulation.check_lines(job, simulation.program_of(job, machine, reading), 2)
 
 
 def _new_feeds(
     job: FeedsJob,
+    inputs: CheckInputs,
     own: tuple[str, str],
     reading: ProgramReading,
     stock: LayeredStock,
-    material: Material,
-    machine: Machine,
     compliance: WorkpieceCompliance | None,
     progress: Progress,
     workers: Workers | None,
@@ -96,19 +90,19 @@ def _new_feeds(
     """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then. ``own``:
     the text as it is, and its dialect.
     """
-    op, seconds = job.operation, float(line_times(reading, machine)[1].sum())
-    fine = resolution_of(job, reading.program)
+    op, cutters, material, machine = inputs.settings, inputs.cutters, inputs.material, inputs.machine
+    seconds, fine = float(line_times(reading, machine)[1].sum()), resolution_of(op, cutters, reading.program)
     turning = np.unique(reading.program.spindle[reading.program.motion != RAPID])
-    limits = {name: limit for name, limit in job.limits.items() if name in LOADS}
-    if "spindle" not in job.table.checks.off:
+    limits = {name: limit for name, limit in inputs.limits.stated.items() if name in LOADS}
+    if "spindle" not in inputs.checks.off:
         limits |= spindle_limits(machine, turning)
-    gives = stiffness_of(job.table.stiffness, job.cutters, None if compliance is None else compliance.steps)
-    bends = with_checks(job.table.checks, material, deflecting(gives, material))
-    checks = default_checks(job.table.checks, job.cutters, material, op.confidence)
-    program, times = timed(reading, job, machine)
+    gives = stiffness_of(inputs.elasticity.stiffness, cutters, None if compliance is None else compliance.steps)
+    bends = with_checks(inputs.checks, material, deflecting(gives, material))
+    checks = default_checks(inputs.checks, cutters, material, op.confidence)
+    program, times = timed(reading, cutters, machine)
     # as it is: what its loads are, and how well they are known
     before = remove(
-        program, stock, job.cutters, material, fine, interpolation=op.interpolation, times=times, watch=bends,
+        program, stock, cutters, material, fine, interpolation=op.interpolation, times=times, watch=bends,
         engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.0, 0.5),
     )  # fmt: skip
     before = with_columns(before, (*watched(gives), *PROGRAM_COLUMNS))
@@ -118,15 +112,16 @@ def _new_feeds(
     before = replace(
         before, resolution_error=with_compliance_error(before.resolution_error, before.columns, compliance)
     )
-    request = FeedRequest(op.feeds, limits, fine.rotation, checks, errors, more)
+    request = FeedRequest(job.operation.feeds, limits, fine.rotation, checks, errors, more)
     steps = steps_of(program, op.step_mm, op.tolerance_mm)
     # again, for the greatest feed of each step
+    fresh = inputs.stock.layered(reading.program, cutters)
     allowed = remove(
-        program, stock_body(job, reading.program), job.cutters, material, fine, interpolation=op.interpolation,
-        times=times, watch=watching(steps, request, job.cutters, material, machine, before.columns), accuracy=False,
+        program, fresh, cutters, material, fine, interpolation=op.interpolation,
+        times=times, watch=watching(steps, request, cutters, material, machine, before.columns), accuracy=False,
         engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.5, 1.0),
     )  # fmt: skip
     return with_new_feeds(
-        *own, reading, steps, before, allowed.columns, request, job.cutters, machine,
+        *own, reading, steps, before, allowed.columns, request, cutters, machine,
         lambda new: simulation.read_for(job, machine, text=read_as(new)), seconds,
     )  # fmt: skip

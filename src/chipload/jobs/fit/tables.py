@@ -13,7 +13,7 @@ from typing import Literal
 from pydantic import Field
 
 from chipload.cutter.table import CutterTable
-from chipload.jobs.tables import Limits, Number, Positive, Table, Text
+from chipload.jobs.tables import LimitsTable, Number, Positive, Table, Text
 
 
 class EngagementTable(Table):
@@ -60,7 +60,7 @@ class AxialTable(Table):
     source: Text = Field(description="where the coefficients come from")
 
 
-class FitLimitsTable(Limits):
+class FitLimitsTable(LimitsTable):
     """Greatest errors of the predicted forces."""
 
     mean_percent: Positive | None = Field(None, description="greatest error of a predicted mean force")

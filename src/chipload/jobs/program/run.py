@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from chipload.checking.outcome import ProgramResult
-from chipload.checking.preparation import material_of
-from chipload.checking.run import (
-    check_lines,
-    compliance_of_workpiece,
-    machine_of,
-    program_of,
-    read_for,
-    require_layers,
-    simulated,
-)
-from chipload.checking.workpiece import stock_body
-from chipload.cutting.material import Material
+from chipload.checking.run import compliance_of_workpiece, simulate_program
 from chipload.jobs.program.outcome import SpeedsProgram
 from chipload.jobs.program.speeds import new_speeds, text_with_speeds
 from chipload.jobs.simulation.job import ProgramJob
-from chipload.machine.machine import Machine
-from chipload.program.read import ProgramReading, line_times
+from chipload.jobs.simulation.run import (
+    check_lines,
+    inputs_of,
+    machine_of,
+    operation_of,
+    program_of,
+    read_for,
+    require_layers,
+)
 from chipload.progress import Progress, part_of, silent
-from chipload.result import Provenance
-from chipload.result.provenance import title_of
 from chipload.simulation.checkpoint import Checkpoint
-from chipload.stock.layers import LayeredStock
 from chipload.workers import Workers
 
 
@@ -48,21 +43,23 @@ def run(
     reading = read_for(job, machine, part_of(progress, 0.0, begin))
     if not job.simulates:
         return program_of(job, machine, reading)
-    stock, material, speeds, own = stock_body(job, reading.program), material_of(job), None, None
+    inputs, speeds, own = inputs_of(job, machine), None, None
+    stock = inputs.stock.layered(reading.program, inputs.cutters)
     if job.table.operation[0].speeds is not None:
-        own = text_with_speeds(job, reading, stock, machine, material)
-    compliance = compliance_of_workpiece(job, reading, stock, machine, material, part_of(progress, begin, 0.6))
+        own = text_with_speeds(job, inputs, reading, stock)
+    compliance = compliance_of_workpiece(inputs, reading, stock, part_of(progress, begin, 0.6))
     begin = 0.6 if compliance is not None else begin
     if own is not None:
-        seconds, end = float(line_times(reading, machine)[1].sum()), 0.5 * (1.0 + begin)
+        end = 0.5 * (1.0 + begin)
         speeds, reading = new_speeds(
-            job, *own, reading, stock, material, machine, lambda text: read_for(job, machine, text=text), seconds,
-            compliance, part_of(progress, begin, end), workers,
-        )  # fmt: skip
-        stock, begin = stock_body(job, reading.program), end
-    last = part_of(progress, begin, 1.0)
-    done = simulated(job, reading, stock, machine, material, checkpoint, compliance, last, workers)
-    program = program_of(job, machine, reading, done)
+            job, inputs, own, reading, stock, compliance, part_of(progress, begin, end), workers
+        )
+        stock, begin = inputs.stock.layered(reading.program, inputs.cutters), end
+    done = simulate_program(
+        inputs, reading, stock, compliance=compliance, checkpoint=checkpoint, workers=workers,
+        progress=part_of(progress, begin, 1.0),
+    )  # fmt: skip
+    program = program_of(job, machine, reading, replace(done, settings=operation_of(job)))
     return program if speeds is None else SpeedsProgram(**vars(program), speeds=speeds)
 
 
@@ -77,32 +74,7 @@ def check(job: ProgramJob) -> tuple[list[str], bool]:
     machine = machine_of(job)
     reading, passes = read_for(job, machine), 1
     if job.simulates and job.table.operation[0].speeds is not None:
-        text_with_speeds(job, reading, stock_body(job, reading.program), machine, material_of(job))
+        inputs = inputs_of(job, machine)
+        text_with_speeds(job, inputs, reading, inputs.stock.layered(reading.program, inputs.cutters))
         passes = 2
     return check_lines(job, program_of(job, machine, reading), passes)
-
-
-def simulate_read(
-    job: ProgramJob,
-    reading: ProgramReading,
-    machine: Machine,
-    material: Material,
-    stock: LayeredStock | None,
-    provenance: Provenance,
-    progress: Progress = silent,
-) -> ProgramResult:
-    """Simulate a program that was already read.
-
-    Parameters
-    ----------
-    job : its operation, cutters, limits, part, fixtures and stiffness are used
-    stock : changes; None: that of the job
-    """
-    if stock is None:
-        stock = stock_body(job, reading.program)
-    lines, seconds = line_times(reading, machine)
-    done = simulated(job, reading, stock, machine, material, None, None, progress)
-    name = job.program_file.name
-    return ProgramResult(
-        title_of(job.path), name, reading, lines, seconds, machine, provenance, done, cutters=job.cutters
-    )  # fmt: skip

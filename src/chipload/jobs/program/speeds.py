@@ -8,29 +8,27 @@ The caller proves the limits by simulating the new program from fresh stock.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from chipload.checking.default_checks import PROGRAM_COLUMNS, with_checks
+from chipload.checking.inputs import CheckInputs
 from chipload.checking.outcome import SpeedResult, ToolSpeed
 from chipload.checking.preparation import resolution_of, timed
 from chipload.checking.program_text import differing, read_as
-from chipload.checking.run import text_to_change
 from chipload.checking.stability import StabilityResult, rounded_rpm, stability_of, watch_of
 from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.checking.workpiece_compliance import WorkpieceCompliance
-from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.jobs.program.zones import row_speeds, zone_speeds
 from chipload.jobs.simulation.job import ProgramJob
-from chipload.jobs.simulation.tables import SimulateTable
+from chipload.jobs.simulation.run import read_for, text_to_change
 from chipload.jobs.tables import stated
-from chipload.machine.machine import Machine
 from chipload.program.gcode.feed_words import DIGITS
 from chipload.program.gcode.speed_words import speed_words, with_speeds
 from chipload.program.program import DWELL, RAPID, Program
-from chipload.program.read import ProgramReading
+from chipload.program.read import ProgramReading, line_times
 from chipload.progress import Progress
 from chipload.simulation.chips import remove
 from chipload.simulation.loads import Cuts, Floats
@@ -43,7 +41,7 @@ GAIN = 0.02
 
 
 def text_with_speeds(
-    job: ProgramJob, reading: ProgramReading, stock: LayeredStock, machine: Machine, material: Material
+    job: ProgramJob, inputs: CheckInputs, reading: ProgramReading, stock: LayeredStock
 ) -> tuple[str, str]:
     """Return the text of a program whose speeds can be changed, and its dialect.
 
@@ -52,48 +50,49 @@ def text_with_speeds(
     InputError
         They cannot be changed in the text; the message states the remedy.
     """
-    text, dialect = text_to_change(job, reading, stock, machine, material, "speeds")
+    text, dialect = text_to_change(job, inputs, reading, stock, "speeds")
     speed_words(text)
     return text, dialect
 
 
 def new_speeds(
     job: ProgramJob,
-    text: str,
-    dialect: str,
+    inputs: CheckInputs,
+    own: tuple[str, str],
     reading: ProgramReading,
     stock: LayeredStock,
-    material: Material,
-    machine: Machine,
-    read: Callable[[str], ProgramReading],
-    seconds: float,
     workpiece: WorkpieceCompliance | None,
     progress: Progress,
     workers: Workers | None = None,
 ) -> tuple[SpeedResult, ProgramReading]:
     """Simulate the program in a stock, which changes, and return its text with new speeds and the new program.
 
+    Parameters
+    ----------
+    own : the text of the program, and its dialect
+
     Raises
     ------
     InputError
         The speeds cannot be changed in the text: the line is named.
     """
-    op: SimulateTable = job.table.operation[0]
-    stability = stated(watch_of(job, material, workpiece), "dynamics")
-    gives = stiffness_of(job.table.stiffness, job.cutters)
-    bends = with_checks(job.table.checks, material, deflecting(gives, material))
-    program, times = timed(reading, job, machine)
+    op, cutters, material, machine = inputs.settings, inputs.cutters, inputs.material, inputs.machine
+    (text, dialect), seconds = own, float(line_times(reading, machine)[1].sum())
+    stability = stated(watch_of(inputs, workpiece), "dynamics")
+    gives = stiffness_of(inputs.elasticity.stiffness, cutters)
+    bends = with_checks(inputs.checks, material, deflecting(gives, material))
+    program, times = timed(reading, cutters, machine)
 
     def watch(cuts: Cuts) -> dict[str, Floats]:
         return {**bends(cuts), **stability(cuts)}
 
     before = remove(
-        program, stock, job.cutters, material, resolution_of(job, reading.program), interpolation=op.interpolation,
+        program, stock, cutters, material, resolution_of(op, cutters, reading.program), interpolation=op.interpolation,
         times=times, watch=watch, accuracy=False, engine=op.engine, processes=workers or op.workers, progress=progress,
     )  # fmt: skip
     before = with_columns(before, (*watched(gives), *PROGRAM_COLUMNS, *stability.columns))
-    found = stability_of(job, stability, machine)
-    table = stated(op.speeds, "operation.0.speeds")
+    found = stability_of(inputs, stability)
+    table = stated(job.table.operation[0].speeds, "operation.0.speeds")
     tools: list[tuple[ToolSpeed, int]] = []
     for one in _advised(found, reading.program):
         zones = zone_speeds(found, reading.program, before.columns, one.tool) if table.by == "zone" else ()
@@ -102,7 +101,7 @@ def new_speeds(
     words = np.array([w.line for w in speed_words(text)], dtype=np.int64)
     wanted, added = row_speeds(reading.program, tools, words)
     new = _new_text(text, reading.program, wanted, added)
-    after = read(read_as(new))
+    after = read_for(job, machine, text=read_as(new))
     _same(reading.program, after.program, wanted)
     return SpeedResult(new, dialect, before, seconds, tuple(t for t, _ in tools), found), after
 

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-import trimesh
-
-from chipload.checking.clamped import clamp_errors
 from chipload.checking.dynamics import dynamics_of
+from chipload.checking.inputs import contradictions
+from chipload.checking.settings import Limits
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
 from chipload.jobs.simulation.tables import ProgramLimitsTable, SimulationJobTable
+from chipload.jobs.simulation.values import elasticity_of, settings_of
 from chipload.jobs.sources import Limited, cutters, sources_of
+from chipload.jobs.tables import value_of
 
 Job = TypeVar("Job", bound="ProgramJob")
 
@@ -33,7 +34,6 @@ class ProgramJob(Limited):
     overrides : the `--set` texts that were applied
     cutters : by number; empty where the program is not simulated
     material : a shipped name or a file; None where the program is not simulated
-    meshes : what stands for the files of ``stock``, ``part``, ``fixture 0`` and so on
     """
 
     path: Path
@@ -44,7 +44,6 @@ class ProgramJob(Limited):
     overrides: tuple[str, ...]
     cutters: Mapping[int, Cutter]
     material: str | Path | None
-    meshes: Mapping[str, trimesh.Trimesh] = field(default_factory=dict)
 
     @property
     def simulates(self) -> bool:
@@ -84,9 +83,13 @@ def program_job(
             for n, cutter in tools.items()
             if cutter.body and changed
         ]
+        with errors.collect("operation.0."):
+            settings_of(table.operation[0])
         with errors.collect():
-            if table.dynamics is not None and tools:
-                dynamics_of(table.dynamics, folder, tools, table.workpiece)
+            elasticity = elasticity_of(table, folder)
+            errors.texts += contradictions(value_of(Limits, table.limits), elasticity, table.part is not None)
+            if elasticity.vibration is not None and tools:
+                dynamics_of(elasticity.vibration, tools, elasticity.workpiece)
     else:
         errors.texts += [
             f'{key}: not used where a program is only read: add an [[operation]] with kind = "simulate" or leave it out'
@@ -135,28 +138,12 @@ def _contradictions(table: SimulationJobTable) -> Iterator[str]:
         saved = stock.file is not None and stock.file.lower().endswith(".npz")
         if saved and stock.layer_mm is not None:
             yield "stock.layer_mm: leave it out: the layers of an earlier result stay"
-    for k, op in enumerate(table.operation):
-        if op.workers > 1 and op.engine != "layers":
-            yield f"operation.{k}.workers = {op.workers}: applies to layers: state engine = 'layers' or leave it out"
-    yield from clamp_errors(table)
     plate = table.machine_table
     for axis, low, high in zip("XYZ", plate.low_mm, plate.high_mm, strict=True) if plate is not None else ():
         if not low < high:
             yield f"machine_table.low_mm: {axis} = {low:g}: must be below high_mm, {axis} = {high:g}"
-    for key in ("form_error_um", "gouge_mm", "excess_mm"):
-        if table.part is None and getattr(table.limits, key) is not None:
-            yield f"limits.{key}: needs the finished part: state [part] or leave it out"
-    if table.dynamics is None:
-        for key in ("stability_margin", "stable_probability", "sle_um"):
-            if getattr(table.limits, key) is not None:
-                yield f"limits.{key}: needs modes of vibration: state [dynamics] or leave it out"
-        if table.operation[0].speeds is not None:
-            yield "operation.0.speeds: needs modes of vibration: state [dynamics] or leave it out"
-    elif table.limits.stable_probability is not None and table.dynamics.frequency_percent is None:
-        yield (
-            "limits.stable_probability: needs deviations of the modes: state frequency_percent, damping_percent and "
-            "stiffness_percent"
-        )
+    if table.dynamics is None and table.operation[0].speeds is not None:
+        yield "operation.0.speeds: needs modes of vibration: state [dynamics] or leave it out"
     if not table.limits.stated:
         names = ", ".join(ProgramLimitsTable.model_fields)
         yield f"limits: none is stated, so nothing would be checked: state at least one of {names}"

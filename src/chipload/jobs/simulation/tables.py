@@ -10,12 +10,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from chipload.checking.clamped import Workpiece
+from chipload.checking.settings import Limits, SimulationSettings
+from chipload.checking.stiffness import MachineStiffness
+from chipload.checking.workpiece import FinishedPart
 from chipload.cutter.table import CutterTable
 from chipload.jobs.simulation.dynamics_tables import DynamicsTable, SpeedsTable
 from chipload.jobs.tables import (
-    Count,
-    Limits,
-    NotNegative,
+    LimitsTable,
     Number,
     Point,
     Positive,
@@ -24,6 +26,8 @@ from chipload.jobs.tables import (
     Table,
     Text,
     Unit,
+    Whole,
+    setting,
 )
 
 
@@ -77,7 +81,7 @@ class TargetTable(Table):
     units: Unit | None = Field(None, description="unit of an STL file, which does not state its unit")
     chord_mm: Positive = Field(0.01, le=1.0, description="greatest deviation of facets from the faces of a model")
     spacing_mm: Positive = Field(description="longest side of the triangles whose corners are compared")
-    excess_range_mm: Positive = Field(1.0, description="greatest excess that is measured")
+    excess_range_mm: Positive = Field(FinishedPart.excess_range_mm, description="greatest excess that is measured")
 
 
 class FixtureTable(Table):
@@ -103,75 +107,81 @@ class SimulateTable(Table):
     """Simulate the program in the stock: chips, forces, torque, power."""
 
     kind: Literal["simulate"] = Field(description="kind of the operation")
-    step_mm: Positive = Field(le=100.0, description="longest step of the tip")
-    tolerance_mm: Positive = Field(
-        0.001, ge=1e-6, le=0.1, description="greatest deviation of chords from the edges of chips"
+    step_mm: Number = setting(SimulationSettings, "step_mm", "longest step of the tip")
+    tolerance_mm: Number = setting(
+        SimulationSettings, "tolerance_mm", "greatest deviation of chords from the edges of chips"
     )
-    interpolation: Literal["slerp", "lerp"] = Field(
-        "slerp", description="how the tool axis turns within a step: at constant rate, or along a straight line"
+    interpolation: Literal["slerp", "lerp"] = setting(
+        SimulationSettings,
+        "interpolation",
+        "how the tool axis turns within a step: at constant rate, or along a straight line",
     )
-    engine: Literal["auto", "moves", "layers"] = Field(
-        "auto",
-        description="moves: exact; layers: polygons in layers of the stock; auto: moves, or layers if moves cannot "
-        "simulate the program",
+    engine: Literal["auto", "moves", "layers"] = setting(
+        SimulationSettings,
+        "engine",
+        "moves: exact; layers: polygons in layers of the stock; auto: moves, or layers if moves cannot simulate the "
+        "program",
     )
-    workers: Annotated[Count, Field(le=64)] = Field(
-        1, description="processes that share a layered stock in strips; does not change the result"
+    workers: Whole = setting(
+        SimulationSettings, "workers", "processes that share a layered stock in strips; does not change the result"
     )
-    corner_slices: Count | None = Field(
-        None,
-        le=200,
-        description="slices of a corner radius, of equal angle; default: 24, narrower near the bottom, or 48 equal "
+    corner_slices: Whole | None = setting(
+        SimulationSettings,
+        "corner_slices",
+        "slices of a corner radius, of equal angle; default: 24, narrower near the bottom, or 48 equal "
         "ones if the axis leans",
     )
-    flank_mm: Positive | None = Field(
-        None, description="length of a slice of the flank; default: half the radius, or a tenth of it if the axis leans"
+    flank_mm: Number | None = setting(
+        SimulationSettings,
+        "flank_mm",
+        "length of a slice of the flank; default: half the radius, or a tenth of it if the axis leans",
     )
-    resolution_error: bool = Field(
-        True,
-        description="estimate the error of the loads by steps and slices from some steps that are computed again; "
-        "false: limits on loads are unproven",
+    resolution_error: bool = setting(
+        SimulationSettings,
+        "resolution_error",
+        "estimate the error of the loads by steps and slices from some steps that are computed again; false: limits on "
+        "loads are unproven",
     )
-    stock_points_mm: Positive | None = Field(
-        None,
-        description="distance of the points of the stock that are compared with shank and holder; default: not checked",
+    stock_points_mm: Number | None = setting(
+        SimulationSettings,
+        "stock_points_mm",
+        "distance of the points of the stock that are compared with shank and holder; default: not checked",
     )
     speeds: SpeedsTable | None = Field(None, description="new spindle speeds; needs [dynamics]; default: unchanged")
-    confidence: Number = Field(
-        0.5,
-        ge=0.5,
-        lt=1.0,
-        description="one-sided confidence of the loads that are compared with limits; 0.5: mean loads",
+    confidence: Number = setting(
+        SimulationSettings,
+        "confidence",
+        "one-sided confidence of the loads that are compared with limits; 0.5: mean loads",
     )
 
 
-class ProgramLimitsTable(Limits):
+def _limit(name: str, description: str) -> Any:
+    return setting(Limits, name, description)
+
+
+class ProgramLimitsTable(LimitsTable):
     """Limits of the simulated loads and of the part."""
 
-    force_n: Positive | None = Field(None, description="greatest force on the cutter")
-    torque_nm: Positive | None = Field(None, description="greatest torque on the cutter")
-    power_w: Positive | None = Field(None, description="greatest mean power over a revolution")
-    chip_max_mm: Positive | None = Field(None, description="greatest undeformed chip thickness")
-    deflection_um: Positive | None = Field(
-        None, description="greatest displacement between tool and workpiece, see [stiffness]"
+    force_n: Number | None = _limit("force_n", "greatest force on the cutter")
+    torque_nm: Number | None = _limit("torque_nm", "greatest torque on the cutter")
+    power_w: Number | None = _limit("power_w", "greatest mean power over a revolution")
+    chip_max_mm: Number | None = _limit("chip_max_mm", "greatest undeformed chip thickness")
+    deflection_um: Number | None = _limit(
+        "deflection_um", "greatest displacement between tool and workpiece, see [stiffness]"
     )
-    deflection_workpiece_um: Positive | None = Field(None, description="greatest deflection of the [workpiece]")
-    form_error_um: Positive | None = Field(
-        None, description="greatest thickness left on, or removed from, the [part] by deflection"
+    deflection_workpiece_um: Number | None = _limit("deflection_workpiece_um", "greatest deflection of the [workpiece]")
+    form_error_um: Number | None = _limit(
+        "form_error_um", "greatest thickness left on, or removed from, the [part] by deflection"
     )
-    gouge_mm: Positive | None = Field(None, description="deepest cut into the [part]")
-    excess_mm: Positive | None = Field(
-        None, description="greatest thickness left on the [part] where the tool came near it"
+    gouge_mm: Number | None = _limit("gouge_mm", "deepest cut into the [part]")
+    excess_mm: Number | None = _limit("excess_mm", "greatest thickness left on the [part] where the tool came near it")
+    stability_margin: Number | None = _limit(
+        "stability_margin", "least stability margin, see [dynamics]; default 1 with [dynamics]"
     )
-    stability_margin: Positive | None = Field(
-        None, le=3.0, description="least stability margin, see [dynamics]; default 1 with [dynamics]"
+    stable_probability: Number | None = _limit(
+        "stable_probability", "least probability of stability; needs deviations in [dynamics]"
     )
-    stable_probability: Positive | None = Field(
-        None, lt=1.0, description="least probability of stability; needs deviations in [dynamics]"
-    )
-    sle_um: Positive | None = Field(
-        None, description="greatest thickness left on, or removed from, a wall by forced vibration"
-    )
+    sle_um: Number | None = _limit("sle_um", "greatest thickness left on, or removed from, a wall by forced vibration")
 
 
 #: limits that new feeds can keep
@@ -184,7 +194,11 @@ def _stiff(value: Any) -> Any:
     return float(value)
 
 
-Stiff = Annotated[float, BeforeValidator(_stiff), Field(gt=0.0)]
+Stiff = Annotated[float, BeforeValidator(_stiff)]
+
+
+def _stiffness(name: str, description: str) -> Any:
+    return setting(MachineStiffness, name, description)
 
 
 class StiffnessTable(Table):
@@ -192,13 +206,13 @@ class StiffnessTable(Table):
     deflections are then unproven.
     """
 
-    holder_gpa: Stiff | None = Field(None, description="Young's modulus of the holders, solid parts of holder_mm")
-    grip_n_um: Stiff | None = Field(None, description="stiffness of the cutter in its holder, across the axis")
-    grip_nm_rad: Stiff | None = Field(None, description="stiffness of the cutter in its holder, against tilting")
-    spindle_n_um: Stiff | None = Field(None, description="stiffness of the spindle nose, across the axis")
-    spindle_nm_rad: Stiff | None = Field(None, description="stiffness of the spindle nose, against tilting")
-    work_n_um: Stiff | None = Field(
-        None, description="stiffness of the workpiece where it is cut, the same in every direction"
+    holder_gpa: Stiff | None = _stiffness("holder_gpa", "Young's modulus of the holders, solid parts of holder_mm")
+    grip_n_um: Stiff | None = _stiffness("grip_n_um", "stiffness of the cutter in its holder, across the axis")
+    grip_nm_rad: Stiff | None = _stiffness("grip_nm_rad", "stiffness of the cutter in its holder, against tilting")
+    spindle_n_um: Stiff | None = _stiffness("spindle_n_um", "stiffness of the spindle nose, across the axis")
+    spindle_nm_rad: Stiff | None = _stiffness("spindle_nm_rad", "stiffness of the spindle nose, against tilting")
+    work_n_um: Stiff | None = _stiffness(
+        "work_n_um", "stiffness of the workpiece where it is cut, the same in every direction"
     )
 
 
@@ -225,30 +239,33 @@ class WorkpieceTable(Table):
     left at that step.
     """
 
-    modulus_gpa: Positive = Field(le=1000.0, description="Young's modulus")
-    poisson: NotNegative = Field(lt=0.5, description="Poisson's ratio")
+    modulus_gpa: Number = setting(Workpiece, "modulus_gpa", "Young's modulus")
+    poisson: Number = setting(Workpiece, "poisson", "Poisson's ratio")
     clamp: tuple[ClampTable, ...] = Field(min_length=1, description="clamps; together they allow no rigid motion")
-    density_kg_m3: Positive | None = Field(
-        None, ge=500.0, le=25000.0, description="density; required for natural frequencies of the workpiece"
+    density_kg_m3: Number | None = setting(
+        Workpiece, "density_kg_m3", "density; required for natural frequencies of the workpiece"
     )
-    damping_ratio: Positive | None = Field(
-        None,
-        lt=0.5,
-        description="damping ratio of the clamped workpiece; without it, stability with [dynamics] is unproven",
+    damping_ratio: Number | None = setting(
+        Workpiece,
+        "damping_ratio",
+        "damping ratio of the clamped workpiece; without it, stability with [dynamics] is unproven",
     )
-    yield_mpa: Positive | None = Field(
-        None, ge=10.0, le=5000.0, description="yield stress; if stated, it limits the stress of the workpiece"
+    yield_mpa: Number | None = setting(
+        Workpiece, "yield_mpa", "yield stress; if stated, it limits the stress of the workpiece"
     )
-    modes: Count = Field(4, le=20, description="number of lowest modes that are tracked as material is removed")
+    modes: Whole = setting(Workpiece, "modes", "number of lowest modes that are tracked as material is removed")
     order: Literal[2, 3] = Field(
-        2, description="polynomial order of a cell; 3 takes longer and is more accurate in corners"
+        Workpiece.order,
+        description="polynomial order of a cell; 3 takes longer and is more accurate in corners",
     )
-    cell_mm: Positive | None = Field(None, description="side of the cells; default: from the thinnest remaining wall")
-    states: Count = Field(16, le=200, description="greatest number of states of removal that are solved")
-    state_change_percent: Positive = Field(
-        5.0,
-        le=100.0,
-        description="a state is added between two whose deflections differ by more than this share of the greatest",
+    cell_mm: Number | None = setting(
+        Workpiece, "cell_mm", "side of the cells; default: from the thinnest remaining wall"
+    )
+    states: Whole = setting(Workpiece, "states", "greatest number of states of removal that are solved")
+    state_change_percent: Number = setting(
+        Workpiece,
+        "state_change_percent",
+        "a state is added between two whose deflections differ by more than this share of the greatest",
     )
 
 

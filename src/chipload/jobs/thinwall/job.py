@@ -10,6 +10,7 @@ from typing import Any
 from chipload.checking.clamped import wrong_clamps
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
+from chipload.jobs.simulation.values import clamps_of
 from chipload.jobs.sources import Limited, sources_and_cutters, unknown_cutter
 from chipload.jobs.thinwall.tables import (
     EVERY,
@@ -306,7 +307,7 @@ def _part_contradictions(table: ThinWallJobTable, walls: Sequence[FaceWallTable]
         yield "part: missing: state [part] with the file of the model whose faces [[wall]] names"
     if not table.workpiece.clamp:
         yield "workpiece.clamp: missing: state how the part is held, as [[workpiece.clamp]]"
-    yield from wrong_clamps(table.workpiece.clamp)
+    yield from wrong_clamps(clamps_of(table.workpiece.clamp))
     for key in ("threshold", "dynamics"):
         if getattr(table, key) is not None:
             yield f"{key}: for one [wall] of a shape only: leave it out"

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
-from chipload.checking.clamped import clamped_volumes, clamps_of, elastic_of
+from chipload.checking.clamped import Workpiece, clamped_volumes, elastic_of, placed_clamps
 from chipload.checking.workpiece_compliance import COARSER, CORNER, FLOOR
-from chipload.jobs.simulation.tables import WorkpieceTable
+from chipload.jobs.simulation.values import clamps_of
 from chipload.jobs.tables import stated
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_floor import PartFloor
@@ -175,15 +175,20 @@ def part_blank(job: ThinWallJob, body: PartShape, step_over: float) -> PartBlank
     made = job.table.workpiece
     n, m = stated(job.table.part, "part").places
     places = np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, m)
-    own = {name: getattr(made, name) for name in ("modulus_gpa", "poisson", "clamp", "density_kg_m3")}
-    table = WorkpieceTable.model_validate(own)
+    workpiece = Workpiece(
+        modulus_gpa=made.modulus_gpa,
+        poisson=made.poisson,
+        clamps=clamps_of(made.clamp),
+        density_kg_m3=made.density_kg_m3,
+    )
     full = [np.full((n, m), s.allowance) for s in body.each]
     layer = float(np.ptp(body.part.bounds, axis=0).max()) / LAYERS
     first, last = (_layered(body, places, D, layer) for D in (full, [np.zeros((n, m)) for _ in full]))
     grid, wall = cells_over(first, last, made.cell_mm, made.order or 2)
-    body, clamped_parts, clamps = replace(body, thickness=wall), clamped_volumes(table, first), clamps_of(table, first)
+    body, clamps = replace(body, thickness=wall), placed_clamps(workpiece, first)
+    clamped_parts = clamped_volumes(workpiece, first)
     return PartBlank(
-        body, places, CONTACT * step_over, elastic_of(table), clamps, clamped_parts, grid, grid.wider(COARSER)
+        body, places, CONTACT * step_over, elastic_of(workpiece), clamps, clamped_parts, grid, grid.wider(COARSER)
     )
 
 

@@ -18,6 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
 
 from chipload.checking.default_checks import check_columns
+from chipload.checking.settings import CheckSettings
+from chipload.jobs.tables import value_of
 from chipload.jobs.thinwall.floor_loads import FloorLoads, floor_finish, floor_loads
 from chipload.jobs.thinwall.floor_shape import floor_shape
 from chipload.jobs.thinwall.inputs import WallInputs
@@ -260,7 +262,9 @@ def _columns(
         "deflection_um": 1000.0 * found["deflection_mm"],
         "force_normal_n": found["force_normal_n"],
     }
-    columns |= check_columns(inputs.job.table.checks, removal.cuts, inputs.cut.material, columns["deflection_um"])
+    columns |= check_columns(
+        value_of(CheckSettings, inputs.job.table.checks), removal.cuts, inputs.cut.material, columns["deflection_um"]
+    )
     at = place.step
     for name, given in (
         ("u", u),

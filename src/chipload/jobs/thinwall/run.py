@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.checking.default_checks import default_checks
+from chipload.checking.settings import CheckSettings
 from chipload.cutting.material import beyond
 from chipload.errors import Finding, InputError, Severity
+from chipload.jobs.tables import value_of
 from chipload.jobs.thinwall.inputs import WallInputs, read_wall
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.kept_proofs import kept_of
@@ -114,7 +116,7 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
         variants=made,
         findings=_findings(inputs),
         settings=settings,
-        checks=default_checks(job.table.checks, cutters, inputs.cut.material, 0.5),
+        checks=default_checks(value_of(CheckSettings, job.table.checks), cutters, inputs.cut.material, 0.5),
         provenance=provenance,
     )
 

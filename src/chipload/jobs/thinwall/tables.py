@@ -17,7 +17,7 @@ from chipload.jobs.tables import (
     ChecksTable,
     Count,
     FaceName,
-    Limits,
+    LimitsTable,
     NotNegative,
     Number,
     Positive,
@@ -273,7 +273,7 @@ class WallOperationTable(Table):
     corner_slices: Count = Field(48, le=400, description="number of slices of the corner radius in the simulation")
 
 
-class ThinWallLimitsTable(Limits):
+class ThinWallLimitsTable(LimitsTable):
     """Limits of the plan. The report lists a limit that is not stated as not checked."""
 
     deflection_workpiece_um: Positive = Field(description="greatest deflection of the wall normal to its surface")

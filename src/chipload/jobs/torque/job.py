@@ -13,6 +13,7 @@ from chipload.control.spindle_file import IDENTIFIED
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
 from chipload.jobs.simulation.tables import WorkpieceTable
+from chipload.jobs.simulation.values import clamps_of
 from chipload.jobs.sources import entries_of, sources_and_cutters, unknown_cutter
 from chipload.jobs.tables import stated
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable, TorqueJobTable
@@ -136,7 +137,7 @@ def _wrong_workpiece(table: TorqueJobTable) -> Iterator[str]:
         if solid.layer_mm is not None:
             yield f"{key}.layer_mm: leave it out: simulation.layer_mm states it"
     if table.workpiece is not None:
-        yield from wrong_clamps(table.workpiece.clamp)
+        yield from wrong_clamps(clamps_of(table.workpiece.clamp))
         if table.workpiece.yield_mpa is None:
             yield "workpiece.yield_mpa: missing: state it (limits.strength_share needs it)"
         for key in ("density_kg_m3", "damping_ratio"):

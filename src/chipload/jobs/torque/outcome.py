@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.checking.default_checks import DefaultChecks
+from chipload.checking.settings import CheckSettings
 from chipload.checking.workpiece_compliance import WorkpieceCompliance
 from chipload.control import plant
 from chipload.control.fuzzy import FuzzyTable
@@ -25,7 +26,6 @@ from chipload.control.plant import Loop
 from chipload.control.spindle_model import Spindle, SpindleDeviation
 from chipload.control.wall import PathLimit
 from chipload.errors import Finding
-from chipload.jobs.tables import ChecksTable
 from chipload.jobs.torque.step_checks import StepChecks
 from chipload.machine.machine import Machine
 from chipload.program.program import Program
@@ -159,7 +159,7 @@ class TorqueInputs:
     settings : the keys of the job but cutters and surprises
     surprises : a text each
     surprise_angles : of those that have one, its angle round the wall [deg] and its kind
-    checks, check_table : checks in addition to the stated limits, and their table
+    checks, check_settings : checks in addition to the stated limits, and their switches
     """
 
     title: str
@@ -172,7 +172,7 @@ class TorqueInputs:
     surprises: tuple[str, ...]
     surprise_angles: tuple[tuple[float, str], ...]
     checks: DefaultChecks
-    check_table: ChecksTable
+    check_settings: CheckSettings
     provenance: Provenance
 
 

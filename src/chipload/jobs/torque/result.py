@@ -169,7 +169,9 @@ def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
         "strength_share": run.stress / outcome.wall.strength,
         "spindle_rpm": rpm_from_rad_s(1.0) * o.speed,
         **({} if run.workpiece is None else {"deflection_workpiece_um": 1e3 * run.workpiece}),
-        **check_columns(outcome.step_checks, path.model.s, o, run.ratio, 1e3 * run.deflection, outcome.job.check_table),
+        **check_columns(
+            outcome.step_checks, path.model.s, o, run.ratio, 1e3 * run.deflection, outcome.job.check_settings
+        ),
     }
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from chipload.checking.clamped import require_clamped
 from chipload.checking.default_checks import default_checks
+from chipload.checking.settings import CheckSettings
 from chipload.control.fuzzy import FuzzyTable, read_fuzzy, standard
 from chipload.control.identification import aliased, bandwidth
 from chipload.control.override import Override
@@ -20,6 +21,8 @@ from chipload.control.spindle_model import Spindle
 from chipload.control.wall import Loads, WallPath
 from chipload.cutting.material import Material, material_named, need_directions, read_material
 from chipload.errors import InputError
+from chipload.jobs.simulation.values import workpiece_of
+from chipload.jobs.tables import value_of
 from chipload.jobs.torque.allowable import allowable, wall_of
 from chipload.jobs.torque.controllers import cases_of, controller_of, shortest
 from chipload.jobs.torque.cut import CutSteps, program_of, require_linear, resolution_of
@@ -134,8 +137,8 @@ def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Materi
         settings=job.table.model_dump(exclude_none=True, exclude={"cutter", "surprise"}),
         surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in job.table.surprise),
         surprise_angles=tuple((x.at_deg, x.kind) for x in job.table.surprise if x.at_deg is not None),
-        checks=default_checks(job.table.checks, job.cutters, material, 0.5),
-        check_table=job.table.checks,
+        checks=default_checks(value_of(CheckSettings, job.table.checks), job.cutters, material, 0.5),
+        check_settings=value_of(CheckSettings, job.table.checks),
         provenance=_provenance(job, machine, material),
     )
 
@@ -196,7 +199,7 @@ def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spin
         require_resolved(job, spindle, 1e3 * job.table.limits.torque_nm)
     counted(program, job.cutters, resolution_of(job))
     if job.workpiece is not None:
-        require_clamped(job.workpiece, real_stock_body(job, program))
+        require_clamped(workpiece_of(job.workpiece), real_stock_body(job, program))
     return machine, material, table, program, spindle
 
 

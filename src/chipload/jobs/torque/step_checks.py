@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.settings import CheckSettings
 from chipload.control.plant import Outcome, TorqueProfile
 from chipload.control.wall import Loads
 from chipload.cutting.material import Material
 from chipload.cutting.strength import cutter_stress
 from chipload.engagement.extent import radial_depth, tooth_feed
-from chipload.jobs.tables import ChecksTable
 from chipload.jobs.torque.cut import CutSteps
 from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.loads import at_feeds
@@ -87,7 +87,7 @@ def feed_ratio(programmed: TorqueProfile, outcome: Outcome, speed: float) -> Flo
 
 
 def check_columns(
-    steps: StepChecks, s: Floats, outcome: Outcome, ratio: Floats, deflection_um: Floats, table: ChecksTable
+    steps: StepChecks, s: Floats, outcome: Outcome, ratio: Floats, deflection_um: Floats, checks: CheckSettings
 ) -> dict[str, NDArray[np.float64]]:
     """Columns of the default checks, (k,) each, one row for each row of the outcome.
 
@@ -101,7 +101,7 @@ def check_columns(
     moves = (outcome.feed > 0.0) & (steps.chip[at] > 0.0)
     share = (ratio - LEAST) / (steps.most - LEAST)
     low, high = steps.stress[at].T
-    room = np.minimum(table.deflection_of_feed * steps.feed[at] * ratio, table.deflection_of_depth * steps.depth[at])
+    room = np.minimum(checks.deflection_of_feed * steps.feed[at] * ratio, checks.deflection_of_depth * steps.depth[at])
     out = {
         "tool": steps.tool[at],
         "torque_mean_nm": 1e-3 * outcome.torque,

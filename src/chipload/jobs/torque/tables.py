@@ -14,7 +14,7 @@ from chipload.jobs.simulation.tables import SolidTable, WorkpieceTable
 from chipload.jobs.tables import (
     ChecksTable,
     Count,
-    Limits,
+    LimitsTable,
     NotNegative,
     Number,
     Point,
@@ -228,7 +228,7 @@ class SimulationTable(Table):
     )
 
 
-class TorqueLimitsTable(Limits):
+class TorqueLimitsTable(LimitsTable):
     """Limits of the wall or the workpiece. The torque limit follows from them."""
 
     form_error_um: Positive = Field(

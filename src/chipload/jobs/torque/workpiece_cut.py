@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.checking.preparation import resolution_of
-from chipload.checking.workpiece import stock_body
+from chipload.checking.settings import SimulationSettings
+from chipload.checking.workpiece import Stock
 from chipload.checking.workpiece_compliance import WorkpieceCompliance, workpiece_compliance
 from chipload.control.linuxcnc.path import ToolPath
 from chipload.control.wall import (
@@ -34,8 +35,8 @@ from chipload.control.wall import (
 )
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.jobs.simulation.job import ProgramJob
-from chipload.jobs.simulation.tables import ProgramLimitsTable, SimulateTable, SimulationJobTable, SolidTable
+from chipload.jobs.simulation.tables import SolidTable
+from chipload.jobs.simulation.values import stock_of, workpiece_of
 from chipload.jobs.tables import stated
 from chipload.jobs.torque.allowable import path_of, relief_of
 from chipload.jobs.torque.cut import (
@@ -55,7 +56,7 @@ from chipload.program.program import Program
 from chipload.progress import Progress, part_of, silent
 from chipload.simulation.chips import remove
 from chipload.simulation.deflection import contacts, step_deflections, tip_deflections
-from chipload.simulation.removal import Removal
+from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.layers import LayeredStock
 from chipload.structure.spindle import Bar, tool_bars
 
@@ -131,23 +132,16 @@ class AllowableWorkpiece:
         return error, WallPath(s, *force, np.full(len(one), real.strained)), whole, work
 
 
-def simulation_of(job: TorqueJob, solid: SolidTable) -> ProgramJob:
-    """Simulation job of the same program in the stock of the workpiece."""
-    t = job.table
-    fine = SimulateTable.model_validate(
-        {"kind": "simulate", "step_mm": t.simulation.step_mm, "tolerance_mm": t.simulation.tolerance_mm}
-    )
-    saved = solid.file is not None and solid.file.lower().endswith(".npz")
-    stock = solid if saved else solid.model_copy(update={"layer_mm": t.simulation.layer_mm})
-    table = SimulationJobTable.model_construct(
-        program=t.program, machine=t.machine, stock=stock, part=None, fixture=(), material=t.material, cutter=t.cutter,
-        stiffness=None, dynamics=None, workpiece=t.workpiece, checks=t.checks, operation=(fine,),
-        limits=ProgramLimitsTable.model_construct(),
-    )  # fmt: skip
-    return ProgramJob(
-        job.path, table, job.path.parent / stated(t.program, "program").file, None, job.machine, job.overrides,
-        job.cutters, job.material,
-    )  # fmt: skip
+def stock_of_workpiece(job: TorqueJob, solid: SolidTable) -> Stock:
+    """The stock of the workpiece, in layers as thick as the simulation states; those of an earlier result stay."""
+    stock = stock_of(solid.model_copy(update={"layer_mm": None}), job.path.parent)
+    return stock if isinstance(stock.body, LayeredStock) else Stock(stock.body, job.table.simulation.layer_mm)
+
+
+def resolution_on_workpiece(job: TorqueJob, program: Program) -> Resolution:
+    """Resolution of the simulation in the stock of the workpiece."""
+    fine = job.table.simulation
+    return resolution_of(SimulationSettings(fine.step_mm, fine.tolerance_mm), job.cutters, program)
 
 
 def workpiece_cut(
@@ -170,10 +164,12 @@ def workpiece_cut(
         The program cuts nothing, the tip stands, the material has a size effect, or the clamps leave a rigid motion.
     """
     require_linear(material)
-    own = simulation_of(job, solid)
-    stock, fine = stock_body(own, program), resolution_of(own, program)
-    known = workpiece_compliance(own, program, stock, material, fine, "layers", part_of(progress, 0.0, 0.5))
-    if known is None or known.strained is None:
+    stock = stock_of_workpiece(job, solid).layered(program, job.cutters)
+    fine, elastic = resolution_on_workpiece(job, program), workpiece_of(stated(job.workpiece, "workpiece"))
+    known = workpiece_compliance(
+        elastic, program, stock, job.cutters, material, fine, "layers", progress=part_of(progress, 0.0, 0.5)
+    )
+    if known.strained is None:
         raise InputError("stock: the program cuts nothing from the workpiece: check its corners and the work offset")
     less, removal = (
         remove(
@@ -290,7 +286,8 @@ def allowable_on_workpiece(
 
 def real_stock_body(job: TorqueJob, program: Program) -> LayeredStock:
     """The real stock before the program."""
-    return stock_body(simulation_of(job, job.table.real_stock or stated(job.table.stock, "stock")), program)
+    solid = job.table.real_stock or stated(job.table.stock, "stock")
+    return stock_of_workpiece(job, solid).layered(program, job.cutters)
 
 
 def _spot_distance(cut: WorkpieceCut, x: SurpriseTable) -> Floats:

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from chipload.checking.preparation import resolution_of
 from chipload.control.wall import PathLimit
 from chipload.cutting.material import Material
 from chipload.jobs.tables import stated
@@ -24,8 +23,8 @@ from chipload.jobs.torque.workpiece_cut import (
     AllowableWorkpiece,
     WorkpieceCut,
     limit_on_workpiece,
+    resolution_on_workpiece,
     responses_of,
-    simulation_of,
     workpiece_cut,
 )
 from chipload.machine.machine import Machine
@@ -61,7 +60,7 @@ def preview_on_workpiece(job: TorqueJob, program: Program, material: Material, m
     few = stated(rough.workpiece, "workpiece").model_copy(update={"states": STATES})
     rough = replace(rough, table=rough.table.model_copy(update={"workpiece": few}))
     stock = stated(rough.table.stock, "stock")
-    if counted(program, job.cutters, resolution_of(simulation_of(rough, stock), program)) > MOST_PREVIEWED:
+    if counted(program, job.cutters, resolution_on_workpiece(rough, program)) > MOST_PREVIEWED:
         return "the run finds the torque limit", True
     planned = workpiece_cut(rough, stock, program, material, machine.rapid)
     margin = planned.compliance.error

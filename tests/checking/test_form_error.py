@@ -32,9 +32,10 @@ def walled(rows=(0.0,), width=1.5, limits=None, part_z=(-6.0, 0.0), **stiffness)
         parts += [plunge([40.0, y, -DEPTH], 20.0, 300.0, 1, "cut"), rapid([40.0, y, 5.0], 300.0, 1, "link")]
     wall = trimesh.creation.box(bounds=[[0.0, -8.0, part_z[0]], [30.0, 0.0, part_z[1]]])
     return chipload.simulate(
-        Program.join(parts), ((0.0, -8.0, -DEPTH), (30.0, width, 0.0)), MILL, EDGE, "vmc",
-        {"form_error_um": 50.0} if limits is None else limits, part={"mesh": wall, "spacing_mm": 1.0},
-        stiffness=RIGID | stiffness, step_mm=2.0, layer_mm=0.5, tolerance_mm=1e-4, flank_mm=0.5,
+        Program.join(parts), chipload.Stock.block((0.0, -8.0, -DEPTH), (30.0, width, 0.0), 0.5), MILL, EDGE, "vmc",
+        chipload.Limits(form_error_um=50.0) if limits is None else limits, part=chipload.FinishedPart(wall, 1.0),
+        stiffness=chipload.MachineStiffness(**(RIGID | stiffness)),
+        settings=chipload.SimulationSettings(2.0, tolerance_mm=1e-4, flank_mm=0.5),
     )  # fmt: skip
 
 
@@ -67,7 +68,7 @@ def test_the_wall_is_left_as_far_out_as_a_bar_bends() -> None:
     error = history["form_error_um"][history["form_points"] > 0.0]
     assert (error > 1e3 * bar(DEPTH)).all()
     assert history.verdict == "holds"
-    assert history.result.limits[0].name == "form_error_um"
+    assert history.limits[0].name == "form_error_um"
 
 
 def test_the_work_gives_way_too_and_what_is_not_stated_is_unproven() -> None:
@@ -75,7 +76,7 @@ def test_the_work_gives_way_too_and_what_is_not_stated_is_unproven() -> None:
     z = lowest(history)
     # 20 N/mm over 4 mm against 40 N/um
     assert history.numbers["form_error_um"]["max"] == pytest.approx(1e3 * bar(z) + 80.0 / 40.0, rel=2e-3)
-    history = walled(limits={"form_error_um": 0.1})
+    history = walled(limits=chipload.Limits(form_error_um=0.1))
     assert history.verdict == "exceeds"
     _, marks = history.plot("form_error_um").data
     assert len(marks.y) == (np.abs(history["form_error_um"]) > 0.1).sum()

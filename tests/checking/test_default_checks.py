@@ -11,6 +11,7 @@ import pytest
 
 import chipload
 from chipload.checking.default_checks import DefaultChecks, upper_loads
+from chipload.checking.history import History
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.strength import ToolStrength
 from chipload.cutting.force import forces_over_turn
@@ -18,7 +19,6 @@ from chipload.cutting.material import material_named
 from chipload.cutting.strength import cutter_stress
 from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import InputError
-from chipload.jobs.program.history import History
 from chipload.jobs.tables import ChecksTable
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
@@ -35,20 +35,19 @@ def slot(cutter: Cutter = MILL, depth: float = 1.0, material: object = "al7075-t
         rapid([-6.0 - cutter.diameter, 0.0, -depth], SPEED, 1, "link"),
         plunge([more.pop("end_mm", 30.0), 0.0, -depth], feed, SPEED, 1, "cut"),
     ]
-    block = ([0.0, -9.0, -20.0], [20.0, 9.0, 0.0])
-    limits = more.pop("limits", {"force_n": 5000.0})
-    return chipload.simulate(
-        Program.join(path), block, cutter, material, "vmc", limits, step_mm=4.0, layer_mm=0.5, **more
-    )
+    block = chipload.Stock.block((0.0, -9.0, -20.0), (20.0, 9.0, 0.0), layer_mm=0.5)
+    limits = more.pop("limits", chipload.Limits(force_n=5000.0))
+    settings = chipload.SimulationSettings(4.0, confidence=more.pop("confidence", 0.5))
+    return chipload.simulate(Program.join(path), block, cutter, material, "vmc", limits, settings=settings, **more)
 
 
 def held(history: History, name: str) -> LimitCheck:
-    return next(x for x in history.result.limits if x.name == name)
+    return next(x for x in history.limits if x.name == name)
 
 
 def codes(history: History) -> set[str]:
     """Codes of what was found in the track in use."""
-    return {f.code for f in history.result.in_use[0].findings}
+    return {f.code for f in history.in_use[0].findings}
 
 
 def test_a_thin_cutter_breaks_and_the_report_says_where() -> None:
@@ -75,7 +74,7 @@ def test_the_range_of_the_rigid_model_has_the_error_of_the_deflection() -> None:
     assert share.resolution_error == force.resolution_error > 0.0
     # a range so small that the share is within its error below 1
     room = share.worst * (1.0 + 0.5 * share.resolution_error)
-    below = slot(checks={"deflection_of_feed": 2.0 * room, "deflection_of_depth": 0.25 * room})
+    below = slot(checks=chipload.CheckSettings(deflection_of_feed=2.0 * room, deflection_of_depth=0.25 * room))
     close = held(below, "deflection_share")
     assert close.worst < 1.0 < close.worst * (1.0 + close.resolution_error)
     assert (close.state, below.verdict) == (Verdict.UNPROVEN, "unproven")
@@ -83,16 +82,16 @@ def test_the_range_of_the_rigid_model_has_the_error_of_the_deflection() -> None:
 
 def test_what_is_switched_off_is_listed() -> None:
     thin = replace(MILL, diameter=4.0)
-    done = slot(thin, 3.0, checks={"cutter_strength": False, "rigid_model": False})
+    done = slot(thin, 3.0, checks=chipload.CheckSettings(cutter_strength=False, rigid_model=False))
     assert done.verdict == "holds"
     assert done.numbers["checks_off"] == ["cutter_strength", "rigid_model"]
     off = {f"check {name}: switched off by the job" for name in ("cutter_strength", "rigid_model")}
-    assert off <= set(done.result.unchecked)
-    assert not {"cutter_stress_mpa", "deflection_share"} & {x.name for x in done.result.limits}
-    spindle = slot(checks={"spindle": False})
+    assert off <= set(done.unchecked)
+    assert not {"cutter_stress_mpa", "deflection_share"} & {x.name for x in done.limits}
+    spindle = slot(checks=chipload.CheckSettings(spindle=False))
     assert not {"spindle_torque_nm", "spindle_power_w"} & {x.name for x in spindle.result.limits}
     with pytest.raises(InputError, match=r"checks\.cutter_strenght: unknown key"):
-        slot(checks={"cutter_strenght": False})
+        slot(checks=chipload.CheckSettings(cutter_strenght=False))
 
 
 @pytest.mark.parametrize(("flutes", "overrun"), [(8.0, 0.0), (6.0, 0.0), (5.0, 1.0), (3.0, 3.0)])
@@ -102,7 +101,9 @@ def test_flutes_shorter_than_the_cut_let_the_shank_rub(flutes: float, overrun: f
     assert (done.verdict == "exceeds") == (overrun > 0.0)
     if overrun > 0.0:
         assert "cut above the flutes" in done.message
-        thinner = slot(replace(MILL, flute_length=flutes), 6.0, feed=2.0, checks={"flute_length": False})
+        thinner = slot(
+            replace(MILL, flute_length=flutes), 6.0, feed=2.0, checks=chipload.CheckSettings(flute_length=False)
+        )
         assert thinner.verdict == "holds"
 
 
@@ -113,10 +114,10 @@ def test_a_shank_over_an_open_side_does_not_rub() -> None:
 
 def test_a_tangential_material_proves_torque_and_power_only() -> None:
     done = slot(
-        material="group-2-steel", feed=30.0, limits={"torque_nm": 50.0, "force_n": 5000.0, "deflection_um": 90.0}
+        material="group-2-steel", feed=30.0, limits=chipload.Limits(torque_nm=50.0, force_n=5000.0, deflection_um=90.0)
     )
     assert done.verdict == "unproven"
-    of = {x.name: x.state for x in done.result.limits}
+    of = {x.name: x.state for x in done.limits}
     assert of["torque_nm"] is of["spindle_torque_nm"] is of["spindle_power_w"] is Verdict.HOLDS
     assert {of[x] for x in ("force_n", "deflection_um", "cutter_stress_mpa", "deflection_share")} == {Verdict.UNPROVEN}
     assert "group-2-steel states the tangential force only" in done.message
@@ -126,7 +127,7 @@ def test_chips_thinner_than_the_coefficients_hold_for_are_unproven() -> None:
     thin = slot(material="group-2-steel", feed=2.0)
     assert "chip-below-coefficients" in codes(thin)
     assert thin.verdict == "unproven"
-    off = slot(material="group-2-steel", feed=2.0, checks={"chip_range": False})
+    off = slot(material="group-2-steel", feed=2.0, checks=chipload.CheckSettings(chip_range=False))
     assert "chip-below-coefficients" not in codes(off)
 
 
@@ -139,7 +140,10 @@ def test_a_cutting_speed_outside_that_of_the_coefficients_is_unproven() -> None:
         assert done.verdict == ("unproven" if code else "holds")
         if code:
             assert f"the cutting speed is 90 m/min: the coefficients of {AL.name} hold from {low:g} to" in done.message
-    assert slot(material=replace(AL, speed=(2000.0, 3000.0)), checks={"chip_range": False}).verdict == "holds"
+    assert (
+        slot(material=replace(AL, speed=(2000.0, 3000.0)), checks=chipload.CheckSettings(chip_range=False)).verdict
+        == "holds"
+    )
 
 
 def test_a_band_on_every_limit_of_the_force_and_the_verdict_at_its_upper_end() -> None:

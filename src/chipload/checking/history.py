@@ -1,32 +1,26 @@
-"""The history of a simulation in Python: columns, plots, numbers and result files."""
+"""The result of a simulated program in Python: its columns, numbers and result files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
 from numpy.typing import NDArray
 
 from chipload.checking.outcome import ProgramResult
+from chipload.checking.result import checked_result
 from chipload.errors import InputError
-from chipload.jobs.program.result import result_of
-from chipload.result import Result, Verdict
+from chipload.result import Result
 from chipload.result.display import message_html, table_html
-from chipload.result.tabular import pandas_of, xarray_of
 from chipload.stock.layers import LayeredStock
 
-if TYPE_CHECKING:
-    import pandas
-    import plotly.graph_objects as go
-    import xarray
 
-
-@dataclass(frozen=True, eq=False)
-class History:
-    """The history of a simulated program, with a row for each step, and its result.
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class History(Result):
+    """The result of a simulated program with its history, which has a row for each step.
 
     Parameters
     ----------
@@ -34,6 +28,12 @@ class History:
     """
 
     program: ProgramResult
+
+    @classmethod
+    def of(cls, program: ProgramResult) -> History:
+        """Return the history of a program that was simulated and stays as it is."""
+        result = checked_result(program)
+        return cls(**{f.name: getattr(result, f.name) for f in fields(result)}, program=program)
 
     def __len__(self) -> int:
         return len(self.columns["line"])
@@ -48,14 +48,9 @@ class History:
         return self.columns[column]
 
     @cached_property
-    def result(self) -> Result:
-        """Verdict, limits and findings, as :func:`chipload.load_result` returns them for a folder."""
-        return result_of(self.program)
-
-    @cached_property
     def columns(self) -> Mapping[str, NDArray[Any]]:
         """Columns (n,) of history.parquet by name, see :data:`chipload.result.COLUMNS`."""
-        return self.result.in_use[0].columns
+        return self.in_use[0].columns
 
     @property
     def stock(self) -> LayeredStock:
@@ -75,47 +70,16 @@ class History:
         return {} if self.program.simulated is None else self.program.simulated.removal.resolution_error
 
     @property
-    def verdict(self) -> Verdict:
-        """Verdict on the limits of the machine and of the job."""
-        return self.result.verdict
-
-    @property
-    def message(self) -> str:
-        """The verdict as a sentence."""
-        return self.result.message
-
-    @property
     def numbers(self) -> Mapping[str, Any]:
         """Numbers of the operation as in summary.json: ``force_n``, ``torque_nm``, ``removed_mm3``, ``collisions``."""
-        return self.result.operations[0]
-
-    def plot(self, *columns: str, x: Literal["t_s", "s_mm"] = "t_s") -> go.Figure:
-        """Plot columns one below the other against time or path, with their limits; without names, plot the loads.
-
-        Raises
-        ------
-        InputError
-            A column is not known.
-        """
-        from chipload.result.plot import USUAL, columns_figure
-
-        limits = {check.name: check.limit for check in self.result.limits}
-        return columns_figure(self.columns, limits, columns or USUAL, x)
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return the columns as a pandas DataFrame. Needs ``chipload[notebook]``."""
-        return pandas_of(self.columns)
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the columns as an xarray Dataset with units. Needs ``chipload[notebook]``."""
-        return xarray_of(self.columns)
+        return self.operations[0]
 
     def save(self, out: str | Path) -> Path:
         """Write the result folder of ``chipload run``: report, summary, history, scene, stock."""
-        from chipload.jobs.program.figures import presentation_of
+        from chipload.checking.figures import program_presentation
         from chipload.report.folder import write_result
 
-        return write_result(self.result, presentation_of(self.program), out)
+        return write_result(self, program_presentation(self.program, self, {}), out)
 
     def _repr_html_(self) -> str:
         """HTML for notebooks."""

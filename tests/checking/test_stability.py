@@ -302,17 +302,19 @@ def test_plain_values_give_margins_too() -> None:
     from chipload.program.program import Program
 
     path = [rapid([-6, 0, -2], 900.0, 1, "link"), plunge([30, 0, -2], 20.0, 900.0, 1, "cut")]
-    mode = {"frequency_hz": 800.0, "damping_ratio": 0.03, "stiffness_n_um": 12.0, "direction": "y"}
-    block = ([0, -9, -5], [20, 9, 0])
-    values = {"stock": block, "cutter": cutter, "material": "al7075-t6", "machine": "vmc", "limits": {}, "step_mm": 6.0}
-    history = chipload.simulate(Program.join(path), dynamics={"mode": (mode,)}, **values)
-    (check,) = (c for c in history.result.limits if c.name == "stability_margin")
+    mode = chipload.Mode(frequency_hz=800.0, damping_ratio=0.03, stiffness_n_um=12.0, direction="y")
+    block = chipload.Stock.block((0, -9, -5), (20, 9, 0))
+    values = {"stock": block, "cutters": cutter, "material": "al7075-t6", "machine": "vmc"}
+    modes = chipload.Vibration(modes=(mode,))
+    history = chipload.simulate(Program.join(path), dynamics=modes, step_mm=6.0, **values)
+    (check,) = (c for c in history.limits if c.name == "stability_margin")
     assert check.worst == history["stability_margin"].min()
-    sure = chipload.simulate(Program.join(path), dynamics={"mode": (mode,)}, confidence=0.95, **values)
-    (lower,) = (c for c in sure.result.limits if c.name == "stability_margin")
+    settings = chipload.SimulationSettings(6.0, confidence=0.95)
+    sure = chipload.simulate(Program.join(path), dynamics=modes, settings=settings, **values)
+    (lower,) = (c for c in sure.limits if c.name == "stability_margin")
     assert lower.worst == pytest.approx(check.worst / (1.0 + 1.6448536 * 0.25))  # the material has a spread of 25 %
     with pytest.raises(InputError, match=r"limits.stability_margin: needs modes"):
-        chipload.simulate(Program.join(path), **{**values, "limits": {"stability_margin": 1.2}})
+        chipload.simulate(Program.join(path), limits=chipload.Limits(stability_margin=1.2), **values)
 
 
 def test_a_cutter_that_leans_has_no_known_margin() -> None:

@@ -1,0 +1,141 @@
+"""Settings of a simulation, limits of its loads and switches of its default checks.
+
+These classes are the one table of defaults and ranges: the tables of the job file take theirs from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from chipload.cutting.rigid import OF_DEPTH, OF_FEED
+from chipload.errors import InputError
+from chipload.ranges import choice_field, number_field, require_ranges
+
+
+@dataclass(frozen=True)
+class SimulationSettings:
+    """Resolution and method of a simulation.
+
+    Parameters
+    ----------
+    step_mm : longest step of the tip
+    tolerance_mm : greatest deviation of chords from the edges of chips
+    interpolation : how the tool axis turns within a step: ``slerp`` at constant rate, ``lerp`` along a straight line
+    engine : ``moves``, ``layers``, or ``auto``: moves, or layers where moves cannot simulate the program
+    workers : processes that share a layered stock in strips; the result does not depend on them
+    corner_slices : slices of a corner radius, of equal angle; None: by the inclination of the axis
+    flank_mm : length of a slice of the flank; None: half the radius, or a tenth of it if the axis leans
+    resolution_error : estimate the error of the loads; without it limits on loads are unproven
+    stock_points_mm : distance of the points of the stock that are compared with shank and holder; None: not checked
+    confidence : one-sided confidence of the loads that are compared with limits; 0.5: mean loads
+    """
+
+    step_mm: float = number_field(above=0.0, most=100.0)
+    tolerance_mm: float = number_field(0.001, least=1e-6, most=0.1)
+    interpolation: Literal["slerp", "lerp"] = choice_field("slerp", "slerp", "lerp")
+    engine: Literal["auto", "moves", "layers"] = choice_field("auto", "auto", "moves", "layers")
+    workers: int = number_field(1, least=1, most=64, whole=True)
+    corner_slices: int | None = number_field(None, least=1, most=200, whole=True)
+    flank_mm: float | None = number_field(None, above=0.0)
+    resolution_error: bool = True
+    stock_points_mm: float | None = number_field(None, above=0.0)
+    confidence: float = number_field(0.5, least=0.5, below=1.0)
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range, and processes for a simulation that they cannot share."""
+        require_ranges(self)
+        if self.workers > 1 and self.engine != "layers":
+            raise InputError(f"workers = {self.workers}: applies to layers: state engine = 'layers' or leave it out")
+
+    @property
+    def stated(self) -> Mapping[str, Any]:
+        """The settings that are not None, without the number of processes, on which no result depends."""
+        return {name: value for name, value in asdict(self).items() if value is not None and name != "workers"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Limits of the loads of a program and of the part that it leaves; None: not checked.
+
+    Parameters
+    ----------
+    force_n, torque_nm : greatest force and torque on the cutter
+    power_w : greatest mean power over a revolution
+    chip_max_mm : greatest undeformed chip thickness
+    deflection_um : greatest displacement between tool and workpiece
+    deflection_workpiece_um : greatest deflection of the workpiece
+    form_error_um : greatest thickness left on, or removed from, the part by deflection
+    gouge_mm, excess_mm : deepest cut into the part, and greatest thickness left on it where the tool came near it
+    stability_margin, stable_probability : least stability margin and probability of stability
+    sle_um : greatest thickness left on, or removed from, a wall by forced vibration
+
+    Examples
+    --------
+    >>> Limits(force_n=800.0).stated
+    {'force_n': 800.0}
+    """
+
+    force_n: float | None = number_field(None, above=0.0)
+    torque_nm: float | None = number_field(None, above=0.0)
+    power_w: float | None = number_field(None, above=0.0)
+    chip_max_mm: float | None = number_field(None, above=0.0)
+    deflection_um: float | None = number_field(None, above=0.0)
+    deflection_workpiece_um: float | None = number_field(None, above=0.0)
+    form_error_um: float | None = number_field(None, above=0.0)
+    gouge_mm: float | None = number_field(None, above=0.0)
+    excess_mm: float | None = number_field(None, above=0.0)
+    stability_margin: float | None = number_field(None, above=0.0, most=3.0)
+    stable_probability: float | None = number_field(None, above=0.0, below=1.0)
+    sle_um: float | None = number_field(None, above=0.0)
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        require_ranges(self, "limits.")
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """The limits that are stated, by name."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+    @property
+    def unstated(self) -> tuple[str, ...]:
+        """Names of the limits that are not stated; they are not checked."""
+        return tuple(name for name, value in asdict(self).items() if value is None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckSettings:
+    """Switches of the default checks: a check that is False is not made, and the result lists it as switched off.
+
+    Parameters
+    ----------
+    cutter_strength : stress of the cutter against its strength
+    flute_length : the cutter does not cut above its flutes
+    chip_space : the chip space, where ``gullet_mm2`` of a cutter is stated
+    chip_range : chip thickness and cutting speed are within the range of the coefficients
+    spindle : torque and power of the spindle
+    rigid_model : the deflection is within the range of the rigid force model
+    deflection_of_feed, deflection_of_depth : greatest ratio of the deflection to feed per tooth and radial depth of cut
+    plunge : the cutters can plunge and ramp into material as the program does
+    """
+
+    cutter_strength: bool = True
+    flute_length: bool = True
+    chip_space: bool = True
+    chip_range: bool = True
+    spindle: bool = True
+    rigid_model: bool = True
+    deflection_of_feed: float = number_field(OF_FEED, above=0.0)
+    deflection_of_depth: float = number_field(OF_DEPTH, above=0.0)
+    plunge: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        require_ranges(self, "checks.")
+
+    @property
+    def off(self) -> tuple[str, ...]:
+        """Names of the checks that are switched off."""
+        return tuple(name for name, value in asdict(self).items() if value is False)

@@ -1,0 +1,173 @@
+"""From a job to the values of its check, and what the jobs of programs share: reading, provenance, refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from chipload.checking.inputs import CheckInputs
+from chipload.checking.outcome import ProgramResult, SimulationResult
+from chipload.checking.preparation import bodies_of
+from chipload.checking.program_text import changeable, straight
+from chipload.checking.run import simulation_estimate
+from chipload.checking.settings import CheckSettings, Limits
+from chipload.checking.workpiece import FinishedPart, Fixture, Surroundings
+from chipload.cutting.material import Material, material_named, read_material
+from chipload.errors import Finding, InputError, Severity, grouped, worst_severity
+from chipload.jobs.simulation.job import ProgramJob
+from chipload.jobs.simulation.values import elasticity_of, settings_of, stock_of
+from chipload.jobs.tables import stated, value_of
+from chipload.machine.ini import read_ini
+from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.machine.saved_offsets import saved_offsets
+from chipload.machine.table import MachineTable
+from chipload.program.read import ProgramReading, line_times, read_program, read_tools
+from chipload.program.setup import Setup
+from chipload.progress import Progress, silent
+from chipload.result.provenance import provenance_of, title_of
+from chipload.stock.layers import LayeredStock
+from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
+from chipload.workers import Workers
+
+
+def machine_of(job: ProgramJob) -> Machine:
+    """Return the machine that the job names."""
+    return machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
+
+
+def material_of(job: ProgramJob) -> Material:
+    """Return the force coefficients that the job names."""
+    if isinstance(job.material, Path):
+        return read_material(job.material)
+    return material_named(stated(job.material, "material"))
+
+
+def inputs_of(job: ProgramJob, machine: Machine) -> CheckInputs:
+    """Return the tables of a simulation as values; every file that they name is read.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read.
+    """
+    table, folder = job.table, job.path.parent
+    op, block, part = table.operation[0], table.machine_table, None
+    if (of := table.part) is not None:
+        part = FinishedPart.read(
+            folder / of.file, of.spacing_mm, of.excess_range_mm, units=of.units, chord_mm=of.chord_mm
+        )
+    fixtures = (
+        Fixture.read(folder / f.file, f.spacing_mm, units=f.units, chord_mm=f.chord_mm, key=f"fixture.{k}.file")
+        for k, f in enumerate(table.fixture)
+    )
+    return CheckInputs(
+        cutters=job.cutters,
+        material=material_of(job),
+        machine=machine,
+        stock=stock_of(stated(table.stock, "stock"), folder),
+        settings=settings_of(op),
+        limits=value_of(Limits, table.limits),
+        checks=value_of(CheckSettings, table.checks),
+        surroundings=Surroundings(
+            part,
+            tuple(fixtures),
+            None if block is None else MachineTable(block.low_mm, block.high_mm, block.spacing_mm),
+        ),
+        elasticity=elasticity_of(table, folder),
+        speeds_rpm=(None, None) if op.speeds is None else (op.speeds.least_rpm, op.speeds.most_rpm),
+    )
+
+
+def operation_of(job: ProgramJob) -> Mapping[str, Any]:
+    """Return the keys of the operation for summary.json; the result does not depend on how many processes found it."""
+    return {k: v for k, v in job.table.operation[0].model_dump().items() if v is not None and k != "workers"}
+
+
+def _of_configuration(job: ProgramJob) -> tuple[dict[str, Sequence[float]], tuple[Finding, ...]]:
+    """Return the work offsets that the `.ini` of a machine leads to and what it does not state; nothing of others."""
+    if not isinstance(job.machine, Path) or job.machine.suffix.lower() != ".ini":
+        return {}, ()
+    return dict(saved_offsets(job.machine)), read_ini(job.machine)[1]
+
+
+def read_for(job: ProgramJob, machine: Machine, progress: Progress = silent, text: str | None = None) -> ProgramReading:
+    """Read the program of a job for a machine; ``text`` replaces the content of its file."""
+    table = job.table.program
+    offsets, found = _of_configuration(job)
+    reading = read_program(
+        job.program_file,
+        machine,
+        dialect=table.dialect,
+        tools=read_tools(job.tools_file) if job.tools_file is not None else None,
+        feed=mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None,
+        speed=rad_s_from_rpm(table.speed_rpm) if table.speed_rpm is not None else None,
+        tolerance=table.tolerance_mm,
+        text=text,
+        setup=Setup(table.parameters, {**offsets, **table.work_offsets}, job.cutters, table.placed_in),
+        comments=table.tool_comments,
+        progress=progress,
+    )
+    return replace(reading, findings=(*found, *reading.findings)) if found else reading
+
+
+def program_of(
+    job: ProgramJob, machine: Machine, reading: ProgramReading, simulated: SimulationResult | None = None
+) -> ProgramResult:
+    """Return the program of a job as it was read, with its times and its provenance."""
+    lines, seconds = line_times(reading, machine)
+    files: dict[str, Path] = {"program": job.program_file}
+    named = {"machine": job.machine, "tools": job.tools_file, "material": job.material}
+    fixtures = {f"fixture {k}": f for k, f in enumerate(job.table.fixture)}
+    if job.table.dynamics is not None and job.table.dynamics.file is not None:
+        named["modes"] = job.path.parent / job.table.dynamics.file
+    for name, solid in {"stock": job.table.stock, "part": job.table.part, **fixtures}.items():
+        if solid is not None and solid.file is not None:
+            named[name] = job.path.parent / solid.file
+    files |= {k: v for k, v in named.items() if isinstance(v, Path)}
+    files |= {f"cutter {k}": job.path.parent / c.file for k, c in enumerate(job.table.cutter) if c.file is not None}
+    metal = (simulated.checks.material,) if simulated is not None else ()
+    provenance = provenance_of(files, job.overrides, machine, metal)
+    name = job.program_file.name
+    return ProgramResult(title_of(job.path), name, reading, lines, seconds, machine, provenance, simulated, job.cutters)
+
+
+def check_lines(job: ProgramJob, done: ProgramResult, passes: int) -> tuple[list[str], bool]:
+    """Return lines on the files of a job and on time and memory of its simulation, and whether the program is valid."""
+    needs = []
+    if job.simulates:
+        inputs = inputs_of(job, done.machine)
+        stock = inputs.stock.layered(done.reading.program, inputs.cutters)
+        needs = [simulation_estimate(inputs, done.reading, stock, passes)]
+    found = [text for _, text in grouped((*done.reading.findings, *done.reading.violations))]
+    count = len(done.reading.violations)
+    state = f"{count} finding{'s exceed' if count > 1 else ' exceeds'}" if count else "the program stays within"
+    holds = not count and worst_severity(done.reading.findings) < Severity.UNPROVEN
+    return [*found, f"{job.path.name}: valid; {state} the limits of machine {done.machine.name}", *needs], holds
+
+
+def text_to_change(
+    job: ProgramJob, inputs: CheckInputs, reading: ProgramReading, stock: LayeredStock, key: str
+) -> tuple[str, str]:
+    """Return the text of a program whose words the key ``key`` of the operation changes, and its dialect.
+
+    Raises
+    ------
+    InputError
+        The text or the simulation cannot be used.
+    """
+    own = changeable(job.program_file, inputs.machine, job.table.program.dialect, f"operation.0.{key}")
+    straight(reading.program, key)
+    bodies_of(inputs, reading, stock)
+    return own
+
+
+def require_layers(job: ProgramJob, workers: Workers | None) -> None:
+    """Refuse processes and a cluster unless the job states that layers are removed."""
+    if workers is None:
+        return
+    if not job.simulates:
+        raise InputError("--workers, --dask: the job reads its program and simulates nothing: leave them out")
+    if job.table.operation[0].engine != "layers":
+        raise InputError('--workers, --dask: share layers only: state engine = "layers" or leave them out')
