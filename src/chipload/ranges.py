@@ -10,6 +10,7 @@ import math
 import operator
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, field, fields
+from numbers import Integral, Real
 from typing import Any
 
 from chipload.errors import InputError, InputErrors
@@ -39,7 +40,7 @@ class Range:
         >>> Range(above=0.0).error_of(-1.0), Range(most=3).error_of(3)
         ('must be above 0', '')
         """
-        if isinstance(value, bool) or not isinstance(value, int if self.whole else (int, float)):
+        if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
             return f"must be a {'whole ' if self.whole else ''}number"
         if math.isnan(value) or (math.isinf(value) and not self.infinite):
             return "must be a finite number"

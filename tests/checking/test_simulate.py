@@ -170,8 +170,9 @@ def test_a_program_of_five_axes_is_read_for_its_machine(tmp_path: Path) -> None:
 
 
 def test_pictures_have_the_columns_and_their_limits(history) -> None:
-    figure = history.plot(x="s_mm")
+    figure = history.plot("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um", x="s_mm")
     assert [t.name for t in figure.data] == ["force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um"]
+    assert [t.name for t in history.plot().data][:2] == ["force_n", "torque_mean_nm"]  # those of its limits
     assert figure.layout.shapes[0].y0 == 1000.0
     np.testing.assert_array_equal(figure.data[0].x, history["s_mm"])
     np.testing.assert_array_equal(figure.data[0].y, history["force_n"])
@@ -213,6 +214,9 @@ def test_the_result_folder_is_that_of_a_run(history, tmp_path: Path) -> None:
     [
         ({"machine": "vmx"}, "machine vmx: not known: the nearest is vmc"),
         ({"material": "al7075"}, "material al7075: not known: the nearest are al7075-carbide"),
+        ({"limits": {"force_n": 3.0}}, "limits: dict: must be a Limits"),
+        ({"stiffness": {"spindle_n_um": 3.0}}, "stiffness: dict: must be a MachineStiffness"),
+        ({"stock": 3.0}, "stock: float: must be a Stock, a closed mesh or a layered stock"),
         ({"limits": Limits(gouge_mm=3.0)}, "limits.gouge_mm: needs the finished part: state [part] or leave it out"),
         ({"step_mm": -1.0}, "step_mm = -1: must be above 0"),
         ({"step_mm": math.nan}, "step_mm = nan: must be a finite number"),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import get_args
 
 from chipload.checking.clamped import Workpiece
 from chipload.checking.dynamics import Vibration
 from chipload.checking.settings import CheckSettings, Limits, SimulationSettings
 from chipload.checking.stiffness import MachineStiffness
-from chipload.checking.workpiece import Stock, Surroundings
+from chipload.checking.workpiece import FinishedPart, Fixture, Stock, Surroundings
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError, InputErrors
@@ -97,7 +98,20 @@ class CheckInputs:
     speeds_rpm: tuple[float | None, float | None] = (None, None)
 
     def __post_init__(self) -> None:
-        """Refuse values that contradict one another."""
+        """Refuse values of another kind, and values that contradict one another."""
+        for name, value, kind in (
+            ("limits", self.limits, Limits),
+            ("checks", self.checks, CheckSettings),
+            ("settings", self.settings, SimulationSettings),
+            ("stiffness", self.elasticity.stiffness, MachineStiffness | None),
+            ("workpiece", self.elasticity.workpiece, Workpiece | None),
+            ("dynamics", self.elasticity.vibration, Vibration | None),
+            ("part", self.surroundings.part, FinishedPart | None),
+            *((f"fixture {k}", fixture, Fixture) for k, fixture in enumerate(self.surroundings.fixtures)),
+        ):
+            if not isinstance(value, kind):
+                own = kind if isinstance(kind, type) else get_args(kind)[0]
+                raise InputError(f"{name}: {type(value).__name__}: must be a {own.__name__}")
         texts = list(contradictions(self.limits, self.elasticity, self.surroundings.part is not None))
         if texts:
             raise InputErrors(*texts) if len(texts) > 1 else InputError(texts[0])

@@ -55,7 +55,9 @@ class Stock:
     file: Path | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a thickness out of range, and one for layers that there are."""
+        """Refuse what is no body, a thickness out of range, and one for layers that there are."""
+        if not isinstance(self.body, (tuple, trimesh.Trimesh, LayeredStock)):
+            raise InputError(f"stock: {type(self.body).__name__}: must be a Stock, a closed mesh or a layered stock")
         require_ranges(self, "stock.")
         if self.layer_mm is not None and isinstance(self.body, LayeredStock):
             raise InputError("stock.layer_mm: leave it out: the layers of an earlier result stay")
