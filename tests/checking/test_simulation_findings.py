@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from chipload.checking.outcome import CollisionCheck
+from chipload.checking.outcome import CollisionCheck, StockCheck
 from chipload.checking.result import simulation_findings
 from chipload.errors import Finding, Severity
 
@@ -14,6 +14,11 @@ def test_a_rapid_that_cuts_exceeds_and_a_program_that_was_handed_over_is_noted()
     findings = (Finding("rapid-cuts", 3, "a rapid goes through material"), Finding("handed-over", 6, "by layers"))
     removal = SimpleNamespace(findings=findings, columns={"chip_max_mm": []})
     checks = SimpleNamespace(material=SimpleNamespace(chip=None, speed=None), off=(), cutters={})
-    simulation: Any = SimpleNamespace(removal=removal, collisions=CollisionCheck(), workpiece=None, checks=checks)
+    # the columns of the stock have found the same rapid and one more
+    again = tuple(Finding("rapid-cuts", line, "a rapid goes through material", Severity.EXCEEDS) for line in (3, 9))
+    simulation: Any = SimpleNamespace(
+        removal=removal, collisions=CollisionCheck(), workpiece=None, checks=checks, stock_check=StockCheck(again)
+    )
     found = [(f.code, f.line, f.severity) for f in simulation_findings(simulation)]
-    assert found == [("rapid-cuts", 3, Severity.EXCEEDS), ("handed-over", 6, Severity.NOTE)]
+    rapids = [("rapid-cuts", line, Severity.EXCEEDS) for line in (3, 9)]
+    assert found == [rapids[0], ("handed-over", 6, Severity.NOTE), rapids[1]]

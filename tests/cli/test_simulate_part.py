@@ -112,7 +112,7 @@ def test_what_is_not_stated_is_said_to_be_unchecked(job: Path, tmp_path: Path) -
     job.write_text(text.replace(text[text.index("[[fixture]]") : text.index("[material]")], ""))
     assert call("run", job, "--out", tmp_path / "r")[0] == 3
     page = (tmp_path / "r" / "report.html").read_text()
-    assert "shank and holder against the stock: stock_points_mm is not stated" in page
+    assert "shank and holder in the stock: a contact less than" in page
     assert "fixtures: none is stated" in page
     assert "holders of tools 1: not stated" in page
 
@@ -142,7 +142,7 @@ def test_the_table_of_the_machine_is_held_against_the_tool_and_shown(tmp_path: P
     assert code == 3
     assert "cutting part goes 0.8 mm into machine table" in said
     op = summary_of(out)["operations"][0]
-    assert op["compared_with"] == ["machine table"]
+    assert op["compared_with"] == ["machine table", "stock"]
     assert max(one["depth_mm"] for one in op["collisions"]) == pytest.approx(0.8, abs=1e-3)
     assert {(one["what"], one["into"]) for one in op["collisions"]} == {("cutting part", "machine table")}
     shown = open_result(tmp_path, "r")
@@ -165,7 +165,7 @@ def test_the_machine_file_states_the_table_unless_the_job_does(tmp_path: Path, o
     (tmp_path / "job.toml").write_text(text.replace('name = "vmc"', 'file = "mine.toml"'))
     assert call("run", tmp_path / "job.toml", "--out", tmp_path / "r")[0] == 3
     op = summary_of(tmp_path / "r")["operations"][0]
-    assert op["compared_with"] == ["machine table"]
+    assert op["compared_with"] == ["machine table", "stock"]
     # the face lies on Z = -5.2 by the machine, on -5 by the job
     assert max(one["depth_mm"] for one in op["collisions"]) == pytest.approx(0.8 if own else 0.6, abs=1e-3)
     shown = open_result(tmp_path, "r")

@@ -15,6 +15,7 @@ from chipload.checking.settings import Limits
 from chipload.checking.stability import StabilityResult
 from chipload.checking.workpiece_compliance import WorkpieceCompliance
 from chipload.cutter.cutter import Cutter
+from chipload.errors import Finding
 from chipload.machine.machine import Machine
 from chipload.program.read import ProgramReading
 from chipload.result import Provenance
@@ -44,6 +45,24 @@ class CollisionCheck:
 
 
 @dataclass(frozen=True, eq=False)
+class StockCheck:
+    """Findings on the stock as it is at each moment, and what they cannot show.
+
+    Parameters
+    ----------
+    findings : rapids that cut, loose stock, slender walls
+    touched : contacts of shank and holder
+    hidden_mm : depth of a contact that the check may miss, and thickness of what it may miss
+    unchecked : what was not checked, in sentences
+    """
+
+    findings: tuple[Finding, ...] = ()
+    touched: tuple[Collision, ...] = ()
+    hidden_mm: float = 0.0
+    unchecked: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class SimulationResult:
     """Result of the simulation of a program in its stock.
 
@@ -61,6 +80,7 @@ class SimulationResult:
     stability : margins and quiet speeds; None: no modes are stated
     workpiece : compliance of the workpiece where it is cut; None: no [workpiece] is stated
     blank : the stock before the program
+    stock_check : findings on the stock as it is at each moment
     """
 
     removal: Removal
@@ -75,6 +95,7 @@ class SimulationResult:
     stability: StabilityResult | None = None
     workpiece: WorkpieceCompliance | None = None
     blank: trimesh.Trimesh | None = None
+    stock_check: StockCheck = field(default_factory=StockCheck)
 
     @property
     def limits(self) -> Mapping[str, float]:

@@ -13,12 +13,14 @@ from chipload.checking.default_checks import DefaultChecks, default_checks
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.settings import SimulationSettings
 from chipload.checking.stiffness import Stiffness, stiffness_of
-from chipload.checking.workpiece import stock_points
+from chipload.checking.workpiece import default_spacing, stock_points
 from chipload.cutter.cutter import Cutter
 from chipload.machine.machine import Machine
 from chipload.program.program import RAPID, Program
 from chipload.program.read import ProgramReading, times_of
 from chipload.simulation.chips import counted, require_steps
+from chipload.simulation.heights.height_map import require_columns
+from chipload.simulation.moves import leans
 from chipload.simulation.removal import Resolution
 from chipload.simulation.surface import require_points
 from chipload.simulation.swept_area import require_upright
@@ -38,7 +40,7 @@ class Bodies:
     ----------
     program, times : from the first tool on, and the time of each row [s]
     resolution : of the simulation
-    stock_points : points of the stock with which shank and holder are compared; None: they are not compared
+    stock_points : points of the stock with which shank and holder are compared where the axis leans; None: none
     fixtures : their points by name
     stiffness : of cutters, holders, spindle and work
     checks : made by default
@@ -73,12 +75,24 @@ def bodies_of(inputs: CheckInputs, reading: ProgramReading, stock: LayeredStock)
     count = counted(program, cutters, fine)
     if op.engine == "layers":
         require_upright(program, op.step_mm, op.tolerance_mm, stock, cutters, op.interpolation)
-    points = stock_points(stock, op.stock_points_mm) if op.stock_points_mm is not None else None
+    points = _points_of_stock(inputs, program, stock)
     part = inputs.surroundings.part
     if part is not None:
         require_points(part.mesh, part.spacing_mm, "part")
     fixtures = inputs.surroundings.fixture_points(machine)
     return Bodies(program, times, fine, points, fixtures, stiffness, checks, count)
+
+
+def _points_of_stock(inputs: CheckInputs, program: Program, stock: LayeredStock) -> NDArray[np.float64] | None:
+    """Return points of the stock where the axis leans and the check is on; refuse too many, or too many columns."""
+    spacing = inputs.settings.stock_points_mm
+    if not inputs.checks.shank_in_stock:
+        return None
+    if leans(program).any():
+        return stock_points(stock, default_spacing(stock) if spacing is None else spacing)
+    if spacing is not None:
+        require_columns(stock, spacing)
+    return None
 
 
 def resolution_of(op: SimulationSettings, cutters: Mapping[int, Cutter], program: Program) -> Resolution:

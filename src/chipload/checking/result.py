@@ -127,8 +127,7 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
     out += program.reading.unchecked
     if simulation.left is None:
         out.append("gouge and excess: no [part] is stated")
-    if "stock" not in simulation.collisions.compared_with:
-        out.append("shank and holder against the stock: stock_points_mm is not stated")
+    out += simulation.stock_check.unchecked
     if not any(name.startswith("fixture") for name in simulation.collisions.compared_with):
         out.append("fixtures: none is stated")
     if simulation.collisions.no_holder:
@@ -155,6 +154,8 @@ def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
         place = (float(c.at[0]), float(c.at[1]), float(c.at[2]))
         text = f"{c.what} goes {c.depth_mm:.3g} mm into {c.into}"
         out.append(Finding("collision", c.line, text, Severity.EXCEEDS, place, int(c.step)))
+    known = {(f.code, f.line) for f in out}
+    out += [f for f in simulation.stock_check.findings if f.code != "rapid-cuts" or (f.code, f.line) not in known]
     if simulation.workpiece is not None:
         out += simulation.workpiece.findings
     out += _bodies(simulation)

@@ -15,6 +15,7 @@ from chipload.checking.outcome import CollisionCheck, SimulationResult
 from chipload.checking.preparation import bodies_of, resolution_of, timed
 from chipload.checking.stability import stability_of, watch_of
 from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.checking.stock_check import check_stock
 from chipload.checking.workpiece import insides, stock_box
 from chipload.checking.workpiece_compliance import (
     WorkpieceCompliance,
@@ -100,13 +101,14 @@ def simulate_program(
     points, before, stiffness = bodies.stock_points, insides(stock), elasticity.stiffness
     # layers that were cut before lie face on face, which rays do not distinguish
     blank = None if stock.cut.any() else stock.body()
-    watches = [with_checks(inputs.checks, material, deflecting(gives, material))]
+    kept = KeptPasses(checkpoint, passes_key(inputs, bodies.program) if checkpoint is not None else "")
     steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
+    stock_check = check_stock(inputs, bodies, stock, steps, kept, progress)
+    watches = [with_checks(inputs.checks, material, deflecting(gives, material))]
 
     def passing(share: float, what: str) -> Callable[[int], None]:
         return lambda done: progress(share + SHARE * done / bodies.steps, what)
 
-    kept = KeptPasses(checkpoint, passes_key(inputs, bodies.program) if checkpoint is not None else "")
     left, solids = None, dict(bodies.fixtures)
     if part is not None:
         left = difference(
@@ -155,16 +157,18 @@ def simulate_program(
         removal = with_columns(removal, stability_watch.columns)
     watching, above = passing(0.8 + SHARE, "collisions"), frozenset(["part"])
     touched = collisions(steps, cutters, solids, op.tolerance_mm, above_only=above, progress=watching, kept=kept)
+    touched += stock_check.touched
     if points is not None:
         touched += in_stock(
             steps, cutters, points, op.tolerance_mm, passing(0.8 + 2.0 * SHARE, "holders in the stock"), kept
         )  # fmt: skip
     settings = {"kind": "simulate", **op.stated}
-    compared_with = (*solids, *(["stock"] if points is not None else []))
+    compared_with = (*solids, *(["stock"] if inputs.checks.shank_in_stock else []))
     return SimulationResult(
         removal, stock, machine, inputs.limits, settings, bodies.checks,
         CollisionCheck(touched, compared_with, _no_holder(cutters), inputs.surroundings.fixture_meshes(machine)), left,
         gives.unknown, None if stability_watch is None else stability_of(inputs, stability_watch), compliance, blank,
+        stock_check,
     )  # fmt: skip
 
 

@@ -28,7 +28,8 @@ class SimulationSettings:
     corner_slices : slices of a corner radius, of equal angle; None: by the inclination of the axis
     flank_mm : length of a slice of the flank; None: half the radius, or a tenth of it if the axis leans
     resolution_error : estimate the error of the loads; without it limits on loads are unproven
-    stock_points_mm : distance of the points of the stock that are compared with shank and holder; None: not checked
+    stock_points_mm : greatest distance of the columns or points of the stock that are compared with shank and holder;
+        None: from the cutters and the size of the stock
     confidence : one-sided confidence of the loads that are compared with limits; 0.5: mean loads
     """
 
@@ -119,6 +120,11 @@ class CheckSettings:
     rigid_model : the deflection is within the range of the rigid force model
     deflection_of_feed, deflection_of_depth : greatest ratio of the deflection to feed per tooth and radial depth of cut
     plunge : the cutters can plunge and ramp into material as the program does
+    shank_in_stock : shank, neck and holder against the stock as it is at each moment
+    loose_stock : no piece is cut on that the program has cut free of the stock
+    slender_walls : no wall is left more slender than ``wall_slenderness``, where no workpiece states how it deflects
+    wall_slenderness : height over thickness up to which a wall counts as rigid; 5 of aluminium 2 mm thick, clamped at
+        its foot: 0.33 um/N at its edge (:mod:`chipload.simulation.heights.slender_walls`)
     """
 
     cutter_strength: bool = True
@@ -130,6 +136,10 @@ class CheckSettings:
     deflection_of_feed: float = number_field(OF_FEED, above=0.0)
     deflection_of_depth: float = number_field(OF_DEPTH, above=0.0)
     plunge: bool = True
+    shank_in_stock: bool = True
+    loose_stock: bool = True
+    slender_walls: bool = True
+    wall_slenderness: float = number_field(5.0, least=1.0)
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""

@@ -28,6 +28,8 @@ from chipload.stock.layers import LayeredStock
 TILE = 4.0
 #: layers where no thickness is stated: thickest and thinnest in smallest diameters, and most of them
 LEVEL, SLOPED, THINNEST, MOST = 0.05, 0.0125, 0.0005, 400
+#: points of a stock where no distance of them is stated: a pass over them costs a few percent of a step that leans
+POINTS = 60_000
 #: layers where no cutter comes are so many times as thick
 COARSE = 4.0
 
@@ -237,6 +239,12 @@ def stock_box(stock: LayeredStock) -> tuple[NDArray[np.float64], NDArray[np.floa
     """Return the low and high corner of the box of the stock, (3,) [mm] each."""
     low, high = (np.array([stock.xs[i], stock.ys[i], stock.bounds[i]], dtype=np.float64) for i in (0, -1))
     return low, high
+
+
+def default_spacing(stock: LayeredStock) -> float:
+    """Return the distance of the points of a stock [mm] if none is stated: at most ``POINTS`` fill its box."""
+    low, high = stock_box(stock)
+    return float(np.cbrt(np.prod(high - low) / POINTS))
 
 
 def stock_points(stock: LayeredStock, pitch: float) -> NDArray[np.float64]:

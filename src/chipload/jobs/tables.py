@@ -204,3 +204,24 @@ class ProgramChecksTable(ChecksTable):
     """Default checks. `false` switches a check off; the report lists the checks that are off."""
 
     plunge: bool = _switch("plunge", "check that the cutters can plunge and ramp into material as the program does")
+
+
+class StockChecksTable(ProgramChecksTable):
+    """Default checks. `false` switches a check off; the report lists the checks that are off."""
+
+    shank_in_stock: bool = _switch(
+        "shank_in_stock", "check shank, neck and holder against the stock as it is at each moment"
+    )
+    loose_stock: bool = _switch(
+        "loose_stock", "check that no piece is cut on that the program has cut free of the stock"
+    )
+    slender_walls: bool = _switch(
+        "slender_walls",
+        "report walls that are left more slender than wall_slenderness, where no [workpiece] states how they deflect",
+    )
+    wall_slenderness: Number = setting(
+        CheckSettings,
+        "wall_slenderness",
+        "height over thickness up to which a wall counts as rigid; 5 of aluminium 2 mm thick, clamped at its foot: "
+        "0.33 um/N at its edge",
+    )

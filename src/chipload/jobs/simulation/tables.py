@@ -21,8 +21,8 @@ from chipload.jobs.tables import (
     Number,
     Point,
     Positive,
-    ProgramChecksTable,
     SourceTable,
+    StockChecksTable,
     Table,
     Text,
     Unit,
@@ -145,7 +145,8 @@ class SimulateTable(Table):
     stock_points_mm: Number | None = setting(
         SimulationSettings,
         "stock_points_mm",
-        "distance of the points of the stock that are compared with shank and holder; default: not checked",
+        "greatest distance of the columns, or where the axis leans of the points, of the stock that are compared with "
+        "shank and holder; default: from the cutters and the size of the stock",
     )
     speeds: SpeedsTable | None = Field(None, description="new spindle speeds; needs [dynamics]; default: unchanged")
     confidence: Number = setting(
@@ -283,6 +284,6 @@ class SimulationJobTable(Table):
     stiffness: StiffnessTable | None = None
     dynamics: DynamicsTable | None = None
     workpiece: WorkpieceTable | None = None
-    checks: ProgramChecksTable = Field(default_factory=ProgramChecksTable.model_construct)
+    checks: StockChecksTable = Field(default_factory=StockChecksTable.model_construct)
     operation: tuple[SimulateTable, ...] = Field((), max_length=1)
     limits: ProgramLimitsTable = Field(default_factory=ProgramLimitsTable.model_construct)

@@ -1,0 +1,130 @@
+"""Checks against the stock as it is at each moment: shank and holder, rapids, loose stock, slender walls.
+
+An upright axis is followed over columns of the stock (:mod:`chipload.simulation.heights.height_map`). Where the axis
+leans, shank and holder are compared with points of the stock; loose stock and slender walls are then not checked.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.checking.inputs import CheckInputs
+from chipload.checking.outcome import StockCheck
+from chipload.checking.preparation import Bodies
+from chipload.checking.workpiece import default_spacing, stock_box
+from chipload.errors import Finding, Severity
+from chipload.program.program import Program
+from chipload.progress import Progress
+from chipload.simulation.heights.height_map import HeightMap, bands_of, follow_heights, pitch_of
+from chipload.simulation.heights.loose_stock import find_loose_stock
+from chipload.simulation.heights.slender_walls import find_slender_walls
+from chipload.simulation.kept_pass import KeptPasses
+from chipload.simulation.moves import leans
+from chipload.simulation.steps import StepBlocks
+from chipload.simulation.surface import Collision
+from chipload.stock.layers import LayeredStock
+
+Floats = NDArray[np.float64]
+
+#: columns stand so many times as close where a shank or holder wider than its cutter goes below the top of the stock
+CLOSER = 3.0
+#: slender walls that are named
+NAMED = 3
+
+
+def check_stock(
+    inputs: CheckInputs, bodies: Bodies, stock: LayeredStock, steps: StepBlocks, kept: KeptPasses, progress: Progress
+) -> StockCheck:
+    """Return the findings on the stock along a program; ``stock`` is that before it."""
+    checks, op = inputs.checks, inputs.settings
+    if leans(bodies.program).any():
+        return _leaning(inputs, stock)
+    pitch = pitch_at(inputs, bodies.program, stock)
+    what = "shank and holder in the stock"
+    progress(0.0, what)
+    found = follow_heights(steps, inputs.cutters, stock, pitch, op.tolerance_mm, lambda done: progress(0.0, what), kept)
+    findings = [
+        Finding("rapid-cuts", c.line, f"a rapid goes through material, {c.depth_mm:.3g} mm deep", Severity.EXCEEDS,
+                None, c.step)
+        for c in found.rapids
+    ]  # fmt: skip
+    hidden, unchecked, touched = found.hidden_mm, list[str](), tuple[Collision, ...]()
+    if checks.shank_in_stock:
+        touched = tuple(Collision(c.what, "stock", c.depth_mm, c.step, c.line, c.place) for c in found.contacts)
+        unchecked.append(
+            f"shank and holder in the stock: a contact less than {hidden:.2g} mm deep, or with what is thinner, may be "
+            "missed between the columns of the stock that are compared"
+        )
+    if checks.loose_stock:
+        findings += _loose(found, max(c.resolved_diameter for c in inputs.cutters.values()))
+    if checks.slender_walls and inputs.elasticity.workpiece is None:
+        findings += _thin(found, checks.wall_slenderness)
+    return StockCheck(tuple(findings), touched, hidden, tuple(unchecked))
+
+
+def pitch_at(inputs: CheckInputs, program: Program, stock: LayeredStock) -> float:
+    """Return the distance of the columns [mm]: closer where a wide shank or holder goes below the top of the stock."""
+    low, high = stock_box(stock)
+    pitch = pitch_of(low, high, inputs.cutters)
+    if any(_dips(inputs, program, n, low, high) for n in inputs.cutters):
+        pitch = max(pitch / CLOSER, math.sqrt(float(np.prod(high[:2] - low[:2]))) / 1000.0)
+    stated = inputs.settings.stock_points_mm
+    return pitch if stated is None else min(pitch, stated)
+
+
+def _dips(inputs: CheckInputs, program: Program, number: int, low: Floats, high: Floats) -> bool:
+    """Return whether a part above the flutes that is wider than the cutter goes below the top of the stock."""
+    cutter, own = inputs.cutters[number], program.tool == number
+    tip = np.asarray(program.p_work)[own]
+    for _, radius, z in bands_of(cutter):
+        near = ((tip[:, :2] > low[:2] - radius) & (tip[:, :2] < high[:2] + radius)).all(axis=1)
+        if 2.0 * radius > cutter.diameter and (near & (tip[:, 2] + z < high[2])).any():
+            return True
+    return False
+
+
+def _leaning(inputs: CheckInputs, stock: LayeredStock) -> StockCheck:
+    """What the check of a program whose axis leans cannot show."""
+    checks, unchecked, hidden = inputs.checks, list[str](), 0.0
+    if checks.shank_in_stock:
+        hidden = math.sqrt(3.0) * (inputs.settings.stock_points_mm or default_spacing(stock))
+        unchecked.append(
+            f"shank and holder in the stock: a contact less than {hidden:.2g} mm deep, or with what is thinner, may be "
+            "missed between the points of the stock that are compared"
+        )
+    if checks.loose_stock:
+        unchecked.append("pieces that are cut free: the axis leans")
+    if checks.slender_walls and inputs.elasticity.workpiece is None:
+        unchecked.append("deflection of slender walls: the axis leans and no [workpiece] is stated")
+    return StockCheck((), (), hidden, tuple(unchecked))
+
+
+def _loose(found: HeightMap, diameter: float) -> list[Finding]:
+    """Return a finding for each piece that is cut on after it was cut free."""
+    out = []
+    for piece in find_loose_stock(found, diameter):
+        x, y = piece.size_mm
+        text = (
+            f"cuts a piece of {x:.3g} x {y:.3g} mm that line {piece.freed_line} has cut free of the stock: what holds "
+            "it is not known: leave tabs or a floor, or cut it free last"
+        )
+        out.append(Finding("loose-stock", piece.line, text, Severity.UNPROVEN, piece.place, piece.step))
+    return out
+
+
+def _thin(found: HeightMap, slenderness: float) -> list[Finding]:
+    """Return a finding for the thinnest walls that are left, whose deflection is not calculated."""
+    out = []
+    walls = find_slender_walls(found, slenderness)
+    for wall in walls[:NAMED]:
+        more = f" (the most slender of {len(walls)})" if wall is walls[0] and len(walls) > 1 else ""
+        text = (
+            f"leaves a wall {wall.height_mm:.3g} mm high and {wall.thickness_mm:.2g} mm thick{more}, "
+            f"{wall.slenderness:.2g} times as high as thick: its deflection is not checked: state [workpiece], or a "
+            f"greater checks.wall_slenderness than {slenderness:g}"
+        )
+        out.append(Finding("slender-wall", 0, text, Severity.UNPROVEN, wall.place))
+    return out

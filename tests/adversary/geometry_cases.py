@@ -1,0 +1,151 @@
+"""Jobs whose shank, holder, rapids, pieces or walls a shop would call wrong, and their neighbours that are right."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from adversary.base import Case, Change, changes, cutter, program, replaced, stated
+
+HEAD = "G21 G90 G17 G94\nG54\nT1 M6\nG43 H1\nS6000 M3\n"
+END = "G0 Z10\nM5\nM2\n"
+
+
+def text(*ways: str) -> Change:
+    """Replace the program by some ways."""
+    return program(HEAD + "\n".join(ways) + "\n" + END)
+
+
+def slots(*depths: float, y: float = 20.0) -> list[str]:
+    """Slots along x, each from beside the block."""
+    return [w for z in depths for w in (f"G0 X-40 Y{y} Z10", f"G0 Z{z}", "G1 X100 F900", "G0 Z10")]
+
+
+def across(*depths: float, x: float = 30.0) -> list[str]:
+    """Slots along y."""
+    return [w for z in depths for w in (f"G0 X{x} Y-10 Z10", f"G0 Z{z}", "G1 Y50 F900", "G0 Z10")]
+
+
+def engine(name: str) -> Change:
+    """State the engine."""
+    return lambda job: job.tables["operation"][0].update(engine=name)
+
+
+def stock(**keys: Any) -> Change:
+    """State keys of the stock."""
+    return stated("stock", **keys)
+
+
+def shank(diameter: float, flutes: float = 6.0) -> Change:
+    """A slot 15 mm deep in three levels, by a cutter of 10 mm with short flutes."""
+    return changes(cutter(flute_length_mm=flutes, shank_diameter_mm=diameter), text(*slots(-5.0, -10.0, -15.0)))
+
+
+def holder(overhang: float, *parts: tuple[float, float], depth: float = 15.0) -> Change:
+    """A slot in levels of 5 mm down to a depth, by a cutter with a holder."""
+    levels = [-5.0 * k for k in range(1, int(depth / 5.0) + 1)]
+    return changes(
+        cutter(flute_length_mm=min(26.0, overhang), overhang_mm=overhang, holder_mm=list(parts)), text(*slots(*levels))
+    )
+
+
+def around(*, tab: float = 0.0, floor: float = 0.0) -> list[str]:
+    """A square of 16 mm that is cut out, with a tab of a height or a floor, and then milled on its top."""
+    deep = -8.5 if floor == 0.0 else -8.0 + floor
+    high = [f"G1 Z{tab - 8.0}", "G1 X26", f"G1 Z{deep}"] if tab else []
+    return [
+        "G0 X15 Y7 Z10", f"G1 Z{deep} F300", "G1 X41 F900", "G1 Y33", *high, "G1 X15", "G1 Y7", "G0 Z10",
+        "G0 X10 Y20", "G0 Z1", "G1 X14 Z-1", "G1 X48 F900",
+    ]  # fmt: skip
+
+
+def _switch(name: str) -> Change:
+    return stated("checks", **{name: False})
+
+
+AFTER = ["G0 X70 Y20 Z10", "G0 Z-5", "G1 X-10 F900"]
+#: a block 8 mm high, which is cut through at once
+PLATE = stock(low_mm=(0.0, 0.0, -8.0))
+LAYERS = changes(engine("layers"), stock(layer_mm=1.0))
+RAPID = "G1 X70 F900"
+
+CASES = (
+    Case("shank-20", "a shank of 20 mm rubs 5 mm deep in both walls", shank(20.0), "exceeds", "collision"),
+    Case("shank-12", "a shank of 12 mm rubs 1 mm deep", shank(12.0), "exceeds", "collision"),
+    Case("shank-10.4", "a shank of 10.4 mm rubs 0.2 mm deep", shank(10.4), "exceeds", "collision"),
+    Case("shank-20-layers", "the same by layers", changes(shank(20.0), LAYERS), "exceeds", "collision"),
+    Case("shank-neck", "nothing: a relieved neck of 9 mm", shank(9.0), "holds", ""),
+    Case("shank-same", "nothing: a shank as wide as the cutter", shank(10.0), "holds", ""),
+    Case("shank-long", "nothing: flutes above the block", shank(20.0, 16.0), "holds", ""),
+    Case(
+        "shank-off", "the check is switched off", changes(shank(20.0), _switch("shank_in_stock")), "unchecked",
+        "check shank_in_stock: switched off by the job",
+    ),
+    Case("holder-3", "a holder of 50 mm goes 3 mm into the block", holder(12.0, (40.0, 50.0)), "exceeds", "collision"),
+    Case(
+        "holder-steps", "the second part of a holder goes 2 mm into the block",
+        holder(10.0, (3.0, 10.0), (20.0, 40.0)), "exceeds", "collision",
+    ),
+    Case("holder-above", "nothing: a holder 1 mm above the block", holder(16.0, (40.0, 50.0)), "holds", ""),
+    Case("holder-slim", "nothing: a holder that fits into the slot", holder(12.0, (40.0, 10.0)), "holds", ""),
+    Case(
+        "holder-unknown", "the holder is not stated", lambda job: None, "unchecked", "holders of tools 1: not stated"
+    ),
+    Case(
+        "rapid-0.49", "a rapid 0.49 mm deep", replaced("G0 Z-2\n" + RAPID, "G0 Z-0.49\nG0 X70"), "exceeds", "rapid-cuts"
+    ),
+    Case(
+        "rapid-0.49-layers", "the same with layers of 1 mm",
+        changes(replaced("G0 Z-2\n" + RAPID, "G0 Z-0.49\nG0 X70\nG0 Z-2\nG1 X-10 F900"), LAYERS), "exceeds",
+        "rapid-cuts",
+    ),
+    Case(
+        "rapid-0.05-layers", "a rapid 0.05 mm deep with layers of 1 mm",
+        changes(replaced("G0 Z-2\n" + RAPID, "G0 Z-0.05\nG0 X70\nG0 Z-2\nG1 X-10 F900"), LAYERS), "exceeds",
+        "rapid-cuts",
+    ),
+    Case(
+        "rapid-back", "nothing: a rapid back through the slot", replaced(RAPID, RAPID + "\nG0 X-10"), "holds", ""
+    ),
+    Case(
+        "rapid-back-layers", "nothing: the same by layers", changes(replaced(RAPID, RAPID + "\nG0 X-10"), LAYERS),
+        "holds", "",
+    ),
+    Case(
+        "part-off", "a half of the block is cut free and milled on", text(*across(-8.0, -16.0, -20.5), *AFTER),
+        "unproven", "loose-stock",
+    ),
+    Case(
+        "part-off-layers", "the same by layers", changes(LAYERS, text(*across(-8.0, -16.0, -20.5), *AFTER)), "unproven",
+        "loose-stock",
+    ),
+    Case(
+        "part-off-contour", "a square is cut out of the block, then milled on its top",
+        changes(PLATE, text(*around())), "unproven", "loose-stock",
+    ),
+    Case("part-off-tab", "nothing: a tab of 2 mm holds it", changes(PLATE, text(*around(tab=2.0))), "holds", ""),
+    Case("part-off-floor", "nothing: a floor of 0.3 mm", changes(PLATE, text(*around(floor=0.3))), "holds", ""),
+    Case("part-off-last", "nothing: cut free at the end", text(*across(-8.0, -16.0, -20.5)), "holds", ""),
+    Case(
+        "part-off-before", "nothing: milled first, then cut free", text(*AFTER, "G0 Z10", *across(-8.0, -16.0, -20.5)),
+        "holds", "",
+    ),
+    Case(
+        "slender-wall", "a wall 2 mm thick and 15 mm high is left, which bends",
+        text(*slots(-7.5, -15.0, y=14.0), *slots(-7.5, -15.0, y=26.0)), "unproven", "slender-wall",
+    ),
+    Case(
+        "slender-wall-border", "the same at the border of the block", text(*slots(-7.5, -15.0, y=7.0)), "unproven",
+        "slender-wall",
+    ),
+    Case(
+        "thick-wall", "nothing: a wall of 4 mm", text(*slots(-7.5, -15.0, y=13.0), *slots(-7.5, -15.0, y=27.0)),
+        "holds", "",
+    ),
+    Case(
+        "slender-wall-allowed", "nothing: a slenderness of 10 is allowed",
+        changes(
+            stated("checks", wall_slenderness=10.0), text(*slots(-7.5, -15.0, y=14.0), *slots(-7.5, -15.0, y=26.0))
+        ),
+        "holds", "",
+    ),
+)  # fmt: skip
