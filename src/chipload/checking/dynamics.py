@@ -22,6 +22,8 @@ from chipload.stability.process_damping import ProcessDamping
 
 #: N/mm in 1 N/um, t in 1 kg
 PER_UM, PER_KG = 1000.0, 1e-3
+#: directions of modes that differ by less are one, relative
+LEAST_ACROSS = 1e-3
 DIRECTIONS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -138,8 +140,11 @@ def dynamics_of(vibration: Vibration, cutters: Mapping[int, Cutter], workpiece: 
     modes, number = {}, {}
     for tool in sorted(cutters):
         own = [x for x in known if x[1].tool in (None, tool)]
-        if not any(m.of == "cutter" and m.tool in (None, tool) for m in listed):
+        across = [m for m in listed if m.of == "cutter" and m.tool in (None, tool)]
+        if not across:
             unknown.append(f"modes of tool {tool}")
+        elif missing := _missing_direction(across):
+            unknown.append(f"modes of tool {tool} along {missing}")
         if own:
             modes[tool] = _modes(own)
             number[tool] = tuple(k for k, _, _ in own)
@@ -164,11 +169,31 @@ def _spread(vibration: Vibration) -> ModeSpread | None:
     return ModeSpread(*stated) if stated else None
 
 
+def _missing_direction(modes: Iterable[Mode]) -> str:
+    """Return the direction across the axis that no mode moves in; empty: they move in all.
+
+    A cutter that is taken as rigid in a direction has a margin there that nobody measured.
+    """
+    flat = np.array([_direction(m)[:2] for m in modes])
+    _, size, along = np.linalg.svd(flat)
+    if len(size) > 1 and size[1] > LEAST_ACROSS * size[0]:
+        return ""
+    if size[0] <= LEAST_ACROSS:
+        return "x and y"
+    a, b = np.abs(along[1]).tolist()
+    return "x" if b <= LEAST_ACROSS else "y" if a <= LEAST_ACROSS else f"[{along[1][0]:.3g}, {along[1][1]:.3g}]"
+
+
+def _direction(mode: Mode) -> tuple[float, ...]:
+    """Return the direction of a mode in x, y and z."""
+    stated = DIRECTIONS[mode.direction] if isinstance(mode.direction, str) else mode.direction
+    return (*stated, 0.0)[:3]
+
+
 def _modes(some: Iterable[tuple[int, Mode, float]]) -> Modes:
     """Return modes with directions in x, y and z if one moves along z, else in x and y."""
     rows = list(some)
-    stated = [DIRECTIONS[m.direction] if isinstance(m.direction, str) else m.direction for _, m, _ in rows]
-    direction = np.array([(*d, 0.0)[:3] for d in stated])
+    direction = np.array([_direction(m) for _, m, _ in rows])
     return Modes(
         frequency=[m.frequency_hz for _, m, _ in rows],  # type: ignore[arg-type]
         damping=[m.damping_ratio for _, m, _ in rows],  # type: ignore[arg-type]

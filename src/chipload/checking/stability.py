@@ -46,6 +46,12 @@ MOST_WAVES = 20.0
 SPEEDS, ROUND_RPM = 161, 10.0
 
 
+def _tool_of(unknown: str) -> int | None:
+    """Return the tool whose modes a text on what is not stated names; None: it is on something else."""
+    words = unknown.split()
+    return int(words[3]) if words[:3] == ["modes", "of", "tool"] else None
+
+
 @dataclass(frozen=True, eq=False)
 class StabilityResult:
     """Stability of a program: margins of its different cuts, and quiet speeds of its tools.
@@ -69,10 +75,7 @@ class StabilityResult:
         """Return why margins may be smaller, for the ``tools`` that cut; empty if the margins are known."""
         used = {int(t) for t in tools}
         dynamics = self.watch.dynamics
-        other = {f"modes of tool {t}" for t in dynamics.number.keys() | dynamics.modes.keys()} - {
-            f"modes of tool {t}" for t in used
-        }
-        out = [text for text in dynamics.unknown if text not in other]
+        out = [text for text in dynamics.unknown if _tool_of(text) in (None, *used)]
         texts = [f"{', '.join(out)} {'is' if len(out) == 1 else 'are'} not stated"] if out else []
         leaning = sorted(self.watch.leaning & used)
         if leaning:
