@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from adversary.base import Case, changes, cutter, file, replaced, stated
+from adversary.base import DRILL, TABLE, Case, Change, changes, cutter, file, program, replaced, stated
 
 #: a LinuxCNC mill with its zero in a corner of the travel
 INI = """[EMC]
@@ -36,6 +36,31 @@ MAX_FORWARD_VELOCITY = 15000
 """
 LINUXCNC = changes(lambda job: job.tables.update(machine={"file": "mill.ini"}), file("mill.ini", INI))
 TABLE_OF_TOOLS = changes(stated("program", tools="t.tbl"), file("t.tbl", "T1 P1 Z50 D10\n"))
+HEAD = "G21 G90 G17 G94\nG54\nT1 M6\nG43 H1\nS{speed} M3\nG0 X30 Y20 Z10\n"
+DRILLING = changes(
+    lambda job: job.tables.update(
+        cutter=[dict(DRILL)], stock={"low_mm": (0.0, 0.0, -80.0), "high_mm": (60.0, 40.0, 0.0)}
+    ),
+    stated("machine_table", low_mm=(-200.0, -200.0, -120.0), high_mm=(200.0, 200.0, -90.0)),
+)
+TAP = {"number": 1, "body_mm": ((2.5, 0.0), (2.5, 20.0)), "overhang_mm": 40.0, "name": "M6 tap"}
+
+
+def hole(words: str, speed: int = 3000) -> Change:
+    """A program that makes one hole by the words of its cycle."""
+    return program(HEAD.format(speed=speed) + f"{words}\nG80\nG0 Z10\nM5\nM2\n")
+
+
+def tap(words: str, speed: int = 500, **keys: object) -> Change:
+    """A tap of M6 in the spindle, and a program of one thread."""
+    return changes(lambda job: job.tables.update(cutter=[{**TAP, **keys}]), hole(words, speed))
+
+
+def modes(*directions: str) -> Change:
+    """Modes of the cutter, each in a direction."""
+    mode = {"tool": 1, "of": "cutter", "frequency_hz": 1200.0, "damping_ratio": 0.03, "stiffness_n_um": 40.0}
+    return stated("dynamics", mode=[{**mode, "direction": d} for d in directions])
+
 
 CASES = (
     Case("slot", "nothing: the base job", lambda job: None, "holds", ""),
@@ -105,4 +130,240 @@ CASES = (
         "exceeds",
         "machine-limit",
     ),
+    Case(
+        "approach-in-stock",
+        "the first rapid ends 2 mm inside the block",
+        replaced("G0 X-10 Y20 Z10\nG0 Z-2", "G0 X30 Y20 Z-2"),
+        "exceeds",
+        "approach-through-stock",
+    ),
+    Case(
+        "approach-plunge",
+        "X and Y first, then a rapid down into the block",
+        replaced("G0 X-10 Y20 Z10\nG0 Z-2", "G0 X30 Y20\nG0 Z-2"),
+        "exceeds",
+        "approach-through-stock",
+    ),
+    Case(
+        "approach-low",
+        "the first rapid ends beside the block below its top: its way may go through the block",
+        replaced("G0 X-10 Y20 Z10\nG0 Z-2", "G0 X-10 Y20 Z-2"),
+        "unproven",
+        "approach-unknown",
+    ),
+    Case(
+        "approach-down-beside",
+        "nothing: X and Y first, then straight down beside the block",
+        replaced("G0 X-10 Y20 Z10\nG0 Z-2", "G0 X-10 Y20\nG0 Z-2"),
+        "holds",
+        "",
+    ),
+    Case(
+        "drill-through",
+        "a drill goes 4 mm through the bottom; what lies below is not stated",
+        changes(lambda job: job.tables.update(cutter=[dict(DRILL)]), hole("G81 X30 Y20 Z-24 R2 F600", 6000)),
+        "unproven",
+        "below-stock",
+    ),
+    Case(
+        "drill-through-table",
+        "a drill goes 4 mm through the bottom into the table",
+        changes(
+            lambda job: job.tables.update(cutter=[dict(DRILL)]),
+            stated("machine_table", low_mm=(-200.0, -200.0, -60.0), high_mm=(200.0, 200.0, -22.0)),
+            hole("G81 X30 Y20 Z-24 R2 F600", 6000),
+        ),
+        "exceeds",
+        "collision",
+    ),
+    Case(
+        "drill-through-above-table",
+        "nothing: the table lies 10 mm below the block",
+        changes(
+            lambda job: job.tables.update(cutter=[dict(DRILL)]),
+            stated("machine_table", **TABLE),
+            hole("G81 X30 Y20 Z-24 R2 F600", 6000),
+        ),
+        "holds",
+        "",
+    ),
+    Case(
+        "slot-through",
+        "an end mill cuts 1 mm below the bottom of the block",
+        changes(replaced("Y20", "Y-4.5"), replaced("G0 Z-2", "G0 Z-21")),
+        "unproven",
+        "below-stock",
+    ),
+    Case("tap-end-mill", "an end mill taps", hole("G84 X30 Y20 Z-15 R2 F100", 6000), "exceeds", "tap-cutter"),
+    Case(
+        "tap-feed",
+        "the feed is not the pitch of the tap times the spindle speed",
+        tap("G84 X30 Y20 Z-15 R2 F400", thread_pitch_mm=1.0),
+        "exceeds",
+        "tap-pitch",
+    ),
+    Case(
+        "tap-feed-rigid",
+        "G33.1 taps with another pitch than that of the tap",
+        tap("G0 Z2\nG33.1 Z-15 K0.8", thread_pitch_mm=1.0),
+        "exceeds",
+        "tap-pitch",
+    ),
+    Case(
+        "tap-feed-comment",
+        "the feed is not the pitch that the comment of the tool states",
+        changes(tap("G84 X30 Y20 Z-15 R2 F400"), replaced("T1 M6\n", "(T1 M6X1 TAP)\nT1 M6\n")),
+        "exceeds",
+        "tap-pitch",
+    ),
+    Case(
+        "tap-no-pitch",
+        "a tap whose pitch is not stated",
+        tap("G84 X30 Y20 Z-15 R2 F500"),
+        "unproven",
+        "tap-pitch-unknown",
+    ),
+    Case(
+        "end-in-cut",
+        "the program ends with the cutter in the material",
+        replaced("G1 X70 F900\nG0 Z10\nM5\n", "G1 X30 F900\n"),
+        "exceeds",
+        "ends-in-cut",
+    ),
+    Case(
+        "end-in-stock",
+        "the program ends with the cutter in the slot that it has cut",
+        replaced("G1 X70 F900\nG0 Z10\n", "G1 X70 F900\nG0 X30\n"),
+        "unproven",
+        "ends-in-stock",
+    ),
+    Case(
+        "spindle-stop-in-cut",
+        "the spindle is stopped in the material, then the cutter goes up",
+        replaced("G1 X70 F900\n", "G1 X30 F900\nM5\n"),
+        "exceeds",
+        "spindle-stopped-in-cut",
+    ),
+    Case(
+        "spindle-stop-after-plunge",
+        "the spindle is stopped at the bottom of a plunge",
+        replaced("G0 Z-2\nG1 X70 F900\n", "G0 X30 Z1\nG1 Z-2 F100\nM5\n"),
+        "exceeds",
+        "spindle-stopped-in-cut",
+    ),
+    Case(
+        "spindle-stop-in-slot",
+        "nothing: the spindle is stopped where the slot is open",
+        replaced("G0 Z10\nM5", "M5\nG0 Z10"),
+        "holds",
+        "",
+    ),
+    Case(
+        "dwell-in-cut",
+        "a dwell in the slot",
+        replaced("G1 X70 F900", "G1 X30 F900\nG4 P2\nG1 X70"),
+        "unproven",
+        "dwell-in-cut",
+    ),
+    Case(
+        "dwell-on-bottom",
+        "a dwell of 5 s at the bottom of a plunge",
+        replaced("G1 X70 F900", "G0 Z1\nX30\nG1 Z-2 F100\nG4 P5\nG0 Z10\nX70"),
+        "unproven",
+        "dwell-in-cut",
+    ),
+    Case(
+        "dwell-in-air",
+        "nothing: a dwell beside the block",
+        replaced("G1 X70 F900", "G4 P2\nG1 X70 F900"),
+        "holds",
+        "",
+    ),
+    Case(
+        "stop-in-cut",
+        "the program waits for its operator in the slot",
+        replaced("G1 X70 F900", "G1 X30 F900\nM0\nG1 X70"),
+        "unproven",
+        "stop-in-cut",
+    ),
+    Case(
+        "optional-stop-in-cut",
+        "M1 in the slot",
+        replaced("G1 X70 F900", "G1 X30 F900\nM1\nG1 X70"),
+        "unproven",
+        "stop-in-cut",
+    ),
+    Case(
+        "change-in-cut",
+        "the tool is changed where it stands in the slot",
+        changes(
+            lambda job: job.tables["cutter"].append({**job.cutter, "number": 2}),
+            replaced("G1 X70 F900", "G1 X30 F900\nT2 M6\nG43 H2\nS6000 M3\nG1 X70"),
+        ),
+        "unproven",
+        "tool-change-in-stock",
+    ),
+    Case(
+        "deep-hole",
+        "a hole of 12.7 diameters in one motion",
+        changes(DRILLING, hole("G81 X30 Y20 Z-76 R2 F600", 6000), cutter(flute_length_mm=80.0, overhang_mm=100.0)),
+        "unproven",
+        "deep-hole",
+    ),
+    Case(
+        "deep-hole-one-peck",
+        "G83 with a peck as deep as the hole",
+        changes(DRILLING, hole("G83 X30 Y20 Z-40 R2 Q50 F600", 6000)),
+        "unproven",
+        "deep-hole",
+    ),
+    Case(
+        "deep-hole-stated",
+        "a hole deeper than the drill may go without a retraction",
+        changes(DRILLING, cutter(hole_depth_mm=15.0), hole("G81 X30 Y20 Z-20 R2 F600", 6000)),
+        "exceeds",
+        "deep-hole",
+    ),
+    Case(
+        "deep-hole-pecks",
+        "nothing: the hole is drilled in pecks",
+        changes(DRILLING, hole("G83 X30 Y20 Z-40 R2 Q10 F600", 6000)),
+        "holds",
+        "",
+    ),
+    Case(
+        "cutter-speed",
+        "the spindle turns faster than the cutter may",
+        cutter(max_rpm=5000.0),
+        "exceeds",
+        "cutter-speed",
+    ),
+    Case("modes-z", "a mode of the cutter along its axis alone", modes("z"), "unproven", "stability_margin"),
+    Case("modes-x", "modes of the cutter along X alone", modes("x", "x"), "unproven", "stability_margin"),
+    Case("modes-xy", "nothing: modes of the cutter along X and Y", modes("x", "y"), "holds", ""),
+    Case(
+        "block-delete-retract",
+        "with block delete on, the retract is skipped and a rapid goes through the block",
+        replaced("G1 X70 F900\nG0 Z10", "G1 X-4 F900\n/G0 Z10\nG0 X70\nG0 Z10"),
+        "exceeds",
+        "rapid-cuts",
+    ),
+    Case(
+        "block-delete-off",
+        "with block delete off, a rapid goes through the block",
+        replaced("G1 X70 F900", "/G0 X20\nG1 X70 F900"),
+        "exceeds",
+        "rapid-cuts",
+    ),
+    Case(
+        "block-delete-load",
+        "with block delete on, the first of two levels is skipped and the force exceeds its limit",
+        changes(
+            replaced("G0 Z-2\nG1 X70 F900", "G0 Z-2\n/G1 X70 F900\n/G0 Z10\n/X-10\nG0 Z-4\nG1 X70 F900"),
+            stated("limits", force_n=200.0),
+        ),
+        "exceeds",
+        "block-delete",
+    ),
+    Case("block-delete-coolant", "nothing: a block without motions", replaced("M5\n", "/M9\nM5\n"), "holds", ""),
 )

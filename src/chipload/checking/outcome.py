@@ -81,6 +81,7 @@ class SimulationResult:
     workpiece : compliance of the workpiece where it is cut; None: no [workpiece] is stated
     blank : the stock before the program
     stock_check : findings on the stock as it is at each moment
+    skipped : with block delete on, where the program moves otherwise then
     """
 
     removal: Removal
@@ -96,6 +97,7 @@ class SimulationResult:
     workpiece: WorkpieceCompliance | None = None
     blank: trimesh.Trimesh | None = None
     stock_check: StockCheck = field(default_factory=StockCheck)
+    skipped: SimulationResult | None = None
 
     @property
     def limits(self) -> Mapping[str, float]:

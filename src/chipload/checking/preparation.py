@@ -18,6 +18,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.machine.machine import Machine
 from chipload.program.program import RAPID, Program
 from chipload.program.read import ProgramReading, times_of
+from chipload.program.travel import leading_rows
 from chipload.simulation.chips import counted, require_steps
 from chipload.simulation.heights.height_map import require_columns
 from chipload.simulation.moves import leans
@@ -123,15 +124,15 @@ def timed(
 
 
 def with_tool(program: Program, cutters: Mapping[int, Cutter]) -> Program:
-    """Return the program without the rapids at its beginning before a tool is in the spindle (T0).
+    """Return the program without the rapids at its beginning before a tool is in the spindle (T0), and without those
+    that end before each of X, Y and Z was sent somewhere, as they come from an unknown place.
 
-    They stay if the job states the tool that is in the spindle.
+    Those without a tool stay if the job states the tool that is in the spindle.
     """
-    if 0 in cutters:
-        return program
-    idle = (program.tool == 0) & (program.motion == RAPID)
+    idle = (program.tool == 0) & (program.motion == RAPID) & (0 not in cutters)
     first = len(program) if idle.all() else int(np.argmin(idle))
-    if first < 2:
+    first = max(first - 1, leading_rows(program.path_mode))
+    if first < 1:
         return program
-    kept = {f.name: getattr(program, f.name)[first - 1 :] for f in fields(program) if f.name != "labels"}
+    kept = {f.name: getattr(program, f.name)[first:] for f in fields(program) if f.name != "labels"}
     return replace(program, **kept)

@@ -16,6 +16,7 @@ from chipload.checking.rows import motion_rows, step_rows
 from chipload.checking.stability import StabilityResult
 from chipload.checking.workpiece import stock_box
 from chipload.errors import Finding, Severity
+from chipload.program.block_delete import with_block_delete
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, in_memory
 from chipload.result.limits import Columns
 from chipload.simulation.placement import nothing_cut, stock_placement
@@ -160,7 +161,22 @@ def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
         out += simulation.workpiece.findings
     out += _bodies(simulation)
     columns = simulation.removal.columns
-    return (*out, *ramp_findings(simulation.checks, columns), *range_findings(simulation.checks, columns))
+    out += [*ramp_findings(simulation.checks, columns), *range_findings(simulation.checks, columns)]
+    if simulation.skipped is not None:
+        out += _skipped_findings(simulation.skipped, out)
+    return tuple(out)
+
+
+def _skipped_findings(skipped: SimulationResult, known: list[Finding]) -> list[Finding]:
+    """Return what is found, and each limit that does not hold, with block delete on and not without it."""
+    without = {(f.code, f.line) for f in known}
+    out = [with_block_delete(f) for f in simulation_findings(skipped) if (f.code, f.line) not in without]
+    severity = {Verdict.EXCEEDS: Severity.EXCEEDS, Verdict.UNPROVEN: Severity.UNPROVEN}
+    for check in program_limits(skipped, skipped.removal.columns, "program"):
+        if check.state in severity:
+            finding = Finding("block-delete", check.line or 0, check.text, severity[check.state], check.place)
+            out.append(with_block_delete(finding))
+    return out
 
 
 def _bodies(simulation: SimulationResult) -> list[Finding]:

@@ -37,9 +37,10 @@ from chipload.simulation.hand import reversed_cuts
 from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.loads import Cuts
 from chipload.simulation.moves import leans
+from chipload.simulation.program_findings import ProgramSurroundings, program_findings
+from chipload.simulation.remaining_stock import Inside
 from chipload.simulation.steps import StepBlocks
 from chipload.simulation.surface import collisions, difference, in_stock
-from chipload.simulation.tool_change import changes_in_stock
 from chipload.stock.layers import LayeredStock
 from chipload.workers import Workers
 
@@ -99,6 +100,7 @@ def simulate_program(
         compliance = compliance_of_workpiece(inputs, reading, stock, progress)
     gives = bodies.stiffness if compliance is None else stiffness_of(elasticity.stiffness, cutters, compliance.steps)
     points, before, stiffness = bodies.stock_points, insides(stock), elasticity.stiffness
+    initial = stock.copied() if reading.skipped is not None else None
     # layers that were cut before lie face on face, which rays do not distinguish
     blank = None if stock.cut.any() else stock.body()
     kept = KeptPasses(checkpoint, passes_key(inputs, bodies.program) if checkpoint is not None else "")
@@ -148,8 +150,9 @@ def simulate_program(
         )  # fmt: skip
     removal = with_columns(removal, (*watched(gives, formed=made is not None), *PROGRAM_COLUMNS))
     errors = with_compliance_error(removal.resolution_error, removal.columns, compliance)
-    changes = changes_in_stock(program, cutters, *stock_box(stock), reading.retractions)
-    findings = (*removal.findings, *reversed_cuts(steps, removal.columns, cutters), *changes)
+    around = program_surroundings(inputs, reading, before, stock_box(stock))
+    more = program_findings(program, steps, removal.columns, cutters, around)
+    findings = (*removal.findings, *reversed_cuts(steps, removal.columns, cutters), *more)
     if compliance is not None:
         findings += compliance.jumps(removal.columns, max(c.diameter for c in cutters.values()))
     removal = replace(removal, resolution_error=errors, samples=recorder.samples(), findings=findings)
@@ -162,6 +165,9 @@ def simulate_program(
         touched += in_stock(
             steps, cutters, points, op.tolerance_mm, passing(0.8 + 2.0 * SHARE, "holders in the stock"), kept
         )  # fmt: skip
+    skipped = None
+    if reading.skipped is not None and initial is not None:
+        skipped = simulate_program(inputs, reading.skipped, initial, workers=workers)
     settings = {"kind": "simulate", **op.stated}
     compared_with = (*solids, *(["stock"] if inputs.checks.shank_in_stock else []))
     return SimulationResult(
@@ -169,7 +175,18 @@ def simulate_program(
         CollisionCheck(touched, compared_with, _no_holder(cutters), inputs.surroundings.fixture_meshes(machine)), left,
         gives.unknown, None if stability_watch is None else stability_of(inputs, stability_watch), compliance, blank,
         stock_check,
+        skipped,
     )  # fmt: skip
+
+
+def program_surroundings(
+    inputs: CheckInputs, reading: ProgramReading, inside: Inside, box: tuple[NDArray[np.float64], NDArray[np.float64]]
+) -> ProgramSurroundings:
+    """Return what a program is run in; ``inside`` and ``box`` are of the initial stock."""
+    bottom, meshes = float(box[0][2]), inputs.surroundings.fixture_meshes(inputs.machine)
+    below = any(float(mesh.bounds[0][2]) < bottom for mesh in meshes.values())
+    text = reading.program if reading.of_text else None
+    return ProgramSurroundings(inside, *box, below, reading.stops, reading.retractions, text)
 
 
 def passes_key(inputs: CheckInputs, program: Program) -> str:

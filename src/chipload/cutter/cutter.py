@@ -26,6 +26,7 @@ from chipload.cutter.barrel import FlankArc, flank_arc
 from chipload.cutter.bodies import Profile, check_body
 from chipload.cutter.strength import ToolStrength, check_material
 from chipload.errors import InputError
+from chipload.units import rpm_from_rad_s
 
 #: strength of a cutter of which only the modulus is stated
 ORDINARY = ToolStrength()
@@ -72,6 +73,9 @@ class Cutter:
     centre_cutting : whether its teeth reach its axis, so that it can plunge; None: not stated
     ramp_angle : greatest angle [rad] at which it may descend into solid material, up to pi/2; None: not known
     left_hand : cuts while the spindle turns counter-clockwise (M4); its helix is left-handed then
+    max_speed : greatest spindle speed [rad/s], > 0; None: not known
+    thread_pitch : of the thread that a tap cuts [mm], > 0; None: not known, or no tap
+    hole_depth : greatest depth [mm] that it drills without a retraction, > 0; None: not known
 
     Raises
     ------
@@ -106,6 +110,9 @@ class Cutter:
     left_hand: bool = False
     centre_cutting: bool | None = None
     ramp_angle: float | None = None
+    max_speed: float | None = None
+    thread_pitch: float | None = None
+    hole_depth: float | None = None
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: float, limit: str) -> None:
@@ -180,6 +187,12 @@ class Cutter:
         ramp = self.ramp_angle
         limit = "must be above 0 and at most 90 (a plunge)"
         need(ramp is None or 0.0 < ramp <= 0.5 * math.pi + 1e-9, "ramp_angle_deg", math.degrees(ramp or 0.0), limit)
+        for key, value, unit in (
+            ("max_rpm", self.max_speed, rpm_from_rad_s(1.0)),
+            ("thread_pitch_mm", self.thread_pitch, 1.0),
+            ("hole_depth_mm", self.hole_depth, 1.0),
+        ):
+            need(value is None or 0.0 < value < math.inf, key, unit * (value or 0.0), "must be above 0")
         need(self.number >= 0, "number", self.number, "must be at least 0")
 
     def _check_corner(self) -> None:

@@ -156,7 +156,8 @@ def _tip(shape: str, geometry: dict[str, Any], out: dict[str, Any], mm: float, l
             raise InputError(f"{label}: LCF, the flute length: must be given and above 0")
         pitch = (_number(geometry, "TP", label) or 0.0) * mm if shape == "tap" else 0.0
         body = tap_core(d, pitch, high) if 0.0 < pitch < 0.5 * d else cylinder(d, high)
-        return {"body_mm": body, "diameter_mm": 2.0 * body[0][0], "flute_length_mm": high}
+        thread = {"thread_pitch_mm": pitch} if pitch > 0.0 else {}
+        return {"body_mm": body, "diameter_mm": 2.0 * body[0][0], "flute_length_mm": high, **thread}
     if shape == "cone" and d is not None:
         angle, tip = _number(geometry, "TA", label), _number(geometry, "tip-diameter", label) or 0.0
         if angle is None or not 0.0 < angle < 90.0:

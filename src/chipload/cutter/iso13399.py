@@ -17,7 +17,7 @@ from chipload.files import read_regular
 SYMBOLS = {
     "DC": "diameter_mm", "RE": "corner_radius_mm", "LCF": "flute_length_mm", "APMX": "flute_length_mm",
     "DMM": "shank_diameter_mm", "DCONMS": "shank_diameter_mm", "FHA": "helix_deg", "ZEFF": "flutes", "NOF": "flutes",
-    "RMPX": "ramp_angle_deg",
+    "RMPX": "ramp_angle_deg", "RPMX": "max_rpm", "TP": "thread_pitch_mm",
 }  # fmt: skip
 _LARGEST_FILE = 20_000_000
 _VALUE = re.compile(

@@ -30,6 +30,7 @@ from chipload.cutter.strength import ToolMaterial, ToolStrength
 from chipload.cutter.tooltable import read_tool_table
 from chipload.errors import InputError, InputErrors
 from chipload.tables import nearest
+from chipload.units import rad_s_from_rpm
 
 #: endings of files with tool data
 ENDINGS = (".fctb", ".json", ".tools", ".p21", ".camotics", ".tbl")
@@ -72,6 +73,13 @@ class CutterTable(BaseModel):
     )
     ramp_angle_deg: float | None = Field(
         None, description="greatest angle at which it may descend into solid material (ISO 13399 RMPX), at most 90"
+    )
+    max_rpm: float | None = Field(None, description="greatest spindle speed (ISO 13399 RPMX)")
+    thread_pitch_mm: float | None = Field(
+        None, description="of a tap: pitch of its thread (ISO 13399 TP); a tap also has body_mm"
+    )
+    hole_depth_mm: float | None = Field(
+        None, description="greatest depth that it drills without a retraction; default: not known above 5 diameters"
     )
     flute_length_mm: float | None = Field(None, description="length of the cutting edges along the axis")
     overhang_mm: float | None = Field(None, description=f"length from the holder to the tip, at most {LONGEST:g}")
@@ -174,6 +182,9 @@ class CutterTable(BaseModel):
             left_hand=values.get("left_hand", False),
             centre_cutting=values.get("centre_cutting"),
             ramp_angle=math.radians(values["ramp_angle_deg"]) if "ramp_angle_deg" in values else None,
+            max_speed=rad_s_from_rpm(values["max_rpm"]) if "max_rpm" in values else None,
+            thread_pitch=values.get("thread_pitch_mm"),
+            hole_depth=values.get("hole_depth_mm"),
         )
 
     def _from_file(self, folder: Path) -> dict[str, Any]:

@@ -6,7 +6,7 @@ each leads to the other, so that a :class:`ProgramReading` always has both.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, cast, get_args
@@ -20,6 +20,7 @@ from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
 from chipload.program.apt.cutters import read_cutters
 from chipload.program.apt.reader import apt_text, read_apt
+from chipload.program.block_delete import WITH, same_motions, with_block_delete, without_deleted_blocks
 from chipload.program.check import check_program
 from chipload.program.commands import Commands
 from chipload.program.gcode.reader import gcode_text, read_gcode
@@ -29,6 +30,7 @@ from chipload.program.program import Program
 from chipload.program.reconcile import agree, tool_comments
 from chipload.program.setup import Setup
 from chipload.program.swivel import Swivel
+from chipload.program.tapping import tapping_findings, thread_comments
 from chipload.program.time import row_times
 from chipload.program.to_axes import LIMITS, to_axes
 from chipload.program.to_work import TOLERANCE_MM, axes_of, to_work, work_frame
@@ -71,6 +73,9 @@ class ProgramReading:
     placed : number of the work offset whose coordinates are those of the workpiece; None: the first that is used
     findings : by the reader
     violations : violations of the machine's limits
+    of_text : whether it comes from a text, which begins from an unknown place and ends behind its last row
+    skipped : the program with block delete on, where it moves otherwise then; ``violations`` and ``findings`` are of
+        both
     """
 
     commands: Commands
@@ -79,6 +84,8 @@ class ProgramReading:
     placed: int | None
     findings: tuple[Finding, ...]
     violations: tuple[Finding, ...]
+    of_text: bool = False
+    skipped: ProgramReading | None = None
 
     @property
     def axes(self) -> Floats:
@@ -97,6 +104,11 @@ class ProgramReading:
         elif not self.machine.chain.rotary and any(f.code in OF_LENGTHS for f in self.findings):
             out.append("travel of Z: tool lengths not stated (program.tools): only what it spans is compared")
         return tuple(out)
+
+    @property
+    def stops(self) -> tuple[int, ...]:
+        """Lines at which the program stops for its operator."""
+        return tuple(f.line for f in self.findings if f.code == "nc-stop")
 
     @property
     def retractions(self) -> tuple[int, ...]:
@@ -185,7 +197,36 @@ def read_program(
     if speed is not None:
         commands = replace(commands, spindle=_turning(commands.spindle, speed))
         program = replace(program, spindle=_turning(program.spindle, speed))
-    return _checked(commands, program, machine, (*agreed, *findings), more, placed)
+    taps = tapping_findings(program, setup.cutters, thread_comments(text) if kind != "apt" else {})
+    breaks = tuple(f for f in taps if f.severity is Severity.EXCEEDS)
+    findings += tuple(f for f in taps if f.severity is not Severity.EXCEEDS)
+    reading = _checked(commands, program, machine, (*agreed, *findings), more, placed)
+    reading = replace(reading, violations=(*reading.violations, *breaks), of_text=True)
+    other = without_deleted_blocks(text) if kind != "apt" else text
+    if other == text:
+        return reading
+    try:
+        skipped = read_program(
+            path, machine, dialect=dialect, tools=tools, feed=feed, speed=speed, tolerance=tolerance, text=other,
+            setup=setup, comments=comments, strict=strict,
+        )  # fmt: skip
+    except InputError as refusal:
+        unread = Finding("block-delete", 0, f"{WITH}, the program cannot be read: {refusal}", Severity.UNPROVEN)
+        return replace(reading, findings=(*reading.findings, unread))
+    if same_motions(program, skipped.program):
+        return reading
+    return replace(
+        reading,
+        skipped=skipped,
+        findings=(*reading.findings, *_others(skipped.findings, reading.findings)),
+        violations=(*reading.violations, *_others(skipped.violations, reading.violations)),
+    )
+
+
+def _others(findings: tuple[Finding, ...], known: tuple[Finding, ...]) -> Iterator[Finding]:
+    """Findings with block delete on that are not made without it."""
+    without = {(f.code, f.line, f.text) for f in known}
+    return (with_block_delete(f) for f in findings if (f.code, f.line, f.text) not in without)
 
 
 def _turning(spindle: Floats, speed: float) -> Floats:

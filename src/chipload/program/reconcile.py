@@ -29,12 +29,13 @@ SAME_MM = 1e-3
 #: angles that differ by at most this are one [rad]
 SAME_ANGLE = math.radians(0.5)
 
-_COMMENT = re.compile(r"\(([^()\n]*)\)|;([^\n]*)")
-_TOOL = r"\bT(?:OOL)?\s*(?:NO\.?|NUMBER)?\s*[-:#=]?\s*T?(?P<tool>[0-9]{1,8})\b"
+#: a comment of NC text, and the number of a tool in it
+COMMENT = re.compile(r"\(([^()\n]*)\)|;([^\n]*)")
+TOOL = r"\bT(?:OOL)?\s*(?:NO\.?|NUMBER)?\s*[-:#=]?\s*T?(?P<tool>[0-9]{1,8})\b"
 _VALUE = r"(?P<value>[0-9]+/[0-9]+|[0-9]+\.?[0-9]*|\.[0-9]+)(?![0-9./])\s*(?P<unit>MM|INCH(?:ES)?\b|IN\b|\")?"
 _STATED = (
-    re.compile(rf"{_TOOL}[^()\n]{{0,80}}?\b(?:D\s*[=:]?|(?:DIAMETER|DIAM|DIA)\.?\s*[-=:]?)\s*{_VALUE}"),
-    re.compile(rf"{_TOOL}\s*[-=:|,]\s*{_VALUE}\s*(?:DIA|FLAT|BALL|BULL|END|MILL|ROUND|SLOT|DRILL|SPOT|CENTER)"),
+    re.compile(rf"{TOOL}[^()\n]{{0,80}}?\b(?:D\s*[=:]?|(?:DIAMETER|DIAM|DIA)\.?\s*[-=:]?)\s*{_VALUE}"),
+    re.compile(rf"{TOOL}\s*[-=:|,]\s*{_VALUE}\s*(?:DIA|FLAT|BALL|BULL|END|MILL|ROUND|SLOT|DRILL|SPOT|CENTER)"),
 )
 #: D and the number of an offset: no point, no sign between them, no unit
 _OFFSET = re.compile(r"\bD([0-9]{1,8})\b(?![./]|\s*(?:MM|INCH|IN\b|\"))")
@@ -70,7 +71,7 @@ def unit_mm(text: str) -> float:
     >>> unit_mm("(G20) G21 G0 X1"), unit_mm("G20 G0 X1")
     (1.0, 25.4)
     """
-    found = _UNITS.search(_COMMENT.sub(" ", text).upper())
+    found = _UNITS.search(COMMENT.sub(" ", text).upper())
     return MM_PER["inch"] if found is not None and found[1] in ("20", "70") else 1.0
 
 
@@ -78,7 +79,7 @@ def _comments(text: str, own: float) -> Iterator[tuple[int, StatedDiameter]]:
     for number, line in enumerate(text.split("\n"), start=1):
         if "(" not in line and ";" not in line:
             continue
-        for comment in _COMMENT.finditer(line):
+        for comment in COMMENT.finditer(line):
             comment_text = (comment[1] if comment[1] is not None else comment[2]).upper()
             hits = (pattern.search(_without_offsets(comment_text)) for pattern in _STATED)
             hit = next((hit for hit in hits if hit is not None), None)
@@ -89,7 +90,7 @@ def _comments(text: str, own: float) -> Iterator[tuple[int, StatedDiameter]]:
 
 def _without_offsets(comment: str) -> str:
     """A comment without the numbers of offsets, which are no diameters."""
-    tool = re.search(_TOOL, comment)
+    tool = re.search(TOOL, comment)
     both = _LENGTH_OFFSET.search(comment) is not None
     return _OFFSET.sub(lambda hit: "" if both or (tool and tool["tool"] == hit[1]) else hit[0], comment)
 

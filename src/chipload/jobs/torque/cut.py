@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable
 from chipload.machine.machine import Machine
 from chipload.program.build import helix, plunge, rapid
 from chipload.program.program import RAPID, Program
-from chipload.program.read import read_program
+from chipload.program.read import ProgramReading, read_program
 from chipload.program.setup import Setup
 from chipload.progress import Progress, silent
 from chipload.simulation.chips import remove
@@ -142,21 +143,7 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
         round_table = stated(job.table.round, "round")
         program = round_program(round_table, Place(job.shell), job.cutters[round_table.cutter])
     else:
-        table = stated(job.table.program, "program")
-        feed = mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None
-        reading = read_program(
-            job.program_file, machine, dialect=table.dialect, feed=feed, tolerance=table.tolerance_mm,
-            setup=Setup(table.parameters, table.work_offsets, job.cutters), comments=table.tool_comments,
-            progress=progress,
-        )  # fmt: skip
-        if reading.violations:
-            raise InputError(f"{job.program_file.name}: exceeds a limit of the machine: {reading.violations[0]}")
-        gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
-        if gaps:
-            raise InputError(
-                f"{job.program_file.name}: {gaps[0]}: chipload cannot control a line that it does not read"
-            )
-        program = with_tool(reading.program, job.cutters)
+        program = with_tool(read_file(job, job.program_file, machine, progress).program, job.cutters)
     if np.abs(program.axis - (0.0, 0.0, 1.0)).max() > 1e-9:
         raise InputError("program: the cutter's axis leans: must be +Z all along; use a cutter with the wall's taper")
     cuts = program.motion != RAPID
@@ -169,6 +156,31 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
             "not 0: the torque is estimated at one speed"
         )
     return program
+
+
+def read_file(job: TorqueJob, file: Path, machine: Machine, progress: Progress = silent) -> ProgramReading:
+    """Read the program of the job.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, does not hold on the machine, or moves otherwise with block delete on.
+    """
+    table = stated(job.table.program, "program")
+    feed = mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None
+    reading = read_program(
+        file, machine, dialect=table.dialect, feed=feed, tolerance=table.tolerance_mm,
+        setup=Setup(table.parameters, table.work_offsets, job.cutters), comments=table.tool_comments,
+        progress=progress,
+    )  # fmt: skip
+    if reading.violations:
+        raise InputError(f"{file.name}: exceeds a limit of the machine: {reading.violations[0]}")
+    gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
+    if gaps:
+        raise InputError(f"{file.name}: {gaps[0]}: chipload cannot control a line that it does not read")
+    if reading.skipped is not None:
+        raise InputError(f"{file.name}: moves otherwise with block delete on: take its blocks with / out, or their /")
+    return reading
 
 
 def round_program(table: RoundTable, place: Place, cutter: Cutter) -> Program:

@@ -195,7 +195,8 @@ def _run_findings(case: ControllerCase, run: ControllerRun) -> tuple[Finding, ..
 
 def _findings(outcome: TorqueResult) -> tuple[Finding, ...]:
     """Findings on the whole result."""
-    out = [Finding(f.code, f.line, f.text, Severity.EXCEEDS, f.place, f.row) for f in outcome.findings]
+    # a rapid that cuts has no severity of its own
+    out = [replace(f, severity=f.severity or Severity.EXCEEDS) for f in outcome.findings]
     if not outcome.attainable:
         limit, what = outcome.allowable.limit, "wall" if isinstance(outcome.wall, ShellWall) else "workpiece"
         text = (

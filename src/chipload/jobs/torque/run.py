@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from chipload.checking.clamped import require_clamped
 from chipload.checking.default_checks import default_checks
 from chipload.checking.settings import CheckSettings
+from chipload.checking.workpiece import insides, stock_box
 from chipload.control.fuzzy import FuzzyTable, read_fuzzy, standard
 from chipload.control.identification import aliased, bandwidth
 from chipload.control.override import Override
@@ -20,12 +21,12 @@ from chipload.control.spindle import first_order
 from chipload.control.spindle_model import Spindle
 from chipload.control.wall import Loads, WallPath
 from chipload.cutting.material import Material, material_named, need_directions, read_material
-from chipload.errors import InputError
+from chipload.errors import Finding, InputError
 from chipload.jobs.simulation.values import workpiece_of
 from chipload.jobs.tables import value_of
 from chipload.jobs.torque.allowable import allowable, wall_of
 from chipload.jobs.torque.controllers import cases_of, controller_of, shortest
-from chipload.jobs.torque.cut import CutSteps, program_of, require_linear, resolution_of
+from chipload.jobs.torque.cut import CutSteps, program_of, read_file, require_linear, resolution_of
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.outcome import (
     HELD,
@@ -51,6 +52,8 @@ from chipload.result.provenance import provenance_of, title_of
 from chipload.simulation.accuracy import energy_balance
 from chipload.simulation.chips import counted
 from chipload.simulation.estimate import estimate
+from chipload.simulation.program_findings import ProgramSurroundings, program_findings
+from chipload.simulation.steps import StepBlocks
 from chipload.stock.blank_mesh import blank_mesh
 from chipload.stock.layers import LayeredStock
 
@@ -101,10 +104,25 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         ),
         step_checks=step_checks(own.real, own.loads, material, _fastest(cases)),
         blank=Blank(blank_mesh(_real_stock(job, program)), job.cutters),
-        findings=(*own.planned.removal.findings, *(own.real.removal.findings if own.real is not own.planned else ())),
+        findings=(
+            *own.planned.removal.findings,
+            *(own.real.removal.findings if own.real is not own.planned else ()),
+            *_of_program(job, program, machine, own.real),
+        ),
         resolution_error=own.real.removal.resolution_error,
         energy_balance={name: energy_balance(cut.removal.columns, material.Ktc) for name, cut in both},
     )
+
+
+def _of_program(job: TorqueJob, program: Program, machine: Machine, real: CutSteps) -> tuple[Finding, ...]:
+    """Findings on the whole program in the real stock, besides its loads."""
+    stock, fine = _real_stock(job, program), resolution_of(job)
+    around = ProgramSurroundings(insides(stock), *stock_box(stock), machine.table is not None)
+    if job.program_file is not None:
+        reading = read_file(job, job.program_file, machine)
+        around = replace(around, stops=reading.stops, retractions=reading.retractions, text=reading.program)
+    steps = StepBlocks(program, fine.step_mm, fine.tolerance)
+    return program_findings(program, steps, real.removal.columns, job.cutters, around)
 
 
 def _real_stock(job: TorqueJob, program: Program) -> LayeredStock:

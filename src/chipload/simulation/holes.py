@@ -1,0 +1,68 @@
+"""Deep holes that are drilled in one motion.
+
+Chips that do not leave a hole jam in the flutes and break the drill: what it drills between two retractions is bounded
+by its diameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import Finding, Severity
+
+#: a hole of at most so many diameters is drilled in one motion: jobber drills are made for 3 to 5
+DEEP = 5.0
+#: a step goes down the axis if the ramp angle is at least this [deg]
+AXIAL_DEG = 90.0 - 1e-3
+
+
+def deep_holes(columns: Mapping[str, NDArray[Any]], cutters: Mapping[int, Cutter]) -> tuple[Finding, ...]:
+    """Return a finding for each tool that drills deeper in one motion than it is known to: its deepest hole.
+
+    The depth is that between two retractions in which material lies under the centre.
+
+    Parameters
+    ----------
+    columns : of the removal, one row for each step; ``ramp_deg`` among them
+    cutters : by tool
+    """
+    if "ramp_deg" not in columns or not len(columns["ramp_deg"]):
+        return ()
+    ramp, tool = np.asarray(columns["ramp_deg"]), np.asarray(columns["tool"])
+    drills = (ramp >= AXIAL_DEG) & (np.asarray(columns["chip_volume_mm3"]) > 0.0)
+    length = np.diff(np.asarray(columns["s_mm"]), prepend=0.0)
+    # runs of steps that drill with one tool
+    begins = drills & ~(np.append(False, drills[:-1]) & np.append(False, tool[1:] == tool[:-1]))
+    run = np.cumsum(begins)
+    depth = np.bincount(run[drills], length[drills], int(run[-1]) + 1)
+    out = []
+    for number, cutter in sorted(cutters.items()):
+        own = np.unique(run[drills & (tool == number)])
+        if not len(own) or cutter.body:
+            continue
+        most = DEEP * cutter.diameter if cutter.hole_depth is None else cutter.hole_depth
+        deepest = int(own[np.argmax(depth[own])])
+        if depth[deepest] <= most * (1.0 + 1e-9):
+            continue
+        row = int(np.flatnonzero(drills & (run == deepest))[-1])
+        ratio = depth[deepest] / cutter.diameter
+        known = cutter.hole_depth is not None
+        text = (
+            f"tool {number} drills {depth[deepest]:.4g} mm, {ratio:.3g} diameters, without a retraction: "
+            + (
+                f"hole_depth_mm of its [[cutter]] is {most:g}"
+                if known
+                else "whether its chips leave the hole is not known"
+            )
+            + ": drill in pecks (G83)"
+            + ("" if known else ", or state hole_depth_mm in its [[cutter]]")
+        )
+        place = (float(columns["x_mm"][row]), float(columns["y_mm"][row]), float(columns["z_mm"][row]))
+        severity = Severity.EXCEEDS if known else Severity.UNPROVEN
+        out.append(Finding("deep-hole", int(columns["line"][row]), text, severity, place, row))
+    return tuple(out)
