@@ -116,7 +116,10 @@ def test_an_endless_loop_is_refused():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"dialect": "okuma"}, "dialect = 'okuma': must be linuxcnc, fanuc or sinumerik"),
+        (
+            {"dialect": "heidenhain"},
+            "control = heidenhain: its texts are not RS-274: must be one of linuxcnc, fanuc, sinumerik",
+        ),
         ({"units": "cm"}, "units = 'cm': must be mm or inch"),
         ({"start": (0.0, 0.0)}, "start: must be nine finite numbers, X Y Z A B C U V W"),
         ({"parameters": {0: 1.0}}, "parameter #0: the number must be from 1 to 5601"),

@@ -79,7 +79,7 @@ def test_a_program_beyond_the_machine(files: Path):
         (["check", "a.ngc", "--machine", "vcm"], "machine vcm: "),
         (["check", "a.xyz", "--machine", "vmc"], "a.xyz: the ending .xyz is not known: must be one of .ngc "),
         (["check", "none.ngc", "--machine", "vmc"], "none.ngc: cannot be read: "),
-        (["check", "bad.ngc", "--machine", "vmc"], "bad.ngc: line 2: "),
+        (["check", "bad.ngc", "--machine", "vmc"], "bad.ngc: no motion: nothing to check: line 2: "),
         (["check", "a.ngc", "--machine", "vmc", "--dialect", "bosch"], "dialect = 'bosch': must be one of linuxcnc, "),
         (["convert", "a.ngc", "b.xyz", "--machine", "vmc"], "the ending .xyz cannot be written: must be one of .ngc "),
         (["convert", "p.cls", "b.ngc", "--machine", "vmc"], "program row "),

@@ -144,9 +144,12 @@ def test_refused(moves, message):
     assert str(error.value) == message
 
 
-def test_refused_in_yz():
-    with pytest.raises(InputError, match=r"not in the plane YZ \(G19\): select G17 or G18"):
-        Compensation(1, 1.0, YZ, at(0, 0))
+def test_the_plane_yz_is_compensated():
+    """In Y and Z as in X and Y: the offset of a line to the left of +Y lies at +Z."""
+    beside = Compensation(1, 1.0, YZ, (0.0,) * 9)
+    moves = [*beside.line(LINE, (0.0, 5.0, 0.0, *[0.0] * 6), 0), *beside.line(LINE, (0.0, 9.0, 0.0, *[0.0] * 6), 0)]
+    moves += beside.finish()
+    assert [m.end[:3] for m in moves] == [(0.0, 5.0, 1.0), (0.0, 9.0, 1.0)]
 
 
 def flattened(rows, start):

@@ -112,7 +112,7 @@ def test_what_g41_compensates_for():
 def test_d_of_other_dialects():
     """Fanuc's D is a register, Sinumerik's an edge: without data both mean the cutter in the spindle."""
     text = "T5 M6\n" + SIDE.replace("D1", "D31").replace("Y20", "Y20.").replace("X30", "X30.")
-    commands, findings = read_gcode(text, dialect="fanuc", diameters={5: 12.0})
+    commands, findings = read_gcode(text, dialect="fanuc", diameters={5: 12.0}, compensation="control")
     assert commands.position[-1, 1] == pytest.approx(26.0)
     assert max(f.severity for f in findings) is Severity.NOTE
     tools = read_tool_table("T1 P1 D3\nT5 P5 D12\n")[0]

@@ -36,6 +36,18 @@ DialectName = Annotated[
     str | None,
     typer.Option("--dialect", help="linuxcnc, fanuc, sinumerik, heidenhain or apt; default: by the file extension"),
 ]
+ControlName = Annotated[
+    str | None,
+    typer.Option("--control", help="control of the program, e.g. haas or fanuc; default: by what the program shows"),
+]
+UnitName = Annotated[
+    str | None, typer.Option("--unit", help="mm or inch: lengths before the program states a unit (G20, G21)")
+]
+ToolsUnit = Annotated[str | None, typer.Option("--tools-unit", help="mm or inch: unit of the tool table")]
+CompensationKind = Annotated[
+    str | None,
+    typer.Option("--compensation", help="control, wear or off: what the offsets for G41 and G42 hold"),
+]
 FeedIfUnsaid = Annotated[float | None, typer.Option("--feed-mm-min", help="feed of cuts before the program states one")]
 ParameterValues = Annotated[
     list[str] | None,

@@ -16,9 +16,16 @@ if TYPE_CHECKING:
     from chipload.result import Result
 
 
-def setup_of(parameters: Sequence[str], work_offsets: Sequence[str]) -> Setup:
-    """The parameters and work offsets of the controller, from the options."""
-    from chipload.program.setup import Setup
+def setup_of(
+    parameters: Sequence[str],
+    work_offsets: Sequence[str],
+    control: str | None = None,
+    unit: str | None = None,
+    tools_unit: str | None = None,
+    compensation: str | None = None,
+) -> Setup:
+    """The parameters and work offsets of the controller and its control, from the options."""
+    from chipload.program.setup import Setup, StatedControl
 
     def pairs(option: str, texts: Sequence[str]) -> Iterator[tuple[str, list[float]]]:
         for text in texts:
@@ -34,7 +41,9 @@ def setup_of(parameters: Sequence[str], work_offsets: Sequence[str]) -> Setup:
     for name, values in given.items():
         if len(values) != 1:
             raise InputError(f"--parameter {name}: has {len(values)} numbers: must have one")
-    return Setup({name: values[0] for name, values in given.items()}, dict(pairs("work-offset", work_offsets)))
+    single = {name: numbers[0] for name, numbers in given.items()}
+    stated = StatedControl(control, unit, tools_unit, compensation)
+    return Setup(single, dict(pairs("work-offset", work_offsets)), control=stated)
 
 
 def machine_of(name: str | None, notice: Callable[[str], None] = show) -> Machine:

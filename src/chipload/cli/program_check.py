@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from chipload.cli.inputs import feed_of, machine_of
 from chipload.errors import InputError, Severity, grouped
 from chipload.terminal import EXCEEDED, bar, show
 
 if TYPE_CHECKING:
-    from chipload.machine.machine import Machine
     from chipload.program.read import ProgramReading
     from chipload.program.setup import Setup
 
-#: texts longer than this are read in one dialect only [bytes]
-LONG = 3_000_000
 #: [mm] default tolerance
 TOLERANCE_MM = 0.001
 #: default machines: the first that has the axes of the program is used
@@ -64,6 +60,9 @@ def check_program(
         raise refused[0]  # that of the simplest machine
     if machine is None:
         show(f"no machine is stated: {on.name} is assumed; name yours with --machine, as its limits and times differ")
+    if reading.recognition is not None:
+        found = reading.recognition
+        show(f"control: {found.control.title} ({'stated' if found.stated else 'a guess'})")
     for line in (*finding_lines(reading), *(f"not checked: {item}" for item in reading.unchecked)):
         show(line)
     gaps = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
@@ -75,27 +74,7 @@ def check_program(
         f"{path.name}: {len(reading.commands)} motions on machine {on.name}, {lengths(reading.program).sum():.6g} mm, "
         f"{seconds.sum() / 60.0:.4g} min; {box} mm"
     )
-    if gaps and dialect is None and machine is None:
-        _other_dialect(path, on, len(gaps), {"tools": table, "feed": feed, "setup": setup})
     count = len(reading.violations)
     state = f"unproven: {gaps[0]}" if gaps else f"the program stays within the limits of machine {on.name}"
     show(f"{count} {'finding exceeds' if count == 1 else 'findings exceed'} the limits" if count else state)
     return EXCEEDED if reading.violations or gaps else 0
-
-
-def _other_dialect(path: Path, machine: Machine, gaps: int, options: dict[str, Any]) -> None:
-    """Name the dialect that leaves least of a text unread, where its ending names none."""
-    from chipload.program.read import ENDINGS, read_program
-
-    if ENDINGS.get(path.suffix.lower(), "") is not None or path.stat().st_size > LONG:
-        return
-    left = {machine.dialect: gaps}
-    for dialect in ("fanuc", "sinumerik"):
-        with contextlib.suppress(InputError):
-            reading = read_program(path, machine, dialect=dialect, **options)
-            left.setdefault(dialect, sum(f.severity >= Severity.UNPROVEN for f in reading.findings))
-    best = min(left, key=lambda name: left[name])
-    if best != machine.dialect:
-        show(
-            f"read as {machine.dialect}; as {best} it has {left[best]} unproven findings, not {gaps}: --dialect {best}"
-        )

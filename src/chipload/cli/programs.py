@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from chipload.cli.app import (
+    CompensationKind,
+    ControlName,
     Debug,
     DialectName,
     FeedIfUnsaid,
@@ -16,6 +18,8 @@ from chipload.cli.app import (
     Sets,
     ToleranceMm,
     Tools,
+    ToolsUnit,
+    UnitName,
     WorkOffsets,
     app,
 )
@@ -41,6 +45,10 @@ def check(
     tolerance_mm: ToleranceMm = TOLERANCE_MM,
     parameters: ParameterValues = None,
     work_offsets: WorkOffsets = None,
+    control: ControlName = None,
+    unit: UnitName = None,
+    tools_unit: ToolsUnit = None,
+    compensation: CompensationKind = None,
     sets: Sets = None,
     debug: Debug = False,
 ) -> None:
@@ -58,7 +66,7 @@ def check(
         if sets and not job:
             raise InputError("--set: applies to a job: leave it out for other files")
         if not job and file.suffix.lower() not in BY_ENDING:
-            setup = setup_of(parameters or (), work_offsets or ())
+            setup = setup_of(parameters or (), work_offsets or (), control, unit, tools_unit, compensation)
             return check_program(file, machine, tools, dialect, feed_mm_min, tolerance_mm, setup)
         for option, value in (
             ("machine", machine),
@@ -67,6 +75,10 @@ def check(
             ("feed-mm-min", feed_mm_min),
             ("parameter", parameters or None),
             ("work-offset", work_offsets or None),
+            ("control", control),
+            ("unit", unit),
+            ("tools-unit", tools_unit),
+            ("compensation", compensation),
         ):
             if value is not None:
                 raise InputError(f"--{option}: applies to a program: in a job, state it in the job file")

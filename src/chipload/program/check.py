@@ -6,6 +6,7 @@ Notation: a row's line is that of its source where it has one; rows are counted 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,9 @@ from chipload.program.program import DWELL, LINE, RAPID, Program
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
 
-def check_program(program: Program, machine: Machine, travel: bool = True) -> tuple[Finding, ...]:
+def check_program(
+    program: Program, machine: Machine, travel: bool = True, probes: Sequence[int] = ()
+) -> tuple[Finding, ...]:
     """Span of the axes (arcs with their bulge), greatest feed, range of the spindle, spindle at rest in a cut, tilted
     axis.
 
@@ -28,6 +31,7 @@ def check_program(program: Program, machine: Machine, travel: bool = True) -> tu
     Parameters
     ----------
     travel : whether the span is compared
+    probes : lines of the source that probe, where the spindle rests
 
     One finding a code and axis: the worst row and its value, how many rows, the first of them. Codes: `machine-limit`,
     `machine-feed`, `machine-spindle`, `machine-spindle-off`, `machine-axis`, `program-start`.
@@ -74,7 +78,10 @@ def check_program(program: Program, machine: Machine, travel: bool = True) -> tu
     )
     report("machine-spindle", turning & (over > 1.0 + 1e-12), over, text, rpm_from_rad_s(1.0) * speed)
     none = np.zeros(len(program))
-    report("machine-spindle-off", cuts & ~turning, none, "cuts with the spindle at rest: state a spindle speed", none)
+    cutting = cuts & ~np.isin(program.line, probes)
+    report(
+        "machine-spindle-off", cutting & ~turning, none, "cuts with the spindle at rest: state a spindle speed", none
+    )
     tilt = np.degrees(np.arccos(np.clip(program.axis[:, 2], -1.0, 1.0)))
     tilted = (np.hypot(program.axis[:, 0], program.axis[:, 1]) > 1e-9) | (program.axis[:, 2] < 0.0)
     text = f"axis tilted by {{:g}} deg: machine {machine.name} has three axes"

@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from chipload.errors import InputError
-from chipload.program.commands import ARC, DWELL, PLANE_AXES, RAPID, YZ
+from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID
 
 #: a change of direction below this is no corner [rad]
 SMOOTH = 0.05
@@ -67,17 +67,19 @@ class Compensation:
     ----------
     side : +1 tool left of the contour (G41), -1 right (G42)
     radius : of the tool [mm]; a negative one stands on the other side
-    plane : XY (G17) or ZX (G18)
+    plane : XY (G17), ZX (G18) or YZ (G19)
     start : (9,) programmed position where compensation begins [mm, rad]
     shift : (2,) from the tool's centre to the point that is commanded, in the plane's axes [mm]
     slack : by how much an arc may turn more than programmed before it is refused [rad]; LinuxCNC's is 0.0254 in a text
         in mm, 0.001 in one in inches
     square : the first motion ends square to the start of the contour
+    sharp : round a corner the offsets go on to where they cross or, where the path turns by more than a right angle, by
+        r each; else an arc goes round it
 
     Raises
     ------
     InputError
-        Plane YZ; later, a motion beside which the tool does not fit.
+        Of its methods: the tool does not fit beside a motion.
     """
 
     def __init__(
@@ -90,15 +92,14 @@ class Compensation:
         shift: tuple[float, float] = (0.0, 0.0),
         slack: float = 0.0254,
         square: bool = False,
+        sharp: bool = False,
     ) -> None:
-        if plane == YZ:
-            raise InputError("radius compensation: not in the plane YZ (G19): select G17 or G18")
         self._side = side if radius >= 0.0 else -side
         # beside a contour of metres a smaller radius is lost in the coordinates
         self._radius = abs(radius) if abs(radius) >= LEAST_RADIUS else 0.0
         self._first, self._second, self._along = PLANE_AXES[plane]
         self._shift = complex(*shift)
-        self._slack, self._square = slack, square
+        self._slack, self._square, self._sharp, self._anew = slack, square, sharp, False
         self._programmed = self._centre = tuple(start)
         self._held: list[CentreMove] = []
         self._front: _Offset | None = None
@@ -168,6 +169,22 @@ class Compensation:
         self._held.append(CentreMove(DWELL, self._centre, (0.0, 0.0), 0, payload))
         return self._release() if self._front is None else []
 
+    def again(self, side: int, radius: float) -> list[CentreMove]:
+        """Motions that are final where G41 or G42 is repeated: the last one ends square to its own end."""
+        self._check()
+        done = self._release()
+        self._side, self._radius = side if radius >= 0.0 else -side, abs(radius)
+        self._anew = self._front is not None
+        return done
+
+    def skip(self, end: Sequence[float]) -> list[CentreMove]:
+        """Motions that are final where the contour up to ``end`` (9) is left out: the next one is a first one."""
+        done = self._release()
+        self._front, self._square = None, True
+        self._programmed = tuple(end)
+        self._centre = self._with(end, self._flat(self._centre))
+        return done
+
     def finish(self) -> list[CentreMove]:
         """The motions that were held back (G40)."""
         self._check()
@@ -183,6 +200,9 @@ class Compensation:
     ) -> list[CentreMove]:
         """Join ``new`` to the front; what is final."""
         c = self._flat(self._centre)
+        if self._anew:
+            self._anew = False
+            return self._append(new, end, payload)
         if front.entry and self._square:
             self._trim(new.m)
             return self._append(new, end, payload)
@@ -201,6 +221,8 @@ class Compensation:
             return self._append(new, end, payload)
         if not new.turns:
             self._check()
+        if self._sharp:
+            return self._outside(front, new, corner, away, end, payload)
         # the other axes go round the corner with the new motion, the one along the tool waits
         around = self._with(end, new.m, along=self._centre[self._along])
         rapid = new.motion == RAPID
@@ -208,6 +230,30 @@ class Compensation:
         move = CentreMove(RAPID if rapid else ARC, around, centre, 0 if rapid else -self._side, payload)
         done = [*self._release(), self._out(move)]
         self._centre = around
+        return [*done, *self._append(new, end, payload)]
+
+    def _outside(
+        self, front: _Offset, new: _Offset, corner: complex, away: float, end: Sequence[float], payload: object
+    ) -> list[CentreMove]:
+        """Straight pieces round a corner that turns away from the tool by ``away``.
+
+        Reference: Fanuc B-63944EN-1, "Cutter or Tool Nose Radius Compensation", offset mode.
+        """
+        c, r = self._flat(self._centre), self._radius
+        first, second = (c - corner) / r, (new.m - corner) / r
+        if away <= 0.5 * math.pi + 1e-9:
+            points = [corner + r * (first + second) / (1.0 + (first * second.conjugate()).real)]
+        else:
+            along = -self._side * 1j * r
+            points = [c + along * first, new.m - along * second]
+        if not front.turns:
+            at = points.pop(0)
+            self._held = [move._replace(end=self._with(move.end, at)) for move in self._held]
+            self._centre = self._with(self._centre, at)
+        done, motion = self._release(), RAPID if new.motion == RAPID else LINE
+        for at in (*points, new.m) if new.turns else points:
+            self._centre = self._with(end, at, along=self._centre[self._along])
+            done.append(self._out(CentreMove(motion, self._centre, (0.0, 0.0), 0, payload)))
         return [*done, *self._append(new, end, payload)]
 
     def _crossing(self, front: _Offset, new: _Offset, corner: complex) -> complex:

@@ -22,12 +22,15 @@ from chipload.program.apt.cutters import read_cutters
 from chipload.program.apt.reader import apt_text, read_apt
 from chipload.program.block_delete import WITH, same_motions, with_block_delete, without_deleted_blocks
 from chipload.program.check import check_program
-from chipload.program.commands import Commands
-from chipload.program.gcode.reader import gcode_text, read_gcode
+from chipload.program.commands import PROBE, Commands
+from chipload.program.control import CONTROLS, control_named
+from chipload.program.gcode.reader import gcode_text
 from chipload.program.gcode.tools import ToolTable, read_tool_table
 from chipload.program.heidenhain.reader import heidenhain_text, read_heidenhain, tool_definitions
+from chipload.program.nc_text import NcText, read_nc
 from chipload.program.program import Program
-from chipload.program.reconcile import agree, tool_comments
+from chipload.program.recognise import Recognition, recognise
+from chipload.program.reconcile import agree
 from chipload.program.setup import Setup
 from chipload.program.swivel import Swivel
 from chipload.program.tapping import tapping_findings, thread_comments
@@ -57,6 +60,8 @@ ENDINGS: dict[str, Dialect | None] = {
 OF_LENGTHS = ("nc-length-unknown", "heidenhain-tool-unknown")
 #: findings on retractions to positions of the machine that are not known, and so have no row
 OF_RETRACTIONS = ("nc-machine-retraction", "heidenhain-m91")
+#: languages that are RS-274
+TEXTS_OF_AXES = ("linuxcnc", "fanuc", "sinumerik")
 #: largest tool table [bytes]
 LARGEST_TABLE = 10_000_000
 
@@ -76,6 +81,7 @@ class ProgramReading:
     of_text : whether it comes from a text, which begins from an unknown place and ends behind its last row
     skipped : the program with block delete on, where it moves otherwise then; ``violations`` and ``findings`` are of
         both
+    recognition : the control that the text was read for; None: of no NC text
     """
 
     commands: Commands
@@ -86,6 +92,7 @@ class ProgramReading:
     violations: tuple[Finding, ...]
     of_text: bool = False
     skipped: ProgramReading | None = None
+    recognition: Recognition | None = None
 
     @property
     def axes(self) -> Floats:
@@ -139,7 +146,7 @@ def read_program(
     Parameters
     ----------
     text : that stands for that of the file; None: the file is read
-    dialect : None: by the ending of the file, for NC texts that of the machine
+    dialect : name of a control, or apt; None: by the ending of the file, for NC texts by what the text shows
     tools : diameters and lengths; without it they count as 0
     feed : [mm/s] of cuts before the text states a feed
     speed : [rad/s] of the spindle, clockwise, before the text starts it, or in all of a text that never does
@@ -155,10 +162,12 @@ def read_program(
         what is stated about a cutter contradicts the job's.
     """
     path, setup = Path(path), setup or Setup()
-    kind = dialect_of(path, machine, dialect)
+    recognition, text = control_of(path, machine, dialect, setup.control.name, text)
+    kind = "apt" if recognition is None else cast("Dialect", recognition.control.language)
     values, origins, placed = setup.values(kind), setup.origins(kind), setup.placed(kind)
     swivel = Swivel(machine, placed)
-    if kind == "apt":
+    said: tuple[Finding, ...] = ()
+    if recognition is None:
         lengths = tools.lengths() if tools is not None else {}
         text = apt_text(path) if text is None else text
         shapes = read_cutters(text)[0] if setup.cutters else {}
@@ -167,7 +176,7 @@ def read_program(
         commands, found = to_axes(program, machine, tool_lengths=lengths, tolerance=tolerance)
         more = tuple(f for f in found if f.code not in LIMITS)
     else:
-        if kind == "heidenhain":
+        if kind not in TEXTS_OF_AXES:
             text = heidenhain_text(path) if text is None else text
             stated = tool_definitions(text) if setup.cutters and comments else {}
             agreed = agree(path.name, setup.cutters, tools=tools, comments=stated)
@@ -181,13 +190,10 @@ def read_program(
             )  # fmt: skip
         else:
             text = gcode_text(path) if text is None else text
-            stated = tool_comments(text) if setup.cutters and comments else {}
-            agreed = agree(path.name, setup.cutters, tools=tools, comments=stated)
-            commands, findings = read_gcode(
-                text, name=path.name, folder=path.parent, dialect=kind, tools=tools, parameters=values,
-                origins=origins, diameters=setup.diameters(), feed=None if feed is None else mm_min_from_mm_s(feed),
-                lenient=not strict, swivel=swivel, progress=progress,
-            )  # fmt: skip
+            nc = NcText(path, text, recognition, setup, tools, comments, origins, values)
+            agreed = agree(path.name, setup.cutters, tools=nc.table, comments=nc.stated)
+            rate = None if feed is None else mm_min_from_mm_s(feed)
+            commands, findings, said = read_nc(nc, rate, strict, swivel, progress)
         if len(commands) == 0:
             left_out = next((f": {f}" for f in findings if f.severity >= Severity.UNPROVEN), "")
             raise InputError(f"{path.name}: no motion: nothing to check{left_out}")
@@ -200,8 +206,8 @@ def read_program(
     taps = tapping_findings(program, setup.cutters, thread_comments(text) if kind != "apt" else {})
     breaks = tuple(f for f in taps if f.severity is Severity.EXCEEDS)
     findings += tuple(f for f in taps if f.severity is not Severity.EXCEEDS)
-    reading = _checked(commands, program, machine, (*agreed, *findings), more, placed)
-    reading = replace(reading, violations=(*reading.violations, *breaks), of_text=True)
+    reading = _checked(commands, program, machine, (*said, *agreed, *findings), more, placed)
+    reading = replace(reading, violations=(*reading.violations, *breaks), of_text=True, recognition=recognition)
     other = without_deleted_blocks(text) if kind != "apt" else text
     if other == text:
         return reading
@@ -269,7 +275,8 @@ def _checked(
     placed: int | None = None,
 ) -> ProgramReading:
     """A program held against the limits of a machine."""
-    violations = [*check_program(program, machine, travel=False)]
+    probes = np.unique(commands.line[commands.motion == PROBE])
+    violations = [*check_program(program, machine, travel=False, probes=probes.tolist())]
     if not machine.chain.rotary:
         violations += travel_findings(commands, machine, not any(f.code in OF_LENGTHS for f in findings))
     if machine.chain.rotary:
@@ -336,6 +343,33 @@ def read_tools(path: str | Path) -> ToolTable:
     return read_tool_table(text, name=path.name)[0]
 
 
+def control_of(
+    path: Path, machine: Machine, dialect: str | None, control: str | None, text: str | None
+) -> tuple[Recognition | None, str | None]:
+    """The control of a file, None for CL data, and its text where it had to be read to tell.
+
+    Raises
+    ------
+    InputError
+        A control or the ending is not known, or two statements differ.
+    """
+    if control is not None:
+        profile = control_named(control)
+        if dialect is not None and dialect_of(path, machine, dialect) != profile.language:
+            raise InputError(
+                f"program.control = {control!r} and dialect = {dialect!r}: {control} is {profile.language}: state one"
+            )
+        return Recognition(profile, True), text
+    kind = dialect_of(path, machine, dialect)
+    if kind not in CONTROLS:
+        return None, text
+    ending = path.suffix.lower()
+    if dialect is not None or ENDINGS.get(ending) is not None:
+        return Recognition(control_named(dialect or kind), True), text
+    text = gcode_text(path) if text is None else text
+    return recognise(text, machine.dialect), text
+
+
 def dialect_of(path: Path, machine: Machine, stated: str | None = None) -> Dialect:
     """The dialect of a file: as it is said, else by its ending, for NC texts that of the machine.
 
@@ -345,6 +379,8 @@ def dialect_of(path: Path, machine: Machine, stated: str | None = None) -> Diale
         The dialect or the ending is not known.
     """
     if stated is not None:
+        if stated in CONTROLS:
+            return cast("Dialect", control_named(stated).language)
         if stated not in get_args(Dialect):
             raise InputError(f"dialect = {stated!r}: must be one of {', '.join(get_args(Dialect))}")
         return cast("Dialect", stated)

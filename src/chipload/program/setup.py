@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
+from chipload.program.control import ControlSettings
 
 #: number from which tools that have only a name count
 FIRST_NAMED = 9001
@@ -23,6 +24,34 @@ _LETTER = {"sinumerik": "r", "heidenhain": "q"}
 _OFFSET = re.compile(r"G(5[4-9])(?:\.([123]))?(?:\s*P([0-9]{1,3}))?|G(5[0-9]{2})")
 
 Nine = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class StatedControl:
+    """What a job states about the control of its program; None: not stated.
+
+    Parameters
+    ----------
+    name : of a profile
+    unit : of lengths before the text says G20 or G21: ``mm`` or ``inch``
+    tools_unit : of the tool table
+    compensation : what an offset for G41 holds: ``control`` (the cutter's radius), ``wear``, ``off`` (G41 is left out)
+    settings : of the control
+    """
+
+    name: str | None = None
+    unit: str | None = None
+    tools_unit: str | None = None
+    compensation: str | None = None
+    settings: ControlSettings = field(default_factory=ControlSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse a value that is not one of the known ones."""
+        units, kinds = ("mm", "inch"), ("control", "wear", "off")
+        for key, known in (("unit", units), ("tools_unit", units), ("compensation", kinds)):
+            value = getattr(self, key)
+            if value is not None and value not in known:
+                raise InputError(f"program.{key} = {value!r}: must be one of {', '.join(known)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +64,14 @@ class Setup:
     work_offsets : 3 to 9 numbers [mm, deg] by code
     placed_in : code of the work offset in whose coordinates the workpiece is; None: the first that the program uses
     cutters : of the tools, by number
+    control : what is stated about the control and the units
     """
 
     parameters: Mapping[str, float] = field(default_factory=dict)
     work_offsets: Mapping[str, Sequence[float]] = field(default_factory=dict)
     cutters: Mapping[int, Cutter] = field(default_factory=dict)
     placed_in: str | None = None
+    control: StatedControl = field(default_factory=StatedControl)
 
     def values(self, dialect: str) -> dict[int | str, float]:
         """Value of each parameter by number, or by name in lower case without spaces.

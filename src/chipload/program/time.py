@@ -13,7 +13,8 @@ that of G64 P; without it the machine's corner tolerance; 0 for G61; under G61.1
 and a feed, at a dwell, a change of tool or of spindle, and at both ends, the machine stands. Acceleration is constant
 in pieces (no jerk limit), and to change the tool or to run up the spindle takes no time.
 
-Where a rotary axis moves, the rows of a line of the text take together at least what the rates of all axes need.
+Where a rotary axis moves, the rows of a line of the text take together at least what the rates of all axes need, and
+what the controller gives them.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from chipload.program.commands import ARC, PLANE_AXES, Commands, spirals
 from chipload.program.motions import bases, directions, is_arc, lengths, radii, sweeps
 from chipload.program.path_mode import PathControl, resolved
 from chipload.program.program import ARC_CCW, ARC_CW, ARC_SKEW_MM, DWELL, LINE, RAPID, Program
+from chipload.program.to_work import turning_times
 from chipload.program.trajectory import planned_times
 
 Floats = NDArray[np.float64]
@@ -102,7 +104,8 @@ def row_times(
     np.add.at(whole, at, own)
     np.add.at(count, at, 1.0)
     if machine.planner is None:
-        least = np.concatenate([[0.0], row_time_limited(machine, axes)])[: len(commands)]
+        wanted = turning_times(commands)
+        least = np.concatenate([[wanted[0]], row_time_limited(machine, axes, wanted[1:])])[: len(commands)]
     else:
         least = _axis_path_times(commands, machine, machine.planner)
     least = np.where(commands.path_mode[:, 0] == PathControl.UNPLACED, 0.0, least)

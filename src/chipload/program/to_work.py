@@ -32,7 +32,7 @@ from chipload.program.commands import (
     extents,
     spirals,
 )
-from chipload.program.motions import lengths, spans
+from chipload.program.motions import spans
 from chipload.program.program import ARC_CCW, ARC_CW, ARC_SKEW_MM, Program
 from chipload.program.program import DWELL as WORK_DWELL
 from chipload.program.program import LINE as WORK_LINE
@@ -147,9 +147,10 @@ def to_work(
     program = Program(**columns, feed=commands.feed, labels=commands.labels)
     cut = turning & ~commands.tcp & (commands.motion != DWELL)
     findings += _off_normal(commands, axis)
-    program = _with_controller_time(program, commands, cut)
+    time = turning_times(commands, cut)
+    program = _with_controller_time(program, time)
     if cut.any():
-        program = _linearised(program, machine, axes, tool, zero, cut, tolerance)
+        program = _linearised(program, machine, axes, tool, zero, cut, time, tolerance)
     return program, findings
 
 
@@ -274,14 +275,24 @@ def _at_rows(commands: Commands, rows: Ints, position: Floats) -> Commands:
     return Commands(**{**columns, "position": position}, frames=commands.frames, labels=commands.labels)
 
 
-def _with_controller_time(program: Program, commands: Commands, turning: NDArray[np.bool_]) -> Program:
-    """The feed of the tip: rows that turn a rotary axis take the time that the controller gives them."""
-    cuts = turning & np.isin(commands.motion, (LINE, PROBE, ARC))
-    if not cuts.any():
+def turning_times(commands: Commands, turning: NDArray[np.bool_] | None = None) -> Floats:
+    """(n,) time [s] that the controller gives to each cut on which a rotary axis moves the tip; 0 for other rows.
+
+    Parameters
+    ----------
+    turning : (n,) such rows; None: those that move a rotary axis without tip control
+    """
+    rows = _turning(commands) & ~commands.tcp if turning is None else turning
+    cuts = rows & np.isin(commands.motion, (LINE, PROBE, ARC)) & (commands.feed > 0.0)
+    return np.where(cuts, extents(commands) / np.where(cuts, commands.feed, 1.0), 0.0)
+
+
+def _with_controller_time(program: Program, time: Floats) -> Program:
+    """The feed of the tip: rows that turn a rotary axis take the (n,) time that the controller gives them."""
+    if not time.any():
         return program
-    time = extents(commands) / np.where(commands.feed > 0.0, commands.feed, 1.0)
     own = spans(program) / np.where(time > 0.0, time, 1.0)
-    return replace(program, feed=np.where(cuts & (own > 0.0), own, program.feed))
+    return replace(program, feed=np.where((time > 0.0) & (own > 0.0), own, program.feed))
 
 
 def _linearised(
@@ -291,6 +302,7 @@ def _linearised(
     tool: Floats,
     zero: Floats,
     cut: NDArray[np.bool_],
+    time: Floats,
     tolerance: float,
 ) -> Program:
     """The program with its turning rows in pieces along which the tip goes straight within the tolerance.
@@ -313,9 +325,13 @@ def _linearised(
         total = np.zeros(stop)
         before = np.vstack([columns["p_work"][:1], columns["p_work"][:-1]])
         np.add.at(total, row, np.linalg.norm(columns["p_work"] - before, axis=1))
-        chord = lengths(program)
-        stretched = np.isin(row, np.flatnonzero(cut)) & (columns["motion"] == WORK_LINE) & (chord[row] > 1e-9)
-        columns["feed"][stretched] *= (total[row] / np.where(chord[row] > 0.0, chord[row], 1.0))[stretched]
+        # a full turn ends where it began: what counts is the way along the pieces, or the turn of the axis at the tip
+        turned = np.zeros(stop)
+        old = np.vstack([columns["axis"][:1], columns["axis"][:-1]])
+        np.add.at(turned, row, 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(columns["axis"] - old, axis=1), 1.0)))
+        way = np.where(total > 1e-9, total, turned)[row]
+        timed = (columns["motion"] == WORK_LINE) & (time[row] > 0.0) & (way > 1e-12)
+        columns["feed"][timed] = way[timed] / time[row][timed]
         parts.append(columns)
         begin = stop
     joined = {name: np.concatenate([p[name] for p in parts]) for name in names}

@@ -68,7 +68,7 @@ def test_turned_coordinates():
 
 @pytest.mark.parametrize(
     ("on", "off"),
-    [("G16", "G15"), ("G51 P2.", "G50"), ("G51.1 X0.", "G50.1"), ("G68.2 X0. Y0. Z0. I0. J30. K0.", "G69"),
+    [("G68.2 X0. Y0. Z0. I0. J30. K0.", "G69"),
      ("G7.1 C50.", "G7.1 C0"), ("G12.1", "G13.1")],
 )  # fmt: skip
 def test_motions_in_coordinates_that_are_not_read_are_left_out_until_they_end(on, off):

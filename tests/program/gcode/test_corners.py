@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from chipload.errors import Finding, InputError, Severity
+from chipload.errors import Finding, Severity
 from chipload.program.commands import ARC, LINE, Commands
 from chipload.program.gcode.reader import read_gcode
 
@@ -133,5 +133,6 @@ def test_inches_and_values_of_variables() -> None:
     got, sharp = read("#5=0.2\nG20\nG1 X1. F20. ,R#5\nG1 Y1.\nM30", "fanuc")
     assert sharp == []
     np.testing.assert_allclose(got.position[1:3, :2], [[20.32, 0.0], [25.4, 5.08]], atol=1e-9)
-    with pytest.raises(InputError, match="a corner must be from 0"):
-        read("G1 X1. F20. ,R-1.\nG1 Y1.\nM30", "fanuc")
+    commands, findings = read_gcode("G0 X0. Y0.\nG1 X1. F20. ,R-1.\nG1 Y1. F20.\nM30", dialect="fanuc", lenient=True)
+    assert commands.line.tolist() == [1, 3]
+    assert ["a corner must be from 0" in f.text for f in findings] == [True]

@@ -17,14 +17,16 @@ from chipload.checking.workpiece import FinishedPart, Fixture, Surroundings
 from chipload.cutting.material import Material, material_named, read_material
 from chipload.errors import Finding, InputError, Severity, grouped, worst_severity
 from chipload.jobs.simulation.job import ProgramJob
+from chipload.jobs.simulation.tables import ProgramTable
 from chipload.jobs.simulation.values import elasticity_of, settings_of, stock_of
 from chipload.jobs.tables import stated, value_of
 from chipload.machine.ini import read_ini
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.machine.saved_offsets import saved_offsets
 from chipload.machine.table import MachineTable
+from chipload.program.control import ControlSettings
 from chipload.program.read import ProgramReading, line_times, read_program, read_tools
-from chipload.program.setup import Setup
+from chipload.program.setup import Setup, StatedControl
 from chipload.progress import Progress, silent
 from chipload.result.provenance import provenance_of, title_of
 from chipload.stock.layers import LayeredStock
@@ -105,11 +107,17 @@ def read_for(job: ProgramJob, machine: Machine, progress: Progress = silent, tex
         speed=rad_s_from_rpm(table.speed_rpm) if table.speed_rpm is not None else None,
         tolerance=table.tolerance_mm,
         text=text,
-        setup=Setup(table.parameters, {**offsets, **table.work_offsets}, job.cutters, table.placed_in),
+        setup=Setup(table.parameters, {**offsets, **table.work_offsets}, job.cutters, table.placed_in, _stated(table)),
         comments=table.tool_comments,
         progress=progress,
     )
     return replace(reading, findings=(*found, *reading.findings)) if found else reading
+
+
+def _stated(table: ProgramTable) -> StatedControl:
+    """Return what a job states about the control of its program."""
+    settings = ControlSettings(**table.settings.model_dump())
+    return StatedControl(table.control, table.unit, table.tools_unit, table.compensation, settings)
 
 
 def program_of(

@@ -31,14 +31,57 @@ from chipload.jobs.tables import (
 )
 
 
+class ControlSettingsTable(Table):
+    """Settings of the control that change how its programs are read. One that is not stated has the usual value of the
+    control; where it matters, the result is then unproven.
+    """
+
+    point: Literal["increment", "whole"] | None = Field(
+        None, description="numbers without a decimal point: least increments, or whole units (calculator type)"
+    )
+    feed_point: Literal["increment", "whole"] | None = Field(None, description="the same for F (Haas Setting 77)")
+    dwell_s: Positive | None = Field(None, le=60.0, description="seconds in a unit of P of a dwell, e.g. 0.001")
+    rotary_diameter_mm: Positive | None = Field(
+        None, le=1e5, description="diameter at which degrees count as lengths for F (Haas Settings 34 and 79)"
+    )
+
+
 class ProgramTable(Table):
     """The program: an NC program or CL data."""
 
     file: Text = Field(description="path of the program")
     dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = Field(
-        None, description="controller whose rules apply; default: that of the machine"
+        None, description="language of the program; default: by the file extension and by what the program shows"
     )
+    control: (
+        Literal[
+            "linuxcnc",
+            "fanuc",
+            "haas",
+            "sinumerik",
+            "heidenhain",
+            "mazak",
+            "okuma",
+            "mitsubishi",
+            "brother",
+            "grbl",
+            "mach3",
+        ]
+        | None
+    ) = Field(None, description="control whose rules apply; default: by what the program shows and by the machine")
+    unit: Literal["mm", "inch"] | None = Field(
+        None, description="unit of lengths before the program states one (G20, G21)"
+    )
+    compensation: Literal["control", "wear", "off"] | None = Field(
+        None,
+        description="what offsets for G41 and G42 hold: control: the radius of the cutter; wear: wear alone, so that "
+        "the path is that of the centre; off: G41 and G42 are left out",
+    )
+    settings: ControlSettingsTable = Field(default_factory=ControlSettingsTable.model_construct)
     tools: Text | None = Field(None, description="LinuxCNC tool table")
+    tools_unit: Literal["mm", "inch"] | None = Field(
+        None, description="unit of the tool table; default: mm, or what agrees with the diameters in the program"
+    )
     feed_mm_min: Positive | None = Field(None, le=1e5, description="feed of cuts before the program states one")
     speed_rpm: Positive | None = Field(
         None, le=1e6, description="clockwise spindle speed until the program starts the spindle"

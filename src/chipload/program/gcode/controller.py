@@ -6,12 +6,14 @@ Notation: positions are nine numbers X Y Z A B C U V W [mm, deg]; F is a speed p
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, cast
 
 from chipload.errors import InputError, Severity
 from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, XY, YZ, ZX
 from chipload.program.compensation import CentreMove, Compensation
+from chipload.program.control import Control, control_named
 from chipload.program.corners import Corner, Piece, joined
 from chipload.program.corners import turns as turns_at
 from chipload.program.gcode import arcs
@@ -19,6 +21,7 @@ from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.parameters import Parameters
 from chipload.program.gcode.state import AXES, LINEAR, NO_MOTION, ZERO, Datum, Nine, State, nine
 from chipload.program.gcode.tilted_plane import machine_of, position_of
+from chipload.program.gcode.tool_rows import ToolRows
 from chipload.program.gcode.tools import Tool, ToolTable
 from chipload.program.gcode.track import Context, Findings, MotionRows
 from chipload.program.path_mode import PathControl
@@ -26,6 +29,7 @@ from chipload.units import MM_PER
 
 if TYPE_CHECKING:
     from chipload.program.gcode.frames import ProgramFrame
+    from chipload.program.gcode.words import MacroCall
     from chipload.program.swivel import Swivel
 
 PLANES = {170: XY, 180: ZX, 190: YZ, 171: XY, 181: ZX, 191: YZ}
@@ -50,11 +54,12 @@ class Controller:
     start : (9,) position of the axes at the start [mm, deg]
     most_rows : rows that the text may make
     strict : what LinuxCNC refuses is refused; without it, it is a finding as far as the rest can be read
-    dialect : name of the dialect
+    control : its profile
     origins : (9,) [mm, deg] and rotation [deg] of work offsets, by number
     diameters : [mm] of the cutters by tool, for compensation where the table states none
     feed : [mm/min] of cuts before the text states one; None: such a cut is refused
     swivel : the machine, for tilted working planes; None: they are not read
+    compensation : what an offset for G41 holds: ``control``, ``wear``, ``off``; None: not stated
     """
 
     def __init__(
@@ -67,29 +72,44 @@ class Controller:
         start: Nine = ZERO,
         most_rows: int = 10_000_000,
         strict: bool = True,
-        dialect: str = "linuxcnc",
+        control: Control | None = None,
         origins: Mapping[int, tuple[Nine, float]] | None = None,
         diameters: Mapping[int, float] | None = None,
         feed: float | None = None,
         swivel: Swivel | None = None,
+        compensation: str | None = None,
     ):
         self.state = State(scale=MM_PER[units])
-        self.dialect, self.feed, self.swivel = dialect, feed, swivel
+        self.control = control = control_named("linuxcnc") if control is None else control
+        self.feed, self.swivel, self.compensation = feed, swivel, compensation
+        self.state.motion = self.state.group_one = control.modal.motion_at_start
+        self.state.old_level = control.modal.old_level_at_start
         self.origins, self.diameters = dict(origins or {}), dict(diameters or {})
         self.machine_scale = MM_PER[machine_units]
         self.tools: dict[int, Tool] | None = None if tools is None else dict(tools.tools)
         self.strict = strict
-        self.strict_tools = dialect == "linuxcnc"
+        self.strict_tools = control.offsets.names_tools
         self.findings = Findings()
         self.track = MotionRows(most_rows)
-        self.parameters = Parameters(parameters, self._note_unproven)
+        self.parameters = Parameters(parameters, self._note_unproven, control.macros.highest_variable)
         self.line = 0
+        #: least increments count where a number has no point; None: not yet decided
+        self.turning_rule = "" if control.feed.rotary == "linear first" else control.feed.rotary
+        self.increments = control.numbers.point == "increment"
+        #: lines of the text that the fast way may not read, as their numbers have no point; None: all may
+        self.pointless: re.Pattern[str] | None = None
+        #: radius and angle [mm, deg] of polar coordinates (G16); None: they are off
+        self.polar: tuple[float, float] | None = None
+        #: factors along X Y Z and the point [mm] that stays (G51, G51.1); None: none
+        self.scaled: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+        #: macro that is called after each motion (G66), and the level of calls at which it was stated
+        self.modal_macro: tuple[MacroCall, int] | None = None
         self.label = 0
         self.returned = (0.0, 0.0)
         #: codes of a motion that is not read and lasts; empty: none
         self.unread = ""
-        #: Fanuc: tapping starts the spindle (M29), and the cycle that lasts is fine boring (G76)
-        self.rigid = self.fine = False
+        #: Fanuc: the cycle that lasts is fine boring (G76)
+        self.fine = False
         #: Sinumerik: the drilling cycle behind each block (MCALL), its name and its arguments
         self.modal_hole: tuple[str, list[float | None]] | None = None
         #: Sinumerik: whether the spindle of the tapping block that is read turns against K; None: no such block
@@ -127,6 +147,20 @@ class Controller:
                 self.store(5201 + 20 * number, at)
                 self.parameters.numbered[5210 + 20 * number] = turn
         self._start(start)
+        self.tool_rows = ToolRows(self)
+
+    def increment(self, letter: str) -> float:
+        """What a number without a decimal point counts in [units of the text]: 1 unless in least increments."""
+        numbers = self.control.numbers
+        if not self.increments or letter not in numbers.increment_letters:
+            return 1.0
+        inch = numbers.increment_inch if self.state.scale != 1.0 else numbers.increment_mm
+        return numbers.increment_deg if letter in "abc" else inch
+
+    def stated_tool_offset(self, kind: str, number: int) -> None:
+        """An offset that the program sets counts from the next G43 or G41 of its number on."""
+        if kind.startswith("length"):
+            self.once("nc-tool-offset", f"the program sets the {kind} of offset {number}: it counts from its next G43")
 
     def _note_unproven(self, code: str, text: str) -> None:
         self.findings.once(code, self.line, text, Severity.UNPROVEN)
@@ -145,7 +179,7 @@ class Controller:
 
     def refused(self, code: str, text: str) -> None:
         """A finding on what LinuxCNC refuses and other controllers take."""
-        severity = Severity.UNPROVEN if self.dialect == "linuxcnc" else Severity.NOTE
+        severity = Severity.UNPROVEN if self.control.text.refuses_unknown else Severity.NOTE
         self.findings.add(code, self.line, text, severity)
 
     # -- offsets ---------------------------------------------------------------------------------------------------
@@ -248,7 +282,7 @@ class Controller:
                 f"{name} D{number}: the tool table states no D for tool {number}, so the controller compensates by "
                 f"0: {assumed}: write D{diameter:g} in the table",
             )
-        elif known != number and self.dialect == "linuxcnc":
+        elif known != number and self.control.offsets.names_tools:
             self.leave_out("nc-diameter-unknown", f"{name} D{number}: no diameter of tool {number} is known: {assumed}")
         else:
             self.once("nc-diameter-of-cutter", f"{name} D{number}: {assumed}")
@@ -267,14 +301,19 @@ class Controller:
         self.end_corner()
         if code == 400:
             if self._beside is not None:
-                self._emit(self._beside.finish())
+                self._compensated(Compensation.finish, self.state.at)
                 self._beside = None
             state.compensation = 400
             return
-        name = f"G{code / 10:g}"
-        self.not_compensated(name)
-        if PLANES[state.plane] == YZ or state.plane % 10:
-            raise InputError(f"{name}: compensation lies in the planes of G17 and G18")
+        name, rule = f"G{code / 10:g}", self.control.compensation
+        if self.compensation == "off":
+            self.once("nc-compensation-off", f"{name}: is left out: program.compensation = off")
+            return
+        if not rule.again:
+            self.not_compensated(name)
+        if state.plane not in rule.planes:
+            planes = " and ".join(f"G{p // 10}" for p in rule.planes)
+            raise InputError(f"{name}: compensation lies in the planes of {planes}")
         if code % 10:
             if d is None:
                 raise InputError(f"{name}: D is missing: the diameter")
@@ -286,13 +325,19 @@ class Controller:
             if number < 0:
                 raise InputError(f"{name}: D{number}: must be the number of a tool")
             tool = self.find_tool(number, "D")
-            radius = 0.5 * self.compensation_diameter(name, number, tool.diameter)
+            radius = self._offset_radius(name, number, tool.diameter)
             turned = tool.orientation
             if turned and state.plane != 180:
                 raise InputError(f"{name}: tool {number} has an orientation for turning: it goes with G18")
         if not 0 <= turned <= 9:
             raise InputError(f"{name}: orientation {turned}: must be from 0 to 9")
         x, z = TIPS[turned]
+        if self._beside is not None:
+            if code != state.compensation:
+                self.leave_out("nc-compensation-side", f"{name}: changes the side while the other one is on")
+            self._emit(self._beside.again(1 if code < 420 else -1, radius))
+            state.compensation = code
+            return
         self._beside = Compensation(
             1 if code < 420 else -1,
             radius,
@@ -300,8 +345,40 @@ class Controller:
             state.at,
             shift=(radius * z, radius * x),
             slack=ARC_SLACK[state.scale != 1.0],
+            square=rule.square_entry,
+            sharp=rule.outside_corner == "intersection",
         )
         state.compensation = code
+
+    def _offset_radius(self, name: str, number: int, stated: float) -> float:
+        """Radius [mm] of an offset of D: geometry and wear; ``stated``: diameter of the tool table, 0 for none."""
+        rows = self.tool_rows
+        wear, own = rows.wear(number), rows.radius(number)
+        if own is not None:
+            return own + wear
+        if self.compensation == "wear":
+            return wear
+        radius = 0.5 * self.compensation_diameter(name, number, stated) + wear
+        if self.control.offsets.offset_holds == "unknown" and stated == 0.0 and number and self.compensation is None:
+            self.once(
+                "nc-compensation-unstated",
+                f"{name} D{number}: whether offset {number} holds the cutter's radius, so that the path moves by "
+                f"{radius:g} mm, or wear alone (0) is not stated: program.compensation = control or wear",
+                Severity.UNPROVEN,
+            )
+        return radius
+
+    def _compensated(self, make: Callable[[Compensation], list[CentreMove]], end: Nine) -> None:
+        """Rows beside the contour; where the tool does not fit, it goes straight on to the next part of the contour."""
+        assert self._beside is not None
+        try:
+            moves = make(self._beside)
+        except InputError as error:
+            if self.strict:
+                raise
+            self.leave_out("nc-compensation", f"{error}: this part of the contour is left out")
+            moves = self._beside.skip(end)
+        self._emit(moves)
 
     def _emit(self, moves: list[CentreMove]) -> None:
         """Rows of motions beside the contour."""
@@ -374,9 +451,9 @@ class Controller:
     def _carry(self, piece: Piece) -> None:
         end, (context, line) = nine(piece.end), cast(tuple[int, int], piece.tail)
         if self._beside is not None and piece.motion == ARC:
-            self._emit(self._beside.arc(end, piece.centre, piece.turns, (context, line)))
+            self._compensated(lambda b: b.arc(end, piece.centre, piece.turns, (context, line)), end)
         elif self._beside is not None:
-            self._emit(self._beside.line(piece.motion, end, (context, line)))
+            self._compensated(lambda b: b.line(piece.motion, end, (context, line)), end)
         elif piece.motion == ARC:
             self.track.arc((ARC, *end, context, line), *piece.centre, piece.turns)
         else:
@@ -440,11 +517,34 @@ class Controller:
         if motion == RAPID:
             return self.context(0)
         kind = self.kind_of(end)
+        a, b = self.state.at, end
+        if rate is None and self.turning_rule and a[3:6] != b[3:6] and not self.state.tcp:
+            return self._together(kind, a, b)
         if rate is None:
             return self.context(kind)
-        a, b = self.state.at, end
         span = math.dist(a[:3], b[:3]) or math.dist(a[6:], b[6:]) or math.dist(a[3:6], b[3:6])
         return self._inverse(kind, span, rate)
+
+    def _together(self, kind: int, a: Nine, b: Nine) -> int:
+        """Context of a cut whose F counts lengths and degrees together."""
+        scale = self.state.scale
+        straight = math.dist(a[:3] + a[6:], b[:3] + b[6:])
+        turn, factor = math.dist(a[3:6], b[3:6]), scale
+        if self.turning_rule == "diameter":
+            diameter = self.control.settings.rotary_diameter_mm
+            if diameter is None:
+                self.once(
+                    "nc-rotary-diameter",
+                    "F of a cut with a rotary axis counts its degrees as lengths on a diameter that is a setting of "
+                    "the control: degrees are taken as units: state program.settings.rotary_diameter_mm",
+                    Severity.UNPROVEN,
+                )
+            else:
+                factor = math.pi * diameter / 360.0
+        path = math.hypot(straight, factor * turn)
+        per_second = self._feed(1)
+        share = (straight if kind == 1 else math.radians(turn)) / path
+        return self.track.context(self.carried(per_second * share))
 
     def _inverse(self, kind: int, span: float, rate: float) -> int:
         unit = self.state.scale if kind == 1 else 1.0
@@ -458,7 +558,7 @@ class Controller:
         if self.in_corner:
             self._piece(motion, end, (0.0, 0.0), 0, context)
         elif self._beside is not None:
-            self._emit(self._beside.line(motion, end, (context, self.line)))
+            self._compensated(lambda b: b.line(motion, end, (context, self.line)), end)
         else:
             self.track.rows.append((motion, *end, context, self.line))
         self.state.at = end
@@ -485,7 +585,7 @@ class Controller:
         if self.in_corner:
             self._piece(ARC, end, centre, turns, context)
         elif self._beside is not None:
-            self._emit(self._beside.arc(end, centre, turns, (context, self.line)))
+            self._compensated(lambda b: b.arc(end, centre, turns, (context, self.line)), end)
         else:
             self.track.arc((ARC, *end, context, self.line), *centre, turns)
         self.state.at = end

@@ -21,6 +21,8 @@ SPIN, STOP = -1, -2
 CYCLES = frozenset({730, 740, 810, 820, 830, 840, 850, 860, 870, 871, 880, 890})
 #: back boring as a Fanuc does it, under a number of its own
 FANUC_BACK_BORING = 871
+#: tapping, right- and left-hand
+TAPPING = frozenset({840, 740})
 #: cycles that need a P word, a Q word
 NEED_P = frozenset({820, 860, 880, 890})
 NEED_Q = frozenset({730, 830})

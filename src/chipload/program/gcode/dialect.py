@@ -73,7 +73,7 @@ class Dialect:
         """Carry out a line that says which block comes next; whether it does."""
         return False
 
-    def call(self, words: dict[str, float]) -> tuple[str, int]:
+    def call(self, words: dict[str, float], c: Controller) -> tuple[str, int]:
         """Label and repeats of M98."""
         if "p" not in words:
             raise InputError("M98: P is missing: the number of the subroutine")

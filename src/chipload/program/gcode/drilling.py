@@ -46,6 +46,26 @@ class Drilling:
     def __init__(self, controller: Controller):
         self.c = controller
         self.series: Series | None = None
+        #: a tapping cycle has started the spindle, and stops it when it ends
+        self.started = False
+
+    def end(self) -> None:
+        """The series of holes ends (G80); a spindle that its cycle has started stops."""
+        self.series = None
+        if self.started:
+            self.started = False
+            self.c.state.sense = 0
+            self.c.changed()
+
+    def _start(self, code: int) -> None:
+        """Start a spindle at rest where the cycle of this control does."""
+        state, which = self.c.state, self.c.control.cycles.starts_spindle
+        tapping = code in cycles.TAPPING
+        if state.sense == 0 and state.speed > 0.0 and (which == "all" or (which == "tapping" and tapping)):
+            state.sense = -1 if code == 740 else 1
+            self.started = tapping
+            self.c.once("nc-cycle-spindle", f"{shown(code)}: the spindle is at rest: the cycle starts it")
+            self.c.changed()
 
     def move(self, block: Block, code: int) -> None:
         """Carry out the cycle ``code`` over the holes of a block."""
@@ -65,10 +85,11 @@ class Drilling:
             rate(self.c, block, shown(code))
         first, second, along = PLANE_AXES[PLANES[state.plane]]
         scale, old = state.scale, self.series
+        self._start(code)
         series = self._sticky(block, code, old, "xyz"[along], state.at[along] / scale)
         repeats = integer_of(words.get("l", 1.0), "L")
         # L0 or K0 of a Fanuc states a cycle and drills no hole
-        least = 0 if c.dialect == "fanuc" else 1
+        least = 0 if c.control.cycles.zero_repeats else 1
         if not least <= repeats <= MOST_REPEATS:
             raise InputError(f"L{repeats}: repeats of a cycle must be from {least} to {MOST_REPEATS}")
         if repeats == 0:
@@ -140,7 +161,7 @@ class Drilling:
             j=words.get("j", new.j),
             k=words.get("k", new.k),
         )
-        if code in cycles.NEED_P and new.dwell is None:
+        if code in cycles.NEED_P and new.dwell is None and not self.c.control.cycles.dwell_optional:
             raise InputError(f"{shown(code)}: P is missing: the time at the bottom")
         if code in cycles.NEED_Q and new.peck is None:
             raise InputError(f"{shown(code)}: Q is missing: the depth of a peck")

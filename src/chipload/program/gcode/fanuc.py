@@ -17,18 +17,21 @@ retractions to where only the machine knows.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from chipload.errors import InputError, Severity
+from chipload.errors import InputError
 from chipload.program.corners import Corner
 from chipload.program.gcode.controller import Controller
+from chipload.program.gcode.coordinates import change_coordinates
 from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING, NEED_Q
 from chipload.program.gcode.dialect import UNREAD, Dialect, NotReadError, go_on, leave_out, lenient
 from chipload.program.gcode.expression import read_value
 from chipload.program.gcode.frames import remove, turn_about
-from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, system_variables, with_brackets
+from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, read_macro_call, system_variables, with_brackets
 from chipload.program.gcode.modal import GROUP_OF, shown
+from chipload.program.gcode.numbers import count_increments, decide_increments, seconds_of
 from chipload.program.gcode.offsets import choose, probed
 from chipload.program.gcode.tilted_plane import align, level, tilted
 from chipload.program.gcode.words import Block, bare, read_block
@@ -39,17 +42,11 @@ if TYPE_CHECKING:
 
 _COLON = re.compile(r"^([ \t]*):(?=[0-9])", re.MULTILINE)
 _SKIP = re.compile(r"^/[1-9]")
-#: a whole number that is not 0: with 0 the point makes no difference
-_NO_POINT = re.compile(r"[XYZIJKR][ \t]*[-+]?0*[1-9][0-9]*(?![0-9.])(?=[^\n(]*)", re.IGNORECASE)
 #: rounding or chamfer of the corner behind a motion, and an angle or what else stands behind a comma
 _CORNER = re.compile(r",([rc])([-+]?[0-9.]+|#[0-9]+|\[[^\]]*\])")
-_COMMENT = re.compile(r"\([^()\n]*\)")
 
 #: coordinates in which motions are left out until a code ends them
 CHANGED = {
-    160: "polar coordinates",
-    510: "scaling",
-    511: "mirrored coordinates",
     683: "a tilted plane",
     684: "a tilted plane",
     71: "cylindrical interpolation",
@@ -57,14 +54,13 @@ CHANGED = {
     1120: "polar interpolation",
 }
 #: and those codes
-ENDS = {150: (160,), 500: (510,), 501: (511,), 690: (682, 683, 684), 130: (), 131: (121,), 1130: (1120,)}
+ENDS = {150: (160,), 690: (682, 683, 684), 130: (), 131: (121,), 1130: (1120,)}
 #: blocks that are left out
 NOT_READ = {
     401: "normal direction control",
     411: "normal direction control",
     421: "normal direction control",
-    660: "a modal macro",
-    661: "a modal macro",
+    661: "a modal macro that is called in every block",
     435: "tip control by vectors",
     440: "a negative tool length",
 }
@@ -74,7 +70,7 @@ TILTED, ALIGN = (682, 2680), (531, 2530)
 HAAS_UNTILTED, EULER = 2690, 313.0
 #: G53.1 P: the angle of the last rotary axis from the workpiece is positive, or negative
 SIGNS = {0.0: 0, 1.0: 1, 2.0: -1}
-TURNED, UNTURNED, MACRO, SKIP, ENDS_CYLINDER = 680, 690, 650, 310, 71
+TURNED, UNTURNED, SKIP, ENDS_CYLINDER = 680, 690, 310, 71
 #: blocks that are left out if they have such words: what they do with them
 NOT_READ_WITH = {
     130: ("i", "circular pocket milling of a Haas"),
@@ -86,8 +82,8 @@ NOT_READ_WITH = {
 NO_POSITIONS = {220: "xyzijk", 51: "xyzabc"}
 #: motions that are left out: involutes, splines
 LEFT_OUT = frozenset({61, 62})
-#: tapping: LinuxCNC's code and the M code that starts its spindle
-TAPPING = {840: (840, 3), 740: (740, 4), 842: (840, 3), 843: (740, 4)}
+#: rigid tapping: LinuxCNC's code
+TAPPING = {842: 840, 843: 740}
 FINE_BORING, BORING = 760, 860
 #: end of what is not on, or what does not affect the path
 IDLE = frozenset(
@@ -110,14 +106,9 @@ class Fanuc(Dialect):
         return _COLON.sub(r"\1O", text)
 
     def begin(self, c: Controller, text: str) -> None:
-        """State at power on, and numbers without a decimal point."""
-        c.state.old_level = True
+        """System variables, and numbers without a decimal point."""
         c.parameters.live.update(system_variables(c))
-        plain = _COMMENT.sub(lambda found: " " * len(found[0]), text)
-        found = _NO_POINT.search(plain)
-        if found is not None:
-            message = f"{found[0]!r} has no decimal point: taken as a whole unit, not as the least increment"
-            c.findings.add("nc-no-point", 1 + plain.count("\n", 0, found.start()), message, Severity.UNPROVEN)
+        decide_increments(c, text)
 
     def read(self, raw: str, c: Controller) -> Block | None:
         """The block of a line, in LinuxCNC's words."""
@@ -126,10 +117,19 @@ class Fanuc(Dialect):
         if OUTPUTS.match(text):
             c.once("nc-output", f"{text[:20].upper()}: its output is not written")
             return None
+        call = read_macro_call(text, comments, c)
+        if call is not None:
+            return lenient(call, c, UNREAD | LEFT_OUT)
         block = read_block(with_brackets(_corners(text, c)), comments, c.parameters)
+        rules = c.control.text
+        _other_codes(block, rules.codes)
+        if 670 in block.g:
+            c.modal_macro = None
+        count_increments(block, c)
         for code in block.g:
-            if code in NOT_READ:
-                raise NotReadError(f"{shown(code)}: {NOT_READ[code]}")
+            unread = rules.unread.get(code) or NOT_READ.get(code)
+            if unread is not None:
+                raise NotReadError(f"{shown(code)}: {unread}")
             letters, what = NOT_READ_WITH.get(code, ("", ""))
             if not block.words.keys().isdisjoint(letters):
                 raise NotReadError(f"{shown(code)}: {what}")
@@ -137,8 +137,7 @@ class Fanuc(Dialect):
             c.leave_out("nc-alarm", f"#{ALARM}: an alarm ends the program here")
             block.sets, block.m = [], [30]
         self._coordinates(block, c)
-        if MACRO in block.g:
-            block.macro, block.words, block.g = {"p": -1.0, **block.words}, {}, []
+        change_coordinates(block, c)
         if 198 in block.m:
             raise NotReadError("M198: calls a program of another device")
         if 97 in block.m:
@@ -238,9 +237,10 @@ class Fanuc(Dialect):
             for letter in "pqr" if not any(x in CYCLES or x in (20, 30) for x in g) else "":
                 words.pop(letter, None)
         if 40 in g:
-            seconds = words.pop("x", words.pop("u", None))
-            if seconds is None and "p" in words:
-                seconds = words["p"] / 1000.0
+            time_word = next((x for x in "xufp" if x in words and x in c.control.dwell), None)
+            seconds = None if time_word is None else seconds_of(block, c, time_word)
+            for x in "xuf":
+                words.pop(x, None)
             if seconds is not None:
                 words["p"] = seconds
         if HAAS_EXTENDED in g:
@@ -270,10 +270,12 @@ class Fanuc(Dialect):
         motion = next((x for x in g if x in CYCLES), c.state.motion)
         if motion in CYCLES:
             self._shorter_pecks(words, g, motion, c)
-            if "k" in words:
-                words["l"] = words.pop("k")
+            repeat = c.control.cycles.repeat_letter
+            if repeat in words and repeat != "l":
+                words["l"] = words.pop(repeat)
             if "p" in words and 40 not in g and 98 not in block.m:
-                words["p"] /= 1000.0
+                seconds = seconds_of(block, c, "p")
+                words["p"] = 0.0 if seconds is None else seconds
 
     @staticmethod
     def _shorter_pecks(words: dict[str, float], g: list[int], motion: int, c: Controller) -> None:
@@ -281,7 +283,7 @@ class Fanuc(Dialect):
 
         Reference: Haas, Mill Operator's Manual, "G83 Normal Peck Drilling Canned Cycle".
         """
-        if motion in NEED_Q and "i" in words:
+        if motion in NEED_Q and "i" in words and c.control.cycles.peck_letters:
             if "q" in words:
                 raise NotReadError(f"{shown(motion)}: I with Q: pecks that retract after a depth Q")
             words["q"] = words.pop("i")
@@ -312,13 +314,10 @@ class Fanuc(Dialect):
                 "G87: the shift by Q is taken along -X (a setting of the machine), and the cutter as round",
             )
         if 29 in block.m:
+            # rigid tapping: its cycle starts the spindle
             block.m.remove(29)
-            c.rigid = True
         for code in [code for code in g if code in TAPPING]:
-            own, starts = TAPPING[code]
-            g[g.index(code)] = own
-            if c.state.sense == 0 and (c.rigid or code != own) and not {3, 4} & set(block.m):
-                block.m.append(starts)
+            g[g.index(code)] = TAPPING[code]
         if FINE_BORING in g or (c.fine and c.state.motion == BORING and not self._moves(g)):
             c.fine = True
             if FINE_BORING in g:
@@ -329,7 +328,6 @@ class Fanuc(Dialect):
                 words.pop(letter, None)
         elif self._moves(g):
             c.fine = False
-            c.rigid = c.rigid and 800 not in g
 
     @staticmethod
     def _moves(g: list[int]) -> bool:
@@ -344,13 +342,24 @@ class Fanuc(Dialect):
         block.g = [code for code in block.g if code not in (EXTENDED, 540)]
         choose(c, f"G54.1 P{number:g}", 9 + int(number))
 
-    def call(self, words: dict[str, float]) -> tuple[str, int]:
+    def call(self, words: dict[str, float], c: Controller) -> tuple[str, int]:
         """M98 P1234 L5 or M98 P51234."""
         p = words.get("p", 0.0)
-        if "l" not in words and p > 9999.0 and p == int(p):
+        if c.control.macros.packed_calls and "l" not in words and p > 9999.0 and p == int(p):
             times, p = divmod(int(p), 10_000)
             words = {"p": float(p), "l": float(times)}
-        return super().call(words)
+        return super().call(words, c)
+
+
+def _other_codes(block: Block, codes: Mapping[int, str]) -> None:
+    """Codes that mean something else on this control, as the profile has them."""
+    for code in [code for code in block.g if code in codes]:
+        if codes[code] == "idle":
+            block.g.remove(code)
+        elif codes[code] != "unread":
+            block.g[block.g.index(code)] = int(codes[code])
+        else:
+            raise NotReadError(f"{shown(code)}: is not read")
 
 
 def _corners(text: str, c: Controller) -> str:

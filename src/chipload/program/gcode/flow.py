@@ -18,10 +18,12 @@ from chipload.program.gcode.dialect import Dialect, NotReadError
 from chipload.program.gcode.expression import integer_of, read_value
 from chipload.program.gcode.interpreter import BlockInterpreter
 from chipload.program.gcode.macros import block_number, call_macro
+from chipload.program.gcode.modal import COVET, has_axes
 from chipload.program.gcode.parameters import LOCAL
 from chipload.program.gcode.plain import run_plain
 from chipload.program.gcode.source import KEYWORDS, OWord, Source, read_source
-from chipload.program.gcode.words import bare
+from chipload.program.gcode.track import BoundError
+from chipload.program.gcode.words import Block, MacroCall, bare
 
 #: calls within calls
 DEEPEST_CALL = 10
@@ -31,8 +33,6 @@ LARGEST_FILE = 50_000_000
 MOST_FILES = 1000
 #: repeats of a loop or a call that are taken at all
 MOST_REPEATS = 1_000_000_000
-#: longest line
-LONGEST_LINE = 255
 
 
 @dataclass
@@ -56,6 +56,7 @@ class Flow:
     folder : the one folder that called files may lie in; None: no files
     most_blocks : blocks that may be carried out
     progress : called with the part of the main text that is done
+    lenient : a block that cannot be read is a finding; else it refuses the text
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class Flow:
         folder: Path | None,
         most_blocks: int,
         progress: Callable[[float, str], None],
+        lenient: bool = False,
     ):
         self.i = interpreter
         self.c = interpreter.c
@@ -75,6 +77,7 @@ class Flow:
         self.folder = folder
         self.most_blocks = most_blocks
         self.progress = progress
+        self.lenient = lenient
         self.blocks = 0
         self.line = 0
         self._calls: list[_Call] = []
@@ -87,13 +90,27 @@ class Flow:
         try:
             self._opened = self._percent()
             report = 0
-            while self._step():
+            while self._step_or_finding():
                 if self.blocks - report >= 4096 or self.blocks < report:
                     report = self.blocks
                     self.c.track.spill()
                     self.progress(min(1.0, self.line / max(1, len(self.main.lines))), "reading")
         except InputError as error:
             raise InputError(f"{self.source.name}: line {self.line + 1}: {error}") from None
+
+    def _step_or_finding(self) -> bool:
+        """Carry out the next blocks; where ``lenient``, a block that cannot be read is a finding and left out."""
+        if not self.lenient:
+            return self._step()
+        try:
+            return self._step()
+        except BoundError:
+            raise
+        except InputError as error:
+            self.c.leave_out("nc-not-read", f"{error}: the block is left out")
+            self.c.placed = set()
+            self.line += 1
+            return self.line <= len(self.source.lines)
 
     def _percent(self) -> bool:
         for line, text in enumerate(self.main.lines):
@@ -117,7 +134,7 @@ class Flow:
                 return self._end()
         self.blocks += 1
         if self.blocks > self.most_blocks:
-            raise InputError(f"more than {self.most_blocks} blocks: a loop does not end, or most_blocks must be raised")
+            raise BoundError(f"more than {self.most_blocks} blocks: a loop does not end, or most_blocks must be raised")
         raw = lines[self.line]
         self.c.line = self.line + 1
         word = self.source.words.get(self.line)
@@ -156,8 +173,9 @@ class Flow:
             )
 
     def _check_length(self, raw: str) -> None:
-        if self.c.dialect == "linuxcnc" and len(raw.rstrip("\r")) > LONGEST_LINE:
-            message = f"{len(raw)} characters: a line has at most {LONGEST_LINE}"
+        longest = self.c.control.text.longest_line
+        if longest and len(raw.rstrip("\r")) > longest:
+            message = f"{len(raw)} characters: a line has at most {longest}"
             if self.dialect.strict:
                 raise InputError(message)
             self.c.leave_out("nc-long-line", message)
@@ -184,11 +202,12 @@ class Flow:
         self.line += 1
         if ends:
             return False
-        if block.macro:
-            try:
-                call_macro(self, block.macro)
-            except NotReadError as error:
-                self.c.leave_out("nc-not-read", f"{error}: the block is left out")
+        if block.macro is not None and block.macro.modal:
+            self.c.modal_macro = block.macro, self.c.level
+        elif block.macro is not None:
+            self._macro(block.macro)
+        elif self.c.modal_macro is not None and self.c.modal_macro[1] == self.c.level and self._moved(block):
+            self._macro(self.c.modal_macro[0])
         elif block.block_call:
             self._call_block(block.block_call)
         elif 98 in block.m:
@@ -197,11 +216,26 @@ class Flow:
             return self._return_number()
         return True
 
+    def _macro(self, call: MacroCall) -> None:
+        try:
+            call_macro(self, call)
+        except NotReadError as error:
+            self.c.leave_out("nc-not-read", f"{error}: the block is left out")
+
+    def _moved(self, block: Block) -> bool:
+        """Whether a block moves an axis, so that a modal macro is called behind it."""
+        return has_axes(block) and not self.c.left_out and COVET.isdisjoint(block.g)
+
     def _end(self) -> bool:
         """The lines are used up."""
         self.line = len(self.source.lines) - 1
         if self._calls:
-            raise InputError(f"the text ends within o{self._calls[-1].label}: endsub or M99 is missing")
+            message = f"the text ends within o{self._calls[-1].label}: endsub or M99 is missing"
+            if not self.lenient:
+                raise InputError(message)
+            self.c.leave_out("nc-no-end", message)
+            self.i.finish()
+            return False
         if self.dialect.strict:
             raise InputError("the text ends without M2, M30 or %: write M2 as its last block")
         self.c.leave_out("nc-no-end", "the text ends without M2 or M30: it may be truncated")
@@ -358,7 +392,7 @@ class Flow:
             return None
         if label not in self._files:
             if len(self._files) >= MOST_FILES:
-                raise InputError(f"more than {MOST_FILES} files are called")
+                raise BoundError(f"more than {MOST_FILES} files are called")
             root = self.folder.resolve()
             path = (root / f"{label}.ngc").resolve()
             found = path.parent == root and is_file(path)
@@ -387,7 +421,7 @@ class Flow:
         """Carry out a block of this text once more, from another place; blocks are counted."""
         self.blocks += 1
         if self.blocks > self.most_blocks:
-            raise InputError(f"more than {self.most_blocks} blocks: a loop does not end, or most_blocks must be raised")
+            raise BoundError(f"more than {self.most_blocks} blocks: a loop does not end, or most_blocks must be raised")
         self.c.line = line + 1
         block = self.dialect.read(self.source.lines[line], self.c)
         if block is not None:
@@ -439,7 +473,7 @@ class Flow:
     def _call_number(self, words: dict[str, float]) -> None:
         """M98: a subroutine that begins with its O number and ends with M99."""
         self.line -= 1
-        label, times = self.dialect.call(words)
+        label, times = self.dialect.call(words, self.c)
         place = self.source.numbers.get(label)
         source = self.source
         if place is None and label in self.main.numbers:

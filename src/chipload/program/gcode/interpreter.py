@@ -19,9 +19,9 @@ from chipload.program.gcode import offsets, targets
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.mirror import mirror
-from chipload.program.gcode.modal import USER_M, check_codes, motion_of, shown, unused
+from chipload.program.gcode.modal import USER_M, check_codes, motion_of, motion_of_group_one, shown, unused
 from chipload.program.gcode.motion import ControllerMotion
-from chipload.program.gcode.state import State
+from chipload.program.gcode.state import NO_MOTION, State
 from chipload.program.gcode.words import Block
 from chipload.program.path_mode import PathControl, PathMode
 
@@ -78,9 +78,15 @@ class BlockInterpreter:
     def execute(self, block: Block) -> bool:
         """Carry out one block; whether the program ends."""
         c, state = self.c, self.c.state
-        codes = check_codes(block)
+        rules = c.control.modal
+        codes = check_codes(block, rules)
         lasting = 52 if self.motion.splines.spline is not None else state.motion
-        motion = motion_of(block, codes, lasting)
+        if rules.cycle_group:
+            motion = motion_of_group_one(block, codes, state)
+            if codes.get("cycle") == NO_MOTION:
+                self.motion.drilling.end()
+        else:
+            motion = motion_of(block, codes, lasting)
         if motion < 0 and lasting == 52 and "p" in block.words and "motion" not in codes:
             motion = 52
         for letter in unused(block, motion):
@@ -231,6 +237,7 @@ class BlockInterpreter:
         for m in block.m:
             if m in (3, 4, 5):
                 state.sense = {3: 1, 4: -1, 5: 0}[m]
+                self.motion.drilling.started = False
                 c.changed()
             elif m == 19:
                 if not 0.0 <= block.words.get("r", 0.0) <= 360.0:

@@ -17,7 +17,7 @@ from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.dialect import NotReadError
 from chipload.program.gcode.expression import integer_of, read_value
 from chipload.program.gcode.source import Source
-from chipload.program.gcode.words import bare
+from chipload.program.gcode.words import Block, MacroCall, bare, strip_number
 
 if TYPE_CHECKING:
     from chipload.program.gcode.flow import Flow
@@ -26,16 +26,14 @@ _START = r"(?:/[1-9]?)?(?:n[0-9]+)?"
 _STATEMENT = re.compile(rf"{_START}(if\[|while\[|goto|end[1-9]|do[1-9])")
 _TO = re.compile(r"goto(?P<value>[0-9]+|#|\[)")
 _NUMBER = re.compile(r"^[ \t]*(?:/[1-9]?[ \t]*)?[nN][ \t]*0*([0-9]+)", re.MULTILINE)
-_VACANT = re.compile(r"#([0-9]{1,4})(eq|ne)#0(?![0-9])")
+_VACANT = re.compile(r"#([0-9]{1,5})(eq|ne)#0(?![0-9])")
 _ASSIGN = re.compile(rf"({_START}#(?:[0-9]+|\[[^\]=]*\]))=(.*)\Z", re.DOTALL)
-#: parameter of each argument of G65
-ARGUMENTS = dict(
-    zip(
-        "abcijkdefhmqrstuvwxyz",
-        (1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26),
-        strict=True,
-    )
-)
+#: a call of a macro, once (G65) or after each motion (G66)
+_CALL = re.compile(r"g(65|66)(?![0-9.])")
+#: words of a call that are no arguments, and those of an argument list that may be repeated
+_NO_ARGUMENT, _REPEATED = "glnop", "ijk"
+#: variables of the arguments of a call
+ARGUMENTS = range(1, 34)
 #: setting this parameter stops the program with an alarm
 ALARM = 3000
 #: statements that write to a file or name parameters
@@ -148,20 +146,59 @@ def with_brackets(text: str) -> str:
     return f"{found[1]}=[{found[2]}]" if found is not None and found[2] else text
 
 
-def call_macro(flow: Flow, words: dict[str, float]) -> None:
+def read_macro_call(text: str, comments: list[str], c: Controller) -> Block | None:
+    """The block of a line with G65 or G66; None where it has neither.
+
+    Every word but G L N O P is an argument, M S T and F too: none is carried out. I J K may be repeated, each set with
+    variables of its own; of two words for one variable the later one counts.
+
+    Reference: Fanuc B-63684EN, "Macro Call"; Haas Mill Operator's Manual, "G65 Macro Subprogram Call".
+    """
+    call = _CALL.search(text)
+    if call is None or OUTPUTS.match(text) or text.startswith("#"):
+        return None
+    number, at = strip_number(text)
+    block, numbers = Block(number=number, comments=comments), c.control.macros.arguments
+    words: dict[str, float] = {}
+    values: dict[int, float] = {}
+    sets, last = 0, ""
+    while at < len(text):
+        letter, begin = text[at], at + 1
+        if letter == "(":
+            at = begin
+            continue
+        if not letter.isalpha():
+            raise InputError(f"character {letter!r}: does not begin a word")
+        value, at = read_value(text, begin, c.parameters)
+        if letter == "g":
+            code = round(10.0 * value)
+            block.g += [] if code in (650, 660) else [code]
+        elif letter in _NO_ARGUMENT:
+            words[letter] = value
+        elif letter not in numbers:
+            raise InputError(f"{letter.upper()}: is no argument of a macro")
+        else:
+            pointless = text[begin:at].lstrip("+-").isdigit()
+            value *= c.increment(letter) if pointless and value else 1.0
+            sets += letter in _REPEATED and letter <= last
+            last = letter if letter in _REPEATED else last
+            words[letter] = value
+            values[numbers[letter] + 3 * sets * (letter in _REPEATED)] = value
+    label, times = integer_of(words.get("p", -1.0), "P"), integer_of(words.get("l", 1.0), "L")
+    block.macro = MacroCall(str(label), max(1, times), tuple(values.items()), words, call[1] == "66")
+    return block
+
+
+def call_macro(flow: Flow, call: MacroCall) -> None:
     """G65: a subroutine of this text with parameters of its own."""
-    label = str(integer_of(words.get("p", -1.0), "P"))
-    place = flow.main.numbers.get(label)
+    place = flow.main.numbers.get(call.label)
     if place is None:
-        raise NotReadError(f"G65 P{label}: there is no O{label} in this text")
-    times = integer_of(words.get("l", 1.0), "L")
-    flow.enter_macro(place, label, max(1, times))
+        raise NotReadError(f"G65 P{call.label}: there is no O{call.label} in this text")
+    flow.enter_macro(place, call.label, call.times)
     numbered = flow.c.parameters.numbered
-    for number in range(1, 34):
+    for number in ARGUMENTS:
         numbered.pop(number, None)
-    for letter, number in ARGUMENTS.items():
-        if letter in words:
-            numbered[number] = words[letter]
+    numbered.update(call.values)
 
 
 def system_variables(c: Controller) -> dict[int | str, Callable[[], float]]:

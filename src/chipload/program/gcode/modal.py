@@ -9,8 +9,9 @@ Reference: LinuxCNC 2.9, "Modal Groups" and "Order of Execution"; what its inter
 from __future__ import annotations
 
 from chipload.errors import InputError
+from chipload.program.control import ModalRules
 from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING, NEED_P, NEED_Q
-from chipload.program.gcode.state import NO_MOTION
+from chipload.program.gcode.state import NO_MOTION, State
 from chipload.program.gcode.words import Block
 
 #: groups of G codes: one code of each in a block
@@ -88,18 +89,24 @@ def has_axes(block: Block) -> bool:
     return not _AXES.isdisjoint(words) or "@" in words or "^" in words
 
 
-def check_codes(block: Block) -> dict[str, int]:
-    """Codes of the block by group; refuses unknown codes and two of one group."""
+#: groups whose last code stays active behind a canned cycle (group 01 of a Fanuc)
+GROUP_ONE = frozenset({0, 10, 20, 30, 330})
+
+
+def check_codes(block: Block, rules: ModalRules) -> dict[str, int]:
+    """Codes of the block by group; refuses unknown codes and, unless the last one counts, two of one group."""
     found: dict[str, int] = {}
     for code in block.g:
-        group = GROUP_OF.get(code)
+        group = "cycle" if rules.cycle_group and (code in CYCLES or code == NO_MOTION) else GROUP_OF.get(code)
         if group is None:
             raise InputError(
                 f"{shown(code)}: is not a code of LinuxCNC: remove it, or read the text in its own dialect"
             )
-        if group in found:
+        if group in found and not rules.last_code_wins:
             raise InputError(f"{shown(found[group])} and {shown(code)}: exclude each other in one block")
         found[group] = code
+    if rules.last_code_wins:
+        return found
     if len(block.m) > MOST_M:
         raise InputError(f"{len(block.m)} M codes: a block has at most {MOST_M}")
     seen: dict[str, int] = {}
@@ -138,6 +145,29 @@ def motion_of(block: Block, codes: dict[str, int], lasting: int) -> int:
             raise InputError("axes are given and no code that moves them is active: write G0 or G1")
         return lasting
     return -1
+
+
+def motion_of_group_one(block: Block, codes: dict[str, int], state: State) -> int:
+    """Code of the motion of a block, -1 for none, where cycles are a group of their own.
+
+    G80 ends a cycle, and the code of G0 to G3 that was active before it moves the axes of its block. Of a cycle and one
+    of G0 to G3 in one block the last counts. Beside a code that acts once, G0 to G3 only becomes active.
+    """
+    own, cycle, axes = codes.get("motion", -1), codes.get("cycle", -1), has_axes(block)
+    if own in GROUP_ONE:
+        state.group_one = own
+    covets = codes.get("once", -1) in COVET
+    if covets and own in GROUP_ONE:
+        state.motion = own
+        return -1
+    if cycle == NO_MOTION or (cycle >= 0 and own >= 0 and block.g.index(own) > block.g.index(cycle)):
+        state.motion = state.group_one
+        cycle = -1
+    if cycle >= 0:
+        return cycle
+    if own >= 0:
+        return motion_of(block, codes, state.motion)
+    return state.motion if axes and not covets and codes.get("length") != 431 else -1
 
 
 def unused(block: Block, motion: int) -> list[str]:

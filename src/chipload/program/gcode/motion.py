@@ -16,7 +16,7 @@ from chipload.program.gcode.controller import PLANES, Controller
 from chipload.program.gcode.cycles import CYCLES
 from chipload.program.gcode.drilling import Drilling
 from chipload.program.gcode.expression import integer_of
-from chipload.program.gcode.modal import shown
+from chipload.program.gcode.modal import GROUP_ONE, shown
 from chipload.program.gcode.offsets import in_machine_unknown, note_machine_coordinates, probed
 from chipload.program.gcode.splines import Splines
 from chipload.program.gcode.state import LINEAR, NO_MOTION, Nine, put
@@ -46,7 +46,7 @@ class ControllerMotion:
         if code != 50:
             self.splines.tangent = (0.0, 0.0)
         if code not in CYCLES:
-            self.drilling.series = None
+            self.drilling.end()
         if code in (0, 10):
             self._straight(block, code, machine)
         elif machine:
@@ -68,6 +68,8 @@ class ControllerMotion:
         elif code != NO_MOTION:
             raise InputError(f"{shown(code)}: threading cycles of a lathe are not read: write the moves out")
         state.motion = code
+        if code in GROUP_ONE:
+            state.group_one = code
 
     # -- lines and arcs --------------------------------------------------------------------------------------------
 
@@ -75,7 +77,7 @@ class ControllerMotion:
         c, state = self.c, self.c.state
         pace = rate(self.c, block, "G1") if code == 10 else None
         if machine:
-            if not state.absolute:
+            if not state.absolute and 900 not in block.g:
                 raise InputError("G53: goes with G90 only")
             c.not_compensated("G53")
             if in_machine_unknown(c, "G53", axes(self.c, block)):

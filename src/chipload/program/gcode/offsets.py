@@ -71,7 +71,7 @@ def note_missing_lengths(c: Controller, commands: Commands) -> None:
     """Findings on tools that cut without the length that the tool table states, or without a length offset in a text
     that gives one to another tool.
     """
-    if c.dialect == "sinumerik":
+    if c.control.offsets.length_with_tool:
         return
     cuts = (commands.motion == LINE) | (commands.motion == ARC)
     _note_stated_lengths(c, commands, cuts)
@@ -279,7 +279,7 @@ def _check_length(c: Controller, code: int, number: int) -> None:
         )
     if code == 430 and number != tool and (known or tool != 0):
         # H names a tool for LinuxCNC, an offset register for the others, which by custom has the number of its tool
-        own = c.dialect == "linuxcnc"
+        own = c.control.offsets.names_tools
         c.once(
             "nc-length-of-another-tool",
             f"G43 H{number}: tool {tool} is in the spindle: "
@@ -325,7 +325,12 @@ def in_machine_unknown(c: Controller, name: str, axes: Axes) -> bool:
     motion along Z is a retraction; one in X and Y before it may go through the work, which stays unproven.
     """
     number = c.state.datum.number
-    if c.dialect == "linuxcnc" or number in c.stated_offsets or number == 0 or not any(k in LINEAR for k in axes):
+    if (
+        c.control.offsets.kept_in_parameters
+        or number in c.stated_offsets
+        or number == 0
+        or not any(k in LINEAR for k in axes)
+    ):
         return False
     here = c.state.at
     if set(axes) & {0, 1} and 2 not in axes and c.retracted != here:

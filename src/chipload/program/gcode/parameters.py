@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 from chipload.errors import InputError
 
-#: numbers of parameters run from 1 to this
+#: numbers of LinuxCNC's parameters run from 1 to this
 HIGHEST = 5601
 #: parameters 1 to this are saved by a call
 LOCAL = 30
@@ -29,9 +29,13 @@ class Parameters:
     ----------
     given : values that stand before the program starts, by number or name
     noted : called with (code, text) when a number is read that nobody has set
+    highest : greatest number
     """
 
-    def __init__(self, given: Mapping[int | str, float] | None = None, noted: Noted | None = None):
+    def __init__(
+        self, given: Mapping[int | str, float] | None = None, noted: Noted | None = None, highest: int = HIGHEST
+    ):
+        self.highest = highest
         self.numbered: dict[int, float] = {}
         self.shared: dict[str, float] = {}
         self.local: dict[str, float] = {}
@@ -39,12 +43,15 @@ class Parameters:
             if isinstance(key, str):
                 (self.shared if key.startswith("_") else self.local)[key] = float(value)
                 continue
-            if not 1 <= key <= HIGHEST:
-                raise InputError(f"parameter #{key}: the number must be from 1 to {HIGHEST}")
+            if not 1 <= key <= highest:
+                raise InputError(f"parameter #{key}: the number must be from 1 to {highest}")
             self.numbered[int(key)] = float(value)
         #: read by a call, never assigned
         self.live: dict[int | str, Callable[[], float]] = {}
         self.noted = noted
+        #: value of a number that is a row of a table (tool offsets), and where one is assigned; None: no such table
+        self.row: Callable[[int], float | None] | None = None
+        self.keep: Callable[[int, float], bool] | None = None
         self._stack: list[tuple[dict[int, float], dict[str, float]]] = []
 
     def read(self, key: int | str) -> float:
@@ -52,11 +59,13 @@ class Parameters:
         if key in self.live:
             return self.live[key]()
         if isinstance(key, int):
-            if not 1 <= key <= HIGHEST:
-                raise InputError(f"parameter #{key}: the number must be from 1 to {HIGHEST}")
+            if not 1 <= key <= self.highest:
+                raise InputError(f"parameter #{key}: the number must be from 1 to {self.highest}")
+            if self.row is not None and (kept := self.row(key)) is not None:
+                return kept
             value = self.numbered.get(key)
             if value is None:
-                if self.noted is not None and (key < 5000):
+                if self.noted is not None and (key < 5000 or key > HIGHEST):
                     message = f"#{key} is read before it is set and is taken as 0: state it in program.parameters"
                     self.noted("nc-parameter-unset", message)
                 return 0.0
@@ -76,8 +85,10 @@ class Parameters:
     def assign(self, key: int | str, value: float) -> None:
         """Set a parameter."""
         if isinstance(key, int):
-            if not 1 <= key <= HIGHEST:
-                raise InputError(f"parameter #{key}: the number must be from 1 to {HIGHEST}")
+            if not 1 <= key <= self.highest:
+                raise InputError(f"parameter #{key}: the number must be from 1 to {self.highest}")
+            if self.keep is not None and self.keep(key, value):
+                return
             if key in _READ_ONLY:
                 raise InputError(f"parameter #{key}: is the controller's own and cannot be assigned")
             self.numbered[key] = value

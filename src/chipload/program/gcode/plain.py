@@ -11,6 +11,7 @@ import re
 from chipload.program.commands import ARC, LINE, RAPID
 from chipload.program.gcode.arcs import check_centre
 from chipload.program.gcode.controller import Controller
+from chipload.program.gcode.modal import GROUP_ONE
 from chipload.program.gcode.motion import ControllerMotion
 
 #: blocks in one go
@@ -36,9 +37,10 @@ def run_plain(c: Controller, motion: ControllerMotion, lines: list[str], line: i
     x, y, z, a, b, cc, u, v, w = state.at
     code, first, count, tilted = state.motion, line, min(len(lines), line + PIECE), state.datum.tilt is not None
     rapid = feed = -1
+    pointless, together = c.pointless, bool(c.turning_rule) and not state.tcp
     while line < count:
         found = match(lines[line])
-        if found is None:
+        if found is None or (pointless is not None and pointless.search(lines[line]) is not None):
             break
         g, sx, sy, sz, sa, sb, sc, si, sj, sk, sf = found.groups()
         new = code if g is None else _CODE[g]
@@ -73,6 +75,9 @@ def run_plain(c: Controller, motion: ControllerMotion, lines: list[str], line: i
         elif inverse:
             state.at, end = here, (x, y, z, a, b, cc, u, v, w)
             append((LINE, *end, c.straight_context(LINE, end, float(sf)), line))
+        elif turning and new == 10 and together:
+            state.at, end = here, (x, y, z, a, b, cc, u, v, w)
+            append((LINE, *end, c.straight_context(LINE, end, None), line))
         elif turning and new == 10 and (x, y, z) == (x0, y0, z0) and (a, b, cc) != here[3:6]:
             append((LINE, x, y, z, a, b, cc, u, v, w, c.context(2), line))
         else:
@@ -90,7 +95,8 @@ def run_plain(c: Controller, motion: ControllerMotion, lines: list[str], line: i
     if line != first:
         state.at = (x, y, z, a, b, cc, u, v, w)
         state.motion = code
-        motion.drilling.series = None
+        state.group_one = code if code in GROUP_ONE else state.group_one
+        motion.drilling.end()
         motion.splines.tangent = (0.0, 0.0)
     return line, line - first
 
@@ -108,6 +114,9 @@ def _ready(c: Controller, motion: ControllerMotion) -> bool:
         and motion.splines.spline is None
         and not c.unread
         and not c.left_out
+        and c.polar is None
+        and c.scaled is None
+        and c.modal_macro is None
         and c.modal_hole is None
         and state.motion in (0, 10, 20, 30, 800)
         and len(c.placed) == 3

@@ -14,6 +14,7 @@ from typing import Literal
 from chipload.errors import Finding, InputError
 from chipload.files import read_regular
 from chipload.program.commands import Commands
+from chipload.program.control import Control, control_named
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.dialect import Dialect
 from chipload.program.gcode.fanuc import Fanuc
@@ -41,7 +42,9 @@ def read_gcode(
     name: str = "program",
     folder: Path | None = None,
     tools: ToolTable | None = None,
-    dialect: Literal["linuxcnc", "fanuc", "sinumerik"] = "linuxcnc",
+    dialect: str = "linuxcnc",
+    control: Control | None = None,
+    compensation: str | None = None,
     units: Literal["mm", "inch"] = "mm",
     machine_units: Literal["mm", "inch"] | None = None,
     start: Sequence[float] = (0.0,) * 9,
@@ -62,7 +65,9 @@ def read_gcode(
     name : for messages
     folder : the one folder in which called files ``<label>.ngc`` are sought; None: no files
     tools : what T, H and D name; None: no table, lengths and diameters count as 0
-    dialect : of the text
+    dialect : name of the control whose profile is used where ``control`` is None
+    control : profile
+    compensation : what an offset for G41 holds: ``control`` (the cutter's radius), ``wear``, ``off``; None: not stated
     units : of lengths before the text says G20 or G21
     machine_units : of numbered parameters of coordinates; None: as ``units``
     start : (9,) float [mm, rad], machine's axes before the first block
@@ -72,7 +77,7 @@ def read_gcode(
     feed : [mm/min] of cuts before the text states one; None: such a cut is refused
     most_blocks : blocks that may be carried out, repeated ones each time; None: ``MOST_REPEATED`` more than the text
         has lines
-    lenient : in the dialect of LinuxCNC, what is not read or refused is a finding as far as the rest can be read
+    lenient : what is not read or refused is a finding as far as the rest can be read
     swivel : the machine, for tilted working planes; None: they are not read
     progress : called with the part that is done
 
@@ -85,9 +90,10 @@ def read_gcode(
     >>> commands.position[-1, :3].tolist(), float(commands.feed[-1])
     ([1.0, 2.0, -3.0], 1.0)
     """
-    rules = {"linuxcnc": Dialect, "fanuc": Fanuc, "sinumerik": Sinumerik}
-    if dialect not in rules:
-        raise InputError(f"dialect = {dialect!r}: must be linuxcnc, fanuc or sinumerik")
+    control = control_named(dialect) if control is None else control
+    readers = {"linuxcnc": Dialect, "fanuc": Fanuc, "sinumerik": Sinumerik}
+    if control.language not in readers:
+        raise InputError(f"control = {control.name}: its texts are not RS-274: must be one of {', '.join(readers)}")
     for what, unit in (("units", units), ("machine_units", machine_units or units)):
         if unit not in ("mm", "inch"):
             raise InputError(f"{what} = {unit!r}: must be mm or inch")
@@ -99,7 +105,8 @@ def read_gcode(
         most_blocks = text.count("\n") + text.count("\r") + MOST_REPEATED
     if most_blocks < 1:
         raise InputError(f"most_blocks = {most_blocks}: must be 1 or more")
-    rule = Dialect(strict=not lenient) if dialect == "linuxcnc" else rules[dialect](strict=False)
+    strict = control.text.refuses_unknown and not lenient
+    rule = readers[control.language](strict=strict)
     controller = Controller(
         tools=tools,
         parameters=parameters,
@@ -107,8 +114,9 @@ def read_gcode(
         machine_units=machine_units or units,
         start=nine(at),
         most_rows=min(2 * most_blocks + 100_000, MOST_ROWS),
-        strict=dialect == "linuxcnc" and not lenient,
-        dialect=dialect,
+        strict=strict,
+        control=control,
+        compensation=compensation,
         origins={number: (nine(list(map(float, at))), turn) for number, (at, turn) in (origins or {}).items()},
         diameters=diameters,
         feed=feed,
@@ -118,8 +126,8 @@ def read_gcode(
     text = rule.prepare(text)
     rule.begin(controller, text)
     # a Sinumerik has no O-words: ORIWKS and the label OUT: are none
-    source = Source(name, lines_of(text, name)) if dialect == "sinumerik" else read_source(text, name)
-    Flow(BlockInterpreter(controller), source, rule, folder, most_blocks, progress).run()
+    source = read_source(text, name) if control.text.o_words else Source(name, lines_of(text, name))
+    Flow(BlockInterpreter(controller), source, rule, folder, most_blocks, progress, lenient).run()
     note_unset_offsets(controller)
     commands = with_stated_offsets(controller, controller.track.commands())
     note_missing_lengths(controller, commands)

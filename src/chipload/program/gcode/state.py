@@ -104,6 +104,7 @@ class State:
     scale : mm in a unit of the text
     at : programmed position
     motion, plane, feed_mode, path : active codes
+    group_one : the code of G0 to G3 that is active behind a cycle
     absolute, absolute_centre : G90, G90.1
     old_level : G98
     diameter : G7
@@ -119,6 +120,7 @@ class State:
     at: Nine = ZERO
     datum: Datum = Datum()
     motion: int = NO_MOTION
+    group_one: int = NO_MOTION
     plane: int = 170
     feed_mode: int = 940
     path: int = 640

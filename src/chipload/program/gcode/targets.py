@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 
 from chipload.errors import InputError, Severity
-from chipload.program.gcode.controller import Controller
+from chipload.program.commands import PLANE_AXES
+from chipload.program.gcode.controller import PLANES, Controller
 from chipload.program.gcode.state import AXES, LINEAR, Nine, put
 from chipload.program.gcode.words import Block
 
@@ -23,9 +24,37 @@ def axes(c: Controller, block: Block) -> dict[int, float]:
     for k, axis in enumerate(AXES):
         if axis in words:
             out[k] = words[axis] * (state.scale if k in LINEAR else 1.0)
+    if c.polar is not None:
+        out |= from_polar(c, words)
+    if c.scaled is not None:
+        out |= scaled(c, out)
     if state.diameter and 0 in out:
         out[0] *= 0.5
     return out
+
+
+def from_polar(c: Controller, words: dict[str, float]) -> dict[int, float]:
+    """Coordinates in the plane [mm] by radius and angle (G16): the first axis is the radius, the second the angle."""
+    first, second, _ = PLANE_AXES[PLANES[c.state.plane]]
+    radius, angle = AXES[first], AXES[second]
+    if c.polar is None or (radius not in words and angle not in words):
+        return {}
+    if not c.state.absolute:
+        raise InputError("G16 with G91: polar coordinates about the present point are not read: write G90")
+    r = words[radius] * c.state.scale if radius in words else c.polar[0]
+    degrees = words.get(angle, c.polar[1])
+    c.polar = r, degrees
+    return {first: r * math.cos(math.radians(degrees)), second: r * math.sin(math.radians(degrees))}
+
+
+def scaled(c: Controller, given: dict[int, float]) -> dict[int, float]:
+    """Linear coordinates of a block in scaled or mirrored coordinates (G51, G51.1), in those without."""
+    if c.scaled is None:
+        return {}
+    factors, fixed = c.scaled
+    if not c.state.absolute:
+        return {k: factors[k] * given[k] for k in given.keys() & {0, 1, 2}}
+    return {k: fixed[k] + factors[k] * (given[k] - fixed[k]) for k in given.keys() & {0, 1, 2}}
 
 
 def end(c: Controller, block: Block) -> Nine:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from chipload.errors import Finding, InputError
 from chipload.program.commands import LETTERS
@@ -53,9 +53,18 @@ class ToolTable:
 
     tools: Mapping[int, Tool] = field(default_factory=dict)
 
+    def scaled(self, factor: float) -> ToolTable:
+        """The table with all lengths times a factor, as one whose unit was taken as another."""
+        return ToolTable({n: _scaled(tool, factor) for n, tool in self.tools.items()})
+
     def lengths(self) -> dict[int, float]:
         """Length [mm] of each tool: its offset along Z."""
         return {number: tool.offset[2] for number, tool in self.tools.items()}
+
+
+def _scaled(tool: Tool, factor: float) -> Tool:
+    offset = tuple(x if k in range(3, 6) else factor * x for k, x in enumerate(tool.offset))
+    return replace(tool, diameter=factor * tool.diameter, offset=offset)
 
 
 def read_tool_table(text: str, *, name: str = "tool table", units: str = "mm") -> tuple[ToolTable, tuple[Finding, ...]]:

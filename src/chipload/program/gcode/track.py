@@ -22,6 +22,11 @@ MOST_FINDINGS = 2000
 #: frames and labels that a text may make
 MOST_FRAMES = 100_000
 
+
+class BoundError(InputError):
+    """A bound of the reader is passed, as by a loop without an end: what follows is not read in any mode."""
+
+
 Row = tuple[int, float, float, float, float, float, float, float, float, float, int, int]
 Context = tuple[float, float, int, bool, int, int, int, PathMode]
 
@@ -87,7 +92,7 @@ class MotionRows:
         """Number of the frame of a datum."""
         number = self._frames.setdefault(datum, len(self._frames))
         if number >= MOST_FRAMES:
-            raise InputError(f"the offsets change more than {MOST_FRAMES} times")
+            raise BoundError(f"the offsets change more than {MOST_FRAMES} times")
         return number
 
     def label(self, text: str) -> int:
@@ -116,7 +121,7 @@ class MotionRows:
             self.count += len(self.rows)
             self.rows.clear()
         if self.count > self.most:
-            raise InputError(f"more than {self.most} motions: split the program")
+            raise BoundError(f"more than {self.most} motions: split the program")
 
     def commands(self) -> Commands:
         """All rows as Commands."""

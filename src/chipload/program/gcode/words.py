@@ -24,6 +24,17 @@ _NUMBERED = re.compile(r"n([0-9]+)(?:\.[0-9]*)?")
 _COMMENTED = re.compile(r"[(;]")
 
 
+@dataclass(frozen=True)
+class MacroCall:
+    """A call of a macro: the label of its program, repeats, variables by number; ``modal``: after each motion (G66)."""
+
+    label: str
+    times: int
+    values: tuple[tuple[int, float], ...]
+    words: dict[str, float]
+    modal: bool = False
+
+
 @dataclass(slots=True)
 class Block:
     """What one block says.
@@ -38,7 +49,8 @@ class Block:
     number : N word, -1 without
     after : blocks that are carried out behind it
     hole : Sinumerik's drilling cycle, its name and its arguments; ``modal``: MCALL stands before it
-    macro, block_call : words of Fanuc's G65, and of M97 of a Haas
+    macro, block_call : call of a macro (G65, G66), and words of M97 of a Haas
+    pointless : letters whose numbers are written without a decimal point
     frame : Sinumerik's word that sets the coordinates (TRANS, ROT ...)
     """
 
@@ -51,9 +63,10 @@ class Block:
     after: list[Block] = field(default_factory=list)
     hole: tuple[str, list[float | None]] | None = None
     modal: bool = False
-    macro: dict[str, float] = field(default_factory=dict)
+    macro: MacroCall | None = None
     block_call: dict[str, float] = field(default_factory=dict)
     frame: str = ""
+    pointless: set[str] = field(default_factory=set)
 
 
 def bare(line: str) -> tuple[str, list[str]]:
@@ -143,7 +156,10 @@ def read_block(text: str, comments: list[str], parameters: Parameters) -> Block:
         elif letter in LETTERS:
             if letter in words:
                 raise InputError(f"{letter.upper()}: appears twice in one block")
+            begin = at
             words[letter], at = read_value(text, at, parameters)
+            if text[begin:at].lstrip("+-").isdigit():
+                block.pointless.add(letter)
         else:
             raise InputError(f"character {letter!r}: does not begin a word")
     if len(block.m) > MOST_M:
