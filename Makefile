@@ -1,4 +1,4 @@
-# make demo | test | quick | coverage | coverage-own | docs | real | package | archives | reference | lock
+# make demo | test | quick | coverage | coverage-own | docs | figures | real | package | archives | reference | lock
 SHELL := /bin/bash
 PYTHON ?= $(shell /usr/bin/python3 -c 'import sys; print("/usr/bin/python3" if sys.version_info >= (3, 11) else "python3")' 2>/dev/null || echo python3)
 VENV := .venv
@@ -9,7 +9,7 @@ export NUMBA_CACHE_DIR := $(CURDIR)/$(VENV)/numba
 # a source file is compiled once, not by each of the processes that the tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup test quick coverage coverage-own docs real package archives demo reference lock
+.PHONY: setup test quick coverage coverage-own docs figures real package archives demo reference lock
 .DELETE_ON_ERROR:
 
 # what runs jobs and shows the page
@@ -59,10 +59,15 @@ coverage-own: setup
 docs: setup
 	$(BIN)/mkdocs build --strict --site-dir site
 
+# every number, console output and picture that the pages show of the examples, from their results: about 15 minutes;
+# FIGURES="plate --results result" names examples and keeps their results. Look at what changed
+figures: setup
+	$(BIN)/python tools/figures.py $(FIGURES)
+
 # the tests that take minutes, and every real file of docs/real_programs.md, run whole; CHIPLOAD_DATA is their folder.
 # Hours: for the night
 real: setup
-	CHIPLOAD_LONG=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -q tests/real
+	CHIPLOAD_LONG=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -q tests/real tests/results/test_page_values.py
 	$(BIN)/python tools/real_programs.py
 
 # the wheel and the source archive; the wheel runs a job in an environment of its own, away from the checkout

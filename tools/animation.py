@@ -1,6 +1,5 @@
-"""Draw the animation of README.md: two strategies of the example contour side by side, as an animated SVG file.
-
-    python tools/animation.py RESULT        RESULT is a result folder of the example: writes docs/contour.svg
+"""Draw the animation of README.md: two strategies of the example contour side by side, as an animated SVG file; see
+tools/figures.py.
 
 Above: the cutter along the finish pass and the angle over which it is engaged. Below: the engagement angle along the
 path and its limit. All numbers are those of the history. Time is that of the machine, slowed down.
@@ -8,7 +7,6 @@ path and its limit. All numbers are those of the history. Time is that of the ma
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import numpy as np
@@ -124,12 +122,6 @@ def drawing(result: chipload.Result) -> str:
     )
 
 
-def main() -> None:
-    """Write the file."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("result", help="a result folder of the example contour")
-    OUT.write_text(drawing(chipload.load_result(parser.parse_args().result)), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+def write(folder: Path) -> None:
+    """Write the file from a result folder of the example contour."""
+    OUT.write_text(drawing(chipload.load_result(folder)), encoding="utf-8")

@@ -1,36 +1,35 @@
-"""Make the pictures of the documentation anew: each example is run as it is shipped, and its report photographed.
+"""Photographs of the reports and of the page of results, for README.md and the pages of docs/; see tools/figures.py.
 
-    python tools/pictures.py [NAME ...] [--results FOLDER]     all, or those of docs/NAME.png
-
-With ``--results`` the examples are not run: FOLDER holds the result of each as EXAMPLE/result.
-
-Needs Chromium and playwright, and as long as the examples take. Look at what changed before it is committed.
+Needs Chromium and playwright.
 """
 
 from __future__ import annotations
 
-import argparse
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from chipload.examples import copy_example
-
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from web_lists import choose
 
 DOCS = Path(__file__).parent.parent / "docs"
+EXAMPLES = Path(__file__).parent.parent / "src" / "chipload" / "examples"
 CHROMIUM = "/usr/bin/chromium"
 FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
-#: figures of the report side by side, each with width and height [pixels]; none: the top of the report
+#: pictures of the report: figures side by side, each with width and height [pixels]
 FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
     "contour": (("along-0", 860, 760),),
+    "pocket": (("plan-0", 900, 560),),
+    "trunnion": (("view3d", 900, 520),),
+    "chips": (("chip", 960, 560),),
     "feeds": (("feeds", 1000, 760),),
     "chatter": (("stability", 500, 460), ("margin", 500, 460)),
     "bracket": (("view3d", 560, 640), ("loads", 430, 860)),
@@ -39,6 +38,9 @@ FIGURES: dict[str, tuple[tuple[str, int, int], ...]] = {
     "cone": (("allowable", 900, 380),),
     "plate": (("depth", 940, 520),),
     "blade": (("space", 940, 560),),
+    "notebooks": (("loads", 960, 900),),
+    "impeller": (("space-0", 920, 580),),
+    "hecc": (("space-0", 920, 580),),
 }
 #: the 3D view of the page, and that it and the plots are drawn
 VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
@@ -46,13 +48,6 @@ SECOND = "chiploadViewer.of(document.querySelector('.cl-second').id)"
 DRAWN = f"{VIEW}.frames > 0 && document.querySelectorAll('.cl-figure .trace').length > 0"
 #: pictures of the page: the example that each shows, and the track that it is compared with; none: none
 PAGES = {"page": ("bracket", ""), "page_compare": ("feeds", "original"), "page_impeller": ("impeller", "")}
-#: keys that shorten an example for its picture: a part of each surface, one cutter
-SHORTER = {
-    "page_impeller": (
-        "operation.0.most_cutters=1",
-        *(f"surface.{k}.{key}" for k in range(3) for key in ("along=[0.42, 0.58]", "points=[6, 5]")),
-    )
-}
 #: what the 3D view of a picture does: where it stands, from where it is looked at, from how far
 POSED = {
     "page_impeller": f"{{ const v = {VIEW}, c = v.camera.position; "
@@ -87,19 +82,15 @@ def photograph(page: Page, report: Path, name: str) -> None:
     page.goto(report.as_uri())
     page.wait_for_timeout(3000)
     wanted = [list(figure) for figure in FIGURES[name]]
-    out = DOCS / f"{name}.png"
-    if not wanted:
-        page.screenshot(path=out)
-        return
     page.evaluate(SHEET, wanted)
     page.wait_for_timeout(3000)
     page.evaluate(RESIZE, wanted)
     page.wait_for_timeout(1000)
-    page.locator("#sheet").screenshot(path=out)
+    page.locator("#sheet").screenshot(path=DOCS / f"{name}.png")
 
 
 def photograph_page(chromium: Browser, folder: Path, name: str) -> None:
-    """Write docs/NAME.png: the page of a result, by itself or beside another track along the path."""
+    """Write docs/NAME.png: the page of a folder with one result, by itself or beside another track along the path."""
     words = [sys.executable, "-m", "chipload", "view", str(folder), "--no-open"]
     server = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     try:
@@ -146,43 +137,20 @@ def fewer_colours(path: Path) -> None:
         picture.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
-def run(job: Path, name: str) -> int:
-    """Run the job of a folder as its picture wants it; the exit code."""
-    words = [sys.executable, "-m", "chipload", "run", str(job / "job.toml"), "--out", str(job / "result")]
-    words += [word for key in SHORTER.get(name, ()) for word in ("--set", key)]
-    return subprocess.run(words, check=False).returncode
-
-
-def main() -> int:
-    """Run the examples and make their pictures."""
-    parser = argparse.ArgumentParser(description="Make the pictures of the documentation anew.")
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join((*PAGES, *FIGURES))}")
-    parser.add_argument("--results", type=Path, metavar="FOLDER", help="with results of the examples")
-    given = parser.parse_args()
-    names = given.names or [*PAGES, *FIGURES]
-    unknown = set(names) - {*PAGES, *FIGURES}
-    if unknown:
-        parser.error(f"{', '.join(sorted(unknown))}: must be of {', '.join((*PAGES, *FIGURES))}")
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path=CHROMIUM,
-            args=list(FLAGS),
-        )
+def take(names: Sequence[str], results: Path) -> None:
+    """Write docs/NAME.png for each name; ``results`` holds the result of each job of the examples by its name."""
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
         page = chromium.new_page(viewport={"width": 860, "height": 1266})
         for name in names:
-            example = PAGES.get(name, (name, ""))[0]
-            job = given.results / example if given.results else copy_example(example, Path(folder) / name / example)
-            if not given.results and (code := run(job, name)) not in (0, 3):
-                return code
             if name in PAGES:
-                photograph_page(chromium, job, name)
+                with tempfile.TemporaryDirectory() as folder:
+                    # with the files of the example beside it: the page shows the program of the job
+                    shutil.copytree(EXAMPLES / PAGES[name][0], Path(folder) / "job")
+                    shutil.copytree(results / PAGES[name][0], Path(folder) / "result")
+                    photograph_page(chromium, Path(folder), name)
             else:
-                photograph(page, job / "result" / "report.html", name)
+                photograph(page, results / name / "report.html", name)
             fewer_colours(DOCS / f"{name}.png")
             print(f"docs/{name}.png", flush=True)
         chromium.close()
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

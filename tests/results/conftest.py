@@ -1,4 +1,4 @@
-"""Every example is run once in a test run; the workers of a run share the results.
+"""Every example is run once in a test run, at its own settings; the workers of a run share the results.
 
 The first test that asks for an example runs it, behind a lock on a file; results stand in the base folder of the run.
 """
@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from page_values import SOURCES
 from typer.testing import CliRunner
 
 import chipload.examples
@@ -27,54 +28,8 @@ from chipload.jobs import LoadedJob, load_job
 from chipload.result import Result, Summary, load_result, read_summary
 
 EXAMPLES = Path(chipload.examples.__file__).parent
-#: what makes a slow example shorter: coarser steps and layers, less of a surface, a smaller wall; its kind, limits and
-#: files stay
+#: of an example that takes many minutes: coarser steps, less of a surface; `make real` runs it whole
 SHORTER: Mapping[str, tuple[str, ...]] = {
-    "contour": ("operation.0.step_mm=0.2",),
-    "pocket": ("operation.0.step_mm=0.6", "operation.0.radial_depth_mm=2.4", "limits.engagement_deg=90"),
-    "chips": ("operation.0.step_mm=4",),
-    "feeds": ("operation.0.step_mm=4", "stock.layer_mm=2"),
-    "bracket": ("operation.0.step_mm=6", "stock.layer_mm=5", "part.spacing_mm=5"),
-    "chatter": ("operation.0.step_mm=4", "stock.layer_mm=2"),
-    "part": (
-        "operation.0.step_mm=4",
-        "stock.layer_mm=3",
-        "part.spacing_mm=5",
-        "workpiece.states=3",
-        "workpiece.cell_mm=4.9",
-    ),
-    "trunnion": (),
-    "tube": ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01"),
-    "cone": ("simulation.step_mm=4.0", "simulation.layer_mm=0.5", "simulation.tolerance_mm=0.01"),
-    "plate": (
-        "operation.0.least_error=false",
-        "operation.0.refine=false",
-        "operation.0.scallop_um=45",
-        "operation.0.step_mm=3",
-        "wall.length_mm=8",
-        "wall.height_mm=9",
-        "wall.thickness_mm=1.7",
-        "wall.foot_mm=4",
-        "wall.elements=[4,5]",
-    ),
-    "blade": (
-        "operation.0.least_error=false",
-        "operation.0.refine=false",
-        "operation.0.layer_mm=0.5",
-        "operation.0.step_mm=2.7",
-        "operation.0.scallop_um=68",
-        "wall.chord_root_mm=11",
-        "wall.chord_tip_mm=10",
-        "wall.height_mm=10",
-        "wall.thickness_root_mm=2.4",
-        "wall.thickness_tip_mm=1.8",
-        "wall.elements=[9,8]",
-    ),
-    "impeller": (
-        "operation.0.most_cutters=1",
-        "operation.0.rough.grid_mm=3.0",
-        *(f"surface.{k}.{key}" for k in range(3) for key in ("along=[0.45, 0.55]", "points=[4, 4]")),
-    ),
     "hecc": (
         "operation.0.most_cutters=1",
         "operation.0.tolerance_mm=1.0",
@@ -91,7 +46,7 @@ class Example:
 
     Parameters
     ----------
-    name : of the example
+    name : of :data:`page_values.SOURCES`
     folder : its result folder
     exit_code, output : of ``chipload run``
     differences : between the result that was made and the one that is read back; empty: none
@@ -106,14 +61,12 @@ class Example:
     @property
     def loaded(self) -> LoadedJob:
         """Its job."""
-        return load_job(EXAMPLES / self.name / "job.toml", SHORTER[self.name])
+        return load_job(_job_file(self.name), SHORTER.get(self.name, ()))
 
     @property
     def limits(self) -> dict[str, Any]:
         """The limits that its job states."""
-        values = tomllib.loads((EXAMPLES / self.name / "job.toml").read_text())
-        own = [word.removeprefix("limits.") for word in SHORTER[self.name] if word.startswith("limits.")]
-        return {**values.get("limits", {}), **tomllib.loads("\n".join(own))}
+        return dict(tomllib.loads(_job_file(self.name).read_text()).get("limits", {}))
 
     @property
     def result(self) -> Result:
@@ -146,6 +99,12 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Example
     return of
 
 
+def _job_file(name: str) -> Path:
+    """The job file of an example."""
+    source = SOURCES[name]
+    return EXAMPLES / source.example / source.job
+
+
 def _run(name: str, out: Path) -> dict[str, Any]:
     """Run an example as the command does, and compare what is read back with what was written."""
     made: list[Result] = []
@@ -160,8 +119,8 @@ def _run(name: str, out: Path) -> dict[str, Any]:
     def wide(blank: Any, path: Any, cutters: Any, before: Any, wider: float) -> Any:
         return shown(blank, path, cutters, before, wider * WIDER_OF.get(name, WIDER))
 
-    words = ["run", str(EXAMPLES / name / "job.toml"), "--out", str(out)]
-    words += [word for value in SHORTER[name] for word in ("--set", value)]
+    words = ["run", str(_job_file(name)), "--out", str(out)]
+    words += [word for value in SHORTER.get(name, ()) for word in ("--set", value)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(folder_module, "write_result", kept)
         patch.setattr(removal_module, "removal_mesh", wide)

@@ -95,7 +95,7 @@ def test_the_report_holds_every_program_in_use_and_stays_small(shown) -> None:
 def test_maps_hold_the_numbers_of_the_summary(shown) -> None:
     maps = {m.name: m for m in shown.result.maps}
     points = next(iter(maps.values())).points
-    assert len(points) == 4 * 4
+    assert len(points) == 20 * 10
     left = [m for m in maps.values() if m.column == "scallop_mm"]
     assert len(left) == 3
     # the rest on all of a surface is not less than what is left between two passes of its patches

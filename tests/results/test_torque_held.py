@@ -1,4 +1,4 @@
-"""The examples on a thin tube and a thin cone keep what they promise, with coarser steps than their own."""
+"""The examples on a thin tube and a thin cone keep what they promise."""
 
 from __future__ import annotations
 

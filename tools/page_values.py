@@ -1,0 +1,377 @@
+"""The numbers that README.md and the pages of docs/ state of the shipped examples, read from results.
+
+A page marks each such number: ``3.14<!--plate.variable_min-->``. The comment names the entry of
+``docs/figures/values.toml`` that stands before it; a reader of the page does not see it. ``tools/figures.py`` runs the
+examples at their own settings, writes that file from their results, and writes the marked numbers anew.
+``tests/results/test_page_values.py`` fails where a result, the file and a page differ.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+
+ROOT = Path(__file__).parent.parent
+EXAMPLES = ROOT / "src" / "chipload" / "examples"
+VALUES = ROOT / "docs" / "figures" / "values.toml"
+#: pages with marked numbers
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), *sorted(EXAMPLES.glob("*/README.md")))
+#: a number or a word, and the entry that states it
+MARK = re.compile(r"([-+\w.,%]+)<!--(\w+)\.(\w+)-->")
+#: number with its digits grouped, a power of ten, or a word
+Text = dict[str, str]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A result folder of an example.
+
+    Parameters
+    ----------
+    folder : that ``chipload run`` wrote
+    """
+
+    folder: Path
+
+    @cached_property
+    def summary(self) -> Mapping[str, Any]:
+        """Of the result."""
+        return dict(json.loads((self.folder / "summary.json").read_text(encoding="utf-8")))
+
+    @property
+    def operation(self) -> Mapping[str, Any]:
+        """Of its first operation."""
+        return dict(self.summary["operations"][0])
+
+    def limit(self, name: str, track: str = "") -> Mapping[str, Any]:
+        """A limit check, of the result or of a track."""
+        owner = self.summary if not track else self.track(track)
+        return next(check for check in owner["limits"] if check["name"] == name)
+
+    def worst(self, name: str, track: str = "") -> float:
+        """Its worst value."""
+        return float(self.limit(name, track)["worst"])
+
+    def error(self, name: str, track: str = "") -> str:
+        """Its resolution error in percent."""
+        return f"{100.0 * self.limit(name, track)['resolution_error']:.2g}"
+
+    def track(self, name: str) -> Mapping[str, Any]:
+        """A track by its name."""
+        return next(track for track in self.summary["tracks"] if track["name"] == name)
+
+    def greatest(self, column: str, track: str = "") -> float:
+        """Greatest value of a column of the history."""
+        table = pq.read_table(self.folder / "history.parquet", columns=["track", column])
+        rows = [x for t, x in zip(*(table[n].to_pylist() for n in table.column_names), strict=True) if track in ("", t)]
+        return float(max(x for x in rows if x is not None))
+
+    def lines(self, program: str) -> int:
+        """Number of lines of a written program."""
+        return len((self.folder / program).read_text(encoding="utf-8").splitlines())
+
+
+def contour(run: Run) -> Text:
+    """A corner, three strategies."""
+    made = run.operation["strategies"]
+    return {
+        "straight_deg": f"{made['plain']['engagement_deg']['wanted']:.1f}",
+        "plain_deg": f"{run.worst('engagement_deg', 'plain'):.1f}",
+        "backward_deg": f"{run.worst('engagement_deg', 'backward'):.1f}",
+        "feed_deg": f"{run.worst('engagement_deg', 'feed'):.1f}",
+        "plain_form_um": f"{run.worst('form_error_um', 'plain'):.1f}",
+        "backward_form_um": f"{run.worst('form_error_um', 'backward'):.1f}",
+        "time_s": f"{made['backward']['time_s']:.1f}",
+        "plain_s": f"{made['plain']['time_s']:.1f}",
+    }
+
+
+def pocket(run: Run) -> Text:
+    """A pocket with islands."""
+    made = run.operation["strategies"]["pocket"]
+    return {
+        "cleared_percent": f"{made['cleared_percent']:.3f}",
+        "engagement_deg": f"{run.worst('engagement_deg'):.4g}",
+        "torque_nm": f"{run.worst('torque_nm'):.3g}",
+        "time_s": f"{made['time_s']:.0f}",
+        "cutting_s": f"{made['cutting_s']:.0f}",
+        "link_s": f"{made['link_s']:.0f}",
+        "lines": f"{run.lines(made['program'] + '.ngc'):,}",
+        "left_mm2": f"{made['leftover_mm2']:.2f}",
+    }
+
+
+def trunnion(run: Run) -> Text:
+    """A program that is only read."""
+    return {
+        "motions": f"{run.operation['program']['motions']:,}",
+        "time_s": f"{run.operation['program']['time_s']:.0f}",
+        "verdict": run.summary["verdict"],
+    }
+
+
+def chips(run: Run) -> Text:
+    """A five-axis step."""
+    return {
+        "volume_mm3": f"{run.operation['chip_volume_mm3']:,.0f}",
+        "steps": f"{run.operation['steps']:,}",
+        "force_n": f"{run.worst('force_n'):.0f}",
+        "torque_nm": f"{run.worst('torque_nm'):.2f}",
+    }
+
+
+def chips_blade(run: Run) -> Text:
+    """A five-axis pass of a flank."""
+    return {"volume_mm3": f"{run.operation['chip_volume_mm3']:,.0f}", "force_n": f"{run.worst('force_n'):.0f}"}
+
+
+def chatter(run: Run) -> Text:
+    """A cutter that chatters, before and after."""
+    made, before = run.operation["speeds"], run.operation["speeds"]["before"]
+    return {
+        "before_rpm": f"{before['speed_rpm']:.0f}",
+        "before_margin": f"{before['margin_min']:.2f}",
+        "chatter_hz": f"{before['chatter_hz']:.0f}",
+        "rpm": f"{made['after']['speed_rpm']:.0f}",
+        "margin": f"{made['after']['margin_min']:.3g}",
+        "before_s": f"{made['time_before_s']:.1f}",
+        "time_s": f"{made['time_after_s']:.1f}",
+    }
+
+
+def bracket(run: Run) -> Text:
+    """A program with three faults."""
+    made = run.operation
+    return {
+        "gouge_mm": f"{made['gouge_mm']['max']:.2f}",
+        "gouge_line": str(made["gouge_mm"]["line"]),
+        "undercut_um": f"{-made['form_error_um']['least']:.0f}",
+        "undercut_line": str(made["form_error_um"]["line"]),
+        "collision_mm": f"{made['collisions'][0]['depth_mm']:.2f}",
+    }
+
+
+def feeds(run: Run) -> Text:
+    """New feeds for a program."""
+    made = run.operation["feeds"]
+    return {
+        "before_s": f"{made['time_before_s']:.1f}",
+        "time_s": f"{made['time_after_s']:.1f}",
+        "before_n": f"{made['before']['force_n']:.0f}",
+        "force_n": f"{made['after']['force_n']:.0f}",
+        "before_nm": f"{made['before']['torque_nm']:.2f}",
+        "torque_nm": f"{made['after']['torque_nm']:.2f}",
+        "force_error_percent": run.error("force_n"),
+        "slower": str(made["lines_slower"]),
+        "faster": str(made["lines_faster"]),
+    }
+
+
+def part(run: Run) -> Text:
+    """A housing that bends."""
+    made = run.operation["feeds"]
+    return {
+        "before_s": f"{made['time_before_s']:.1f}",
+        "time_s": f"{made['time_after_s']:.1f}",
+        "deflection_um": f"{run.worst('deflection_workpiece_um'):.1f}",
+        "form_um": f"{run.worst('form_error_um'):.0f}",
+    }
+
+
+def _wall(run: Run) -> Text:
+    """The variants of a thin wall."""
+    made = run.operation["variants"]
+    out = {}
+    for name, short in (
+        ("variable", "variable"),
+        ("constant", "constant"),
+        ("unconstrained", "free"),
+        ("least_error", "least"),
+    ):
+        out[f"{short}_min"] = f"{made[name]['time_min']:.2f}"
+        out[f"{short}_um"] = f"{made[name]['deflection_workpiece_um_max']:.1f}"
+        out[f"{short}_form_um"] = f"{made[name]['form_error_um_max']:.1f}"
+    return out | {
+        "error_percent": run.error("deflection_workpiece_um", "variable"),
+        "constant_error_percent": run.error("deflection_workpiece_um", "constant"),
+        "free_over": str(made["unconstrained"]["over_threshold"]),
+        "variable_rms_um": f"{made['variable']['form_error_um_rms']:.1f}",
+        "compensated_rms_um": f"{made['compensated']['form_error_um_rms']:.1f}",
+    }
+
+
+def plate(run: Run) -> Text:
+    """A titanium plate."""
+    return _wall(run)
+
+
+def blade(run: Run) -> Text:
+    """A titanium blade."""
+    return _wall(run)
+
+
+def _controllers(run: Run) -> Text:
+    """The controllers of a thin wall, with latency."""
+    made, late = run.operation, run.operation["with_latency"]
+    fuzzy, constant = (late["controllers"][name]["time_s"] for name in ("fuzzy", "constant"))
+    out = {}
+    for name, short in (
+        ("constant", "constant"),
+        ("model", "model"),
+        ("model_not_derated", "whole"),
+        ("pi", "pi"),
+        ("fuzzy", "fuzzy"),
+        ("fuzzy_feedforward", "both"),
+    ):
+        one = late["controllers"][name]
+        share = one["torque_nm_max"] / made["torque_limit_nm"]
+        out[f"{short}_s"] = f"{one['time_s']:.1f}"
+        out[f"{short}_share"] = f"{share:.2f}"
+        out[f"{short}_over_percent"] = f"{max(100.0 * (share - 1.0), 0.0):.0f}"
+        out[f"{short}_um"] = f"{one['form_error_um_max']:.1f}"
+    return out | {
+        "limit_nm": f"{made['torque_limit_nm']:.3f}",
+        "shorter_percent": f"{late['compared']['shorter_percent']:.0f}",
+        "shorter_model_percent": f"{late['compared']['shorter_than_model_percent']:.0f}",
+        "fuzzy_shorter_percent": f"{100.0 * (1.0 - fuzzy / constant):.0f}",
+        "ideal_s": f"{made['ideal_time_s']:.1f}",
+        "torque_error_percent": run.error("torque_over_percent"),
+        "form_error_percent": run.error("form_error_um"),
+        "rigid_share": f"{run.worst('deflection_share'):.2f}",
+    }
+
+
+def tube(run: Run) -> Text:
+    """A thin tube."""
+    return _controllers(run)
+
+
+def cone(run: Run) -> Text:
+    """A thin cone."""
+    return _controllers(run)
+
+
+def notebooks(run: Run) -> Text:
+    """The program of the notebook."""
+    return {"force_n": f"{run.worst('force_n'):.0f}", "deflection_um": f"{run.worst('deflection_um'):.1f}"}
+
+
+def impeller(run: Run) -> Text:
+    """The impeller with an index table."""
+    made, words = run.operation, ("no", "one", "two", "three", "four", "five")
+    partitions = made["ways"]
+    used = next(one for one in partitions if one["in_use"])
+    single = next(one for one in partitions if len(one["cutters"]) == 1 and "picked" not in one["name"])
+    picked = next(one for one in partitions if "picked" in one["name"])
+    sizes = [point["diameter_mm"] for row in made["surfaces"] for point in row["pointwise"]]
+    return {
+        "contact_points": f"{made['cc_points']:,}",
+        "check_points": f"{made['check_points']:,}",
+        "one_mm": f"{made['diameter_mm']:g}",
+        "one_corner_mm": f"{made['corner_radius_mm']:g}",
+        "one_deg": f"{made['table_deg']:g}",
+        "least_mm": f"{min(sizes):g}",
+        "most_mm": f"{max(sizes):g}",
+        "used": words[len(used["cutters"])],
+        "used_min": f"{used['time_min']:.0f}",
+        "single_min": f"{single['time_min']:.0f}",
+        "picked_min": f"{picked['time_min']:.0f}",
+        "gouge_mm": f"{made['finished']['gouge_mm']:.3f}",
+    }
+
+
+def hecc(run: Run) -> Text:
+    """NASA's impeller."""
+    made = run.operation
+    return {
+        "contact_points": f"{made['cc_points']:,}",
+        "check_points": f"{made['check_points']:,}",
+        "unreached": str(made["unreachable"]),
+    }
+
+
+@dataclass(frozen=True)
+class Source:
+    """A job of the shipped examples whose numbers pages state.
+
+    Parameters
+    ----------
+    example, job : folder of the example, and its job file
+    values : reads the numbers from its result
+    pictures : files ``docs/NAME.png`` that show it
+    long : takes many minutes: run by ``make real``, and by ``tools/figures.py`` only where it is named
+    """
+
+    example: str
+    values: Callable[[Run], Text]
+    job: str = "job.toml"
+    pictures: tuple[str, ...] = ()
+    long: bool = False
+
+
+SOURCES: Mapping[str, Source] = {
+    "contour": Source("contour", contour, pictures=("contour",)),
+    "pocket": Source("pocket", pocket, pictures=("pocket",)),
+    "trunnion": Source("trunnion", trunnion, pictures=("trunnion",)),
+    "chips": Source("chips", chips, pictures=("chips",)),
+    "chips_blade": Source("chips", chips_blade, "blade.toml"),
+    "chatter": Source("chatter", chatter, pictures=("chatter",)),
+    "bracket": Source("bracket", bracket, pictures=("bracket", "page")),
+    "feeds": Source("feeds", feeds, pictures=("feeds", "page_compare")),
+    "part": Source("part", part, pictures=("part",)),
+    "plate": Source("plate", plate, pictures=("plate",)),
+    "blade": Source("blade", blade, pictures=("blade",)),
+    "tube": Source("tube", tube, pictures=("tube",)),
+    "cone": Source("cone", cone, pictures=("cone",)),
+    "notebooks": Source("notebooks", notebooks, pictures=("notebooks",)),
+    "impeller": Source("impeller", impeller, pictures=("impeller", "page_impeller")),
+    "hecc": Source("hecc", hecc, pictures=("hecc",), long=True),
+}
+
+
+def values_of(name: str, folder: Path) -> Text:
+    """Return the entries of a job from its result folder."""
+    return SOURCES[name].values(Run(folder))
+
+
+def fingerprint(folder: Path) -> str:
+    """Return a digest of what the pictures of a result show: its verdict, and its numbers to four digits."""
+    summary = Run(folder).summary
+    shown = [summary["verdict"], summary["message"]]
+    for track in summary["tracks"]:
+        numbers = [track["time_s"], track["rows"], *(check["worst"] for check in track["limits"])]
+        shown += [track["name"], *(None if x is None else f"{x:.4g}" for x in numbers)]
+    return hashlib.sha256(json.dumps(shown).encode()).hexdigest()[:16]
+
+
+def read_values() -> dict[str, Text]:
+    """Return the stored entries: a table for each job, and ``pictures``, the digest that each picture was made from."""
+    return tomllib.loads(VALUES.read_text(encoding="utf-8")) if VALUES.exists() else {}
+
+
+def write_values(values: Mapping[str, Text]) -> None:
+    """Store entries, in the order of :data:`SOURCES`."""
+    lines = ["# Written by tools/figures.py (make figures) from the results of the shipped examples: do not edit."]
+    for name in (*SOURCES, "pictures"):
+        if name in values:
+            lines += ["", f"[{name}]", *(f'{key} = "{text}"' for key, text in values[name].items())]
+    VALUES.parent.mkdir(exist_ok=True)
+    VALUES.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def numbered(text: str, values: Mapping[str, Text]) -> str:
+    """Return a page with its marked numbers written from the entries.
+
+    >>> numbered("in 3.06<!--plate.variable_min--> min", {"plate": {"variable_min": "3.14"}})
+    'in 3.14<!--plate.variable_min--> min'
+    """
+    return MARK.sub(lambda found: f"{values[found[2]][found[3]]}<!--{found[2]}.{found[3]}-->", text)
