@@ -37,6 +37,7 @@ COARSE = {
     1.6: 0.35, 2.0: 0.4, 2.5: 0.45, 3.0: 0.5, 3.5: 0.6, 4.0: 0.7, 5.0: 0.8, 6.0: 1.0, 7.0: 1.0, 8.0: 1.25, 10.0: 1.5,
     12.0: 1.75, 14.0: 2.0, 16.0: 2.0, 18.0: 2.5, 20.0: 2.5, 22.0: 2.5, 24.0: 3.0, 27.0: 3.0, 30.0: 3.5,
 }  # fmt: skip
+_TAP = re.compile(r"\bTAP(?:PED|PING|S)?\b")
 _NUMBER = r"[0-9]+(?:\.[0-9]+)?"
 _METRIC = re.compile(rf"\bM({_NUMBER})(?:\s*[X*]\s*({_NUMBER}))?(?![0-9.])")
 _INCH = re.compile(r"(?<![0-9.])(?:#?[0-9]{1,2}|[0-9]/[0-9]{1,2}|\.[0-9]+)\s*-\s*([0-9]{1,2})(?![0-9.])")
@@ -129,7 +130,11 @@ def thread_comments(text: str) -> dict[int, tuple[float, str]]:
         for comment in COMMENT.finditer(line) if "TAP" in line.upper() else ():
             words = (comment[1] if comment[1] is not None else comment[2]).upper()
             tool = re.search(TOOL, words)
-            pitch = _pitch(words[tool.end() :]) if tool is not None and re.search(r"\bTAP", words) else None
+            pitch = (
+                _pitch(words[tool.end() :])
+                if tool is not None and re.search(r"\bTAP(?:PED|PING|S)?\b", words)
+                else None
+            )
             if tool is not None and pitch is not None:
                 out.setdefault(int(tool["tool"]), (pitch, f"the comment ({' '.join(words.split())[:60]})"))
     return out
