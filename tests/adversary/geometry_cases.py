@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from adversary.base import Case, Change, changes, cutter, program, replaced, stated
+import shapely
+import trimesh
+
+from adversary.base import Case, Change, Job, changes, cutter, program, replaced, stated
 
 HEAD = "G21 G90 G17 G94\nG54\nT1 M6\nG43 H1\nS6000 M3\n"
 END = "G0 Z10\nM5\nM2\n"
@@ -149,3 +152,50 @@ CASES = (
         "holds", "",
     ),
 )  # fmt: skip
+
+
+def part(
+    spacing: float = 100.0, *, scale: float = 1.0, shift: float = 0.0, limit: float | None = 0.05, depth: float = 2.0
+) -> Change:
+    """The block with a slot 10 mm wide along x at Y20 as finished part, of triangles from corner to corner."""
+
+    def change(job: Job) -> None:
+        profile = [(0, -20), (40, -20), (40, 0), (25, 0), (25, -depth), (15, -depth), (15, 0), (0, 0)]
+        body = trimesh.creation.extrude_polygon(shapely.Polygon(profile), 60.0)
+        # the profile is in Y and Z, the block along X
+        body.apply_transform([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+        body.apply_translation([0.0, 0.0, shift])
+        body.apply_scale(scale)
+        job.files["part.stl"] = body.export(file_type="stl")
+        job.tables["part"] = {"file": "part.stl", "units": "mm", "spacing_mm": spacing}
+        if limit is not None:
+            job.tables["limits"]["gouge_mm"] = limit
+
+    return change
+
+
+def hole(depth: float, end: str = END) -> Change:
+    """The slot, then a plunge into the finished face at (33, 7)."""
+    return program(HEAD + "\n".join([*slots(-2.0), "G0 X33 Y7", f"G1 Z{-depth} F100"]) + "\n" + end)
+
+
+GOUGES = (
+    Case("gouge-100", "a plunge 3 mm into the finished face, points 100 mm apart", changes(part(), hole(3.0)),
+         "exceeds", "gouge_mm"),
+    Case("gouge-20", "the same, points 20 mm apart", changes(part(20.0), hole(3.0)), "exceeds", "gouge_mm"),
+    Case("gouge-shallow", "a plunge 0.08 mm deep", changes(part(), hole(0.08)), "exceeds", "gouge_mm"),
+    Case("gouge-ball", "a plunge of a ball nose 0.1 mm deep",
+         changes(part(depth=1.0), hole(0.1), cutter(corner_radius_mm=5.0)), "exceeds", "gouge_mm"),
+    Case("gouge-slot", "the slot is 0.1 mm too deep", changes(part(depth=1.9)), "exceeds", "gouge_mm"),
+    Case("gouge-default", "3 mm into the face of a part without a limit on the gouge",
+         changes(part(limit=None), hole(3.0)), "exceeds", "gouge_mm"),
+    Case("gouge-switched-off", "the same with the check off",
+         changes(part(limit=None), hole(3.0), _switch("gouge")), "unchecked", "check gouge: switched off by the job"),
+    Case("gouge-none", "nothing: the part as programmed", part(), "holds", ""),
+    Case("gouge-0.02", "nothing: 0.02 mm deep at a limit of 0.05", changes(part(), hole(0.02)), "holds", ""),
+    Case("gouge-unit", "the part is 25.4 times too small", part(scale=1.0 / 25.4), "unproven", "part-misplaced"),
+    Case("gouge-inch", "the part is 25.4 times too large", part(scale=25.4), "exceeds", "gouge_mm"),
+    Case("gouge-outside", "the part stands 5 mm out of its stock", part(shift=5.0), "exceeds", "gouge_mm"),
+    Case("gouge-under", "the part stands 30 mm under its stock", part(shift=-30.0), "unproven", "part-misplaced"),
+)  # fmt: skip
+CASES = (*CASES, *GOUGES)

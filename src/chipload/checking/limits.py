@@ -15,6 +15,8 @@ from chipload.result import LimitCheck, Verdict, check_limit, column_of, state_o
 from chipload.result.limits import Columns
 from chipload.simulation.surface import Difference
 
+#: greatest gouge [mm] of a part whose job states no limit on it: the least medium deviation, ISO 2768-1 m
+GOUGE = 0.1
 #: columns that deflection falsifies where a stiffness is not stated
 BY_STIFFNESS = ("deflection_um", "form_error_um")
 
@@ -36,6 +38,7 @@ def program_limits(
     own = stability or simulation.stability
     return (
         *(_stated(simulation, upper, track, name, limit) for name, limit in loads.items()),
+        *_default_gouge(simulation, columns, track),
         *stability_limits(
             own, simulation.limits, columns, track, simulation.errors, direction, simulation.checks.sigma
         ),
@@ -73,12 +76,15 @@ def greatest_difference(left: Difference, name: str) -> tuple[float, int, tuple[
     """Return the deepest gouge (``gouge_mm``) or highest excess (``excess_mm``) [mm], its step and its place."""
     sign = -1.0 if name == "gouge_mm" else 1.0
     counts = np.isfinite(left.distance) & (left.over | (left.distance < 0.0))
-    value = np.where(counts, sign * left.distance, -np.inf)
+    value, points, step = np.where(counts, sign * left.distance, -np.inf), left.points, left.step
+    if name == "gouge_mm":
+        places, distance, own = left.between
+        value, points, step = np.append(value, -distance), np.vstack([points, places]), np.append(step, own)
     k = int(np.argmax(value))
     if not value[k] > 0.0:
         return 0.0, 0, None
-    x, y, z = (float(v) for v in left.points[k])
-    return float(value[k]), int(left.step[k]), (x, y, z)
+    x, y, z = (float(v) for v in points[k])
+    return float(value[k]), int(step[k]), (x, y, z)
 
 
 def _stated(simulation: SimulationResult, columns: Columns, track: str, name: str, limit: float) -> LimitCheck:
@@ -94,13 +100,27 @@ def _stated(simulation: SimulationResult, columns: Columns, track: str, name: st
     return with_peaks(check, simulation.checks, columns)
 
 
+def _default_gouge(simulation: SimulationResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:
+    """Return the check of the gouge where a part is stated without a limit on it."""
+    if simulation.left is None or simulation.limits.get("gouge_mm") is not None or "gouge" in simulation.checks.off:
+        return ()
+    return (_difference(simulation, columns, track, "gouge_mm", GOUGE),)
+
+
 def _difference(simulation: SimulationResult, columns: Columns, track: str, name: str, limit: float) -> LimitCheck:
     """Return the check of the cutter's path against points of the part; its row is the step of the worst point."""
     if simulation.left is None:
         return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason="no [part] is stated")
-    worst, k, place = greatest_difference(simulation.left, name)
-    if place is None:
-        return LimitCheck(name, limit, worst, Verdict.HOLDS, track)
-    line, t = int(columns["line"][k]), float(columns["t_s"][k])
+    left = simulation.left
+    worst, k, place = greatest_difference(left, name)
+    hidden = left.hidden if name == "gouge_mm" else 0.0
     state, why = state_of(worst, limit)
-    return LimitCheck(name, limit, worst, state, track, k, line, place, t, 0.0, why)
+    if state is Verdict.HOLDS and worst + hidden > limit:
+        text = f"{hidden:.2g} mm" if math.isfinite(hidden) else "an unknown depth"
+        state = Verdict.UNPROVEN
+        why = f"between the points of the part it may be deeper by {text}: state a smaller part.spacing_mm"
+    error = hidden / worst if worst > 0.0 and math.isfinite(hidden) else 0.0
+    if place is None:
+        return LimitCheck(name, limit, worst, state, track, resolution_error=error, reason=why)
+    line, t = int(columns["line"][k]), float(columns["t_s"][k])
+    return LimitCheck(name, limit, worst, state, track, k, line, place, t, error, why)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -122,12 +123,20 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
         read = "removal, engagement, forces and collisions: the program was only read, not simulated"
         return (read, *program.reading.unchecked)
     # where modes are stated a margin of 1 is checked
-    always = () if simulation.stability is None else ("stability_margin",)
+    always: tuple[str, ...] = () if simulation.stability is None else ("stability_margin",)
+    if simulation.left is not None and "gouge" not in simulation.checks.off:
+        always += ("gouge_mm",)
     missing = [name for name in simulation.stated_limits.unstated if name not in always]
     out = [*unchecked_checks(simulation.checks), *(f"limit {name}: not stated" for name in missing)]
     out += program.reading.unchecked
     if simulation.left is None:
         out.append("gouge and excess: no [part] is stated")
+    else:
+        narrow = 2.0 * simulation.left.spacing / math.sqrt(3.0)
+        if math.isfinite(narrow):
+            out.append(f"gouges narrower than {narrow:.2g} mm, by the corner or the point of a cutter alone")
+        if "excess_mm" in simulation.limits:
+            out.append("excess between the points of the part: part.spacing_mm")
     out += simulation.stock_check.unchecked
     if not any(name.startswith("fixture") for name in simulation.collisions.compared_with):
         out.append("fixtures: none is stated")

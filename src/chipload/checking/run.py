@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from chipload.checking.default_checks import PROGRAM_COLUMNS, with_checks
 from chipload.checking.form_error import forming
 from chipload.checking.inputs import CheckInputs
+from chipload.checking.limits import GOUGE
 from chipload.checking.outcome import CollisionCheck, SimulationResult
 from chipload.checking.preparation import bodies_of, resolution_of, timed
 from chipload.checking.stability import stability_of, watch_of
@@ -33,6 +34,7 @@ from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
 from chipload.simulation.engagement_samples import EngagementRecorder
 from chipload.simulation.estimate import LEANING, QUICK, SLOW, UPRIGHT, estimate, slowest_step
+from chipload.simulation.gouge_refinement import refine_gouges
 from chipload.simulation.hand import reversed_cuts
 from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.loads import Cuts
@@ -118,6 +120,10 @@ def simulate_program(
             passing(0.0, "distances to the part"), kept,
         )  # fmt: skip
         solids["part"] = left.points
+        gouge = inputs.limits.gouge_mm or (GOUGE if inputs.checks.gouge else None)
+        if gouge is not None:
+            used = {n: c for n, c in cutters.items() if bool((program.tool == n).any())}
+            left = refine_gouges(left, steps, used, op.tolerance_mm, gouge)
     # form error costs as much as the chips, and means little without stiffness data
     made = left if stiffness is not None or compliance is not None or inputs.limits.form_error_um is not None else None
     if made is not None:

@@ -120,6 +120,8 @@ class CheckSettings:
     rigid_model : the deflection is within the range of the rigid force model
     deflection_of_feed, deflection_of_depth : greatest ratio of the deflection to feed per tooth and radial depth of cut
     plunge : the cutters can plunge and ramp into material as the program does
+    gouge : the deepest cut into the part against 0.1 mm, the least medium deviation of ISO 2768-1, where no limit is
+        stated
     shank_in_stock : shank, neck and holder against the stock as it is at each moment
     loose_stock : no piece is cut on that the program has cut free of the stock
     slender_walls : no wall is left more slender than ``wall_slenderness``, where no workpiece states how it deflects
@@ -136,6 +138,7 @@ class CheckSettings:
     deflection_of_feed: float = number_field(OF_FEED, above=0.0)
     deflection_of_depth: float = number_field(OF_DEPTH, above=0.0)
     plunge: bool = True
+    gouge: bool = True
     shank_in_stock: bool = True
     loose_stock: bool = True
     slender_walls: bool = True

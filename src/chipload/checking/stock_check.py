@@ -7,12 +7,14 @@ leans, shank and holder are compared with points of the stock; loose stock and s
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.outcome import StockCheck
+from chipload.checking.part_place import find_misplaced_part
 from chipload.checking.preparation import Bodies
 from chipload.checking.workpiece import default_spacing, stock_box
 from chipload.errors import Finding, Severity
@@ -39,9 +41,10 @@ def check_stock(
     inputs: CheckInputs, bodies: Bodies, stock: LayeredStock, steps: StepBlocks, kept: KeptPasses, progress: Progress
 ) -> StockCheck:
     """Return the findings on the stock along a program; ``stock`` is that before it."""
-    checks, op = inputs.checks, inputs.settings
+    checks, op, part = inputs.checks, inputs.settings, inputs.surroundings.part
+    placed = () if part is None else find_misplaced_part(part.mesh.bounds, part.mesh.volume, *stock_box(stock))
     if leans(bodies.program).any():
-        return _leaning(inputs, stock)
+        return replace(_leaning(inputs, stock), findings=placed)
     pitch = pitch_at(inputs, bodies.program, stock)
     what = "shank and holder in the stock"
     progress(0.0, what)
@@ -62,7 +65,7 @@ def check_stock(
         findings += _loose(found, max(c.resolved_diameter for c in inputs.cutters.values()))
     if checks.slender_walls and inputs.elasticity.workpiece is None:
         findings += _thin(found, checks.wall_slenderness)
-    return StockCheck(tuple(findings), touched, hidden, tuple(unchecked))
+    return StockCheck((*placed, *findings), touched, hidden, tuple(unchecked))
 
 
 def pitch_at(inputs: CheckInputs, program: Program, stock: LayeredStock) -> float:

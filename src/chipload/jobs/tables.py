@@ -209,6 +209,11 @@ class ProgramChecksTable(ChecksTable):
 class StockChecksTable(ProgramChecksTable):
     """Default checks. `false` switches a check off; the report lists the checks that are off."""
 
+    gouge: bool = _switch(
+        "gouge",
+        "check the deepest cut into the [part] against 0.1 mm, the least medium deviation of ISO 2768-1, if no limit "
+        "is stated",
+    )
     shank_in_stock: bool = _switch(
         "shank_in_stock", "check shank, neck and holder against the stock as it is at each moment"
     )

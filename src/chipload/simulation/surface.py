@@ -4,11 +4,13 @@ Notation: steps as in :mod:`chipload.simulation.steps`; the distance of a point 
 the program, is below 0 where the part is cut into (gouge) and above 0 where material stands over it (excess).
 
 The part, fixtures and what a stock fills are points: corners of triangles whose sides are at most ``spacing`` long, and
-a grid of that pitch. The space between points is not examined: a rod thinner than the spacing may be missed.
+a grid of that pitch. The space between points is not examined: a rod of a fixture thinner than the spacing may be
+missed; of a part the gouge between the points is bounded (:mod:`chipload.simulation.gouge_refinement`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -48,6 +50,10 @@ class Difference:
     deepest : (n,) float [mm] of each step; inf: far from the part
     search_range : [mm]
     over : (p,) bool, whether the stock stood over the point before: elsewhere nothing can be left
+    between : places (b, 3) [mm] between the points, their distance (b,) [mm] and nearest step (b,), see
+        :mod:`chipload.simulation.gouge_refinement`
+    hidden : [mm] by which a gouge may be deeper than at any point; inf: not known
+    spacing : [mm] longest side of triangles where the tool goes
     """
 
     points: Floats
@@ -57,6 +63,9 @@ class Difference:
     deepest: Floats
     search_range: float
     over: NDArray[np.bool_]
+    between: tuple[Floats, Floats, Ints] = (np.empty((0, 3)), np.empty(0), np.empty(0, dtype=np.int64))
+    hidden: float = math.inf
+    spacing: float = math.inf
 
 
 @dataclass(frozen=True)
