@@ -186,7 +186,7 @@ def read_program(
             commands, findings = read_heidenhain(
                 text, name=path.name, folder=path.parent, parameters={int(k): v for k, v in values.items()},
                 radii={n: 0.5 * diameter for n, diameter in known.items()}, feed=feed,
-                swivel=swivel,
+                swivel=swivel, lenient=not strict,
             )  # fmt: skip
         else:
             text = gcode_text(path) if text is None else text

@@ -42,6 +42,8 @@ ALLOWANCE_MM = 1.0
 STEPS = 8_000
 #: thickness of layers in smallest diameters, and most layers where cutters come
 LAYER, LAYERS = 0.05, 60
+#: what the finding on a cut says that no feed precedes
+NO_FEED = "the feed is 0 or was never set"
 #: findings that are listed in the draft
 LISTED = 8
 #: ends of the codes of findings that do not concern the motions
@@ -171,7 +173,7 @@ def _read(path: Path, known: Known, cutters: Mapping[int, Cutter] | None = None)
     groups: tuple[tuple[str | None, ...], ...] = ((None,),)
     if ENDINGS.get(ending, "") is None and size <= LONG:
         # CL data and conversational programs are named .txt too
-        groups = ((None, "fanuc", "sinumerik"), ("heidenhain", "apt"))
+        groups = ((None,), ("heidenhain", "apt"))
     elif ending not in ENDINGS:
         groups = (("linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"),)
     setup = Setup(cutters=cutters or {})
@@ -202,7 +204,7 @@ def _refusal(path: Path, refused: Sequence[tuple[Machine, InputError]], shipped:
             f"{path.name}: none of the machines {', '.join(first)} has its axes: {'; '.join(reasons)}: "
             "name a machine that has (--on)"
         )
-    why = reasons[0]
+    why = reasons[0].removeprefix("no motion: nothing to check: ").removesuffix(": the block is left out (nc-not-read)")
     if "does not begin a word" in why:
         return InputError(f"{path.name}: neither NC text nor CL data nor a table with a heading of its columns: {why}")
     return refused[0][1]
@@ -230,6 +232,8 @@ def _best(
                 refused.append((machine, err))
                 if "feed" not in str(err):
                     break
+                continue
+            if feed is None and any(NO_FEED in f.text for f in reading.findings):
                 continue
             gaps = sum(f.severity >= Severity.UNPROVEN for f in reading.findings)
             if best is None or gaps < best[0]:
@@ -316,8 +320,12 @@ def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known, smal
     entries = [Entry("file", path.name if known.text is not None else relative(path, folder))]
     if chosen.dialect is not None:
         entries.append(Entry("dialect", chosen.dialect, "the one that leaves the fewest words unread", True))
+    elif chosen.reading.recognition is not None and not chosen.reading.recognition.stated:
+        found = chosen.reading.recognition
+        entries.append(Entry("control", found.control.name, ", ".join(found.reasons), True))
     else:
         entries.append(Entry("dialect", note="else by the ending of the file and the machine", example='"fanuc"'))
+    entries += _guesses(chosen.reading)
     if known.tools is not None:
         entries.append(Entry("tools", relative(known.tools, folder)))
     else:
@@ -329,6 +337,22 @@ def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known, smal
         entries.append(Entry("speed_rpm", speed[0], f"the text cuts with the spindle at rest; {speed[1]}", True))
     offsets = Entry("work_offsets", note="origins in the machine", example="{ G54 = [0.0, 0.0, 0.0] }")
     return DraftTable("program", (*entries, offsets), note="the program; lengths here are in mm, whatever unit it has")
+
+
+def _guesses(reading: ProgramReading) -> list[Entry]:
+    """What the reader guessed about unit, tool table and compensation: the keys that confirm it."""
+    guesses = {
+        "nc-unit": ("unit", lambda text: "inch" if "read as inch" in text else "mm", "the program states none"),
+        "nc-tools-unit": ("tools_unit", lambda _: "inch", "its diameters agree with the program as inches"),
+        "nc-compensation-wear": ("compensation", lambda _: "wear", "the cutter does not fit beside the contour"),
+        "nc-compensation-unstated": ("compensation", lambda _: "control", "the offset of D holds the cutter's radius"),
+    }
+    out: dict[str, Entry] = {}
+    for finding in reading.findings:
+        if finding.code in guesses:
+            key, value, reason = guesses[finding.code]
+            out.setdefault(key, Entry(key, value(finding.text), reason, True))
+    return list(out.values())
 
 
 def _speed(chosen: _Chosen, smallest: float, text: str) -> tuple[float, str] | None:

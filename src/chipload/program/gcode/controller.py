@@ -130,6 +130,8 @@ class Controller:
         #: why motions are left out until further notice; empty: they are not
         self.left_out = ""
         self.level = 0
+        #: word by which the block that is read names coordinates of the machine
+        self.machine_word = "G53"
         self._contexts: dict[int, int] = {}
         #: linear axes that have been sent somewhere; whether the block sends another, before any feed
         self.placed: set[int] = set()
@@ -325,7 +327,7 @@ class Controller:
             if number < 0:
                 raise InputError(f"{name}: D{number}: must be the number of a tool")
             tool = self.find_tool(number, "D")
-            radius = self._offset_radius(name, number, tool.diameter)
+            radius = self.offset_radius(name, number, tool.diameter)
             turned = tool.orientation
             if turned and state.plane != 180:
                 raise InputError(f"{name}: tool {number} has an orientation for turning: it goes with G18")
@@ -350,7 +352,7 @@ class Controller:
         )
         state.compensation = code
 
-    def _offset_radius(self, name: str, number: int, stated: float) -> float:
+    def offset_radius(self, name: str, number: int, stated: float) -> float:
         """Radius [mm] of an offset of D: geometry and wear; ``stated``: diameter of the tool table, 0 for none."""
         rows = self.tool_rows
         wear, own = rows.wear(number), rows.radius(number)

@@ -29,6 +29,7 @@ from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING, NEED_Q
 from chipload.program.gcode.dialect import UNREAD, Dialect, NotReadError, go_on, leave_out, lenient
 from chipload.program.gcode.expression import read_value
 from chipload.program.gcode.frames import remove, turn_about
+from chipload.program.gcode.haas_cycles import circular_pocket, hole_pattern
 from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, read_macro_call, system_variables, with_brackets
 from chipload.program.gcode.modal import GROUP_OF, shown
 from chipload.program.gcode.numbers import count_increments, decide_increments, seconds_of
@@ -73,7 +74,6 @@ SIGNS = {0.0: 0, 1.0: 1, 2.0: -1}
 TURNED, UNTURNED, SKIP, ENDS_CYLINDER = 680, 690, 310, 71
 #: blocks that are left out if they have such words: what they do with them
 NOT_READ_WITH = {
-    130: ("i", "circular pocket milling of a Haas"),
     270: ("xyzabc", "a motion to a position of the machine"),
     600: ("xyzabc", "positioning from one direction"),
     70: ("xyzabc", "a hypothetical axis"),
@@ -126,6 +126,9 @@ class Fanuc(Dialect):
         if 670 in block.g:
             c.modal_macro = None
         count_increments(block, c)
+        hole_pattern(block, c)
+        if circular_pocket(block, c):
+            return None
         for code in block.g:
             unread = rules.unread.get(code) or NOT_READ.get(code)
             if unread is not None:

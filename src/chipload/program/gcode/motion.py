@@ -50,7 +50,7 @@ class ControllerMotion:
         if code in (0, 10):
             self._straight(block, code, machine)
         elif machine:
-            raise InputError(f"G53 with {shown(code)}: goes with G0 and G1 only")
+            raise InputError(f"{self.c.machine_word} with {shown(code)}: goes with G0 and G1 only")
         elif code in (20, 30):
             self._arc(block, code)
         elif code in (50, 51, 52, 53):
@@ -78,11 +78,11 @@ class ControllerMotion:
         pace = rate(self.c, block, "G1") if code == 10 else None
         if machine:
             if not state.absolute and 900 not in block.g:
-                raise InputError("G53: goes with G90 only")
-            c.not_compensated("G53")
-            if in_machine_unknown(c, "G53", axes(self.c, block)):
+                raise InputError(f"{c.machine_word}: goes with G90 only")
+            c.not_compensated(c.machine_word)
+            if in_machine_unknown(c, c.machine_word, axes(self.c, block)):
                 return
-            note_machine_coordinates(c, "G53")
+            note_machine_coordinates(c, c.machine_word)
             to = c.position(put(c.machine_position(), axes(self.c, block)))
         else:
             goal = end(self.c, block)

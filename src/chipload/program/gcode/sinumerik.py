@@ -225,6 +225,8 @@ def _put(block: Block, letter: str, value: float) -> None:
 
 
 def _code(block: Block, c: Controller, code: int) -> None:
+    if code in (53, 153):
+        c.machine_word = f"G{code}"
     if code in SAME and code != 9:
         block.g.append(SAME[code])
     elif code in PLAIN:
@@ -383,6 +385,7 @@ def _keyword(block: Block, c: Controller, word: str, body: str = "") -> None:
     elif word == "MCALL":
         block.modal = True
     elif word == "SUPA":
+        c.machine_word = word
         block.g.append(530)
     elif word == "RET":
         c.note("nc-ignored", "RET: ends a subroutine: the text ends here")

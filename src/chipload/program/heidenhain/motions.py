@@ -15,7 +15,7 @@ import math
 import re
 
 from chipload.errors import InputError
-from chipload.program.commands import LINE, RAPID
+from chipload.program.commands import LINE, PLANE_AXES, RAPID, XY, YZ, ZX
 from chipload.program.corners import Corner
 from chipload.program.heidenhain import tilted_plane, words
 from chipload.program.heidenhain.formula import NotKnownError
@@ -40,6 +40,8 @@ def polar_line(s: ConversationalState, text: str) -> None:
     codes, fast = _read(s, text)
     end, named = s.ends(words.POLAR.sub(" ", text))
     x, y = _centre(s)
+    if s.pole_plane != XY:
+        raise NotKnownError("LP: polar coordinates in a plane along the tool's axis are not read")
     radius, angle = cmath.polar(complex(s.at[0] - x, s.at[1] - y))
     if {0, 1} & s.unknown and len(words.POLAR.findall(text)) < 2:
         raise NotKnownError("LP: the position of the tool is not known: give PR and PA")
@@ -102,13 +104,16 @@ def _retract(s: ConversationalState, text: str) -> None:
 
 
 def pole(s: ConversationalState, text: str) -> None:
-    """CC: the pole; without coordinates it is where the tool stands."""
+    """CC: the pole, in the plane of the axes that it names; without coordinates it is where the tool stands, in XY."""
     end, named = s.ends(text)
     if not named and {0, 1} & s.unknown:
         raise NotKnownError("CC: the position of the tool is not known: give X and Y")
-    for k in (0, 1):
+    plane = YZ if {1, 2} <= named else ZX if {0, 2} <= named else XY
+    if plane != s.pole_plane:
+        s.pole, s.pole_plane = [None, None], plane
+    for place, k in enumerate(PLANE_AXES[plane][:2]):
         if k in named or not named:
-            s.pole[k] = end[k]
+            s.pole[place] = end[k]
 
 
 def arc(s: ConversationalState, text: str) -> None:
@@ -116,7 +121,7 @@ def arc(s: ConversationalState, text: str) -> None:
     codes, fast = _read(s, text)
     sense = _sense(text, "C")
     end, _ = s.ends(text)
-    _arc(s, text, end, _centre(s), sense, codes, fast)
+    _arc(s, text, end, _centre(s), sense, codes, fast, about_pole=True)
 
 
 def arc_of_radius(s: ConversationalState, text: str) -> None:
@@ -158,15 +163,17 @@ def tangent_arc(s: ConversationalState, text: str) -> None:
 
 
 def helix(s: ConversationalState, text: str) -> None:
-    """CP: about the pole, by IPA or to PA, with a rise along Z."""
+    """CP: about the pole, by IPA or to PA, with a rise along the axis across its plane."""
     sweep, to = _SPAN.search(text), words.POLAR.search(text)
     sense = _sense(text, "CP")
     without = words.POLAR.sub(" ", text)
     codes, fast = _read(s, without)
     end, _ = s.ends(without)
     x, y = _centre(s)
-    _placed(s)
-    vx, vy = s.at[0] - x, s.at[1] - y
+    first, second, _ = PLANE_AXES[s.pole_plane]
+    if {first, second} & s.unknown:
+        raise NotKnownError("an arc begins at a position that is not known: move there first")
+    vx, vy = s.at[first] - x, s.at[second] - y
     if sweep is not None:
         angle = math.radians(s.signed(sweep[1], sweep[2]))
         if angle * sense < 0.0:
@@ -175,12 +182,12 @@ def helix(s: ConversationalState, text: str) -> None:
         angle = sense * ((sense * (math.radians(s.signed(to[3], to[4])) - math.atan2(vy, vx))) % math.tau or math.tau)
     else:
         raise InputError("CP: IPA or PA must be given")
-    end[0] = x + vx * math.cos(angle) - vy * math.sin(angle)
-    end[1] = y + vx * math.sin(angle) + vy * math.cos(angle)
+    end[first] = x + vx * math.cos(angle) - vy * math.sin(angle)
+    end[second] = y + vx * math.sin(angle) + vy * math.cos(angle)
     turns = max(1, math.ceil(abs(angle) / math.tau - 1e-9))
     if turns > MOST_TURNS:
         raise InputError(f"CP: {turns} turns: must be at most {MOST_TURNS}")
-    _arc(s, text, end, (x, y), sense * turns, codes, fast)
+    _arc(s, text, end, (x, y), sense * turns, codes, fast, about_pole=True)
 
 
 def approach(s: ConversationalState, text: str) -> None:
@@ -259,10 +266,14 @@ def _arc(
     turns: int,
     codes: list[int],
     fast: bool,
+    about_pole: bool = False,
 ) -> None:
-    _placed(s)
+    first, second, _ = PLANE_AXES[s.pole_plane if about_pole else XY]
+    if {first, second} & s.unknown:
+        raise NotKnownError("an arc begins at a position that is not known: move there first")
     x, y = centre
-    r0, r1 = math.hypot(s.at[0] - x, s.at[1] - y), math.hypot(end[0] - x, end[1] - y)
+    r0 = math.hypot(s.at[first] - x, s.at[second] - y)
+    r1 = math.hypot(end[first] - x, end[second] - y)
     if r0 < 1e-9 or abs(r1 - r0) > ROUNDED:
         raise InputError(
             f"an arc begins {r0:.6g} mm from its pole and ends {r1:.6g} mm from it: must agree to {ROUNDED:g} mm"
@@ -270,16 +281,18 @@ def _arc(
     if fast:
         raise InputError("an arc at FMAX is not read: give its feed")
     # the text rounds: the centre moves along the chord's bisector until both ends are as far
-    dx, dy = end[0] - s.at[0], end[1] - s.at[1]
+    dx, dy = end[first] - s.at[first], end[second] - s.at[second]
     chord = math.hypot(dx, dy)
     if chord > 1e-9:
-        mx, my = 0.5 * (end[0] + s.at[0]), 0.5 * (end[1] + s.at[1])
+        mx, my = 0.5 * (end[first] + s.at[first]), 0.5 * (end[second] + s.at[second])
         along = (-dy * (x - mx) + dx * (y - my)) / chord
         x, y = mx - dy / chord * along, my + dx / chord * along
     before(s, codes)
-    s.select(_side(s, text), {0, 1})
+    s.select(_side(s, text), {first, second})
     if s.left_out:
-        s.unknown |= {0, 1}
+        s.unknown |= {first, second}
+    elif about_pole and s.pole_plane != XY:
+        s.upright_arc(end, (x, y), turns, s.pole_plane)
     else:
         s.arc(end, (x, y), turns)
     after(s, codes)

@@ -17,7 +17,7 @@ are wrong is refused.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from chipload.errors import Finding, InputError
@@ -63,6 +63,7 @@ def read_heidenhain(
     radii: Mapping[int, float] | None = None,
     feed: float | None = None,
     swivel: Swivel | None = None,
+    lenient: bool = False,
 ) -> tuple[Commands, tuple[Finding, ...]]:
     r"""The motions of a conversational program, and the findings.
 
@@ -75,6 +76,7 @@ def read_heidenhain(
     radii : [mm] of the tools, where TOOL DEF states none
     feed : [mm/s] of cuts before the program states one; None: such a cut is refused
     swivel : the machine, for tilted working planes; None: they are not read
+    lenient : a block that cannot be read is a finding; else it refuses the text
 
     Raises
     ------
@@ -88,7 +90,7 @@ def read_heidenhain(
     if len(text) > LONGEST_TEXT:
         raise InputError(f"{name}: {len(text)} characters: must be at most {LONGEST_TEXT}")
     state = ConversationalState(name, parameters or {}, radii or {}, feed, swivel)
-    run = _Blocks(state, HeidenhainFlow(state, text_of(text), folder))
+    run = _Blocks(state, HeidenhainFlow(state, text_of(text), folder), lenient)
     try:
         run.go()
         state.end_contour()
@@ -128,7 +130,8 @@ def tool_definitions(text: str) -> dict[int, StatedDiameter]:
 class _Blocks:
     """Carries blocks out, one after another."""
 
-    def __init__(self, state: ConversationalState, flow: HeidenhainFlow) -> None:
+    def __init__(self, state: ConversationalState, flow: HeidenhainFlow, lenient: bool) -> None:
+        self.lenient = lenient
         self.s, self.flow = state, flow
         self.cycles, self.tools = Cycles(state), switches.Tools()
 
@@ -158,12 +161,11 @@ class _Blocks:
         self.s.before_corner = following.startswith(("RND", "CHF"))
         if not block:
             return at + 1
-        if block.startswith("LBL"):
-            return self.flow.label(block, at)
-        if block.startswith("CALL LBL"):
-            return self.flow.call(block, at)
-        if block.startswith("CALL PGM"):
-            return self.flow.call_program(block, at)
+        for word, step in (
+            ("LBL", self.flow.label), ("CALL LBL", self.flow.call), ("CALL PGM", self.flow.call_program),
+        ):  # fmt: skip
+            if block.startswith(word):
+                return self._step(step, block, at)
         if re.match(r"FN\s*\d+", block):
             try:
                 return self.flow.function(block, at)
@@ -176,10 +178,22 @@ class _Blocks:
             return at if back is None else back
         try:
             self._carry_out(block)
-        except NotKnownError as err:
+        except InputError as err:
+            if not (self.lenient or isinstance(err, NotKnownError)):
+                raise
             self.s.unproven("heidenhain-left-out", f"{err} [left out: {block[:60]}]")
             self.s.unknown |= {"XYZ".index(letter) for letter in re.findall(r"[XYZ]", block)}
         return at + 1
+
+    def _step(self, step: Callable[[str, int], int], block: str, at: int) -> int:
+        """Index of the block that follows a label or a call; one that cannot be read is left out where ``lenient``."""
+        try:
+            return step(block, at)
+        except InputError as err:
+            if not self.lenient:
+                raise
+            self.s.unproven("heidenhain-left-out", f"{err} [left out: {block[:60]}]")
+            return at + 1
 
     def _carry_out(self, block: str) -> None:
         s, word = self.s, block.split(maxsplit=1)[0]

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import cast
 
 from chipload.errors import Finding, InputError, Severity
-from chipload.program.commands import ARC, DWELL, LINE, RAPID, XY, Frame, Row
+from chipload.program.commands import ARC, DWELL, LINE, RAPID, XY, YZ, Frame, Row
 from chipload.program.compensation import CentreMove, Compensation
 from chipload.program.corners import Corner, Piece, joined
 from chipload.program.heidenhain.formula import NotKnownError, QParameters, q_number
@@ -58,7 +58,9 @@ class ConversationalState:
         self.frames: list[Frame] = [Frame()]
         self.at = [0.0] * 9
         self.unknown = set(range(3))
+        #: in the plane that the axes of CC name
         self.pole: list[float | None] = [None, None]
+        self.pole_plane = XY
         self.heading: complex | None = None
         self.shift = [0.0] * 9
         self.scale = 1.0
@@ -217,6 +219,17 @@ class ConversationalState:
         self._piece(Piece(ARC, self.at, end, centre, turns, feed, self._tail()))
         self.at = end
 
+    def upright_arc(self, end: list[float], centre: tuple[float, float], turns: int, plane: int) -> None:
+        """ARC to ``end`` in the plane YZ or ZX, about ``centre`` in its coordinates."""
+        if self.side:
+            raise InputError("an arc in a plane along the tool's axis: must be without RL and RR: write R0 before it")
+        self._flush()
+        x, y = self.lag
+        at = (centre[0] + y, centre[1]) if plane == YZ else (centre[0], centre[1] + x)
+        self._row(ARC, end, self.cutting_feed(), at, turns, self._tail(), plane)
+        self.heading = None
+        self.at = end
+
     def corner(self, corner: Corner) -> bool:
         """Round or chamfer the corner between the piece before and the next one; whether there is one before."""
         self._corner = corner
@@ -291,9 +304,10 @@ class ConversationalState:
         centre: tuple[float, float],
         turns: int,
         tail: tuple[object, ...],
+        plane: int = XY,
     ) -> None:
         x, y = end[0] + self.lag[0], end[1] + self.lag[1]
-        self.rows.append((motion, (x, y, *end[2:]), XY, centre, turns, feed, *tail))
+        self.rows.append((motion, (x, y, *end[2:]), plane, centre, turns, feed, *tail))
 
     def _tail(self) -> tuple[object, ...]:
         spindle = self.speed * self.sense

@@ -1,0 +1,42 @@
+"""Poles of a Heidenhain in the planes YZ and ZX, and blocks that cannot be read. Oracle: points by hand."""
+
+import numpy as np
+import pytest
+
+from chipload.errors import Severity
+from chipload.program.commands import ARC, YZ, ZX
+from chipload.program.heidenhain.reader import read_heidenhain
+
+
+def read(*blocks, lenient=False):
+    text = "\n".join(["BEGIN PGM A MM", "TOOL CALL 1 Z S1000", "M3", *blocks, "END PGM A MM"])
+    return read_heidenhain(text, lenient=lenient)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "plane", "end"),
+    [
+        (("CC Y+10 Z+0", "CP IPA+90 DR+ F500"), YZ, (0, 10, -10)),
+        (("CC Y+10 Z+0", "CP IPA-90 DR- F500"), YZ, (0, 10, 10)),
+        (("CC Z+10 X+0", "CP IPA+90 DR+ F500"), ZX, (-10, 0, 10)),
+        (("CC Y+10 Z+0", "C Y+20 Z+0 DR- F500"), YZ, (0, 20, 0)),
+    ],
+)
+def test_an_arc_along_the_tool(blocks, plane, end):
+    """From the origin about a pole 10 mm away."""
+    commands, _ = read("L X+0 Y+0 Z+0 FMAX", *blocks)
+    arc = commands.motion == ARC
+    assert commands.plane[arc].tolist() == [plane]
+    np.testing.assert_allclose(commands.position[-1, :3], end, atol=1e-9)
+
+
+def test_the_pole_in_xy_comes_back():
+    commands, _ = read("L X+0 Y+0 Z+0 FMAX", "CC Y+10 Z+0", "CC X+5 Y+0", "CP IPA+180 DR+ F500")
+    np.testing.assert_allclose(commands.position[-1, :3], (10, 0, 0), atol=1e-9)
+
+
+def test_a_block_that_cannot_be_read_is_a_finding():
+    commands, findings = read("L X+0 Y+0 Z+0 FMAX", "CR X+50 Y+0 R+1 DR+ F100", "L X+9 Y+0 F100", lenient=True)
+    left_out = [f for f in findings if f.severity is Severity.UNPROVEN]
+    assert [(f.code, f.line) for f in left_out] == [("heidenhain-left-out", 5)]
+    assert commands.position[-1, 0] == 9.0
