@@ -58,7 +58,7 @@ def square_result(job: str = "square", program: bytes = PROGRAM.encode()) -> Res
     at = (23.2, 40.0, -2.0)
     limits = (
         LimitCheck("force_n", 800.0, 900.0, Verdict.EXCEEDS, "program", 120, 9, at, 12.1),
-        LimitCheck("torque_nm", 12.0, 9.0, Verdict.HOLDS, "program", None, 9, at),
+        LimitCheck("torque_nm", 12.0, 9.0, Verdict.HOLDS, "program", None, 9, at, resolution_error=0.0),
     )
     found = (Finding("rapid-in-stock", 8, "a rapid goes through material", Severity.EXCEEDS),)
     track = Track(
@@ -82,7 +82,7 @@ def two_variants() -> Result:
     half = {**columns, "force_n": FORCE / 2.0}
     twice = {**columns, "t_s": 2.0 * T, "duration_s": np.full(ROWS, 0.2)}
     at = (23.2, 40.0, -2.0)
-    holds = LimitCheck("force_n", 800.0, 450.0, Verdict.HOLDS, "variable", 120, 9, at, 12.1)
+    holds = LimitCheck("force_n", 800.0, 450.0, Verdict.HOLDS, "variable", 120, 9, at, 12.1, 0.0)
     exceeds = LimitCheck("force_n", 800.0, 900.0, Verdict.EXCEEDS, "constant", 120, 9, at, 24.2)
     found = (Finding("off-part", 8, "the path leaves the workpiece", Severity.EXCEEDS),)
     kind, program = TrackKind.VARIANT, ("0-program.apt",)

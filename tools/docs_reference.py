@@ -19,7 +19,9 @@ DOCS = Path(__file__).parents[1] / "docs"
 HEAD = """# Columns and limits
 
 Every quantity of a result has one name, with the unit in it. A limit in `[limits]` of a job has the name of the column
-that it bounds. The fields of `history.parquet` carry unit, label and meaning as metadata.
+that it bounds. The fields of `history.parquet` carry unit, label and meaning as metadata. The last column states where the
+error of a quantity comes from: it is exact, or as that of other columns, or the calculation states it. A limit on a quantity
+whose error nothing states is unproven.
 
 This page is made from `src/chipload/result/columns.py` by `make reference`.
 """
@@ -51,10 +53,10 @@ def schema_text() -> str:
 
 def columns_text() -> str:
     """The table of columns, and the limits of another name."""
-    rows = ["| column | unit | label | meaning |", "|---|---|---|---|"]
+    rows = ["| column | unit | label | meaning | error |", "|---|---|---|---|---|"]
     for c in COLUMNS.values():
         signed = " (a limit bounds its size)" if c.signed else ""
-        rows.append(f"| `{c.name}` | {c.unit} | {c.label} | {c.meaning}{signed} |")
+        rows.append(f"| `{c.name}` | {c.unit} | {c.label} | {c.meaning}{signed} | {c.error.text} |")
     others = ["| limit | column that it bounds | label |", "|---|---|---|"]
     others += [f"| `{limit}` | `{column}` | {label} |" for limit, (column, label) in BOUNDED.items()]
     return "\n".join([HEAD, *rows, "", "## Limits that bound a column of another name", "", *others, ""])

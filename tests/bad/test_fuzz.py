@@ -96,7 +96,7 @@ def test_a_campaign_goes_on_after_its_record(tmp_path: Path, monkeypatch: pytest
 
 def result_with(**track: object) -> Result:
     """A result of one limit that holds."""
-    force = LimitCheck("force_n", 500.0, 480.0, Verdict.HOLDS, "program")
+    force = LimitCheck("force_n", 500.0, 480.0, Verdict.HOLDS, "program", resolution_error=0.0)
     one = Track("program", TrackKind.PROGRAM, True, 3.0, (force,), blocks=in_memory({"force_n": np.array([480.0])}))
     return Result("program", "x", (replace(one, **track),), (), (), (), Provenance({}, (), "", {}, {}))  # type: ignore[arg-type]
 
@@ -104,7 +104,7 @@ def result_with(**track: object) -> Result:
 @pytest.mark.parametrize(("track", "said"), [
     ({"blocks": in_memory({"force_n": np.array([np.nan])})}, "not finite"),
     ({"blocks": in_memory({"force_n": np.array([-3.0, 480.0])})}, "is -3"),
-    ({"limits": (LimitCheck("force_n", 400.0, 480.0, Verdict.HOLDS, "program"),)}, "of 400.0 holds"),
+    ({"limits": (LimitCheck("force_n", 400.0, 480.0, Verdict.HOLDS, resolution_error=0.0),)}, "of 400.0 holds"),
 ])  # fmt: skip
 def test_nonsense_is_seen(track: dict[str, object], said: str) -> None:
     fuzz_jobs.judge(result_with())

@@ -98,7 +98,7 @@ def test_means_are_not_peaks() -> None:
     """Every column of a greatest value of force, torque, stress or deflection is one; none of a mean or of a power."""
     assert set(PEAKS) <= set(COLUMNS)
     assert not {"torque_mean_nm", "power_w", "chip_max_mm"} & set(PEAKS)
-    check = LimitCheck("spindle_torque_nm", 10.0, 9.9, Verdict.HOLDS)
+    check = LimitCheck("spindle_torque_nm", 10.0, 9.9, Verdict.HOLDS, resolution_error=0.0)
     own = replace(material_named("al7075-t6"), peak_excess=0.4, chip=(0.0, 0.05))
     assert with_peaks(check, DefaultChecks({}, own), {"chip_max_mm": np.array([0.1])}) is check
 
@@ -111,7 +111,7 @@ def test_the_stress_of_a_workpiece_has_the_band_of_the_force() -> None:
 
     def stress(sigma: float, excess: float = 0.0) -> LimitCheck:
         simulation = SimpleNamespace(
-            workpiece=SimpleNamespace(strained=strained, error=0.0), errors={}, limits={}, stability=None,
+            workpiece=SimpleNamespace(strained=strained, error=0.0), errors={"force_n": 0.0}, limits={}, stability=None,
             machine=None, checks=DefaultChecks({}, replace(own, peak_excess=excess), ("spindle",), sigma),
         )  # fmt: skip
         (found,) = program_limits(simulation, columns, "program")

@@ -253,14 +253,14 @@ def test_a_margin_needs_modes(tmp_path: Path) -> None:
 def test_a_limit_that_is_a_least_value() -> None:
     assert [state_of(x, 1.0, 0.05, least=True)[0].value for x in (0.9, 1.02, 1.1)] == ["exceeds", "unproven", "holds"]
     rows = {"stability_margin": np.array([2.0, 1.3, 3.0]), "line": np.array([1, 2, 3])}
-    check = check_limit("stability_margin", 1.2, rows)
+    check = check_limit("stability_margin", 1.2, rows, error=0.0)
     assert (check.worst, check.line, check.state, check.text) == (
         1.3,
         2,
         Verdict.HOLDS,
         "stability margin 1.3 of at least 1.2",
     )
-    assert check_limit("stability_margin", 1.4, rows).text == "stability margin 1.3 is below 1.4 in line 2"
+    assert check_limit("stability_margin", 1.4, rows, error=0.0).text == "stability margin 1.3 is below 1.4 in line 2"
 
 
 def test_a_mirrored_program_has_the_same_margins(tmp_path: Path) -> None:

@@ -69,19 +69,30 @@ def with_strategies(outcome: ContourResult, change: Callable[[StrategyResult], S
 def verdict(outcome: ContourResult) -> tuple[Verdict, str]:
     """Verdict and message of an outcome."""
     result = result_of(outcome)
-    return result.verdict, result.message
+    return result.verdict, result.message.partition(" Critical limit")[0].partition(" Not covered")[0]
 
 
 def test_the_verdict_stands_on_the_strategy_in_use(outcome: Maker) -> None:
     # the engagement counts where the wall is made, the force everywhere: the semi-finish pass has 95 N
     assert verdict(outcome("backward")) == (
         Verdict.HOLDS,
-        "Holds: engagement 12.68 of 13 deg, force across the axis 95 of 200 N. The simulation agrees with the plan.",
+        "Holds: engagement 12.68 of 13 deg in the finish pass, margin 2.48 %, at (5, 8.006, -5).",
     )
     assert verdict(outcome("plain")) == (
         Verdict.EXCEEDS,
-        "Exceeds: engagement 18.74 deg exceeds 13 deg at (5, 7.957, -5).",
+        "Exceeds: engagement 18.74 deg exceeds 13 deg at (5, 7.957, -5), 44.1 % beyond the limit.",
     )
+
+
+def test_the_first_lines_state_what_the_limits_do_not_cover(outcome: Maker) -> None:
+    result = result_of(outcome("backward"))
+    message, unchecked = result.first_lines
+    assert (
+        "Not covered: engagement counts in the finish pass only, where the wall is made; 4.497 s of other cuts reach "
+        "25 deg. The simulation agrees with the plan." in message
+    )
+    assert unchecked == "Not checked: default checks; limit torque_nm."
+    assert result.limits[0].coverage.mask(1800).sum() == 900
 
 
 @pytest.mark.parametrize("state", [Verdict.EXCEEDS, Verdict.UNPROVEN])
@@ -128,8 +139,14 @@ def test_summary_states_the_verdict_first_and_every_strategy(outcome: Maker) -> 
         "place": pytest.approx([5.0, 7.957, -5.0], abs=1e-3),
         "t_s": pytest.approx(plain["limits"][0]["row"] * 9.0 / 1799),
         "resolution_error": 0.0,
+        "absolute_error": 0.05,
+        "margin": pytest.approx(1.0 - plain["limits"][0]["worst"] / 13.0),
+        "coverage": {
+            "name": "finish pass", "reason": "where the wall is made", "ranges": [[900, 1800]],
+            "excluded_s": pytest.approx(4.5, abs=0.01), "excluded_worst": 25.0,
+        },
         "reason": "",
-    }
+    }  # fmt: skip
     assert plain["time_s"] == 9.0
     assert [(f["code"], f["severity"]) for f in plain["findings"]] == [("lead-none", "note")]
     strategies = stated["operations"][0]["strategies"]

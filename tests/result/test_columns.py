@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
-from chipload.result import COLUMNS, Column, column_of
+from chipload.result import COLUMNS, Column, column_of, error_of
 from chipload.result.columns import BOUNDED, _by_name, unit_of
 
 #: units by the ending of a name, written here a second time on purpose
@@ -34,6 +36,31 @@ def test_no_two_columns_have_one_label_and_unit():
     for c in COLUMNS.values():
         shared.setdefault(c.title, []).append(c.name)
     assert [names for names in shared.values() if len(names) > 1] == []
+
+
+def test_every_column_declares_where_its_error_comes_from():
+    """Exact and why, or like other columns, which end at columns whose error a calculation states; never both."""
+    for column in COLUMNS.values():
+        source = column.error
+        assert not (source.exact and source.like), column.name
+        assert set(source.like) <= set(COLUMNS), column.name
+        stated = dict.fromkeys(source.like, 0.02)
+        expected = 0.0 if source.exact else 0.02 if source.like else math.inf
+        assert error_of(column.name, stated) == expected, column.name
+        assert error_of(column.name, {}) == (0.0 if source.exact else math.inf), column.name
+        assert error_of(column.name, {column.name: 0.3}) == 0.3, column.name
+
+
+@pytest.mark.parametrize("name", ["feed_mm_min", "spindle_rpm", "line", "x_mm", "s_mm", "override", "unreached_points"])
+def test_what_is_commanded_or_counted_is_exact(name):
+    assert COLUMNS[name].error.exact
+
+
+@pytest.mark.parametrize(
+    "name", ["force_n", "torque_nm", "chip_max_mm", "engagement_deg", "gouge_mm", "form_error_um", "stress_mpa", "t_s"]
+)
+def test_what_a_calculation_finds_is_not_exact(name):
+    assert not COLUMNS[name].error.exact
 
 
 def test_a_name_that_stands_twice_is_refused():

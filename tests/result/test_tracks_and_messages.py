@@ -12,8 +12,8 @@ from chipload.result import LimitCheck, Provenance, Result, Track, TrackKind, Ve
 
 H, U, E = Verdict.HOLDS, Verdict.UNPROVEN, Verdict.EXCEEDS
 NOWHERE = Provenance({}, (), "none", {}, {})
-FORCE = LimitCheck("force_n", 500.0, 412.0, H)
-TORQUE = LimitCheck("torque_nm", 3.0, 2.0, H)
+FORCE = LimitCheck("force_n", 500.0, 412.0, H, resolution_error=0.0)
+TORQUE = LimitCheck("torque_nm", 3.0, 2.0, H, resolution_error=0.0)
 TOO_MUCH = LimitCheck("force_n", 500.0, 812.0, E, line=12)
 UNKNOWN = LimitCheck("power_w", 900.0, None, U, reason="no speed is stated")
 
@@ -60,22 +60,28 @@ def test_the_columns_of_a_track_are_those_of_all_its_blocks():
     assert Track("a", TrackKind.PROGRAM, True, 3.0).columns == {}
 
 
-def test_where_everything_holds_every_limit_is_named():
-    assert result(track("a", FORCE, TORQUE)).message == "Holds: force 412 of 500 N, torque 2 of 3 N m."
+def test_where_everything_holds_the_critical_limit_is_named():
+    assert result(track("a", FORCE, TORQUE)).message == "Holds: force 412 of 500 N, margin 17.6 %."
     two = result(track("a", FORCE), track("b", TORQUE), note="Twice as quick.")
-    assert two.message == "Holds: a: force 412 of 500 N; b: torque 2 of 3 N m. Twice as quick."
+    assert two.message == "Holds: a: force 412 of 500 N, margin 17.6 %. Twice as quick."
 
 
 def test_what_exceeds_comes_before_what_is_unproven():
     some = result(track("a", FORCE, UNKNOWN, TOO_MUCH))
-    assert (some.verdict, some.message) == (E, "Exceeds: force 812 N exceeds 500 N in line 12.")
+    assert (some.verdict, some.message) == (
+        E,
+        "Exceeds: force 812 N exceeds 500 N in line 12, 62.4 % beyond the limit.",
+    )
     some = result(track("a", FORCE, UNKNOWN), findings=(Finding("g", 7, "G41 without D", Severity.UNPROVEN),))
-    assert (some.verdict, some.message) == (U, "Unproven: line 7: G41 without D; and 1 more.")
+    assert (some.verdict, some.message) == (
+        U,
+        "Unproven: line 7: G41 without D; and 1 more. Critical limit: force 412 of 500 N, margin 17.6 %.",
+    )
 
 
 def test_a_track_that_is_not_in_use_does_not_count():
     some = result(track("a", FORCE), track("b", TOO_MUCH, in_use=False))
-    assert (some.verdict, some.limits, some.message) == (H, (FORCE,), "Holds: force 412 of 500 N.")
+    assert (some.verdict, some.limits, some.message) == (H, (FORCE,), "Holds: force 412 of 500 N, margin 17.6 %.")
     assert some.track("b").verdict is E
     with pytest.raises(KeyError):
         some.track("c")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chipload.errors import Finding, InputError, Severity
-from chipload.result import LimitCheck, Verdict, check_limit, state_of
+from chipload.result import COLUMNS, Coverage, CoveredRows, LimitCheck, Verdict, check_limit, state_of
 
 H, U, E = Verdict.HOLDS, Verdict.UNPROVEN, Verdict.EXCEEDS
 
@@ -71,7 +71,7 @@ def test_an_error_of_unknown_size_leaves_a_value_unproven():
 )  # fmt: skip
 def test_a_check_refuses_what_is_not_finite(wrong):
     with pytest.raises(ValueError, match=r"limit force_n: .* must be finite"):
-        LimitCheck(**({"name": "force_n", "limit": 1.0, "worst": 0.5, "state": H} | wrong))
+        LimitCheck(**({"name": "force_n", "limit": 1.0, "worst": 0.5, "state": H, "resolution_error": 0.0} | wrong))
 
 
 def test_a_check_refuses_an_error_below_zero_and_a_missing_value_that_holds():
@@ -84,7 +84,7 @@ def test_a_check_refuses_an_error_below_zero_and_a_missing_value_that_holds():
 @pytest.mark.parametrize(
     ("check", "text"),
     [
-        (LimitCheck("force_n", 500.0, 412.345, H), "force 412.3 of 500 N"),
+        (LimitCheck("force_n", 500.0, 412.345, H, resolution_error=0.0), "force 412.3 of 500 N"),
         (LimitCheck("force_n", 500.0, 812.0, E, line=12), "force 812 N exceeds 500 N in line 12"),
         (
             LimitCheck("gouge_mm", 0.02, 0.05, E, place=(1.0, -2.5, 3.0)),
@@ -96,7 +96,7 @@ def test_a_check_refuses_an_error_below_zero_and_a_missing_value_that_holds():
             "power of at most 900 W is unknown: no speed is stated",
         ),
         (LimitCheck("torque_nm", 3.0, 2.9, U, reason="coarse"), "torque 2.9 of 3 N m, unproven: coarse"),
-        (LimitCheck("spindle_power_w", 900.0, 100.0, H), "spindle power 100 of 900 W"),
+        (LimitCheck("spindle_power_w", 900.0, 100.0, H, resolution_error=0.0), "spindle power 100 of 900 W"),
     ],
 )
 def test_the_text_of_a_check(check, text):
@@ -120,20 +120,49 @@ def test_a_check_names_the_row_of_the_greatest_value():
 
 
 def test_only_the_chosen_rows_count():
-    check = check_limit("force_n", 470.0, ROWS, rows=np.array([True, False, True]))
+    some = CoveredRows(np.array([True, False, True]), "finish pass", "where the wall is made")
+    check = check_limit("force_n", 470.0, ROWS, rows=some, error=0.0)
     assert (check.state, check.worst, check.row) == (H, 300.0, 2)
+    covered = Coverage("finish pass", "where the wall is made", ((0, 1), (2, 3)), 0.5, 480.0)
+    assert (check.coverage, check.coverage.mask(3).tolist()) == (covered, [True, False, True])
+    assert check.text == "force 300 of 470 N in the finish pass"
 
 
 def test_a_signed_column_is_bounded_by_its_size():
-    check = check_limit("form_error_um", 8.5, ROWS)
+    check = check_limit("form_error_um", 8.5, ROWS, error=0.0)
     assert (check.state, check.worst, check.row) == (E, 9.0, 1)
 
 
 def test_what_is_not_calculated_is_unproven():
     missing = check_limit("power_w", 900.0, ROWS)
     assert (missing.state, missing.worst, missing.reason) == (U, None, "power was not calculated")
-    none = check_limit("force_n", 900.0, ROWS, rows=np.zeros(3, dtype=bool))
+    none = check_limit("force_n", 900.0, ROWS, rows=CoveredRows(np.zeros(3, dtype=bool), "no pass", "none is cut"))
     assert (none.state, none.worst, none.reason) == (U, None, "no step was checked")
+
+
+@pytest.mark.parametrize("name", sorted(COLUMNS))
+def test_a_limit_holds_only_where_the_error_of_its_column_is_known(name):
+    """Every column: a value far within its limit holds where the column is exact or its error is stated, else never."""
+    column = COLUMNS[name]
+    value, limit = (3.0, 1.0) if column.least else (1.0, 3.0)
+    rows = {name: np.array([value])}
+    assert check_limit(name, limit, rows, error=0.02).state is H
+    silent = check_limit(name, limit, rows)
+    assert silent.state is (H if column.error.exact else U)
+    if not column.error.exact:
+        assert silent.reason == f"the resolution error of {column.label} is not known"
+        assert check_limit(name, limit, rows, error=math.inf).state is U
+        with pytest.raises(ValueError, match="holds, but its resolution_error is not stated"):
+            LimitCheck(name, limit, value, H)
+
+
+def test_a_value_between_the_checked_points_counts():
+    hidden = {"gouge_mm": np.array([0.01])}
+    assert check_limit("gouge_mm", 0.05, hidden, error=0.0, absolute=0.03).state is H
+    check = check_limit("gouge_mm", 0.05, hidden, error=0.0, absolute=0.05)
+    assert (check.state, check.absolute_error) == (U, 0.05)
+    assert check.reason == "between the points that are checked it may be worse by 0.05, beyond the limit"
+    assert check_limit("gouge_mm", 0.005, hidden, error=0.0, absolute=0.05).state is E
 
 
 def test_a_column_that_is_not_a_number_is_refused():

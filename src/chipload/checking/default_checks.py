@@ -18,8 +18,9 @@ from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.errors import Finding, InputError, Severity
 from chipload.machine.machine import Machine
-from chipload.result import LimitCheck, Verdict, check_limit
+from chipload.result import CoveredRows, LimitCheck, Verdict, check_limit, error_of
 from chipload.result.limits import Columns
+from chipload.result.number_text import percent_text
 from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.loads import Cuts, Floats, Ints
 from chipload.simulation.ramp import ramp_angle
@@ -51,8 +52,6 @@ DIRECTED = (
 PEAKS = (
     *DIRECTED, "force_xy_n", "force_normal_n", "force_over_allowable", "stress_mpa", "strength_share", "torque_nm",
 )  # fmt: skip
-#: columns that have the error of the force where they have none of their own
-WITH_FORCE = ("cutter_stress_mpa", "deflection_um", "deflection_workpiece_um")
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,24 +304,22 @@ def default_limits(
     if "spindle" not in checks.off:
         out += _spindle(machine, upper, track, errors)
     if "flute_fill" in columns and "chip_space" not in checks.off:
-        out.append(check_limit("flute_fill", 1.0, columns, track=track))
+        out.append(check_limit("flute_fill", 1.0, columns, track=track, error=error_of("flute_fill", errors)))
     direction = checks.unknown_direction
     if "cutter_strength" not in checks.off and "cutter_stress_mpa" in columns:
         allowed = checks.allowed_stress(columns["tool"])
         k = int(np.argmax(upper["cutter_stress_mpa"] / allowed))
         if np.isfinite(allowed[k]):
-            rows, error = np.arange(len(allowed)) == k, load_error(errors, "cutter_stress_mpa")
-            limit = float(allowed[k])
-            out.append(
-                check_limit("cutter_stress_mpa", limit, upper, track=track, rows=rows, error=error, reason=direction)
-            )
+            limit, error = float(allowed[k]), error_of("cutter_stress_mpa", errors)
+            out.append(check_limit("cutter_stress_mpa", limit, upper, track=track, at=k, error=error, reason=direction))
     if "flute_length" not in checks.off and "axial_overrun_mm" in columns:
-        out.append(check_limit("axial_overrun_mm", 0.0, columns, track=track))
+        # what stands in material above the flutes is found to half a layer, see simulation.shank
+        out.append(check_limit("axial_overrun_mm", 0.0, columns, track=track, error=0.0))
     if "plunge" not in checks.off and "ramp_deg" in columns:
         out += _ramp(checks, columns, track)
     if "rigid_model" not in checks.off and "deflection_share" in columns:
-        rows, error = _could_be_greatest(columns, checks), load_error(errors, "deflection_share")
-        why = direction or ("" if rows.any() else "nothing is cut")
+        rows, error = _could_be_greatest(columns, checks), error_of("deflection_share", errors)
+        why = direction or ("" if rows.mask.any() else "nothing is cut")
         check = check_limit("deflection_share", 1.0, columns, track=track, rows=rows, error=error, reason=why)
         out.append(_rigid(check, checks, columns))
     return tuple(with_peaks(check, checks, columns) for check in out)
@@ -337,11 +334,10 @@ def _ramp(checks: DefaultChecks, columns: Columns, track: str) -> list[LimitChec
     allowed = np.array([stated.get(n, math.inf) for n in tool.tolist()])
     ramp = np.where(ramp <= allowed + STEEPER, np.minimum(ramp, allowed), ramp)
     k = int(np.argmax(np.where(np.isfinite(allowed), ramp / allowed, -1.0)))
-    rows, own = np.arange(len(tool)) == k, {**columns, "ramp_deg": ramp}
-    return [check_limit("ramp_deg", float(allowed[k]), own, track=track, rows=rows)]
+    return [check_limit("ramp_deg", float(allowed[k]), {**columns, "ramp_deg": ramp}, track=track, at=k)]
 
 
-def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> NDArray[np.bool_]:
+def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> CoveredRows:
     """Steps with a load or a deflection that, greater by what the deflection may add to the chip, would be the greatest
     of their tool.
 
@@ -360,7 +356,7 @@ def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> NDArray[np.bo
         touches = load[own] < LOADED * load[own].max(initial=0.0)
         could = np.any([v[own] * more[own] >= v[own].max(initial=0.0) for v in judged], axis=0)
         out[own] = could & ~touches & (load[own] > 0.0)
-    return out
+    return CoveredRows(out, "steps with the greatest loads", "since elsewhere no greater load can follow from it")
 
 
 def _rigid(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> LimitCheck:
@@ -380,27 +376,12 @@ def _spindle(machine: Machine, columns: Columns, track: str, errors: Mapping[str
     able = machine.torque_at(spindle_speed(columns)) / 1000.0
     k = int(np.argmax(torque / able))
     if np.isfinite(able[k]):
-        rows, error = np.arange(len(torque)) == k, load_error(errors, "torque_mean_nm")
-        limit = float(able[k])
-        out.append(check_limit("spindle_torque_nm", limit, columns, track=track, rows=rows, error=error))
+        limit, error = float(able[k]), error_of("torque_mean_nm", errors)
+        out.append(check_limit("spindle_torque_nm", limit, columns, track=track, at=k, error=error))
     if machine.power_w is not None:
-        error = load_error(errors, "power_w")
+        error = error_of("power_w", errors)
         out.append(check_limit("spindle_power_w", machine.power_w, columns, track=track, error=error))
     return out
-
-
-def load_error(errors: Mapping[str, float], column: str) -> float:
-    """Relative error of a column by the resolution; stress and deflection have that of the force, and the share of the
-    range of the rigid model that of the deflection.
-
-    >>> load_error({"force_n": 0.02}, "cutter_stress_mpa"), load_error({"force_n": 0.02}, "power_w")
-    (0.02, 0.0)
-    >>> load_error({"force_n": 0.02, "deflection_um": 0.03}, "deflection_share")
-    0.03
-    """
-    if column == "deflection_share" and column not in errors:
-        column = "deflection_um"
-    return errors.get(column, errors.get("force_n", 0.0) if column in WITH_FORCE else 0.0)
 
 
 def peak_excess(material: Material, column: str) -> float:
@@ -429,9 +410,9 @@ def with_peaks(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> Li
         reason = f"chips are up to {thickest:.4g} mm thick, {material.name} was measured up to {material.chip[1]:g} mm"
         return replace(check, state=Verdict.UNPROVEN, reason=reason)
     excess = peak_excess(material, check.column.name)
-    if abs(check.worst) * (1.0 + check.resolution_error) * (1.0 + excess) <= check.limit:
+    if abs(check.worst) * (1.0 + check.error) * (1.0 + excess) <= check.limit:
         return check
-    reason = f"measured peaks of {material.name} were up to {100.0 * excess:.3g} % above predicted ones"
+    reason = f"measured peaks of {material.name} were up to {percent_text(excess)} above predicted ones"
     return replace(check, state=Verdict.UNPROVEN, reason=reason)
 
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chipload.checking.default_checks import DIRECTED, default_limits, load_error, upper_loads, with_peaks
+from chipload.checking.default_checks import DIRECTED, default_limits, upper_loads, with_peaks
 from chipload.checking.outcome import SimulationResult
 from chipload.checking.stability import STABILITY_LIMITS, StabilityResult, stability_limits
 from chipload.machine.machine import Machine
-from chipload.result import LimitCheck, Verdict, check_limit, column_of, state_of
+from chipload.result import LimitCheck, Verdict, check_limit, column_of, error_of, state_of
 from chipload.result.limits import Columns
+from chipload.result.number_text import number_text
 from chipload.simulation.surface import Difference
 
 #: greatest gouge [mm] of a part whose job states no limit on it: the least medium deviation, ISO 2768-1 m
@@ -52,13 +54,14 @@ def _yield_limit(simulation: SimulationResult, columns: Columns, track: str) -> 
     own = None if simulation.workpiece is None else simulation.workpiece.strained
     if simulation.workpiece is None or own is None:
         return ()
-    force = simulation.errors.get("force_n", 0.0)
+    force = error_of("force_n", simulation.errors)
     # a stress converges more slowly than a displacement
-    error = 2.0 * simulation.workpiece.error + (force if math.isfinite(force) else 0.0)
+    error = 2.0 * simulation.workpiece.error + force
     k, stress, place = own.worst(np.asarray(columns["force_n"], dtype=np.float64))
     state, why = state_of(stress, own.strength, error)
     line, t = int(columns["line"][k]), float(columns["t_s"][k])
-    check = LimitCheck("stress_mpa", own.strength, stress, state, track, k, line, place, t, error, why)
+    known = error if math.isfinite(error) else 0.0
+    check = LimitCheck("stress_mpa", own.strength, stress, state, track, k, line, place, t, known, why)
     return (with_peaks(check, simulation.checks, columns),)
 
 
@@ -95,7 +98,7 @@ def _stated(simulation: SimulationResult, columns: Columns, track: str, name: st
         return _difference(simulation, columns, track, name, limit)
     if name == "form_error_um" and "form_points" in columns and not np.asarray(columns["form_points"]).any():
         reason = "no point of the part is finished"
-    error = load_error(simulation.errors, column_of(name).name)
+    error = error_of(column_of(name).name, simulation.errors)
     check = check_limit(name, limit, columns, track=track, error=error, reason=reason)
     return with_peaks(check, simulation.checks, columns)
 
@@ -114,13 +117,13 @@ def _difference(simulation: SimulationResult, columns: Columns, track: str, name
     left = simulation.left
     worst, k, place = greatest_difference(left, name)
     hidden = left.hidden if name == "gouge_mm" else 0.0
-    state, why = state_of(worst, limit)
+    state, why = state_of(worst, limit, 0.0)
     if state is Verdict.HOLDS and worst + hidden > limit:
-        text = f"{hidden:.2g} mm" if math.isfinite(hidden) else "an unknown depth"
+        text = f"{number_text(hidden, 2)} mm" if math.isfinite(hidden) else "an unknown depth"
         state = Verdict.UNPROVEN
         why = f"between the points of the part it may be deeper by {text}: state a smaller part.spacing_mm"
-    error = hidden / worst if worst > 0.0 and math.isfinite(hidden) else 0.0
+    known = hidden if math.isfinite(hidden) else 0.0
+    check = LimitCheck(name, limit, worst, state, track, resolution_error=0.0, reason=why, absolute_error=known)
     if place is None:
-        return LimitCheck(name, limit, worst, state, track, resolution_error=error, reason=why)
-    line, t = int(columns["line"][k]), float(columns["t_s"][k])
-    return LimitCheck(name, limit, worst, state, track, k, line, place, t, error, why)
+        return check
+    return replace(check, row=k, line=int(columns["line"][k]), place=place, t_s=float(columns["t_s"][k]))

@@ -74,7 +74,7 @@ def rubbing(
         force, now = (
             float(np.linalg.norm(kc * h ** (1.0 - np.array(material.exponents)) + ke)) for h in (x * thick, thick)
         )
-        return (1.0 + 2.0 * check.resolution_error) * share * force / (x * now)
+        return (1.0 + 2.0 * check.error) * share * force / (x * now)
 
     low, high = 1.0, MOST_FEED
     if share_at(high) > 1.0:

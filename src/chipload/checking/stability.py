@@ -21,7 +21,7 @@ from chipload.checking.inputs import CheckInputs
 from chipload.checking.stability_watch import PROBABILITY, StabilityWatch, relative_covariance
 from chipload.checking.workpiece_compliance import WorkpieceCompliance
 from chipload.machine.machine import Machine
-from chipload.result import LimitCheck, check_limit
+from chipload.result import CoveredRows, LimitCheck, check_limit, error_of
 from chipload.result.limits import Columns
 from chipload.stability.cuts import joined
 from chipload.stability.margin import MOST_MARGIN, stability_margins
@@ -187,11 +187,7 @@ def stability_limits(
     reason = direction or stability.reason(np.unique(np.asarray(columns["tool"])[cutting]))
     if not reason and (margin[cutting] == 0.0).any():
         reason = "the margin of some steps is unknown"
-    error = (
-        MARGIN_ERROR
-        + stability.frequency_share
-        + (errors.get("force_n", 0.0) if math.isfinite(errors.get("force_n", 0.0)) else 0.0)
-    )
+    error = MARGIN_ERROR + stability.frequency_share + error_of("force_n", errors)
     out = []
     for name, limit in limits.items():
         why = reason
@@ -207,7 +203,9 @@ def stability_limits(
         ]
         if name == "sle_um" and spatial and not uneven:
             why = f"tool {int(spatial[0])} and workpiece move along the axis"
-        rows = cutting if name == "sle_um" else margin > 0.0
+        rows = CoveredRows(margin > 0.0, "cuts with a known margin", "since elsewhere none is calculated")
+        if name == "sle_um":
+            rows = CoveredRows(cutting, "cuts at a feed", "since a rapid makes no wall")
         known = 0.0 if name == PROBABILITY else error
         out.append(check_limit(name, limit, columns, track=track, rows=rows, error=known, reason=why))
     return tuple(out)

@@ -70,9 +70,20 @@ def feed_of(mm_min: float | None) -> float | None:
     return mm_s_from_mm_min(mm_min)
 
 
+def show_verdict(result: Result) -> None:
+    """Show the first lines of a verdict: state and critical limit, then what is not covered and not checked."""
+    for line in result.first_lines:
+        show(line)
+
+
 def show_limits(result: Result) -> None:
     """Show the worst value of each limit in one line; the message of an unproven result may omit it."""
+    from chipload.result.number_text import number_text
+
     known = [c for c in result.limits if c.worst is not None]
-    worst = ", ".join(f"{c.column.label} {c.worst:.4g} of {c.limit:g} {c.column.unit}".strip() for c in known)
+    worst = ", ".join(
+        f"{c.column.label} {number_text(c.worst or 0.0)} of {number_text(c.limit, 6)} {c.column.unit}".strip()
+        for c in known
+    )
     if worst:
         show(f"worst values: {worst}")

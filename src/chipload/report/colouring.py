@@ -34,13 +34,10 @@ FIRST = (
 
 
 def beyond(values: Floats, check: LimitCheck) -> Bools:
-    """(n,) rows beyond a limit; values beyond what the check calls the worst were not part of it."""
+    """(n,) rows beyond a limit, of those that the check covers."""
     size = np.abs(np.nan_to_num(values)) if check.column.signed else np.nan_to_num(values)
     above = size < check.limit if check.column.least else size > check.limit
-    if check.worst is not None:
-        worst = check.worst * (1.0 + 1e-9 * (-1.0 if check.column.least else 1.0))
-        above &= size >= worst if check.column.least else size <= worst
-    return np.asarray(above, dtype=np.bool_)
+    return np.asarray(above & check.coverage.mask(len(size)), dtype=np.bool_)
 
 
 def lowest_limit(limits: Sequence[LimitCheck], column: str) -> LimitCheck | None:

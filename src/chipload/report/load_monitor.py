@@ -163,7 +163,7 @@ def _sections(track: Track) -> Iterator[LoadSection]:
     names = [n for n in (*NEEDED, "rapid", "power_sd_w") if all(n in block for block in blocks)]
     c = {n: np.concatenate([np.asarray(block[n]) for block in blocks]) for n in names}
     limit = next((check for check in track.limits if check.name == POWER_LIMIT), None)
-    error = 0.0 if limit is None else limit.resolution_error
+    error = 0.0 if limit is None else limit.error
     rapid = c["rapid"].astype(bool) if "rapid" in c else np.zeros(len(c["tool"]), dtype=bool)
     ends = np.flatnonzero(np.diff(c["tool"]) != 0) + 1
     borders = np.union1d(ends, np.flatnonzero(np.diff(rapid.astype(int)) != 0) + 1)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from chipload.errors import Finding
 from chipload.report.view import ViewMark
 from chipload.result import LimitCheck, Result, Track, Verdict
+from chipload.result.number_text import number_text
 
 #: collisions that are marked at most
 MARKED = 200
@@ -32,7 +33,8 @@ def marks_of(
     for c in sorted(worst, key=lambda c: -_share(c)):
         k = row(c)
         if k is not None:
-            text = f"{c.column.label} {c.worst:.4g} {c.column.unit}, limit {c.limit:g}"
+            value, limit = number_text(c.worst or 0.0), number_text(c.limit, 6)
+            text = f"{c.column.label} {value} {c.column.unit}, limit {limit}"
             out.append(ViewMark(k, _at(place[k]), text, "limit"))
     touched = []
     for f in track.findings:

@@ -18,6 +18,7 @@ from chipload.report.sheet import definitions, framed, heading, items, table
 from chipload.report.view import viewer_script
 from chipload.report.view_section import DATA, VIEW
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
+from chipload.result.number_text import number_text, percent_text
 
 #: findings and limits that the report lists
 LISTED = 300
@@ -41,7 +42,7 @@ def page_bytes(result: Result, presentation: Presentation, view: Sequence[str] =
     figures: dict[str, go.Figure] = {}
     verdict = result.verdict
     body = [
-        *heading(result.title, BANNERS[verdict], verdict.value, result.message),
+        *heading(result.title, BANNERS[verdict], verdict.value, result.first_lines),
         "<h2>Limits</h2>",
         *limits_table(result.tracks),
         *tracks_table(result.tracks),
@@ -76,7 +77,8 @@ def limits_table(tracks: Iterable[Track]) -> list[str]:
     if not checks:
         return ["<p>No limit was checked.</p>"]
     rows = [_limit_row(track, check) for track, check in checks[:LISTED]]
-    head = ["track", "limit", "state", "limit value", "worst", "resolution", "line", "time [s]", "place [mm]", "reason"]
+    head = ["track", "limit", "state", "limit value", "worst", "resolution", "line", "time [s]", "place [mm]"]
+    head += ["reason", "covers"]
     kept = [k for k in range(len(head)) if k < 5 or any(row[k] for row in rows)]
     numbers = tuple(i for i, k in enumerate(kept) if k in (3, 4, 5, 6, 7))
     cells = [[row[k] for k in kept] for row in rows]
@@ -90,18 +92,19 @@ def _limit_row(track: Track, check: LimitCheck | None) -> list[str]:
         passing = [x.column.label for x in track.limits if x.state is Verdict.HOLDS]
         others = "all limits" if len(passing) == len(track.limits) else "the other limits"
         text = f'<span title="{escape(", ".join(passing))}">{others} ({len(passing)})</span>'
-        return [name, text, state_cell(Verdict.HOLDS), *[""] * 7]
+        return [name, text, state_cell(Verdict.HOLDS), *[""] * 8]
     return [
         name,
         f'<span class="name">{escape(check.column.title)}</span>',
         state_cell(check.state),
-        f"{check.limit:g}",
-        "not known" if check.worst is None else f"{check.worst:.4g}",
-        f"{100.0 * check.resolution_error:.2g} %" if check.resolution_error else "",
+        number_text(check.limit, 6),
+        "not known" if check.worst is None else number_text(check.worst),
+        percent_text(check.error) if check.error else "",
         str(check.line or ""),
         "" if check.t_s is None else f"{check.t_s:.4g}",
         place_cell(check),
         escape(check.reason),
+        "" if check.coverage.whole else escape(check.coverage.name),
     ]
 
 

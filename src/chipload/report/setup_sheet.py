@@ -13,6 +13,7 @@ from chipload.report.page import BANNERS, limits_table
 from chipload.report.pdf import Block, SheetLine, SheetTable, one_page
 from chipload.report.sheet import definitions, heading, items, style, table
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
+from chipload.result.number_text import number_text
 
 #: guesses, things not checked and limits that a page has room for
 ROOM = 12
@@ -38,7 +39,7 @@ def setup_sheet(result: Result) -> bytes:
     machine = definitions({"machine": result.provenance.machine, "materials": ", ".join(result.provenance.materials)})
     tools = [definitions({"tools": numbers, "motions [mm]": box}) for numbers, box in _travel(result)]
     body = [
-        *heading(result.title, BANNERS[verdict], verdict.value, result.message),
+        *heading(result.title, BANNERS[verdict], verdict.value, result.first_lines),
         machine,
         "<h2>Programs</h2>",
         table(["program", "files", "time [min]", "verdict"], rows, numbers=(2,)),
@@ -84,7 +85,7 @@ def _blocks(result: Result, limits: int, room: int) -> list[Block]:
     out: list[Block] = [
         SheetLine(f"chipload: {result.title}", size=1.1),
         SheetLine(f"{result.verdict.value.upper()}", True, 1.8),
-        SheetLine(result.message),
+        *map(SheetLine, result.first_lines),
         SheetLine(f"Machine: {result.provenance.machine}"),
         SheetLine(f"Materials: {', '.join(result.provenance.materials) or 'none'}"),
         SheetLine("Programs", True, 1.2),
@@ -110,8 +111,9 @@ def _blocks(result: Result, limits: int, room: int) -> list[Block]:
 def _limit(track: Track, check: LimitCheck, named: bool) -> tuple[str, ...]:
     """The row of a limit."""
     name = f"{track.name}: {check.column.title}" if named else check.column.title
-    worst = "not known" if check.worst is None else f"{check.worst:.4g}"
-    return (name, check.state.value, f"{check.limit:g}", worst, str(check.line or ""), check.reason)
+    name += "" if check.coverage.whole else f", {check.coverage.name}"
+    worst = "not known" if check.worst is None else number_text(check.worst)
+    return (name, check.state.value, number_text(check.limit, 6), worst, str(check.line or ""), check.reason)
 
 
 def _tracks(result: Result) -> list[Track]:

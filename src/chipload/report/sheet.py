@@ -29,7 +29,8 @@ p { margin: 4px 0 8px; max-width: 92ch; }
 .good { color: var(--good); border-color: var(--good); background: #eef7f3; }
 .bad { color: var(--bad); border-color: var(--bad); background: #fcf1f0; }
 .open { color: var(--may); border-color: #d19a1f; background: #fdf3dc; }
-.verdict span { color: var(--ink); }
+.verdict span { color: var(--ink); display: block; }
+.verdict .more { font-size: 13px; color: var(--soft); }
 .note { color: var(--soft); font-size: 13px; }
 td code { white-space: nowrap; }
 table { border-collapse: collapse; width: 100%; margin: 6px 0 12px; font-variant-numeric: tabular-nums; }
@@ -129,11 +130,13 @@ def _shown_view(view: tuple[str, str, str] | None) -> str:
     return _library("viewer", script) + f'<script>library("viewer").then(() => {call});</script>\n'
 
 
-def heading(title: str, banner: str, word: str, message: str) -> list[str]:
+def heading(title: str, banner: str, word: str, lines: Sequence[str]) -> list[str]:
     """The first lines of a page: what it is about, and the verdict; ``banner`` is `good`, `open` or `bad`."""
+    message, *more = lines
+    texts = [f"<span>{escape(message)}</span>", *(f'<span class="more">{escape(line)}</span>' for line in more)]
     return [
         f"<h1>chipload &middot; {escape(title)}</h1>",
-        f'<div class="verdict {banner}"><b>{word}</b><span>{escape(message)}</span></div>',
+        f'<div class="verdict {banner}"><b>{word}</b>{"".join(texts)}</div>',
     ]
 
 

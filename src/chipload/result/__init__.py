@@ -1,6 +1,7 @@
 """The result contract: verdict, limits, columns, tracks, maps, findings and provenance of every capability."""
 
-from chipload.result.columns import COLUMNS, Column, column_of
+from chipload.result.columns import COLUMNS, Column, ErrorSource, column_of, error_of
+from chipload.result.coverage import Coverage, CoveredRows
 from chipload.result.limits import LimitCheck, check_limit, state_of
 from chipload.result.load import load_result, read_summary
 from chipload.result.release import release_of
@@ -13,6 +14,9 @@ __all__ = [
     "COLUMNS",
     "SCHEMA_VERSION",
     "Column",
+    "Coverage",
+    "CoveredRows",
+    "ErrorSource",
     "LimitCheck",
     "Provenance",
     "Result",
@@ -23,6 +27,7 @@ __all__ = [
     "Verdict",
     "check_limit",
     "column_of",
+    "error_of",
     "in_memory",
     "load_result",
     "read_summary",

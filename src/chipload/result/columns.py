@@ -1,15 +1,38 @@
 """The table of all quantities in results: column name, unit, label and meaning of each.
 
 The table is used for the fields of history.parquet, the limits, the report, the page and docs/columns.md. A limit has
-the name of the column that it bounds; :data:`BOUNDED` lists the few limits that bound a column of another name.
+the name of the column that it bounds; :data:`BOUNDED` lists the few limits that bound a column of another name. Each
+column declares where its error comes from, without which a limit on it is unproven.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from chipload.errors import InputError
+
+
+@dataclass(frozen=True)
+class ErrorSource:
+    """Where the relative error of a quantity comes from.
+
+    Parameters
+    ----------
+    exact : why the quantity has no error; empty: it has one
+    like : columns whose error it has where the calculation states none of its own; the greatest of theirs counts
+    """
+
+    exact: str = ""
+    like: tuple[str, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """The source in words, for the page of columns."""
+        if self.exact:
+            return f"exact: {self.exact}"
+        return f"as {', '.join(f'`{name}`' for name in self.like)}" if self.like else "stated by the calculation"
 
 
 @dataclass(frozen=True)
@@ -22,6 +45,7 @@ class Column:
     unit : as printed; empty for a count or a word
     label : name shown to the user
     meaning : one sentence
+    error : where its relative error comes from; a limit on a column whose error nothing states is unproven
     signed : whether a limit bounds its size, whatever the sign
     least : whether a limit is the least value that is allowed
     """
@@ -30,6 +54,7 @@ class Column:
     unit: str
     label: str
     meaning: str
+    error: ErrorSource = ErrorSource()
     signed: bool = False
     least: bool = False
 
@@ -43,122 +68,154 @@ class Column:
         return f"{self.label} [{self.unit}]" if self.unit else self.label
 
 
+#: names, numbers and states; what the program and the job state; quantities whose error the calculation must state
+LABEL = ErrorSource("a name, a number or a state, not a measured size")
+PATH = ErrorSource("follows from the program's motions by coordinates alone")
+COMMANDED = ErrorSource("commanded or stated, not calculated")
+COMPARED = ErrorSource("difference of a measured and a predicted mean, both of which are stated")
+COUNT = ErrorSource("a count of checked points; what lies between them is certified apart")
+SPREAD = ErrorSource("a probability, which contains the spread of modes and coefficients")
+STATED = ErrorSource()
+FORCE, TORQUE = ErrorSource(like=("force_n",)), ErrorSource(like=("torque_nm",))
+MEAN_TORQUE, POWER = ErrorSource(like=("torque_mean_nm",)), ErrorSource(like=("power_w",))
+MEAN_FORCE = ErrorSource(like=("force_n", "torque_mean_nm"))
+NORMAL, DEFLECTION = ErrorSource(like=("force_normal_n",)), ErrorSource(like=("deflection_um",))
+
 _ROWS = (
     # where and when
-    ("operation", "", "operation", "number of the operation in the job, from 0"),
-    ("track", "", "track", "the strategy, variant, controller or program that the row belongs to"),
-    ("pass", "", "pass", "name of the pass or section of the program"),
-    ("line", "", "line", "line of the program; 0: none"),
-    ("tool", "", "tool", "tool number"),
-    ("motion", "", "motion", "rapid, line, arc or dwell"),
-    ("rapid", "", "rapid", "whether the step is a rapid"),
-    ("s_mm", "mm", "path", "length of the tip's path up to the end of the step"),
-    ("t_s", "s", "time", "time at the end of the step, with all rapids but the first, whose start is unknown"),
-    ("duration_s", "s", "duration", "time that the step takes on the machine"),
-    ("cutting_s", "s", "cutting time", "time of the step at the commanded feed"),
-    ("x_mm", "mm", "x", "tip in the workpiece frame"),
-    ("y_mm", "mm", "y", "tip in the workpiece frame"),
-    ("z_mm", "mm", "z", "tip in the workpiece frame"),
-    ("axis_x", "", "axis x", "tool axis in the workpiece frame, a unit vector from the tip to the spindle"),
-    ("axis_y", "", "axis y", "tool axis in the workpiece frame"),
-    ("axis_z", "", "axis z", "tool axis in the workpiece frame"),
-    ("contact_x_mm", "mm", "contact x", "contact point on the finished surface"),
-    ("contact_y_mm", "mm", "contact y", "contact point on the finished surface"),
-    ("contact_z_mm", "mm", "contact z", "contact point on the finished surface"),
+    ("operation", "", "operation", "number of the operation in the job, from 0", LABEL),
+    ("track", "", "track", "the strategy, variant, controller or program that the row belongs to", LABEL),
+    ("pass", "", "pass", "name of the pass or section of the program", LABEL),
+    ("line", "", "line", "line of the program; 0: none", LABEL),
+    ("tool", "", "tool", "tool number", LABEL),
+    ("motion", "", "motion", "rapid, line, arc or dwell", LABEL),
+    ("rapid", "", "rapid", "whether the step is a rapid", LABEL),
+    ("s_mm", "mm", "path", "length of the tip's path up to the end of the step", PATH),
+    ("t_s", "s", "time", "time at the end of the step, with all rapids but the first, whose start is unknown", STATED),
+    ("duration_s", "s", "duration", "time that the step takes on the machine", STATED),
+    ("cutting_s", "s", "cutting time", "time of the step at the commanded feed", STATED),
+    ("x_mm", "mm", "x", "tip in the workpiece frame", PATH),
+    ("y_mm", "mm", "y", "tip in the workpiece frame", PATH),
+    ("z_mm", "mm", "z", "tip in the workpiece frame", PATH),
+    ("axis_x", "", "axis x", "tool axis in the workpiece frame, a unit vector from the tip to the spindle", PATH),
+    ("axis_y", "", "axis y", "tool axis in the workpiece frame", PATH),
+    ("axis_z", "", "axis z", "tool axis in the workpiece frame", PATH),
+    ("contact_x_mm", "mm", "contact x", "contact point on the finished surface", PATH),
+    ("contact_y_mm", "mm", "contact y", "contact point on the finished surface", PATH),
+    ("contact_z_mm", "mm", "contact z", "contact point on the finished surface", PATH),
     # what is commanded
-    ("feed_mm_min", "mm/min", "feed", "feed of the tip"),
-    ("spindle_rpm", "1/min", "spindle speed", "spindle speed, negative when it turns anticlockwise"),
-    ("override", "", "feed override", "feed over programmed feed"),
-    ("override_state", "", "override state", "what determined the feed override"),
-    ("feed_limited_by", "", "feed limited by", "what limits the feed of the line"),
-    ("latency_s", "s", "latency", "time between a measurement and the override that follows from it"),
+    ("feed_mm_min", "mm/min", "feed", "feed of the tip", COMMANDED),
+    ("spindle_rpm", "1/min", "spindle speed", "spindle speed, negative when it turns anticlockwise", COMMANDED),
+    ("override", "", "feed override", "feed over programmed feed", COMMANDED),
+    ("override_state", "", "override state", "what determined the feed override", LABEL),
+    ("feed_limited_by", "", "feed limited by", "what limits the feed of the line", LABEL),
+    ("latency_s", "s", "latency", "time between a measurement and the override that follows from it", COMMANDED),
     # engagement and chip
-    ("engagement_deg", "deg", "engagement", "engagement angle of the cutter"),
-    ("engagement_max_deg", "deg", "greatest engagement", "greatest engagement angle within the step"),
-    ("ae_mm", "mm", "radial depth of cut", "radial depth of cut"),
-    ("ap_mm", "mm", "axial depth of cut", "axial depth of cut"),
-    ("depth_mm", "mm", "depth of cut", "depth of cut normal to the surface"),
-    ("chip_max_mm", "mm", "chip thickness", "greatest undeformed chip thickness"),
-    ("chip_volume_mm3", "mm\u00b3", "chip volume", "volume that the step removes"),
-    ("engaged_volume_mm3", "mm\u00b3", "engaged volume", "volume that the engaged edge sweeps in the step"),
-    ("cutting_work_j", "J", "cutting work", "work of the torque without the edge coefficients"),
-    ("chip_areas", "", "chip areas", "number of separate areas of the chip: on a layer, or along the edge (moves)"),
-    ("chip_layers", "", "chip layers", "number of layers of the stock that lose material"),
-    ("flute_fill", "", "chip space", "loose chip volume of a tooth over the volume of its flute"),
+    ("engagement_deg", "deg", "engagement", "engagement angle of the cutter", STATED),
+    ("engagement_max_deg", "deg", "greatest engagement", "greatest engagement angle within the step", STATED),
+    ("ae_mm", "mm", "radial depth of cut", "radial depth of cut", STATED),
+    ("ap_mm", "mm", "axial depth of cut", "axial depth of cut", STATED),
+    ("depth_mm", "mm", "depth of cut", "depth of cut normal to the surface", PATH),
+    ("chip_max_mm", "mm", "chip thickness", "greatest undeformed chip thickness", STATED),
+    ("chip_volume_mm3", "mm\u00b3", "chip volume", "volume that the step removes", STATED),
+    ("engaged_volume_mm3", "mm\u00b3", "engaged volume", "volume that the engaged edge sweeps in the step", STATED),
+    ("cutting_work_j", "J", "cutting work", "work of the torque without the edge coefficients", STATED),
+    ("chip_areas", "", "chip areas", "number of separate areas of the chip: on a layer, or along the edge (moves)",
+     STATED),
+    ("chip_layers", "", "chip layers", "number of layers of the stock that lose material", STATED),
+    ("flute_fill", "", "chip space", "loose chip volume of a tooth over the volume of its flute", MEAN_TORQUE),
     # loads
-    ("force_n", "N", "force", "greatest magnitude of the force on the cutter over a revolution"),
-    ("force_xy_n", "N", "force across the axis", "greatest force on the cutter across its axis over a revolution"),
-    ("force_x_n", "N", "force x", "force on the cutter where the force across the axis is greatest"),
-    ("force_y_n", "N", "force y", "force on the cutter where the force across the axis is greatest"),
-    ("force_z_n", "N", "force z", "force on the cutter where the force across the axis is greatest"),
-    ("force_x_mean_n", "N", "mean force x", "mean of the force on the cutter over a revolution"),
-    ("force_y_mean_n", "N", "mean force y", "mean of the force on the cutter over a revolution"),
-    ("force_z_mean_n", "N", "mean force z", "mean of the force on the cutter over a revolution"),
-    ("force_x_max_n", "N", "greatest force x", "greatest value over a revolution"),
-    ("force_y_max_n", "N", "greatest force y", "greatest value over a revolution"),
-    ("force_z_max_n", "N", "greatest force z", "greatest value over a revolution"),
-    ("force_x_min_n", "N", "least force x", "least value over a revolution"),
-    ("force_y_min_n", "N", "least force y", "least value over a revolution"),
-    ("force_z_min_n", "N", "least force z", "least value over a revolution"),
-    ("force_sd_n", "N", "standard deviation of force", "of the greatest force, from the spread of the coefficients"),
-    ("torque_sd_nm", "N m", "standard deviation of torque", "of the greatest torque, from the spread of coefficients"),
-    ("torque_mean_sd_nm", "N m", "standard deviation of mean torque", "from the spread of the coefficients"),
-    ("power_sd_w", "W", "standard deviation of power", "of the mean power, from the spread of the coefficients"),
-    ("force_normal_n", "N", "normal force", "greatest force normal to the surface that the step leaves"),
-    ("force_normal_planned_n", "N", "planned normal force", "normal force that the plan expects"),
-    ("force_allowable_n", "N", "allowable normal force", "normal force that the workpiece allows at the place"),
-    ("force_over_allowable", "", "force over allowable", "normal force over allowable normal force"),
-    ("torque_nm", "N m", "torque", "greatest torque on the cutter over a revolution"),
-    ("torque_mean_nm", "N m", "mean torque", "mean torque over a revolution, which the spindle must supply"),
-    ("torque_measured_nm", "N m", "measured torque", "torque as the controller measures it"),
-    ("torque_planned_nm", "N m", "planned torque", "mean torque that the plan expects at the programmed feed"),
-    ("torque_allowable_nm", "N m", "allowable torque", "torque that the workpiece allows at the place"),
-    ("torque_over_percent", "%", "torque over allowable", "torque above the allowable torque, in percent of it"),
-    ("power_w", "W", "power", "mean power over a revolution"),
-    ("cutter_stress_mpa", "MPa", "cutter stress", "greatest equivalent stress of shank and fluted section"),
-    ("strength_share", "", "stress over strength", "greatest equivalent stress of the workpiece over its strength"),
-    ("stress_mpa", "MPa", "workpiece stress", "greatest equivalent stress of the workpiece"),
+    ("force_n", "N", "force", "greatest magnitude of the force on the cutter over a revolution", STATED),
+    ("force_xy_n", "N", "force across the axis", "greatest force on the cutter across its axis over a revolution",
+     FORCE),
+    ("force_x_n", "N", "force x", "force on the cutter where the force across the axis is greatest", FORCE),
+    ("force_y_n", "N", "force y", "force on the cutter where the force across the axis is greatest", FORCE),
+    ("force_z_n", "N", "force z", "force on the cutter where the force across the axis is greatest", FORCE),
+    ("force_x_mean_n", "N", "mean force x", "mean of the force on the cutter over a revolution", MEAN_FORCE),
+    ("force_y_mean_n", "N", "mean force y", "mean of the force on the cutter over a revolution", MEAN_FORCE),
+    ("force_z_mean_n", "N", "mean force z", "mean of the force on the cutter over a revolution", MEAN_FORCE),
+    ("force_x_max_n", "N", "greatest force x", "greatest value over a revolution", FORCE),
+    ("force_y_max_n", "N", "greatest force y", "greatest value over a revolution", FORCE),
+    ("force_z_max_n", "N", "greatest force z", "greatest value over a revolution", FORCE),
+    ("force_x_min_n", "N", "least force x", "least value over a revolution", FORCE),
+    ("force_y_min_n", "N", "least force y", "least value over a revolution", FORCE),
+    ("force_z_min_n", "N", "least force z", "least value over a revolution", FORCE),
+    ("force_sd_n", "N", "standard deviation of force", "of the greatest force, from the spread of the coefficients",
+     FORCE),
+    ("torque_sd_nm", "N m", "standard deviation of torque", "of the greatest torque, from the spread of coefficients",
+     TORQUE),
+    ("torque_mean_sd_nm", "N m", "standard deviation of mean torque", "from the spread of the coefficients",
+     MEAN_TORQUE),
+    ("power_sd_w", "W", "standard deviation of power", "of the mean power, from the spread of the coefficients", POWER),
+    ("force_normal_n", "N", "normal force", "greatest force normal to the surface that the step leaves", FORCE),
+    ("force_normal_planned_n", "N", "planned normal force", "normal force that the plan expects", FORCE),
+    ("force_allowable_n", "N", "allowable normal force", "normal force that the workpiece allows at the place", STATED),
+    ("force_over_allowable", "", "force over allowable", "normal force over allowable normal force", NORMAL),
+    ("torque_nm", "N m", "torque", "greatest torque on the cutter over a revolution", STATED),
+    ("torque_mean_nm", "N m", "mean torque", "mean torque over a revolution, which the spindle must supply", STATED),
+    ("torque_measured_nm", "N m", "measured torque", "torque as the controller measures it", STATED),
+    ("torque_planned_nm", "N m", "planned torque", "mean torque that the plan expects at the programmed feed",
+     MEAN_TORQUE),
+    ("torque_allowable_nm", "N m", "allowable torque", "torque that the workpiece allows at the place", STATED),
+    ("torque_over_percent", "%", "torque over allowable", "torque above the allowable torque, in percent of it",
+     STATED),
+    ("power_w", "W", "power", "mean power over a revolution", MEAN_TORQUE),
+    ("cutter_stress_mpa", "MPa", "cutter stress", "greatest equivalent stress of shank and fluted section", FORCE),
+    ("strength_share", "", "stress over strength", "greatest equivalent stress of the workpiece over its strength",
+     STATED),
+    ("stress_mpa", "MPa", "workpiece stress", "greatest equivalent stress of the workpiece", STATED),
     # deflection and form error
-    ("deflection_um", "\u00b5m", "deflection", "relative displacement of cutter and workpiece"),
-    ("deflection_cutter_um", "\u00b5m", "cutter deflection", "deflection of cutter, holder and spindle"),
-    ("deflection_workpiece_um", "\u00b5m", "workpiece deflection", "deflection of the workpiece"),
-    ("deflection_share", "", "deflection over model range", "deflection over the range of the rigid force model"),
-    ("form_error_um", "\u00b5m", "form error", "material left on the surface by deflection; negative: removed", True),
-    ("form_points", "", "finished points", "number of points of the part's surface that the step finishes"),
-    ("ramp_deg", "deg", "ramp angle", "angle of descent into material under the cutter's centre; 90: a plunge"),
-    ("axial_overrun_mm", "mm", "cut above the flutes", "engaged length of the cutter above its flutes"),
+    ("deflection_um", "\u00b5m", "deflection", "relative displacement of cutter and workpiece", FORCE),
+    ("deflection_cutter_um", "\u00b5m", "cutter deflection", "deflection of cutter, holder and spindle", FORCE),
+    ("deflection_workpiece_um", "\u00b5m", "workpiece deflection", "deflection of the workpiece", STATED),
+    ("deflection_share", "", "deflection over model range", "deflection over the range of the rigid force model",
+     DEFLECTION),
+    ("form_error_um", "\u00b5m", "form error", "material left on the surface by deflection; negative: removed",
+     STATED, True),
+    ("form_points", "", "finished points", "number of points of the part's surface that the step finishes", STATED),
+    ("ramp_deg", "deg", "ramp angle", "angle of descent into material under the cutter's centre; 90: a plunge", PATH),
+    ("axial_overrun_mm", "mm", "cut above the flutes", "engaged length of the cutter above its flutes", STATED),
     # vibration
     ("stability_margin", "", "stability margin", "factor by which the cutting force (with straight teeth, the depth of "
-     "cut) could grow before the step chatters; 3: 3 or more; 0: unknown", False, True),
+     "cut) could grow before the step chatters; 3: 3 or more; 0: unknown", FORCE, False, True),
     ("stable_probability", "", "probability of stability", "probability that the step does not chatter, from the "
-     "spread of modes and coefficients; 0: it certainly chatters, or unknown", False, True),
-    ("chatter_hz", "Hz", "chatter frequency", "frequency of chatter at the stability margin; 0: the margin is 3"),
-    ("chatter_mode", "", "chatter mode", "number of the mode that chatters, from 1 in the order of the job; 0: none"),
+     "spread of modes and coefficients; 0: it certainly chatters, or unknown", SPREAD, False, True),
+    ("chatter_hz", "Hz", "chatter frequency", "frequency of chatter at the stability margin; 0: the margin is 3",
+     STATED),
+    ("chatter_mode", "", "chatter mode", "number of the mode that chatters, from 1 in the order of the job; 0: none",
+     LABEL),
     ("sle_um", "\u00b5m", "surface location error", "material left on the wall by forced vibration; negative: removed; "
-     "0 if the step chatters or makes no wall", True),
+     "0 if the step chatters or makes no wall", FORCE, True),
     # measured forces, and predicted ones to compare
-    ("rotation_deg", "deg", "rotation", "rotation of tooth 0 from the beginning of a slot"),
-    ("force_feed_n", "N", "force along the feed", "predicted force on the cutter along the feed"),
-    ("force_across_n", "N", "force across the feed", "predicted force on the cutter to the left of the feed"),
-    ("force_axis_n", "N", "force along the axis", "predicted force on the cutter along its axis"),
-    ("force_feed_measured_n", "N", "measured force along the feed", "measured force, averaged over revolutions"),
-    ("force_across_measured_n", "N", "measured force across the feed", "measured force, averaged over revolutions"),
-    ("force_axis_measured_n", "N", "measured force along the axis", "measured force, averaged over revolutions"),
-    ("mean_percent", "%", "error of mean force", "predicted minus measured mean force, over the measured one", True),
-    ("peak_percent", "%", "error of peak force", "predicted minus measured peak force, over the measured one", True),
+    ("rotation_deg", "deg", "rotation", "rotation of tooth 0 from the beginning of a slot", COMMANDED),
+    ("force_feed_n", "N", "force along the feed", "predicted force on the cutter along the feed", STATED),
+    ("force_across_n", "N", "force across the feed", "predicted force on the cutter to the left of the feed", STATED),
+    ("force_axis_n", "N", "force along the axis", "predicted force on the cutter along its axis", STATED),
+    ("force_feed_measured_n", "N", "measured force along the feed", "measured force, averaged over revolutions",
+     STATED),
+    ("force_across_measured_n", "N", "measured force across the feed", "measured force, averaged over revolutions",
+     STATED),
+    ("force_axis_measured_n", "N", "measured force along the axis", "measured force, averaged over revolutions",
+     STATED),
+    ("mean_percent", "%", "error of mean force", "predicted minus measured mean force, over the measured one",
+     COMPARED, True),
+    ("peak_percent", "%", "error of peak force", "predicted minus measured peak force, over the measured one",
+     COMPARED, True),
     # geometry of the part
-    ("gouge_mm", "mm", "gouge", "deepest cut into the part"),
-    ("excess_mm", "mm", "excess", "greatest thickness left on the part where the cutter came near it"),
-    ("scallop_mm", "mm", "scallop height", "height of the material left between two passes"),
-    ("clearance_mm", "mm", "clearance", "least distance of shank and holder from what they must not touch"),
+    ("gouge_mm", "mm", "gouge", "deepest cut into the part", STATED),
+    ("excess_mm", "mm", "excess", "greatest thickness left on the part where the cutter came near it", STATED),
+    ("scallop_mm", "mm", "scallop height", "height of the material left between two passes", STATED),
+    ("clearance_mm", "mm", "clearance", "least distance of shank and holder from what they must not touch", STATED),
     ("tool_clearance_mm", "mm", "tool clearance", "least distance of the whole tool from points of the walls, except "
-     "the wall that a pass mills; 20: 20 or more"),
-    ("table_deg", "deg", "table angle", "angle between the axis of the pallet and the tool axis"),
-    ("pallet_deg", "deg", "pallet angle", "direction of the tool axis about the axis of the pallet"),
-    ("largest_diameter_mm", "mm", "largest diameter", "diameter of the largest cutter that reaches a contact point"),
-    ("unreached_points", "", "unreached contact points", "number of contact points that no cutter reaches"),
-    ("uncertified_points", "", "uncertified contact points", "number of points whose largest cutter is uncertified"),
-    ("time_s", "s", "program time", "time of the program on the machine"),
+     "the wall that a pass mills; 20: 20 or more", STATED),
+    ("table_deg", "deg", "table angle", "angle between the axis of the pallet and the tool axis", PATH),
+    ("pallet_deg", "deg", "pallet angle", "direction of the tool axis about the axis of the pallet", PATH),
+    ("largest_diameter_mm", "mm", "largest diameter", "diameter of the largest cutter that reaches a contact point",
+     STATED),
+    ("unreached_points", "", "unreached contact points", "number of contact points that no cutter reaches", COUNT),
+    ("uncertified_points", "", "uncertified contact points", "number of points whose largest cutter is uncertified",
+     COUNT),
+    ("time_s", "s", "program time", "time of the program on the machine", STATED),
 )  # fmt: skip
 
 
@@ -216,4 +273,27 @@ def column_of(limit: str) -> Column:
     if name not in COLUMNS:
         raise InputError(f"limit {limit}: not known: no column of a history has this name")
     own = COLUMNS[name]
-    return Column(own.name, own.unit, label, own.meaning, own.signed, own.least) if label else own
+    return replace(own, label=label) if label else own
+
+
+def error_of(column: str, errors: Mapping[str, float]) -> float:
+    """Return the relative error of a column, from those that a calculation states; inf where nothing states it.
+
+    Parameters
+    ----------
+    column : name of the column
+    errors : relative errors that the calculation states, by column
+
+    Examples
+    --------
+    >>> error_of("cutter_stress_mpa", {"force_n": 0.02}), error_of("feed_mm_min", {}), error_of("chip_max_mm", {})
+    (0.02, 0.0, inf)
+    >>> error_of("deflection_share", {"force_n": 0.02, "deflection_um": 0.03})
+    0.03
+    """
+    if column in errors:
+        return errors[column]
+    source = COLUMNS[column].error
+    if source.exact:
+        return 0.0
+    return max((error_of(name, errors) for name in source.like), default=math.inf)

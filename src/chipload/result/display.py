@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
+from chipload.result.number_text import number_text
 from chipload.result.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -38,8 +39,8 @@ def result_html(result: Result) -> str:
     limits = table_html(
         ("limit", "worst", "allowed", "unit", "state", "track", "where"),
         (
-            (check.column.label, _number(check.worst), f"{check.limit:g}", check.column.unit, check.state.value,
-             track.name, check.where)
+            (check.column.label, _number(check.worst), number_text(check.limit, 6), check.column.unit,
+             check.state.value, track.name, check.where)
             for track in result.in_use
             for check in track.limits
         ),
@@ -52,7 +53,7 @@ def result_html(result: Result) -> str:
         ),
     )
     found = [*result.findings, *(finding for track in result.in_use for finding in track.findings)]
-    return message_html(result.verdict, result.message) + limits + tracks + _findings(found)
+    return message_html(result.verdict, "\n".join(result.first_lines)) + limits + tracks + _findings(found)
 
 
 def _findings(found: Sequence[Finding]) -> str:
@@ -64,7 +65,7 @@ def _findings(found: Sequence[Finding]) -> str:
 
 
 def _number(value: float | None) -> str:
-    return "not known" if value is None else f"{value:.4g}"
+    return "not known" if value is None else number_text(value)
 
 
 def _side(cell: str) -> str:

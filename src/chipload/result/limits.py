@@ -2,7 +2,8 @@
 
 Notation: e relative error of a column, from the resolution of the calculation and from the spread of coefficients; a
 value v stands for v - e |v| .. v + e |v|. A limit that lies above this band holds, one below it is exceeded, one inside
-it is unproven. Where a limit is the least allowed value (:attr:`Column.least`), the comparison is reversed.
+it is unproven. Where a limit is the least allowed value (:attr:`Column.least`), the comparison is reversed. A check
+names the rows that it covers (:class:`~chipload.result.coverage.Coverage`).
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.result.columns import Column, column_of
+from chipload.result.columns import Column, column_of, error_of
+from chipload.result.coverage import FAR_BEYOND, WHOLE, Coverage, CoveredRows, coverage_of
+from chipload.result.number_text import number_text, percent_text
 from chipload.result.verdict import Verdict
 
 Columns = Mapping[str, NDArray[Any]]
@@ -35,13 +38,17 @@ class LimitCheck:
     line : of the program's text; 0: none
     place : (x, y, z) [mm] in the workpiece frame
     t_s : time in the track [s]
-    resolution_error : relative error of ``worst`` by the resolution of the calculation
+    resolution_error : relative error of ``worst`` by the resolution of the calculation; None: 0 where the column is
+        exact, else it is not stated, and the limit cannot hold
     reason : why it is unproven; empty otherwise
+    absolute_error : how much worse a value between the points that are checked may be, in the unit of the column
+    coverage : rows of the history that the limit covers
 
     Raises
     ------
     ValueError
-        A number is not finite, an error is below 0, or a value is missing where the state is not unproven.
+        A number is not finite, an error is below 0, a value is missing where the state is not unproven, or a limit
+        holds although nothing states the error of its column.
     """
 
     name: str
@@ -53,24 +60,64 @@ class LimitCheck:
     line: int = 0
     place: tuple[float, float, float] | None = None
     t_s: float | None = None
-    resolution_error: float = 0.0
+    resolution_error: float | None = None
     reason: str = ""
+    absolute_error: float = 0.0
+    coverage: Coverage = WHOLE
 
     def __post_init__(self) -> None:
-        """Refuse numbers that are not finite, and a missing worst value without a reason."""
-        numbers = [self.limit, self.resolution_error, *(self.place or ())]
+        """Refuse numbers that are not finite, a missing worst value without a reason, and an unknown error."""
+        if self.worst is None and self.state is not Verdict.UNPROVEN:
+            raise ValueError(f"limit {self.name}: without a value it can only be unproven, not {self.state}")
+        if self.resolution_error is None:
+            if self.state is Verdict.HOLDS and not math.isfinite(error_of(self.column.name, {})):
+                raise ValueError(f"limit {self.name}: holds, but its resolution_error is not stated")
+            object.__setattr__(self, "resolution_error", 0.0)
+        numbers = [self.limit, self.error, self.absolute_error, *(self.place or ())]
         numbers += [x for x in (self.worst, self.t_s) if x is not None]
         if not all(map(math.isfinite, numbers)):
             raise ValueError(f"limit {self.name}: {numbers} must be finite")
-        if self.resolution_error < 0.0:
-            raise ValueError(f"limit {self.name}: resolution_error = {self.resolution_error}: must be at least 0")
-        if self.worst is None and self.state is not Verdict.UNPROVEN:
-            raise ValueError(f"limit {self.name}: without a value it can only be unproven, not {self.state}")
+        if self.error < 0.0:
+            raise ValueError(f"limit {self.name}: resolution_error = {self.error}: must be at least 0")
+        if self.absolute_error < 0.0:
+            raise ValueError(f"limit {self.name}: absolute_error = {self.absolute_error}: must be at least 0")
 
     @property
     def column(self) -> Column:
         """The column that the limit bounds."""
         return column_of(self.name)
+
+    @property
+    def error(self) -> float:
+        """Relative error of the worst value."""
+        return self.resolution_error or 0.0
+
+    @property
+    def margin(self) -> float | None:
+        """How far the worst value lies within the limit, over the limit; below 0: beyond it; None: it has none.
+
+        >>> LimitCheck("force_n", 500.0, 412.0, Verdict.HOLDS, resolution_error=0.01).margin
+        0.176
+        """
+        if self.worst is None or self.limit == 0.0:
+            return None
+        beyond = (abs(self.worst) if self.column.signed else self.worst) / self.limit - 1.0
+        return round(beyond if self.column.least else -beyond, 12)
+
+    @property
+    def margin_text(self) -> str:
+        """The margin in words; empty where there is none.
+
+        >>> LimitCheck("force_n", 500.0, 812.0, Verdict.EXCEEDS).margin_text
+        '62.4 % beyond the limit'
+        """
+        if self.margin is None:
+            return ""
+        return (
+            f"{percent_text(abs(self.margin))} beyond the limit"
+            if self.margin < 0.0
+            else (f"margin {percent_text(self.margin)}")
+        )
 
     @property
     def place_text(self) -> str:
@@ -97,25 +144,35 @@ class LimitCheck:
 
         >>> LimitCheck("force_n", 500.0, 812.0, Verdict.EXCEEDS, line=12).text
         'force 812 N exceeds 500 N in line 12'
-        >>> LimitCheck("force_n", 500.0, 412.0, Verdict.HOLDS).text
+        >>> LimitCheck("force_n", 500.0, 412.0, Verdict.HOLDS, resolution_error=0.01).text
         'force 412 of 500 N'
+        >>> LimitCheck("axial_overrun_mm", 0.0, 0.0, Verdict.HOLDS, resolution_error=0.0).text
+        'no cut above the flutes'
         >>> LimitCheck("torque_nm", 3.0, 2.9, Verdict.UNPROVEN, line=7, reason="coarse").text
         'torque 2.9 of 3 N m in line 7, unproven: coarse'
         """
         unit = f" {self.column.unit}" if self.column.unit else ""
+        label, limit = self.column.label, number_text(self.limit, 6)
         least = self.column.least
         if self.worst is None:
             bound = "at least" if least else "at most"
-            return f"{self.column.label} of {bound} {self.limit:g}{unit} is unknown: {self.reason}"
+            return f"{label} of {bound} {limit}{unit} is unknown: {self.reason}"
+        worst = number_text(self.worst)
         if self.state is Verdict.EXCEEDS:
             beyond = "is below" if least else "exceeds"
-            return f"{self.column.label} {self.worst:.4g}{unit} {beyond} {self.limit:g}{unit} {self.where}".rstrip()
-        text = f"{self.column.label} {self.worst:.4g} of {'at least ' if least else ''}{self.limit:g}{unit}"
-        return text if self.state is Verdict.HOLDS else f"{text} {self.where}".rstrip() + f", unproven: {self.reason}"
+            return f"{label} {worst}{unit} {beyond} {limit}{unit} {self.where}".rstrip()
+        text = f"{label} {worst} of {'at least ' if least else ''}{limit}{unit}"
+        if self.worst == self.limit == 0.0:
+            text = f"no {label}"
+        elif self.margin is not None and self.margin < -FAR_BEYOND:
+            text = f"{label} far beyond {limit}{unit}"
+        if self.state is not Verdict.HOLDS:
+            return f"{text} {self.where}".rstrip() + f", unproven: {self.reason}"
+        return text if self.coverage.whole else f"{text} in the {self.coverage.name}"
 
 
 def state_of(
-    worst: float, limit: float, error: float = 0.0, reason: str = "", *, least: bool = False
+    worst: float, limit: float, error: float, reason: str = "", *, least: bool = False, absolute: float = 0.0
 ) -> tuple[Verdict, str]:
     """Return the state of a value against its limit, and the reason if it is unproven.
 
@@ -124,6 +181,7 @@ def state_of(
     error : relative error of ``worst``
     reason : why the value may be worse, whatever its error; empty: it may not
     least : whether the limit is the least value that is allowed
+    absolute : how much worse the value may be between the points that are checked
 
     Raises
     ------
@@ -132,12 +190,12 @@ def state_of(
 
     Examples
     --------
-    >>> state_of(480.0, 500.0)[0].value, state_of(490.0, 500.0, 0.05)[0].value, state_of(600.0, 500.0, 0.05)[0].value
-    ('holds', 'unproven', 'exceeds')
+    >>> [state_of(worst, 500.0, 0.05)[0].value for worst in (470.0, 490.0, 600.0)]
+    ['holds', 'unproven', 'exceeds']
     """
-    if not (math.isfinite(worst) and math.isfinite(limit)) or math.isnan(error):
+    if not (math.isfinite(worst) and math.isfinite(limit)) or math.isnan(error) or math.isnan(absolute):
         raise ValueError(f"value {worst} and limit {limit} must be finite, error {error} a number")
-    if math.isinf(error):
+    if math.isinf(error) or math.isinf(absolute):
         return Verdict.UNPROVEN, reason or "the resolution of the calculation causes an error of unknown size"
     band = error * abs(worst)
     if least:
@@ -147,10 +205,11 @@ def state_of(
     if reason:
         return Verdict.UNPROVEN, reason
     if worst + band > limit:
-        return (
-            Verdict.UNPROVEN,
-            f"the value is known to {100.0 * error:.{0 if error >= 0.1 else 1}f} %, and the limit lies within this",
-        )
+        known = f"known to {percent_text(error)}" if error <= 1.0 else "not known: its error is greater than itself"
+        return Verdict.UNPROVEN, f"the value is {known}, and the limit lies within this"
+    if worst + band + absolute > limit:
+        more = number_text(absolute, 3)
+        return Verdict.UNPROVEN, f"between the points that are checked it may be worse by {more}, beyond the limit"
     return Verdict.HOLDS, ""
 
 
@@ -160,8 +219,10 @@ def check_limit(
     columns: Columns,
     *,
     track: str = "",
-    rows: NDArray[np.bool_] | None = None,
-    error: float = 0.0,
+    rows: CoveredRows | None = None,
+    at: int | None = None,
+    error: float | None = None,
+    absolute: float = 0.0,
     reason: str = "",
 ) -> LimitCheck:
     """Compare a limit with the greatest value of its column, or with the least if the limit is a least allowed value.
@@ -170,35 +231,44 @@ def check_limit(
     ----------
     name : of the limit
     columns : (n,) each; the column of the limit and, as far as they are there, ``line``, ``x_mm`` .. ``z_mm``, ``t_s``
-    rows : (n,) rows that count; None: all
-    error : relative error of the column; inf: it is not known
+    rows : rows that count, with their name; None: all
+    at : row with the worst value, for a limit that differs from row to row; None: it is searched
+    error : relative error of the column; inf: it is not known; None: 0 where the column is exact, else not known
+    absolute : how much worse a value between the points that are checked may be, in the unit of the column
     reason : why the column may be too small; empty: it is not
 
     Examples
     --------
     >>> force = {"force_n": np.array([100.0, 480.0]), "line": np.array([3, 4])}
-    >>> check_limit("force_n", 500.0, force).state, check_limit("force_n", 470.0, force).text
+    >>> check_limit("force_n", 500.0, force, error=0.01).state, check_limit("force_n", 470.0, force, error=0.0).text
     (<Verdict.HOLDS: 'holds'>, 'force 480 N exceeds 470 N in line 4')
+    >>> check_limit("force_n", 500.0, force).text
+    'force 480 of 500 N in line 4, unproven: the resolution error of force is not known'
     """
     column = column_of(name)
-    if not math.isfinite(error):
-        error, reason = 0.0, reason or f"the resolution error of {column.label} is not known"
     if column.name not in columns:
         missing = reason or f"{column.label} was not calculated"
         return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason=missing)
     values = np.asarray(columns[column.name], dtype=np.float64)
     size = np.abs(values) if column.signed else values
     worse = -size if column.least else size
-    among = np.arange(len(size)) if rows is None else np.flatnonzero(rows)
+    among = np.arange(len(size)) if rows is None else np.flatnonzero(rows.mask)
+    covered = WHOLE if rows is None else coverage_of(rows, worse, size, columns)
+    if at is not None:
+        among = np.array([at])
     if len(among) == 0:
-        return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason=reason or "no step was checked")
+        why = reason or "no step was checked"
+        return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason=why, coverage=covered)
+    if error is None:
+        error = error_of(column.name, {})
+    if not math.isfinite(error):
+        error, reason = 0.0, reason or f"the resolution error of {column.label} is not known"
     k = int(among[np.argmax(worse[among])])
     worst = float(size[k])
-    state, why = state_of(worst, limit, error, reason, least=column.least)
+    state, why = state_of(worst, limit, error, reason, least=column.least, absolute=absolute)
     place = None
     if {"x_mm", "y_mm", "z_mm"} <= set(columns):
         place = (float(columns["x_mm"][k]), float(columns["y_mm"][k]), float(columns["z_mm"][k]))
     line = int(columns["line"][k]) if "line" in columns else 0
     t = float(columns["t_s"][k]) if "t_s" in columns else None
-    known = error if math.isfinite(error) else 1.0
-    return LimitCheck(name, limit, worst, state, track, k, line, place, t, known, why)
+    return LimitCheck(name, limit, worst, state, track, k, line, place, t, error, why, absolute, covered)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -22,6 +23,8 @@ USUAL = ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um")
 AGAINST = {"t_s": "time [s]", "s_mm": "path [mm]"}
 #: columns whose size is held, whatever their sign
 SIGNED = tuple(name for name, column in COLUMNS.items() if column.signed)
+#: colour of rows that a limit does not cover
+FAINT = "#b5bcc6"
 #: height of a row [px]
 ROW = 190
 
@@ -30,6 +33,7 @@ def columns_figure(
     columns: Mapping[str, NDArray[Any]],
     limits: Mapping[str, float],
     names: Sequence[str] = USUAL,
+    covered: Mapping[str, NDArray[np.bool_]] = MappingProxyType({}),
     x: Literal["t_s", "s_mm"] = "t_s",
 ) -> go.Figure:
     """Plot each column in a row of its own; limits are dashed lines, and values that exceed them are marked.
@@ -38,6 +42,7 @@ def columns_figure(
     ----------
     columns : (n,) each, those of a history; ``t_s`` or ``s_mm`` must be there
     limits : by name
+    covered : (n,) rows that a limit covers, by the name of the limit; the others are drawn faint; none: all
 
     Raises
     ------
@@ -54,6 +59,7 @@ def columns_figure(
     if not names:
         raise InputError("plot: no column is named: name at least one, such as force_n")
     bound = {column_of(k).name: v for k, v in limits.items() if not k.startswith("spindle")}
+    own_rows = {column_of(k).name: v for k, v in covered.items() if not k.startswith("spindle")}
     across = np.asarray(columns[x])
     lines = np.asarray(columns.get("line", np.zeros(len(across), dtype=np.int64)))
     out = make_subplots(rows=len(names), cols=1, shared_xaxes=True, vertical_spacing=0.24 / (2 + 2 * len(names)))
@@ -62,12 +68,17 @@ def columns_figure(
         keep = thinned(y, LINE_POINTS)
         text = f"{name}: %{{y:.4g}}, line %{{customdata}}<extra></extra>"
         given = {"x": across[keep], "y": y[keep], "customdata": lines[keep], "hovertemplate": text}
-        out.add_trace(go.Scatter(**given, mode="lines", name=name, line={"color": INK, "width": 1.3}), row=row, col=1)
+        counts = own_rows.get(name, np.ones(len(y), dtype=np.bool_))
+        for own, colour, mask in ((name, INK, counts), (f"{name} elsewhere", FAINT, ~counts)):
+            if mask.any():
+                drawn = {**given, "y": np.where(mask[keep], y[keep], np.nan)}
+                line = {"color": colour, "width": 1.3}
+                out.add_trace(go.Scatter(**drawn, mode="lines", name=own, line=line), row=row, col=1)
         if name in bound:
             for end in (bound[name], *((-bound[name],) if name in SIGNED else ())):
                 out.add_hline(y=end, line={"color": LIMIT, "width": 1.2, "dash": "dash"}, row=row, col=1)
             size = np.abs(y[keep]) if name in SIGNED else y[keep]
-            over = keep[size < bound[name] if COLUMNS[name].least else size > bound[name]]
+            over = keep[(size < bound[name] if COLUMNS[name].least else size > bound[name]) & counts[keep]]
             if len(over):
                 given = {"x": across[over], "y": y[over], "customdata": lines[over], "hovertemplate": text}
                 mark = {"color": LIMIT, "size": 5}

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.errors import Finding, InputError, Severity
+from chipload.errors import Finding, InputError
 from chipload.result.columns import COLUMNS
 from chipload.result.display import result_html
+from chipload.result.first_lines import coverage_lines, guesses_line, headline, unchecked_line
 from chipload.result.limits import Columns, LimitCheck
 from chipload.result.tabular import pandas_of, xarray_of
 from chipload.result.track import Track
@@ -140,37 +141,21 @@ class Result:
         return Verdict.worst(states + ([] if self.limits else [Verdict.UNPROVEN]))
 
     @cached_property
+    def headline(self) -> str:
+        """The first line of the verdict: state, critical limit with its margin and place, and what is not proven."""
+        return headline(self.verdict, self.findings, self.in_use)
+
+    @cached_property
     def message(self) -> str:
-        """The verdict in one or two sentences, with the numbers of the limits.
+        """The verdict in a few sentences: its first line, what the limits do not cover, and the note."""
+        note = self.note if self.verdict is Verdict.HOLDS else ""
+        lines = (self.headline, *coverage_lines(self.in_use), note, guesses_line(self.findings))
+        return " ".join(filter(None, lines))
 
-        Limits that are exceeded come first, then those that are unproven. If all limits hold, each is named.
-        """
-        texts: dict[Verdict, list[str]] = {state: [] for state in Verdict}
-        for f in self.findings:
-            texts[Verdict.of_finding(f)].append(_located(f))
-        for track in self.in_use:
-            of = f"{track.name}: " if len(self.in_use) > 1 else ""
-            for f in track.findings:
-                texts[Verdict.of_finding(f)].append(of + _located(f))
-            for check in track.limits:
-                texts[check.state].append(of + check.text)
-        if self.verdict is Verdict.HOLDS:
-            held = "; ".join(
-                (f"{track.name}: " if len(self.in_use) > 1 else "") + ", ".join(check.text for check in track.limits)
-                for track in self.in_use
-                if track.limits
-            )
-            return " ".join(filter(None, (f"Holds: {held}.", self.note, self._accepted)))
-        found = list(dict.fromkeys(texts[self.verdict])) or ["no limit was checked"]
-        more = f"; and {len(found) - 1} more" if len(found) > 1 else ""
-        return " ".join(filter(None, (f"{self.verdict.value.capitalize()}: {found[0]}{more}.", self._accepted)))
-
-    @property
-    def _accepted(self) -> str:
-        """A sentence with the number of accepted guesses of a draft; empty if there are none."""
-        guesses = sum(f.code == "job-guess" and f.severity is Severity.NOTE for f in self.findings)
-        many = f"{guesses} guesses of the job were" if guesses > 1 else "1 guess of the job was"
-        return f"{many} accepted." if guesses else ""
+    @cached_property
+    def first_lines(self) -> tuple[str, ...]:
+        """The lines that every page and terminal shows first: the message, and what is not checked."""
+        return tuple(filter(None, (self.message, unchecked_line(self.unchecked))))
 
     def _repr_html_(self) -> str:
         """HTML for notebooks: the message, and tables of limits, tracks and findings."""
@@ -195,7 +180,9 @@ class Result:
         chosen, history = self._chosen(track), self._history(track)
         bound = [check.column.name for check in chosen.limits]
         names = columns or tuple(dict.fromkeys(c for c in (*bound, *USUAL) if c in history))[:MOST_ROWS]
-        return columns_figure(history, {check.name: check.limit for check in chosen.limits}, names, x)
+        n = len(next(iter(history.values())))
+        covered = {check.name: check.coverage.mask(n) for check in chosen.limits}
+        return columns_figure(history, {check.name: check.limit for check in chosen.limits}, names, covered, x)
 
     def to_pandas(self, track: str = "") -> pandas.DataFrame:
         """Return the history of a track as a pandas DataFrame; without a name that of the first track in use.
@@ -242,7 +229,3 @@ class Result:
                 f"track {chosen.name!r}: has no history; tracks with a history: {', '.join(with_history) or 'none'}"
             )
         return columns
-
-
-def _located(finding: Finding) -> str:
-    return f"line {finding.line}: {finding.text}" if finding.line else finding.text

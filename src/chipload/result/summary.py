@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from chipload.errors import Finding, Severity
 from chipload.result.columns import column_of
+from chipload.result.coverage import Coverage
 from chipload.result.limits import LimitCheck
 from chipload.result.result import Provenance, Result, SurfaceMap
 from chipload.result.track import Track, TrackKind
@@ -29,6 +30,20 @@ class _SummaryPart(BaseModel):
     )
 
 
+class CoverageModel(_SummaryPart):
+    """The rows of the track's history that a limit covers."""
+
+    name: str = Field(description="name of the covered rows, such as all cuts or finish pass")
+    reason: str = Field(description="why the limit does not count for the other rows; empty: it counts for all")
+    ranges: tuple[tuple[int, int], ...] | None = Field(
+        description="first row and end of each range of covered rows, from 0; null: all rows"
+    )
+    excluded_s: float = Field(description="time in the cut of the rows that are not covered")
+    excluded_worst: float | None = Field(
+        description="worst value in the cuts that are not covered; null: there are none"
+    )
+
+
 class LimitModel(_SummaryPart):
     """A limit, and the worst value of its column."""
 
@@ -44,6 +59,11 @@ class LimitModel(_SummaryPart):
     place: Place | None = Field(description="x, y, z in mm in the workpiece frame")
     t_s: float | None = Field(description="time of the row from the start of the program; null: not a row of it")
     resolution_error: float = Field(description="relative error of worst that the resolution of the calculation causes")
+    absolute_error: float = Field(description="how much worse a value between the checked points may be")
+    margin: float | None = Field(
+        description="how far worst lies within the limit, over the limit; below 0: beyond it; null: it has none"
+    )
+    coverage: CoverageModel = Field(description="rows that the limit covers")
     reason: str = Field(description="why the limit is unproven")
 
 
@@ -190,7 +210,8 @@ def limit_from(model: LimitModel) -> LimitCheck:
         Its numbers do not agree.
     """
     column_of(model.name)
-    return LimitCheck(**model.model_dump(exclude={"column", "unit"}))
+    own = model.model_dump(exclude={"column", "unit", "margin", "coverage"})
+    return LimitCheck(**own, coverage=Coverage(**model.coverage.model_dump()))
 
 
 def finding_from(model: FindingModel) -> Finding:
@@ -205,7 +226,8 @@ def provenance_from(model: ProvenanceModel) -> Provenance:
 
 
 def _limit(check: LimitCheck) -> LimitModel:
-    return LimitModel(**vars(check), column=check.column.name, unit=check.column.unit)
+    own = {**vars(check), "coverage": CoverageModel(**vars(check.coverage))}
+    return LimitModel(**own, column=check.column.name, unit=check.column.unit, margin=check.margin)
 
 
 def _finding(f: Finding) -> FindingModel:

@@ -79,7 +79,7 @@ class Track:
             object.__setattr__(self, "findings", (*self.findings, *self._unbalanced()))
 
     def _unbalanced(self) -> Iterator[Finding]:
-        loads = (c.resolution_error for c in self.limits if c.column.unit in LOAD_UNITS)
+        loads = (c.error for c in self.limits if c.column.unit in LOAD_UNITS)
         error = max((e for e in loads if math.isfinite(e)), default=0.0)
         for tool, balance in self.energy_balance.items():
             if not abs(balance) <= BALANCE + error:

@@ -18,10 +18,14 @@ LISTED = 300
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """A limit of a column: ``above`` (n,) rows exceed it, or are below a limit that is a least value."""
+    """A limit of a column: ``above`` (n,) rows exceed it, or are below a limit that is a least value.
+
+    ``covers`` names the rows that it covers; empty: all.
+    """
 
     limit: float
     above: NDArray[np.bool_]
+    covers: str = ""
 
 
 @dataclass(frozen=True)
@@ -44,14 +48,14 @@ def label_and_unit(column: str) -> tuple[str, str]:
 
 
 def bound_of(result: PageResult, track: PageTrack, column: str) -> Bound | None:
-    """The lowest limit of a column; values beyond what the check calls the worst were not part of it."""
+    """The lowest limit of a column, of the rows that it covers."""
     check = lowest_limit(track.own.limits, column)
     if check is None or column not in result.columns:
         return None
     values = result.column(track, column)
     if isinstance(values, TextColumn):
         return None
-    return Bound(check.limit, beyond(values, check))
+    return Bound(check.limit, beyond(values, check), "" if check.coverage.whole else check.coverage.name)
 
 
 def limits(track: PageTrack) -> list[LimitCheck]:

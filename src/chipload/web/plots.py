@@ -189,7 +189,8 @@ def annotation(
     word, unit = label_and_unit(column)
     limit = ""
     if bound is not None:
-        limit = f'  <span style="color:{LIMIT}">limit {bound.limit:g}</span>'
+        covers = f", {escape(bound.covers)}" if bound.covers else ""
+        limit = f'  <span style="color:{LIMIT}">limit {bound.limit:g}{covers}</span>'
     values = [f"<b>{escape(_value(result, track, column, row))}</b>"]
     for side in sides[1:]:
         there = _value(side.result, side.track, column, matching_row(sides[0], side, against, row))

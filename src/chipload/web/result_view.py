@@ -212,7 +212,7 @@ class ResultView:
         self.verdict.classes(f"cl-{VERDICTS[verdict]}")
         self.word.set_text(verdict.value)
         self.message.set_text(message)
-        self.tip.set_text(message)
+        self.tip.set_text("\n".join(result.result.first_lines))
         await self.scene.open(result, track)
         await self._tracked(result, track)
 

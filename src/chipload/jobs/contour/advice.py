@@ -19,10 +19,11 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.engagement.contact import PIECES, Engagement
 from chipload.errors import InputError
+from chipload.jobs.contour.outcome import PLANNED_ERRORS
 from chipload.jobs.contour.tables import OperationTable
 from chipload.machine.machine import Machine
 from chipload.planning.cost import CutConditions, cost
-from chipload.result import LimitCheck, Verdict, check_limit
+from chipload.result import LimitCheck, Verdict, check_limit, column_of, error_of
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 Floats = NDArray[np.float64]
@@ -124,6 +125,10 @@ def _exceeded(
         cost(cut, zone, zero, zero, np.zeros((PLACES, 2)), ahead, 0.0, engagement, np.full(PLACES, feed), wall)
     )
     columns["tool"] = np.full(PLACES, cut.cutter.number)
-    found = [check_limit(name, limit, columns) for name, limit in limits.items() if name != "engagement_deg"]
-    found += default_limits(checks, machine, columns, "", {})
+    found = [
+        check_limit(name, limit, columns, error=error_of(column_of(name).name, PLANNED_ERRORS))
+        for name, limit in limits.items()
+        if name != "engagement_deg"
+    ]
+    found += default_limits(checks, machine, columns, "", PLANNED_ERRORS)
     return next((c for c in found if c.state is not Verdict.HOLDS), None)

@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 from chipload.jobs.contour.outcome import ContourResult, Operation
 from chipload.jobs.contour.pass_figures import COLOURS, along, plan
 from chipload.jobs.contour.programs import program_files
+from chipload.jobs.contour.result import limits_of
 from chipload.jobs.contour.samples import samples_of
 from chipload.jobs.contour.scene import blanks_of, scene_bytes
 from chipload.machine.machine import Machine
@@ -18,6 +19,10 @@ from chipload.planning.result import StrategyResult
 from chipload.report.page import state_cell
 from chipload.report.presentation import Presentation
 from chipload.report.sheet import figure, items, table, value_text
+from chipload.result import Verdict
+
+#: what the independent check of a plan found
+AGREES = {Verdict.HOLDS: "agrees", Verdict.UNPROVEN: "not compared", Verdict.EXCEEDS: '<span class="no">differs</span>'}
 
 
 def presentation_of(outcome: ContourResult) -> Presentation:
@@ -46,7 +51,9 @@ def _operation(machine: Machine, k: int, op: Operation, figures: dict[str, go.Fi
         f"helix {_degrees(c.helix)} deg, overhang {c.overhang:g} mm.</p>",
         f'<p class="note">{escape(settings)}</p>',
         "<h3>Strategies</h3>",
-        _strategies(op),
+        f'<p class="note">Engagement, force, torque and form error are those of the {_shown_name(op)}; the table of '
+        "limits states what each limit covers.</p>",
+        _strategies(machine, op),
         f"<h3>Along the {'pass' if result.kind != 'contour' else 'finish pass'}</h3>",
         figure(f"along-{k}", along(op), figures),
         "<h3>Plan view</h3>",
@@ -57,9 +64,18 @@ def _operation(machine: Machine, k: int, op: Operation, figures: dict[str, go.Fi
     return out + (["<h3>Findings of the planner</h3>", items(result.findings)] if result.findings else [])
 
 
-def _strategies(op: Operation) -> str:
+def _strategies(machine: Machine, op: Operation) -> str:
     """Strategies side by side in numbers."""
-    head = ["strategy", "engagement [deg]", "force [N]", "torque [N m]", "form error [µm]", "time [s]", "simulation"]
+    head = [
+        "strategy",
+        "engagement [deg]",
+        "force [N]",
+        "torque [N m]",
+        "form error [µm]",
+        "time [s]",
+        "limits",
+        "plan against its check",
+    ]
     rows = []
     for name, s in op.result.strategies.items():
         check = op.verifications.get(name)
@@ -71,11 +87,17 @@ def _strategies(op: Operation) -> str:
                 _span(s, "torque_nm"),
                 _most(s, "form_error_um"),
                 _most(s, "time_s"),
-                "not checked" if check is None else state_cell(check.verdict),
+                state_cell(Verdict.worst(c.state for c in limits_of(machine, op, s, name))),
+                "not checked" if check is None else AGREES[check.verdict],
             ]
         )
     used = [name == op.result.use for name in op.result.strategies]
     return table(head, rows, numbers=(1, 2, 3, 4, 5), used=used)
+
+
+def _shown_name(op: Operation) -> str:
+    """Name of the rows that the table of strategies and the figures show."""
+    return "finish pass" if op.result.kind == "contour" else "passes"
 
 
 def _degrees(angle: float) -> str:

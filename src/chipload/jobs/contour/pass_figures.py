@@ -16,7 +16,7 @@ from plotly.subplots import make_subplots
 
 from chipload.geometry.contour import Contour
 from chipload.jobs.contour.outcome import Operation
-from chipload.jobs.contour.result import limits_of
+from chipload.jobs.contour.result import ON_WALL, limits_of
 from chipload.machine.machine import Machine
 from chipload.planning.result import StrategyResult
 from chipload.report.shape import CHORD_MM, stretches
@@ -96,7 +96,9 @@ def along(operation: Operation) -> go.Figure:
         figure.update_yaxes(title_text=COLUMNS[column].title, range=[0.0, reach or 1.0], row=row, col=1)
         if limit is None:
             continue
-        label = {"text": f"limit {limit:g}" + ("" if near else ", far above"), "font": {"color": LIMIT, "size": 11}}
+        where = ", where the wall is made" if column in ON_WALL and operation.result.kind == "contour" else ""
+        text = f"limit {limit:g}{where}" + ("" if near else ", far above")
+        label = {"text": text, "font": {"color": LIMIT, "size": 11}}
         if near:
             line = {"color": LIMIT, "width": 1.2, "dash": "dash"}
             figure.add_hline(y=limit, line=line, annotation=label, annotation_position="top left", row=row, col=1)

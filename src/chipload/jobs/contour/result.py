@@ -11,12 +11,26 @@ from numpy.typing import NDArray
 
 from chipload.checking.default_checks import default_limits, ramp_findings, range_findings, unchecked_checks, with_peaks
 from chipload.errors import Finding, Severity
-from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
+from chipload.jobs.contour.outcome import PLANNED_ERRORS, ContourResult, Operation, PlanVerification
 from chipload.machine.machine import Machine
 from chipload.planning.result import Event, StrategyResult
 from chipload.report.programs import ENDINGS, program_name
-from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, check_limit, in_memory
+from chipload.result import (
+    CoveredRows,
+    LimitCheck,
+    Result,
+    Track,
+    TrackKind,
+    Verdict,
+    check_limit,
+    column_of,
+    error_of,
+    in_memory,
+)
+from chipload.result.coverage import ranges_of
 
+#: error of the engagement where its check states no difference, the tolerance of that check [deg]
+ENGAGEMENT_DEG = 0.05
 #: limits that count only where the wall is made
 ON_WALL = ("engagement_deg", "form_error_um")
 #: columns of the planner that the result does not keep
@@ -70,15 +84,46 @@ def limits_of(machine: Machine, op: Operation, strategy: StrategyResult, track: 
     columns = history_of(op, strategy)
     if "engagement_max_deg" in columns:
         columns["engagement_deg"] = columns["engagement_max_deg"]
+    wall = _wall_rows(op, strategy)
     stated = tuple(
-        check_limit(name, limit, columns, track=track, rows=strategy.wall_rows if name in ON_WALL else None)
+        check_limit(
+            name, limit, columns, track=track, rows=wall if name in ON_WALL else None, **_error(op, strategy, name)
+        )
         for name, limit in op.limits.items()
     )
     if op.checks is not None:
         stated = tuple(with_peaks(check, op.checks, columns) for check in stated)
-    own = () if op.checks is None else default_limits(op.checks, machine, columns, track, {})
-    step = np.cumsum(takes_time(columns)) - 1
-    return tuple(c if c.row is None else replace(c, row=int(step[c.row])) for c in (*stated, *own))
+    own = () if op.checks is None else default_limits(op.checks, machine, columns, track, PLANNED_ERRORS)
+    kept = takes_time(columns)
+    return tuple(_of_steps(check, kept) for check in (*stated, *own))
+
+
+def _wall_rows(op: Operation, strategy: StrategyResult) -> CoveredRows | None:
+    """Rows that make the wall; None: all."""
+    mask = strategy.wall_rows
+    if mask is None:
+        return None
+    names = list(dict.fromkeys(np.asarray(strategy.history["pass"]).astype(str)[mask].tolist()))
+    reason = "where the wall is made" if op.result.kind == "contour" else "not in entries and links"
+    return CoveredRows(mask, f"{' and '.join(names)} pass", reason)
+
+
+def _error(op: Operation, strategy: StrategyResult, name: str) -> dict[str, float]:
+    """Error of a planned column: of loads relative, of the engagement the difference that its check found."""
+    if name != "engagement_deg":
+        return {"error": error_of(column_of(name).name, PLANNED_ERRORS)}
+    check = op.verifications.get(strategy.name)
+    found = None if check is None else check.numbers.get("engagement_difference_deg")
+    return {"error": 0.0, "absolute": ENGAGEMENT_DEG if found is None else float(found)}
+
+
+def _of_steps(check: LimitCheck, kept: NDArray[np.bool_]) -> LimitCheck:
+    """A check of samples as one of the steps of the history, see :func:`steps_of`."""
+    row = None if check.row is None else int((np.cumsum(kept) - 1)[check.row])
+    covered = check.coverage
+    if covered.ranges is not None:
+        covered = replace(covered, ranges=ranges_of(covered.mask(len(kept))[kept]))
+    return replace(check, row=row, coverage=covered)
 
 
 def steps_of(op: Operation, strategy: StrategyResult) -> dict[str, NDArray[Any]]:

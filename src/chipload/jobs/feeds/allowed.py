@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.checking.default_checks import DefaultChecks, load_error, peak_excess, upper_loads
+from chipload.checking.default_checks import DefaultChecks, peak_excess, upper_loads
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.cutting.strength import allowed_stress, cutter_stress
@@ -31,7 +31,7 @@ from chipload.program.gcode.feed_words import DIGITS, with_feeds
 from chipload.program.program import DWELL, RAPID
 from chipload.program.read import ProgramReading
 from chipload.program.time import peak_speed, program_time
-from chipload.result import column_of
+from chipload.result import column_of, error_of
 from chipload.simulation.loads import Cuts, at_feeds, greatest_loads
 from chipload.simulation.removal import Removal, Watch
 from chipload.simulation.steps import Steps
@@ -85,7 +85,7 @@ class FeedRequest:
         An error that is not finite counts as 0: no step has this load.
         """
         column = column_of(limit).name
-        error = load_error(self.errors, column)
+        error = error_of(column, self.errors)
         peaks = peak_excess(self.checks.material, column)
         return (1.0 + (error if math.isfinite(error) else 0.0)) * (1.0 + peaks) - 1.0
 

@@ -80,7 +80,7 @@ def _check(c: Comparison, track: str, name: str, limit: float, errors: Floats) -
     if not known.any():
         return LimitCheck(name, limit, None, Verdict.UNPROVEN, track, reason=reason or "no channel was measured")
     worst = float(np.abs(errors[known]).max())
-    state, why = state_of(worst, limit, reason=reason)
+    state, why = state_of(worst, limit, 0.0, reason)
     return LimitCheck(name, limit, worst, state, track, reason=why)
 
 

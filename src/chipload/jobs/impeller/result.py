@@ -144,8 +144,8 @@ def _five_axis(milled: ImpellerResult) -> list[Track]:
     out = []
     named: list[tuple[str, CheckedFlank | CheckedPoints]] = [*flank_names(milled), *points_names(milled)]
     for name, p in named:
-        state = state_of(p.excess, p.most)[0]
-        limits = (_gouge(name, p), LimitCheck(p.limit, p.most, p.excess, state, name))
+        state = state_of(p.excess, p.most, 0.0)[0]
+        limits = (_gouge(name, p), LimitCheck(p.limit, p.most, p.excess, state, name, resolution_error=0.0))
         findings = tuple(Finding("machine", 0, text, Severity.EXCEEDS) for text in p.findings)
         ending = ENDINGS[p.machine.dialect]
         every = () if isinstance(p.every, str) else (f"{name}{ALL}.{ending}",)
@@ -199,8 +199,8 @@ def _scallops(track: str, p: Checked) -> tuple[LimitCheck, ...]:
         return ()
     k = int(np.argmax([s.greatest / s.limit for s in p.scallops]))
     s = p.scallops[k]
-    state = state_of(s.greatest, s.limit)[0]
-    return (LimitCheck("scallop_mm", s.limit, s.greatest, state, track),)
+    state = state_of(s.greatest, s.limit, 0.0)[0]
+    return (LimitCheck("scallop_mm", s.limit, s.greatest, state, track, resolution_error=0.0),)
 
 
 def _loads(track: str, p: Checked) -> tuple[LimitCheck, ...]:

@@ -22,7 +22,7 @@ from chipload.planning.thinwall.passes import ThresholdOf, WallPass
 from chipload.planning.thinwall.paths import rows_of
 from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.planning.thinwall.threshold import Threshold
-from chipload.result import LimitCheck, check_limit
+from chipload.result import CoveredRows, LimitCheck, check_limit
 from chipload.simulation.removal import Removal
 from chipload.stability.cuts import dynamic_cuts
 from chipload.stability.margin import MOST_MARGIN, stability_margins
@@ -208,7 +208,9 @@ def chatter_limits(
     if dynamics is None:
         return ()
     limit, reason = float(dynamics["margin"]), "" if dynamics["mode"] else "modes of the cutter are not stated"
-    cuts = np.asarray(columns["chip_areas"]) > 0
+    cuts = CoveredRows(
+        np.asarray(columns["chip_areas"]) > 0, "cuts with a chip", "since elsewhere no margin is calculated"
+    )
     return (
         check_limit(
             "stability_margin", limit, columns, track=track, rows=cuts, error=MARGIN_ERROR + force_error, reason=reason

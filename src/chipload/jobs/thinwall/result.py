@@ -14,7 +14,19 @@ from chipload.jobs.thinwall.chatter import FIRST_STATE, chatter_limits, chatter_
 from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, remedy_text
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.report.programs import ENDINGS, program_name
-from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, check_limit, in_memory, state_of
+from chipload.result import (
+    CoveredRows,
+    LimitCheck,
+    Result,
+    SurfaceMap,
+    Track,
+    TrackKind,
+    Verdict,
+    check_limit,
+    error_of,
+    in_memory,
+    state_of,
+)
 from chipload.simulation.accuracy import energy_balance
 from chipload.simulation.deflection_jumps import jump_findings
 
@@ -92,29 +104,34 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
         if name == "form_error_um":
             out.append(with_peaks(_form_error(walled, one, limit), walled.checks, c))
         else:
-            check = check_limit(name, limit, c, track=one.name, error=error_of(walled, one, name))
+            check = check_limit(name, limit, c, track=one.name, error=limit_error(walled, one, name))
             out.append(with_peaks(check, walled.checks, c))
     over, cuts = "force_over_allowable", c["force_normal_n"] > 0.0
-    force = check_limit(over, 1.0 + OVER, c, track=one.name, rows=cuts, error=error_of(walled, one, over))
+    pressing = CoveredRows(cuts, "cuts that press on the wall", "since the others do not bend it")
+    force = check_limit(over, 1.0 + OVER, c, track=one.name, rows=pressing, error=limit_error(walled, one, over))
     strength = float(walled.settings["yield_mpa"])
-    stress = _limit_check("stress_mpa", strength, one.stress, one, error_of(walled, one, "stress_mpa"))
+    stress = _limit_check("stress_mpa", strength, one.stress, one, limit_error(walled, one, "stress_mpa"))
     out += [with_peaks(check, walled.checks, c) for check in (force, stress)]
     gouge, tolerance = max(one.shape.gouge, -one.shape.nearest, 0.0), float(walled.settings["gouge_tolerance_mm"])
     place = (float(one.shape.at[0]), float(one.shape.at[1]), float(one.shape.at[2]))
-    state, why = state_of(gouge, tolerance + one.shift)[0], ""
+    state, why = state_of(gouge, tolerance + one.shift, 0.0)[0], ""
     if one.shift > 0.0 and state is Verdict.HOLDS:
         state, why = (
             Verdict.UNPROVEN,
             "the path is shifted against the form error: the gouge is known to within the greatest shift only",
         )
-    out.append(LimitCheck("gouge_mm", tolerance + one.shift, gouge, state, one.name, place=place, reason=why))
-    out += chatter_limits(walled.settings.get("dynamics"), c, one.name, error_of(walled, one, "force_n"))
+    out.append(
+        LimitCheck(
+            "gouge_mm", tolerance + one.shift, gouge, state, one.name, place=place, resolution_error=0.0, reason=why
+        )
+    )
+    out += chatter_limits(walled.settings.get("dynamics"), c, one.name, limit_error(walled, one, "force_n"))
     return (*out, *default_limits(walled.checks, walled.planning.machine, c, one.name, one.load_error))
 
 
-def error_of(walled: ThinWallResult, one: Variant, name: str) -> float:
+def limit_error(walled: ThinWallResult, one: Variant, name: str) -> float:
     """Relative error of the value that a limit bounds: of the loads by layers and steps, and of the mesh."""
-    loads = max(one.load_error.get(load, 0.0) for load in GOES_WITH.get(name, (name,)))
+    loads = max(error_of(load, one.load_error) for load in GOES_WITH.get(name, (name,)))
     return (1.0 + loads) * (1.0 + mesh_error_of(walled, name, one.columns)) - 1.0
 
 
@@ -200,7 +217,7 @@ def _track(walled: ThinWallResult, one: Variant) -> Track:
 def _limit_check(name: str, limit: float, worst: float, one: Variant, error: float, place: Place = None) -> LimitCheck:
     """The check of one value of a variant with its relative error; inf: it is not known."""
     state, why = state_of(worst, limit, error)
-    known = error if np.isfinite(error) else 1.0
+    known = error if np.isfinite(error) else 0.0
     return LimitCheck(name, limit, worst, state, one.name, place=place, resolution_error=known, reason=why)
 
 
@@ -217,7 +234,7 @@ def _form_error(walled: ThinWallResult, one: Variant, limit: float) -> LimitChec
         return LimitCheck("form_error_um", limit, None, Verdict.UNPROVEN, one.name, reason="no side is finished")
     sizes = [(np.where(f.made, np.abs(f.error), 0.0).ravel(), f.unsure.ravel()) for f in one.finish]
     mesh = _growth(*(np.concatenate(x) for x in zip(*sizes, strict=True)))
-    error = (1.0 + error_of(walled, one, "form_error_um")) * (1.0 + mesh) - 1.0
+    error = (1.0 + limit_error(walled, one, "form_error_um")) * (1.0 + mesh) - 1.0
     return _limit_check("form_error_um", limit, worst, one, error, place)
 
 

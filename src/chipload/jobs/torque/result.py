@@ -26,7 +26,18 @@ from chipload.jobs.torque.outcome import (
 )
 from chipload.jobs.torque.step_checks import check_columns
 from chipload.report.programs import ENDINGS
-from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, check_limit, column_of, in_memory, state_of
+from chipload.result import (
+    LimitCheck,
+    Result,
+    Track,
+    TrackKind,
+    Verdict,
+    check_limit,
+    column_of,
+    error_of,
+    in_memory,
+    state_of,
+)
 from chipload.result.limits import Columns
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
@@ -82,7 +93,7 @@ def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[Limi
     compliance = outcome.wall.real.error if isinstance(outcome.wall, ClampedWorkpiece) else 0.0
     errors = errors_of(outcome.resolution_error, compliance)
     stated = (
-        check_limit(name, limit, columns, track=track, error=errors.get(column_of(name).name, 0.0))
+        check_limit(name, limit, columns, track=track, error=error_of(column_of(name).name, errors))
         for name, limit in outcome.job.limits.items()
     )
     checks = outcome.job.checks

@@ -1,0 +1,108 @@
+"""The first lines of a verdict: state, critical limit, what is not proven, what is not covered and not checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from chipload.errors import Finding, Severity
+from chipload.result.limits import LimitCheck
+from chipload.result.track import Track
+from chipload.result.verdict import Verdict
+
+#: names of things that are not checked which the first lines list
+LISTED = 8
+
+
+def headline(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Track]) -> str:
+    """Return the first line: the state, the critical limit with its margin and its place, and what is not proven.
+
+    What exceeds comes first, the most first; then what is unproven. The critical limit is the one with the least
+    margin.
+
+    Parameters
+    ----------
+    findings : of the whole result
+    tracks : those in use
+    """
+    checks = [(_of(track, tracks), check) for track in tracks for check in track.limits]
+    critical = min(
+        ((of, check) for of, check in checks if check.margin is not None),
+        key=lambda one: (one[1].margin or 0.0, one[1].name),
+        default=None,
+    )
+    if verdict is Verdict.HOLDS:
+        held = _critical_text(*critical) if critical else ", ".join(of + check.text for of, check in checks)
+        return f"Holds: {held}."
+    found = list(dict.fromkeys(_texts(verdict, findings, tracks))) or ["no limit was checked"]
+    more = f"; and {len(found) - 1} more" if len(found) > 1 else ""
+    line = f"{verdict.value.capitalize()}: {found[0]}{more}."
+    if critical is not None and not found[0].startswith(critical[0] + critical[1].text):
+        line += f" Critical limit: {_critical_text(*critical)}."
+    return line
+
+
+def coverage_lines(tracks: Sequence[Track]) -> Iterator[str]:
+    """Yield what the limits of the tracks in use do not cover, where other cuts are beyond the limit."""
+    for track in tracks:
+        for check in track.limits:
+            worst = check.coverage.excluded_worst
+            if worst is not None and (worst < check.limit if check.column.least else worst > check.limit):
+                text = check.coverage.text(check.column.label, check.column.unit, check.limit)
+                yield f"Not covered: {_of(track, tracks)}{text}."
+
+
+def unchecked_line(unchecked: Iterable[str]) -> str:
+    """Return what is not checked, in one line; empty: everything is.
+
+    >>> unchecked_line(["limit power_w: not stated", "fixtures: none is stated", "limit torque_nm: not stated"])
+    'Not checked: fixtures; limits power_w, torque_nm.'
+    """
+    names = list(dict.fromkeys(text.partition(": ")[0] for text in unchecked))
+    limits = [name.removeprefix("limit ") for name in names if name.startswith("limit ")]
+    shown = [name for name in names if not name.startswith("limit ")]
+    if limits:
+        shown.append(f"limit{'s' if len(limits) > 1 else ''} {', '.join(limits)}")
+    if len(shown) > LISTED:
+        shown = [*shown[:LISTED], f"{len(shown) - LISTED} more"]
+    return f"Not checked: {'; '.join(shown)}." if shown else ""
+
+
+def guesses_line(findings: Iterable[Finding]) -> str:
+    """Return the number of accepted guesses of a draft in a sentence; empty if there are none."""
+    guesses = sum(f.code == "job-guess" and f.severity is Severity.NOTE for f in findings)
+    many = f"{guesses} guesses of the job were" if guesses > 1 else "1 guess of the job was"
+    return f"{many} accepted." if guesses else ""
+
+
+def _texts(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Track]) -> Iterator[str]:
+    """Yield each finding and limit of a state; findings first, then limits with the least margin first."""
+    for f in findings:
+        if Verdict.of_finding(f) is verdict:
+            yield located(f)
+    for track in tracks:
+        of = _of(track, tracks)
+        for f in track.findings:
+            if Verdict.of_finding(f) is verdict:
+                yield of + located(f)
+        own = [check for check in track.limits if check.state is verdict]
+        for check in sorted(own, key=lambda c: 0.0 if c.margin is None else c.margin):
+            beyond = verdict is Verdict.EXCEEDS and check.margin_text
+            yield f"{of}{check.text}, {check.margin_text}" if beyond else of + check.text
+
+
+def _critical_text(of: str, check: LimitCheck) -> str:
+    """A limit with its margin, its line and its place."""
+    if check.state is Verdict.EXCEEDS:
+        return f"{of}{check.text}, {check.margin_text}"
+    where = f", {check.where}" if check.where and check.state is Verdict.HOLDS else ""
+    margin = f", {check.margin_text}" if check.margin is not None and check.margin >= 0.0 else ""
+    return f"{of}{check.text}{margin}{where}"
+
+
+def located(finding: Finding) -> str:
+    """Return the text of a finding with its line."""
+    return f"line {finding.line}: {finding.text}" if finding.line else finding.text
+
+
+def _of(track: Track, tracks: Sequence[Track]) -> str:
+    return f"{track.name}: " if len(tracks) > 1 else ""
