@@ -19,9 +19,9 @@ DOCS = Path(__file__).parents[1] / "docs"
 HEAD = """# Columns and limits
 
 Every quantity of a result has one name, with the unit in it. A limit in `[limits]` of a job has the name of the column
-that it bounds. The fields of `history.parquet` carry unit, label and meaning as metadata. The last column states where the
-error of a quantity comes from: it is exact, or as that of other columns, or the calculation states it. A limit on a quantity
-whose error nothing states is unproven.
+that it bounds. The fields of `history.parquet` carry unit, label and meaning as metadata. The last column states where
+the error of a quantity comes from: it is exact, or as that of other columns, or the calculation states it. A limit on a
+quantity whose error nothing states is unproven.
 
 This page is made from `src/chipload/result/columns.py` by `make reference`.
 """

@@ -155,9 +155,11 @@ def _load_sections(simulation: SimulationResult, time_s: float, figures: dict[st
     body = [
         "<h2>Chips, force, torque, power</h2>",
         f"<p>{what['steps']} steps; {what['chip_volume_mm3']:.6g} mm\u00b3 of chips, stock less by "
-        f"{what['removed_mm3']:.6g} mm\u00b3; {what['cutting_s']:.4g} s in cut, {what['air_cut_s']:.4g} s "
-        f"in air; greatest chip thickness {what['chip_max_mm']['max']:.4g} mm; "
+        f"{what['removed_mm3']:.6g} mm\u00b3; greatest chip thickness {what['chip_max_mm']['max']:.4g} mm; "
         f"{what['films_mm3']:.2g} mm\u00b3 in films thinner than the tolerance.</p>",
+        f"<p>Time on the machine: {what['cutting_s']:.4g} s in cut, {what['air_cut_s']:.4g} s in air, "
+        f"{what['rapid_s']:.4g} s of rapids, {what['dwell_s']:.4g} s of dwells, {what['other_s']:.4g} s of tool "
+        f"changes and start-up; {what['time_s']:.4g} s in all.</p>",
         table(["", "mean", "greatest", "least"], rows, numbers=(1, 2, 3)),
         f'<p class="note">{SPREAD if torque["mean_sd"] is not None else NO_SPREAD}{escape(rigid)}</p>',
         figure("loads", along(simulation), figures),

@@ -7,6 +7,7 @@ of the spindle in all steps. Forces are on the cutter, in the workpiece frame.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -77,8 +78,7 @@ def operation_numbers(simulation: SimulationResult, time_s: float) -> dict[str, 
         "stock_before_mm3": removal.volume_before,
         "removed_mm3": removal.volume_before - removal.volume_after,
         "time_s": time_s,
-        "cutting_s": whole,
-        "air_cut_s": float(c["seconds"][~cuts & ~c["rapid"]].sum()),
+        **_times(c, cuts, time_s),
         "force_n": {**force, "max": float(c["force_n"].max(initial=0.0)), "normal_max": normal},
         "torque_nm": torque | {"mean_sd": band[3] if band is not None else None},
         "power_w": {"mean": mean("power_w"), "max": float(c["power_w"].max(initial=0.0))},
@@ -98,6 +98,18 @@ def operation_numbers(simulation: SimulationResult, time_s: float) -> dict[str, 
         "settings": dict(simulation.settings),
         **({} if simulation.stability is None else {"stability": stability_numbers(simulation.stability, c)}),
     }
+
+
+def _times(c: Mapping[str, NDArray[Any]], cuts: NDArray[np.bool_], time_s: float) -> dict[str, float]:
+    """Return the time on the machine in the cut, in air, in rapids and dwells, and what remains: they add up."""
+    moving, wait = c["duration_s"] - c["wait_s"], float(c["wait_s"].sum())
+    cut, air = float(moving[cuts].sum()), float(moving[~cuts & ~c["rapid"]].sum())
+    rapid = float(moving[c["rapid"]].sum())
+    other = time_s - cut - air - rapid - wait
+    return {
+        "cutting_s": cut, "air_cut_s": air, "rapid_s": rapid, "dwell_s": wait,
+        "other_s": 0.0 if abs(other) <= 1e-9 * max(time_s, 1.0) else other,
+    }  # fmt: skip
 
 
 def _allowed(simulation: SimulationResult) -> dict[str, dict[str, Any]]:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from chipload.errors import Finding, InputError, InputErrors, Severity
+from chipload.errors import InputError, InputErrors, Severity
 from chipload.files import read_regular, require_utf8
 from chipload.jobs.confirm import guesses_of, take_confirm
 from chipload.jobs.messages import Errors, left_missing, renamed_tables, table_errors
@@ -265,9 +265,11 @@ def run_job(
     outcome = capability.module("run").run(loaded.job, progress, **more)
     result: Result = capability.module("result").result_of(outcome)
     inputs = {"job": loaded.source, **result.provenance.inputs}
-    accepted = tuple(Finding("job-guess", 0, f"guess: {text}", guesses or Severity.NOTE) for text in loaded.guesses)
-    provenance = replace(result.provenance, inputs=inputs)
-    result = replace(result, provenance=provenance, findings=(*accepted, *result.findings))
+    result = replace(result, provenance=replace(result.provenance, inputs=inputs))
+    if guesses is not None:
+        from chipload.jobs.guesses import with_guesses
+
+        result = with_guesses(result, loaded.guesses, guesses)
     return FinishedJob(result, capability.module("figures").presentation_of(outcome), outcome)
 
 

@@ -27,6 +27,8 @@ WHOLE = 4
 #: classes of the banner and of a cell by state
 BANNERS = {Verdict.HOLDS: "good", Verdict.UNPROVEN: "open", Verdict.EXCEEDS: "bad"}
 CELLS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
+#: parts of the time of a program in the table of tracks
+TIMES = ("in cut", "in air", "rapids", "dwell", "other")
 #: headings of the table of tracks
 HEADINGS = {
     TrackKind.STRATEGY: "Strategies",
@@ -120,13 +122,24 @@ def tracks_table(tracks: tuple[Track, ...]) -> list[str]:
             ),
             state_cell(track.verdict),
             "" if track.time_s is None else f"{track.time_s:.5g}",
+            *_times_cells(track),
             ", ".join(f"<code>{escape(name)}</code>" for name in track.programs),
         ]
         for track in tracks
     ]
     kind = tracks[0].kind
-    head = [kind.value, "parameters", "verdict", "time [s]", "programs"]
-    return [f"<h2>{HEADINGS[kind]}</h2>", table(head, rows, numbers=(3,), used=[t.in_use for t in tracks])]
+    head = [kind.value, "parameters", "verdict", "time [s]", *TIMES, "programs"]
+    used = [t.in_use for t in tracks]
+    note = '<p class="note">Other: tool change, start-up and the approach to the first point. The parts add up.</p>'
+    return [f"<h2>{HEADINGS[kind]}</h2>", table(head, rows, numbers=tuple(range(3, 9)), used=used), note]
+
+
+def _times_cells(track: Track) -> list[str]:
+    """The parts of the time of a program."""
+    own = track.times
+    if own is None:
+        return [""] * len(TIMES)
+    return [number_text(x) for x in (own.cut, own.air, own.rapid, own.dwell, own.other)]
 
 
 def findings_table(title: str, findings: tuple[Finding, ...]) -> list[str]:

@@ -93,6 +93,7 @@ _ROWS = (
     ("s_mm", "mm", "path", "length of the tip's path up to the end of the step", PATH),
     ("t_s", "s", "time", "time at the end of the step, with all rapids but the first, whose start is unknown", STATED),
     ("duration_s", "s", "duration", "time that the step takes on the machine", STATED),
+    ("wait_s", "s", "wait", "what of the duration the machine stands after the step, as in a dwell", STATED),
     ("cutting_s", "s", "cutting time", "time of the step at the commanded feed", STATED),
     ("x_mm", "mm", "x", "tip in the workpiece frame", PATH),
     ("y_mm", "mm", "y", "tip in the workpiece frame", PATH),

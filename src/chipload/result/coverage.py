@@ -19,7 +19,10 @@ EVERYTHING = "all cuts"
 #: a value so many times its limit is not written as a number where it is not the worst of a check
 FAR_BEYOND = 10.0
 #: columns that are above 0 where a step cuts, the first that a history has
-CUTTING = ("chip_areas", "engagement_deg", "force_n", "force_xy_n", "force_normal_n", "torque_mean_nm", "torque_nm")
+CUTTING = (
+    "chip_volume_mm3", "chip_areas", "engagement_deg", "force_n", "force_xy_n", "force_normal_n", "torque_mean_nm",
+    "torque_nm",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

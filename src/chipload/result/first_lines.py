@@ -9,6 +9,8 @@ from chipload.result.limits import LimitCheck
 from chipload.result.track import Track
 from chipload.result.verdict import Verdict
 
+#: code of the finding that states a guess of a draft
+GUESS = "job-guess"
 #: names of things that are not checked which the first lines list
 LISTED = 8
 
@@ -69,15 +71,16 @@ def unchecked_line(unchecked: Iterable[str]) -> str:
 
 def guesses_line(findings: Iterable[Finding]) -> str:
     """Return the number of accepted guesses of a draft in a sentence; empty if there are none."""
-    guesses = sum(f.code == "job-guess" and f.severity is Severity.NOTE for f in findings)
+    guesses = sum(f.code == GUESS and f.severity is Severity.NOTE for f in findings)
     many = f"{guesses} guesses of the job were" if guesses > 1 else "1 guess of the job was"
     return f"{many} accepted." if guesses else ""
 
 
 def _texts(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Track]) -> Iterator[str]:
-    """Yield each finding and limit of a state; findings first, then limits with the least margin first."""
+    """Yield each finding and limit of a state: findings, limits with the least margin first, then guesses."""
+    guesses = [located(f) for f in findings if f.code == GUESS and Verdict.of_finding(f) is verdict]
     for f in findings:
-        if Verdict.of_finding(f) is verdict:
+        if Verdict.of_finding(f) is verdict and f.code != GUESS:
             yield located(f)
     for track in tracks:
         of = _of(track, tracks)
@@ -88,6 +91,7 @@ def _texts(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Track
         for check in sorted(own, key=lambda c: 0.0 if c.margin is None else c.margin):
             beyond = verdict is Verdict.EXCEEDS and check.margin_text
             yield f"{of}{check.text}, {check.margin_text}" if beyond else of + check.text
+    yield from guesses
 
 
 def _critical_text(of: str, check: LimitCheck) -> str:
@@ -100,8 +104,14 @@ def _critical_text(of: str, check: LimitCheck) -> str:
 
 
 def located(finding: Finding) -> str:
-    """Return the text of a finding with its line."""
-    return f"line {finding.line}: {finding.text}" if finding.line else finding.text
+    """Return the text of a finding with its line.
+
+    >>> located(Finding("x", 18, "would be a rapid through the guessed stock")), located(Finding("x", 2, "no feed"))
+    ('line 18 would be a rapid through the guessed stock', 'line 2: no feed')
+    """
+    if not finding.line:
+        return finding.text
+    return f"line {finding.line}{' ' if finding.text.startswith('would ') else ': '}{finding.text}"
 
 
 def _of(track: Track, tracks: Sequence[Track]) -> str:

@@ -78,6 +78,16 @@ class FindingModel(_SummaryPart):
     row: int | None = Field(description="row of the track's history, from 0; null: not a row of it")
 
 
+class TimesModel(_SummaryPart):
+    """The time of a program by what the machine does; the parts add up to the time of the program."""
+
+    cut_s: float = Field(description="motions at a feed that remove material")
+    air_s: float = Field(description="motions at a feed that remove nothing, or of which it is not known")
+    rapid_s: float = Field(description="rapids")
+    dwell_s: float = Field(description="standing in a dwell")
+    other_s: float = Field(description="tool change, start-up and the approach to the first point")
+
+
 class TrackModel(_SummaryPart):
     """One program along its path."""
 
@@ -87,6 +97,7 @@ class TrackModel(_SummaryPart):
     in_use: bool = Field(description="whether its program is the one that is released")
     verdict: Verdict = Field(description="verdict of this track")
     time_s: float | None = Field(description="cycle time of the program; null: not calculated")
+    times: TimesModel | None = Field(description="parts of time_s; null: the track has no history")
     parameters: dict[str, float | str] = Field(description="parameters that distinguish the track from the others")
     programs: tuple[str, ...] = Field(description="files in the result folder")
     rows: int = Field(description="number of its rows in history.parquet")
@@ -243,6 +254,7 @@ def _track(track: Track, rows: int) -> TrackModel:
         in_use=track.in_use,
         verdict=track.verdict,
         time_s=track.time_s,
+        times=_times(track),
         parameters=dict(track.parameters),
         programs=track.programs,
         rows=rows,
@@ -250,6 +262,11 @@ def _track(track: Track, rows: int) -> TrackModel:
         limits=tuple(map(_limit, track.limits)),
         findings=tuple(map(_finding, track.findings)),
     )
+
+
+def _times(track: Track) -> TimesModel | None:
+    own = track.times
+    return None if own is None else TimesModel(**{f"{name}_s": value for name, value in vars(own).items()})
 
 
 def _map(one: SurfaceMap) -> MapModel:

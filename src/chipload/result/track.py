@@ -10,6 +10,7 @@ import enum
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
 from chipload.result.limits import Columns, LimitCheck
+from chipload.result.times import Times, times_of
 from chipload.result.verdict import Verdict
 
 #: work that differs from that of the volume by this share, beside the error of the loads, leaves them unproven
@@ -95,6 +97,11 @@ class Track:
         """The worst state of the track's limits and findings."""
         states = [check.state for check in self.limits] + [Verdict.of_finding(f) for f in self.findings]
         return Verdict.worst(states)
+
+    @cached_property
+    def times(self) -> Times | None:
+        """The time of the program by what the machine does; None: the track has no history with times."""
+        return times_of(self.blocks(), self.time_s)
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:

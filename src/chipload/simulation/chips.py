@@ -448,6 +448,7 @@ def _columns(steps: Steps, removed: Floats, loads: Floats, sums: RunningSums) ->
         "s_mm": np.cumsum([sums.s_mm, *length])[1:],
         "t_s": np.cumsum([sums.t_s, *steps.duration])[1:],
         "duration_s": steps.duration,
+        "wait_s": steps.wait,
         "seconds": steps.seconds,
         **{f"{x}_mm": steps.p1[:, i] for i, x in enumerate("xyz")},
         **{f"axis_{x}": steps.a1[:, i] for i, x in enumerate("xyz")},

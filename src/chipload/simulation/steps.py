@@ -40,6 +40,7 @@ class Steps:
     tool, line, label : (n,) int
     duration : (n,) float [s], on the machine: rapids, accelerations and, in the step before it, a dwell included; None:
         as ``seconds``
+    wait : (n,) float [s], what of the duration the machine stands after the step, as in a dwell; None: nothing
     """
 
     p0: Floats
@@ -53,10 +54,13 @@ class Steps:
     line: Ints
     label: Ints
     duration: Floats = None  # type: ignore[assignment]
+    wait: Floats = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         if self.duration is None:
             object.__setattr__(self, "duration", self.seconds)
+        if self.wait is None:
+            object.__setattr__(self, "wait", np.zeros(len(self.seconds)))
 
     def __len__(self) -> int:
         return len(self.tool)
@@ -241,9 +245,10 @@ def _cut(moves: _Moves, first: int, end: int) -> Steps:
     rapid = chords.motion[at] == RAPID
     with np.errstate(divide="ignore", invalid="ignore"):
         seconds = np.where(rapid, 0.0, moves.span[at] / chords.feed[at])
-    duration = seconds / parts
+    duration, wait = seconds / parts, np.zeros(len(at))
     if moves.timed is not None:
-        duration = moves.timed[at, 0] / parts + np.where(k == parts - 1, moves.timed[at, 1], 0.0)
+        wait = np.where(k == parts - 1, moves.timed[at, 1], 0.0)
+        duration = moves.timed[at, 0] / parts + wait
     return Steps(
         _line(p0, p1, u0),
         _line(p0, p1, u1),
@@ -256,6 +261,7 @@ def _cut(moves: _Moves, first: int, end: int) -> Steps:
         chords.line[at],
         chords.label[at],
         duration,
+        wait,
     )
 
 
