@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from adversary.base import DRILL, TABLE, Case, Change, changes, cutter, file, program, replaced, stated
+from adversary.base import DRILL, TABLE, Case, Change, Job, changes, cutter, file, program, replaced, slot_job, stated
 
 #: a LinuxCNC mill with its zero in a corner of the travel
 INI = """[EMC]
@@ -61,6 +61,16 @@ def modes(*directions: str) -> Change:
     mode = {"tool": 1, "of": "cutter", "frequency_hz": 1200.0, "damping_ratio": 0.03, "stiffness_n_um": 40.0}
     return stated("dynamics", mode=[{**mode, "direction": d} for d in directions])
 
+
+def feeds_job() -> Job:
+    """The base job with new feeds, which holds."""
+    job = slot_job()
+    job.tables["operation"][0]["feeds"] = {"slowest_percent": 50.0, "fastest_percent": 120.0}
+    return job
+
+
+LAYERS: Change = lambda job: job.tables["operation"][0].update(engine="layers")  # noqa: E731
+FANUC: Change = lambda job: job.tables.update(machine={"name": "vmc-fanuc"})  # noqa: E731
 
 CASES = (
     Case("slot", "nothing: the base job", lambda job: None, "holds", ""),
@@ -366,4 +376,73 @@ CASES = (
         "block-delete",
     ),
     Case("block-delete-coolant", "nothing: a block without motions", replaced("M5\n", "/M9\nM5\n"), "holds", ""),
+    Case(
+        "layers-stop-in-cut",
+        "the spindle is stopped in the material, by layers",
+        changes(LAYERS, replaced("G1 X70 F900\n", "G1 X30 F900\nM5\n")),
+        "exceeds",
+        "spindle-stopped-in-cut",
+    ),
+    Case(
+        "layers-deep-hole",
+        "a hole of 6 diameters in one motion, by layers",
+        changes(DRILLING, hole("G81 X30 Y20 Z-36 R2 F600", 6000), LAYERS, stated("stock", layer_mm=4.0)),
+        "unproven",
+        "deep-hole",
+    ),
+    Case(
+        "feeds-end-in-cut",
+        "a program that is given new feeds ends in the material",
+        replaced("G1 X70 F900\nG0 Z10\nM5\n", "G1 X30 F900\n"),
+        "exceeds",
+        "ends-in-cut",
+        base=feeds_job,
+    ),
+    Case(
+        "feeds-below",
+        "a program that is given new feeds cuts below the bottom of the block",
+        changes(replaced("Y20", "Y-4.5"), replaced("G0 Z-2", "G0 Z-21")),
+        "unproven",
+        "below-stock",
+        base=feeds_job,
+    ),
+    Case(
+        "fanuc-spindle-stop",
+        "the spindle is stopped in the material, on a Fanuc",
+        changes(
+            FANUC,
+            program(
+                "O1\nG21 G90 G17 G94\nG28 G91 Z0.\nG90 G54\nT1 M6\nS6000 M3\nG0 X-10. Y20.\nG43 H1 Z10.\n"
+                "Z-2.\nG1 X30. F900.\nM5\nG0 Z10.\nM30\n"
+            ),
+        ),
+        "exceeds",
+        "spindle-stopped-in-cut",
+    ),
+    Case(
+        "fanuc-home-from-cut",
+        "nothing: the cutter is retracted by G28 from the slot before the spindle stops",
+        changes(
+            FANUC,
+            program(
+                "O1\nG21 G90 G17 G94\nG90 G54\nT1 M6\nS6000 M3\nG0 X-10. Y20.\nG43 H1 Z10.\n"
+                "Z-2.\nG1 X30. F900.\nG28 G91 Z0.\nM5\nM30\n"
+            ),
+        ),
+        "holds",
+        "",
+    ),
+    Case(
+        "heidenhain-stop-in-cut",
+        "STOP in the slot, in conversational language",
+        changes(
+            stated("program", dialect="heidenhain"),
+            program(
+                "BEGIN PGM P MM\nTOOL CALL 1 Z S6000\nL Z+10 R0 FMAX M3\nL X-10 Y+20 R0 FMAX\n"
+                "L Z-2 R0 FMAX\nL X+30 R0 F900\nSTOP\nL X+70 R0 F900\nL Z+10 R0 FMAX M5\nEND PGM P MM\n"
+            ),
+        ),
+        "unproven",
+        "stop-in-cut",
+    ),
 )

@@ -14,7 +14,7 @@ from rs274 import MISSING, canonical, rs274_installed
 
 SLOT = """%
 (A slot and a shoulder, one feed)
-N10 G21 G90 G17 G94 (F words in here stay: F99)
+/N10 G21 G90 G17 G94 (F words in here stay: F99)
 N20 T1 M6
 N30 S3000 M3
 N40 F600. (for all of it)
@@ -22,7 +22,7 @@ N50 G0 X-10 Y0 Z5
 N60 G0 Z-3
 N70 G1 X30
 N80 Y3.5
-/N90 X-8 ; back F1
+N90 X-8 ; back F1
 N100 G2 X-12 Y7.5 I0 J4 (in air)
 N110 G0 Z5
 N120 M2

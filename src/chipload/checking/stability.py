@@ -62,6 +62,7 @@ class StabilityResult:
     machine : whose spindle bounds the speeds
     wanted : the least required margin
     radii : of the cutters [mm], by tool
+    fastest : greatest speed of the cutters [rad/s], by tool; one that is not known is left out
     speeds : least and greatest speed to consider [1/min]; None: that of the machine
     """
 
@@ -69,6 +70,7 @@ class StabilityResult:
     machine: Machine
     wanted: float
     radii: Mapping[int, float]
+    fastest: Mapping[int, float]
     speeds: tuple[float | None, float | None] = (None, None)
 
     def reason(self, tools: NDArray[Any]) -> str:
@@ -144,6 +146,7 @@ class StabilityResult:
         low, high = (x / per if x is not None else None for x in self.speeds)
         low = max(low or 0.0, self.machine.spindle_min, 0.02 * self.machine.spindle_max)
         high = min(high or math.inf, self.machine.spindle_max)
+        high = min(high, self.fastest.get(tool, math.inf))
         some = self.watch.cuts.get(tool)
         if some:
             stated = self.watch.dynamics.modes.get(tool)
@@ -326,4 +329,5 @@ def stability_of(inputs: CheckInputs, watch: StabilityWatch) -> StabilityResult:
     """Return the stability result of a watch that has seen every step."""
     wanted = max(inputs.limits.stability_margin or DEFAULT_MARGIN, DEFAULT_MARGIN)
     radii = {n: c.radius for n, c in inputs.cutters.items()}
-    return StabilityResult(watch, inputs.machine, wanted, radii, inputs.speeds_rpm)
+    fastest = {n: c.max_speed for n, c in inputs.cutters.items() if c.max_speed is not None}
+    return StabilityResult(watch, inputs.machine, wanted, radii, fastest, inputs.speeds_rpm)

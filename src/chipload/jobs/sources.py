@@ -13,6 +13,7 @@ from chipload.cutter.table import CutterTable
 from chipload.errors import InputError
 from chipload.jobs.messages import Errors
 from chipload.jobs.tables import SourceTable
+from chipload.units import rpm_from_rad_s
 
 
 def source(key: str, table: SourceTable, folder: Path) -> str | Path:
@@ -63,7 +64,38 @@ def sources_and_cutters(
         for n, cutter in tools.items()
         if cutter.body
     ]
+    errors.texts += speed_errors(table.model_dump(), tools, number=next(iter(tools)) if len(tools) == 1 else None)
     return sources, tools
+
+
+def speed_errors(values: Any, cutters: Mapping[int, Cutter], key: str = "", number: int | None = None) -> list[str]:
+    """Spindle speeds (``speed_rpm``, ``most_rpm``) of the tables of a job that are above ``max_rpm`` of their cutter.
+
+    Parameters
+    ----------
+    values : of the job, or of a table of it
+    key : of that table
+    number : of the cutter that a table outside of it names
+    """
+    if isinstance(values, (list, tuple)):
+        return [text for k, one in enumerate(values) for text in speed_errors(one, cutters, f"{key}.{k}", number)]
+    if not isinstance(values, Mapping):
+        return []
+    own = values.get("cutter")
+    number = own if isinstance(own, int) else number
+    out, per = list[str](), rpm_from_rad_s(1.0)
+    for name, value in values.items():
+        place = f"{key}.{name}" if key else name
+        most = cutters[number].max_speed if number in cutters else None
+        if (
+            name in ("speed_rpm", "most_rpm")
+            and most is not None
+            and value is not None
+            and value > per * most * (1.0 + 1e-9)
+        ):
+            out.append(f"{place} = {value:g}: must be at most max_rpm = {per * most:g} of cutter {number}")
+        out += speed_errors(value, cutters, place, number)
+    return out
 
 
 def entries_of(values: Mapping[str, Any], key: str) -> Iterator[tuple[int, Mapping[str, Any]]]:
