@@ -88,7 +88,7 @@ def test_the_first_lines_state_what_the_limits_do_not_cover(outcome: Maker) -> N
     result = result_of(outcome("backward"))
     message, unchecked = result.first_lines
     assert (
-        "Not covered: engagement counts in the finish pass only, where the wall is made; 4.497 s of other cuts reach "
+        "Not covered: 4.5 s of cuts outside the finish pass (limits count where the wall is made): engagement reaches "
         "25 deg. The simulation agrees with the plan." in message
     )
     assert unchecked == "Not checked: default checks; limit torque_nm."

@@ -356,7 +356,7 @@ def _could_be_greatest(columns: Columns, checks: DefaultChecks) -> CoveredRows:
         touches = load[own] < LOADED * load[own].max(initial=0.0)
         could = np.any([v[own] * more[own] >= v[own].max(initial=0.0) for v in judged], axis=0)
         out[own] = could & ~touches & (load[own] > 0.0)
-    return CoveredRows(out, "steps with the greatest loads", "since elsewhere no greater load can follow from it")
+    return CoveredRows(out, "steps with the greatest loads", "where a greater load could follow from it")
 
 
 def _rigid(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> LimitCheck:

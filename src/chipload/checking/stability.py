@@ -206,9 +206,9 @@ def stability_limits(
         ]
         if name == "sle_um" and spatial and not uneven:
             why = f"tool {int(spatial[0])} and workpiece move along the axis"
-        rows = CoveredRows(margin > 0.0, "cuts with a known margin", "since elsewhere none is calculated")
+        rows = CoveredRows(margin > 0.0, "cuts with a known margin", "where one is calculated")
         if name == "sle_um":
-            rows = CoveredRows(cutting, "cuts at a feed", "since a rapid makes no wall")
+            rows = CoveredRows(cutting, "cuts at a feed", "where a wall is made")
         known = 0.0 if name == PROBABILITY else error
         out.append(check_limit(name, limit, columns, track=track, rows=rows, error=known, reason=why))
     return tuple(out)

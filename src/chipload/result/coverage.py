@@ -93,19 +93,26 @@ class Coverage:
             out[first:end] = True
         return out
 
-    def text(self, label: str, unit: str, limit: float) -> str:
-        """What is not covered, in a sentence; empty where no cut is left out.
+    @property
+    def outside(self) -> str:
+        """The time in the cut that is left out, and why.
 
-        >>> Coverage("finish pass", "where the wall is made", ((4, 9),), 12.25, 55.0).text("engagement", "deg", 13.0)
-        'engagement counts in the finish pass only, where the wall is made; 12.25 s of other cuts reach 55 deg'
+        >>> Coverage("finish pass", "where the wall is made", ((4, 9),), 12.5, 55.0).outside
+        '12.5 s of cuts outside the finish pass (limits count where the wall is made)'
+        """
+        return f"{number_text(self.excluded_s, 3)} s of cuts outside the {self.name} (limits count {self.reason})"
+
+    def excluded_text(self, label: str, unit: str, limit: float) -> str:
+        """The worst value that is left out, in words; empty where no cut is left out.
+
+        >>> Coverage("finish pass", "where the wall is made", ((4, 9),), 12.5, 55.0).excluded_text("force", "N", 50.0)
+        'force reaches 55 N'
         """
         if self.excluded_worst is None:
             return ""
-        beyond = f"reach {number_text(self.excluded_worst)} {unit}".rstrip()
         if limit > 0.0 and self.excluded_worst > FAR_BEYOND * limit:
-            beyond = "lie far beyond the limit"
-        seconds = number_text(self.excluded_s)
-        return f"{label} counts in the {self.name} only, {self.reason}; {seconds} s of other cuts {beyond}"
+            return f"{label} lies far beyond its limit"
+        return f"{label} reaches {number_text(self.excluded_worst)} {unit}".rstrip()
 
 
 #: of a limit that covers the whole program

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 from chipload.errors import Finding, Severity
+from chipload.result.coverage import Coverage
 from chipload.result.limits import LimitCheck
 from chipload.result.track import Track
 from chipload.result.verdict import Verdict
@@ -43,14 +45,18 @@ def headline(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Tra
     return line
 
 
-def coverage_lines(tracks: Sequence[Track]) -> Iterator[str]:
-    """Yield what the limits of the tracks in use do not cover, where other cuts are beyond the limit."""
+def coverage_line(tracks: Sequence[Track]) -> str:
+    """Return what the limits of the tracks in use do not cover, where other cuts are beyond a limit; empty: nothing."""
+    left: dict[tuple[str, Coverage], list[str]] = {}
     for track in tracks:
         for check in track.limits:
-            worst = check.coverage.excluded_worst
-            if worst is not None and (worst < check.limit if check.column.least else worst > check.limit):
-                text = check.coverage.text(check.column.label, check.column.unit, check.limit)
-                yield f"Not covered: {_of(track, tracks)}{text}."
+            covered, column = check.coverage, check.column
+            worst = covered.excluded_worst
+            if worst is not None and (worst < check.limit if column.least else worst > check.limit):
+                key = (_of(track, tracks), replace(covered, excluded_worst=None))
+                left.setdefault(key, []).append(covered.excluded_text(column.label, column.unit, check.limit))
+    parts = [f"{of}{covered.outside}: {', '.join(texts)}" for (of, covered), texts in left.items()]
+    return f"Not covered: {'; '.join(parts)}." if parts else ""
 
 
 def unchecked_line(unchecked: Iterable[str]) -> str:

@@ -208,9 +208,7 @@ def chatter_limits(
     if dynamics is None:
         return ()
     limit, reason = float(dynamics["margin"]), "" if dynamics["mode"] else "modes of the cutter are not stated"
-    cuts = CoveredRows(
-        np.asarray(columns["chip_areas"]) > 0, "cuts with a chip", "since elsewhere no margin is calculated"
-    )
+    cuts = CoveredRows(np.asarray(columns["chip_areas"]) > 0, "cuts with a chip", "where a margin is calculated")
     return (
         check_limit(
             "stability_margin", limit, columns, track=track, rows=cuts, error=MARGIN_ERROR + force_error, reason=reason

@@ -107,7 +107,7 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
             check = check_limit(name, limit, c, track=one.name, error=limit_error(walled, one, name))
             out.append(with_peaks(check, walled.checks, c))
     over, cuts = "force_over_allowable", c["force_normal_n"] > 0.0
-    pressing = CoveredRows(cuts, "cuts that press on the wall", "since the others do not bend it")
+    pressing = CoveredRows(cuts, "cuts that press on the wall", "where the wall is bent")
     force = check_limit(over, 1.0 + OVER, c, track=one.name, rows=pressing, error=limit_error(walled, one, over))
     strength = float(walled.settings["yield_mpa"])
     stress = _limit_check("stress_mpa", strength, one.stress, one, limit_error(walled, one, "stress_mpa"))
