@@ -18,8 +18,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
-
 ROOT = Path(__file__).parent.parent
 EXAMPLES = ROOT / "src" / "chipload" / "examples"
 VALUES = ROOT / "docs" / "figures" / "values.toml"
@@ -69,11 +67,10 @@ class Run:
         """A track by its name."""
         return next(track for track in self.summary["tracks"] if track["name"] == name)
 
-    def greatest(self, column: str, track: str = "") -> float:
-        """Greatest value of a column of the history."""
-        table = pq.read_table(self.folder / "history.parquet", columns=["track", column])
-        rows = [x for t, x in zip(*(table[n].to_pylist() for n in table.column_names), strict=True) if track in ("", t)]
-        return float(max(x for x in rows if x is not None))
+    def tracks_with(self, limit: str) -> list[str]:
+        """Names of the tracks in use that have a limit."""
+        used = (track for track in self.summary["tracks"] if track["in_use"])
+        return [track["name"] for track in used if any(check["name"] == limit for check in track["limits"])]
 
     def lines(self, program: str) -> int:
         """Number of lines of a written program."""
@@ -285,7 +282,7 @@ def impeller(run: Run) -> Text:
         "used_min": f"{used['time_min']:.0f}",
         "single_min": f"{single['time_min']:.0f}",
         "picked_min": f"{picked['time_min']:.0f}",
-        "gouge_mm": f"{made['finished']['gouge_mm']:.3f}",
+        "gouge_mm": f"{max(run.worst('gouge_mm', track) for track in run.tracks_with('gouge_mm')):.3f}",
     }
 
 
@@ -323,7 +320,7 @@ SOURCES: Mapping[str, Source] = {
     "pocket": Source("pocket", pocket, pictures=("pocket",)),
     "trunnion": Source("trunnion", trunnion, pictures=("trunnion",)),
     "chips": Source("chips", chips, pictures=("chips",)),
-    "chips_blade": Source("chips", chips_blade, "blade.toml"),
+    "chips_blade": Source("chips", chips_blade, "blade.toml", long=True),
     "chatter": Source("chatter", chatter, pictures=("chatter",)),
     "bracket": Source("bracket", bracket, pictures=("bracket", "page")),
     "feeds": Source("feeds", feeds, pictures=("feeds", "page_compare")),
