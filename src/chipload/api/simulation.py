@@ -14,7 +14,7 @@ from chipload.checking.clamped import Workpiece
 from chipload.checking.dynamics import Vibration
 from chipload.checking.history import History
 from chipload.checking.inputs import CheckInputs, Elasticity
-from chipload.checking.outcome import ProgramResult
+from chipload.checking.outcome import ProgramResult, SimulationResult
 from chipload.checking.run import simulate_program
 from chipload.checking.settings import CheckSettings, Limits, SimulationSettings
 from chipload.checking.stiffness import MachineStiffness
@@ -127,14 +127,24 @@ def simulate(
     )
     layers = inputs.stock.layered(reading.program, tools)
     done = simulate_program(inputs, reading, layers, progress=progress)
-    bodies = {"stock": inputs.stock, "part": part, **{f"fixture {k}": f for k, f in enumerate(fixtures)}}
-    files = {name: body.file for name, body in bodies.items() if body is not None and body.file is not None}
     path = Path(VALUE) if isinstance(program, Program) else Path(program)
-    if not isinstance(program, Program):
-        files = {"program": path, **files}
-    lines, seconds = line_times(reading, on)
-    provenance = provenance_of(files, (), on, (metal,))
-    return History.of(ProgramResult(path.stem, path.name, reading, lines, seconds, on, provenance, done, cutters=tools))
+    files = {} if isinstance(program, Program) else {"program": path}
+    return _history(inputs, reading, done, path, files)
+
+
+def _history(
+    inputs: CheckInputs, reading: ProgramReading, done: SimulationResult, path: Path, files: dict[str, Path]
+) -> History:
+    """Return the result of a simulation; ``files`` are those of the program."""
+    around = inputs.surroundings
+    fixtures = {f"fixture {k}": fixture for k, fixture in enumerate(around.fixtures)}
+    bodies = {"stock": inputs.stock, "part": around.part, **fixtures}
+    files |= {name: body.file for name, body in bodies.items() if body is not None and body.file is not None}
+    lines, seconds = line_times(reading, inputs.machine)
+    provenance = provenance_of(files, (), inputs.machine, (inputs.material,))
+    return History.of(
+        ProgramResult(path.stem, path.name, reading, lines, seconds, inputs.machine, provenance, done, inputs.cutters)
+    )
 
 
 def _with_cutters(

@@ -156,8 +156,8 @@ def dynamics_of(vibration: Vibration, cutters: Mapping[int, Cutter], workpiece: 
         if density is not None and damping is None:
             unknown.append("damping of the workpiece")
     names = {k: f"{m.of} {m.frequency_hz:g} Hz" for k, m in enumerate(listed, 1)}
-    spread, missing = _spread(vibration), tuple(dict.fromkeys(unknown))
-    return Dynamics(modes, number, names, missing, spread, damping, vibration.process_damping)
+    spread, lacking = _spread(vibration), tuple(dict.fromkeys(unknown))
+    return Dynamics(modes, number, names, lacking, spread, damping, vibration.process_damping)
 
 
 def _spread(vibration: Vibration) -> ModeSpread | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,8 @@ from chipload.checking.default_checks import PROGRAM_COLUMNS, with_checks
 from chipload.checking.form_error import forming
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.limits import GOUGE
-from chipload.checking.outcome import CollisionCheck, SimulationResult
-from chipload.checking.preparation import bodies_of, resolution_of, timed
+from chipload.checking.outcome import CollisionCheck, SimulationResult, StockCheck
+from chipload.checking.preparation import Bodies, bodies_of, resolution_of, timed
 from chipload.checking.stability import stability_of, watch_of
 from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.checking.stock_check import check_stock
@@ -24,6 +25,7 @@ from chipload.checking.workpiece_compliance import (
     workpiece_compliance,
 )
 from chipload.cutter.cutter import Cutter
+from chipload.errors import Finding
 from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.program.read import ProgramReading
@@ -41,10 +43,14 @@ from chipload.simulation.loads import Cuts
 from chipload.simulation.moves import leans
 from chipload.simulation.program_findings import ProgramSurroundings, program_findings
 from chipload.simulation.remaining_stock import Inside
+from chipload.simulation.removal import Columns
 from chipload.simulation.steps import StepBlocks
-from chipload.simulation.surface import collisions, difference, in_stock
+from chipload.simulation.surface import Difference, collisions, difference, in_stock
 from chipload.stock.layers import LayeredStock
 from chipload.workers import Workers
+
+#: progress of a pass by the number of steps that are done
+Counted: TypeAlias = Callable[[int], None]
 
 #: share of a simulation that one pass over its steps besides the removal takes
 SHARE = 0.2 / 3.0
@@ -97,11 +103,11 @@ def simulate_program(
     """
     op, cutters, material, machine = inputs.settings, inputs.cutters, inputs.material, inputs.machine
     bodies, elasticity = bodies_of(inputs, reading, stock), inputs.elasticity
-    program, times, fine, part = bodies.program, bodies.times, bodies.resolution, inputs.surroundings.part
+    program, times, fine = bodies.program, bodies.times, bodies.resolution
     if compliance is None:
         compliance = compliance_of_workpiece(inputs, reading, stock, progress)
     gives = bodies.stiffness if compliance is None else stiffness_of(elasticity.stiffness, cutters, compliance.steps)
-    points, before, stiffness = bodies.stock_points, insides(stock), elasticity.stiffness
+    before, stiffness = insides(stock), elasticity.stiffness
     initial = stock.copied() if reading.skipped is not None else None
     # layers that were cut before lie face on face, which rays do not distinguish
     blank = None if stock.cut.any() else stock.body()
@@ -110,20 +116,12 @@ def simulate_program(
     stock_check = check_stock(inputs, bodies, stock, steps, kept, progress)
     watches = [with_checks(inputs.checks, material, deflecting(gives, material))]
 
-    def passing(share: float, what: str) -> Callable[[int], None]:
+    def passing(share: float, what: str) -> Counted:
         return lambda done: progress(share + SHARE * done / bodies.steps, what)
 
-    left, solids = None, dict(bodies.fixtures)
-    if part is not None:
-        left = difference(
-            steps, cutters, part.mesh, before, part.spacing_mm, part.excess_range_mm, op.tolerance_mm,
-            passing(0.0, "distances to the part"), kept,
-        )  # fmt: skip
-        solids["part"] = left.points
-        gouge = inputs.limits.gouge_mm or (GOUGE if inputs.checks.gouge else None)
-        if gouge is not None:
-            used = {n: c for n, c in cutters.items() if bool((program.tool == n).any())}
-            left = refine_gouges(left, steps, used, op.tolerance_mm, gouge)
+    left, part_points = _difference_from_part(
+        inputs, program, steps, before, passing(0.0, "distances to the part"), kept
+    )
     # form error costs as much as the chips, and means little without stiffness data
     made = left if stiffness is not None or compliance is not None or inputs.limits.form_error_um is not None else None
     if made is not None:
@@ -157,32 +155,35 @@ def simulate_program(
     removal = with_columns(removal, (*watched(gives, formed=made is not None), *PROGRAM_COLUMNS))
     errors = with_compliance_error(removal.resolution_error, removal.columns, compliance)
     around = program_surroundings(inputs, reading, before, stock_box(stock))
-    more = program_findings(program, steps, removal.columns, cutters, around)
-    findings = (*removal.findings, *reversed_cuts(steps, removal.columns, cutters), *more)
-    if compliance is not None:
-        findings += compliance.jumps(removal.columns, max(c.diameter for c in cutters.values()))
+    findings = (*removal.findings, *_findings_of(program, steps, removal.columns, cutters, around, compliance))
     removal = replace(removal, resolution_error=errors, samples=recorder.samples(), findings=findings)
     if stability_watch is not None:
         removal = with_columns(removal, stability_watch.columns)
-    watching, above = passing(0.8 + SHARE, "collisions"), frozenset(["part"])
-    touched = collisions(steps, cutters, solids, op.tolerance_mm, above_only=above, progress=watching, kept=kept)
-    touched += stock_check.touched
-    if points is not None:
-        touched += in_stock(
-            steps, cutters, points, op.tolerance_mm, passing(0.8 + 2.0 * SHARE, "holders in the stock"), kept
-        )  # fmt: skip
+    solids = {**bodies.fixtures, **part_points}
+    touched = _collision_check(inputs, bodies, steps, solids, stock_check, passing, kept)
     skipped = None
     if reading.skipped is not None and initial is not None:
         skipped = simulate_program(inputs, reading.skipped, initial, workers=workers)
-    settings = {"kind": "simulate", **op.stated}
-    compared_with = (*solids, *(["stock"] if inputs.checks.shank_in_stock else []))
     return SimulationResult(
-        removal, stock, machine, inputs.limits, settings, bodies.checks,
-        CollisionCheck(touched, compared_with, _no_holder(cutters), inputs.surroundings.fixture_meshes(machine)), left,
-        gives.unknown, None if stability_watch is None else stability_of(inputs, stability_watch), compliance, blank,
-        stock_check,
+        removal, stock, machine, inputs.limits, {"kind": "simulate", **op.stated}, bodies.checks, touched, left, gives.unknown,
+        None if stability_watch is None else stability_of(inputs, stability_watch), compliance, blank, stock_check,
         skipped,
     )  # fmt: skip
+
+
+def _findings_of(
+    program: Program,
+    steps: StepBlocks,
+    columns: Columns,
+    cutters: Mapping[int, Cutter],
+    around: ProgramSurroundings,
+    compliance: WorkpieceCompliance | None,
+) -> tuple[Finding, ...]:
+    """Return what a program does wrong besides its loads, and deflections that their neighbours do not explain."""
+    found = (*reversed_cuts(steps, columns, cutters), *program_findings(program, steps, columns, cutters, around))
+    if compliance is None:
+        return found
+    return (*found, *compliance.jumps(columns, max(c.diameter for c in cutters.values())))
 
 
 def program_surroundings(
@@ -193,6 +194,51 @@ def program_surroundings(
     below = any(float(mesh.bounds[0][2]) < bottom for mesh in meshes.values())
     text = reading.program if reading.of_text else None
     return ProgramSurroundings(inside, *box, below, reading.stops, reading.retractions, text)
+
+
+def _difference_from_part(
+    inputs: CheckInputs,
+    program: Program,
+    steps: StepBlocks,
+    before: Callable[[NDArray[np.float64]], NDArray[np.bool_]],
+    progress: Counted,
+    kept: KeptPasses,
+) -> tuple[Difference | None, dict[str, NDArray[np.float64]]]:
+    """Return the distances of the path of the cutters from the part, and its points by name; nothing without a part."""
+    part, tolerance, cutters = inputs.surroundings.part, inputs.settings.tolerance_mm, inputs.cutters
+    if part is None:
+        return None, {}
+    left = difference(
+        steps, cutters, part.mesh, before, part.spacing_mm, part.excess_range_mm, tolerance, progress, kept
+    )
+    gouge = inputs.limits.gouge_mm or (GOUGE if inputs.checks.gouge else None)
+    points = {"part": left.points}
+    if gouge is None:
+        return left, points
+    used = {n: c for n, c in cutters.items() if bool((program.tool == n).any())}
+    return refine_gouges(left, steps, used, tolerance, gouge), points
+
+
+def _collision_check(
+    inputs: CheckInputs,
+    bodies: Bodies,
+    steps: StepBlocks,
+    solids: Mapping[str, NDArray[np.float64]],
+    stock_check: StockCheck,
+    passing: Callable[[float, str], Counted],
+    kept: KeptPasses,
+) -> CollisionCheck:
+    """Return the collisions of cutter, shank and holder with part and fixtures, and with the stock of each moment."""
+    cutters, tolerance = inputs.cutters, inputs.settings.tolerance_mm
+    watching, above = passing(0.8 + SHARE, "collisions"), frozenset(["part"])
+    touched = collisions(steps, cutters, solids, tolerance, above_only=above, progress=watching, kept=kept)
+    touched += stock_check.touched
+    if bodies.stock_points is not None:
+        watching = passing(0.8 + 2.0 * SHARE, "holders in the stock")
+        touched += in_stock(steps, cutters, bodies.stock_points, tolerance, watching, kept)
+    compared_with = (*solids, *(["stock"] if inputs.checks.shank_in_stock else []))
+    no_holder = tuple(n for n, c in sorted(cutters.items()) if not c.holder)
+    return CollisionCheck(touched, compared_with, no_holder, inputs.surroundings.fixture_meshes(inputs.machine))
 
 
 def passes_key(inputs: CheckInputs, program: Program) -> str:
@@ -213,8 +259,3 @@ def compliance_of_workpiece(
     return workpiece_compliance(
         workpiece, program, stock, cutters, inputs.material, fine, op.engine, op.interpolation, progress
     )
-
-
-def _no_holder(cutters: Mapping[int, Cutter]) -> tuple[int, ...]:
-    """Return the tools whose holder is not stated."""
-    return tuple(n for n, c in sorted(cutters.items()) if not c.holder)
