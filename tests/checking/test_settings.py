@@ -23,12 +23,12 @@ from chipload.jobs.simulation.tables import (
     TargetTable,
     WorkpieceTable,
 )
-from chipload.jobs.tables import ProgramChecksTable, Table, value_of
+from chipload.jobs.tables import StockChecksTable, Table, value_of
 
 PAIRS = [
     (SimulationSettings, SimulateTable, {"kind", "speeds"}),
     (Limits, ProgramLimitsTable, set()),
-    (CheckSettings, ProgramChecksTable, set()),
+    (CheckSettings, StockChecksTable, set()),
     (MachineStiffness, StiffnessTable, set()),
     (Workpiece, WorkpieceTable, {"clamp"}),
     (WorkpieceClamp, ClampTable, set()),

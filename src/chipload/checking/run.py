@@ -29,7 +29,7 @@ from chipload.errors import Finding
 from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.program.read import ProgramReading
-from chipload.progress import Progress, silent
+from chipload.progress import Progress, part_of, silent
 from chipload.result.provenance import sources, versions
 from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.chips import remove
@@ -126,16 +126,13 @@ def simulate_program(
     made = left if stiffness is not None or compliance is not None or inputs.limits.form_error_um is not None else None
     if made is not None:
         watches.append(forming(made, gives, material))
-
     stability_watch, recorder = watch_of(inputs, compliance), EngagementRecorder(material)
     watches += [recorder] if stability_watch is None else [stability_watch, recorder]
 
     def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
         return {name: values for each in watches for name, values in each(cuts).items()}
 
-    def removing(done: float, what: str) -> None:
-        progress(SHARE + 0.8 * done, what)
-
+    removing = part_of(progress, SHARE, SHARE + 0.8)
     if checkpoint is None:
         removal = remove(
             program, stock, cutters, material, fine, interpolation=op.interpolation, watch=watch, times=times,
@@ -165,9 +162,9 @@ def simulate_program(
     if reading.skipped is not None and initial is not None:
         skipped = simulate_program(inputs, reading.skipped, initial, workers=workers)
     return SimulationResult(
-        removal, stock, machine, inputs.limits, {"kind": "simulate", **op.stated}, bodies.checks, touched, left, gives.unknown,
-        None if stability_watch is None else stability_of(inputs, stability_watch), compliance, blank, stock_check,
-        skipped,
+        removal, stock, machine, inputs.limits, {"kind": "simulate", **op.stated}, bodies.checks, touched, left,
+        gives.unknown, None if stability_watch is None else stability_of(inputs, stability_watch), compliance, blank,
+        stock_check, skipped,
     )  # fmt: skip
 
 
