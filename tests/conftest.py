@@ -16,6 +16,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
 from chipload.geometry.contour import Contour
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
+from chipload.jobs.contour.text_simulation import SimulatedText
 from chipload.machine.machine import machine_named
 from chipload.planning.result import Event, OperationResult, StrategyResult
 from chipload.program.build import follow, plunge, rapid, retract
@@ -139,9 +140,13 @@ def made_outcome(use: str = "backward", verdict: Verdict = Verdict.HOLDS, rows: 
     checks = {n: PlanVerification(verdict, "1800 rows compared", {"gouge_mm": 0.0}) for n in names}
     settings = {"kind": "contour", "use": use, "feed_mm_min": 600.0}
     limits = {"engagement_deg": 13.0, "force_xy_n": 200.0}
+    errors = dict.fromkeys(
+        ("engagement_deg", "force_n", "torque_nm", "torque_mean_nm", "power_w", "form_error_um"), 0.0
+    )
+    simulations = {n: SimulatedText(s.program, s.history, (), errors, None) for n, s in result.strategies.items()}
     return ContourResult(
         "corner",
-        (Operation(result, settings, cutter, 0.0, 5.0, checks, limits=limits),),
+        (Operation(result, settings, cutter, 0.0, 5.0, checks, simulations, limits),),
         machine_named("vmc"),
         ("torque_nm",),
         (Finding("made", 0, "operation.0.x: a finding"),),

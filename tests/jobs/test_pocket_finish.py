@@ -58,7 +58,7 @@ def test_the_engagement_is_kept_and_the_wall_is_thin(finished):
     """On straight walls acos(1 - 0.3 / 4), in the corners no more than was asked for."""
     pocket, outcome = finished
     h = pocket.history
-    walls = h["engagement_max_deg"][h["pass"] == "wall"]
+    walls = h["engagement_deg"][h["pass"] == "wall"]
     assert walls.max() <= math.degrees(math.acos(1.0 - 1.2 / 4.0)) + 0.01
     straight = math.degrees(math.acos(1.0 - 0.3 / 4.0))
     assert np.isclose(h["engagement_deg"][h["pass"] == "wall"], straight, atol=0.02).mean() > 0.25

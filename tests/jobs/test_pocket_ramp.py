@@ -59,7 +59,7 @@ def test_a_ramp_in_a_slot(tmp_path):
     h = strategy.history
     assert (h["pass"] == "entry").any()
     wanted = strategy.summary["engagement_deg"]["wanted"]
-    assert h["engagement_max_deg"][h["pass"] == "pocket"].max() <= wanted + 0.01
+    assert h["engagement_deg"][h["pass"] == "pocket"].max() <= wanted + 0.01
     assert strategy.summary["cleared_percent"] > 99.5
     gone = swept(strategy.program, 4.0, -5.0)
     assert gone.bounds == pytest.approx((0.0, 0.0, 40.0, 11.0), abs=2e-3)
@@ -88,7 +88,7 @@ def test_an_entry_is_no_steeper_than_its_cutter_allows(tmp_path, entry):
     flat = along > 1e-6
     steepest = float(np.degrees(np.arctan(down[flat] / along[flat])).max())
     assert 0.8 < steepest <= 1.0 + 1e-6
-    assert strategy.history["ramp_deg"].max() == pytest.approx(steepest, abs=1e-6)
+    assert strategy.history["ramp_deg"].max() == pytest.approx(steepest, abs=1e-3)
     assert not (strategy.history["ramp_deg"] > 0.0)[strategy.history["pass"] == "pocket"].any()
     assert [f.code for f in findings_of(outcome.operations[0], "pocket") if f.code == "plunge"] == []
 

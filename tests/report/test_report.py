@@ -112,7 +112,9 @@ def test_what_was_not_simulated_is_unproven(outcome: Maker) -> None:
 
 def test_what_the_machine_cannot_do_does_not_hold(outcome: Maker) -> None:
     far = Finding("travel", 0, "row 1: X = 401 mm", Severity.EXCEEDS)
-    made = with_operation(outcome(), machine_findings={"backward": (far,), "plain": ()})
+    made = outcome()
+    simulations = {n: replace(s, findings=(far,)) for n, s in made.operations[0].simulations.items()}
+    made = with_operation(made, simulations={**simulations, "plain": made.operations[0].simulations["plain"]})
     assert verdict(made) == (Verdict.EXCEEDS, "Exceeds: row 1: X = 401 mm.")
 
 
@@ -139,7 +141,7 @@ def test_summary_states_the_verdict_first_and_every_strategy(outcome: Maker) -> 
         "place": pytest.approx([5.0, 7.957, -5.0], abs=1e-3),
         "t_s": pytest.approx(plain["limits"][0]["row"] * 9.0 / 1799),
         "resolution_error": 0.0,
-        "absolute_error": 0.05,
+        "absolute_error": 0.0,
         "margin": pytest.approx(1.0 - plain["limits"][0]["worst"] / 13.0),
         "coverage": {
             "name": "finish pass", "reason": "where the wall is made", "ranges": [[900, 1800]],

@@ -188,22 +188,54 @@ def wall_error_along(
     """
     if spindle not in ("cw", "ccw"):
         raise InputError(f"spindle = {spindle!r}: must be cw or ccw")
+    engagement = engagement_of_arcs(
+        phi_in, phi_out, feed_per_tooth, cutter, axial_depth, count=count, clockwise=spindle == "cw"
+    )
+    return greatest_wall_error(
+        engagement, cutter, material, axial_depth, milling=milling, heights=heights, work_compliance=work_compliance,
+        fluted_factor=fluted_factor, reach=reach,
+    )  # fmt: skip
+
+
+def greatest_wall_error(
+    engagement: ToothEngagement,
+    cutter: Cutter,
+    material: Material,
+    axial_depth: float,
+    *,
+    milling: Milling,
+    heights: int = 17,
+    work_compliance: float = 0.0,
+    fluted_factor: float | None = None,
+    reach: float = REACH,
+) -> dict[str, NDArray[Any]]:
+    """Return the form error of greatest size over the depth for every step of a tooth engagement.
+
+    Parameters
+    ----------
+    axial_depth : [mm], height above the tip up to which the error counts
+    engagement, cutter, material, milling, heights, work_compliance, fluted_factor, reach
+        as :func:`wall_profile` and :func:`wall_error_along`
+
+    Returns
+    -------
+    columns, (n,) each, as :func:`wall_error_along`
+    """
     if heights < 3:
         raise InputError(f"heights = {heights}: must be at least 3")
     _check_work(work_compliance)
     _check_teeth(cutter)
     phi_wall = _wall_immersion(milling)
-    engagement = engagement_of_arcs(
-        phi_in, phi_out, feed_per_tooth, cutter, axial_depth, count=count, clockwise=spindle == "cw"
-    )
     made = _makes_wall(engagement, phi_wall, reach)
+    by_height = engagement.slices.copy()
+    by_height[:, 0] = by_height[:, 2]
     out = np.zeros((len(engagement), 2))
     _wall_error.wall_worst(
         engagement.start,
-        engagement.rows,
+        _straight(engagement, cutter),
         engagement.tooth,
         engagement.slice,
-        engagement.slices,
+        by_height,
         phi_wall,
         edge_lag(cutter),
         cutter.flutes,

@@ -50,6 +50,7 @@ class Machine:
     planner : settings of LinuxCNC's trajectory planner; None: another controller, judged by its corner tolerance
     table : the block under the workpiece; None: not known
     tcp_words : blocks that begin and end tool centre point control, ``{tool}`` for the tool's number; None: it has none
+    counter_clockwise : whether the spindle also turns counter-clockwise (M4)
 
     Raises
     ------
@@ -74,6 +75,7 @@ class Machine:
     planner: TrajectoryPlanner | None = None
     jerk: float | None = None
     table: MachineTable | None = None
+    counter_clockwise: bool = True
 
     def __post_init__(self) -> None:
         def require(ok: bool, key: str, value: object, limit: str) -> None:
@@ -176,6 +178,7 @@ def _from_table(label: str, table: Row) -> Machine:
             planner=_planner(label, top),
             jerk=float(top["jerk_mm_s3"]) if "jerk_mm_s3" in top else None,
             table=_machine_table(label, top),
+            counter_clockwise=bool(spindle.get("counter_clockwise", True)),
         )
     except InputError as err:
         text = str(err)
@@ -232,7 +235,8 @@ def read_machine(path: str | Path) -> Machine:
     table, ``corner_tolerance_mm`` sets the speed at corners.
 
     In ``[spindle]``: ``min_rpm``, ``max_rpm``, optional ``power_w``, ``torque_nm``, ``torque_curve`` (pairs of rpm and
-    N m), ``direction`` (from the tip to the spindle; else +Z), and ``nose_mm`` or ``gauge_mm``, the distance of the
+    N m), ``direction`` (from the tip to the spindle; else +Z), ``counter_clockwise`` (whether it has M4, else
+    true), and ``nose_mm`` or ``gauge_mm``, the distance of the
     nose from the pivot of the head's last rotary axis. In ``[work]``, which may be left out: ``zero_mm``,
     ``x_axis``, ``z_axis``.
 

@@ -38,6 +38,7 @@ _SPINDLE = {
     "direction?": _VECTOR,
     "nose_mm?": _VECTOR,
     "gauge_mm?": _NUMBER,
+    "counter_clockwise?": _FLAG,
 }
 _PLANNER = {
     "cycle_ms": _NUMBER,

@@ -68,7 +68,7 @@ def cost(
     s, t : (n,) length [mm] and time [s] along the pass
     centre, heading : (n, 2) [mm], unit feed
     z : height of the tip [mm]
-    met : the exact engagement
+    met : the exact engagement, phi in the sense of the spindle
     speed : (n,) [mm/s]
     makes_wall : (n,) bool, where the wall error is needed; 0 elsewhere
     """
@@ -84,6 +84,7 @@ def cost(
         cut.material,
         cut.axial_depth,
         spindle_speed=cut.spindle_speed,
+        spindle="ccw" if cut.cutter.left_hand else "cw",
         count=count,
     )
     error = np.zeros(len(s))

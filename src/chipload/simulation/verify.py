@@ -66,7 +66,7 @@ class Verification:
 
 
 @dataclass(frozen=True, eq=False)
-class _Level:
+class Level:
     """One height of the program: its centre path, and what lies above it up to ``top``."""
 
     z: float
@@ -137,7 +137,7 @@ def verify_contour(
     hits: list[Place] = []
     compared = samples = 0
     try:
-        levels = _levels(program, radius, stock, stock_top_mm)
+        levels = levels_of(program, radius, stock, stock_top_mm)
         if not levels:
             open_.append("the program has no level cutting motion below the stock's top")
         progress(0.05, "centre path")
@@ -166,7 +166,7 @@ def verify_contour(
 
 
 def _rapids_through_stock(
-    program: Program, levels: Sequence[_Level], step: float, failed: list[str]
+    program: Program, levels: Sequence[Level], step: float, failed: list[str]
 ) -> tuple[list[Place], int]:
     """Places of rapids in the stock of the levels, and how many points were checked; adds findings to ``failed``."""
     hits: list[Place] = []
@@ -224,7 +224,7 @@ def _need_tolerances(stock: Region | None, **tolerances: float) -> None:
 
 
 def _wall(
-    levels: Sequence[_Level],
+    levels: Sequence[Level],
     wall: Sequence[Contour],
     wall_below: tuple[float, Sequence[Contour]] | None,
     material: str,
@@ -259,31 +259,31 @@ def _columns(history: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     return out
 
 
-def _heights(program: Program) -> tuple[Floats, Floats]:
+def heights_of(program: Program) -> tuple[Floats, Floats]:
     """Heights (n,) at which the motions begin and end; row 0 begins where it ends."""
     z1 = program.p_work[:, 2]
     return np.concatenate([z1[:1], z1[:-1]]), z1
 
 
-def _levels(program: Program, radius: float, stock: Region | None, top: float) -> list[_Level]:
+def levels_of(program: Program, radius: float, stock: Region | None, top: float) -> list[Level]:
     """The heights of level cutting motions below the stock's top, the lowest last."""
-    z0, z1 = _heights(program)
+    z0, z1 = heights_of(program)
     cuts = np.isin(program.motion, (LINE, ARC_CW, ARC_CCW)) & (np.abs(z1 - z0) <= LEVEL_MM) & (z1 < top - LEVEL_MM)
     heights: list[float] = []
     for z in np.sort(z1[cuts])[::-1]:
         if not heights or heights[-1] - z > LEVEL_MM:
             heights.append(float(z))
     tops = [top, *heights[:-1]]
-    return [_Level(z, t, CentrePath.of_program(program, radius, stock, z)) for z, t in zip(heights, tops, strict=True)]
+    return [Level(z, t, CentrePath.of_program(program, radius, stock, z)) for z, t in zip(heights, tops, strict=True)]
 
 
-def _rapids(program: Program, level: _Level, step: float) -> tuple[list[Place], int]:
+def _rapids(program: Program, level: Level, step: float) -> tuple[list[Place], int]:
     """Centres at which rapids meet uncut stock of this level, one a motion, and the number of checked points.
 
     The part of a rapid below the level's top sweeps its front half rim, ``RAPID_MM`` smaller than the cutter, through
     what stood before it; one that comes from above is also checked over its whole disc, in 8 rings of 64 points.
     """
-    z0, z1 = _heights(program)
+    z0, z1 = heights_of(program)
     below = np.minimum(z0, z1) < level.top - LEVEL_MM
     at = np.flatnonzero((program.motion == RAPID) & below)
     at = at[at > 0]
@@ -321,7 +321,7 @@ def _rapids(program: Program, level: _Level, step: float) -> tuple[list[Place], 
 
 def _compare(
     program: Program,
-    levels: Sequence[_Level],
+    levels: Sequence[Level],
     columns: Mapping[str, NDArray[Any]],
     passes: Sequence[str] | None,
     top: float,
@@ -336,7 +336,7 @@ def _compare(
     points = np.ascontiguousarray(np.column_stack([x, y]))
     m = len(points)
     mot = motion_rows(flat_motions(program))
-    z0, z1 = _heights(program)
+    z0, z1 = heights_of(program)
     k, w = np.zeros(m, dtype=np.int64), np.zeros(m)
     found = int(_centre_path.locate(points, np.ascontiguousarray(z), mot, z0, z1, MATCH_MM, LEVEL_MM, k, w))
     if found < m:

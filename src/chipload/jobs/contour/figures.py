@@ -11,8 +11,7 @@ import plotly.graph_objects as go
 from chipload.jobs.contour.outcome import ContourResult, Operation
 from chipload.jobs.contour.pass_figures import COLOURS, along, plan
 from chipload.jobs.contour.programs import program_files
-from chipload.jobs.contour.result import limits_of
-from chipload.jobs.contour.samples import samples_of
+from chipload.jobs.contour.result import limits_of, samples_of
 from chipload.jobs.contour.scene import blanks_of, scene_bytes
 from chipload.machine.machine import Machine
 from chipload.planning.result import StrategyResult

@@ -26,6 +26,7 @@ from chipload.geometry.distance import distance
 from chipload.geometry.offset import offset
 from chipload.jobs.contour.semifinish_text import inserted_lines, put_in
 from chipload.machine.machine import Machine
+from chipload.planning.hand import Milling, clockwise_milling
 from chipload.program.apt.reader import apt_text
 from chipload.program.gcode.reader import gcode_text
 from chipload.program.heidenhain.reader import heidenhain_text
@@ -189,7 +190,7 @@ def flat_lengths(p: Program) -> NDArray[Any]:
     return np.where(seg[:, 6] == 0.0, chord, turn)
 
 
-def finish_contours(finish: FinishProgram, cutter: Cutter, milling: str, side: str | None) -> tuple[Contour, ...]:
+def finish_contours(finish: FinishProgram, cutter: Cutter, milling: Milling, side: str | None) -> tuple[Contour, ...]:
     """The wall next to the finish path.
 
     Raises
@@ -205,7 +206,7 @@ def finish_contours(finish: FinishProgram, cutter: Cutter, milling: str, side: s
             f"has cutter = {cutter.number}: state cutter = {number}"
         )
     path = Contour(flat_motions(p)[finish.first : finish.last + 1])
-    right = milling == "down"
+    right = clockwise_milling(milling, cutter) == "down"
     walls = offset([path], -cutter.radius if right else cutter.radius)
     if len(walls) != 1:
         raise InputError(

@@ -9,6 +9,7 @@ from typing import Any
 from chipload.checking.default_checks import DefaultChecks
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
+from chipload.jobs.contour.text_simulation import SimulatedText
 from chipload.machine.machine import Machine
 from chipload.planning.result import OperationResult
 from chipload.result import Provenance, Verdict
@@ -47,7 +48,7 @@ class Operation:
     cutter : the tool
     top, depth : z of the stock's top, depth of cut [mm]
     verifications : by strategy
-    machine_findings : by strategy, violations of the machine's limits
+    simulations : by strategy, the text of its program as it was read back and simulated; its history is that of this
     limits : of the job, by name
     checks : checks in addition to the limits; None: nothing
     inserted : name and text of the program that the finish path came from, with the semi-finish passes; else ""
@@ -59,7 +60,7 @@ class Operation:
     top: float
     depth: float
     verifications: Mapping[str, PlanVerification]
-    machine_findings: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
+    simulations: Mapping[str, SimulatedText] = field(default_factory=dict)
     limits: Mapping[str, float] = field(default_factory=dict)
     checks: DefaultChecks | None = None
     inserted: tuple[str, str] = ("", "")

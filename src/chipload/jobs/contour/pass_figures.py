@@ -70,7 +70,7 @@ def along(operation: Operation) -> go.Figure:
         where = np.flatnonzero(shown_rows(strategy))
         s, apart = _abscissa(strategy.history, where)
         for row, column in enumerate(shown, start=1):
-            values = np.asarray(strategy.history[column], dtype=np.float64)[where]
+            values = np.abs(np.asarray(strategy.history[column], dtype=np.float64)[where])
             x, y = _gapped(s, values, apart)
             keep = thinned(y, LINE_POINTS)
             highest[row - 1] = max(highest[row - 1], float(values.max(initial=0.0)))

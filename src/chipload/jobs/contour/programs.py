@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from chipload.jobs.contour.outcome import ContourResult, Operation
+from chipload.cutter.cutter import Cutter
+from chipload.jobs.contour.outcome import ContourResult
+from chipload.machine.machine import Machine
+from chipload.planning.result import OperationResult
 from chipload.program.apt.writer import write_apt
 from chipload.program.gcode.writer import write_gcode
+from chipload.program.release import Release
 from chipload.report.programs import ENDINGS, program_name
 from chipload.result import Result, release_of
 
@@ -16,17 +20,10 @@ def program_files(outcome: ContourResult, result: Result) -> dict[str, bytes]:
     for k, op in enumerate(outcome.operations):
         for name, strategy in op.result.strategies.items():
             stem = program_name(k, name)
-            title = f"{outcome.title}, operation {k}, {op.result.kind}, {name}"
-            text = write_gcode(
-                strategy.program,
-                outcome.machine,
-                title=title,
-                release=release_of(result, f"{stem}.{ending}"),
-                comments=_comments(outcome, op),
-                number=min(9999, 100 * (k + 1) + list(op.result.strategies).index(name)),
-            )
+            release = release_of(result, f"{stem}.{ending}")
+            text = program_text(outcome.title, outcome.machine, k, op.result, name, op.cutter, op.top, release)
             out[f"{stem}.{ending}"] = text.encode("ascii")
-            release = release_of(result, f"{stem}.apt")
+            release, title = release_of(result, f"{stem}.apt"), _title(outcome.title, k, op.result, name)
             cl = write_apt(strategy.program, {op.cutter.number: op.cutter}, title=title, release=release)
             out[f"{stem}.apt"] = cl.encode("ascii")
         name, text = op.inserted
@@ -40,10 +37,22 @@ def inserted_name(operation: int, name: str) -> str:
     return f"{operation}-semifinish-{name}"
 
 
-def _comments(outcome: ContourResult, op: Operation) -> list[str]:
-    """Comments for the machine operator: the tool, the zero."""
-    c = op.cutter
-    return [
-        f"T{c.number}: D {c.diameter:g} mm, {c.flutes} flutes, overhang {c.overhang:g} mm",
-        f"Z 0 as in the job: top of stock {op.top:g} mm; machine {outcome.machine.name}",
-    ]
+def program_text(
+    title: str, machine: Machine, k: int, result: OperationResult, name: str, c: Cutter, top: float, release: Release
+) -> str:
+    """The text of the program of a strategy of operation ``k``; its lines do not depend on ``release``."""
+    return write_gcode(
+        result.strategies[name].program,
+        machine,
+        title=_title(title, k, result, name),
+        release=release,
+        comments=[
+            f"T{c.number}: D {c.diameter:g} mm, {c.flutes} flutes, overhang {c.overhang:g} mm",
+            f"Z 0 as in the job: top of stock {top:g} mm; machine {machine.name}",
+        ],
+        number=min(9999, 100 * (k + 1) + list(result.strategies).index(name)),
+    )
+
+
+def _title(title: str, k: int, result: OperationResult, name: str) -> str:
+    return f"{title}, operation {k}, {result.kind}, {name}"

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.checking.default_checks import default_limits, ramp_findings, range_findings, unchecked_checks, with_peaks
+from chipload.checking.default_checks import (
+    default_limits,
+    ramp_findings,
+    range_findings,
+    unchecked_checks,
+    with_peaks,
+)
 from chipload.errors import Finding, Severity
-from chipload.jobs.contour.outcome import PLANNED_ERRORS, ContourResult, Operation, PlanVerification
+from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.machine.machine import Machine
 from chipload.planning.result import Event, StrategyResult
 from chipload.report.programs import ENDINGS, program_name
@@ -27,14 +31,10 @@ from chipload.result import (
     error_of,
     in_memory,
 )
-from chipload.result.coverage import ranges_of
+from chipload.simulation.engagement_samples import EngagementSamples
 
-#: error of the engagement where its check states no difference, the tolerance of that check [deg]
-ENGAGEMENT_DEG = 0.05
 #: limits that count only where the wall is made
 ON_WALL = ("engagement_deg", "form_error_um")
-#: columns of the planner that the result does not keep
-DROPPED = ("arcs", "arc_from_rad", "arc_to_rad", "heading_x", "heading_y", "form_error_signed_um")
 SEVERITIES = {Verdict.HOLDS: Severity.NOTE, Verdict.UNPROVEN: Severity.UNPROVEN, Verdict.EXCEEDS: Severity.EXCEEDS}
 
 
@@ -66,36 +66,41 @@ def track_name(outcome: ContourResult, operation: int, strategy: str) -> str:
 def history_of(op: Operation, strategy: StrategyResult) -> dict[str, NDArray[Any]]:
     """Columns (n,) of the history of a strategy, as the result keeps them."""
     columns = dict(strategy.history)
-    if "form_error_signed_um" in columns:
-        columns["form_error_um"] = columns["form_error_signed_um"]
     t = np.asarray(columns["t_s"], dtype=np.float64)
     columns["duration_s"] = np.diff(t, prepend=0.0)
     columns["tool"] = np.full(len(t), op.cutter.number)
     cuts = np.asarray(columns["engagement_deg"]) > 0.0
     columns["axial_overrun_mm"] = np.where(cuts, max(op.depth - op.cutter.flute_length, 0.0), 0.0)
-    return {name: values for name, values in columns.items() if name not in DROPPED}
+    return columns
+
+
+def samples_of(outcome: ContourResult) -> dict[str, EngagementSamples]:
+    """Tooth engagement of some steps of each strategy, by the name of its track."""
+    return {
+        track_name(outcome, k, name): simulated.samples
+        for k, op in enumerate(outcome.operations)
+        for name, simulated in op.simulations.items()
+        if simulated.samples is not None
+    }
 
 
 def limits_of(machine: Machine, op: Operation, strategy: StrategyResult, track: str) -> tuple[LimitCheck, ...]:
-    """Limit checks of a strategy: those of the job, then the default checks.
-
-    The engagement counts with its greatest along each step.
-    """
+    """Limit checks of a strategy: those of the job, then the default checks."""
     columns = history_of(op, strategy)
-    if "engagement_max_deg" in columns:
-        columns["engagement_deg"] = columns["engagement_max_deg"]
+    simulated = op.simulations.get(strategy.name)
+    errors = {} if simulated is None else simulated.resolution_error
     wall = _wall_rows(op, strategy)
     stated = tuple(
         check_limit(
-            name, limit, columns, track=track, rows=wall if name in ON_WALL else None, **_error(op, strategy, name)
+            name, limit, columns, track=track, rows=wall if name in ON_WALL else None,
+            error=error_of(column_of(name).name, errors),
         )
         for name, limit in op.limits.items()
-    )
+    )  # fmt: skip
     if op.checks is not None:
         stated = tuple(with_peaks(check, op.checks, columns) for check in stated)
-    own = () if op.checks is None else default_limits(op.checks, machine, columns, track, PLANNED_ERRORS)
-    kept = takes_time(columns)
-    return tuple(_of_steps(check, kept) for check in (*stated, *own))
+    own = () if op.checks is None else default_limits(op.checks, machine, columns, track, errors)
+    return (*stated, *own)
 
 
 def _wall_rows(op: Operation, strategy: StrategyResult) -> CoveredRows | None:
@@ -108,45 +113,14 @@ def _wall_rows(op: Operation, strategy: StrategyResult) -> CoveredRows | None:
     return CoveredRows(mask, f"{' and '.join(names)} pass", reason)
 
 
-def _error(op: Operation, strategy: StrategyResult, name: str) -> dict[str, float]:
-    """Error of a planned column: of loads relative, of the engagement the difference that its check found."""
-    if name != "engagement_deg":
-        return {"error": error_of(column_of(name).name, PLANNED_ERRORS)}
-    check = op.verifications.get(strategy.name)
-    found = None if check is None else check.numbers.get("engagement_difference_deg")
-    return {"error": 0.0, "absolute": ENGAGEMENT_DEG if found is None else float(found)}
-
-
-def _of_steps(check: LimitCheck, kept: NDArray[np.bool_]) -> LimitCheck:
-    """A check of samples as one of the steps of the history, see :func:`steps_of`."""
-    row = None if check.row is None else int((np.cumsum(kept) - 1)[check.row])
-    covered = check.coverage
-    if covered.ranges is not None:
-        covered = replace(covered, ranges=ranges_of(covered.mask(len(kept))[kept]))
-    return replace(check, row=row, coverage=covered)
-
-
-def steps_of(op: Operation, strategy: StrategyResult) -> dict[str, NDArray[Any]]:
-    """The history of a strategy without the samples at which a pass begins where the one before ends."""
-    columns = history_of(op, strategy)
-    kept = takes_time(columns)
-    return {name: values[kept] for name, values in columns.items()}
-
-
-def takes_time(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
-    """Rows that take time, and the first."""
-    kept = np.asarray(columns["duration_s"]) > 0.0
-    kept[:1] = True
-    return kept
-
-
 def findings_of(op: Operation, name: str) -> tuple[Finding, ...]:
     """Findings of a strategy: events of the planner, the machine, the simulation."""
     strategy = op.result.strategies[name]
     out = [_event(e, op.top - op.depth) for e in strategy.events]
-    out += op.machine_findings.get(name, ())
-    check = op.verifications.get(name)
-    if check is None:
+    simulated, check = op.simulations.get(name), op.verifications.get(name)
+    if simulated is not None:
+        out += simulated.findings
+    if check is None or simulated is None:
         out.append(Finding("not-simulated", 0, "the program was not checked by the simulation", Severity.UNPROVEN))
     elif check.verdict is not Verdict.HOLDS:
         out.append(Finding("simulation", 0, f"simulation: {check.text}", SEVERITIES[check.verdict]))
@@ -167,7 +141,7 @@ def _track(outcome: ContourResult, k: int, op: Operation, name: str) -> Track:
         findings=findings_of(op, name),
         programs=(f"{stem}.{ENDINGS[outcome.machine.dialect]}", f"{stem}.apt", *_inserted(k, op, name)),
         operation=k,
-        blocks=in_memory(steps_of(op, strategy)),
+        blocks=in_memory(history_of(op, strategy)),
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from chipload.checking.default_checks import default_checks
 from chipload.checking.settings import CheckSettings
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named, need_directions, read_material
-from chipload.errors import Finding, InputError, Severity
+from chipload.errors import Finding, InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.jobs.contour.advice import greatest_engagement
 from chipload.jobs.contour.earlier_stock import read_stock, standing_between
@@ -33,14 +34,15 @@ from chipload.jobs.contour.job import ContourJob, left_on_walls
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.jobs.contour.part import read_part, require_within_travel
 from chipload.jobs.contour.tables import OperationTable
+from chipload.jobs.contour.written_operation import WrittenOperation
 from chipload.jobs.tables import value_of
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.contour.plan import Finishing, check_contour, plan_contour
+from chipload.planning.hand import require_hand
 from chipload.planning.pocket.plan import check_pocket, plan_pocket
 from chipload.planning.pocket.request import LINK_LIFT_MM, Clearing, FloorFinish, LargerCutter, WallFinish
 from chipload.planning.pocket.tabs import Tabs
 from chipload.planning.result import OperationResult, StrategyResult
-from chipload.program.check import check_program
 from chipload.progress import Progress, silent
 from chipload.result import Provenance, Verdict
 from chipload.result.provenance import provenance_of, title_of
@@ -114,6 +116,8 @@ def read_inputs(job: ContourJob) -> Inputs:
     else:
         contours, stock, findings = read_part(job)
         require_within_travel(contours, machine, max(job.cutters[op.cutter].radius for op in job.operations))
+    for op in job.operations:
+        require_hand(machine, job.cutters[op.cutter])
     for at, rpm in _speeds(job):
         speed = rad_s_from_rpm(rpm)
         if not machine.spindle_min * (1.0 - 1e-9) <= speed <= machine.spindle_max * (1.0 + 1e-9):
@@ -245,23 +249,21 @@ def _operation(
     op, advice = _resolved(job, inputs, op)
     result = _plan(job, inputs, op, cutter, planned, lambda done, what: progress(0.5 * done, what))
     result = replace(result, findings=(*result.findings, *advice))
-    verifications, machine_findings = {}, {}
-    for k, (name, strategy) in enumerate(result.strategies.items()):
-        start = 0.5 + 0.5 * k / len(result.strategies)
-
-        def part(done: float, what: str, start: float = start) -> None:
-            progress(start + 0.5 * done / len(result.strategies), f"simulation: {what}")
-
-        verifications[name] = verify(strategy, op, cutter, inputs.top, part)
-        machine_findings[name] = tuple(
-            replace(f, severity=Severity.EXCEEDS) for f in check_program(strategy.program, inputs.machine)
-        )
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
     checks = default_checks(value_of(CheckSettings, job.table.checks), {cutter.number: cutter}, inputs.material, 0.5)
-    return Operation(
-        result, settings, cutter, inputs.top, op.depth_mm or op.axial_depth_mm, verifications,
-        machine_findings, job.limits, checks,
-    )  # fmt: skip
+    depth = op.depth_mm or op.axial_depth_mm
+    made = Operation(result, settings, cutter, inputs.top, depth, {}, {}, job.limits, checks)
+    written = WrittenOperation(title_of(job.path), inputs.machine, len(planned), op.milling, op.step_mm)
+    for k, (name, strategy) in enumerate(result.strategies.items()):
+        start, share = 0.5 + 0.5 * k / len(result.strategies), 0.25 / len(result.strategies)
+
+        def part(done: float, what: str, start: float = start, share: float = share) -> None:
+            progress(start + share * done, f"simulation: {what}")
+
+        verification = verify(strategy, op, cutter, inputs.top, part)
+        made = written.with_strategy(made, strategy, partial(part, start=start + share))
+        made = replace(made, verifications={**made.verifications, name: verification})
+    return made
 
 
 def _inserted(inputs: Inputs, operations: Sequence[Operation]) -> tuple[str, str]:

@@ -23,7 +23,7 @@ from chipload.geometry.step_meridian import meridian_of
 from chipload.geometry.step_patch import four_sided, patch_of
 from chipload.geometry.step_side import side_of
 from chipload.jobs.impeller.job import ImpellerJob
-from chipload.jobs.impeller.tables import SectionsTable, ShapeTable, StepTable
+from chipload.jobs.impeller.tables import ImpellerTable, SectionsTable, ShapeTable, StepTable
 from chipload.jobs.tables import stated
 from chipload.planning.impeller.fillets import with_fillets
 from chipload.planning.impeller.impeller import Impeller
@@ -31,6 +31,8 @@ from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.surfaces import BODIES
 
 Floats = NDArray[np.float64]
+#: a hub whose ends differ by less than this share of the radius has no wide end
+SAME_RADIUS = 0.02
 #: faces of one side
 Names = Name | tuple[Name, ...]
 
@@ -59,6 +61,8 @@ def read_part(job: ImpellerJob) -> ImpellerPart:
     """
     part = job.table.impeller
     plain = _without_fillets(job)
+    if part.shape is None:
+        _require_narrow_end_up(plain.impeller.hub, part)
     if part.fillet_mm is None:
         return plain
     made, fillet_lines = with_fillets(plain.impeller, part.fillet_mm)
@@ -67,6 +71,26 @@ def read_part(job: ImpellerJob) -> ImpellerPart:
     left = [" ".join(name) for name in names if name not in milled]
     not_milled = (f"not milled: no [[surface]] names it: {', '.join(left)}",) if left else ()
     return ImpellerPart(made, (*plain.faces, *fillet_lines, *not_milled))
+
+
+def _require_narrow_end_up(hub: Revolved, part: ImpellerTable) -> None:
+    """Refuse a part whose hub widens upwards: the stated flow contradicts the geometry, and no cutter from above would
+    reach between the blades.
+    """
+    ends = hub.meridian[[int(hub.meridian[:, 1].argmin()), int(hub.meridian[:, 1].argmax())]]
+    (low, _), (high, _) = ends.tolist()
+    if high <= (1.0 + SAME_RADIUS) * low:
+        return
+    key, value, other = "impeller.sections.flow_along_x", "true", "false"
+    if part.step is not None:
+        key, value = "impeller.step.flow", str(part.step.flow)
+        other = ("-" if value.startswith("+") else "+") + value[1:]
+    elif not stated(part.sections, "impeller.sections").flow_along_x:
+        value, other = other, value
+    raise InputError(
+        f"{key} = {value}: the hub would be {high:.4g} mm in radius at its upper end, {low:.4g} mm at the table: the "
+        f"part is milled with the narrow end of its hub upwards: state {other}"
+    )
 
 
 def _without_fillets(job: ImpellerJob) -> ImpellerPart:

@@ -56,7 +56,7 @@ class ProgramRows:
     def poses(self, cutter: Cutter, feed_per_tooth: float) -> tuple[CutterPose, ...]:
         """Poses of the cutter along the rows."""
         return tuple(
-            CutterPose(cutter, feed_per_tooth, (sign or 1) * self.step_over, lead, tilt)
+            CutterPose(cutter, feed_per_tooth, (sign or 1) * self.step_over, lead, tilt, clockwise=not cutter.left_hand)
             for sign, lead, tilt in self.stands
         )
 

@@ -26,6 +26,7 @@ from chipload.jobs.thinwall.outcome import (
 )
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.places import places_of, wall_stock
+from chipload.jobs.thinwall.program_text import with_texts_read_back
 from chipload.jobs.thinwall.proof import resolution_of
 from chipload.jobs.thinwall.tries import Tried, compared_variants, constant_within, unlimited_plan, variable_within
 from chipload.jobs.thinwall.wall_operation import WallOperation
@@ -96,7 +97,7 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
     if job.table.dynamics is not None:
         settings["dynamics"] = job.table.dynamics.model_dump()
     cutters = {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
-    return ThinWallResult(
+    walled = ThinWallResult(
         title=title_of(job.path),
         geometry=WallGeometry(
             shape=inputs.body.shape,
@@ -119,6 +120,7 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
         checks=default_checks(value_of(CheckSettings, job.table.checks), cutters, inputs.cut.material, 0.5),
         provenance=provenance,
     )
+    return with_texts_read_back(walled)
 
 
 def _planned_operation(one: WallOperation) -> PlannedOperation:

@@ -17,6 +17,7 @@ from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.program_rows import ProgramRows
 from chipload.jobs.thinwall.tables import WallOperationTable, WallTable
 from chipload.machine.machine import Machine
+from chipload.planning.hand import clockwise_milling, require_hand
 from chipload.planning.thinwall.depth import DepthRange, Measure
 from chipload.planning.thinwall.end_stock import EndPose
 from chipload.planning.thinwall.flank_stock import FlankPose, Pose
@@ -103,6 +104,7 @@ def wall_operation(
     """
     op = job.table.operation[number]
     cutter = job.cutters[op.cutter]
+    require_hand(machine, cutter)
     feed, spindle = mm_s_from_mm_min(op.feed_mm_min), rad_s_from_rpm(op.speed_rpm)
     feed_per_tooth = feed * math.tau / (spindle * cutter.flutes)
     poses: tuple[Pose, ...] = (
@@ -149,16 +151,18 @@ def wall_operation(
 
 def _planned_poses(op: WallOperationTable, number: int, cutter: Cutter, feed_per_tooth: float) -> tuple[Pose, ...]:
     """How the cutter stands along planned rows."""
+    right = clockwise_milling(stated(op.milling, f"operation.{number}.milling"), cutter) == "down"
+    clockwise = not cutter.left_hand
     if op.contact == "flank":
         deep = stated(op.axial_depth_mm, f"operation.{number}.axial_depth_mm")
-        return (FlankPose(cutter, feed_per_tooth, deep if op.milling == "down" else -deep),)
+        return (FlankPose(cutter, feed_per_tooth, deep if right else -deep, clockwise),)
     if op.contact == "end":
         across = stated(op.step_over_mm, f"operation.{number}.step_over_mm")
-        return (EndPose(cutter, feed_per_tooth, -across if op.milling == "down" else across),)
+        return (EndPose(cutter, feed_per_tooth, -across if right else across, clockwise),)
     lean, lead = (stated(getattr(op, key), f"operation.{number}.{key}") for key in ("lean_deg", "lead_deg"))
-    step = _step_over(op, number, cutter) * (-1.0 if op.milling == "down" else 1.0)
+    step = _step_over(op, number, cutter) * (-1.0 if right else 1.0)
     tilt = -math.copysign(math.radians(lean), step)
-    return (CutterPose(cutter, feed_per_tooth, step, math.radians(lead), tilt),)
+    return (CutterPose(cutter, feed_per_tooth, step, math.radians(lead), tilt, clockwise),)
 
 
 def _check_foot(job: ThinWallJob, below: float) -> None:

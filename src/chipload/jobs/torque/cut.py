@@ -23,6 +23,7 @@ from chipload.jobs.tables import stated
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable
 from chipload.machine.machine import Machine
+from chipload.planning.hand import clockwise_milling, require_hand, signed_speed
 from chipload.program.build import helix, plunge, rapid
 from chipload.program.program import RAPID, Program
 from chipload.program.read import ProgramReading, read_program
@@ -141,7 +142,9 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
     """
     if job.program_file is None:
         round_table = stated(job.table.round, "round")
-        program = round_program(round_table, Place(job.shell), job.cutters[round_table.cutter])
+        cutter = job.cutters[round_table.cutter]
+        require_hand(machine, cutter)
+        program = round_program(round_table, Place(job.shell), cutter)
     else:
         program = with_tool(read_file(job, job.program_file, machine, progress).program, job.cutters)
     if np.abs(program.axis - (0.0, 0.0, 1.0)).max() > 1e-9:
@@ -185,10 +188,10 @@ def read_file(job: TorqueJob, file: Path, machine: Machine, progress: Progress =
 
 def round_program(table: RoundTable, place: Place, cutter: Cutter) -> Program:
     """Straight to the wall, down it in a helix, one full turn at the bottom, straight away."""
-    spindle, tool = rad_s_from_rpm(table.speed_rpm), cutter.number
+    spindle, tool = signed_speed(rad_s_from_rpm(table.speed_rpm), cutter), cutter.number
     feed = mm_s_from_mm_min(table.feed_mm_min)
-    # down milling has the wall on the right of travel: clockwise round it
-    sense = -1 if table.milling == "down" else 1
+    # with the wall on the right of travel: clockwise round it
+    sense = -1 if clockwise_milling(table.milling, cutter) == "down" else 1
     corner = float(cutter.radius_at(cutter.apt[3]))
 
     def radius(z: float) -> float:
@@ -225,7 +228,8 @@ def round_program(table: RoundTable, place: Place, cutter: Cutter) -> Program:
         plunge([*away, low], feed, spindle, tool, "lead"),
         rapid([*away, clear], spindle, tool, "link"),
     ]
-    return Program.join(parts)
+    program = Program.join(parts)
+    return replace(program, line=np.arange(1, len(program) + 1))
 
 
 def shell_stock(

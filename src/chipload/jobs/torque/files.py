@@ -17,10 +17,11 @@ from chipload.control.hal_file import write_hal
 from chipload.control.linuxcnc.path import write_path
 from chipload.control.override import Override
 from chipload.jobs.torque.outcome import TorqueResult
+from chipload.machine.machine import Machine
 from chipload.program.gcode.writer import write_commands, write_gcode
 from chipload.program.motions import is_arc
 from chipload.program.program import DWELL, RAPID, Program
-from chipload.program.release import NOT_SIMULATED
+from chipload.program.release import NOT_SIMULATED, Release
 from chipload.program.to_axes import to_axes
 from chipload.report.programs import ENDINGS
 from chipload.result import Result, release_of
@@ -43,12 +44,9 @@ CONTROLLER_FILES = (PATH, TABLE, HAL)
 def program_files(outcome: TorqueResult, result: Result) -> dict[str, bytes]:
     """All files by name."""
     machine, ending = outcome.job.machine, ENDINGS[outcome.job.machine.dialect]
-    commands, _ = to_axes(outcome.job.program, machine)
-    takes = [(0, "M52 P1")] if machine.dialect == "linuxcnc" else []
-    title = f"{outcome.job.title}, programmed feeds, to be run with chipload hal"
-    name = f"0-override.{ending}"
+    name = override_file(machine)
     release = replace(release_of(result, name), condition="with chipload hal")
-    text = write_commands(commands, machine, title=title, release=release, words=takes)
+    text = override_text(outcome.job.title, outcome.job.program, machine, release)
     out = {name: text.encode("ascii")}
     if not outcome.attainable or outcome.control.controller is None:
         return out
@@ -66,6 +64,19 @@ def program_files(outcome: TorqueResult, result: Result) -> dict[str, bytes]:
     out[TABLE] = write_fuzzy(outcome.control.table).encode("ascii")
     out[HAL] = write_hal(job, PATH, TABLE).encode("ascii")
     return out
+
+
+def override_file(machine: Machine) -> str:
+    """Name of the file of the program that takes the override."""
+    return f"0-override.{ENDINGS[machine.dialect]}"
+
+
+def override_text(title: str, program: Program, machine: Machine, release: Release) -> str:
+    """The text of the program with the programmed feeds; its lines do not depend on ``release``."""
+    commands, _ = to_axes(program, machine)
+    takes = [(0, "M52 P1")] if machine.dialect == "linuxcnc" else []
+    title = f"{title}, programmed feeds, to be run with chipload hal"
+    return write_commands(commands, machine, title=title, release=release, words=takes)
 
 
 def planned_override(outcome: TorqueResult, config: Override) -> Floats:

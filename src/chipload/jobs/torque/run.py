@@ -27,6 +27,7 @@ from chipload.jobs.tables import value_of
 from chipload.jobs.torque.allowable import allowable, wall_of
 from chipload.jobs.torque.controllers import cases_of, controller_of, shortest
 from chipload.jobs.torque.cut import CutSteps, program_of, read_file, require_linear, resolution_of
+from chipload.jobs.torque.files import override_file, override_text
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.outcome import (
     HELD,
@@ -45,6 +46,8 @@ from chipload.jobs.torque.workpiece_cut import allowable_on_workpiece, real_stoc
 from chipload.jobs.torque.workpiece_limit import allowable_torque, clamped_workpiece, preview_on_workpiece
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.program import Program
+from chipload.program.read_back import text_findings
+from chipload.program.release import NOT_SIMULATED
 from chipload.progress import Progress, part_of, silent
 from chipload.report.presentation import Blank
 from chipload.result import Provenance
@@ -108,6 +111,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
             *own.planned.removal.findings,
             *(own.real.removal.findings if own.real is not own.planned else ()),
             *_of_program(job, program, machine, own.real),
+            *_text_findings(job, program, machine),
         ),
         resolution_error=own.real.removal.resolution_error,
         energy_balance={name: energy_balance(cut.removal.columns, material.Ktc) for name, cut in both},
@@ -123,6 +127,12 @@ def _of_program(job: TorqueJob, program: Program, machine: Machine, real: CutSte
         around = replace(around, stops=reading.stops, retractions=reading.retractions, text=reading.program)
     steps = StepBlocks(program, fine.step_mm, fine.tolerance)
     return program_findings(program, steps, real.removal.columns, job.cutters, around)
+
+
+def _text_findings(job: TorqueJob, program: Program, machine: Machine) -> tuple[Finding, ...]:
+    """Findings of the text that takes the override, read back and compared with the simulated program."""
+    text = override_text(title_of(job.path), program, machine, NOT_SIMULATED)
+    return text_findings(text, override_file(machine), machine, job.cutters, program)
 
 
 def _real_stock(job: TorqueJob, program: Program) -> LayeredStock:

@@ -44,6 +44,7 @@ from chipload.planning.contour.sampled import SampledPass, mirrored_pass, sample
 from chipload.planning.contour.schedule import LEAST_SHARE, straight_force
 from chipload.planning.contour.totals import cleared_percent, counts, elapsed
 from chipload.planning.cost import CutConditions, cost, stacked
+from chipload.planning.hand import clockwise_milling, engagement_of_hand, signed_speed
 from chipload.planning.link_rows import row_ends, with_links
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
 from chipload.program.motions import lengths
@@ -135,7 +136,7 @@ class _Job:
 
     @property
     def flip(self) -> bool:
-        return self.setting.milling == "up"
+        return clockwise_milling(self.setting.milling, self.cut.cutter) == "up"
 
 
 def plan_contour(
@@ -200,7 +201,8 @@ def _prepared(
     radius = cutter.radius
     a = setting.engagement(radius)
     cut = CutConditions(cutter, material, setting.axial_depth, setting.spindle_speed, setting.milling, *setting.rigid)
-    walls = walls_of(contours, setting.side, setting.milling, run_on_length(radius, setting.lead, setting.passes))
+    milling = clockwise_milling(setting.milling, cutter)
+    walls = walls_of(contours, setting.side, milling, run_on_length(radius, setting.lead, setting.passes))
     if setting.strategies == ("forward",):
         return _Job(setting, cut, machine, limits, walls, (), 0.0, ())
     finish = tuple(start_at_widest(p) for p in centre_paths(walls, radius, setting.tolerance))
@@ -296,6 +298,7 @@ def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> tuple[Strategy
     clocks: list[tuple[SampledPass, Speeds]] = []
     for run in runs:
         steps = sampled(run, job.radius, setting.step)
+        steps = replace(steps, engagement=engagement_of_hand(steps.engagement, job.cut.cutter))
         regulated = wanted if name == "feed" and run.name == "finish" else None
         speed = speeds(steps, programmed_feeds(steps, job.cut, setting.feed, job.machine, regulated), job.machine)
         makes_wall = (steps.zone == run.name) | (steps.zone == "closing")
@@ -306,7 +309,15 @@ def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> tuple[Strategy
         histories.append(with_links(own, safe_z))
         clocks.append((steps, speed))
         programs.append(
-            pass_program(run, steps, speed.programmed, z, safe_z, setting.spindle_speed, job.cut.cutter.number)
+            pass_program(
+                run,
+                steps,
+                speed.programmed,
+                z,
+                safe_z,
+                signed_speed(setting.spindle_speed, job.cut.cutter),
+                job.cut.cutter.number,
+            )
         )
     program = Program.join(programs)
     history = {**stacked(histories), "t_s": _pass_times(programs, clocks, row_ends(program, job.machine))}

@@ -21,6 +21,7 @@ from chipload.geometry.distance import distance
 from chipload.geometry.offset import offset_region
 from chipload.machine.machine import Machine
 from chipload.planning.cost import CutConditions, cost
+from chipload.planning.hand import clockwise_milling, engagement_of_hand, signed_speed
 from chipload.planning.link_rows import row_ends, with_last_link
 from chipload.planning.pocket.clearing import require_clearing
 from chipload.planning.pocket.clearing_path import CUT, ENTRY, LIFT
@@ -99,7 +100,7 @@ def _strategy(
     """One strategy with its program and its totals."""
     radius = cutter.radius
     sections = sections_of(task, setting)
-    stages = stages_of(sections, setting, radius, name, lambda done, what: progress(0.9 * done, what))
+    stages = stages_of(sections, setting, cutter, name, lambda done, what: progress(0.9 * done, what))
     history, program, whole, motions = _history(stages, setting, cutter, material, machine)
     on_front = np.isin(history["pass"], [stage.name for stage in stages])
     reaches = [_reach(section.task, setting, radius) for section in sections]
@@ -143,7 +144,12 @@ def _history(
     slope = HELIX if cutter.ramp_angle is None else min(HELIX, cutter.ramp_angle)
     each = [[motions_of(stage.path, h, stage.feed, link_feed, slope) for h in stage.heights] for stage in stages]
     parts = [
-        [programs_of(m, stage.feed, stage.depth, stage.spindle_speed, cutter.number, stage.name) for m in levels]
+        [
+            programs_of(
+                m, stage.feed, stage.depth, signed_speed(stage.spindle_speed, cutter), cutter.number, stage.name
+            )
+            for m in levels
+        ]
         for stage, levels in zip(stages, each, strict=True)
     ]
     program = Program.join([p for levels in parts for runs in levels for p in runs])
@@ -179,6 +185,7 @@ def _columns(
     """Columns of one level of a stage, and the time within its runs [s]."""
     radius, task = cutter.radius, stage.task
     met, most = replayed(motions, samples, radius, task.free, stage.before)
+    met = engagement_of_hand(met, cutter)
     length, speed, own = speeds(motions, samples, machine)
     kind = motions.kind[samples.motion]
     zone = np.array([{**ZONES, CUT: stage.name}[int(k)] for k in kind], dtype=object)
@@ -241,7 +248,12 @@ def check_pocket(contours: Sequence[Contour], setting: Clearing, cutter: Cutter)
     require_finish(setting)
     for section in sections_of(task, setting):
         require_clearing(
-            section.task.region, cutter.radius, task.engagement, setting.milling, task.step, setting.allowance
+            section.task.region,
+            cutter.radius,
+            task.engagement,
+            clockwise_milling(setting.milling, cutter),
+            task.step,
+            setting.allowance,
         )
     return task.region.area
 

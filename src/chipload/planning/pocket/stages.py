@@ -12,7 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
+from chipload.planning.hand import clockwise_milling
 from chipload.planning.pocket.clearing import clear_region
 from chipload.planning.pocket.clearing_path import ClearingPath, EarlierPath
 from chipload.planning.pocket.motions import Heights
@@ -129,7 +131,7 @@ def sections_of(task: ClearingTask, setting: Clearing) -> list[PocketSection]:
 
 
 def stages_of(
-    sections: Sequence[PocketSection], setting: Clearing, radius: float, strategy: str, progress: Progress
+    sections: Sequence[PocketSection], setting: Clearing, cutter: Cutter, strategy: str, progress: Progress
 ) -> list[PocketStage]:
     """The stages of a pocket in their order, with their paths; ``strategy`` is that of the clearing."""
     out = []
@@ -138,22 +140,22 @@ def stages_of(
         def part(done: float, what: str, start: int = k) -> None:
             progress((start + done) / len(sections), what)
 
-        out += _stages(k, section, setting, radius, strategy, part)
+        out += _stages(k, section, setting, cutter, strategy, part)
     return out
 
 
 def _stages(
-    number: int, section: PocketSection, setting: Clearing, radius: float, strategy: str, progress: Progress
+    number: int, section: PocketSection, setting: Clearing, cutter: Cutter, strategy: str, progress: Progress
 ) -> list[PocketStage]:
     """The stages of one section."""
-    task = section.task
+    task, radius = section.task, cutter.radius
 
     def path_of(allowance: float, earlier: EarlierPath | None, share: tuple[float, float]) -> ClearingPath:
         return clear_region(
             task.region,
             radius,
             task.engagement,
-            milling=setting.milling,
+            milling=clockwise_milling(setting.milling, cutter),
             step=task.step,
             allowance=allowance,
             free=task.free,

@@ -1,0 +1,176 @@
+"""Comparison of a written program text with the program that was simulated: the text is read as a controller reads it.
+
+Notation: a row of the planned program is found in the text where the tip, its axis, the tool and the spindle are those
+at its end. Rows that round to nothing may be missing from the text; further rows may lie between two that are found (a
+motion of rotary axes is written in pieces), if they stay near the straight line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.errors import Finding, InputError, Severity
+from chipload.machine.machine import Machine
+from chipload.program.gcode.tools import Tool, ToolTable
+from chipload.program.motions import is_arc
+from chipload.program.program import RAPID, Program
+from chipload.program.read import ProgramReading, read_program
+
+Floats = NDArray[np.float64]
+
+#: a place is found within so many units of the last written decimal, and within this [mm] where an axis turns
+UNITS, TURNED_MM = 4.0, 0.02
+#: directions of the axis agree within this [rad]
+AXIS_RAD = 1e-3
+#: speeds of the spindle agree within this share
+SPEED_SHARE = 1e-3
+#: rows of the text among which the end of a planned row is sought
+AHEAD = 400
+#: tool lengths along A B C U V W
+NO_OFFSET = (0.0,) * 6
+
+
+def read_back(
+    text: str, name: str, machine: Machine, cutters: Mapping[int, Cutter], *, lengths: bool = False
+) -> ProgramReading:
+    """Read a written text as the controller of a machine reads it.
+
+    Parameters
+    ----------
+    name : of its file
+    cutters : by tool number
+    lengths : whether the tools are as long in the tool table as their overhang; else they have no length
+
+    Raises
+    ------
+    InputError
+        The text cannot be read.
+    """
+    table = ToolTable(
+        {
+            n: Tool(n, diameter=c.diameter, offset=(0.0, 0.0, c.overhang if lengths else 0.0, *NO_OFFSET))
+            for n, c in cutters.items()
+        }
+    )
+    return read_program(Path(name), machine, text=text, tools=table, comments=False, strict=True)
+
+
+def text_findings(
+    text: str, name: str, machine: Machine, cutters: Mapping[int, Cutter], planned: Program, *, lengths: bool = False
+) -> tuple[Finding, ...]:
+    """Return the findings of a written text that keep it from being released.
+
+    They are what its reader finds that is more than a note, violations of the machine's limits, cuts with the spindle
+    turning against the hand of the cutter, and the first place that differs from the ``planned`` program, which was
+    simulated. For ``name``, ``cutters`` and ``lengths`` see :func:`read_back`.
+    """
+    try:
+        reading = read_back(text, name, machine, cutters, lengths=lengths)
+    except InputError as err:
+        return (Finding("text-unread", 0, f"the written text cannot be read back: {err}", Severity.EXCEEDS),)
+    return (
+        *(f for f in reading.findings if f.severity > Severity.NOTE),
+        *(replace(f, severity=Severity.EXCEEDS) for f in reading.violations if f.code != "machine-offset"),
+        *_against_hand(reading, cutters),
+        *text_differences(planned, reading),
+    )
+
+
+def _against_hand(reading: ProgramReading, cutters: Mapping[int, Cutter]) -> tuple[Finding, ...]:
+    """The first feed motion of each tool that turns against its hand."""
+    p, out = reading.program, list[Finding]()
+    for number in np.unique(p.tool).tolist():
+        if number not in cutters:
+            continue
+        hand = -1.0 if cutters[number].left_hand else 1.0
+        wrong = np.flatnonzero((p.tool == number) & (p.motion != RAPID) & (hand * p.spindle < 0.0))
+        if len(wrong):
+            side, word = ("left", "M4") if hand < 0.0 else ("right", "M3")
+            text = f"tool {number} is a {side}-hand cutter and is not started by {word}"
+            out.append(Finding("spindle-reversed", int(p.line[wrong[0]]), text, Severity.EXCEEDS))
+    return tuple(out)
+
+
+def text_differences(planned: Program, reading: ProgramReading) -> tuple[Finding, ...]:
+    """Return a finding for the first place where a text differs from the program that was simulated; none: it agrees.
+
+    Parameters
+    ----------
+    planned : the program that was simulated
+    reading : of the text that was written from it
+    """
+    read = reading.program
+    turned = bool(np.abs(np.diff(planned.axis, axis=0)).max(initial=0.0) > 0.0)
+    near = UNITS * 10.0**-reading.machine.decimals + (TURNED_MM if turned else 0.0)
+    last, row = -1, -1
+    for k in range(len(planned)):
+        place = planned.p_work[k]
+        if row >= 0 and np.abs(place - planned.p_work[row]).max() <= near and _alike(planned, k, planned, row):
+            continue
+        found = _next(read, last, planned, k, near)
+        if found is None:
+            line = int(read.line[min(last + 1, len(read) - 1)])
+            return (_finding(line, k, place, read, last),)
+        off = _away(read, last, found, planned, k) if row >= 0 else 0.0
+        if off > near:
+            text = f"the written text leaves the simulated path by {off:.4g} mm"
+            return (Finding("text-differs", int(read.line[found]), text, Severity.EXCEEDS, _place(place), k),)
+        last, row = found, k
+    rest = np.abs(read.p_work[last + 1 :] - read.p_work[last]).max(initial=0.0)
+    if rest > near:
+        text = f"the written text goes on for {rest:.4g} mm after the end of the simulated program"
+        return (Finding("text-differs", int(read.line[last + 1]), text, Severity.EXCEEDS),)
+    return ()
+
+
+def _alike(a: Program, i: int, b: Program, j: int) -> bool:
+    """Whether two rows have the same tool and spindle, are both rapids or neither, and end with the same axis."""
+    same = int(a.tool[i]) == int(b.tool[j]) and (int(a.motion[i]) == RAPID) == (int(b.motion[j]) == RAPID)
+    speed = abs(float(a.spindle[i]) - float(b.spindle[j])) <= SPEED_SHARE * abs(float(a.spindle[i]))
+    return same and speed and float(np.linalg.norm(a.axis[i] - b.axis[j])) <= AXIS_RAD
+
+
+def _next(read: Program, last: int, planned: Program, k: int, near: float) -> int | None:
+    """The next row of the text that ends where row k of the plan does; None: none does."""
+    first = last + 1
+    close = first < len(read) and bool(np.abs(read.p_work[first] - planned.p_work[k]).max() <= near)
+    if close and _alike(planned, k, read, first):
+        return first
+    after = read.p_work[last + 1 : last + 1 + AHEAD]
+    for at in np.flatnonzero(np.abs(after - planned.p_work[k]).max(axis=1) <= near).tolist():
+        if _alike(planned, k, read, last + 1 + at):
+            return last + 1 + int(at)
+    return None
+
+
+def _away(read: Program, last: int, found: int, planned: Program, k: int) -> float:
+    """How far rows of the text between two places lie off the line between them [mm]; 0 beside an arc."""
+    between = read.p_work[last + 1 : found]
+    if not len(between) or is_arc(planned)[k]:
+        return 0.0
+    a, b = read.p_work[last], read.p_work[found]
+    along = b - a
+    size = float(along @ along)
+    share = np.clip((between - a) @ along / size, 0.0, 1.0) if size > 0.0 else np.zeros(len(between))
+    return float(np.linalg.norm(between - a - share[:, None] * along, axis=1).max())
+
+
+def _finding(line: int, k: int, place: Floats, read: Program, last: int) -> Finding:
+    at = ", ".join(f"{x:.6g}" for x in place)
+    close = np.flatnonzero(np.linalg.norm(read.p_work[last + 1 : last + 1 + AHEAD] - place, axis=1) <= 0.05)
+    what = (
+        "with another tool, spindle, axis or kind of motion"
+        if len(close)
+        else "nowhere: the simulated program goes there"
+    )
+    return Finding("text-differs", line, f"the written text reaches ({at}) {what}", Severity.EXCEEDS, _place(place), k)
+
+
+def _place(place: Floats) -> tuple[float, float, float]:
+    return float(place[0]), float(place[1]), float(place[2])
