@@ -28,7 +28,7 @@ def made(*limits, findings=(), own=()):
 def test_a_rapid_through_a_guessed_stock_is_unproven_and_comes_first():
     result = with_guesses(made(HOLDS, findings=(RAPID,)), GUESSES, Severity.UNPROVEN)
     assert (result.verdict, result.verdict.exit_code) == (Verdict.UNPROVEN, 3)
-    assert result.message.startswith("Unproven: line 18 would be a rapid through the guessed stock; and 3 more.")
+    assert result.message.startswith("Unproven: line 18 would be a rapid through the guessed stock; and 1 more. ")
     assert "xceeds" not in result.message
 
 
@@ -39,6 +39,14 @@ def test_a_load_with_a_guessed_material_neither_holds_nor_exceeds(check, would):
         (Verdict.UNPROVEN, f"{would} with the guessed material and stock")
     ]
     assert result.limits[0].worst == check.worst
+
+
+def test_limits_that_hold_but_for_guesses_are_one_reason():
+    result = with_guesses(made(HOLDS), GUESSES, Severity.UNPROVEN)
+    assert result.message == (
+        "Unproven: 2 values of the job are guesses. Critical limit: force 812 of 900 N, margin 9.78 %, unproven: it "
+        "holds with the guessed material and stock."
+    )
 
 
 def test_what_does_not_rest_on_the_guess_stays():

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from chipload.errors import Finding, Severity
 from chipload.result import LimitCheck, Result, Track, Verdict
-from chipload.result.first_lines import GUESS
+from chipload.result.first_lines import GUESS, HELD_BY_GUESS
 
 #: tables that decide where material is, and how much a tooth takes
 PLACE, LOAD = ("stock", "cutter", "program", "part", "fixture"), ("cutter", "material", "stock", "program", "workpiece")
@@ -62,8 +62,8 @@ def _of_limit(check: LimitCheck, tables: Collection[str]) -> LimitCheck:
     own = _guessed((*LOAD, *LIMITS.get(check.name, ()), "limits"), tables)
     if check.state is Verdict.UNPROVEN or not own:
         return check
-    would = "it would exceed the limit" if check.state is Verdict.EXCEEDS else "it holds"
-    return replace(check, state=Verdict.UNPROVEN, reason=f"{would} with the guessed {own}")
+    would = "it would exceed the limit with the guessed" if check.state is Verdict.EXCEEDS else HELD_BY_GUESS
+    return replace(check, state=Verdict.UNPROVEN, reason=f"{would} {own}")
 
 
 def _of_finding(f: Finding, tables: Collection[str]) -> Finding:

@@ -13,6 +13,8 @@ from chipload.result.verdict import Verdict
 
 #: code of the finding that states a guess of a draft
 GUESS = "job-guess"
+#: begins the reason of a limit that holds with guessed values
+HELD_BY_GUESS = "it holds with the guessed"
 #: names of things that are not checked which the first lines list
 LISTED = 8
 
@@ -83,30 +85,37 @@ def guesses_line(findings: Iterable[Finding]) -> str:
 
 
 def _texts(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Track]) -> Iterator[str]:
-    """Yield each finding and limit of a state: findings, limits with the least margin first, then guesses."""
-    guesses = [located(f) for f in findings if f.code == GUESS and Verdict.of_finding(f) is verdict]
+    """Yield each finding and limit of a state: findings, limits with the least margin first, then the guesses.
+
+    A limit that holds but for a guess stands for nothing of its own.
+    """
+    guesses = 0
     for f in findings:
-        if Verdict.of_finding(f) is verdict and f.code != GUESS:
-            yield located(f)
+        if Verdict.of_finding(f) is verdict:
+            guesses += f.code == GUESS
+            if f.code != GUESS:
+                yield located(f)
     for track in tracks:
         of = _of(track, tracks)
         for f in track.findings:
             if Verdict.of_finding(f) is verdict:
                 yield of + located(f)
-        own = [check for check in track.limits if check.state is verdict]
+        own = [c for c in track.limits if c.state is verdict and not (guesses and c.reason.startswith(HELD_BY_GUESS))]
         for check in sorted(own, key=lambda c: 0.0 if c.margin is None else c.margin):
             beyond = verdict is Verdict.EXCEEDS and check.margin_text
             yield f"{of}{check.text}, {check.margin_text}" if beyond else of + check.text
-    yield from guesses
+    if guesses:
+        yield f"{guesses} values of the job are guesses" if guesses > 1 else "1 value of the job is a guess"
 
 
 def _critical_text(of: str, check: LimitCheck) -> str:
     """A limit with its margin, its line and its place."""
     if check.state is Verdict.EXCEEDS:
         return f"{of}{check.text}, {check.margin_text}"
-    where = f", {check.where}" if check.where and check.state is Verdict.HOLDS else ""
-    margin = f", {check.margin_text}" if check.margin is not None and check.margin >= 0.0 else ""
-    return f"{of}{check.text}{margin}{where}"
+    parts = [check.value_text, check.margin_text if (check.margin or 0.0) >= 0.0 else "", check.where]
+    if check.state is Verdict.UNPROVEN:
+        parts.append(f"unproven: {check.reason}")
+    return of + ", ".join(filter(None, parts))
 
 
 def located(finding: Finding) -> str:

@@ -151,24 +151,33 @@ class LimitCheck:
         >>> LimitCheck("torque_nm", 3.0, 2.9, Verdict.UNPROVEN, line=7, reason="coarse").text
         'torque 2.9 of 3 N m in line 7, unproven: coarse'
         """
-        unit = f" {self.column.unit}" if self.column.unit else ""
-        label, limit = self.column.label, number_text(self.limit, 6)
-        least = self.column.least
         if self.worst is None:
-            bound = "at least" if least else "at most"
-            return f"{label} of {bound} {limit}{unit} is unknown: {self.reason}"
-        worst = number_text(self.worst)
+            bound = "at least" if self.column.least else "at most"
+            return f"{self.column.label} of {bound} {number_text(self.limit, 6)}{self._unit} is unknown: {self.reason}"
         if self.state is Verdict.EXCEEDS:
-            beyond = "is below" if least else "exceeds"
-            return f"{label} {worst}{unit} {beyond} {limit}{unit} {self.where}".rstrip()
-        text = f"{label} {worst} of {'at least ' if least else ''}{limit}{unit}"
+            beyond = "is below" if self.column.least else "exceeds"
+            worst, limit = number_text(self.worst), number_text(self.limit, 6)
+            return f"{self.column.label} {worst}{self._unit} {beyond} {limit}{self._unit} {self.where}".rstrip()
+        if self.state is Verdict.UNPROVEN:
+            return f"{self.value_text} {self.where}".rstrip() + f", unproven: {self.reason}"
+        return self.value_text
+
+    @property
+    def value_text(self) -> str:
+        """The worst value and the limit, without state and place."""
+        label, limit = self.column.label, f"{number_text(self.limit, 6)}{self._unit}"
+        if self.worst is None:
+            return f"{label} of {limit}"
+        text = f"{label} {number_text(self.worst)} of {'at least ' if self.column.least else ''}{limit}"
         if self.worst == self.limit == 0.0:
             text = f"no {label}"
-        elif self.margin is not None and self.margin < -FAR_BEYOND:
-            text = f"{label} far beyond {limit}{unit}"
-        if self.state is not Verdict.HOLDS:
-            return f"{text} {self.where}".rstrip() + f", unproven: {self.reason}"
-        return text if self.coverage.whole else f"{text} in the {self.coverage.name}"
+        elif self.state is Verdict.UNPROVEN and self.margin is not None and self.margin < -FAR_BEYOND:
+            text = f"{label} far beyond {limit}"
+        return text if self.coverage.whole or self.state is not Verdict.HOLDS else f"{text} in the {self.coverage.name}"
+
+    @property
+    def _unit(self) -> str:
+        return f" {self.column.unit}" if self.column.unit else ""
 
 
 def state_of(
