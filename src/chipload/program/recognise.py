@@ -16,6 +16,8 @@ from chipload.program.control import CONTROLS, Control, control_named
 #: a difference of scores below this is none
 MARGIN = 3
 DECISIVE, HINT, OF_MACHINE = 3, 1, 2
+#: endings that are named after a language (RS274/NGC)
+ENDINGS = {".ngc": "linuxcnc"}
 #: characters of a text that are searched
 SEARCHED = 200_000
 #: patterns that are named in a reason
@@ -93,10 +95,12 @@ def _shown(found: str) -> str:
     return repr(" ".join(found.split())[:24])
 
 
-def recognise(text: str, machine: str) -> Recognition:
+def recognise(text: str, machine: str, ending: str = "") -> Recognition:
     """The control of a text; where nothing contradicts it, that of the machine, whose name is ``machine``."""
-    found = scores(text)
-    points = {name: score + OF_MACHINE * (name == machine) for name, (score, _) in found.items()}
+    found, named = scores(text), ENDINGS.get(ending)
+    points = {
+        name: score + OF_MACHINE * (name == machine) + DECISIVE * (name == named) for name, (score, _) in found.items()
+    }
     order = sorted(points, key=lambda name: -points[name])
     best, second = order[:2]
     if points[machine] == points[best]:

@@ -192,8 +192,6 @@ def test_shifted_and_turned_coordinates():
 @pytest.mark.parametrize(
     ("on", "off"),
     [
-        ("MIRROR X0", "MIRROR"),
-        ("SCALE X2 Y2", "SCALE"),
         ("ROT X30", "ROT"),
         ('CYCLE800(1,"TC1",100000,57,0,0,0,0,30,0,0,0,0,1,0)', "CYCLE800()"),
     ],

@@ -56,5 +56,5 @@ def test_what_does_not_is_not(block: str) -> None:
 
 def test_the_end_of_coordinates_along_the_tool_is_read() -> None:
     assert read("TOROT\nTOROTOF")[0] == 0
-    # it ends no mirroring
-    assert read("MIRROR X0\nTOROTOF")[0] == -3
+    # it ends no tilted coordinates
+    assert read("ROT X30\nTOROTOF")[0] == -3

@@ -1,4 +1,4 @@
-"""Polar, scaled and mirrored coordinates of a Fanuc and a Haas: G16, G51, G51.1 and what ends them.
+"""Polar, scaled and mirrored coordinates: G16, G51, G51.1 of a Fanuc and a Haas, MIRROR and SCALE of a Sinumerik.
 
 Notation: a coordinate x of the text lies at f (x - p) + p of the work offset, f the factor of its axis and p the point
 that stays. A mirror is a factor of -1; one mirrored axis of the plane turns G2 into G3 and G41 into G42.
@@ -9,6 +9,7 @@ Manual, "G51 Scaling", "G101 Enable Mirror Image".
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from chipload.program.commands import PLANE_AXES
@@ -62,7 +63,7 @@ def change_coordinates(block: Block, c: Controller) -> None:
         for axis in "xyz":
             words.pop(axis, None)
     if c.scaled is not None:
-        _words_of_arcs(block, c)
+        words_of_arcs(block, c)
 
 
 def _scale(words: dict[str, float], c: Controller) -> None:
@@ -80,7 +81,14 @@ def _scale(words: dict[str, float], c: Controller) -> None:
     c.scaled = _triple(factors), _triple(fixed)
 
 
-def _words_of_arcs(block: Block, c: Controller) -> None:
+def factor_axes(c: Controller, factors: Mapping[str, float]) -> None:
+    """Further factors of axes about the origin (MIRROR and SCALE of a Sinumerik)."""
+    old, fixed = c.scaled or (_UNCHANGED, (0.0, 0.0, 0.0))
+    new = [f * factors.get(axis, 1.0) for f, axis in zip(old, "xyz", strict=True)]
+    c.scaled = None if tuple(new) == _UNCHANGED else (_triple(new), fixed)
+
+
+def words_of_arcs(block: Block, c: Controller) -> None:
     """Sense, centre and radius of an arc and side of compensation in the scaled coordinates."""
     assert c.scaled is not None
     words, (factors, _) = block.words, c.scaled

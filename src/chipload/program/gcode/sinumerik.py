@@ -4,13 +4,14 @@ Notation: ``X=10``, ``X=IC(5)`` and ``I=AC(3)`` give values; ``CR=`` the radius 
 ``R1=..`` sets a parameter, stored as #1. TRAORI begins tip control and TRAFOOF ends it. G70 and G700 are inches, G71
 and G710 mm.
 
-CYCLE81 to CYCLE86, with MCALL too, are carried out (:mod:`~chipload.program.gcode.sinumerik_cycles`).
+CYCLE81 to CYCLE89, with MCALL too, are carried out (:mod:`~chipload.program.gcode.sinumerik_cycles`).
 
-TRANS, ATRANS, ROT and AROT about Z are carried out (:mod:`~chipload.program.gcode.frames`), and CYCLE800
+TRANS, ATRANS, ROT and AROT about Z are carried out (:mod:`~chipload.program.gcode.frames`), MIRROR and SCALE with their
+additive forms (:mod:`~chipload.program.gcode.coordinates`), and CYCLE800
 (:mod:`~chipload.program.gcode.sinumerik_swivel`).
 
 Jumps and loops are in :mod:`~chipload.program.gcode.sinumerik_flow`. Left out, so that the result is unproven: motions
-in mirrored or scaled coordinates until they end, tool vectors (A3 B3 C3), cycles that are not drilling,
+in coordinates that change within mirrored or scaled ones, tool vectors (A3 B3 C3), cycles that are not drilling,
 calls of other programs, curves (CIP, CT, splines), values of names that nothing defines. Noted and left out: what does
 not concern the path. G331 is read as G33, G332 as G33 with the spindle reversed.
 """
@@ -24,6 +25,7 @@ from typing import TYPE_CHECKING
 from chipload.errors import InputError
 from chipload.program.corners import Corner
 from chipload.program.gcode.controller import Controller
+from chipload.program.gcode.coordinates import factor_axes, words_of_arcs
 from chipload.program.gcode.dialect import NOTED, Dialect, NotReadError, go_on, leave_out, lenient
 from chipload.program.gcode.expression import integer_of, read_value
 from chipload.program.gcode.frames import further, remove
@@ -121,7 +123,11 @@ class Sinumerik(Dialect):
                 _keyword(block, c, found["word"], body)
         if block.frame:
             _frame(block, c)
+        if c.scaled is not None and values:
+            raise NotReadError("AC and IC in mirrored or scaled coordinates")
         self._resolve(block, c, values)
+        if c.scaled is not None:
+            words_of_arcs(block, c)
         self._holes(block, c)
         return lenient(block, c)
 
@@ -130,6 +136,8 @@ class Sinumerik(Dialect):
         moves = {"x", "y", "z"} - {NORMAL.get(c.state.plane, "z")}
         if block.modal:
             c.modal_hole = block.hole
+        elif (block.hole or c.modal_hole) and c.scaled is not None and c.scaled[0][2] != 1.0:
+            raise NotReadError("a cycle in coordinates that are scaled or mirrored along Z")
         elif block.hole is not None:
             block.after = hole_blocks(*block.hole, c)
         elif c.modal_hole is not None and not moves.isdisjoint(block.words):
@@ -358,12 +366,18 @@ def _frame(block: Block, c: Controller) -> None:
         if c.left_out.startswith(("TOFRAME", "TOROT")):
             go_on(c)
         return
+    if not word.startswith("A"):
+        c.scaled = None
     if not word.startswith("A") and not given:
         go_on(c)
         remove(c)
     elif tilted:
         leave_out(c, f"{word}: coordinates that change within a swivelled plane")
-    elif word not in PLACED:
+    elif word in ("MIRROR", "AMIRROR", "SCALE", "ASCALE") and not given.keys() - set("xyz"):
+        if not word.startswith("A"):
+            remove(c)
+        factor_axes(c, {x: -1.0 if word.endswith("MIRROR") else given[x] for x in given})
+    elif word not in PLACED or c.scaled is not None:
         leave_out(c, f"{word}: mirrored, scaled or tilted coordinates")
     elif word.endswith("TRANS"):
         shift = nine([given.get(x, 0.0) * (c.state.scale if x in "xyz" else 1.0) for x in AXES])

@@ -1,11 +1,12 @@
-"""Sinumerik's drilling cycles as blocks of LinuxCNC's: CYCLE81 to CYCLE86.
+"""Sinumerik's drilling cycles as blocks of LinuxCNC's: CYCLE81 to CYCLE89.
 
 Notation: RTP retraction plane, RFP reference plane, SDIS safety distance above it, DP final depth (absolute) or DPR
 (below RFP, without sign), DTB dwell at the bottom [s]. A cycle goes at rapid to RFP + SDIS, cuts to the bottom, and
 ends at rapid in RTP. Of CYCLE83 the first plunge FDEP or FDPR is that of all (DAM, which shortens the later ones, is
 left out); VARI 0 breaks chips, 1 clears them. CYCLE84 taps with the pitch PIT, or that of the metric size MPIT, at the
-speed SST. CYCLE840 taps with a floating chuck at the speed that holds; without a pitch at the feed F, out with the
-spindle reversed, after DTB. SDAC is the sense of the spindle behind it.
+speed SST. CYCLE87 and CYCLE88 stop at the bottom, CYCLE89 cuts on its way out. CYCLE840 taps with a floating chuck at
+the speed that holds; without a pitch at the feed F, out with the spindle reversed, after DTB. SDAC is the sense of the
+spindle behind it.
 
 Reference: Siemens, Sinumerik 840D sl Programming Manual Cycles, "Drilling".
 """
@@ -18,7 +19,9 @@ from chipload.program.gcode.words import Block
 
 #: LinuxCNC's code of each cycle
 CYCLES = {"CYCLE81": 810, "CYCLE82": 820, "CYCLE83": 830, "CYCLE84": 331, "CYCLE85": 850, "CYCLE86": 860,
-          "CYCLE840": 331}  # fmt: skip
+          "CYCLE87": 880, "CYCLE88": 880, "CYCLE89": 890, "CYCLE840": 331}  # fmt: skip
+#: argument SDIR, the sense of the spindle: 3 or 4
+SENSE = {"CYCLE86": 6, "CYCLE87": 5, "CYCLE88": 6}
 #: pitch [mm] of metric threads by their size
 PITCHES = {
     3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 8: 1.25, 10: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5, 22: 2.5, 24: 3.0,
@@ -53,8 +56,10 @@ def hole_blocks(name: str, given: list[float | None], c: Controller) -> list[Blo
     code, dwell = CYCLES[name], args[5] or 0.0
     cut = Block(words={normal: bottom, "r": r}, g=[900, 990, code])
     begin = Block(words={normal: r}, g=[900, 0])
-    if name in ("CYCLE82", "CYCLE86"):
+    if name in ("CYCLE82", "CYCLE86", "CYCLE88", "CYCLE89"):
         cut.words["p"] = dwell
+    if name == "CYCLE87":
+        cut.words["p"] = 0.0
     if name == "CYCLE83":
         _pecks(cut, args, rfp, r)
         c.once("nc-cycle", f"{name}: all plunges are as deep as the first")
@@ -64,8 +69,9 @@ def hole_blocks(name: str, given: list[float | None], c: Controller) -> list[Blo
         cut = _floating_tap(cut, args, c, normal, bottom)
     if name == "CYCLE85" and args[6] is not None:
         cut.words["f"] = args[6]
-    if name == "CYCLE86" and args[6] in (3.0, 4.0):
-        cut.m = [int(args[6] or 3.0)]
+    sense = args[SENSE[name]] if name in SENSE else None
+    if sense in (3.0, 4.0):
+        cut.m = [int(sense or 3.0)]
     after = Block(words={normal: rtp}, g=[0])
     ends = [Block(g=[910])] if not c.state.absolute else []
     if name == "CYCLE84" and args[6] in (3.0, 4.0, 5.0):

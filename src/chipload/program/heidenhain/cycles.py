@@ -3,9 +3,9 @@
 Notation of cycle 1 (pecking): the tool stands the set-up clearance DIST above the surface; DEPTH of the hole and PLNGNG
 of each plunge are counted from the surface down; before each plunge it stops ``advanced_stop`` above what is drilled.
 
-Cycles 7 (datum shift), 9 (dwell), 19 (working plane, by spatial angles) and 220, 221 (patterns) act where they are
-defined. Turned, mirrored and scaled coordinates (8, 10, 11, 26) are not read: motions are left out until they end. A
-cycle that is not read is left out where it is called.
+Cycles 7 (datum shift), 9 (dwell), 10 (turned coordinates), 19 (working plane, by spatial angles) and 220, 221
+(patterns) act where they are defined. Mirrored and scaled coordinates (8, 11, 26) are not read: motions are left out
+until they end. A cycle that is not read is left out where it is called.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from chipload.program.heidenhain import bore_cycles, q_cycles, words
 from chipload.program.heidenhain.formula import NotKnownError, q_number
 from chipload.program.heidenhain.state import ConversationalState
 from chipload.program.heidenhain.switches import datum_shift, leave_out
-from chipload.program.heidenhain.tilted_plane import put
+from chipload.program.heidenhain.tilted_plane import enter, put
 from chipload.program.tilt import spatial
 from chipload.units import mm_s_from_mm_min
 
@@ -30,7 +30,7 @@ MOST_PLUNGES, MOST_HOLES = 10_000, 10_000
 SILENT = (13, 14, 20, 32)
 #: by what the coordinates are changed, and the value that leaves them as they are
 CHANGES = {8: ("mirrored", 0.0), 10: ("turned", 0.0), 11: ("scaled", 1.0), 26: ("scaled", 1.0)}
-PRESET, PATTERNS, WORKING_PLANE = 247, (220, 221), 19
+PRESET, PATTERNS, WORKING_PLANE, ROTATION = 247, (220, 221), 19, 10
 _VALUE = re.compile(r"([A-Z. ]*?)\s*([-+]?\d*\.?\d+)\s*$")
 _SPATIAL = re.compile(rf"\b([ABC])\s*([-+]?)\s*({words.VALUE})")
 _CHANGED = re.compile(rf"(?:\b|(?<=\s))[A-Z]*\s*([-+]?)\s*({words.VALUE})")
@@ -54,6 +54,8 @@ class Cycles:
         self.values: dict[int, float] = {}
         self.modal = False
         self.preset: float | None = None
+        #: turn of the coordinates about Z [deg]
+        self.turned = 0.0
 
     def define(self, text: str) -> None:
         """Carry out one block of a definition."""
@@ -113,6 +115,10 @@ class Cycles:
         if part == 0:
             return
         values = [self.s.signed(sign, value) for sign, value in _CHANGED.findall(body)]
+        if number == ROTATION and values and (self.s.tilt is None or self.s.tilt.upright):
+            self.turned = values[0] + (self.turned if re.search(r"\bIROT", body) else 0.0)
+            enter(self.s, spatial(0.0, 0.0, self.turned))
+            return
         changes = bool(re.search(r"[XYZ]", body)) if number == 8 else any(value != none for value in values)
         if changes:
             leave_out(self.s, f"{text[:60]}: {how} coordinates are not read: motions are left out until they end")

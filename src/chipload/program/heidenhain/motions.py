@@ -73,9 +73,12 @@ def _straight(
             _turn(s, end, named, RAPID if fast else LINE)
             named &= {0, 1, 2}
             end = [x if k in named else s.at[k] for k, x in enumerate(end)]
+        first, rows = bool(fast and named & s.unknown & {0, 1, 2}), len(s.rows)
         s.unknown -= named
         if named:
             s.straight(RAPID if fast else LINE, end)
+            if first and len(s.rows) == rows + 1:
+                s.unplaced.append(rows)
     else:
         s.select(_side(s, text), named)
     _retract(s, text)

@@ -18,7 +18,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from chipload.errors import Finding, InputError
 from chipload.files import read_regular
@@ -29,6 +32,7 @@ from chipload.program.heidenhain.flow import HeidenhainFlow, text_of
 from chipload.program.heidenhain.formula import NotKnownError, q_number
 from chipload.program.heidenhain.q_cycles import MAX
 from chipload.program.heidenhain.state import KEPT, ConversationalState
+from chipload.program.path_mode import PathControl
 from chipload.program.reconcile import StatedDiameter
 from chipload.program.swivel import Swivel
 from chipload.units import MM_PER
@@ -96,7 +100,12 @@ def read_heidenhain(
         state.end_contour()
     except InputError as err:
         raise InputError(f"{name}: line {state.line}: {err}") from None
-    return commands_from_rows(state.rows, state.frames, state.labels), tuple(state.findings)
+    commands = commands_from_rows(state.rows, state.frames, state.labels)
+    if state.unplaced:
+        mode = np.array(commands.path_mode)
+        mode[state.unplaced, 0] = PathControl.UNPLACED
+        commands = replace(commands, path_mode=mode)
+    return commands, tuple(state.findings)
 
 
 def read_heidenhain_file(path: str | Path, **options: object) -> tuple[Commands, tuple[Finding, ...]]:

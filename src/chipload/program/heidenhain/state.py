@@ -58,6 +58,8 @@ class ConversationalState:
         self.frames: list[Frame] = [Frame()]
         self.at = [0.0] * 9
         self.unknown = set(range(3))
+        #: rows of rapids that send an axis for the first time, from nobody knows where
+        self.unplaced: list[int] = []
         #: in the plane that the axes of CC name
         self.pole: list[float | None] = [None, None]
         self.pole_plane = XY
