@@ -206,7 +206,22 @@ class ProgramChecksTable(ChecksTable):
     plunge: bool = _switch("plunge", "check that the cutters can plunge and ramp into material as the program does")
 
 
-class StockChecksTable(ProgramChecksTable):
+class WallChecksTable(ProgramChecksTable):
+    """Default checks. `false` switches a check off; the report lists the checks that are off."""
+
+    slender_walls: bool = _switch(
+        "slender_walls",
+        "report walls that are left more slender than wall_slenderness, where no [workpiece] states how they deflect",
+    )
+    wall_slenderness: Number = setting(
+        CheckSettings,
+        "wall_slenderness",
+        "height over thickness up to which a wall counts as rigid; 5 of aluminium 2 mm thick, clamped at its foot: "
+        "0.33 um/N at its edge",
+    )
+
+
+class StockChecksTable(WallChecksTable):
     """Default checks. `false` switches a check off; the report lists the checks that are off."""
 
     gouge: bool = _switch(
@@ -219,14 +234,4 @@ class StockChecksTable(ProgramChecksTable):
     )
     loose_stock: bool = _switch(
         "loose_stock", "check that no piece is cut on that the program has cut free of the stock"
-    )
-    slender_walls: bool = _switch(
-        "slender_walls",
-        "report walls that are left more slender than wall_slenderness, where no [workpiece] states how they deflect",
-    )
-    wall_slenderness: Number = setting(
-        CheckSettings,
-        "wall_slenderness",
-        "height over thickness up to which a wall counts as rigid; 5 of aluminium 2 mm thick, clamped at its foot: "
-        "0.33 um/N at its edge",
     )

@@ -14,6 +14,7 @@ from chipload.geometry.dxf import read_dxf
 from chipload.geometry.even_odd import even_odd
 from chipload.geometry.step import StepLevel, read_step_level
 from chipload.jobs.contour.job import ContourJob
+from chipload.jobs.contour.walls import find_walls
 from chipload.machine.machine import Machine
 
 #: heights of a model that are one [mm]
@@ -51,7 +52,8 @@ def read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Contour, ...]
     contours, outline = moved(contours, part.origin_mm), moved(outline, part.origin_mm)
     kept, left_out = closed_alone(contours) if part.open_chains == "dropped" else (contours, ())
     used, crossings = clear_of_each_other(kept)
-    return used, outline, tuple(replace(f, text=f"part: {f.text}") for f in (*drawing.findings, *left_out, *crossings))
+    found = tuple(replace(f, text=f"part: {f.text}") for f in (*drawing.findings, *left_out, *crossings))
+    return used, outline, (*found, *find_walls(job, used))
 
 
 def require_heights(job: ContourJob, face: StepLevel) -> None:

@@ -15,11 +15,11 @@ from chipload.jobs.tables import (
     NotNegative,
     Number,
     Positive,
-    ProgramChecksTable,
     SourceTable,
     Table,
     Text,
     Unit,
+    WallChecksTable,
 )
 
 Engagement = Annotated[float, Field(ge=2.0, le=150.0)]
@@ -201,7 +201,7 @@ class ContourJobTable(Table):
     cutter: tuple[CutterTable, ...] = Field(min_length=1)
     operation: tuple[OperationTable, ...] = Field(min_length=1)
     limits: ContourLimitsTable = Field(default_factory=ContourLimitsTable.model_construct)
-    checks: ProgramChecksTable = Field(default_factory=ProgramChecksTable.model_construct)
+    checks: WallChecksTable = Field(default_factory=WallChecksTable.model_construct)
 
 
 #: keys that every planned operation needs

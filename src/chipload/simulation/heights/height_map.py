@@ -276,7 +276,7 @@ def columns_of(stock: LayeredStock, pitch: float) -> tuple[Floats, Floats, Float
     """Return places x, y and heights low, top (nx, ny) [mm] of the columns of a stock; inf, -inf where it has none."""
     box, count = require_columns(stock, pitch)
     if stock.part is not None and not stock.cut.any():
-        return _by_rays(stock.part, pitch)
+        return columns_of_mesh(stock.part, pitch)
     size = (box[1] - box[0]) / count
     x, y = (box[0][k] + size[k] * (np.arange(int(count[k])) + 0.5) for k in (0, 1))
     return x, y, *_by_sections(stock, x, y)
@@ -299,8 +299,8 @@ def _by_sections(stock: LayeredStock, x: Floats, y: Floats) -> tuple[Floats, Flo
     return low.reshape(len(x), len(y)), top.reshape(len(x), len(y))
 
 
-def _by_rays(body: trimesh.Trimesh, pitch: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Columns as :func:`columns_of` of a mesh, by rays through it."""
+def columns_of_mesh(body: trimesh.Trimesh, pitch: float) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return places and heights of the columns of a closed mesh as :func:`columns_of`, by rays through it."""
     rays = TriDexel.of_mesh(body, pitch, "z").rays[0]
     u0, v0, du, dv, nu, nv = rays.grid
     shape = (int(nu), int(nv))

@@ -20,7 +20,9 @@ from chipload.simulation.heights.height_map import HeightMap
 
 Floats = NDArray[np.float64]
 #: floors that are examined: with the greatest area, at least this share of what was cut, equal within so many mm
-FLOORS, SHARE, ALIKE = 16, 0.002, 0.01
+FLOORS, SHARE, ALIKE = 8, 0.002, 0.01
+#: columns that are looked at, at most
+COLUMNS = 250_000
 #: a wall is at least so many times as long as it is thick, and covers so many squares of the radius of the circle that
 #: it is too thin for: a right corner that the circle does not reach covers 0.2 of them
 LONG, COVER = 2.0, 0.75
@@ -42,47 +44,72 @@ class SlenderWall:
 
 
 def find_slender_walls(found: HeightMap, slenderness: float) -> tuple[SlenderWall, ...]:
-    """Return the walls that are more slender than ``slenderness``, the most slender first.
+    """Return the walls after a program that are more slender than ``slenderness``, the most slender first."""
+    return slender_walls_of(found.x, found.y, found.low, found.top, found.before, slenderness)
+
+
+def slender_walls_of(
+    x: Floats, y: Floats, low: Floats, top: Floats, before: Floats, slenderness: float
+) -> tuple[SlenderWall, ...]:
+    """Return the walls among columns that are more slender than ``slenderness``, the most slender first.
 
     A wall that stands over several floors is given once, over the lowest.
+
+    Parameters
+    ----------
+    x, y : (nx,), (ny,) places of the columns [mm]
+    low, top : (nx, ny) heights of the columns [mm]; inf, -inf where there is no material
+    before : (nx, ny) tops before the cut [mm]: floors are where it is higher
     """
     from scipy import ndimage
 
-    there = np.isfinite(found.low)
-    cut = there & (found.top < found.before)
+    # no finer than needed: of many columns every second one, or fewer
+    stride = max(int(np.ceil(np.sqrt(top.size / COLUMNS))), 1)
+    x, y = x[::stride], y[::stride]
+    low, top, before = (a[::stride, ::stride] for a in (low, top, before))
+    there = np.isfinite(low)
+    cut = there & (top < before)
     if not cut.any():
         return ()
-    ground = np.where(np.isfinite(found.top), found.top, np.where(there, found.low, np.inf))
+    ground = np.where(np.isfinite(top), top, np.where(there, low, np.inf))
     levels, area = np.unique((ground[cut] / ALIKE).round().astype(np.int64), return_counts=True)
     kept = np.sort(levels[area >= SHARE * area.sum()][np.argsort(-area[area >= SHARE * area.sum()])][:FLOORS])
-    hx, hy = float(found.x[1] - found.x[0]), float(found.y[1] - found.y[0])
+    hx, hy = float(x[1] - x[0]), float(y[1] - y[0])
     out: list[SlenderWall] = []
     taken = np.zeros(there.shape, dtype=np.bool_)
     for level in (ALIKE * kept).tolist():
-        standing = there & np.isfinite(found.top) & (found.top > level + 2.0 * ALIKE)
+        standing = there & np.isfinite(top) & (top > level + 2.0 * ALIKE)
         if not standing.any():
             continue
         inner = ndimage.distance_transform_edt(np.pad(standing, 1), sampling=(hx, hy))[1:-1, 1:-1]
-        highest = float(found.top[standing].max()) - level
-        radius = 0.5 * highest / slenderness
-        # opened by a circle of this radius: what is wide stays
-        wide = inner >= radius + 0.5 * max(hx, hy)
-        if wide.any():
-            away = ndimage.distance_transform_edt(np.pad(~wide, 1, constant_values=True), sampling=(hx, hy))[1:-1, 1:-1]
-            thin = standing & (away > radius + 2.0 * max(hx, hy))
-        else:
-            thin = standing
-        label, count = ndimage.label(thin & ~taken)
-        for k, box in enumerate(ndimage.find_objects(label)[:count], start=1):
-            own = label[box] == k
-            thickness = max(2.0 * float(inner[box][own].max()) - max(hx, hy), max(hx, hy))
-            tops = found.top[box][own]
-            height = float(np.median(tops)) - level
-            length = float(own.sum()) * hx * hy / thickness
-            if height <= slenderness * thickness or length < max(LONG * thickness, COVER * radius**2 / thickness):
-                continue
-            taken[box] |= own
-            i, j = (int(v[len(v) // 2]) for v in np.nonzero(own))
-            place = (float(found.x[box[0]][i]), float(found.y[box[1]][j]), float(tops.max()))
-            out.append(SlenderWall(height, thickness, length, place))
+        half = 0.5 * (float(top[standing].max()) - level) / slenderness
+        # the thinnest first, so that a thick one that it meets is another wall
+        plans = [(half, _thin(standing, inner, half, hx, hy))]
+        while plans[-1][1].any() and plans[-1][0] > max(hx, hy):
+            plans.append((0.5 * plans[-1][0], _thin(standing, inner, 0.5 * plans[-1][0], hx, hy)))
+        for radius, thin in reversed(plans):
+            label, count = ndimage.label(thin & ~taken)
+            for k, box in enumerate(ndimage.find_objects(label)[:count], start=1):
+                own = label[box] == k
+                thickness = max(2.0 * float(inner[box][own].max()) - max(hx, hy), max(hx, hy))
+                tops = top[box][own]
+                height = float(np.median(tops)) - level
+                length = float(own.sum()) * hx * hy / thickness
+                if height <= slenderness * thickness or length < max(LONG * thickness, COVER * radius**2 / thickness):
+                    continue
+                taken[box] |= own
+                i, j = (int(v[len(v) // 2]) for v in np.nonzero(own))
+                place = (float(x[box[0]][i]), float(y[box[1]][j]), float(tops.max()))
+                out.append(SlenderWall(height, thickness, length, place))
     return tuple(sorted(out, key=lambda w: -w.slenderness))
+
+
+def _thin(standing: NDArray[np.bool_], inner: Floats, radius: float, hx: float, hy: float) -> NDArray[np.bool_]:
+    """Mask of the columns that no circle of a radius [mm] within what stands covers; ``inner``: distance from air."""
+    from scipy import ndimage
+
+    wide = inner >= radius + 0.5 * max(hx, hy)
+    if not wide.any():
+        return standing
+    away = ndimage.distance_transform_edt(np.pad(~wide, 1, constant_values=True), sampling=(hx, hy))[1:-1, 1:-1]
+    return np.asarray(standing & (away > radius + 2.0 * max(hx, hy)))
