@@ -143,8 +143,8 @@ def dynamics_of(vibration: Vibration, cutters: Mapping[int, Cutter], workpiece: 
         across = [m for m in listed if m.of == "cutter" and m.tool in (None, tool)]
         if not across:
             unknown.append(f"modes of tool {tool}")
-        elif missing := _missing_direction(across):
-            unknown.append(f"modes of tool {tool} along {missing}")
+        elif along := _missing_direction(across):
+            unknown.append(f"modes of tool {tool} along {along}")
         if own:
             modes[tool] = _modes(own)
             number[tool] = tuple(k for k, _, _ in own)

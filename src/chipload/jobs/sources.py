@@ -86,7 +86,8 @@ def speed_errors(values: Any, cutters: Mapping[int, Cutter], key: str = "", numb
     out, per = list[str](), rpm_from_rad_s(1.0)
     for name, value in values.items():
         place = f"{key}.{name}" if key else name
-        most = cutters[number].max_speed if number in cutters else None
+        cutter = None if number is None else cutters.get(number)
+        most = None if cutter is None else cutter.max_speed
         if (
             name in ("speed_rpm", "most_rpm")
             and most is not None

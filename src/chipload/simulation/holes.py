@@ -18,7 +18,8 @@ from chipload.errors import Finding, Severity
 #: a hole of at most so many diameters is drilled in one motion: jobber drills are made for 3 to 5
 DEEP = 5.0
 #: a step goes down the axis if the ramp angle is at least this [deg]
-AXIAL_DEG = 90.0 - 1e-3
+AXIAL_DEG, AXIAL = 90.0 - 1e-3, 1.0 - 1e-9
+PLACE, AXIS = ("x_mm", "y_mm", "z_mm"), ("axis_x", "axis_y", "axis_z")
 
 
 def deep_holes(columns: Mapping[str, NDArray[Any]], cutters: Mapping[int, Cutter]) -> tuple[Finding, ...]:
@@ -33,23 +34,25 @@ def deep_holes(columns: Mapping[str, NDArray[Any]], cutters: Mapping[int, Cutter
     """
     if "ramp_deg" not in columns or not len(columns["ramp_deg"]):
         return ()
-    ramp, tool = np.asarray(columns["ramp_deg"]), np.asarray(columns["tool"])
-    drills = (ramp >= AXIAL_DEG) & (np.asarray(columns["chip_volume_mm3"]) > 0.0)
-    length = np.diff(np.asarray(columns["s_mm"]), prepend=0.0)
-    # runs of steps that drill with one tool
-    begins = drills & ~(np.append(False, drills[:-1]) & np.append(False, tool[1:] == tool[:-1]))
-    run = np.cumsum(begins)
-    depth = np.bincount(run[drills], length[drills], int(run[-1]) + 1)
+    tool, s_mm = np.asarray(columns["tool"]), np.asarray(columns["s_mm"])
+    solid = (np.asarray(columns["ramp_deg"]) >= AXIAL_DEG) & (np.asarray(columns["chip_volume_mm3"]) > 0.0)
+    # runs of steps that go down the axis with one tool; by layers some of them meet nothing
+    down = _down_axis(columns)
+    run = np.cumsum(down & ~(np.append(False, down[:-1]) & np.append(False, tool[1:] == tool[:-1])))
+    solid &= down
     out = []
     for number, cutter in sorted(cutters.items()):
-        own = np.unique(run[drills & (tool == number)])
-        if not len(own) or cutter.body:
+        rows = np.flatnonzero(solid & (tool == number))
+        if not len(rows) or cutter.body:
             continue
+        first = rows[np.flatnonzero(np.diff(run[rows], prepend=-1))]
+        last = rows[np.flatnonzero(np.diff(run[rows], append=-1))]
+        depth = s_mm[last] - np.where(first > 0, s_mm[first - 1], 0.0)
+        deepest = int(np.argmax(depth))
         most = DEEP * cutter.diameter if cutter.hole_depth is None else cutter.hole_depth
-        deepest = int(own[np.argmax(depth[own])])
         if depth[deepest] <= most * (1.0 + 1e-9):
             continue
-        row = int(np.flatnonzero(drills & (run == deepest))[-1])
+        row = int(last[deepest])
         ratio = depth[deepest] / cutter.diameter
         known = cutter.hole_depth is not None
         text = (
@@ -66,3 +69,11 @@ def deep_holes(columns: Mapping[str, NDArray[Any]], cutters: Mapping[int, Cutter
         severity = Severity.EXCEEDS if known else Severity.UNPROVEN
         out.append(Finding("deep-hole", int(columns["line"][row]), text, severity, place, row))
     return tuple(out)
+
+
+def _down_axis(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
+    """Which steps feed down the axis of the tool, (n,)."""
+    p, axis = (np.column_stack([columns[name] for name in names]) for names in (PLACE, AXIS))
+    d = np.diff(p, axis=0, prepend=p[:1])
+    size = np.linalg.norm(d, axis=1)
+    return np.asarray((-(d * axis).sum(axis=1) >= AXIAL * size) & (size > 0.0) & ~np.asarray(columns["rapid"]))
