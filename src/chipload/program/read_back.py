@@ -30,7 +30,7 @@ UNITS, TURNED_MM = 4.0, 0.02
 AXIS_RAD = 1e-3
 #: speeds of the spindle agree within this share
 SPEED_SHARE = 1e-3
-#: rows of the text among which the end of a planned row is sought
+#: rows of the text among which the end of a planned row is sought first
 AHEAD = 400
 #: tool lengths along A B C U V W
 NO_OFFSET = (0.0,) * 6
@@ -142,10 +142,11 @@ def _next(read: Program, last: int, planned: Program, k: int, near: float) -> in
     close = first < len(read) and bool(np.abs(read.p_work[first] - planned.p_work[k]).max() <= near)
     if close and _alike(planned, k, read, first):
         return first
-    after = read.p_work[last + 1 : last + 1 + AHEAD]
-    for at in np.flatnonzero(np.abs(after - planned.p_work[k]).max(axis=1) <= near).tolist():
-        if _alike(planned, k, read, last + 1 + at):
-            return last + 1 + int(at)
+    for end in (first + AHEAD, len(read)):
+        after = read.p_work[first:end]
+        for at in np.flatnonzero(np.abs(after - planned.p_work[k]).max(axis=1) <= near).tolist():
+            if _alike(planned, k, read, first + at):
+                return first + int(at)
     return None
 
 

@@ -51,7 +51,7 @@ from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
 
 #: greatest deviations with which the simulation proves a program
-ENGAGEMENT_DEG, GOUGE_MM, CHORDS_MM = 0.05, 1e-4, 1e-3
+ENGAGEMENT_DEG, GOUGE_MM, CHORDS_MM = 0.5, 1e-4, 1e-3
 #: heights of a program are rounded to this [mm]
 ROUNDED_MM = 1e-6
 #: passes that descend or rise, whose engagement the simulation in the plane cannot compare; their path it does follow
@@ -438,9 +438,19 @@ def verify(
         workers=2,
         progress=progress,
     )
+    verdict, text = VERDICTS[verification.verdict], "; ".join((*verification.reasons, verification.text))
+    apart = verification.engagement_difference_deg
+    if apart > ENGAGEMENT_DEG and len(verification.reasons) == 1:
+        # the limits hold for the simulated engagement: the difference is a fault of the planner
+        x, y = verification.engagement_at
+        verdict = Verdict.UNPROVEN
+        text = (
+            f"the planned engagement differs by {apart:.3g} deg from that of its path at ({x:.4g}, {y:.4g}), "
+            f"more than {ENGAGEMENT_DEG:g} deg"
+        )
     return PlanVerification(
-        VERDICTS[verification.verdict],
-        "; ".join((*verification.reasons, verification.text)),
+        verdict,
+        text,
         {
             "engagement_difference_deg": verification.engagement_difference_deg,
             "engagement_at_mm": list(verification.engagement_at),
