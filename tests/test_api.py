@@ -30,8 +30,9 @@ OPERATION = {
 }  # fmt: skip
 LIMITS = {"engagement_deg": 13, "force_xy_n": 450, "torque_nm": 2, "form_error_um": 6}
 JOB = {
-    "part": {"file": "corner.dxf", "units_if_unstated": "mm"}, "stock": {"top_mm": 0.0}, "machine": "vmc",
-    "material": "al7075-carbide", "cutter": chipload.Cutter(**MILL), "operation": OPERATION, "limits": LIMITS,
+    "part": {"file": "corner.dxf", "units_if_unstated": "mm"}, "stock": {"top_mm": 0.0}, "machine": {"name": "vmc"},
+    "material": {"name": "al7075-carbide"}, "cutter": [chipload.Cutter(**MILL)],
+    "operation": [OPERATION], "limits": LIMITS,
 }  # fmt: skip
 BLOCK = chipload.Stock.block((0, 0, -12), (60, 40, 0))
 
@@ -43,9 +44,19 @@ def folder(tmp_path_factory) -> Path:
     return out
 
 
+def values(folder: Path, **changed) -> dict:
+    """Arguments of ``plan_contour`` for the contour of the example."""
+    contours = chipload.read_dxf(folder / "corner.dxf", units_if_unstated="mm").contours
+    return {
+        "contours": contours, "stock": 0.0, "cutters": chipload.Cutter(**MILL), "material": "al7075-carbide",
+        "machine": "vmc", "limits": chipload.ContourLimits(**LIMITS), "operations": chipload.Operation(**OPERATION),
+        **changed,
+    }  # fmt: skip
+
+
 @pytest.fixture(scope="module")
 def plan(folder):
-    return chipload.plan_contour(**JOB, folder=folder)
+    return chipload.plan_contour(**values(folder))
 
 
 # -- names ------------------------------------------------------------------------------------------------------
@@ -91,13 +102,12 @@ def test_values_give_the_operations_of_the_job_file(folder, plan, tmp_path):
     path = folder / "same.toml"
     path.write_text("\n".join(lines))
     of_file = chipload.run_job(path)
-    values, written = (json.loads(summary_bytes(x.result, {})) for x in (plan, of_file))
-    assert json.dumps(values["operations"]) == json.dumps(written["operations"])
-    assert values["limits"] == written["limits"]
-    assert values["tracks"] == written["tracks"]
-    assert (values["job"], written["job"]) == ("contour", "same")
-    assert values["provenance"]["inputs"]["job"].startswith("contour sha256 ")
-    assert {k: v for k, v in values["provenance"].items() if k != "inputs"} == {
+    own, written = (json.loads(summary_bytes(x.result, {})) for x in (plan, of_file))
+    assert json.dumps(own["operations"]) == json.dumps(written["operations"])
+    assert own["limits"] == written["limits"]
+    assert own["tracks"] == written["tracks"]
+    assert (own["job"], written["job"]) == ("contour", "same")
+    assert {k: v for k, v in own["provenance"].items() if k != "inputs"} == {
         k: v for k, v in written["provenance"].items() if k != "inputs"
     }
     assert chipload.run_job(tomllib.loads(path.read_text()), folder=folder).result.operations == plan.result.operations
@@ -133,7 +143,6 @@ def test_a_job_of_values_is_checked(folder):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"operation": {**OPERATION, "kind": "pocket"}}, r"operation.0.kind = 'pocket': must be one of"),
         ({"operation": {**OPERATION, "feed_mm_min": float("nan")}}, r"feed_mm_min = nan: must be a finite number"),
         ({"stock": {"top_mm": np.float64("nan")}}, r"stock.top_mm = nan: must be a finite number"),
         ({"limits": {"engagement_deg": float("inf")}}, r"limits.engagement_deg = inf: must be a finite number"),
@@ -141,20 +150,40 @@ def test_a_job_of_values_is_checked(folder):
         ({"limits": {}}, r"limits: none is stated"),
         ({"cutter": {**MILL, "diameter": 10.0}}, r"cutter.0.diameter: unknown key; did you mean diameter_mm"),
         ({"cutter": []}, r"cutter: has no entry"),
-        ({"machine": 3}, r"machine: int: give a name, a file"),
-        ({"machine": "vmx"}, r"machine vmx: not known: the nearest is"),
-        ({"part": "corner.pdf"}, r"must end in .dxf, .step or .stp"),
+        ({"machine": {"name": "vmx"}}, r"machine vmx: not known: the nearest is"),
+        ({"part": {"file": "corner.pdf"}}, r"must end in .dxf, .step or .stp"),
         ({"stock": {"top_mm": object()}}, r"object: is not a value that a job can hold"),
     ],
 )
-def test_refused(folder, change, says):
+def test_refused_tables(folder, change, says):
+    tables = {**JOB, **change}
+    for key in ("cutter", "operation"):
+        tables[key] = tables[key] if isinstance(tables[key], list) else [tables[key]]
     with pytest.raises(chipload.InputError, match=says):
-        chipload.plan_contour(**{**JOB, **change}, folder=folder)
+        chipload.run_job(tables, folder=folder)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"operations": OPERATION}, r"operation.0: str: must be a chipload.Operation"),
+        ({"operations": chipload.Operation(**{**OPERATION, "kind": "pocket"})}, r"kind = 'pocket': must be one of"),
+        ({"limits": LIMITS}, r"limits: dict: must be a chipload.ContourLimits"),
+        ({"limits": chipload.ContourLimits()}, r"limits: none is stated"),
+        ({"cutters": []}, r"cutter: has no entry"),
+        ({"stock": float("nan")}, r"stock.top_mm = nan: must be a finite number"),
+        ({"machine": "vmx"}, r"machine vmx: not known: the nearest is"),
+        ({"checks": chipload.CheckSettings(loose_stock=False)}, r"checks.loose_stock: is made of a simulated program"),
+    ],
+)
+def test_refused_values(folder, change, says):
+    with pytest.raises(chipload.InputError, match=says):
+        chipload.plan_contour(**values(folder, **change))
 
 
 def test_a_pocket_is_no_contour(folder):
     with pytest.raises(chipload.InputError, match="must be 'pocket'"):
-        chipload.plan_pocket(**JOB, folder=folder)
+        chipload.plan_pocket(**values(folder))
 
 
 def test_new_feeds_need_their_range(folder):
@@ -197,8 +226,8 @@ def test_a_program_runs_with_the_cutter_of_a_job(tmp_path):
 @pytest.mark.parametrize(
     ("function", "capability"),
     [
-        ("plan_contour", "contour"), ("plan_pocket", "contour"), ("plan_impeller", "impeller"),
-        ("plan_thin_wall", "thinwall"), ("hold_torque", "torque"), ("optimise_feeds", "feeds"),
+        ("plan_impeller", "impeller"), ("plan_thin_wall", "thinwall"), ("hold_torque", "torque"),
+        ("optimise_feeds", "feeds"),
     ],
 )  # fmt: skip
 def test_every_table_of_the_job_is_a_parameter(function, capability):
@@ -209,6 +238,6 @@ def test_every_table_of_the_job_is_a_parameter(function, capability):
 
 
 def test_a_check_that_is_switched_off_is_stated(folder):
-    done = chipload.plan_contour(**JOB, folder=folder, checks={"cutter_strength": False})
-    assert "cutter_stress_mpa" not in {limit.name for limit in done.limits}
-    assert any("cutter_strength" in text for text in done.unchecked)
+    done = chipload.plan_contour(**values(folder, checks=chipload.CheckSettings(cutter_strength=False)))
+    assert "cutter_stress_mpa" not in {limit.name for limit in done.result.limits}
+    assert any("cutter_strength" in text for text in done.result.unchecked)

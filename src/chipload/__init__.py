@@ -9,9 +9,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from chipload.api.contours import FlatStock, plan_contour, plan_pocket
     from chipload.api.jobs import check_job, load_result, run_job, write_result
     from chipload.api.loads import fit_coefficients, hold_torque, optimise_feeds
-    from chipload.api.planning import plan_contour, plan_impeller, plan_pocket, plan_thin_wall
+    from chipload.api.planning import plan_impeller, plan_thin_wall
     from chipload.api.reading import read_machine, read_material, read_program
     from chipload.api.simulation import simulate
     from chipload.checking.clamped import Workpiece, WorkpieceClamp
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from chipload.cutting.material import Material
     from chipload.errors import Finding, InputError
     from chipload.geometry.contour import Contour
+    from chipload.geometry.dxf import read_dxf
+    from chipload.jobs.contour.tables import ContourLimitsTable as ContourLimits
+    from chipload.jobs.contour.tables import OperationTable as Operation
     from chipload.machine.machine import Machine
     from chipload.program.program import Program
     from chipload.result.columns import COLUMNS
@@ -38,10 +42,12 @@ __all__ = [
     "COLUMNS",
     "CheckSettings",
     "Contour",
+    "ContourLimits",
     "Cutter",
     "Finding",
     "FinishedPart",
     "Fixture",
+    "FlatStock",
     "History",
     "InputError",
     "LimitCheck",
@@ -50,6 +56,7 @@ __all__ = [
     "MachineStiffness",
     "Material",
     "Mode",
+    "Operation",
     "Program",
     "Result",
     "SimulationSettings",
@@ -68,6 +75,7 @@ __all__ = [
     "plan_impeller",
     "plan_pocket",
     "plan_thin_wall",
+    "read_dxf",
     "read_machine",
     "read_material",
     "read_program",
@@ -81,10 +89,12 @@ _PLACES = {
     "COLUMNS": ("chipload.result.columns", "COLUMNS"),
     "CheckSettings": ("chipload.checking.settings", "CheckSettings"),
     "Contour": ("chipload.geometry.contour", "Contour"),
+    "ContourLimits": ("chipload.jobs.contour.tables", "ContourLimitsTable"),
     "Cutter": ("chipload.cutter.table", "CutterTable"),
     "Finding": ("chipload.errors", "Finding"),
     "FinishedPart": ("chipload.checking.workpiece", "FinishedPart"),
     "Fixture": ("chipload.checking.workpiece", "Fixture"),
+    "FlatStock": ("chipload.api.contours", "FlatStock"),
     "History": ("chipload.checking.history", "History"),
     "InputError": ("chipload.errors", "InputError"),
     "LimitCheck": ("chipload.result.limits", "LimitCheck"),
@@ -93,6 +103,7 @@ _PLACES = {
     "MachineStiffness": ("chipload.checking.stiffness", "MachineStiffness"),
     "Material": ("chipload.cutting.material", "Material"),
     "Mode": ("chipload.checking.dynamics", "Mode"),
+    "Operation": ("chipload.jobs.contour.tables", "OperationTable"),
     "Program": ("chipload.program.program", "Program"),
     "Result": ("chipload.result.result", "Result"),
     "SimulationSettings": ("chipload.checking.settings", "SimulationSettings"),
@@ -102,6 +113,7 @@ _PLACES = {
     "Vibration": ("chipload.checking.dynamics", "Vibration"),
     "Workpiece": ("chipload.checking.clamped", "Workpiece"),
     "WorkpieceClamp": ("chipload.checking.clamped", "WorkpieceClamp"),
+    "read_dxf": ("chipload.geometry.dxf", "read_dxf"),
 }
 
 #: module of ``chipload.api`` of each function
@@ -110,7 +122,8 @@ _FUNCTIONS = {
     for module, names in {
         "jobs": "check_job load_result run_job write_result",
         "loads": "fit_coefficients hold_torque optimise_feeds",
-        "planning": "plan_contour plan_impeller plan_pocket plan_thin_wall",
+        "contours": "plan_contour plan_pocket",
+        "planning": "plan_impeller plan_thin_wall",
         "reading": "read_machine read_material read_program",
         "simulation": "simulate",
     }.items()

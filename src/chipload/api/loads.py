@@ -36,7 +36,7 @@ def hold_torque(
 ) -> FinishedJob:
     """Simulate the control of the cutting torque on a thin tube, a cone or a clamped workpiece.
 
-    Result and errors are those of :func:`plan_contour`.
+    Result and errors are those of :func:`plan_impeller`.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def optimise_feeds(
 ) -> FinishedJob:
     """Change the feed of each line of a program to the greatest that the load limits allow; the path does not change.
 
-    Result and errors are those of :func:`plan_contour`.
+    Result and errors are those of :func:`plan_impeller`.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def fit_coefficients(
 
     ``result.operations[0]`` holds the coefficients with their intervals, ``outcome.material`` the
     :class:`chipload.Material`; ``save(out)`` writes material.toml and the report. Errors are those of
-    :func:`plan_contour`.
+    :func:`plan_impeller`.
 
     Parameters
     ----------

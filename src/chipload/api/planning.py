@@ -1,4 +1,4 @@
-"""Functions that plan and verify contours, pockets, impellers and thin walls."""
+"""Functions that plan and verify impellers and thin walls."""
 
 from __future__ import annotations
 
@@ -10,89 +10,6 @@ from chipload.progress import Progress, silent
 
 if TYPE_CHECKING:
     from chipload.jobs import FinishedJob
-
-
-def plan_contour(
-    *,
-    part: Source,
-    stock: Values,
-    machine: Source,
-    material: Source,
-    cutter: Cutters,
-    operation: Tables,
-    limits: Values,
-    checks: Values | None = None,
-    folder: str | Path = ".",
-    progress: Progress = silent,
-) -> FinishedJob:
-    """Plan passes along contours of a drawing and prove their programs.
-
-    Parameters
-    ----------
-    part : keys of ``[part]``, or the drawing (DXF, STEP) alone
-    stock : keys of ``[stock]``, as ``{"top_mm": 0.0}``
-    machine, material : a shipped name, a file, or keys of the table
-    cutter : one :class:`chipload.Cutter`, or several
-    operation : keys of an ``[[operation]]`` of kind ``contour`` or ``forward``, or several
-    limits : keys of ``[limits]``, as ``{"engagement_deg": 13.0}``
-    checks : keys of ``[checks]``: which default checks are switched off; None: all are made
-    folder : that file names are relative to
-
-    Returns
-    -------
-    FinishedJob
-        ``result`` with verdict, limits and tracks; ``save(out)`` writes programs and report.
-
-    Raises
-    ------
-    InputError
-        A key is unknown, missing or out of range, a file cannot be read, or the operation is of another kind.
-    Cancelled
-        By ``progress``.
-
-    Examples
-    --------
-    >>> plan_contour(part="a.dxf", stock={}, machine="vmc", material="al7075-t6", cutter=[], limits={},
-    ...              operation={"kind": "pocket"})
-    Traceback (most recent call last):
-        ...
-    chipload.errors.InputError: operation.0.kind = 'pocket': must be one of 'contour', 'forward'
-    """
-    return run_tables(
-        "contour", folder, progress, ("contour", "forward"), part=part, stock=stock, machine=machine, material=material,
-        cutter=cutters_of(cutter), operation=operation, limits=limits, checks=checks,
-    )  # fmt: skip
-
-
-def plan_pocket(
-    *,
-    part: Source,
-    stock: Values,
-    machine: Source,
-    material: Source,
-    cutter: Cutters,
-    operation: Tables,
-    limits: Values,
-    checks: Values | None = None,
-    folder: str | Path = ".",
-    progress: Progress = silent,
-) -> FinishedJob:
-    """Plan the clearing of pockets at constant engagement and prove its programs.
-
-    Parameters, result and errors are those of :func:`plan_contour`; every operation is of kind ``pocket``.
-
-    Examples
-    --------
-    >>> plan_pocket(part="a.dxf", stock={}, machine="vmc", material="al7075-t6", cutter=[], limits={},
-    ...             operation={"kind": "contour"})
-    Traceback (most recent call last):
-        ...
-    chipload.errors.InputError: operation.0.kind = 'contour': must be 'pocket'
-    """
-    return run_tables(
-        "contour", folder, progress, ("pocket",), part=part, stock=stock, machine=machine, material=material,
-        cutter=cutters_of(cutter), operation=operation, limits=limits, checks=checks,
-    )  # fmt: skip
 
 
 def plan_impeller(
@@ -107,8 +24,6 @@ def plan_impeller(
 ) -> FinishedJob:
     """Plan the milling of an impeller: the largest cutters that reach its surfaces, and their five-axis programs.
 
-    Result and errors are those of :func:`plan_contour`.
-
     Parameters
     ----------
     impeller : keys of ``[impeller]``
@@ -117,6 +32,18 @@ def plan_impeller(
     machine : a shipped name, a file, or keys of the table
     operation : keys of the ``[[operation]]``
     folder : that file names are relative to
+
+    Returns
+    -------
+    FinishedJob
+        ``result`` with verdict, limits and tracks; ``save(out)`` writes programs and report.
+
+    Raises
+    ------
+    InputError
+        A key is unknown, missing or out of range, or a file cannot be read.
+    Cancelled
+        By ``progress``.
     """
     return run_tables(
         "impeller", folder, progress, impeller=impeller, surface=surface, catalogue=catalogue, machine=machine,
@@ -143,7 +70,7 @@ def plan_thin_wall(
 ) -> FinishedJob:
     """Plan the semi-finishing and finishing of a thin wall so that its deflection stays below a limit.
 
-    Result and errors are those of :func:`plan_contour`.
+    Result and errors are those of :func:`plan_impeller`.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ from chipload.jobs.contour.finish_program import (
 )
 from chipload.jobs.contour.job import ContourJob, left_on_walls
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
-from chipload.jobs.contour.part import read_part, require_within_travel
+from chipload.jobs.contour.part import clear_of_each_other, read_part, require_within_travel
 from chipload.jobs.contour.tables import OperationTable
 from chipload.jobs.contour.written_operation import WrittenOperation
 from chipload.jobs.tables import value_of
@@ -90,9 +90,6 @@ def read_inputs(job: ContourJob) -> Inputs:
     """
     machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
     material = material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
-    for name in ("force_xy_n", "form_error_um"):
-        if name in job.limits:
-            need_directions(material, f"limits.{name}")
     stock, findings, top = _NO_CONTOURS, _NO_FINDINGS, job.table.stock.top_mm
     finish: tuple[FinishProgram, ...] = ()
     levels: tuple[tuple[Contour, ...], ...] = ()
@@ -116,6 +113,33 @@ def read_inputs(job: ContourJob) -> Inputs:
     else:
         contours, stock, findings = read_part(job)
         require_within_travel(contours, machine, max(job.cutters[op.cutter].radius for op in job.operations))
+    _require_machine(job, machine, material)
+    file = job.table.stock.file
+    standing = None if file is None else read_stock(job.path.parent / file)
+    return Inputs(contours, stock, top, finish, levels, standing, machine, material, findings)
+
+
+def inputs_of_contours(
+    job: ContourJob, contours: Sequence[Contour], outline: Sequence[Contour], machine: Machine, material: Material
+) -> Inputs:
+    """Return inputs of contours that are values; ``outline`` is that of the stock, none: material everywhere.
+
+    Raises
+    ------
+    InputError
+        Contours cross, or the machine or the material cannot be used.
+    """
+    used, crossings = clear_of_each_other(tuple(contours))
+    require_within_travel(used, machine, max(job.cutters[op.cutter].radius for op in job.operations))
+    _require_machine(job, machine, material)
+    return Inputs(used, tuple(outline), job.table.stock.top_mm, (), (), None, machine, material, crossings)
+
+
+def _require_machine(job: ContourJob, machine: Machine, material: Material) -> None:
+    """Refuse a material without the forces that are limited, cutters of the wrong hand, and speeds out of range."""
+    for name in ("force_xy_n", "form_error_um"):
+        if name in job.limits:
+            need_directions(material, f"limits.{name}")
     for op in job.operations:
         require_hand(machine, job.cutters[op.cutter])
     for at, rpm in _speeds(job):
@@ -126,9 +150,6 @@ def read_inputs(job: ContourJob) -> Inputs:
                 f"{job.path.name}: {at}.speed_rpm = {rpm:g}: machine {machine.name} turns from "
                 f"{low:g} to {high:g} rpm: state a speed between them"
             )
-    file = job.table.stock.file
-    standing = None if file is None else read_stock(job.path.parent / file)
-    return Inputs(contours, stock, top, finish, levels, standing, machine, material, findings)
 
 
 def _cuts(job: ContourJob, inputs: Inputs) -> list[tuple[OperationTable, Inputs]]:
@@ -172,6 +193,11 @@ def run(job: ContourJob, progress: Progress = silent) -> ContourResult:
     """
     progress(0.0, "reading")
     inputs = read_inputs(job)
+    return plan_inputs(job, inputs, _provenance(job, inputs), progress)
+
+
+def plan_inputs(job: ContourJob, inputs: Inputs, provenance: Provenance, progress: Progress = silent) -> ContourResult:
+    """Plan and check every operation of a job whose files were read, or whose contours are values; errors of run."""
     operations: list[Operation] = []
     cuts = _cuts(job, inputs)
     for k, (op, own) in enumerate(cuts):
@@ -190,7 +216,7 @@ def run(job: ContourJob, progress: Progress = silent) -> ContourResult:
         machine=inputs.machine,
         unchecked=job.unchecked,
         findings=(*(Finding("job-key-unused", 0, text) for text in job.findings), *inputs.findings),
-        provenance=_provenance(job, inputs),
+        provenance=provenance,
     )
 
 
