@@ -102,7 +102,8 @@ def read_nc(
     of_wear: tuple[Finding, ...] = ()
     if {NO_ROOM, UNSTATED} <= codes:
         line = next(f.line for f in findings if f.code == NO_ROOM)
-        commands, findings = read(control=control, units=unit, compensation="wear")
+        kind = "wear"
+        commands, findings = read(control=control, units=unit, compensation=kind)
         message = (
             "the cutter does not fit beside the contour of G41 or G42: its offset is taken as wear alone (0), so that "
             'the path is that of the cutter\'s centre: state program.compensation = "wear" or "control"'

@@ -40,7 +40,7 @@ _STATED = (
 #: D and the number of an offset: no point, no sign between them, no unit
 _OFFSET = re.compile(r"\bD([0-9]{1,8})\b(?![./]|\s*(?:MM|INCH|IN\b|\"))")
 _LENGTH_OFFSET = re.compile(r"\bH\s*[0-9]+\b")
-_UNITS = re.compile(r"\bG\s*(20|21|70|71)\b(?!\.)")
+_UNITS = re.compile(r"\bG\s*(20|21|70|71|700|710)\b(?!\.)")
 
 
 class StatedDiameter(NamedTuple):
@@ -72,7 +72,7 @@ def unit_mm(text: str) -> float:
     (1.0, 25.4)
     """
     found = _UNITS.search(COMMENT.sub(" ", text).upper())
-    return MM_PER["inch"] if found is not None and found[1] in ("20", "70") else 1.0
+    return MM_PER["inch"] if found is not None and found[1] in ("20", "70", "700") else 1.0
 
 
 def _comments(text: str, own: float) -> Iterator[tuple[int, StatedDiameter]]:

@@ -26,13 +26,10 @@ def read(text: str, dialect: str = "fanuc") -> tuple[Commands, list[Finding]]:
 @pytest.mark.parametrize(
     ("block", "rows"),
     [
-        ("G13 I10. F500. D1", 0),
         ("G27 X0. Y0.", 0),
         ("G60 X50.", 0),
         ("G41.1 D1", 0),
         ("M198 P2000", 0),
-        ("G10 L12 P1 R5.", 0),
-        ("G10 L11 P1 R-0.5", 0),
         ("G10 P1 R3.", 0),
         ("G10 L50", 0),
         ("G1 X50. ,A30.", 0),

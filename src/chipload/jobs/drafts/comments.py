@@ -33,7 +33,11 @@ _FUSION = re.compile(rf"\bT(\d+)\s+D={_NUMBER}\s+CR={_NUMBER}(?:\s+TAPER={_NUMBE
 _BLK = re.compile(
     rf"BLK\s+FORM\s+0\.([12])\s+(?:[XYZ]\s+)?X\s*{_NUMBER}\s+Y\s*{_NUMBER}\s+Z\s*{_NUMBER}", re.IGNORECASE
 )
-_WORKPIECE = re.compile(r"WORKPIECE\s*\(([^)]*)\"BOX\"([^)]*)\)", re.IGNORECASE)
+_WORKPIECE = re.compile(r"WORKPIECE\s*\([^)]*\"(BOX|CYLINDER)\"([^)]*)\)", re.IGNORECASE)
+#: radius, length and height of the top of a cylinder
+_BLK_CYLINDER = re.compile(
+    rf"BLK\s+FORM\s+CYLINDER\s+Z\s+R\s*{_NUMBER}\s+L\s*{_NUMBER}(?:\s+DIST\s*{_NUMBER})?", re.IGNORECASE
+)
 _STOCK_SIZE = re.compile(rf"Stock\s+Size\s+X{_NUMBER}\s*Y{_NUMBER}\s*Z{_NUMBER}", re.IGNORECASE)
 #: Vectric: width, length and thickness
 _MATERIAL_SIZE = re.compile(
@@ -285,7 +289,9 @@ def _apt_body(shape: Shape) -> Profile | None:
 
 
 def _stock(text: str, mm: float) -> tuple[Box, str] | None:
-    corners = {hit[1]: tuple(float(hit[k]) for k in (2, 3, 4)) for hit in _BLK.finditer(text)}
+    if re.search(r"\bBEGIN\s+PGM\b[^\n]*\bINCH\b", text[:1000], re.IGNORECASE):
+        mm = MM_PER["inch"]
+    corners = {hit[1]: tuple(mm * float(hit[k]) for k in (2, 3, 4)) for hit in _BLK.finditer(text)}
     if set(corners) == {"1", "2"}:
         low, high = corners["1"], corners["2"]
         if all(a < b for a, b in zip(low, high, strict=True)):
@@ -295,14 +301,11 @@ def _stock(text: str, mm: float) -> tuple[Box, str] | None:
         low, high = stated["min"], stated["max"]
         if len(low) == len(high) == 3 and all(a < b for a, b in zip(low, high, strict=True)):
             return ((low[0], low[1], low[2]), (high[0], high[1], high[2])), "stockMin, stockMax"
-    if hit := _WORKPIECE.search(text):
-        numbers = [part.strip() for part in hit[2].split(",")]
-        try:
-            _, top, bottom, _, x0, y0, x1, y1 = (float(p or 0.0) for p in numbers[-8:])
-        except ValueError:
-            return None
-        if x0 < x1 and y0 < y1 and bottom < top:
-            return ((x0, y0, bottom), (x1, y1, top)), "WORKPIECE"
+    if (hit := _WORKPIECE.search(text)) and (box := _workpiece(hit[1].upper(), hit[2], mm)):
+        return box, "WORKPIECE" if hit[1].upper() == "BOX" else "the box around the cylinder of WORKPIECE"
+    if (hit := _BLK_CYLINDER.search(text)) and float(hit[1]) > 0.0 and float(hit[2]) > 0.0:
+        r, length, top = (float(x or 0.0) * mm for x in hit.groups())
+        return ((-r, -r, top - length), (r, r, top)), "the box around the cylinder of BLK FORM"
     if hit := _MATERIAL_SIZE.search(text):
         x, y, z = (float(hit[k]) * mm for k in (1, 2, 3))
         if min(x, y, z) > 0.0:
@@ -312,6 +315,26 @@ def _stock(text: str, mm: float) -> tuple[Box, str] | None:
         if min(x, y, z) > 0.0:
             return ((0.0, 0.0, -z), (x, y, 0.0)), "Stock Size, with the program's zero at its upper corner"
     return None
+
+
+def _workpiece(kind: str, arguments: str, mm: float) -> Box | None:
+    """The block of WORKPIECE: a mask, Z0, Z1, ZB, then X0, Y0, X1, Y1 of a box or the diameter of a cylinder.
+
+    Bits 16, 32 and 64 of the mask say that X1, Y1 and Z1 are coordinates; else they are lengths from X0, Y0, Z0.
+
+    Reference: Siemens, SINUMERIK Operate, "Blank input" (WORKPIECE).
+    """
+    try:
+        numbers = [float(part.strip() or 0.0) for part in arguments.split(",")[1:]]
+    except ValueError:
+        return None
+    mask, z0, z1, _, *rest = [*numbers, *[0.0] * (8 - len(numbers))]
+    x0, y0, x1, y1 = rest[:4] if kind == "BOX" else (-0.5 * rest[0], -0.5 * rest[0], rest[0], rest[0])
+    bits = int(mask) if kind == "BOX" else int(mask) & 64
+    x1, y1, z1 = (b if bits & bit else a + b for a, b, bit in ((x0, x1, 16), (y0, y1, 32), (z0, z1, 64)))
+    low = min(x0, x1) * mm, min(y0, y1) * mm, min(z0, z1) * mm
+    high = max(x0, x1) * mm, max(y0, y1) * mm, max(z0, z1) * mm
+    return (low, high) if all(a < b for a, b in zip(low, high, strict=True)) else None
 
 
 def _corner(text: str, mm: float) -> tuple[float, ...]:

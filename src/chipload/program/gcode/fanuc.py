@@ -1,17 +1,19 @@
-"""Fanuc's dialect where it differs from LinuxCNC's in what matters.
+"""Fanuc's language, and that of the controls that read like one, where it differs from LinuxCNC's in what matters.
 
-Notation: codes of G are in tenths. P of a dwell is in ms, X and U of G4 in s; K of a cycle repeats it; a series of
-cycles returns to the level where it began (G98) until told otherwise; M98 P51234 calls O1234 five times. After M29,
-and in G84.2 and G84.3, tapping starts the spindle itself. Fine boring (G76) is carried out without its shift in the
-bottom of the hole; back boring (G87) shifts by Q against X, which leaves it unproven, as the machine's own setting
-says where to and the cutter is round. G33 has its lead in F. Macro statements are those of
-:mod:`~chipload.program.gcode.macros`; G68 turns about Z. A tilted plane (G68.2 X Y Z I J K, Haas G268) has an origin
-and Euler angles; G53.1 (G253) turns the tool along its normal (:mod:`~chipload.program.gcode.tilted_plane`).
+Notation: codes of G are in tenths. What differs from control to control (units of a dwell, repeats, starts of the
+spindle, macro arguments, numbers without a point) is in their profiles (:mod:`~chipload.program.control`). M98 P51234
+calls O1234 five times. Fine boring (G76) is carried out without its shift in the bottom of the hole; back boring (G87)
+shifts by Q against X, which leaves it unproven, as the machine's own setting says where to and the cutter is round. G33
+has its lead in F. Macro statements and calls (G65, G66) are those of :mod:`~chipload.program.gcode.macros`; polar,
+scaled and mirrored coordinates (G16, G51, G51.1) of :mod:`~chipload.program.gcode.coordinates`; G12, G13 and G70 to G72
+of a Haas of :mod:`~chipload.program.gcode.haas_cycles`. G68 turns about Z. A tilted plane (G68.2 X Y Z I J K, Haas
+G268) has an origin and Euler angles; G53.1 (G253) turns the tool along its normal
+(:mod:`~chipload.program.gcode.tilted_plane`).
 
-Left out, so that the result is unproven: motions in polar, scaled or mirrored coordinates (G16, G51) and in planes that
-are tilted otherwise (G68.2 P, G68.3, G68 about another axis than Z) until they end, tool vectors (G43.5), modal macros
-(G66), involutes and splines. Noted and left out: smoothing and look-ahead (G5.1, G8), tool offsets by G10 L10 to L13,
-retractions to where only the machine knows.
+Left out, so that the result is unproven: motions in cylindrical and polar interpolation (G7.1, G12.1) and in planes
+that are tilted otherwise (G68.2 P, G68.3, G68 about another axis than Z) until they end, tool vectors (G43.5),
+involutes and splines. Noted and left out: smoothing and look-ahead (G5.1, G8), retractions to where only the machine
+knows.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.coordinates import change_coordinates
 from chipload.program.gcode.cycles import CYCLES, FANUC_BACK_BORING, NEED_Q
 from chipload.program.gcode.dialect import UNREAD, Dialect, NotReadError, go_on, leave_out, lenient
-from chipload.program.gcode.expression import read_value
+from chipload.program.gcode.expression import integer_of, read_value
 from chipload.program.gcode.frames import remove, turn_about
 from chipload.program.gcode.haas_cycles import circular_pocket, hole_pattern
 from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, read_macro_call, system_variables, with_brackets
@@ -91,6 +93,8 @@ IDLE = frozenset(
     | {531, 690, 691, 692, 693, 1030, 1130, 1870}
 )
 EXTENDED = 541
+#: kind of tool offset by L of G10
+TOOL_OFFSETS = {10.0: "length", 11.0: "length wear", 12.0: "radius", 13.0: "radius wear"}
 #: largest rounding or chamfer [mm]
 LARGEST_CORNER = 1e6
 #: G154 P and G234 of a Haas: more work offsets, tip control
@@ -296,15 +300,17 @@ class Fanuc(Dialect):
 
     @staticmethod
     def _tool_offset(words: dict[str, float], c: Controller) -> None:
-        """G10 without L2 and L20: lengths of tools count as 0 (L10), the rest changes the path or the controller."""
-        which, value = words.get("l"), words.get("r", 0.0)
-        if which == 10.0 or (value == 0.0 and which in (None, 11.0, 12.0, 13.0)):
-            c.note("nc-ignored", "G10: offsets of tools that the program sets are left out")
+        """G10 L10 to L13: length and radius of an offset and their wear; the diameter on a Haas."""
+        kind = TOOL_OFFSETS.get(words.get("l", 0.0))
+        if kind is None or "p" not in words or "r" not in words:
+            name = f"G10 L{words['l']:g}" if "l" in words else "G10"
+            c.leave_out("nc-offset-left-out", f"{name}: data of the controller are left out")
             return
-        kinds = {None: "a tool offset", 11.0: "a wear of length", 12.0: "a radius", 13.0: "a wear of radius"}
-        what = kinds.get(which, "data of the controller")
-        radius = f" R{value:g}" if "r" in words else ""
-        c.leave_out("nc-offset-left-out", f"G10{'' if which is None else f' L{which:g}'}{radius}: {what} is left out")
+        if kind.startswith("radius") and "diameter" in c.control.macros.tool_variables.values():
+            kind = kind.replace("radius", "diameter")
+        number, value = integer_of(words["p"], "P"), words["r"] * c.state.scale
+        old = 0.0 if c.state.absolute else c.tool_rows.value(kind, number) or 0.0
+        c.tool_rows.set(kind, number, old + value)
 
     def _holes(self, block: Block, c: Controller) -> None:
         """Tapping, fine and back boring in LinuxCNC's words."""

@@ -257,6 +257,8 @@ def length_offset(c: Controller, block: Block, code: int, axes: Axes) -> None:
         c.with_length |= {number, state.tool}
         _check_length(c, code, number)
         length = nine([math.degrees(x) if 3 <= k < 6 else x for k, x in enumerate(tool.offset)])
+        if number:
+            length = put(length, {2: c.tool_rows.length(number, length[2])})
         new = nine([a + b for a, b in zip(old, length, strict=True)]) if code == 432 else length
     c.rebase(replace(state.datum, length=new))
 
