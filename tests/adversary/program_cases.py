@@ -37,9 +37,10 @@ MAX_FORWARD_VELOCITY = 15000
 LINUXCNC = changes(lambda job: job.tables.update(machine={"file": "mill.ini"}), file("mill.ini", INI))
 TABLE_OF_TOOLS = changes(stated("program", tools="t.tbl"), file("t.tbl", "T1 P1 Z50 D10\n"))
 HEAD = "G21 G90 G17 G94\nG54\nT1 M6\nG43 H1\nS{speed} M3\nG0 X30 Y20 Z10\n"
+DRILL_IN_BLOCK = changes(lambda job: job.tables.update(cutter=[dict(DRILL)]), stated("stock", layer_mm=2.0))
 DRILLING = changes(
     lambda job: job.tables.update(
-        cutter=[dict(DRILL)], stock={"low_mm": (0.0, 0.0, -80.0), "high_mm": (60.0, 40.0, 0.0)}
+        cutter=[dict(DRILL)], stock={"low_mm": (0.0, 0.0, -80.0), "high_mm": (60.0, 40.0, 0.0), "layer_mm": 2.0}
     ),
     stated("machine_table", low_mm=(-200.0, -200.0, -120.0), high_mm=(200.0, 200.0, -90.0)),
 )
@@ -171,7 +172,7 @@ CASES = (
     Case(
         "drill-through",
         "a drill goes 4 mm through the bottom; what lies below is not stated",
-        changes(lambda job: job.tables.update(cutter=[dict(DRILL)]), hole("G81 X30 Y20 Z-24 R2 F600", 6000)),
+        changes(DRILL_IN_BLOCK, hole("G81 X30 Y20 Z-24 R2 F600", 6000)),
         "unproven",
         "below-stock",
     ),
@@ -179,7 +180,7 @@ CASES = (
         "drill-through-table",
         "a drill goes 4 mm through the bottom into the table",
         changes(
-            lambda job: job.tables.update(cutter=[dict(DRILL)]),
+            DRILL_IN_BLOCK,
             stated("machine_table", low_mm=(-200.0, -200.0, -60.0), high_mm=(200.0, 200.0, -22.0)),
             hole("G81 X30 Y20 Z-24 R2 F600", 6000),
         ),
@@ -190,7 +191,7 @@ CASES = (
         "drill-through-above-table",
         "nothing: the table lies 10 mm below the block",
         changes(
-            lambda job: job.tables.update(cutter=[dict(DRILL)]),
+            DRILL_IN_BLOCK,
             stated("machine_table", **TABLE),
             hole("G81 X30 Y20 Z-24 R2 F600", 6000),
         ),
@@ -386,7 +387,7 @@ CASES = (
     Case(
         "layers-deep-hole",
         "a hole of 6 diameters in one motion, by layers",
-        changes(DRILLING, hole("G81 X30 Y20 Z-36 R2 F600", 6000), LAYERS, stated("stock", layer_mm=4.0)),
+        changes(DRILLING, hole("G81 X30 Y20 Z-36 R2 F600", 6000), LAYERS),
         "unproven",
         "deep-hole",
     ),
