@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from adversary import geometry_cases, program_cases
+from adversary import geometry_cases, planner_cases, program_cases
 from adversary.base import Case, require_end
 
 #: tables of cases, one a subject
-SUBJECTS = (geometry_cases, program_cases)
+SUBJECTS = (geometry_cases, planner_cases, program_cases)
 CASES: tuple[Case, ...] = tuple(case for subject in SUBJECTS for case in subject.CASES)
 
 

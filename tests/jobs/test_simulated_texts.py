@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from chipload.errors import InputError, Severity
+from chipload.jobs import load_job
 from chipload.jobs.contour.programs import program_text
 from chipload.jobs.contour.result import findings_of, history_of, limits_of, result_of, samples_of
+from chipload.jobs.contour.run import _plan, read_inputs, verify
 from chipload.jobs.contour.text_simulation import CutColumns, PlaneStock, simulate_text
 from chipload.machine.machine import machine_named
 from chipload.planning.hand import require_hand
@@ -150,3 +152,21 @@ def test_a_machine_without_m4_refuses_a_left_hand_cutter(left):
     machine = replace(left[2].machine, counter_clockwise=False)
     with pytest.raises(InputError, match=r"cutter 1: left_hand = true: cuts under M4, and machine vmc states"):
         require_hand(machine, left[1].cutter)
+
+
+def test_a_plan_that_differs_from_its_path_is_unproven_in_one_sentence(tmp_path):
+    """By 0.2 deg it holds, the difference of two methods; by 5 deg nothing of the plan is proved."""
+    job = load_job(written(tmp_path, {"0": [SMALL]}, operation(MORE))).job
+    inputs = read_inputs(job)
+    (op,) = job.operations
+    cutter = job.cutters[1]
+    (planned,) = _plan(job, inputs, op, cutter, [], silent).strategies.values()
+    cuts = planned.history["engagement_deg"] > 10.0
+    found = []
+    for more in (0.2, 5.0):
+        history = {**planned.history, "engagement_deg": planned.history["engagement_deg"] + more * cuts}
+        found.append(verify(replace(planned, history=history), op, cutter, 0.0, silent))
+    assert [one.verdict for one in found] == [Verdict.HOLDS, Verdict.UNPROVEN]
+    assert re.fullmatch(
+        r"the planned engagement differs by \S+ deg from that of its path at .*, more than 0.5 deg", found[1].text
+    )
