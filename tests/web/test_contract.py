@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 
 from chipload.cli import app
 from chipload.result import Verdict, load_result
+from chipload.result.number_text import number_text
 from square import two_variants, write_by_hand
 from web_lists import press_until
 from web_served import Served
@@ -126,7 +127,7 @@ def rows_of(text: str) -> list[list[str]]:
 
 
 def number(value: float | None) -> str:
-    return "not known" if value is None else f"{value:.4g}"
+    return "not known" if value is None else number_text(value)
 
 
 @pytest.mark.parametrize("name", RUNS)
@@ -168,7 +169,7 @@ def test_every_limit_of_the_job_stands_in_summary_and_report(opened, name: str) 
     checks = {c.name: c for t in load_result(folder).tracks for c in t.limits}
     wanted = [
         (t["name"] + (" in use" if t["in_use"] else ""), checks[c["name"]].column.title, c["state"],
-         f"{c['limit']:g}", number(c["worst"]))
+         number_text(c["limit"], 6), number(c["worst"]))
         for t in summary["tracks"] for c in t["limits"]
     ]  # fmt: skip
     assert sorted(tuple(r[:5]) for r in rows_of(text)) == sorted(wanted)

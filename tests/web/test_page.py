@@ -49,7 +49,10 @@ def test_what_the_folder_holds_is_listed_and_opened(window) -> None:
     page.wait_for_selector(".cl-limits", state="visible")
     assert page.inner_text(".cl-word") == "exceeds"
     assert "cl-no" in page.get_attribute(".cl-verdict", "class")
-    assert page.inner_text(".cl-message") == "Exceeds: line 8: a rapid goes through material; and 1 more."
+    message = page.inner_text(".cl-message")
+    assert message.startswith(
+        "Exceeds: line 8: a rapid goes through material; and 1 more. Critical limit: force 900 N "
+    )
 
 
 def test_limits_and_findings_lead_to_their_place(square) -> None:
