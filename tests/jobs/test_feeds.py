@@ -138,7 +138,7 @@ def test_the_words_of_a_sinumerik_are_changed_too(tmp_path: Path) -> None:
     assert float(word[1]) == pytest.approx(feed, rel=1.2e-3)
     assert read.outcome.feeds.text == text.replace("600", word[1])
     bad = done(tmp_path, SLOT, "force_n = 50.0\n", job=job)
-    first, rest = bad.presentation.files()["0-feeds.mpf"].decode().split("\n", 1)
+    first, rest = bad.presentation.files(bad.result)["0-feeds.mpf"].decode().split("\n", 1)
     assert first.startswith("; a slot ; NOT VERIFIED: Exceeds: force ")
     assert rest == bad.outcome.feeds.text.split("\n", 1)[1]
 
@@ -200,7 +200,7 @@ def test_what_no_feed_can_hold_is_listed_and_said_in_the_first_line(tmp_path: Pa
         assert row["slowest"]
         assert row["factor"] == pytest.approx(0.1)
         assert row["allowed"] == 50.0 < row["worst"] < row["before"]
-    text = read.presentation.files()["0-feeds.ngc"].decode()
+    text = read.presentation.files(read.result)["0-feeds.ngc"].decode()
     first, rest = text.split("\r\n", 1)
     assert re.fullmatch(r"G21 G90 G94 G17 \(NOT VERIFIED: [ -~]+\)", first)
     assert rest == read.outcome.feeds.text.split("\r\n", 1)[1]
@@ -220,7 +220,8 @@ def test_lines_that_would_rub_are_listed(tmp_path: Path) -> None:
     )
     assert rubs.outcome.feeds.rubs == ((6, pytest.approx(0.02)),)
     assert rubs.result.verdict is Verdict.EXCEEDS
-    assert rubs.result.message == "Exceeds: line 6: feed per tooth 0.02 mm is less than 0.05 mm."
+    first = "Exceeds: line 6: feed per tooth 0.02 mm is less than 0.05 mm. Critical limit: force 132.4 of 620 N, "
+    assert rubs.result.message.startswith(first)
 
 
 def test_a_limit_is_used_up(tmp_path: Path) -> None:
