@@ -53,7 +53,7 @@ def holder(overhang: float, *parts: tuple[float, float], depth: float = 15.0) ->
 
 def around(*, tab: float = 0.0, floor: float = 0.0) -> list[str]:
     """A square of 16 mm that is cut out, with a tab of a height or a floor, and then milled on its top."""
-    deep = -8.5 if floor == 0.0 else -8.0 + floor
+    deep = -8.0 if floor == 0.0 else -8.0 + floor
     high = [f"G1 Z{tab - 8.0}", "G1 X26", f"G1 Z{deep}"] if tab else []
     return [
         "G0 X15 Y7 Z10", f"G1 Z{deep} F300", "G1 X41 F900", "G1 Y33", *high, "G1 X15", "G1 Y7", "G0 Z10",
@@ -114,11 +114,11 @@ CASES = (
         "holds", "",
     ),
     Case(
-        "part-off", "a half of the block is cut free and milled on", text(*across(-8.0, -16.0, -20.5), *AFTER),
+        "part-off", "a half of the block is cut free and milled on", text(*across(-8.0, -16.0, -20.0), *AFTER),
         "unproven", "loose-stock",
     ),
     Case(
-        "part-off-layers", "the same by layers", changes(LAYERS, text(*across(-8.0, -16.0, -20.5), *AFTER)), "unproven",
+        "part-off-layers", "the same by layers", changes(LAYERS, text(*across(-8.0, -16.0, -20.0), *AFTER)), "unproven",
         "loose-stock",
     ),
     Case(
@@ -127,9 +127,9 @@ CASES = (
     ),
     Case("part-off-tab", "nothing: a tab of 2 mm holds it", changes(PLATE, text(*around(tab=2.0))), "holds", ""),
     Case("part-off-floor", "nothing: a floor of 0.3 mm", changes(PLATE, text(*around(floor=0.3))), "holds", ""),
-    Case("part-off-last", "nothing: cut free at the end", text(*across(-8.0, -16.0, -20.5)), "holds", ""),
+    Case("part-off-last", "nothing: cut free at the end", text(*across(-8.0, -16.0, -20.0)), "holds", ""),
     Case(
-        "part-off-before", "nothing: milled first, then cut free", text(*AFTER, "G0 Z10", *across(-8.0, -16.0, -20.5)),
+        "part-off-before", "nothing: milled first, then cut free", text(*AFTER, "G0 Z10", *across(-8.0, -16.0, -20.0)),
         "holds", "",
     ),
     Case(

@@ -7,6 +7,7 @@ leans, shank and holder are compared with points of the stock; loose stock and s
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from chipload.checking.outcome import StockCheck
 from chipload.checking.part_place import find_misplaced_part
 from chipload.checking.preparation import Bodies
 from chipload.checking.workpiece import default_spacing, stock_box
+from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, Severity
 from chipload.program.program import Program
 from chipload.progress import Progress
@@ -45,7 +47,7 @@ def check_stock(
     placed = () if part is None else find_misplaced_part(part.mesh.bounds, part.mesh.volume, *stock_box(stock))
     if leans(bodies.program).any():
         return replace(_leaning(inputs, stock), findings=placed)
-    pitch = pitch_at(inputs, bodies.program, stock)
+    pitch = pitch_at(inputs.cutters, bodies.program, stock, op.stock_points_mm)
     what = "shank and holder in the stock"
     progress(0.0, what)
     found = follow_heights(steps, inputs.cutters, stock, pitch, op.tolerance_mm, lambda done: progress(0.0, what), kept)
@@ -68,25 +70,40 @@ def check_stock(
     return StockCheck((*placed, *findings), touched, hidden, tuple(unchecked))
 
 
-def pitch_at(inputs: CheckInputs, program: Program, stock: LayeredStock) -> float:
+def contact_findings(
+    program: Program, steps: StepBlocks, cutters: Mapping[int, Cutter], stock: LayeredStock, tolerance: float
+) -> tuple[Finding, ...]:
+    """Return the contacts of shank and holder of upright tools with a stock, for a program that a planner has written.
+
+    Parameters
+    ----------
+    stock : before the program
+    tolerance : of the path [mm]
+    """
+    if not any(_dips(cutters[n], n, program, stock_box(stock)[1]) for n in cutters):
+        return ()
+    found = follow_heights(steps, cutters, stock, pitch_at(cutters, program, stock), tolerance)
+    return tuple(
+        Finding("collision", c.line, f"{c.what} goes {c.depth_mm:.3g} mm into stock", Severity.EXCEEDS, c.place, c.step)
+        for c in found.contacts
+    )
+
+
+def pitch_at(
+    cutters: Mapping[int, Cutter], program: Program, stock: LayeredStock, stated: float | None = None
+) -> float:
     """Return the distance of the columns [mm]: closer where a wide shank or holder goes below the top of the stock."""
     low, high = stock_box(stock)
-    pitch = pitch_of(low, high, inputs.cutters)
-    if any(_dips(inputs, program, n, low, high) for n in inputs.cutters):
+    pitch = pitch_of(low, high, cutters)
+    if any(_dips(cutters[n], n, program, high) for n in cutters):
         pitch = max(pitch / CLOSER, math.sqrt(float(np.prod(high[:2] - low[:2]))) / 1000.0)
-    stated = inputs.settings.stock_points_mm
     return pitch if stated is None else min(pitch, stated)
 
 
-def _dips(inputs: CheckInputs, program: Program, number: int, low: Floats, high: Floats) -> bool:
+def _dips(cutter: Cutter, number: int, program: Program, high: Floats) -> bool:
     """Return whether a part above the flutes that is wider than the cutter goes below the top of the stock."""
-    cutter, own = inputs.cutters[number], program.tool == number
-    tip = np.asarray(program.p_work)[own]
-    for _, radius, z in bands_of(cutter):
-        near = ((tip[:, :2] > low[:2] - radius) & (tip[:, :2] < high[:2] + radius)).all(axis=1)
-        if 2.0 * radius > cutter.diameter and (near & (tip[:, 2] + z < high[2])).any():
-            return True
-    return False
+    tip = np.asarray(program.p_work)[program.tool == number]
+    return any(2.0 * radius > cutter.diameter and (tip[:, 2] + z < high[2]).any() for _, radius, z in bands_of(cutter))
 
 
 def _leaning(inputs: CheckInputs, stock: LayeredStock) -> StockCheck:

@@ -209,6 +209,9 @@ class ProgramChecksTable(ChecksTable):
 class WallChecksTable(ProgramChecksTable):
     """Default checks. `false` switches a check off; the report lists the checks that are off."""
 
+    shank_in_stock: bool = _switch(
+        "shank_in_stock", "check shank, neck and holder against the stock as it is at each moment"
+    )
     slender_walls: bool = _switch(
         "slender_walls",
         "report walls that are left more slender than wall_slenderness, where no [workpiece] states how they deflect",
@@ -228,9 +231,6 @@ class StockChecksTable(WallChecksTable):
         "gouge",
         "check the deepest cut into the [part] against 0.1 mm, the least medium deviation of ISO 2768-1, if no limit "
         "is stated",
-    )
-    shank_in_stock: bool = _switch(
-        "shank_in_stock", "check shank, neck and holder against the stock as it is at each moment"
     )
     loose_stock: bool = _switch(
         "loose_stock", "check that no piece is cut on that the program has cut free of the stock"

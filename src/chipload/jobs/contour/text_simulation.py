@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from chipload.checking.default_checks import DefaultChecks
 from chipload.checking.preparation import with_tool
+from chipload.checking.stock_check import contact_findings
 from chipload.checking.workpiece import insides, stock_box
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import greatest_forces
@@ -247,6 +248,9 @@ def simulate_text(
     around = ProgramSurroundings(
         insides(body), *stock_box(body), True, reading.stops, reading.retractions, reading.program
     )
+    steps = StepBlocks(program, step_mm, TOLERANCE_MM)
+    off = "shank_in_stock" in columns.checks.off
+    contacts = () if off else contact_findings(program, steps, cutters, body, TOLERANCE_MM)
     removal = remove(
         program, body, cutters, columns.checks.material, fine, watch=watch, times=times,
         engine="auto", progress=progress,
@@ -265,9 +269,9 @@ def simulate_text(
     found["engagement_deg"] = np.where(cuts, level.max(axis=1), found["engagement_deg"])
     most = level.max(axis=0, initial=0.0)
     errors = {**removal.resolution_error, "engagement_deg": float(np.ptp(most) / most.max()) if most.any() else 0.0}
-    steps = StepBlocks(program, step_mm, TOLERANCE_MM)
     findings = (
         *_findings(reading),
+        *contacts,
         *(replace(f, severity=Severity.EXCEEDS) if f.code == "rapid-cuts" else f for f in removal.findings),
         *reversed_cuts(steps, removal.columns, cutters),
         *program_findings(program, steps, removal.columns, cutters, around),
