@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from chipload.cli.app import Debug, MachineName, Sets, Tools, app
-from chipload.cli.inputs import show_limits, show_verdict
+from chipload.cli.inputs import show_verdict
 from chipload.errors import InputError
 from chipload.terminal import bar, guarded, show
 
@@ -137,8 +137,7 @@ def simulate(
             with bar() as progress:
                 done = run_job(loaded, progress, guesses=Severity.UNPROVEN)
                 target = write_finished(done.result, done.presentation, out) if out is not None else None
-        show_verdict(done.result)
-        show_limits(done.result)
+        show_verdict(done.result, worst=True)
         more = "" if written else f"; chipload init {file} DIR writes the job"
         show(f"{done.result.verdict.value}: a first result{more}")
         if target is not None:

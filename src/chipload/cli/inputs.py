@@ -70,9 +70,16 @@ def feed_of(mm_min: float | None) -> float | None:
     return mm_s_from_mm_min(mm_min)
 
 
-def show_verdict(result: Result) -> None:
-    """Show the first lines of a verdict: state and critical limit, then what is not covered and not checked."""
-    for line in result.first_lines:
+def show_verdict(result: Result, *, worst: bool = False) -> None:
+    """Show the first lines of a verdict: state and critical limit, then what is not covered and not checked.
+
+    ``worst``: the worst value of each limit stands below the first line.
+    """
+    message, *more = result.first_lines
+    show(message)
+    if worst:
+        show_limits(result)
+    for line in more:
         show(line)
 
 

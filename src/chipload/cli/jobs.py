@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from chipload.cli.app import Accept, Debug, JobFile, Sets, app
-from chipload.cli.inputs import show_limits, show_verdict
+from chipload.cli.inputs import show_verdict
 from chipload.errors import Cancelled, InputError, Severity
 from chipload.terminal import bar, guarded, show, write_line
 
@@ -91,9 +91,7 @@ def run(
                     "--fresh it starts from the beginning"
                 ) from None
             kept.discard()
-        show_verdict(done.result)
-        if coarse:
-            show_limits(done.result)
+        show_verdict(done.result, worst=coarse)
         show(f"report: {target / 'report.html'}")
         return done.result.verdict.exit_code
 
