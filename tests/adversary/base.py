@@ -4,7 +4,8 @@ The base job mills a slot 2 mm deep through a block of 60 x 40 x 20 mm of alumin
 :class:`Case` changes one thing in it; :func:`end_of` runs the job and returns how it ends. A capability with a job of
 its own states it as ``base``.
 
-To add cases, make ``tests/adversary/<subject>_cases.py`` with a tuple ``CASES`` and name it in ``test_adversary.py``.
+To add cases, make ``tests/adversary/<subject>_cases.py`` with a tuple ``CASES``, name it in ``subjects.py``, and run
+``python benchmarks/adversary.py --page``.
 """
 
 from __future__ import annotations

@@ -6,12 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from adversary import geometry_cases, planner_cases, program_cases
 from adversary.base import Case, require_end
+from adversary.subjects import CASES, page_table
 
-#: tables of cases, one a subject
-SUBJECTS = (geometry_cases, planner_cases, program_cases)
-CASES: tuple[Case, ...] = tuple(case for subject in SUBJECTS for case in subject.CASES)
+PAGE = Path(__file__).parents[2] / "docs" / "reliability.md"
 
 
 def test_each_case_has_a_name_of_its_own() -> None:
@@ -22,3 +20,7 @@ def test_each_case_has_a_name_of_its_own() -> None:
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_a_job_with_one_thing_wrong(case: Case, tmp_path: Path) -> None:
     require_end(case, tmp_path)
+
+
+def test_the_page_has_the_table_of_the_cases() -> None:
+    assert page_table() in PAGE.read_text(), "run: python benchmarks/adversary.py --page"
