@@ -12,6 +12,7 @@ import pytest
 from tests.rs274 import MISSING, canonical, rs274_installed
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
+from chipload.cutter.cutter import Cutter
 from chipload.jobs.impeller.channels import channel_repeat
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import machine_named
@@ -26,6 +27,7 @@ from chipload.planning.impeller.tables import index_table
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import RAPID
 from chipload.program.read import read_program
+from chipload.program.read_back import text_findings
 from chipload.program.release import NOT_SIMULATED
 
 MACHINE = machine_named("horizontal-b")
@@ -220,3 +222,12 @@ def test_a_pallet_with_ends_is_not_turned_beyond_them(impeller):
     )
     assert channel_repeat(program, short, index_table(MACHINE), BLADES) is None
     assert channel_repeat(program, MACHINE, index_table(MACHINE), BLADES) is not None
+
+
+def test_the_text_reads_back_as_the_checked_program(written):
+    """Row by row: tip, axis, tool, spindle and kind of motion; a spindle turned the other way is found."""
+    program, text = written
+    cutters = {int(program.tool[0]): Cutter(12.0, 4, 0.5, 45.0, 60.0, 5.8e5, corner_radius=2.0)}
+    assert text_findings(text, "impeller.ngc", MACHINE, cutters, program) == ()
+    (wrong, *_) = text_findings(text.replace(" M3", " M4"), "impeller.ngc", MACHINE, cutters, program)
+    assert wrong.code == "spindle-reversed"
