@@ -31,7 +31,14 @@ Sets = Annotated[
 MachineName = Annotated[
     str | None, typer.Option("--machine", metavar="MACHINE", help="a shipped machine, or a file (.toml, LinuxCNC .ini)")
 ]
-Tools = Annotated[Path | None, typer.Option("--tools", metavar="FILE", help="LinuxCNC tool table (.tbl)")]
+Tools = Annotated[
+    Path | None,
+    typer.Option(
+        "--tools",
+        metavar="FILE",
+        help="LinuxCNC tool table (.tbl); init also takes a tool library of Fusion (.json, .tools)",
+    ),
+]
 DialectName = Annotated[
     str | None,
     typer.Option("--dialect", help="linuxcnc, fanuc, sinumerik, heidenhain or apt; default: by the file extension"),

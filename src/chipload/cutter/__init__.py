@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
     from chipload.cutter.cutter import Cutter
     from chipload.cutter.fctb import read_fctb
-    from chipload.cutter.fusion import read_fusion_tool
+    from chipload.cutter.fusion import read_fusion_library, read_fusion_tool
     from chipload.cutter.iso13399 import read_iso13399
     from chipload.cutter.slices import Slices
     from chipload.cutter.strength import ToolMaterial, ToolStrength
@@ -31,6 +31,7 @@ __all__ = [
     "read_camotics_tool",
     "read_catalogue",
     "read_fctb",
+    "read_fusion_library",
     "read_fusion_tool",
     "read_iso13399",
     "read_tool_table",
@@ -46,7 +47,7 @@ __getattr__, __dir__ = attach(
         "strength": "ToolMaterial ToolStrength",
         "camotics": "read_camotics_tool",
         "fctb": "read_fctb",
-        "fusion": "read_fusion_tool",
+        "fusion": "read_fusion_library read_fusion_tool",
         "iso13399": "read_iso13399",
         "tooltable": "read_tool_table",
     },

@@ -65,6 +65,35 @@ def read_fusion_tool(path: str | Path, tool: int | None) -> dict[str, Any]:
     return _cutter(chosen, tool, f"{label}: tool {tool if tool is not None else ''}".rstrip())
 
 
+def read_fusion_library(path: str | Path) -> dict[int, dict[str, Any]]:
+    """Read the tools of a library by their post-process numbers, as :func:`read_fusion_tool` does.
+
+    Holders, probes, tools without a number, and numbers that two tools have are left out; so are tools whose shape is
+    not supported.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or has no tool with a number that can be used.
+    """
+    label = f"tools {path}"
+    tools = [t for t in _tools(path, label) if t.get("type") not in ("holder", "probe")]
+    posts = [t.get("post-process") for t in tools]
+    numbers = [p.get("number") if isinstance(p, dict) else None for p in posts]
+    out: dict[int, dict[str, Any]] = {}
+    refused: list[InputError] = []
+    for tool, number in zip(tools, numbers, strict=True):
+        if not isinstance(number, int) or number < 0 or numbers.count(number) > 1:
+            continue
+        try:
+            out[number] = _cutter(tool, number, f"{label}: tool {number}")
+        except InputError as error:
+            refused.append(error)
+    if not out:
+        raise refused[0] if refused else InputError(f"{label}: no tool has a post-process number of its own")
+    return out
+
+
 def _tools(path: str | Path, label: str) -> list[dict[str, Any]]:
     data = read_regular(path, label, _LARGEST_FILE, "not a tool library")
     try:

@@ -13,7 +13,7 @@ from chipload.jobs.drafts.draft import DraftTable, Entry
 KEYS = (
     "diameter_mm", "corner_radius_mm", "barrel_radius_mm", "corner_e_mm", "bottom_deg", "taper_deg",
     "flutes", "helix_deg", "flute_length_mm",
-    "overhang_mm", "shank_diameter_mm", "modulus_gpa", "body_mm",
+    "overhang_mm", "shank_diameter_mm", "modulus_gpa", "tool_material", "body_mm", "thread_pitch_mm",
 )  # fmt: skip
 
 
@@ -39,7 +39,9 @@ def cutter_table(number: int, sources: Iterable[Stated], deepest: float = 0.0) -
         elif key in guessed:
             entries.append(Entry(key, *guessed[key], True))
     entries += [
-        Entry("holder_mm", note="length and diameter of its parts: collisions", example="[[30.0, 25.0]]"),
+        Entry("holder_mm", *stated["holder_mm"])
+        if "holder_mm" in stated
+        else Entry("holder_mm", note="length and diameter of its parts: collisions", example="[[30.0, 25.0]]"),
         Entry("gullet_mm2", note="area between two teeth: room for chips", example="8.0"),
     ]
     return DraftTable("cutter", tuple(entries), repeated=True)

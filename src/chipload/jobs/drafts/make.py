@@ -19,7 +19,7 @@ def draft_of(
     file : NC text, CL data, a CAMotics project, DXF, STEP, FreeCAD document or blade sections
     folder : of the job, to which file names are relative
     machine : a shipped name or a file (TOML); None: guessed
-    tools : a LinuxCNC tool table of a program
+    tools : a LinuxCNC tool table of a program, or a tool library of Fusion, whose tools are assigned by number
     job : a CAM job of a FreeCAD document, by name or label; None: the first
 
     Raises
@@ -51,4 +51,13 @@ def draft_of(
 
     if holds_sections(file):
         return draft_sections(file, folder, machine)
+    if tools is not None and tools.suffix.lower() in (".json", ".tools"):
+        from chipload.cutter.fusion import read_fusion_library
+
+        where = f"the library {tools.name}"
+        library = {
+            number: {key: (value, where) for key, value in values.items() if key != "number"}
+            for number, values in read_fusion_library(tools).items()
+        }
+        return draft_program(file, folder, Known(machine=machine, cutters=library))
     return draft_program(file, folder, Known(machine=machine, tools=tools))
