@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import shapely
@@ -199,3 +200,29 @@ GOUGES = (
     Case("gouge-under", "the part stands 30 mm under its stock", part(shift=-30.0), "unproven", "part-misplaced"),
 )  # fmt: skip
 CASES = (*CASES, *GOUGES)
+
+
+def tilted(shank_mm: float) -> Change:
+    """Slots along y with the axis tilted by 20 deg towards x, as cutter locations on a five-axis machine."""
+
+    def change(job: Job) -> None:
+        axis = f"{math.sin(math.radians(20.0)):.9f},0,{math.cos(math.radians(20.0)):.9f}"
+        rows = ["PARTNO/T", "UNITS/MM", "LOADTL/1", "SPINDL/6000,CLW", "MULTAX/ON", "RAPID", f"GOTO/30,-30,20,{axis}"]
+        for z in (-2.0, -4.0):
+            rows += ["RAPID", f"GOTO/30,-30,{z},{axis}", "FEDRAT/900,MMPM", f"GOTO/30,70,{z},{axis}"]
+            rows += ["RAPID", f"GOTO/30,70,40,{axis}", "RAPID", f"GOTO/30,-30,40,{axis}"]
+        job.files["p.apt"] = "\n".join([*rows, "SPINDL/OFF", "FINI"]) + "\n"
+        job.tables["program"] = {"file": "p.apt"}
+        job.tables["machine"] = {"name": "xyzbc-trunnion"}
+        job.cutter.update(flute_length_mm=8.0, shank_diameter_mm=shank_mm)
+
+    return change
+
+
+CASES = (
+    *CASES,
+    # its lowest place is at -4 + 8 cos 20 - 20 sin 20 deg = -3.3 mm
+    Case("shank-tilted", "a shank of 40 mm, tilted by 20 deg, goes 3 mm below the top", tilted(40.0), "exceeds",
+         "collision"),
+    Case("shank-tilted-slim", "nothing: a shank as wide as the cutter", tilted(10.0), "holds", ""),
+)  # fmt: skip

@@ -365,7 +365,10 @@ def test_check_opens_the_bodies_of_a_job(tmp_path: Path, name: str) -> None:
     [
         ("stock.layer_mm=1e-9", r"stock\.layer_mm = 1e-09: .* layers: must be at most 200000|stock\.layer_mm"),
         ("operation.0.step_mm=1e-8", r"operation\.0\.step_mm = 1e-08: .* steps: must be at most 50000000"),
-        ("operation.0.stock_points_mm=1e-9", r"operation\.0\.stock_points_mm = 1e-09: .* points: must be at most"),
+        (
+            "operation.0.stock_points_mm=1e-9",
+            r"operation\.0\.stock_points_mm = 1e-09: .* columns of the stock: must be at most",
+        ),
     ],
 )
 def test_check_refuses_the_sizes_that_run_refuses(tmp_path: Path, change: str, message: str) -> None:
