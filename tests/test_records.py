@@ -15,6 +15,7 @@ SOURCE = Path(chipload.__file__).parent
 FIELDS, LINES, FILE = 12, 90, 500
 #: keys that users write or read: to divide the record would move the keys, or write each of them twice
 KEYS = {
+    "checking/settings.CheckSettings": "[checks]",
     "control/hal.HalJob": "hal.toml",
     "control/override.Override": "[torque_control.override] and hal.toml",
     "control/_override.Rules": "the same, as plain numbers for the compiled controller",

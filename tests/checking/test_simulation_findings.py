@@ -18,11 +18,10 @@ def test_a_rapid_that_cuts_exceeds_and_a_program_that_was_handed_over_is_noted()
     again = tuple(Finding("rapid-cuts", line, "a rapid goes through material", Severity.EXCEEDS) for line in (3, 9))
     simulation: Any = SimpleNamespace(
         removal=removal,
-        collisions=CollisionCheck(),
+        collisions=CollisionCheck(stock=StockCheck(again)),
         workpiece=None,
         checks=checks,
         skipped=None,
-        stock_check=StockCheck(again),
     )
     found = [(f.code, f.line, f.severity) for f in simulation_findings(simulation)]
     rapids = [("rapid-cuts", line, Severity.EXCEEDS) for line in (3, 9)]

@@ -88,9 +88,9 @@ def program_presentation(
 def _blanks(program: ProgramResult, result: Result) -> dict[str, Blank]:
     """Return the initial stock for the page; it is the same for every track."""
     simulated = program.simulated
-    if simulated is None or simulated.blank is None:
+    if simulated is None or simulated.collisions.stock.blank is None:
         return {}
-    return {track.name: Blank(simulated.blank, program.cutters) for track in result.tracks}
+    return {track.name: Blank(simulated.collisions.stock.blank, program.cutters) for track in result.tracks}
 
 
 def _samples(program: ProgramResult, result: Result) -> dict[str, EngagementSamples]:

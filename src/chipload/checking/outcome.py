@@ -27,24 +27,6 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class CollisionCheck:
-    """Collisions of cutter, shank and holder, and the bodies with which they were compared.
-
-    Parameters
-    ----------
-    found : the collisions
-    compared_with : names of the bodies that were compared
-    no_holder : tools whose holder is not stated
-    fixtures : bodies that no tool may touch, by name
-    """
-
-    found: tuple[Collision, ...] = ()
-    compared_with: tuple[str, ...] = ()
-    no_holder: tuple[int, ...] = ()
-    fixtures: Mapping[str, trimesh.Trimesh] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False)
 class StockCheck:
     """Findings on the stock as it is at each moment, and what they cannot show.
 
@@ -54,12 +36,34 @@ class StockCheck:
     touched : contacts of shank and holder
     hidden_mm : depth of a contact that the check may miss, and thickness of what it may miss
     unchecked : what was not checked, in sentences
+    blank : the stock before the program; None: layers that were cut before
     """
 
     findings: tuple[Finding, ...] = ()
     touched: tuple[Collision, ...] = ()
     hidden_mm: float = 0.0
     unchecked: tuple[str, ...] = ()
+    blank: trimesh.Trimesh | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionCheck:
+    """Collisions of cutter, shank and holder, and the bodies with which they were compared.
+
+    Parameters
+    ----------
+    found : the collisions
+    compared_with : names of the bodies that were compared
+    no_holder : tools whose holder is not stated
+    fixtures : bodies that no tool may touch, by name
+    stock : what was found in the stock as it is at each moment
+    """
+
+    found: tuple[Collision, ...] = ()
+    compared_with: tuple[str, ...] = ()
+    no_holder: tuple[int, ...] = ()
+    fixtures: Mapping[str, trimesh.Trimesh] = field(default_factory=dict)
+    stock: StockCheck = field(default_factory=StockCheck)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +83,6 @@ class SimulationResult:
     rigid : compliant components that are not stated and count as rigid
     stability : margins and quiet speeds; None: no modes are stated
     workpiece : compliance of the workpiece where it is cut; None: no [workpiece] is stated
-    blank : the stock before the program
-    stock_check : findings on the stock as it is at each moment
     skipped : with block delete on, where the program moves otherwise then
     """
 
@@ -95,8 +97,6 @@ class SimulationResult:
     rigid: tuple[str, ...] = ()
     stability: StabilityResult | None = None
     workpiece: WorkpieceCompliance | None = None
-    blank: trimesh.Trimesh | None = None
-    stock_check: StockCheck = field(default_factory=StockCheck)
     skipped: SimulationResult | None = None
 
     @property

@@ -137,7 +137,7 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
             out.append(f"gouges narrower than {narrow:.2g} mm, by the corner or the point of a cutter alone")
         if "excess_mm" in simulation.limits:
             out.append("excess between the points of the part: part.spacing_mm")
-    out += simulation.stock_check.unchecked
+    out += simulation.collisions.stock.unchecked
     if not any(name.startswith("fixture") for name in simulation.collisions.compared_with):
         out.append("fixtures: none is stated")
     if simulation.collisions.no_holder:
@@ -165,7 +165,7 @@ def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
         text = f"{c.what} goes {c.depth_mm:.3g} mm into {c.into}"
         out.append(Finding("collision", c.line, text, Severity.EXCEEDS, place, int(c.step)))
     known = {(f.code, f.line) for f in out}
-    out += [f for f in simulation.stock_check.findings if f.code != "rapid-cuts" or (f.code, f.line) not in known]
+    out += [f for f in simulation.collisions.stock.findings if f.code != "rapid-cuts" or (f.code, f.line) not in known]
     if simulation.workpiece is not None:
         out += simulation.workpiece.findings
     out += _bodies(simulation)

@@ -113,7 +113,7 @@ def simulate_program(
     blank = None if stock.cut.any() else stock.body()
     kept = KeptPasses(checkpoint, passes_key(inputs, bodies.program) if checkpoint is not None else "")
     steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
-    stock_check = check_stock(inputs, bodies, stock, steps, kept, progress)
+    stock_check = replace(check_stock(inputs, bodies, stock, steps, kept, progress), blank=blank)
     watches = [with_checks(inputs.checks, material, deflecting(gives, material))]
 
     def passing(share: float, what: str) -> Counted:
@@ -163,8 +163,8 @@ def simulate_program(
         skipped = simulate_program(inputs, reading.skipped, initial, workers=workers)
     return SimulationResult(
         removal, stock, machine, inputs.limits, {"kind": "simulate", **op.stated}, bodies.checks, touched, left,
-        gives.unknown, None if stability_watch is None else stability_of(inputs, stability_watch), compliance, blank,
-        stock_check, skipped,
+        gives.unknown, None if stability_watch is None else stability_of(inputs, stability_watch), compliance,
+        skipped,
     )  # fmt: skip
 
 
@@ -235,7 +235,8 @@ def _collision_check(
         touched += in_stock(steps, cutters, bodies.stock_points, tolerance, watching, kept)
     compared_with = (*solids, *(["stock"] if inputs.checks.shank_in_stock else []))
     no_holder = tuple(n for n, c in sorted(cutters.items()) if not c.holder)
-    return CollisionCheck(touched, compared_with, no_holder, inputs.surroundings.fixture_meshes(inputs.machine))
+    fixtures = inputs.surroundings.fixture_meshes(inputs.machine)
+    return CollisionCheck(touched, compared_with, no_holder, fixtures, stock_check)
 
 
 def passes_key(inputs: CheckInputs, program: Program) -> str:
