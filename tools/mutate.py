@@ -57,6 +57,7 @@ FILES = (
     "cutting/band.py",
     "engagement/contact.py",
     "engagement/tooth_engagement.py",
+    "engagement/tooth_surfaces.py",
     "control/limit.py",
     "control/override.py",
     "control/spindle.py",
@@ -83,6 +84,7 @@ KERNELS = (
     "control/_override.py",
     "control/_plant.py",
     "engagement/_contact.py",
+    "engagement/_tooth_chips.py",
 )
 #: tests that are collected
 TESTS = (

@@ -12,7 +12,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.band import band_over_turn, mean_band, peak_band
 from chipload.cutting.force import forces_over_turn, in_work, mean_forces
 from chipload.cutting.material import Material, material_named
-from chipload.engagement.tooth_engagement import engagement_of_arcs, with_runout
+from chipload.engagement.tooth_engagement import engagement_of_arcs
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 
 MILL = Cutter(10.0, 3, math.radians(30.0), 25.0, 35.0, 6e5)
@@ -88,7 +89,7 @@ def test_refuses_a_material_that_does_not_say():
 def test_the_band_of_the_greatest_force_is_that_of_materials_drawn_at_random(runout):
     """2000 materials, each coefficient wrong by itself by 2 %: the scatter of |F| and of the torque at the peak."""
     mill = replace(MILL, runout=runout)
-    engagement = with_runout(BITES, mill)
+    engagement = chips_of_teeth(BITES, mill)
     al = replace(material_named("al7075-t6"), spread=0.02)
     theta = np.linspace(0.0, math.tau, 181)
     force, torque = forces_over_turn(engagement, mill, al, theta)

@@ -1,4 +1,4 @@
-"""Fits against the textbook's means and against forces that are summed slice by slice here.
+"""Fits against forces by the true paths of the teeth, slice by slice.
 
 N teeth, a depth, c feed per tooth, phi immersion, K as in chipload.cutting.material.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,43 +17,30 @@ from chipload.cutting.fit import NAMES, aligned, fit_average, predict, predicted
 from chipload.cutting.fit_turns import fit_instantaneous
 from chipload.cutting.turns import MeasuredCut, turns_of
 from chipload.errors import InputError
+from engagement.tooth_paths import loads
 
 X = np.array([850.0, 260.0, 140.0, 18.0, 22.0, -3.0])
 SPEED = 100.0 * math.tau
 MILL = Cutter(12.0, 4, math.radians(35.0), 26.0, 40.0, 6e5)
 
 
-def textbook(x, arc, teeth, depth, c):
-    """Mean forces on the cutter along T, n and the axis [Altintas2012, mean forces per tooth period]."""
-    ktc, krc, kac, kte, kre, kae = x
-    p, q = arc
-
-    def between(f):
-        return f(q) - f(p)
-
-    half = teeth * depth / math.tau
-    fx = half * c / 4.0 * between(lambda a: ktc * math.cos(2 * a) - krc * (2 * a - math.sin(2 * a)))
-    fx += half * between(lambda a: -kte * math.sin(a) + kre * math.cos(a))
-    fy = half * c / 4.0 * between(lambda a: ktc * (2 * a - math.sin(2 * a)) + krc * math.cos(2 * a))
-    fy -= half * between(lambda a: kte * math.cos(a) + kre * math.sin(a))
-    fz = half * between(lambda a: kac * c * math.cos(a) - kae * a)
-    return np.array([fx, fy, fz])
-
-
-def sliced(theta, x, cutter, arc, depth, c, slices=60):
-    """Forces on the cutter (m, 3) summed over thin discs, each tooth cutting what the ones before left."""
-    n, (e, direction) = cutter.flutes, cutter.runout
-    r = e * np.cos(direction - math.tau * np.arange(n) / n)
+def sliced(theta, x, cutter, arc, depth, c, slices=200):
+    """Forces on the cutter (m, 3) by the true paths of its teeth, slice by slice."""
+    lead, R = math.tan(cutter.helix) / cutter.radius, cutter.radius
     z = (np.arange(slices) + 0.5) * depth / slices
-    out = np.zeros((len(theta), 3))
-    for j in range(n):
-        phi = np.mod(theta[:, None] - math.tau * j / n - z * math.tan(cutter.helix) / cutter.radius, math.tau)
-        s, co = np.sin(phi), np.cos(phi)
-        h = np.min([m * c * s + r[j] - r[(j - m) % n] for m in range(1, n + 1)], axis=0)
-        on = (phi >= arc[0]) & (phi <= arc[1]) & (h > 0.0)
-        ft, fr, fa = (np.where(on, x[k] * h + x[k + 3], 0.0) * depth / slices for k in range(3))
-        out += np.stack([-ft * co - fr * s, ft * s - fr * co, -fa], axis=-1).sum(axis=1)
-    return out
+    edge = np.column_stack([0.0 * z + R, 0.0 * z + 1.0, 0.0 * z, lead * z, 0.0 * z + depth / slices])
+    low = R * math.cos(arc[1]) if arc[1] < math.pi else -10.0 * R
+    high = R * math.cos(arc[0]) if arc[0] > 0.0 else 10.0 * R
+    force, torque, thick = np.zeros((len(theta), 3)), np.zeros(len(theta)), np.zeros(len(theta))
+    pitch = np.full(cutter.flutes, math.tau / cutter.flutes)
+    rate = cutter.flutes * c / math.tau
+    loads(edge, pitch, rate, *cutter.runout, low, high, np.array(x), np.array(theta), force, torque, thick)
+    return force
+
+
+@cache
+def turn_of(cutter, arc, depth, c):
+    return sliced(np.linspace(0.0, math.tau, 721), X, cutter, arc, depth, c)
 
 
 def made(feeds, cutter, *, noise=4.0, seed=1, turns=20, per_turn=64, arc=(0.0, math.pi), depth=3.0, off=0.0, speed=1.0):
@@ -64,7 +52,7 @@ def made(feeds, cutter, *, noise=4.0, seed=1, turns=20, per_turn=64, arc=(0.0, m
         t = np.arange(math.ceil(turns * per_turn / speed) + 3) / rate
         theta = rng.uniform(0.0, math.tau) + SPEED * speed * t
         fine = np.linspace(0.0, math.tau, 721)
-        known = sliced(fine, X, cutter, arc, depth, c)
+        known = turn_of(cutter, arc, depth, c)
         force = np.column_stack([np.interp(np.mod(theta, math.tau), fine, known[:, a]) for a in range(3)])
         force += rng.normal(0.0, noise, force.shape) + off
         cuts.append(MeasuredCut(f"cut {k}", rate, force, c * cutter.flutes * SPEED / math.tau, SPEED, arc, depth))
@@ -77,28 +65,18 @@ def inside(fit):
 
 # -- average ----------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("arc", [(0.0, math.pi), (0.0, 0.9), (2.1, math.pi), (0.4, 2.0)])
-def test_average_against_the_textbook(arc):
+def test_average_against_the_means_of_true_paths(arc):
+    """The chip of circles, h = f sin(phi), gave Ktc 3 % off here."""
     feeds = (0.03, 0.06, 0.11)
     cuts = []
     for c in feeds:
-        force = np.tile(textbook(X, arc, 4, 2.5, c), (640, 1))
+        theta = math.tau * (np.arange(640) + 0.5) / 640
+        force = np.tile(sliced(theta, X, MILL, arc, 2.5, c, 400).mean(axis=0), (640, 1))
         cuts.append(MeasuredCut("c", 6400.0, force, c * 4 * SPEED / math.tau, SPEED, arc, 2.5))
     fit = fit_average(cuts, MILL)
-    assert np.allclose(fit.coefficients.values, X, rtol=1e-9)
+    np.testing.assert_allclose(fit.coefficients.values, X, rtol=3e-3)
     assert np.allclose(fit.channels.r2, 1.0)
     assert fit.identified.all()
-
-
-def test_slot_formula_of_the_textbook():
-    """The general formula above is the slot's: -(N a / 4) Krc c - (N a / pi) Kre and so on."""
-    c, teeth, depth = 0.08, 4, 2.5
-    na = teeth * depth
-    slot = [
-        -na / 4 * X[1] * c - na / math.pi * X[4],
-        na / 4 * X[0] * c + na / math.pi * X[3],
-        -na / math.pi * X[2] * c - na / 2 * X[5],
-    ]
-    assert np.allclose(textbook(X, (0.0, math.pi), teeth, depth, c), slot, rtol=1e-12)
 
 
 def test_average_with_noise_and_two_feeds():

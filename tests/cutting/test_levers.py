@@ -12,7 +12,7 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.levers import greatest_height, has_lever_loads, lever_loads
 from chipload.cutting.strength import cutter_stress, normal_stress, section_loads, sections_of, von_mises_stress
-from chipload.engagement.tooth_engagement import with_runout
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.simulation._form_error import loads_of_teeth
 from chipload.structure.spindle import Bar, Joint, chain_compliance, tip_compliance
 from cutting.test_revolution import STEEL, some_engagement
@@ -34,7 +34,7 @@ def test_compliance_of_the_tip_is_that_of_the_chain() -> None:
 @pytest.mark.parametrize("runout", [0.0, 0.01])
 def test_loads_are_those_rotation_by_rotation(flutes: int, helix: float, runout: float) -> None:
     cutter = Cutter(10.0, flutes, helix, 20.0, 30.0, 6e5, runout=(runout, 0.4))
-    engagement = with_runout(some_engagement(flutes, helix, flutes), cutter)
+    engagement = chips_of_teeth(some_engagement(flutes, helix, flutes), cutter)
     assert has_lever_loads(engagement, cutter, STEEL)
     assert greatest_height(engagement) < 25.0
     count, n = 36, len(engagement)

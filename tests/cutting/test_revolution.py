@@ -14,7 +14,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn
 from chipload.cutting.material import Material
 from chipload.cutting.revolution import _one_by_one, loads_over_turn, rotations
-from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
+from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 
 STEEL = Material("steel", 1800.0, 700.0, 250.0, 25.0, 18.0, 6.0, source="made up")
 
@@ -50,7 +51,7 @@ def some_engagement(seed: int, helix: float, flutes: int) -> ToothEngagement:
 def test_loads_are_those_rotation_by_rotation(flutes: int, helix: float, runout: float) -> None:
     cutter = Cutter(10.0, flutes, helix, 20.0, 30.0, 6e5, runout=(runout, 0.4))
     plain = some_engagement(flutes, helix, flutes)
-    engagement = with_runout(plain, cutter)
+    engagement = chips_of_teeth(plain, cutter)
     left = np.random.default_rng(5).normal(size=(len(engagement), 3))
     found, at, _ = loads_over_turn(engagement, cutter, STEEL, math.radians(3.0), left)
     count = rotations(cutter, math.radians(3.0))
@@ -109,7 +110,7 @@ def test_entries_that_cut_alike_have_the_loads_of_the_first(runout: float) -> No
     five = ToothEngagement(start, rows, plain.tooth[row], plain.slice[row], plain.slices, frames)
     left = np.repeat(np.random.default_rng(5).normal(size=(n, 3)), 5, axis=0)
     left[4::5] = 0.0
-    engagement = with_runout(five, cutter)
+    engagement = chips_of_teeth(five, cutter)
     found = loads_over_turn(engagement, cutter, STEEL, math.radians(3.0), left)[0]
     known = _one_by_one(engagement, cutter, STEEL, rotations(cutter, math.radians(3.0)), left)[:, :15]
     np.testing.assert_allclose(found, known, rtol=1e-6, atol=1e-6)

@@ -40,9 +40,10 @@ def run(
 
 
 def work(removal: Removal) -> Floats:
-    """Of each step [N mm]."""
-    c = removal.columns
-    return 1e3 * c["torque_mean_nm"] * 300.0 * c["seconds"]
+    """Of each step [N mm], of the front that moves on: chips between the paths of the teeth have a law of their own, in
+    tests/engagement/test_tooth_chips.py.
+    """
+    return 1e3 * removal.columns["cutting_work_j"]
 
 
 def segment_area(radius: float, depth: float) -> float:

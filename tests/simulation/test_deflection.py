@@ -13,6 +13,7 @@ from chipload.cutting.force import forces_over_turn, in_work
 from chipload.cutting.material import Material, material_named
 from chipload.cutting.wall_error import wall_profile
 from chipload.engagement.tooth_engagement import engagement_of_arcs
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
@@ -90,7 +91,8 @@ def test_it_is_the_wall_of_the_closed_form(milling: str, helix: float) -> None:
     found = form_error(removal, AL, p, n, work=np.full(len(p), work), bars={1: cutter_bars(mill)}, near=0.1)
     a = math.acos(1.0 - width / 5.0)
     arc = (math.pi - a, math.pi) if milling == "down" else (0.0, a)
-    engagement = engagement_of_arcs([arc[0]], [arc[1]], math.tau * 20.0 / (4 * 300.0), mill, depth)
+    front = engagement_of_arcs([arc[0]], [arc[1]], math.tau * 20.0 / (4 * 300.0), mill, depth)
+    engagement = chips_of_teeth(front, mill)
     closed = wall_profile(engagement, mill, AL, z, milling=milling, work_compliance=work)[0]
     assert abs(closed).max() > 1e-4
     np.testing.assert_allclose(found.error, closed, rtol=0.0, atol=1e-5 * abs(closed).max())
@@ -139,7 +141,10 @@ def test_compliances_add_and_the_whole_one_equals_the_normal_one_along_the_norma
     both = form_error(removal, AL, p, N, work=[2e-4, 1e-4], bars=bars, **only)
     work = form_error(removal, AL, p, N, work=[2e-4, 1e-4], bars=None, **only)
     cutter = form_error(removal, AL, p, N, work=None, bars=bars, **only)
-    assert both.error == pytest.approx(work.work + cutter.cutter, rel=1e-12)
+    # the step that leaves least makes a point, which may be another one with a cutter that gives way
+    same = (both.step == work.step) & (both.step == cutter.step)
+    assert same.any()
+    assert both.error[same] == pytest.approx((work.work + cutter.cutter)[same], rel=1e-12)
     assert work.work == pytest.approx(np.array([2e-4, 1e-4]) * work.force, rel=1e-12)
     assert (work.force > 1.0).all()
     # C = 1e-4 along x alone does not move the surface, whose normal has no x
@@ -161,11 +166,14 @@ def test_a_rigid_bar_on_a_joint_moves_as_the_lever_says() -> None:
 
 
 def test_the_surface_is_made_at_its_moment_not_under_the_greatest_force() -> None:
-    """Climb milling without helix: at the wall h = 0, so that the edge force is all, whatever the chip was before."""
+    """Climb milling without helix: at the wall h = f^2 / (2 R), the paths of two teeth, so that there is hardly more
+    than the edge force, whatever the chip was before.
+    """
     removal = along_a_wall(MILL, AL, 4.0, width=4.0)
     p, n = wall_points(np.array([-2.0]))
     found = form_error(removal, AL, p, n, work=[1e-4], bars=None, near=0.1)
-    assert found.force == pytest.approx([AL.Kre * 4.0], rel=1e-6)
+    feed = math.tau * 20.0 / (4 * 300.0)
+    assert found.force == pytest.approx([4.0 * (AL.Kre + AL.Krc * feed**2 / (2.0 * MILL.radius))], rel=1e-4)
     greatest = removal.columns["force_normal_n"][found.step[0]]
     assert greatest > 3.0 * found.force[0]
     place = contacts(removal)
@@ -193,7 +201,8 @@ def test_the_greatest_deflection_of_a_flank(helix, width) -> None:
     assert greatest.max() > 50.0
     ratio = found["force_normal_n"][cuts.step][greatest > 1.0] / greatest[greatest > 1.0]
     assert ratio.min() > 0.995
-    assert ratio.max() < 1.0 + 1e-6
+    # the chip rises within less than 0.02 deg before the edge leaves
+    assert ratio.max() < 1.0 + 2e-4
     assert found["work_mm"] == pytest.approx(1e-4 * found["force_normal_n"], rel=1e-12)
 
 

@@ -72,9 +72,10 @@ def test_each_step_has_its_own_factor_and_cuts_join() -> None:
     for k in range(len(whole)):
         some = slice(start[k], start[k + 1])
         np.testing.assert_allclose(mixed.plain.rows[some, 4:], factor[k] * old[some, 4:], rtol=1e-15)
-    # runout does not grow with the feed: chips of the long tooth are thicker by no more than twice its radius
+    # runout does not grow with the feed: chips of the long tooth are thicker by no more than twice its radius, and by
+    # the feed marks of true paths, f^2 / (2 R) two teeth apart
     thick, true = mixed.engagement.chip_max(), mixed.plain.chip_max()
-    assert (thick - true <= 0.008 + 1e-9).all()
+    assert (thick - true <= 0.008 + (2.0 * true) ** 2 / 10.0).all()
     assert (thick[true > 1e-3] > true[true > 1e-3]).all()
     again = joined([whole, whole])
     np.testing.assert_array_equal(again.spindle, np.full(2 * len(whole), 300.0))

@@ -102,7 +102,7 @@ def test_work_of_the_torque_is_ktc_times_the_volume_that_the_stock_lost() -> Non
     plain = Material("plain", 900.0, 300.0, 100.0, 0.0, 0.0, 0.0, source="made up")
     stock = block(0.02)
     removal = remove(zigzag(), stock, {1: MILL, 2: BALL}, plain, FINE, engine="moves")
-    work = (1e3 * removal.columns["torque_mean_nm"] * 300.0 * removal.columns["seconds"]).sum()
+    work = 1e3 * removal.columns["cutting_work_j"].sum()
     lost = removal.volume_before - removal.volume_after
     assert removal.volume_before == pytest.approx(40.0 * 30.0 * 8.0)
     assert work == pytest.approx(900.0 * lost, rel=5e-3)
@@ -274,7 +274,7 @@ def test_every_load_is_that_of_the_layered_engine_for_the_same_engagement(tool: 
         for k, (a, b) in enumerate(itertools.pairwise(engagement.start.tolist()))
     ]
     turn = over_turn(engagement, cuts.cutter, ALLOY, FINE.rotation)
-    known = loads_of_steps(engagement, parts, cuts.cutter, ALLOY, turn, cuts.spindle, seconds)
+    known = loads_of_steps(cuts.plain, engagement, parts, cuts.cutter, ALLOY, turn, cuts.spindle, seconds)
     for i, name in enumerate(LOADS):
         if name != "force_normal_n":
             some = removal.columns[name][cuts.step]

@@ -12,6 +12,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import mean_forces
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 from chipload.stability._several_delays import matrices3
 from chipload.stability.cuts import dynamic_cuts
@@ -142,14 +143,15 @@ def test_runout_grows_as_in_time(rpm, share, depth, offset):
 def test_a_small_runout_changes_nothing_and_a_great_one_leaves_one_tooth():
     small, great = (replace(mill(3), runout=(e, 0.0)) for e in (1e-9, 0.2))
     speed, frames = 6000 * TAU / 60.0, ([[1.0, 0.0]], [[0.0, 1.0]])
+    # the chips of single teeth begin a little before the front, f / (2 R), which the map of equal teeth does not know
     met = engagement_of_arcs([HALF[0]], [HALF[1]], FEED, mill(3), 2.0)
     plain, one_of_three = (dynamic_cuts(met, c, METAL, TWO, speed, *frames) for c in (mill(3), great))
     even = largest_multipliers(plain)[0]
     assert abs(largest_multipliers(dynamic_cuts(met, small, METAL, TWO, speed, *frames))[0]) == pytest.approx(
-        abs(even) ** 3, rel=1e-3
+        abs(even) ** 3, rel=3e-3
     )
     single = Cutter(10.0, 1, 0.0, 60.0, 80.0, 6e5)
-    met = engagement_of_arcs([HALF[0]], [HALF[1]], 3 * FEED, single, 2.0)
+    met = chips_of_teeth(engagement_of_arcs([HALF[0]], [HALF[1]], 3 * FEED, single, 2.0), single)
     alone = dynamic_cuts(met, single, METAL, TWO, speed, *frames)
     assert one_of_three.delay.tolist() == pytest.approx([TAU])
     assert largest_multipliers(one_of_three)[0] == pytest.approx(largest_multipliers(alone)[0], rel=1e-4)

@@ -126,7 +126,7 @@ def contact_lines(cuts: Cuts) -> Floats:
     It runs along the axis through the mean of the ends of the engagement at which the chip has no thickness, from the
     lowest to the highest of them; where a step leaves no surface, through the middle of its engagement.
     """
-    engagement = cuts.engagement
+    engagement = cuts.plain
     owner = np.repeat(np.arange(len(engagement)), np.diff(engagement.start))
     p, q, a, b, along, offset, across = engagement.rows.T
     s0, rho, z0, sk = engagement.slices[engagement.slice, :4].T

@@ -21,6 +21,8 @@ NODES = np.array([-0.906179845938664, -0.5384693101056831, 0.0, 0.53846931010568
 WEIGHTS = np.array(
     [0.23692688505618908, 0.47862867049936647, 0.5688888888888889, 0.47862867049936647, 0.23692688505618908]
 )
+#: greatest number of ranges of a step at whose ends the wall is calculated too
+FEW = 24
 #: longest piece of immersion that five points integrate to rounding [rad]
 PIECE = 0.6
 
@@ -73,41 +75,34 @@ def push(theta, z, rows, tooth, lo, hi, teeth, lag, c, length, fluted, flex_flut
 
 
 @njit(cache=True, nogil=True)
-def wall_at(z, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work):
-    """Error of the wall at height z [mm], positive where material is left. ``gen`` the immersion that makes the wall (0
-    or pi), ``last`` whether it is the teeth of greatest radius alone that make it.
+def wall_at(z, gen, lag, teeth, runout, rows, tooth, lo, hi, c, beam, work):
+    """Error of the wall at height z [mm], positive where material is left: what the tooth leaves that cuts deepest
+    there. ``gen`` the immersion that makes the wall (0 or pi), ``runout`` (2,) [mm, rad].
     """
     sign = 1.0 if gen > 1.0 else -1.0
     inside = gen - sign * BESIDE
-    top = np.max(radii)
     least = math.inf
-    for j in range(teeth if last else 1):
-        if radii[j] < top - 1e-12:
-            continue
+    for j in range(teeth if runout[0] > 0.0 else 1):
         theta = inside + lag * z + TAU * j / teeth
         e = sign * push(theta, z, rows, tooth, lo, hi, teeth, lag, c, beam[0], beam[1], beam[2], beam[3], work)
-        least = min(least, e - radii[j])
+        least = min(least, e - runout[0] * math.cos(runout[1] - TAU * j / teeth - lag * z))
     return least
 
 
 @njit(cache=True, nogil=True)
-def wall_profiles(start, rows, tooth, gen, lag, teeth, radii, c, z, beam, work, made, out):
+def wall_profiles(start, rows, tooth, gen, lag, teeth, runout, c, z, beam, work, made, out):
     """Wall error of every step at the heights z (p,): out (n, p); steps that make no wall stay 0."""
-    last = np.max(radii) > np.min(radii)
     for i in range(len(start) - 1):
         if made[i]:
             for k in range(len(z)):
-                out[i, k] = wall_at(
-                    z[k], gen, last, lag, teeth, radii, rows, tooth, start[i], start[i + 1], c, beam, work
-                )
+                out[i, k] = wall_at(z[k], gen, lag, teeth, runout, rows, tooth, start[i], start[i + 1], c, beam, work)
 
 
 @njit(cache=True, nogil=True)
-def wall_worst(start, rows, tooth, piece, flank, gen, lag, teeth, radii, c, heights, depth, beam, work, made, out):
+def wall_worst(start, rows, tooth, piece, flank, gen, lag, teeth, runout, c, heights, depth, beam, work, made, out):
     """Wall error of greatest size of every step, and its height: out (n, 2). Sampled at ``heights`` equal heights and
     at those where an engagement range begins or ends as the generating edge passes; then refined by golden section.
     """
-    last = np.max(radii) > np.min(radii)
     pitch = TAU / teeth
     for i in range(len(start) - 1):
         if not made[i]:
@@ -117,17 +112,19 @@ def wall_worst(start, rows, tooth, piece, flank, gen, lag, teeth, radii, c, heig
         best = -1.0
         for k in range(heights):
             zk = depth * k / (heights - 1)
-            e = wall_at(zk, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work)
+            e = wall_at(zk, gen, lag, teeth, runout, rows, tooth, lo, hi, c, beam, work)
             if abs(e) > best:
                 best = abs(e)
                 out[i, 0] = e
                 out[i, 1] = zk
-        room = np.empty(4 * (hi - lo) * teeth)
-        count = breaks_of(rows, tooth, piece, flank, lo, hi, teeth, pitch, room) if lag > 0.0 else 0
+        # many ranges are parts of edges whose runout lags: what begins or ends with each is small
+        few = lag > 0.0 and hi - lo <= FEW
+        room = np.empty(4 * (hi - lo) * teeth if few else 1)
+        count = breaks_of(rows, tooth, piece, flank, lo, hi, teeth, pitch, room) if few else 0
         for b in range(count):
             zk = ((room[b] - gen) % pitch) / lag
             while zk < depth:
-                e = wall_at(zk, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work)
+                e = wall_at(zk, gen, lag, teeth, runout, rows, tooth, lo, hi, c, beam, work)
                 if abs(e) > best:
                     best = abs(e)
                     out[i, 0] = e
@@ -138,8 +135,8 @@ def wall_worst(start, rows, tooth, piece, flank, gen, lag, teeth, radii, c, heig
         for _ in range(REFINEMENTS):
             x = d - GOLDEN * (d - a)
             y = a + GOLDEN * (d - a)
-            ex = wall_at(x, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work)
-            ey = wall_at(y, gen, last, lag, teeth, radii, rows, tooth, lo, hi, c, beam, work)
+            ex = wall_at(x, gen, lag, teeth, runout, rows, tooth, lo, hi, c, beam, work)
+            ey = wall_at(y, gen, lag, teeth, runout, rows, tooth, lo, hi, c, beam, work)
             if abs(ex) > abs(ey):
                 d = y
                 if abs(ex) > best:

@@ -32,6 +32,7 @@ from scipy.optimize import least_squares
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.fit import (
     LOOSE,
+    WEAK,
     Fit,
     FitSearch,
     FittedChannels,
@@ -275,11 +276,11 @@ def _final_fit(problem: _Problem, q: Floats, converged: bool) -> Fit:
     size = np.linalg.norm(jacobian, axis=0)
     scale = np.where(size > 0.0, size, 1.0)
     u, s, vt = np.linalg.svd(jacobian / scale, full_matrices=False)
-    sure = s > LOOSE * s[0]
+    sure = s > WEAK * s[0]
     leverage = np.minimum(np.sum(u[:, sure] ** 2, axis=1), 1.0 - 1e-6)
     turned = (vt[sure].T / s[sure]) @ (u[:, sure].T * (left / (1.0 - leverage)))
     covariance = (turned @ turned.T) / np.outer(scale, scale)
-    free = np.sum(vt[sure] ** 2, axis=0) > 1.0 - 1e-6
+    free = np.sum(vt[sure] ** 2, axis=0) > 1.0 - WEAK
     linear = x[:6]
     identified = (there & determined)[:6] & free[f + m : f + m + 6]
     residual, r2 = _quality(problem, q, x)

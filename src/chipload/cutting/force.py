@@ -37,6 +37,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting import _tooth_force
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -223,9 +224,10 @@ def forces_along(
     if spindle not in ("cw", "ccw"):
         raise InputError(f"spindle = {spindle!r}: must be cw or ccw")
     heading = np.asarray(T, dtype=np.float64)
-    engagement = engagement_of_arcs(
+    front = engagement_of_arcs(
         phi_in, phi_out, feed_per_tooth, cutter, axial_depth, count=count, clockwise=spindle == "cw"
     )
+    engagement = chips_of_teeth(front, cutter)
     n = len(engagement)
     if heading.shape != (n, 2) or not np.all(np.abs(np.hypot(heading[:, 0], heading[:, 1]) - 1.0) < 1e-6):
         raise InputError(f"T of shape {heading.shape}: need ({n}, 2) unit vectors, one a step")
@@ -234,7 +236,7 @@ def forces_along(
         raise InputError("spindle_speed: must be finite and at least 0 rad/s")
     side = 1.0 if spindle == "cw" else -1.0
     left = side * np.column_stack([-heading[:, 1], heading[:, 0]])
-    peak = greatest_forces(engagement, cutter, material, sample_step, exact_rows=None)
+    peak = greatest_forces(engagement, cutter, material, sample_step)
     mean, torque_mean = mean_forces(engagement, cutter, material)
     plane = peak["force_t"][:, None] * heading + peak["force_n"][:, None] * left
     mean_plane = mean[:, :1] * heading + mean[:, 1:2] * left

@@ -12,8 +12,8 @@ milling), that is at theta = phi_wall + z tan(helix) / R. The load of all teeth 
 
 f_n(z') the force on the cutter for each mm of depth, along the normal of the wall and away from it, each slice with its
 own height; c_w a compliance of the work normal to the wall. With zero helix and down milling h = 0 where the wall is
-made, so that the edge force alone shows. With runout the wall is made by the tooth of greatest radius, which takes its
-excess r_j - R away: e(z) lessened by it.
+made to first order, so that hardly more than the edge force shows. With runout each tooth takes what it stands out by
+at z away, e(z) lessened by it, and the wall is what the tooth leaves that cuts deepest.
 
 The load is that of the rigid model: bending does not thin the chip. Only a straight flank is accepted: an engagement
 range elsewhere is refused.
@@ -33,7 +33,8 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
 from chipload.cutting.force import Spindle
 from chipload.cutting.material import Material
-from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs, tooth_radii
+from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 from chipload.lazy import LateModule
 from chipload.structure.beam import flexibilities
@@ -55,9 +56,10 @@ def _wall_immersion(milling: Milling) -> float:
 
 
 def _makes_wall(engagement: ToothEngagement, phi_wall: float, reach: float) -> NDArray[np.bool_]:
-    """Return for each step whether an engagement range comes within ``reach`` of the wall, (n,) bool."""
+    """Return for each step whether an engagement range holds the wall or comes within ``reach`` of it, (n,) bool."""
     made = np.zeros(len(engagement), dtype=np.bool_)
-    near = np.abs(engagement.rows[:, 0 if phi_wall == 0.0 else 1] - phi_wall) <= reach
+    low, high = engagement.rows[:, 0] - reach, engagement.rows[:, 1] + reach
+    near = low + (phi_wall - low) % math.tau <= high
     np.logical_or.at(made, np.repeat(np.arange(len(engagement)), np.diff(engagement.start)), near)
     return made
 
@@ -132,7 +134,7 @@ def wall_profile(
         phi_wall,
         edge_lag(cutter),
         cutter.flutes,
-        tooth_radii(cutter),
+        np.array(cutter.runout),
         np.array(material.law),
         heights,
         _beam(cutter, fluted_factor),
@@ -188,9 +190,10 @@ def wall_error_along(
     """
     if spindle not in ("cw", "ccw"):
         raise InputError(f"spindle = {spindle!r}: must be cw or ccw")
-    engagement = engagement_of_arcs(
+    front = engagement_of_arcs(
         phi_in, phi_out, feed_per_tooth, cutter, axial_depth, count=count, clockwise=spindle == "cw"
     )
+    engagement = chips_of_teeth(front, cutter)
     return greatest_wall_error(
         engagement, cutter, material, axial_depth, milling=milling, heights=heights, work_compliance=work_compliance,
         fluted_factor=fluted_factor, reach=reach,
@@ -239,7 +242,7 @@ def greatest_wall_error(
         phi_wall,
         edge_lag(cutter),
         cutter.flutes,
-        tooth_radii(cutter),
+        np.array(cutter.runout),
         np.array(material.law),
         heights,
         axial_depth,

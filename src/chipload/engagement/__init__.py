@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from chipload.engagement.chips.move import Move
     from chipload.engagement.contact import Engagement, StockBoundary
     from chipload.engagement.immersion.immersion import Section, immersed
-    from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs, with_runout
+    from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
+    from chipload.engagement.tooth_surfaces import chips_of_teeth
 
 __all__ = [
     "Engagement",
@@ -19,16 +20,17 @@ __all__ = [
     "Section",
     "StockBoundary",
     "ToothEngagement",
+    "chips_of_teeth",
     "covered",
     "engagement_of_arcs",
     "immersed",
-    "with_runout",
 ]
 
 __getattr__, __dir__ = attach(
     __name__,
     {
-        "tooth_engagement": "ToothEngagement engagement_of_arcs with_runout",
+        "tooth_engagement": "ToothEngagement engagement_of_arcs",
+        "tooth_surfaces": "chips_of_teeth",
         "contact": "Engagement StockBoundary",
         "chips.move": "Move",
         "chips.covered": "covered",

@@ -1,8 +1,7 @@
-"""Compiled loops of the engagement of a cutter circle with line-and-arc stock, and of runout; arrays and scalars only.
+"""Compiled loops of the engagement of a cutter circle with line-and-arc stock; arrays and scalars only.
 
 Notation: segments as in :mod:`chipload.geometry.contour`, with the MATERIAL ON THE LEFT of every segment. The rim is
-the circle about (ox, oy) of radius r; rim angles are counter-clockwise from +x [rad]. ToothEngagement
-as in :mod:`chipload.engagement.tooth_engagement`.
+the circle about (ox, oy) of radius r; rim angles are counter-clockwise from +x [rad].
 """
 
 from __future__ import annotations
@@ -266,76 +265,3 @@ def engage(centres, headings, r, seg, box, first, last, angle, count, phi):
                 phi[q, k, 0] = phi_in[k]
                 phi[q, k, 1] = phi_out[k]
         angle[q] = total
-
-
-@njit(cache=True, nogil=True)
-def runout_engagement(whole, every, sine, radii, turns, sizes, rows, tooth, fill):
-    """Tooth engagement of each tooth for teeth of unlike radii. With g the chip thickness of a range of equal teeth:
-    the lower envelope of N lines in g, where positive, and then the immersions at which g lies between its corners.
-
-    ``whole`` (b, 7) and ``every`` (b,) the engagement ranges and their teeth, ``sine`` (b,) sin(kappa), ``radii`` (N,)
-    [mm], ``turns`` (N, N) the m of each tooth by the number of teeth before it, from 1. First call (fill False) counts
-    into ``sizes``, the second fills ``rows`` and ``tooth``.
-    """
-    teeth = len(radii)
-    at = 0
-    for i in range(len(whole)):
-        before = at
-        if every[i] >= 0:
-            if fill:
-                rows[at] = whole[i]
-                tooth[at] = every[i]
-            at += 1
-            sizes[i] = 1
-            continue
-        offset = whole[i, 5]
-        swing = math.hypot(whole[i, 4], whole[i, 6])
-        peak = math.atan2(whole[i, 4], whole[i, 6])
-        top = offset + swing
-        for j in range(teeth):
-            line = teeth
-            low = 0.0
-            for m in range(teeth, 0, -1):
-                d = (radii[j] - radii[(j - m) % teeth]) * sine[i] if m < teeth else 0.0
-                if d <= low:
-                    low = d
-                    line = m
-            g = 0.0
-            while g < top:
-                d = (radii[j] - radii[(j - line) % teeth]) * sine[i] if line < teeth else 0.0
-                end = top
-                after = line
-                for m in range(1, line):
-                    cross = ((radii[j] - radii[(j - m) % teeth]) * sine[i] - d) / (turns[j, line - 1] - turns[j, m - 1])
-                    if cross < end:
-                        end = cross
-                        after = m
-                first = max(g, -d / turns[j, line - 1])
-                if end > first:
-                    outer = PI if first <= offset - swing else math.acos((first - offset) / swing)
-                    inner = 0.0
-                    if end < top:
-                        inner = PI if end <= offset - swing else math.acos((end - offset) / swing)
-                    for turn in range(-1, 3):
-                        for part in range(1 if inner == 0.0 else 2):
-                            p = peak - outer if part == 0 else peak + inner
-                            q = peak - inner if part == 0 and inner > 0.0 else peak + outer
-                            p = max(p + TAU * turn, whole[i, 0])
-                            q = min(q + TAU * turn, whole[i, 1])
-                            if q > p:
-                                if fill:
-                                    back = TAU if p > TAU else 0.0
-                                    rows[at, 0] = p - back
-                                    rows[at, 1] = q - back
-                                    rows[at, 2] = whole[i, 2]
-                                    rows[at, 3] = whole[i, 3]
-                                    rows[at, 4] = turns[j, line - 1] * whole[i, 4]
-                                    rows[at, 5] = turns[j, line - 1] * offset + d
-                                    rows[at, 6] = turns[j, line - 1] * whole[i, 6]
-                                    tooth[at] = j
-                                at += 1
-                if after == line:
-                    break
-                g = max(g, end)
-                line = after
-        sizes[i] = at - before

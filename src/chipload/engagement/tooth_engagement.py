@@ -8,19 +8,18 @@ immersion, counted in the sense of the spindle from n, so that pi/2 is T (up mil
 u = cos(phi) n + sin(phi) T the radial direction; s [mm] along the cutter's profile and kappa the angle of its outward
 normal nu = sin(kappa) u - cos(kappa) A with the downward axis, as in :mod:`chipload.cutter.slices`; f_z [mm] feed per
 tooth; N teeth; j tooth, each its pitch p_j behind the one before it, 2 pi / N where all are alike, and so a_j behind
-tooth 0; r_j = R + e cos(lambda - a_j) its radius with the runout (e, lambda), lambda counted from tooth 0 towards tooth
-1; h [mm] chip thickness along nu.
+tooth 0; (e, lambda) runout, lambda counted from tooth 0 towards tooth 1; h [mm] chip thickness along nu.
 
 An engagement range is a range of immersion and of the profile in which h = along sin(phi) + across cos(phi) + offset,
 at least 0. A motion f a tooth of the point on the edge gives along = sin(kappa) f.T, across = sin(kappa) f.n and
 offset = -cos(kappa) f.A: a plunge is an offset on the bottom.
 
-Reference: [Altintas2012] ch. 2 for h = f_z sin(phi); [Kline1983] for runout: a tooth cuts what the N teeth before it
-left, h_j = min over m = 1 .. N of m h + (r_j - r_(j-m)) sin(kappa), where positive; else it does not touch. With
-uneven pitches m is the angle of the m pitches before tooth j over 2 pi / N, and the angle of the tooth behind an evenly
-spaced one is added to the lag of its slices.
-Differs from source: the phase of the offset does not lag with the helix; a tooth has one radius over its depth.
-The volume that a revolution removes does not depend on runout: sum over j of h_j = N h.
+The front is the part of the cutter that the feed moves into the stock, with h = f_z sin(phi) for every tooth: what the
+methods that find the engagement give. :func:`chipload.engagement.tooth_surfaces.chips_of_teeth` makes of it the chips
+between the true paths of the teeth, with runout and uneven pitch; the angle of a tooth behind an evenly spaced one is
+added there to the lag of its slices.
+
+Reference: [Altintas2012] ch. 2 for h = f_z sin(phi).
 """
 
 from __future__ import annotations
@@ -33,7 +32,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
-from chipload.engagement import _contact
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -155,90 +153,6 @@ class ToothEngagement:
         return out
 
 
-def tooth_radii(cutter: Cutter) -> Floats:
-    """Return the radius of each tooth less R: r_j - R = e cos(lambda - 2 pi j / N), (N,) float [mm].
-
-    >>> tooth_radii(Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5, runout=(0.01, 0.0))).round(6).tolist()
-    [0.01, -0.01]
-    """
-    offset, direction = cutter.runout
-    return np.asarray(offset * np.cos(direction - cutter.tooth_angles))
-
-
-def with_runout(engagement: ToothEngagement, cutter: Cutter) -> ToothEngagement:
-    """Return the tooth engagement of every tooth by itself with the cutter's runout; rows of a single tooth stay.
-
-    Each engagement range of every tooth, with the thickness h that it would have without runout, becomes for tooth j
-    the ranges of immersion in which one of the lines m h + (r_j - r_(j-m)) sin(kappa) is the lowest, and positive.
-    Teeth that are not evenly spaced take h by their pitch.
-
-    Returns
-    -------
-    ToothEngagement
-        ``engagement`` itself where all teeth are alike.
-
-    Examples
-    --------
-    Two teeth, their radii 0.01 mm apart, 0.01 mm a tooth: the shorter one does not touch.
-
-    >>> slot = engagement_of_arcs([0.0], [math.pi], 0.01, Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5), 1.0)
-    >>> each = with_runout(slot, Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5, runout=(0.005, 0.0)))
-    >>> each.tooth.tolist(), each.rows[:, 4:].tolist()
-    ([0], [[0.02, 0.0, 0.0]])
-    """
-    if cutter.teeth_alike:
-        return engagement
-    radii, turns = tooth_radii(cutter), turns_before(cutter)
-    sine = engagement.slices[engagement.slice, 3]
-    sizes = np.zeros(len(engagement.rows), dtype=np.int64)
-    none = np.empty((0, 7))
-    _contact.runout_engagement(
-        engagement.rows, engagement.tooth, sine, radii, turns, sizes, none, np.empty(0, np.int64), False
-    )
-    rows = np.empty((int(sizes.sum()), 7))
-    tooth = np.empty(len(rows), dtype=np.int64)
-    _contact.runout_engagement(engagement.rows, engagement.tooth, sine, radii, turns, sizes, rows, tooth, True)
-    start = np.concatenate([[0], np.cumsum(sizes)])[engagement.start]
-    own, slices = np.repeat(engagement.slice, sizes), engagement.slices
-    if cutter.pitch:
-        late = cutter.tooth_angles - math.tau / cutter.flutes * np.arange(cutter.flutes)
-        own, count = own + tooth * len(slices), len(slices)
-        slices = np.tile(slices, (cutter.flutes, 1))
-        slices[:, 5] += np.repeat(late - late.min(), count)
-    return ToothEngagement(start, rows, tooth, own, slices, engagement.frame)
-
-
-def thickest_of_teeth(plain: ArrayLike, cutter: Cutter, sine: ArrayLike = 1.0) -> Floats:
-    """Return the thickest chip [mm] of any tooth with runout, where each tooth cuts ``plain`` without runout.
-
-    max_j min_m (m h + (r_j - r_(j-m)) sin(kappa)), see :func:`with_runout`. It grows with h, is at least h, and O(N^2).
-
-    Parameters
-    ----------
-    plain, sine : (...) h [mm] and sin(kappa), of shapes that fit one another
-
-    Examples
-    --------
-    Radii 0.01 mm apart: the longer tooth cuts 0.01 mm more, but never more than both would without runout.
-
-    >>> cutter = Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5, runout=(0.005, 0.0))
-    >>> thickest_of_teeth([0.05, 0.005], cutter).round(6).tolist()
-    [0.06, 0.01]
-    """
-    h, s = np.broadcast_arrays(np.asarray(plain, dtype=np.float64), np.asarray(sine, dtype=np.float64))
-    radii, turns, N = tooth_radii(cutter), turns_before(cutter), cutter.flutes
-    behind = (np.arange(N)[:, None] - np.arange(1, N + 1)) % N
-    more = radii[:, None] - radii[behind]
-    return np.asarray((turns * h[..., None, None] + more * s[..., None, None]).min(axis=-1).max(axis=-1))
-
-
-def turns_before(cutter: Cutter) -> Floats:
-    """Return (N, N) float: for tooth j and m = 1 .. N the angle of the m pitches before it over 2 pi / N."""
-    N = cutter.flutes
-    pitch = np.array(cutter.pitch) * N / math.tau if cutter.pitch else np.ones(N)
-    return np.array([[pitch[(j - np.arange(m)) % N].sum() for m in range(1, N + 1)] for j in range(N)])
-
-
 def engagement_of_arcs(
     phi_in: ArrayLike,
     phi_out: ArrayLike,
@@ -264,7 +178,7 @@ def engagement_of_arcs(
     Returns
     -------
     ToothEngagement
-        Of one slice, the flank, on which s is the height above the tip; without frames.
+        The front, of one slice, the flank, on which s is the height above the tip; without frames.
 
     Raises
     ------
@@ -307,7 +221,7 @@ def engagement_of_arcs(
     start = np.concatenate([[0], np.cumsum(np.bincount(step, minlength=n))])
     flank = np.array([[0.0, cutter.radius, 0.0, 1.0, 0.0, 0.0, edge_lag(cutter)]])
     zero = np.zeros(len(step), dtype=np.int64)
-    return with_runout(ToothEngagement(start, rows, zero - 1, zero, flank), cutter)
+    return ToothEngagement(start, rows, zero - 1, zero, flank)
 
 
 def _check_cutter(cutter: Cutter, axial_depth: float) -> None:

@@ -21,7 +21,8 @@ from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
 from chipload.cutting.strength import cutter_stress
 from chipload.cutting.wall_error import Milling, wall_error_along
 from chipload.engagement.contact import PIECES, Engagement
-from chipload.engagement.tooth_engagement import engagement_of_arcs, with_runout
+from chipload.engagement.tooth_engagement import engagement_of_arcs
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.planning.result import Columns
 from chipload.structure.spindle import chain_compliance, tool_bars
 from chipload.units import mm_min_from_mm_s
@@ -136,7 +137,7 @@ def _bent(
     tip = float(chain_compliance(tool_bars(cut.cutter), 0.0, 0.0))
     deflection = 1000.0 * tip * force
     return {
-        "cutter_stress_mpa": cutter_stress(with_runout(plain, cut.cutter), cut.cutter, cut.material),
+        "cutter_stress_mpa": cutter_stress(chips_of_teeth(plain, cut.cutter), cut.cutter, cut.material),
         "deflection_cutter_um": deflection,
         "deflection_share": deflection_share(chips, deflection, cut.of_feed, cut.of_depth),
     }

@@ -2,12 +2,12 @@
 
 Both are calculated from a run and stated with its result.
 
-**Energy balance** of each cutter: (work / energy) - 1, which is 0 if contact, chip thickness and volume are right.
-The work is the sum of T omega dt over its steps, T the mean torque without the edge coefficients. The energy is the
-sum of K V over its steps, V [mm^3] the volume that the stock has lost in the step and K [MPa] the specific energy: Ktc
-of a material without size effect, else the mean of Ktc h^(-m) over the engaged edge, h the chip thickness with which
-the loads were computed. A step that lost volume and has no engaged edge takes the mean K of its cutter. V and the
-engaged edge come from different computations.
+**Energy balance** of each cutter: (work / energy) - 1, which is 0 if contact, chip thickness and volume are right. The
+work is the sum of T omega dt over its steps, T the mean torque of the front without the edge coefficients. The energy
+is the sum of K V over its steps, V [mm^3] the volume that the stock has lost in the step and K [MPa] the specific
+energy: Ktc of a material without size effect, else the mean of Ktc h^(-m) over the engaged edge, h the chip thickness
+with which the loads were computed. A step that lost volume and has no engaged edge takes the mean K of its cutter. V
+and the engaged edge come from different computations.
 
 **Resolution error** of each column of loads, by layers: some steps are computed a second time, with a finer resolution,
 in a stock of their own. This stock is the initial stock in the box around the cutter. The thickness of its layers is a
@@ -42,6 +42,11 @@ exceeds every load of the run. FLOOR is :data:`MOVES_FLOOR`, within which 99 of 
 (docs/design/engines.md); only some of the steps are computed a second time. If all cutters have a straight flank and a
 flat bottom, on which slices are exact, it is that of the layers; if an axis leans, :data:`LEANING_MOVES_FLOOR`.
 
+**Chip.** To each error what the chips between the paths of the teeth leave out is added, of the steps that are computed
+a second time and have at least half of the worst load: :func:`chipload.engagement.tooth_surfaces.chip_error`. The
+thickest chip of teeth with runout is that of parts of the edge, and may be off by twice
+:data:`chipload.engagement.tooth_surfaces.SHARE` more.
+
 Deflection and form error are proportional to the force and have its error.
 """
 
@@ -57,8 +62,10 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import slices
+from chipload.engagement.tooth_surfaces import SHARE as PARTS_OF_EDGE
+from chipload.engagement.tooth_surfaces import chip_error
 from chipload.simulation.checkpoint import in_rows
-from chipload.simulation.loads import LOADS
+from chipload.simulation.loads import LOADS, Cuts
 from chipload.simulation.moves import MoveRun, moved
 from chipload.simulation.steps import Steps
 from chipload.simulation.swept_area import boxes, swept_ahead
@@ -113,6 +120,8 @@ EVEN, IDLE = 3, 2
 #: by layers: number of steps that remove most of what is not engaged at their middle, its least share of what they
 #: remove, and the number of parts of such a step
 MISSED, UNLIKE, PARTS = 3, 0.1, 16
+#: greatest error of the chip of a step that is computed a second time: of its loads
+CHIP = "chip_error"
 #: rows of columns that are read together
 ROWS = 65_536
 #: columns of the energy balance
@@ -209,7 +218,7 @@ def resolution_error(
     missed = _missed_steps(columns) if setting.moves is None else []
     chosen = list(dict.fromkeys([*chosen[:1], *missed, *chosen[1:]]))
     found = dict.fromkeys((*names, *WITH_FORCE), 0.0)
-    excess = dict.fromkeys(names, 0.0)
+    excess, chip = dict.fromkeys(names, 0.0), dict.fromkeys(names, 0.0)
     worst = {name: float(np.max(columns[name], initial=0.0)) for name in names}
     budget, spent = max(int(SHARE * count), LEAST), 0
     left = max(int(MISSED_SHARE * count), MISSED_LEAST)
@@ -228,10 +237,14 @@ def resolution_error(
             same = alike.get(name, c)
             off = max(halves[name] - w, abs(same - c) if c >= 0.5 * w else same - w)
             excess[name] = max(excess[name], window.factor * off)
+            if max(c, halves[name]) >= 0.5 * w:
+                chip[name] = max(chip[name], halves[CHIP])
     # the flank of a flat mill is cut into slices where its contact changes: exact
     straight = all(
         c.corner_radius == c.taper == c.bottom == 0.0 and c.barrel_radius is None for c in _used(windows, setting)
     )
+    if "chip_max_mm" in chip and not all(c.teeth_alike for c in _used(windows, setting)):
+        chip["chip_max_mm"] += 2.0 * PARTS_OF_EDGE
     films, least = _films(columns), FLOOR if all(w.upright for w in windows.values()) else LEANING_FLOOR
     for name in names:
         if worst[name] > 0.0 and films < 1.0:
@@ -240,7 +253,7 @@ def resolution_error(
                 floor = LEANING_MOVES_FLOOR[name]
             elif setting.moves is not None and not straight:
                 floor = MOVES_FLOOR[name]
-            found[name] = excess[name] / worst[name] + floor + films / (1.0 - films)
+            found[name] = excess[name] / worst[name] + floor + films / (1.0 - films) + chip[name]
         elif excess[name] > 0.0 or films > 0.0:
             found[name] = math.inf
     return found | dict.fromkeys(WITH_FORCE, found["force_n"])
@@ -343,13 +356,14 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
     def loads_of(window: Window, own: Steps, more: tuple[int, int] | None) -> tuple[Mapping[str, float], float]:
         stock = run.stock.cropped(window.low, window.high)
         if stock is None:
-            return dict.fromkeys(COMPARABLE, 0.0), 0.0
+            return dict.fromkeys((*COMPARABLE, CHIP), 0.0), 0.0
         stock.more = stock.more if more is None else more
         finer = replace(run, stock=stock, corner_slices=MORE * run.corner_slices, flank_mm=flank)
         for some in window.earlier:
             finer.make(some, len(some))
         found = moved(own, finer, 0, setting.cutters, setting.material, rotation)
         worst = {name: float(found.loads[:, LOADS.index(name)].max()) for name in COMPARABLE}
+        worst[CHIP] = max((float(chip_error(c.plain, c.cutter).max(initial=0.0)) for c in found.cuts), default=0.0)
         return worst, float(found.removed[:, 0].sum())
 
     def again(window: Window) -> tuple[Mapping[str, float], Mapping[str, float]]:
@@ -367,7 +381,7 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
     cutter = setting.cutters[tool]
     stock = before.cropped(window.low[:2], window.high[:2])
     if stock is None:
-        return dict.fromkeys(COMPARABLE, 0.0)
+        return dict.fromkeys((*COMPARABLE, CHIP), 0.0)
     low, high = float(window.low[2]), float(window.high[2])
     thickest = 0.5 * float(np.median(before.thickness[slice(*_span(before, low, high))]))
     heights, z, thin = [low], low, LOWEST * cutter.diameter
@@ -392,7 +406,7 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
         flank_mm=fine.flank_mm,
         grading=max(fine.grading, 2.0) if window.upright else fine.grading,
     )
-    again = replace(setting, profiles={tool: profile}, resolution=fine, watch=None)
+    again = replace(setting, profiles={tool: profile}, resolution=fine, watch=_chip_errors)
     tolerance = fine.tolerance
     for some in window.earlier:
         tiles = TileRings(stock)
@@ -400,7 +414,13 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
             tiles.remove(swept.met, swept.shape, swept.areas, 0.0, 0.5 * tolerance)
         tiles.finish()
     columns = remove(_parts(window.own, window.parts), stock, again)
-    return {name: float(columns[name].max()) for name in COMPARABLE} | {AXIAL: float(axial_force(columns).max())}
+    worst = {name: float(columns[name].max()) for name in COMPARABLE} | {AXIAL: float(axial_force(columns).max())}
+    return worst | {CHIP: float(np.max(columns.get(CHIP, 0.0)))}
+
+
+def _chip_errors(cuts: Cuts) -> dict[str, Floats]:
+    """Return the error of the chip of each step, a watch."""
+    return {CHIP: chip_error(cuts.plain, cuts.cutter)}
 
 
 def axial_force(columns: Columns) -> Floats:

@@ -24,7 +24,7 @@ from chipload.cutter.slices import Slices, slices
 from chipload.cutting.band import deviations, mean_basis
 from chipload.cutting.material import Material
 from chipload.engagement.moves.stock import Engaged
-from chipload.engagement.tooth_engagement import with_runout
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import Finding, InputError
 from chipload.program.motions import lengths
 from chipload.program.program import Program
@@ -352,9 +352,9 @@ def remove_block(
         own = [c for c in engagement if steps.tool[c.step] == number]
         at, cutter, material = [c.step for c in own], setting.cutters[number], setting.material
         plain = engagement_of_steps(own, setting.profiles[number])
-        bitten = with_runout(plain, cutter)
+        bitten = chips_of_teeth(plain, cutter)
         turn = over_turn(bitten, cutter, material, setting.resolution.rotation)
-        loads[at] = loads_of_steps(bitten, own, cutter, material, turn, steps.spindle[at], steps.seconds[at])
+        loads[at] = loads_of_steps(plain, bitten, own, cutter, material, turn, steps.spindle[at], steps.seconds[at])
         ends = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
         cut.append(Cuts(number, cutter, sums.steps + np.array(at), ends, bitten, plain, steps.spindle[at]))
         if setting.watch is not None:

@@ -14,12 +14,13 @@ cut at that rotation bends both, and they part along n by
 
 positive where the cutter is pushed away. The surface is what the deflected cutter leaves:
 
-    left(q) = min over k and j of d_k + e_k - (r_j - R) sin(kappa),
+    left(q) = min over k and j of d_k + e_k - r_j sin(kappa),
 
-over the steps at which q lies at the end of an engagement range (over all where there are none): the moment that makes
-q counts, not the greatest force, nor a tooth that has just left its engagement range and would spring back. d of that
-step is what a rigid cutter leaves there (cusps, and stock where the program leaves any). Steps that do not cut count as
-absent: what they would take again after a deflection is not known.
+r_j what tooth j stands out by where its edge passes q, over the steps at which q lies at the end of an engagement range
+of the front (over all where there are none): the moment that makes q counts, not the greatest force, nor a tooth that
+has just left its engagement range and would spring back. d of that step is what a rigid cutter leaves there (cusps, and
+stock where the program leaves any). Steps that do not cut count as absent: what they would take again after a
+deflection is not known.
 
 Without helix a tooth leaves all of its engagement range at once: the moment just before counts, as in
 :mod:`chipload.cutting.wall_error`.
@@ -45,7 +46,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.levers import greatest_height, has_lever_loads, lever_loads, lever_loads_in_blocks
 from chipload.cutting.material import Material
-from chipload.engagement.tooth_engagement import tooth_radii
+from chipload.engagement.tooth_surfaces import tooth_radii
 from chipload.errors import InputError
 from chipload.lazy import LateModule
 from chipload.progress import Progress, silent
@@ -146,7 +147,7 @@ def contacts(removal: Removal) -> Contacts:
     """
     parts = [(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))]
     for cuts in _kept(removal):
-        engagement = cuts.engagement
+        engagement = cuts.plain
         owner = np.repeat(np.arange(len(engagement)), np.diff(engagement.start))
         p, q, a, b, along, offset, across = engagement.rows.T
         s0, rho, z0, sk, ck = engagement.slices[engagement.slice, :5].T
@@ -405,11 +406,12 @@ def _made_by(
     along, left = (np.einsum("mi,mi->m", moment[:, 11:], frame[:, i]) for i in (0, 1))
     phi = np.arctan2(along, left) % math.tau
     lag = math.tan(cuts.cutter.helix) / cuts.cutter.radius
-    radii = tooth_radii(cuts.cutter)
+    radii = tooth_radii(cuts.cutter, lag * z)
     widest = 0.0
     for j in range(1 if cuts.cutter.teeth_alike else cuts.cutter.flutes):
         there, made = np.empty(count), np.empty(count, dtype=np.bool_)
-        b = cuts.engagement
+        # the ends of the front, not those of the chips of each tooth
+        b = cuts.plain
         _form_error.nearest_engaged_many(
             k, s, phi, b.start, b.rows, b.tooth, b.slice, b.slices, j, model.reach, there, made
         )
@@ -422,8 +424,8 @@ def _made_by(
         away = np.einsum("mi,mi->m", force, n[point])
         work = np.einsum("mi,mij,mj->m", n[point], stiff[point], force)
         cutter = np.einsum("mi,mi->m", bent, n[point])
-        rigid = d - radii[j] * sine
-        widest = max(widest, float(np.abs(cutter + work - radii[j] * sine).max()))
+        rigid = d - radii[:, j] * sine
+        widest = max(widest, float(np.abs(cutter + work - radii[:, j] * sine).max()))
         total = rigid + cutter + work
         order = np.lexsort((total, ~made, point))
         first = order[np.r_[True, point[order][1:] != point[order][:-1]]]

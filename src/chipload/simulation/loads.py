@@ -20,7 +20,8 @@ from chipload.cutting.material import Material
 from chipload.cutting.revolution import first_greatest
 from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
-from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
+from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 from chipload.lazy import LateModule
 from chipload.simulation.steps import Steps
@@ -129,7 +130,7 @@ def at_feeds(cuts: Cuts, factor: Floats) -> Cuts:
     rows = old.rows.copy()
     rows[:, 4:] *= np.repeat(factor, np.diff(old.start))[:, None]
     plain = ToothEngagement(old.start, rows, old.tooth, old.slice, old.slices, old.frame)
-    return replace(cuts, engagement=with_runout(plain, cuts.cutter), plain=plain)
+    return replace(cuts, engagement=chips_of_teeth(plain, cuts.cutter), plain=plain)
 
 
 def engagement_of_step(
@@ -235,6 +236,7 @@ def over_turn(engagement: ToothEngagement, cutter: Cutter, material: Material, r
 
 
 def loads_of_steps(
+    front: ToothEngagement,
     engagement: ToothEngagement,
     cuts: list[StepEngagement],
     cutter: Cutter,
@@ -243,12 +245,14 @@ def loads_of_steps(
     spindle: Floats,
     seconds: Floats,
 ) -> Floats:
-    """Return loads (c, len(LOADS)) of steps that take ``seconds`` (c,), from :func:`over_turn`."""
+    """Return loads (c, len(LOADS)) of steps that take ``seconds`` (c,), from :func:`over_turn`; ``engagement`` has the
+    chips of ``front``.
+    """
     force, torque, _ = turn
     mean, torque_mean = mean_forces(engagement, cutter, material)
     turned = in_work(force, engagement.frames)
     left = _left(engagement, cuts)
-    volume, work = engaged_work(engagement, cutter, material, np.abs(spindle) * seconds)
+    volume, work = engaged_work(front, cutter, material, np.abs(spindle) * seconds)
     return np.column_stack(
         [
             in_work(mean, engagement.frames),
@@ -269,12 +273,13 @@ def loads_of_steps(
 def engaged_work(
     engagement: ToothEngagement, cutter: Cutter, material: Material, turned: Floats
 ) -> tuple[Floats, Floats]:
-    """(c,) volume [mm^3] that the engaged edge sweeps while the spindle turns by ``turned`` (c,) [rad], and (c,) work
+    """(c,) volume [mm^3] that the engaged front sweeps while the spindle turns by ``turned`` (c,) [rad], and (c,) work
     [N mm] of the torque without the edge coefficients.
 
     With h the thickness used, rho the distance from the axis and N teeth they are N / (2 pi) times ``turned`` times the
     integrals over phi and s of rho h and of rho Ktc h^(1 - m): the work is Ktc times the volume where m = 0, and where
-    the material has a size effect the quotient is the mean of Ktc h^(-m) over the volume.
+    the material has a size effect the quotient is the mean of Ktc h^(-m) over the volume. The front moves on by what is
+    removed; chips between the paths of the teeth are this volume to first order, and cost as much.
     """
     plain = replace(material, Kte=0.0, Kre=0.0, Kae=0.0, covariance=None)
     work = mean_forces(engagement, cutter, plain)[1] * turned

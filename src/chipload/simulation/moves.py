@@ -26,7 +26,8 @@ from chipload.cutting.material import Material
 from chipload.cutting.revolution import loads_over_turn
 from chipload.engagement.bricks.stock import BrickStock
 from chipload.engagement.moves.stock import Engaged, MoveStock, cutter_row
-from chipload.engagement.tooth_engagement import ToothEngagement, with_runout
+from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 from chipload.lazy import LateModule
 from chipload.program.program import Program
@@ -250,10 +251,11 @@ def moved(
         entries = feeding[steps.tool[found.step[feeding]] == number]
         cutter = cutters[number]
         plain = engagement_of(found, entries, steps, cutter)
-        engagement = with_runout(plain, cutter)
+        engagement = chips_of_teeth(plain, cutter)
         step = found.step[entries]
         left, spindle = _left(found, entries), np.abs(steps.spindle[step])
-        each, at, mean = loads_of_instants(engagement, cutter, material, rotation, left, spindle, steps.seconds[step])
+        seconds = steps.seconds[step]
+        each, at, mean = loads_of_instants(plain, engagement, cutter, material, rotation, left, spindle, seconds)
         weight = 1.0 / found.instants[entries]
         _merge_instants(loads, step, each, weight)
         if material.has_band:
@@ -267,6 +269,7 @@ def moved(
 
 
 def loads_of_instants(
+    front: ToothEngagement,
     engagement: ToothEngagement,
     cutter: Cutter,
     material: Material,
@@ -275,8 +278,9 @@ def loads_of_instants(
     spindle: Floats,
     seconds: Floats,
 ) -> tuple[Floats, Floats, Floats]:
-    """(m, len(LOADS)) loads of steps that take ``seconds`` (m,) and cut all over as ``engagement`` say, (m, 2)
-    rotations [rad] at which force and torque are greatest, and (m, 4, 6) basis of the mean loads along T, n and the
+    """(m, len(LOADS)) loads of steps that take ``seconds`` (m,) and cut all over as ``engagement``, the chips of
+    ``front``, says, (m, 2) rotations
+    [rad] at which force and torque are greatest, and (m, 4, 6) basis of the mean loads along T, n and the
     axis.
 
     Oracle: :func:`chipload.simulation.loads.loads_of_steps`, which takes rotation by rotation.
@@ -284,11 +288,7 @@ def loads_of_instants(
     each, at, basis = loads_over_turn(engagement, cutter, material, rotation, left)
     each[:, 10:12] /= 1000.0
     each[:, 12] = each[:, 10] * spindle
-    if any(material.exponents):
-        volume, work = engaged_work(engagement, cutter, material, spindle * seconds)
-    else:
-        volume = basis[:, 3, 0] * spindle * seconds
-        work = material.Ktc * volume
+    volume, work = engaged_work(front, cutter, material, spindle * seconds)
     return np.column_stack([each, volume, work / 1000.0]), at, basis
 
 
@@ -449,4 +449,4 @@ def _cuts(
     some = plain if len(kept) == len(entries) else plain.part(kept)
     at = step[kept]
     ends = np.hstack([steps.p0[at], steps.p1[at], steps.a0[at], steps.a1[at]])
-    return Cuts(number, cutter, first + at, ends, with_runout(some, cutter), some, steps.spindle[at])
+    return Cuts(number, cutter, first + at, ends, chips_of_teeth(some, cutter), some, steps.spindle[at])

@@ -1,8 +1,8 @@
 """Greatest multipliers of cuts with several delays (uneven pitch, runout) or three directions.
 
 Notation: pitch of tooth j, the angle by which it follows the tooth before it. A tooth cuts the surface that another one
-left: the one before it, or with runout the m-th before it for which m h + (r_j - r_(j-m)) sin(kappa) is least, as in
-:mod:`chipload.engagement.tooth_engagement`. Its delay is the time in which the spindle turns by the pitches between
+left: the one before it, or with runout the m-th before it for which the chip is least, as in
+:mod:`chipload.engagement.tooth_surfaces`. Its delay is the time in which the spindle turns by the pitches between
 them. The nominal chip determines which tooth that is. The period is a revolution; that of even teeth without runout in
 three directions is a tooth period. A revolution takes several times as long as the periods of even teeth together.
 
@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement.tooth_engagement import ToothEngagement, tooth_radii, turns_before, with_runout
+from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.engagement.tooth_surfaces import chips_and_paths, turns_before
 from chipload.errors import InputError
 from chipload.lazy import LateModule
 
@@ -56,21 +57,11 @@ def engagement_of_teeth(engagement: ToothEngagement, cutter: Cutter) -> tuple[To
     >>> each.tooth.tolist(), (delay / math.tau).tolist()
     ([0], [1.0])
     """
-    rows = np.array(engagement.rows)
-    single = ToothEngagement(np.arange(len(rows) + 1), rows, engagement.tooth, engagement.slice, engagement.slices)
-    each = with_runout(single, cutter)
-    parent = np.repeat(np.arange(len(rows)), np.diff(each.start))
-    turns, radii, tooth = turns_before(cutter), tooth_radii(cutter), np.array(each.tooth)
-    m = np.arange(1, cutter.flutes + 1)
-    step = radii[tooth][:, None] - radii[(tooth[:, None] - m) % cutter.flutes]
-    sine = engagement.slices[engagement.slice, 3][parent]
-    wanted = turns[tooth][:, :, None] * rows[parent][:, None, 4:7]
-    wanted[:, :, 1] += step * sine[:, None]
-    off = np.abs(wanted - each.rows[:, None, 4:7]).max(axis=2)
-    which = off.argmin(axis=1)
-    delay = turns[tooth, which] * math.tau / cutter.flutes
-    start = np.asarray(each.start)[engagement.start]
-    return ToothEngagement(start, each.rows, tooth, each.slice, each.slices, engagement.frame), delay
+    each, _, before = chips_and_paths(engagement, cutter)
+    tooth = np.array(each.tooth)
+    # at a wall the tooth meets what the one before it left
+    delay = turns_before(cutter)[tooth, np.maximum(before, 1) - 1] * math.tau / cutter.flutes
+    return each, delay
 
 
 def several_multipliers(

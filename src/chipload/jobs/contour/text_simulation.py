@@ -173,7 +173,7 @@ class CutColumns:
             away = distance(np.vstack([c.segments for c in self.wall]), cuts.ends[makes, 3:5])
             makes[makes] = np.abs(away - cutter.radius) <= AT_WALL_MM
         if makes.any() and not cutter.pitch:
-            own = plain.part(np.flatnonzero(makes))
+            own = cuts.engagement.part(np.flatnonzero(makes))
             found = greatest_wall_error(own, cutter, self.checks.material, self.depth, milling=self.milling)
             out[makes] = found["form_error_signed_um"]
         return out

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from chipload.checking.default_checks import DefaultChecks, peak_excess, upper_loads
 from chipload.cutter.cutter import Cutter
+from chipload.cutter.slices import edge_lag
 from chipload.cutting.material import Material
 from chipload.cutting.strength import allowed_stress, cutter_stress
-from chipload.engagement.tooth_engagement import thickest_of_teeth
+from chipload.engagement.tooth_surfaces import thickest_of_teeth
 from chipload.jobs.feeds.outcome import FeedResult
 from chipload.jobs.feeds.tables import FeedsTable
 from chipload.jobs.feeds.verify import require_same, rubbing_lines, speeds_of, tooth_feeds
@@ -48,6 +49,8 @@ STRESS = "cutter_stress_mpa"
 CHIP = "chip_max_mm"
 #: angles kappa at which a chip with runout is evaluated, and halvings of the chip without runout
 KAPPAS, HALVINGS = 41, 40
+#: lags of the edge at which its runout is evaluated
+LAGS = 12
 #: columns of the removal in which a watch states what each step allows
 _FACTOR, _BY = "feed_factor", "feed_by"
 
@@ -149,7 +152,7 @@ def _chip_of_instant(chip: Floats, cutter: Cutter, sines: Floats) -> Callable[[F
 
     Without runout the thickness is proportional to the feed. The part that runout adds does not depend on the feed, so
     that a slower feed reduces the thickness by less. The angle kappa of the edge at the instant is not known: the
-    greatest thickness over all angles is taken.
+    greatest thickness over all angles is taken, and over all lags of the edge.
 
     Parameters
     ----------
@@ -160,17 +163,18 @@ def _chip_of_instant(chip: Floats, cutter: Cutter, sines: Floats) -> Callable[[F
     if cutter.teeth_alike or not len(counts):
         return lambda factor: factor * chip
     sine = np.unique(np.linspace(float(sines.min()), float(sines.max()), KAPPAS))
+    lags = np.linspace(0.0, min(edge_lag(cutter) * cutter.flute_length, math.tau), LAGS if cutter.helix > 0.0 else 1)
     least = np.zeros((len(counts), len(sine)))
     # without runout it is at most what it is with it
     most = np.repeat(chip[counts, None], len(sine), axis=1)
     for _ in range(HALVINGS):
         middle = 0.5 * (least + most)
-        thicker = thickest_of_teeth(middle, cutter, sine) >= chip[counts, None]
+        thicker = thickest_of_teeth(middle, cutter, sine, lags) >= chip[counts, None]
         least, most = np.where(thicker, least, middle), np.where(thicker, middle, most)
 
     def at(factor: Floats) -> Floats:
         out = factor * chip
-        out[counts] = thickest_of_teeth(factor[counts, None] * most, cutter, sine).max(axis=1)
+        out[counts] = thickest_of_teeth(factor[counts, None] * most, cutter, sine, lags).max(axis=1)
         return out
 
     return at

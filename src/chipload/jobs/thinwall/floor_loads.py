@@ -84,7 +84,7 @@ def floor_loads(places: Places, removal: Removal, left: Sequence[Floats], side: 
 
 def arc_places(cuts: Cuts, floor: PartFloor) -> Floats:
     """Parameters (3, c, 2) of the places of a floor under the beginning, the middle and the end of the arcs in cut."""
-    engagement = cuts.engagement
+    engagement = cuts.plain
     first = engagement.start[:-1]
     low, high = (
         f.reduceat(x, first) for f, x in ((np.minimum, engagement.rows[:, 0]), (np.maximum, engagement.rows[:, 1]))

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutting.force import forces_over_turn, mean_forces
 from chipload.cutting.material import Material
-from chipload.engagement.tooth_engagement import with_runout
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 from chipload.planning.thinwall.end_stock import EndPose
 from chipload.planning.thinwall.flank_stock import FlankPose, Pose
@@ -148,7 +148,7 @@ def normal_force(
         if measure == "mean":
             out[at : at + BLOCK] = np.abs(mean_forces(engagement, cutter, material)[0] @ N)
         else:
-            force = forces_over_turn(with_runout(engagement, cutter), cutter, material, theta)[0]
+            force = forces_over_turn(chips_of_teeth(engagement, cutter), cutter, material, theta)[0]
             out[at : at + BLOCK] = np.abs(force @ N).max(axis=1)
     return out
 

@@ -276,7 +276,7 @@ def engagement_of_depths(posture: CutterPose, depths: ArrayLike, nodes: int = 8)
     Returns
     -------
     ToothEngagement
-        Every tooth alike; runout: :func:`chipload.engagement.tooth_engagement.with_runout`.
+        Every tooth alike; runout: :func:`chipload.engagement.tooth_surfaces.chips_of_teeth`.
 
     Raises
     ------

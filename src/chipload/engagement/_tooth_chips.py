@@ -1,0 +1,352 @@
+"""Compiled loops of the chips between the true paths of the teeth; arrays and scalars only.
+
+Notation as in :mod:`chipload.engagement.tooth_surfaces`: a line is a sinusoid along sin(phi) + offset + across cos(phi)
+in the immersion phi counted from the feed, so that 0 and pi are the ends of the front; ``alike``: all teeth cut
+equally, and tooth -1 stands for each.
+Oracle: every slice against the paths of all earlier teeth by Newton's method, tests/engagement/tooth_paths.py.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+PI = math.pi
+TAU = 2.0 * math.pi
+#: widest piece of immersion in which a chip of second order is a sinusoid through three of its values [rad]
+WIDEST = 0.5 * PI + 0.1
+#: share of the greatest chip below which a range ends where the feed is tangent to the cutter, not at a wall
+CUSP = 1e-4
+#: least cosine of the immersion at which a wall shortens the chip
+STEEP = 1e-3
+#: share of the chip's area below which what a wall takes away is left out
+THIN = 1e-3
+#: greatest offset of a range, as a share of its swing, at which its walls are those of a level cut
+LEVEL = 1e-3
+#: greatest feed over the distance from the axis for which the second order is taken: near a pointed tip less
+LARGE = 0.25
+#: piece of immersion that is left out, and half a piece below which a sinusoid through three values is a line [rad]
+NONE, SMALL = 1e-9, 1e-4
+#: rounding of angles [rad] and places [mm], and of chips as a share of it
+GRID, THICK = 1e-9, 1e-2
+
+
+@njit(cache=True, nogil=True)
+def chip(phi, f, c, R):
+    """Chip [mm] against a tooth that passed f [mm] of feed before, of second order in f / R; c feed per radian."""
+    co = math.cos(phi)
+    return f * math.sin(phi) * (1.0 - c * co / R) + f * f * co * co / (2.0 * R)
+
+
+@njit(cache=True, nogil=True)
+def through(p, q, hp, hm, hq):
+    """(along, offset, across) of the sinusoid through hp, hm, hq at p, (p + q) / 2, q."""
+    w = 0.5 * (q - p)
+    m = 0.5 * (p + q)
+    A = (hm - 0.5 * (hp + hq)) / (1.0 - math.cos(w)) if w > SMALL else 0.0
+    B = (hq - hp) / (2.0 * math.sin(w))
+    return A * math.sin(m) + B * math.cos(m), hm - A, A * math.cos(m) - B * math.sin(m)
+
+
+@njit(cache=True, nogil=True)
+def first_root(al, of, ac, x, y):
+    """Least phi in (x, y) with al sin(phi) + of + ac cos(phi) = 0; y if none."""
+    swing = math.hypot(al, ac)
+    if swing <= abs(of):
+        return y
+    peak = math.atan2(al, ac)
+    d = math.acos(-of / swing)
+    best = y
+    for t in (peak - d, peak + d):
+        r = t - TAU * math.floor((t - x - 1e-12) / TAU)
+        if r < best:
+            best = r
+    return best
+
+
+@njit(cache=True, nogil=True)
+def like(i, k, start, rows, tooth, piece, slices):
+    """Whether step i has the same ranges as step k, as the steps along a straight row have."""
+    count = start[i + 1] - start[i]
+    if start[k + 1] - start[k] != count:
+        return False
+    for n in range(count):
+        r = start[i] + n
+        q = start[k] + n
+        if tooth[r] != tooth[q]:
+            return False
+        for d in range(7):
+            if rows[r, d] != rows[q, d] or slices[piece[r], d] != slices[piece[q], d]:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def rounded(rows):
+    """Ranges rounded to :data:`GRID`, so that those of steps along a straight row are equal to the last bit: chips do
+    not depend on which steps are calculated together.
+    """
+    out = np.empty_like(rows)
+    for r in range(len(rows)):
+        for d in range(7):
+            grid = GRID if d < 4 else GRID * THICK
+            out[r, d] = math.floor(rows[r, d] / grid + 0.5) * grid
+    return out
+
+
+@njit(cache=True, nogil=True)
+def adjoin(rows, piece, r, other):
+    """Whether the range ``r`` ends where the range ``other`` of the same place of the edge begins."""
+    if piece[r] != piece[other] or rows[r, 2] >= rows[other, 3] or rows[other, 2] >= rows[r, 3]:
+        return False
+    d = (rows[other, 0] - rows[r, 1]) % TAU
+    return min(d, TAU - d) < 1e-6
+
+
+@njit(cache=True, nogil=True)
+def parts_of_lag(span, wide, thick, swing, e, share):
+    """Number of parts of an edge that lags by ``span`` [rad] in which its radius is taken as that of the middle: what
+    is missed at both ends of the engaged part, ``wide`` [rad], is about ``share`` of the mean chip ``thick`` [mm], and
+    twice that of the thickest, ``swing``.
+    """
+    if e <= 0.0 or span <= 0.0:
+        return 1
+    x = share * thick / e
+    most = max(min(math.sqrt(4.0 * x * min(wide, span)), wide, 2.0 * share * swing / e), x)
+    return math.ceil(span / most)
+
+
+@njit(cache=True, nogil=True)
+def put(out, own, parent, before, at, p, q, s0, s1, al, of, ac, turned, tooth, row, m):
+    """Write one range, its immersion counted from the feed less ``turned`` [rad], if there is room; next number."""
+    if at < len(out):
+        co = math.cos(turned)
+        si = math.sin(turned)
+        low = p - turned
+        low -= TAU * math.floor(low / TAU)
+        out[at, 0] = low
+        out[at, 1] = low + min(q - p, TAU)
+        out[at, 2] = s0
+        out[at, 3] = s1
+        out[at, 4] = al * co - ac * si
+        out[at, 5] = of
+        out[at, 6] = al * si + ac * co
+        own[at] = tooth
+        parent[at] = row
+        before[at] = m
+    return at + 1
+
+
+@njit(cache=True, nogil=True, inline="always")
+def along_wall(line, lines, phi, sine, rho, radius):
+    """Add the line of the chip that runs out along the wall that a circle of radius ``rho`` meets at phi."""
+    line[lines, 0] = 0.0
+    line[lines, 1] = sine * (radius - rho)
+    line[lines, 2] = sine * rho / math.cos(phi)
+    line[lines, 3] = 0.0
+    return lines + 1
+
+
+@njit(cache=True, nogil=True)
+def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, share, room, out, own, parent, before):
+    """Ranges of the chips that the true paths of the teeth leave; their number, which may be more than ``out`` holds.
+
+    Parameters
+    ----------
+    start, given, tooth, piece, slices : of the front, as if each tooth were a circle that the feed moves on
+    runout : (2,) [mm, rad]; angles (N,) lag of each tooth; turns (N, N) pitches before tooth j, over 2 pi / N
+    share : see :func:`parts_of_lag`
+    room : (n + 1,) filled: where the ranges of each step begin
+    out, own, parent, before : filled: rows, tooth, row of ``given`` and number of teeth before the one that cuts whose
+        path it meets; 0: a wall
+    """
+    N = len(angles)
+    e = runout[0]
+    rows = rounded(given)
+    line = np.empty((N + 2, 4))
+    radii = np.zeros(N)
+    cut = np.zeros((5, N, N, 3))
+    at = 0
+    known = -1
+    for i in range(len(start) - 1):
+        room[i] = at
+        if known >= 0 and like(i, known, start, rows, tooth, piece, slices):
+            for k in range(room[known], room[known + 1]):
+                if at < len(out):
+                    out[at] = out[k]
+                    own[at] = own[k]
+                    parent[at] = parent[k] - start[known] + start[i]
+                    before[at] = before[k]
+                at += 1
+            room[i + 1] = at
+            known = i
+            continue
+        known = i
+        for r in range(start[i], start[i + 1]):
+            k = piece[r]
+            sine = slices[k, 3]
+            offset = rows[r, 5]
+            swing = math.hypot(rows[r, 4], rows[r, 6])
+            if tooth[r] >= 0 or swing <= 0.0 or sine <= 0.0 or slices[k, 1] <= 0.0:
+                # of one tooth, or not across the axis: every tooth as long as the one before
+                one = alike or tooth[r] >= 0
+                for j in range(1 if one else N):
+                    fed = 1.0 if one else turns[j, 0]
+                    at = put(
+                        out, own, parent, before, at, rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3],
+                        fed * rows[r, 4], fed * offset, fed * rows[r, 6], 0.0, tooth[r] if one else j, r, 1,
+                    )  # fmt: skip
+                continue
+            f = swing / sine
+            rho = max(slices[k, 1], f / LARGE)
+            c = N * f / TAU
+            turned = math.atan2(rows[r, 6], rows[r, 4])
+            p = rows[r, 0] + turned
+            p -= TAU * math.floor((p + 1e-6) / TAU)
+            q = p + rows[r, 1] - rows[r, 0]
+            whole = rows[r, 1] - rows[r, 0] > TAU - 1e-6
+            least = CUSP * (swing + abs(offset))
+            cusp_p = abs(swing * math.sin(p) + offset) <= least
+            cusp_q = abs(swing * math.sin(q) + offset) <= least
+            # a wall shortens the chip where the tooth before has cut along it already
+            area = math.cos(p) - math.cos(q)
+            level = abs(offset) <= LEVEL * swing and not whole
+            wall_p = level and not cusp_p and p < PI and math.cos(p) < -STEEP
+            wall_q = level and not cusp_q and q < PI and math.cos(q) > STEEP
+            if wall_p and 0.5 * f / rho * abs(math.sin(p) * math.cos(p)) < THIN * area:
+                wall_p = False
+            if wall_q and 0.5 * f / rho * abs(math.sin(q) * math.cos(q)) < THIN * area:
+                wall_q = False
+            if r > start[i]:
+                if wall_p and adjoin(rows, piece, r - 1, r):
+                    wall_p = False
+                if wall_q and adjoin(rows, piece, r, r - 1):
+                    wall_q = False
+            if r + 1 < start[i + 1]:
+                if wall_p and adjoin(rows, piece, r + 1, r):
+                    wall_p = False
+                if wall_q and adjoin(rows, piece, r, r + 1):
+                    wall_q = False
+            most = 1 if alike else N
+            reach = 0.5 * f / rho * (1.2 if alike else float(N))
+            base = slices[k, 5] - slices[k, 6] * slices[k, 0]
+            span = slices[k, 6] * (rows[r, 3] - rows[r, 2])
+            thick = swing * area / (q - p) if level and q > p else swing + abs(offset)
+            count = 1 if alike else parts_of_lag(span, q - p, max(thick, 1e-3 * swing), swing, e * sine, share)
+            ds = (rows[r, 3] - rows[r, 2]) / count
+            # the same lines for all parts of the edge; a wall may be met beyond an end by what a tooth stands out
+            first = p - reach if cusp_p and not whole else p
+            last = q + reach if cusp_q and not whole else q
+            parts = max(1, math.ceil((last - first) / WIDEST - 1e-9))
+            for part in range(parts):
+                x = first + (last - first) * part / parts
+                y = first + (last - first) * (part + 1) / parts
+                mid = 0.5 * (x + y)
+                if y - x > NONE:
+                    for j in range(1 if alike else N):
+                        for m in range(most):
+                            past = f * turns[j, m]
+                            al, of, ac = through(
+                                x, y, chip(x, past, c, rho), chip(mid, past, c, rho), chip(y, past, c, rho)
+                            )
+                            cut[part, j, m, 0] = sine * al
+                            cut[part, j, m, 1] = sine * of + offset * turns[j, m]
+                            cut[part, j, m, 2] = sine * ac
+            for b in range(count):
+                s0 = rows[r, 2] + b * ds
+                s1 = rows[r, 3] if b == count - 1 else s0 + ds
+                psi = base + slices[k, 6] * 0.5 * (s0 + s1)
+                if not alike:
+                    for j in range(N):
+                        radii[j] = e * math.cos(runout[1] - angles[j] - psi)
+                for j in range(1 if alike else N):
+                    lo = first
+                    hi = last
+                    if not alike and level and not cusp_p and p < PI:
+                        lo = math.acos(min(max(rho * math.cos(p) / (rho + radii[j]), -1.0), 1.0))
+                    if not alike and level and not cusp_q and q < PI:
+                        hi = math.acos(min(max(rho * math.cos(q) / (rho + radii[j]), -1.0), 1.0))
+                    for part in range(parts):
+                        x = lo if part == 0 else first + (last - first) * part / parts
+                        y = hi if part == parts - 1 else first + (last - first) * (part + 1) / parts
+                        if y - x <= NONE:
+                            continue
+                        for m in range(most):
+                            line[m, 0] = cut[part, j, m, 0]
+                            line[m, 1] = cut[part, j, m, 1]
+                            if not alike:
+                                line[m, 1] += sine * (radii[j] - radii[(j - m - 1) % N])
+                            line[m, 2] = cut[part, j, m, 2]
+                            line[m, 3] = m + 1
+                        lines = most
+                        if wall_p and part == 0:
+                            lines = along_wall(line, lines, p, sine, rho, radii[j])
+                        if wall_q and part == parts - 1:
+                            lines = along_wall(line, lines, q, sine, rho, radii[j])
+                        at = lowest(
+                            line, lines, x, y, s0, s1, turned, -1 if alike else j, r, out, own, parent, before, at
+                        )
+        room[i + 1] = at
+    return at
+
+
+@njit(cache=True, nogil=True)
+def lowest(line, lines, x, y, s0, s1, turned, tooth, row, out, own, parent, before, at):
+    """Write the ranges in x .. y [rad] of the lower envelope of lines where it is positive; next number.
+
+    From each corner on the lowest line stays so until another crosses it downwards. A line is not looked at whose
+    distance at both ends is more than it can bend between them.
+    """
+    sx = math.sin(x)
+    cx = math.cos(x)
+    sy = math.sin(y)
+    cy = math.cos(y)
+    best = 0
+    low = math.inf
+    for m in range(lines):
+        v = line[m, 0] * sx + line[m, 1] + line[m, 2] * cx
+        if v < low:
+            low = v
+            best = m
+    g = x
+    steps = 0
+    while g < y - NONE and steps < 4 * lines + 4:
+        steps += 1
+        end = y
+        after = best
+        if lines > 1:
+            sg = math.sin(g)
+            cg = math.cos(g)
+            bend = 0.125 * (y - g) * (y - g)
+            for m in range(lines):
+                if m == best:
+                    continue
+                A = line[m, 0] - line[best, 0]
+                B = line[m, 1] - line[best, 1]
+                C = line[m, 2] - line[best, 2]
+                v = min(A * sg + B + C * cg, A * sy + B + C * cy)
+                if v > (abs(A) + abs(C)) * bend:
+                    continue
+                t = first_root(A, B, C, g + 1e-10, end)
+                if t < end and A * math.cos(t) - C * math.sin(t) < 0.0:
+                    end = t
+                    after = m
+        al = line[best, 0]
+        of = line[best, 1]
+        ac = line[best, 2]
+        u = g
+        for _ in range(3):
+            t = first_root(al, of, ac, u, end)
+            if t > u + NONE:
+                mid = 0.5 * (u + t)
+                if al * math.sin(mid) + of + ac * math.cos(mid) > 0.0:
+                    m = int(line[best, 3])
+                    at = put(out, own, parent, before, at, u, t, s0, s1, al, of, ac, turned, tooth, row, m)
+            u = t
+            if t >= end:
+                break
+        g = end
+        best = after
+    return at
