@@ -133,6 +133,9 @@ def agree(
     """
     found: list[Finding] = []
     for number, cutter in sorted(cutters.items()):
+        if cutter.body and cutter.thread_pitch is not None:
+            # a tap is simulated as its core, a comment states its thread
+            continue
         table = tools.tools.get(number) if tools is not None else None
         if table is not None and table.diameter != 0.0:
             stated = StatedDiameter(abs(table.diameter), "the tool table", 0)

@@ -18,6 +18,7 @@ from chipload.errors import InputError
 from chipload.machine.machine import Machine
 from chipload.program.commands import ARC, DWELL, LETTERS, LINE, PLANE_AXES, RAPID, XY, Commands, arc_sweeps, extents
 from chipload.program.commands import starts as starts_of
+from chipload.program.control import control_named
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
 Floats = NDArray[np.float64]
@@ -101,7 +102,7 @@ class Blocks:
 
     def __init__(self, commands: Commands, machine: Machine, kept: Sequence[tuple[int, str]]) -> None:
         self.commands, self.machine = commands, machine
-        self.fanuc, d = machine.dialect == "fanuc", machine.decimals
+        self.fanuc, d = control_named(machine.dialect).text.program_number, machine.decimals
         self.columns = [LETTERS.index(x) for x in LETTERS if x in machine.chain.letters]
         done = _written(commands, d)
         self.arc = done.arc

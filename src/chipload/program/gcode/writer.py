@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from chipload.errors import InputError
 from chipload.machine.machine import Machine
 from chipload.program.commands import Commands
+from chipload.program.control import control_named
 from chipload.program.gcode.blocks import Blocks, comment, decimal
 from chipload.program.program import Program
 from chipload.program.release import Release
@@ -97,7 +98,7 @@ def write_commands(
         A tool does not begin with a rapid, a feed rounds to 0, the number is out of range, the controller has no word
         for tool centre point control; a program of several tools is to be repeated.
     """
-    fanuc = machine.dialect == "fanuc"
+    fanuc = control_named(machine.dialect).text.program_number
     if not 1 <= number <= 9999:
         raise InputError(f"program number = {number}: must be from 1 to 9999")
     status = f"chipload: {release.text}" if release.verified else release.text
@@ -133,7 +134,7 @@ def _repeated(blocks: list[str], repeat: Repeat, fanuc: bool) -> list[str]:
 def _modes(machine: Machine) -> list[str]:
     """Every mode that the motions rely on, set and not assumed."""
     path = "G61" if machine.corner_tolerance == 0.0 else "G64"
-    if machine.dialect == "fanuc":
+    if control_named(machine.dialect).text.program_number:
         return ["G21", "G17 G90 G94 G40 G49 G80", f"G54 {path}"]
     if path == "G64":
         path += f" P{decimal(machine.corner_tolerance, 6)}"
