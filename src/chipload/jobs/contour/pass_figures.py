@@ -56,7 +56,7 @@ def shown_rows(strategy: StrategyResult) -> NDArray[np.bool_]:
     """Rows that the figures along the pass show: the finish pass, or all cutting where there is none."""
     names = np.asarray(strategy.history["pass"]).astype(str)
     finish: NDArray[np.bool_] = np.isin(names, ["finish", "closing"])
-    cut: NDArray[np.bool_] = np.isin(names, ["pocket", "floor", "wall", "semifinish"])
+    cut: NDArray[np.bool_] = np.isin(names, ["entry", "pocket", "floor", "wall", "semifinish"])
     return next((some for some in (finish, cut) if some.any()), np.ones(len(names), dtype=np.bool_))
 
 
@@ -96,8 +96,9 @@ def along(operation: Operation) -> go.Figure:
         figure.update_yaxes(title_text=COLUMNS[column].title, range=[0.0, reach or 1.0], row=row, col=1)
         if limit is None:
             continue
-        where = ", where the wall is made" if column in ON_WALL and operation.result.kind == "contour" else ""
-        text = f"limit {limit:g}{where}" + ("" if near else ", far above")
+        covered = ", where the wall is made" if operation.result.kind == "contour" else ", in the passes"
+        covered = covered if column in ON_WALL else ""
+        text = f"limit {limit:g}{covered}" + ("" if near else ", far above")
         label = {"text": text, "font": {"color": LIMIT, "size": 11}}
         if near:
             line = {"color": LIMIT, "width": 1.2, "dash": "dash"}
