@@ -96,6 +96,8 @@ def test_gouge_excess_and_collision(job: Path, tmp_path: Path) -> None:
     assert (hit["what"], hit["into"], hit["line"], hit["tool"]) == ("shank or holder", "fixture 0", 6, 1)
     assert hit["depth_mm"] == pytest.approx(2.1, abs=0.01)
     assert op["compared_with"] == ["fixture 0", "part", "stock"]
+    missed = "fixtures: what is thinner than their spacing_mm, and a contact less deep, may be missed"
+    assert missed in summary["unchecked"]
     assert op["no_holder"] == []
     history = pq.read_table(out / "history.parquet")
     assert max(history["gouge_mm"].to_pylist()) == pytest.approx(op["gouge_mm"]["max"])

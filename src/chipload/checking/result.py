@@ -140,6 +140,8 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
     out += simulation.collisions.stock.unchecked
     if not any(name.startswith("fixture") for name in simulation.collisions.compared_with):
         out.append("fixtures: none is stated")
+    else:
+        out.append("fixtures: what is thinner than their spacing_mm, and a contact less deep, may be missed")
     if simulation.collisions.no_holder:
         out.append(f"holders of tools {', '.join(map(str, simulation.collisions.no_holder))}: not stated")
     if simulation.rigid:
