@@ -120,7 +120,7 @@ def write_pictures(names: list[str], results: Path) -> None:
     shown = values.setdefault("pictures", {})
     for name in names:
         take(SOURCES[name].pictures, results)
-        shown |= dict.fromkeys(SOURCES[name].pictures, fingerprint(results / name))
+        shown |= {picture: fingerprint(results / name, picture) for picture in SOURCES[name].pictures}
         if name == "contour":
             animation.write(results / name)
     write_values({**values, "pictures": {p: shown[p] for s in SOURCES.values() for p in s.pictures if p in shown}})

@@ -340,10 +340,10 @@ def values_of(name: str, folder: Path) -> Text:
     return SOURCES[name].values(Run(folder))
 
 
-def fingerprint(folder: Path) -> str:
-    """Return a digest of what the pictures of a result show: its verdict, and its numbers to four digits."""
+def fingerprint(folder: Path, picture: str) -> str:
+    """Return a digest of what a picture of a result shows: numbers to four digits, of the page the first line too."""
     summary = Run(folder).summary
-    shown = [summary["verdict"], summary["message"]]
+    shown = [summary["verdict"], summary["message"] if picture.startswith("page") else ""]
     for track in summary["tracks"]:
         numbers = [track["time_s"], track["rows"], *(check["worst"] for check in track["limits"])]
         shown += [track["name"], *(None if x is None else f"{x:.4g}" for x in numbers)]
