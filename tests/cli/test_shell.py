@@ -93,8 +93,8 @@ def test_an_excess_over_the_allowable_torque_has_the_error_of_the_torque(share, 
     """No excess is allowed, and the torque is known to 5 %: 0.97 of what is allowed may be 1.02 of it."""
     columns = {"torque_nm": np.array([0.1, share]), "torque_allowable_nm": np.ones(2)}
     excess = 100.0 * max(share - 1.0, 0.0)
-    state = Verdict.EXCEEDS if excess > 0.0 else Verdict.HOLDS
-    plain = LimitCheck("torque_over_percent", 0.0, excess, state, resolution_error=0.0)
+    without = Verdict.EXCEEDS if excess > 0.0 else Verdict.HOLDS
+    plain = LimitCheck("torque_over_percent", 0.0, excess, without, resolution_error=0.0)
     found = over_allowable(plain, columns, 0.05)
     assert (found.state.value, found.resolution_error, found.worst) == (state, 0.05, excess)
     assert bool(found.reason) == (state == "unproven")
