@@ -165,7 +165,8 @@ def text_to_change(
     InputError
         The text or the simulation cannot be used.
     """
-    own = changeable(job.program_file, inputs.machine, job.table.program.dialect, f"operation.0.{key}")
+    read_as = job.table.program.dialect if reading.recognition is None else reading.recognition.control.language
+    own = changeable(job.program_file, inputs.machine, read_as, f"operation.0.{key}")
     straight(reading.program, key)
     bodies_of(inputs, reading, stock)
     return own

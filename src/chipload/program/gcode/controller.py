@@ -361,7 +361,7 @@ class Controller:
         if self.compensation == "wear":
             return wear
         radius = 0.5 * self.compensation_diameter(name, number, stated) + wear
-        if self.control.offsets.offset_holds == "unknown" and stated == 0.0 and number and self.compensation is None:
+        if self.control.offsets.offset_holds == "unknown" and stated == 0.0 and radius and self.compensation is None:
             self.once(
                 "nc-compensation-unstated",
                 f"{name} D{number}: whether offset {number} holds the cutter's radius, so that the path moves by "
