@@ -18,6 +18,7 @@ from chipload.cutting.force import forces_over_turn
 from chipload.cutting.material import material_named
 from chipload.cutting.strength import cutter_stress
 from chipload.engagement.tooth_engagement import engagement_of_arcs
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 from chipload.jobs.tables import ChecksTable
 from chipload.program.build import plunge, rapid
@@ -57,7 +58,7 @@ def test_a_thin_cutter_breaks_and_the_report_says_where() -> None:
     assert "cutter stress" in done.message
     assert "exceeds 1500 MPa" in done.message
     found = held(done, "cutter_stress_mpa")
-    engagement = engagement_of_arcs([0.0], [math.pi], FEED, thin, 3.0)
+    engagement = chips_of_teeth(engagement_of_arcs([0.0], [math.pi], FEED, thin, 3.0), thin)
     assert found.worst == pytest.approx(cutter_stress(engagement, thin, AL)[0], rel=1e-3)
     allowed = done.numbers["cutter_stress_mpa"]["allowed"]["1"]
     assert (allowed["mpa"], allowed["tool_material"], allowed["safety_factor"]) == (1500.0, "carbide", 2.0)
@@ -98,11 +99,14 @@ def test_flutes_shorter_than_the_cut_let_the_shank_rub(flutes: float, overrun: f
     assert held(done, "axial_overrun_mm").worst == pytest.approx(overrun, abs=1e-9)
     assert (done.verdict == "exceeds") == (overrun > 0.0)
     if overrun > 0.0:
-        assert "cut above the flutes" in done.message
-        thinner = slot(
-            replace(MILL, flute_length=flutes), 6.0, feed=2.0, checks=chipload.CheckSettings(flute_length=False)
-        )
-        assert thinner.verdict == "holds"
+        assert held(done, "axial_overrun_mm").state is Verdict.EXCEEDS
+        assert done.message.startswith(f"Exceeds: shank goes {overrun:g} mm into stock; and 1 more.")
+        # the shank against the stock is a check of its own
+        off = chipload.CheckSettings(flute_length=False)
+        shank = slot(replace(MILL, flute_length=flutes), 6.0, feed=2.0, checks=off)
+        assert shank.message.startswith(f"Exceeds: shank goes {overrun:g} mm into stock.")
+        off = chipload.CheckSettings(flute_length=False, shank_in_stock=False)
+        assert slot(replace(MILL, flute_length=flutes), 6.0, feed=2.0, checks=off).verdict == "holds"
 
 
 def test_a_shank_over_an_open_side_does_not_rub() -> None:

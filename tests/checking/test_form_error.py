@@ -32,7 +32,7 @@ def walled(rows=(0.0,), width=1.5, limits=None, part_z=(-6.0, 0.0), **stiffness)
         parts += [plunge([40.0, y, -DEPTH], 20.0, 300.0, 1, "cut"), rapid([40.0, y, 5.0], 300.0, 1, "link")]
     wall = trimesh.creation.box(bounds=[[0.0, -8.0, part_z[0]], [30.0, 0.0, part_z[1]]])
     return chipload.simulate(
-        Program.join(parts), chipload.Stock.block((0.0, -8.0, -DEPTH), (30.0, width, 0.0), 0.5), MILL, EDGE, "vmc",
+        Program.join(parts), chipload.Stock.block((0.0, -8.0, part_z[0]), (30.0, width, 0.0), 0.5), MILL, EDGE, "vmc",
         chipload.Limits(form_error_um=50.0) if limits is None else limits, part=chipload.FinishedPart(wall, 1.0),
         stiffness=chipload.MachineStiffness(**(RIGID | stiffness)),
         settings=chipload.SimulationSettings(2.0, tolerance_mm=1e-4, flank_mm=0.5),

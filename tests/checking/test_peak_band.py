@@ -112,7 +112,7 @@ def test_the_stress_of_a_workpiece_has_the_band_of_the_force() -> None:
     def stress(sigma: float, excess: float = 0.0) -> LimitCheck:
         simulation = SimpleNamespace(
             workpiece=SimpleNamespace(strained=strained, error=0.0), errors={"force_n": 0.0}, limits={}, stability=None,
-            machine=None, checks=DefaultChecks({}, replace(own, peak_excess=excess), ("spindle",), sigma),
+            machine=None, left=None, checks=DefaultChecks({}, replace(own, peak_excess=excess), ("spindle",), sigma),
         )  # fmt: skip
         (found,) = program_limits(simulation, columns, "program")
         return found

@@ -330,7 +330,7 @@ def test_a_cutter_that_leans_has_no_known_margin() -> None:
         met = ToothEngagement([0, 1], rows, [-1], [0], flank, axes)
         columns = watch(Cuts(1, cutter, np.array([0]), np.zeros((1, 12)), met, met, np.array([900.0])))
         assert (columns["stability_margin"][0] > 0.0) == (axes is frame)
-    result = StabilityResult(watch, machine_named("vmc"), 1.0, {1: 5.0})
+    result = StabilityResult(watch, machine_named("vmc"), 1.0, {1: 5.0}, {})
     assert result.reason(np.array([1])) == "tool 1 leans: modes are known for an upright axis only"
     assert result.reason(np.array([2])) == ""
 
