@@ -52,15 +52,19 @@ LIMITS = {"force_n": 620.0, "torque_nm": 2.5, "power_w": 400.0, "chip_max_mm": 0
 def slot_feed(name: str, load: float) -> float:
     """The feed [mm/min] at which a slot of 3 mm with two straight teeth has a load.
 
-    [Altintas2012] ch. 2: a tooth straight ahead has h = f_z, all other rotations less; the mean torque as there.
+    [Altintas2012] ch. 2: a tooth straight ahead has h = f_z, all other rotations less; the mean torque as there, but of
+    chips between trochoids: the integral of h over the front is 2 f_z + pi f_z^2 / (4 R), and a tooth touches over
+    pi + f_z / R. Every slice against these paths (tests/engagement/tooth_paths.py) gives the same within 1e-4.
     """
-    a, teeth, rpm, omega = 3.0, 2, 3000.0, 3000.0 * math.tau / 60.0
+    a, teeth, rpm, omega, R = 3.0, 2, 3000.0, 3000.0 * math.tau / 60.0, 5.0
     cut, edge = np.array([1200.0, 500.0, 300.0]), np.array([14.0, 11.0, 2.0])
     roots = np.roots([(cut**2).sum(), 2.0 * (cut * edge).sum(), (edge**2).sum() - (load / a) ** 2])
+    turned = load * 1000.0 / omega * math.tau / (teeth * a * R)
+    mean = np.roots([cut[0] * math.pi / (4.0 * R), 2.0 * cut[0] + edge[0] / R, math.pi * edge[0] - turned])
     tooth = {
         "force_n": float(roots.real.max()),
-        "torque_nm": (load * 1000.0 / (5.0 * a) - edge[0]) / cut[0],
-        "power_w": (load * 1000.0 / omega * math.tau / (teeth * a * 5.0) - math.pi * edge[0]) / (2.0 * cut[0]),
+        "torque_nm": (load * 1000.0 / (R * a) - edge[0]) / cut[0],
+        "power_w": float(mean.real.max()),
         "chip_max_mm": load,
     }
     return tooth[name] * teeth * rpm
@@ -309,7 +313,10 @@ def test_the_thickest_chip_of_a_ramp_is_not_that_of_its_greatest_force(tmp_path:
     read = done(tmp_path, text, "chip_max_mm = 0.026\n", job=job)
     before, after = read.outcome.feeds.before.columns, read.outcome.simulated.removal.columns
     assert before["chip_max_mm"].max() > 0.08
-    assert 0.024 < after["chip_max_mm"].max() <= 0.026
+    # all of the limit is used but the room for the stated error of the chip
+    room = 1.0 + 2.0 * read.outcome.feeds.before.resolution_error["chip_max_mm"]
+    assert room < 1.15
+    assert 0.026 / room < after["chip_max_mm"].max() <= 0.026
 
 
 def test_the_chip_of_another_instant_grows_no_more_than_the_feed(tmp_path: Path) -> None:
