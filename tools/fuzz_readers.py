@@ -507,7 +507,7 @@ def _modes_text() -> list[bytes]:
 
 
 def _modes(path: Path) -> int:
-    from chipload.checking.dynamics import read_modes
+    from chipload.jobs.simulation.modes_file import read_modes
 
     finite([(mode.frequency_hz, mode.stiffness_n_um or 0.0) for mode in read_modes(path)])
     return 0

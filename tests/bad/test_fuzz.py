@@ -22,6 +22,7 @@ sys.path.insert(0, str(TOOL.parent))
 
 import fuzz_fork  # noqa: E402
 import fuzz_jobs  # noqa: E402
+import fuzz_readers  # noqa: E402
 
 
 def ran(*words: str) -> subprocess.CompletedProcess[str]:
@@ -32,7 +33,8 @@ def test_few_cases_of_every_reader() -> None:
     done = ran("--cases", "6", "--budget", "800")
     assert done.returncode == 0, done.stdout + done.stderr
     rows = re.findall(r"^\| (\w+) \| (\d+) \|", done.stdout, re.MULTILINE)
-    assert len(rows) == 26
+    assert [name for name, _ in rows] == [*fuzz_readers.READERS, "all"]
+    assert len(rows) == 32
     assert all(int(count) > 0 for _, count in rows)
 
 

@@ -28,8 +28,8 @@ JOB = block_job("side.ngc", "[0.0, -20.0, -5.0]", "[40.0, 20.0, 0.0]", simulatio
 REMOVED = 40.0 * 10.0 * 2.0
 
 
-def run(folder: Path, *, head: str = "", keys: str = "", table: str | None = None):
-    (folder / "side.ngc").write_text(PATH.format(head=head))
+def run(folder: Path, *, head: str = "", keys: str = "", table: str | None = None, length: str = ""):
+    (folder / "side.ngc").write_text(PATH.format(head=head).replace("G0 X-20 Y-20 Z5", f"{length}G0 X-20 Y-20 Z5"))
     if table is not None:
         (folder / "tool.tbl").write_text(table)
         keys += '\ntools = "tool.tbl"'
@@ -73,11 +73,18 @@ def test_a_table_that_contradicts_the_cutter_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_worn_cutter_is_noted_and_its_diameter_is_compensated_for(tmp_path: Path) -> None:
-    code, _, _, summary = run(tmp_path, table="T1 P1 D9.96 Z50\n")
+    code, _, _, summary = run(tmp_path, table="T1 P1 D9.96 Z50\n", length="G43 H1 ")
     assert code == 0
     assert "tool-diameter" in [f["code"] for f in summary["findings"]]
     # the centre goes 0.02 mm nearer to the contour than that of the cutter that is simulated
     assert summary["operations"][0]["removed_mm3"] == pytest.approx(REMOVED, rel=1e-3)
+
+
+def test_the_length_of_the_table_without_g43_leaves_the_result_unproven(tmp_path: Path) -> None:
+    code, out, _, summary = run(tmp_path, table="T1 P1 D10 Z50\n")
+    assert code == 3
+    assert out.startswith("Unproven: line 6: tool 1 moves without its length, Z50 of the tool table (active is Z0)")
+    assert [f["code"] for f in summary["findings"] if f["severity"] == "unproven"] == ["nc-length-missing"]
 
 
 def test_a_comment_that_contradicts_the_cutter_is_refused_unless_comments_do_not_count(tmp_path: Path) -> None:
