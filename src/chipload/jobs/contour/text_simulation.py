@@ -291,7 +291,7 @@ def labels_of_lines(text: str, labels: Sequence[str], machine: Machine) -> NDArr
     r"""Label of each line of a text, from line 0: that of the last comment that is one of ``labels``; else link.
 
     >>> from chipload.machine.machine import machine_named
-    >>> labels_of_lines("(link)\\nG0 X1\\n(finish)\\nG1 X2", ["link", "finish"], machine_named("vmc")).tolist()
+    >>> labels_of_lines("(link)\nG0 X1\n(finish)\nG1 X2", ["link", "finish"], machine_named("vmc")).tolist()
     ['link', 'link', 'link', 'finish', 'finish']
     """
     names = {comment(label, machine.dialect == "fanuc"): label for label in labels}
