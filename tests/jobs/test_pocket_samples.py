@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from chipload.jobs.contour.result import history_of, samples_of
 from pocket_job import done, operation, written
@@ -28,8 +27,13 @@ def test_the_loads_of_each_level(tmp_path):
     heights, counts = np.unique(rows["z_mm"][found.row][clearing].round(9), return_counts=True)
     assert heights.tolist() == [-4.6, -2.3]
     assert counts.min() > 20
-    most = np.hypot(found.turn[:, :, 0], found.turn[:, :, 1]).max(axis=1)
-    assert most == pytest.approx(rows["force_xy_n"][found.row], rel=0.01, abs=0.5)
+    force, greatest = np.hypot(found.turn[:, :, 0], found.turn[:, :, 1]), rows["force_xy_n"][found.row]
+    most = force.max(axis=1)
+    # the greatest force may lie between two rotations, 1 deg apart, where a slice of the entry begins to cut
+    between = np.abs(force - np.roll(force, 1, axis=1)).max(axis=1)
+    assert (most <= 1.001 * greatest).all()
+    assert (greatest - most <= between).all()
+    assert np.isclose(most, greatest, rtol=0.01, atol=0.5).mean() > 0.99
     # the greatest torque of a step may belong to another instant than its greatest force
     torque = np.abs(found.turn[:, :, 3]).max(axis=1)
     assert (torque <= 1.01 * rows["torque_nm"][found.row] + 0.002).all()
