@@ -56,7 +56,7 @@ def array_of(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
 
 
 def read_arrays(
-    path: Path, remedy: str = "run the job again", wanted: Callable[[str], bool] = lambda name: True
+    path: Path, remedy: str = "run the job again", wanted: Callable[[str], object] = lambda name: True
 ) -> dict[str, NDArray[Any]]:
     """Return the arrays of a ``.npz`` file by name, those that are ``wanted``.
 

@@ -21,7 +21,7 @@ from chipload.result.result import Result
 from chipload.result.track import Track
 
 
-def write_history(result: Result, file: IO[bytes]) -> dict[str, int]:
+def write_history(result: Result, file: IO[bytes] | io.RawIOBase) -> dict[str, int]:
     """Write history.parquet and return the number of rows of each track.
 
     Raises

@@ -58,7 +58,7 @@ def _border_lengths(tiles: Shapes, borders: Floats) -> Floats:
     on = np.abs(points[:, [0, 1, 0, 1]] - borders[tile]) <= ON_BORDER
     along = (ring[1:] == ring[:-1]) & (on[1:] & on[:-1]).any(axis=1)
     length = np.where(along, np.linalg.norm(np.diff(points, axis=0), axis=1), 0.0)
-    return np.bincount(tile[1:], length, minlength=len(tiles))
+    return np.asarray(np.bincount(tile[1:], length, minlength=len(tiles)), dtype=np.float64)
 
 
 def _rings(tiles: Shapes) -> tuple[Shapes, Ints]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -341,7 +341,7 @@ def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known, smal
 
 def _guesses(reading: ProgramReading) -> list[Entry]:
     """What the reader guessed about unit, tool table and compensation: the keys that confirm it."""
-    guesses = {
+    guesses: dict[str, tuple[str, Callable[[str], str], str]] = {
         "nc-unit": ("unit", lambda text: "inch" if "read as inch" in text else "mm", "the program states none"),
         "nc-tools-unit": ("tools_unit", lambda _: "inch", "its diameters agree with the program as inches"),
         "nc-compensation-wear": ("compensation", lambda _: "wear", "the cutter does not fit beside the contour"),
