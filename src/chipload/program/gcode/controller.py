@@ -303,7 +303,7 @@ class Controller:
         self.end_corner()
         if code == 400:
             if self._beside is not None:
-                self._compensated(Compensation.finish, self.state.at)
+                self._compensated(self._beside, Compensation.finish, self.state.at)
                 self._beside = None
             state.compensation = 400
             return
@@ -370,16 +370,15 @@ class Controller:
             )
         return radius
 
-    def _compensated(self, make: Callable[[Compensation], list[CentreMove]], end: Nine) -> None:
+    def _compensated(self, beside: Compensation, make: Callable[[Compensation], list[CentreMove]], end: Nine) -> None:
         """Rows beside the contour; where the tool does not fit, it goes straight on to the next part of the contour."""
-        assert self._beside is not None
         try:
-            moves = make(self._beside)
+            moves = make(beside)
         except InputError as error:
             if self.strict:
                 raise
             self.leave_out("nc-compensation", f"{error}: this part of the contour is left out")
-            moves = self._beside.skip(end)
+            moves = beside.skip(end)
         self._emit(moves)
 
     def _emit(self, moves: list[CentreMove]) -> None:
@@ -453,9 +452,9 @@ class Controller:
     def _carry(self, piece: Piece) -> None:
         end, (context, line) = nine(piece.end), cast(tuple[int, int], piece.tail)
         if self._beside is not None and piece.motion == ARC:
-            self._compensated(lambda b: b.arc(end, piece.centre, piece.turns, (context, line)), end)
+            self._compensated(self._beside, lambda b: b.arc(end, piece.centre, piece.turns, (context, line)), end)
         elif self._beside is not None:
-            self._compensated(lambda b: b.line(piece.motion, end, (context, line)), end)
+            self._compensated(self._beside, lambda b: b.line(piece.motion, end, (context, line)), end)
         elif piece.motion == ARC:
             self.track.arc((ARC, *end, context, line), *piece.centre, piece.turns)
         else:
@@ -560,7 +559,7 @@ class Controller:
         if self.in_corner:
             self._piece(motion, end, (0.0, 0.0), 0, context)
         elif self._beside is not None:
-            self._compensated(lambda b: b.line(motion, end, (context, self.line)), end)
+            self._compensated(self._beside, lambda b: b.line(motion, end, (context, self.line)), end)
         else:
             self.track.rows.append((motion, *end, context, self.line))
         self.state.at = end
@@ -587,7 +586,7 @@ class Controller:
         if self.in_corner:
             self._piece(ARC, end, centre, turns, context)
         elif self._beside is not None:
-            self._compensated(lambda b: b.arc(end, centre, turns, (context, self.line)), end)
+            self._compensated(self._beside, lambda b: b.arc(end, centre, turns, (context, self.line)), end)
         else:
             self.track.arc((ARC, *end, context, self.line), *centre, turns)
         self.state.at = end

@@ -63,7 +63,7 @@ def change_coordinates(block: Block, c: Controller) -> None:
         for axis in "xyz":
             words.pop(axis, None)
     if c.scaled is not None:
-        words_of_arcs(block, c)
+        words_of_arcs(block, c, c.scaled[0])
 
 
 def _scale(words: dict[str, float], c: Controller) -> None:
@@ -88,10 +88,9 @@ def factor_axes(c: Controller, factors: Mapping[str, float]) -> None:
     c.scaled = None if tuple(new) == _UNCHANGED else (_triple(new), fixed)
 
 
-def words_of_arcs(block: Block, c: Controller) -> None:
-    """Sense, centre and radius of an arc and side of compensation in the scaled coordinates."""
-    assert c.scaled is not None
-    words, (factors, _) = block.words, c.scaled
+def words_of_arcs(block: Block, c: Controller, factors: tuple[float, float, float]) -> None:
+    """Sense, centre and radius of an arc and side of compensation in coordinates scaled by the factors of the axes."""
+    words = block.words
     first, second, _ = PLANE_AXES[_plane(block, c)]
     for code in [code for code in block.g if code in EXCHANGED and factors[first] * factors[second] < 0.0]:
         block.g[block.g.index(code)] = EXCHANGED[code]

@@ -127,7 +127,7 @@ class Sinumerik(Dialect):
             raise NotReadError("AC and IC in mirrored or scaled coordinates")
         self._resolve(block, c, values)
         if c.scaled is not None:
-            words_of_arcs(block, c)
+            words_of_arcs(block, c, c.scaled[0])
         self._holes(block, c)
         return lenient(block, c)
 
