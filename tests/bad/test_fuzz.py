@@ -32,9 +32,9 @@ def ran(*words: str) -> subprocess.CompletedProcess[str]:
 def test_few_cases_of_every_reader() -> None:
     done = ran("--cases", "6", "--budget", "800")
     assert done.returncode == 0, done.stdout + done.stderr
-    rows = re.findall(r"^\| (\w+) \| (\d+) \|", done.stdout, re.MULTILINE)
+    rows = re.findall(r"^\| ([\w-]+) \| (\d+) \|", done.stdout, re.MULTILINE)
     assert [name for name, _ in rows] == [*fuzz_readers.READERS, "all"]
-    assert len(rows) == 32
+    assert len(rows) == 34
     assert all(int(count) > 0 for _, count in rows)
 
 
