@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from chipload.result import load_result
+from chipload.result.number_text import number_text
 from results.test_examples import NAMES
 from web_served import Served
 
@@ -32,7 +33,7 @@ def test_the_page_states_what_the_summary_states(example, browser, served, name)
     tracks = sorted((t for t in summary["tracks"] if t["rows"]), key=lambda t: not t["in_use"])
     if not tracks:
         return  # a search without programs has no page: tests/results/test_examples.py
-    columns = {c.name: c.column for t in load_result(done.folder).tracks for c in t.limits}
+    checks = {(t.name, c.name): c for t in load_result(done.folder).tracks for c in t.limits}
     page = browser.new_page(viewport={"width": 1280, "height": 720})
     try:
         page.set_default_timeout(60_000)
@@ -51,10 +52,15 @@ def test_the_page_states_what_the_summary_states(example, browser, served, name)
             if len(tracks) > 1:
                 page.wait_for_function(SHOWN, arg=track["name"])
             expected = [
-                (columns[c["name"]].label, "not known" if c["worst"] is None else f"{c['worst']:.4g}",
-                 f"{'≥ ' if columns[c['name']].least else ''}{c['limit']:g} {c['unit']}".strip(), c["state"])
+                (
+                    check.column.label + ("" if check.coverage.whole else f", {check.coverage.name}"),
+                    "not known" if c["worst"] is None else number_text(c["worst"]),
+                    f"{'≥ ' if check.column.least else ''}{number_text(c['limit'], 6)} {c['unit']}".strip(),
+                    c["state"],
+                )
                 for c in track["limits"]
-            ]  # fmt: skip
+                for check in [checks[track["name"], c["name"]]]
+            ]
             for _ in range(600):  # the table follows the name of the track
                 cells = sorted((c[0], c[1], c[2], c[4]) for c in page.evaluate(CELLS))
                 if cells == sorted(expected):
