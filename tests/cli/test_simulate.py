@@ -52,7 +52,7 @@ def test_the_example_cuts_two_pieces_and_as_much_as_the_stock_loses(tmp_path: Pa
     folder = examples.copy_example("chips", tmp_path / "chips")
     code, out, _ = call("run", folder / "job.toml", "--out", tmp_path / "r")
     assert code == 0  # what errors prints is progress where kernels are compiled first
-    assert out.startswith("Holds: torque 3.573 of 6 N m, margin 40.4 %, in line 11 at ")
+    assert out.startswith("Holds: torque 3.574 of 6 N m, margin 40.4 %, in line 11 at ")
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
     op = summary["operations"][0]
     assert op["kind"] == "simulate"
@@ -108,9 +108,12 @@ def test_a_slot_in_numbers(job: Path, tmp_path: Path) -> None:
     parts = ("cutting_s", "air_cut_s", "rapid_s", "dwell_s", "other_s")
     assert sum(op[name] for name in parts) == pytest.approx(op["time_s"], rel=1e-12)
     assert op["time_s"] == op["program"]["time_s"] == summary["tracks"][0]["time_s"] > 4.0
-    # mean torque of a full slot: teeth / (2 pi) R b (2 Ktc f + pi Kte)
+    # mean torque of a full slot: teeth / (2 pi) R b (Ktc times the integral of h over the angle + Kte times the
+    # angle); the paths of two teeth cross f / (2 R) before the full slot begins and behind its end; of the area
+    # 2 R f of a chip, that is the integral of h - h^2 / (2 R), the integral of h is 2 f + pi f^2 / (4 R)
     al = material_named("al7075-t6")
-    torque = 2.0 / math.tau * 5.0 * 2.0 * (2.0 * al.Ktc * 0.1 + math.pi * al.Kte) / 1000.0
+    per_length = al.Ktc * (0.2 + math.pi * 0.1**2 / 20.0) + al.Kte * (math.pi + 0.1 / 5.0)
+    torque = 2.0 / math.tau * 5.0 * 2.0 * per_length / 1000.0
     mean = {x["name"]: (x["limit"], x["worst"], x["state"]) for x in summary["limits"]}
     assert mean["spindle_torque_nm"] == (70.0, pytest.approx(torque, rel=1e-3), "holds")
     assert mean["spindle_power_w"] == (11000.0, pytest.approx(torque * 100.0 * math.pi, rel=1e-3), "holds")
@@ -202,7 +205,7 @@ def test_a_spindle_that_is_too_weak_does_not_hold(job: Path, tmp_path: Path) -> 
     job.write_text(JOB.replace('name = "vmc"', 'file = "weak.toml"'))
     code, out, _ = call("run", job, "--out", tmp_path / "r")
     assert code == 3
-    assert out.startswith("Exceeds: spindle power 240.4 W exceeds 100 W in line 6 at ")
+    assert out.startswith("Exceeds: spindle power 242.2 W exceeds 100 W in line 6 at ")
     found = states(summary_of(tmp_path / "r")["limits"])
     assert [name for name, state in found.items() if state == "exceeds"] == ["spindle_torque_nm", "spindle_power_w"]
 
@@ -214,7 +217,7 @@ def test_the_spindle_gives_what_its_curve_says_at_the_speed_of_the_step(job: Pat
     job.write_text(JOB.replace('name = "vmc"', 'file = "weak.toml"'))
     code, out, _ = call("run", job, "--out", tmp_path / "r")
     assert code == 3
-    assert out.startswith("Exceeds: spindle torque 0.7653 N m exceeds 0.7 N m in line 6")
+    assert out.startswith("Exceeds: spindle torque 0.7709 N m exceeds 0.7 N m in line 6")
 
 
 def test_chips_that_the_flutes_have_no_room_for(job: Path, tmp_path: Path) -> None:
@@ -260,7 +263,7 @@ def test_the_first_progress_comes_before_a_step_is_made(job: Path, monkeypatch: 
         raise AssertionError("a step was made")
 
     def stop(done: float, what: str) -> None:
-        assert (done, what) == (pytest.approx(0.1, abs=0.1), "removing")
+        assert (done, what) == (pytest.approx(0.1, abs=0.1), "shank and holder in the stock")
         raise Cancelled("seen")
 
     monkeypatch.setattr("chipload.simulation.steps._cut", made)
