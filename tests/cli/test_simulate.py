@@ -118,7 +118,8 @@ def test_a_slot_in_numbers(job: Path, tmp_path: Path) -> None:
     assert mean["spindle_torque_nm"] == (70.0, pytest.approx(torque, rel=1e-3), "holds")
     assert mean["spindle_power_w"] == (11000.0, pytest.approx(torque * 100.0 * math.pi, rel=1e-3), "holds")
     assert op["power_w"]["max"] == pytest.approx(torque * 100.0 * math.pi, rel=1e-3)
-    assert op["chip_max_mm"]["max"] == pytest.approx(0.1, rel=1e-6)
+    # what the chips leave out of the trochoids is of the order (f / R)^2: these have f (1 + (f / (pi R))^2 / 2)
+    assert op["chip_max_mm"]["max"] == pytest.approx(0.1, rel=(0.1 / 5.0) ** 2)
     assert op["gouge_mm"]["max"] is op["excess_mm"]["max"] is None
     t = pq.read_table(tmp_path / "r" / "history.parquet")
     assert max(t["deflection_um"].to_pylist()) == op["deflection_um"]["max"] > 1.0
@@ -239,7 +240,7 @@ def test_chips_that_the_flutes_have_no_room_for(job: Path, tmp_path: Path) -> No
 def test_chips_thicker_than_the_coefficients_know_are_unproven(job: Path, tmp_path: Path) -> None:
     al = (files("chipload") / "data" / "materials" / "al7075-t6.toml").read_text()
     job.write_text(JOB.replace('name = "al7075-t6"', 'file = "al.toml"'))
-    for most, code in ((0.1, 0), (0.08, 3)):
+    for most, code in ((0.101, 0), (0.08, 3)):
         (job.parent / "al.toml").write_text(f"{al}\nchip_min_mm = 0.01\nchip_max_mm = {most}\n")
         found, out, err = call("run", job, "--out", tmp_path / f"r{code}")
         assert (found, err) == (code, "")
