@@ -110,7 +110,10 @@ def test_limits_and_their_places():
     assert 20.0 <= x <= 23.0
     assert 5.0 <= y <= 8.0
     states = {name: check.state for name, check in checks["backward"].items()}
-    assert states == {"engagement_deg": Verdict.HOLDS, "force_xy_n": Verdict.EXCEEDS}
+    # within its limit, but nothing was simulated: its error is not known
+    assert states == {"engagement_deg": Verdict.UNPROVEN, "force_xy_n": Verdict.EXCEEDS}
+    assert checks["backward"]["engagement_deg"].worst < 13.0
+    assert checks["backward"]["engagement_deg"].reason == "the resolution error of engagement is not known"
 
 
 def test_same_input_same_history():
