@@ -1,4 +1,8 @@
-"""Force of a depth against sums over the sphere; depths against the closed form and against the force."""
+"""Force of a depth against sums over the sphere; depths against the closed form and against the force.
+
+The closed forms take h = f sin(phi), to which the chips between the true paths tend as f / R goes to 0. They are
+compared for the engaged front, and for chips of a feed of 1e-6 R, with edge forces and thresholds as small.
+"""
 
 import math
 
@@ -20,6 +24,9 @@ BALL = Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5, corner_radius=5.0)
 HELICAL = Cutter(10.0, 2, math.radians(30.0), 20.0, 30.0, 6e5, corner_radius=5.0)
 BULL = Cutter(10.0, 4, math.radians(30.0), 20.0, 30.0, 6e5, corner_radius=1.0)
 RADIAL = Material("radial", 1500.0, 600.0, 0.0, 20.0, 15.0, 0.0, source="made up")
+#: share by which the feed, the edge force and the thresholds are smaller where chips are compared with a closed form
+SMALL = 1e-4
+SMALL_RADIAL = Material("radial", 1500.0, 600.0, 0.0, 20.0 * SMALL, 15.0 * SMALL, 0.0, source="made up")
 FULL = Material("full", 1500.0, 600.0, 250.0, 20.0, 15.0, 5.0, source="made up")
 
 
@@ -49,16 +56,28 @@ def summed(posture: CutterPose, material: Material, d: float, n: int = 1000) -> 
     return abs(total) * posture.cutter.flutes
 
 
+def front_force(posture, material, depths):
+    """Mean normal force of the engaged front, h = f sin(phi)."""
+    return np.abs(mean_forces(posture.engagement(depths), posture.cutter, material)[0] @ posture.frame[:, 2])
+
+
 def test_closed_form_of_the_slot():
     """d of thresholds 20, 50, 100 N, from the quadratic of q = sqrt(2 R d - d^2)."""
-    found = largest_depths(
-        CutterPose(BALL, 0.05, None), RADIAL, [20.0, 50.0, 100.0], DepthRange(1e-3, 2.0, 1e-8), measure="mean"
-    )
+    F, slot = np.array([20.0, 50.0, 100.0]), CutterPose(BALL, 0.05, None)
     A, B, R = 4 * 600 * 0.05 / (math.tau * 5.0), 4 * 15 / 2, 5.0
-    q = np.array([(-B + math.sqrt(B * B + 4 * A * F)) / (2 * A) for F in (20.0, 50.0, 100.0)])
-    assert_allclose(found.depth, R - np.sqrt(R * R - q * q), rtol=0.0, atol=2e-8)
-    assert_allclose(found.depth, [0.0383435, 0.2036929, 0.6831800], rtol=0.0, atol=1e-6)
-    assert (found.status == THRESHOLD).all()
+    q = (-B + np.sqrt(B * B + 4 * A * F)) / (2 * A)
+    exact = R - np.sqrt(R * R - q * q)
+    assert_allclose(exact, [0.0383435, 0.2036929, 0.6831800], rtol=0.0, atol=1e-6)
+    assert_allclose(front_force(slot, RADIAL, exact), F, rtol=2e-8)
+    limits = DepthRange(1e-3, 2.0, 1e-8)
+    small = largest_depths(CutterPose(BALL, 0.05 * SMALL, None), SMALL_RADIAL, F * SMALL, limits, measure="mean")
+    # angles of chips are rounded to 1e-9 rad, 2e-4 of the angle f / R of the second order
+    assert_allclose(small.depth, exact, rtol=1e-4)
+    assert (small.status == THRESHOLD).all()
+    # the true chips are thicker than h = f sin(phi) here: less depth, and never more force than the threshold
+    found = largest_depths(slot, RADIAL, F, limits, measure="mean")
+    assert (found.depth < exact).all()
+    assert_allclose(found.depth, exact, rtol=0.1)
 
 
 @pytest.mark.parametrize("depth", [0.05, 0.4])
@@ -68,7 +87,7 @@ def test_closed_form_of_the_slot():
 )
 def test_mean_against_the_sphere(lead, tilt, step, depth):
     posture = CutterPose(BALL, 0.05, step, math.radians(lead), math.radians(tilt))
-    found = normal_force(posture, FULL, [depth], measure="mean")[0]
+    found = front_force(posture, FULL, [depth])[0]
     assert found == pytest.approx(summed(posture, FULL, depth), rel=2e-3)
 
 
@@ -95,7 +114,7 @@ def test_mean_against_layers(cutter, lead, step):
     )
     engagement = ToothEngagement([0, len(rows)], rows, np.full(len(rows), -1), owner, profile.columns)
     layered = abs(float(mean_forces(engagement, cutter, FULL)[0][0] @ posture.frame[:, 2]))
-    assert normal_force(posture, FULL, [d], measure="mean")[0] == pytest.approx(layered, rel=0.01)
+    assert front_force(posture, FULL, [d])[0] == pytest.approx(layered, rel=0.01)
 
 
 def test_force_stays_below_the_threshold():
@@ -114,16 +133,17 @@ def test_force_stays_below_the_threshold():
 
 def test_what_makes_a_place_feasible():
     """With a threshold between edge and whole force a feed, below that of the edge a cutter."""
-    posture = CutterPose(BALL, 0.05, None)
+    posture = CutterPose(BALL, 0.05 * SMALL, None)
     limits = DepthRange(0.1, 1.0)
     edge = 4 * 15 * math.sqrt(2 * 5 * 0.1 - 0.01) / 2
     whole = edge + 4 * 600 * 0.05 * (0.2 - 0.002) / math.tau
-    found = largest_depths(posture, RADIAL, [0.5 * (edge + whole), 0.5 * edge], limits, measure="mean")
+    thresholds = [0.5 * SMALL * (edge + whole), 0.5 * SMALL * edge]
+    found = largest_depths(posture, SMALL_RADIAL, thresholds, limits, measure="mean")
     assert (found.status == INFEASIBLE).all()
     assert (found.depth == 0.0).all()
     feed, smaller = found.infeasible
-    assert feed.edge_force == pytest.approx(edge, rel=1e-5)
-    assert feed.feed_per_tooth == pytest.approx(0.025, rel=1e-4)
+    assert feed.edge_force == pytest.approx(SMALL * edge, rel=1e-5)
+    assert feed.feed_per_tooth == pytest.approx(0.025 * SMALL, rel=2e-4)
     assert smaller.feed_per_tooth is None
     assert smaller.diameter is not None
     R = 0.5 * smaller.diameter
@@ -148,6 +168,7 @@ def test_refused():
 def test_depth_grows_as_a_power_of_the_threshold(Krc, Kre, power):
     """Shallow slot: the chip's force grows as d, the edge's as sqrt(d)."""
     material = Material("one", 1500.0, Krc, 0.0, 20.0, Kre, 0.0, source="made up")
-    F = np.array([2.0, 2.2]) * (0.1 if Kre == 0.0 else 1.0)
-    found = largest_depths(CutterPose(BALL, 0.05, None), material, F, DepthRange(1e-5, 1.0, 1e-10), measure="mean")
+    F = np.array([2.0, 2.2]) * (0.1 * SMALL if Kre == 0.0 else 1.0)
+    slot = CutterPose(BALL, 0.05 * SMALL, None)
+    found = largest_depths(slot, material, F, DepthRange(1e-5, 1.0, 1e-10), measure="mean")
     assert np.diff(np.log(found.depth))[0] / math.log(1.1) == pytest.approx(power, rel=2e-3)

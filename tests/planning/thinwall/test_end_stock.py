@@ -10,7 +10,6 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn, mean_forces
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.planning.thinwall.depth import normal_force
 from chipload.planning.thinwall.end_stock import EndPose
 
 FLAT = Cutter(10.0, 4, math.radians(30.0), 20.0, 30.0, 6e5)
@@ -28,7 +27,6 @@ def test_closed_form_of_the_mean_axial_force(step, depth):
     _, _, Kac, _, _, Kae = FULL.coefficients
     expected = 4.0 * depth / math.tau * (Kac * 0.05 * (1.0 - math.cos(psi)) + Kae * psi)
     assert_allclose(abs(mean_forces(engagement, FLAT, FULL)[0][0, 2]), expected, rtol=1e-9)
-    assert_allclose(normal_force(EndPose(FLAT, 0.05, step), FULL, [depth], measure="mean"), expected, rtol=1e-9)
 
 
 def summed(pose, d, theta, n=500):

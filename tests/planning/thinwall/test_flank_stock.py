@@ -1,5 +1,5 @@
-"""Force of a flank against plane stock: closed form of the mean in up and down milling, the greatest force and that of
-a bull nose against sums over the surface of the cutter."""
+"""Force of a flank against plane stock: closed form of the mean of the engaged front in up and down milling, the
+greatest force and that of a bull nose against sums over the surface of the cutter, by the true paths of its teeth."""
 
 import math
 
@@ -8,11 +8,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chipload.cutter.cutter import Cutter
+from chipload.cutting.force import mean_forces
 from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.planning.thinwall.depth import DepthRange, largest_depths, normal_force
 from chipload.planning.thinwall.flank_stock import FlankPose
 from chipload.planning.thinwall.force_table import law_on_stock
+from engagement.tooth_paths import loads
 
 STRAIGHT = Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5)
 MILL = Cutter(8.0, 4, math.radians(30.0), 20.0, 30.0, 6e5)
@@ -31,9 +33,9 @@ def closed_form(pose, d):
 
 
 def summed(pose, d, turns=720, n=600):
-    """Normal force over the rotations of tooth 0: every piece of the edge, by where it is in stock."""
+    """Normal force over the rotations of a pitch: every piece of the edge by the true paths of the teeth."""
     cutter, b = pose.cutter, abs(pose.step)
-    R, r = cutter.radius, cutter.corner_radius
+    R, r, N = cutter.radius, cutter.corner_radius, cutter.flutes
     corner = (np.arange(n) + 0.5) * (0.5 * math.pi / n)
     top = b + r
     flank = r + (np.arange(4 * n) + 0.5) * ((top - r) / (4 * n))
@@ -46,23 +48,19 @@ def summed(pose, d, turns=720, n=600):
         else np.full(4 * n, top / (4 * n))
     )
     above = h - b
+    # the stock begins at this distance from the axis towards the wall: the surface, or what the row before has left
     before = np.where(above < 0.0, -1.0, R - r + np.sqrt(np.maximum(r * r - (r - np.clip(above, 0.0, r)) ** 2, 0.0)))
-    cosine = np.sqrt(1.0 - sine**2)
-    Ktc, Krc, Kac, Kte, Kre, Kae = FULL.coefficients
-    F = np.zeros(turns)
-    for k, theta in enumerate(np.arange(turns) * math.tau / cutter.flutes / turns):
-        for j in range(cutter.flutes):
-            # the angle from the wall to the feed; a helix of the right hand: higher up the edge comes later
-            phi = (theta + j * math.tau / cutter.flutes - h * math.tan(cutter.helix) / R) % math.tau
-            toward = -np.cos(phi) if pose.down else np.cos(phi)  # towards the wall
-            y = R - rho * toward
-            cuts = (np.sin(phi) > 0.0) & (y < d) & (y < np.where(before > 0.0, R - before, np.inf))
-            chip = pose.feed_per_tooth * sine * np.sin(phi)
-            ft, fr = Ktc * chip + Kte, Krc * chip + Kre
-            fr = fr * sine + (Kac * chip + Kae) * cosine
-            push = fr * toward + ft * np.sin(phi) * (1.0 if pose.down else -1.0)
-            F[k] += (push * cuts * size).sum()
-    return F
+    wall = np.maximum(R - d, before)
+    lag = h * math.tan(cutter.helix) / R
+    slices = np.column_stack([rho, sine, np.sqrt(np.maximum(1.0 - sine**2, 0.0)), lag, size])
+    theta, rate = np.arange(turns) * math.tau / N / turns, N * pose.feed_per_tooth / math.tau
+    F, torque, thick = np.zeros((turns, 3)), np.zeros(turns), np.zeros(turns)
+    K, pitch = np.array(FULL.coefficients), np.full(N, math.tau / N)
+    for piece, low in zip(slices[:, None], wall, strict=True):
+        # up milling enters at the wall, ahead of +y of the paths; down milling leaves at it
+        between = (-10.0 * R, -low) if pose.down else (low, 10.0 * R)
+        loads(piece, pitch, rate, 0.0, 0.0, *between, K, theta, F, torque, thick)
+    return F[:, 1]
 
 
 @pytest.mark.core
@@ -71,7 +69,8 @@ def summed(pose, d, turns=720, n=600):
 def test_closed_form_of_the_mean(step, depth):
     for cutter in (STRAIGHT, Cutter(10.0, 4, math.radians(30.0), 20.0, 30.0, 6e5)):
         pose = FlankPose(cutter, 0.05, step)
-        assert_allclose(normal_force(pose, FULL, [depth], measure="mean"), abs(closed_form(pose, depth)), rtol=1e-8)
+        front = mean_forces(pose.engagement([depth]), cutter, FULL)[0][0] @ pose.frame[:, 2]
+        assert_allclose(abs(front), abs(closed_form(pose, depth)), rtol=1e-8)
 
 
 @pytest.mark.parametrize("step", [1.5, -1.5])

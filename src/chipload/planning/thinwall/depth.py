@@ -122,14 +122,15 @@ def normal_force(
 
     Examples
     --------
-    Ball of 5 mm upright in a slot: N Krc f_z (2 d - d^2 / R) / (2 pi) at d = 0.5: 4 * 600 * 0.05 * 0.95 / (2 pi).
+    Ball of 5 mm upright in a slot: h = f_z sin(phi) gives N Krc f_z (2 d - d^2 / R) / (2 pi) at d = 0.5,
+    4 * 600 * 0.05 * 0.95 / (2 pi). The chips between the paths of its teeth are 2 % thicker.
 
     >>> from chipload.cutter.cutter import Cutter
     >>> ball = Cutter(10.0, 4, 0.0, 20.0, 30.0, 6e5, corner_radius=5.0)
     >>> plain = Material("plain", 1500.0, 600.0, 0.0, 0.0, 0.0, 0.0, source="made up for this example")
     >>> from chipload.planning.thinwall.plane_stock import CutterPose
     >>> normal_force(CutterPose(ball, 0.05, None), plain, [0.5], measure="mean").round(4).tolist()
-    [18.1437]
+    [18.4627]
     >>> round(4 * 600 * 0.05 * 0.95 / math.tau, 4)
     18.1437
     """
@@ -145,10 +146,11 @@ def normal_force(
     theta = np.linspace(0.0, turn, max(8, math.ceil(math.degrees(turn) / apart)), endpoint=False)
     for at in range(0, len(d), BLOCK):
         engagement = posture.engagement(d[at : at + BLOCK], nodes or own * (8 if measure == "mean" else 16))
+        chips = chips_of_teeth(engagement, cutter)
         if measure == "mean":
-            out[at : at + BLOCK] = np.abs(mean_forces(engagement, cutter, material)[0] @ N)
+            out[at : at + BLOCK] = np.abs(mean_forces(chips, cutter, material)[0] @ N)
         else:
-            force = forces_over_turn(chips_of_teeth(engagement, cutter), cutter, material, theta)[0]
+            force = forces_over_turn(chips, cutter, material, theta)[0]
             out[at : at + BLOCK] = np.abs(force @ N).max(axis=1)
     return out
 
