@@ -38,6 +38,8 @@ STEEPER = 1e-3
 #: steps with less than this share of the greatest load of their tool are not judged by their deflection: the cutter
 #: only touches there
 LOADED = 0.1
+#: share by which the thickest chip between the paths of two teeth may be above the feed, by which a range was measured
+RANGE_SLACK = 1e-3
 #: the column by which :func:`_could_be_greatest` judges a step, the first that a track has
 LOADS = ("force_n", "force_xy_n", "force_normal_n", "torque_mean_nm")
 #: what a load does at its place, which a light load may do most
@@ -279,7 +281,7 @@ def _beyond(checks: DefaultChecks, columns: Columns) -> float:
     if chip is None or "chip_range" in checks.off or "chip_max_mm" not in columns:
         return 0.0
     thickest = float(np.max(columns["chip_max_mm"], initial=0.0))
-    return thickest if thickest > chip[1] * (1.0 + 1e-9) else 0.0
+    return thickest if thickest > chip[1] * (1.0 + RANGE_SLACK) else 0.0
 
 
 def _at_step(code: str, c: Columns, k: int, text: str) -> Finding:
