@@ -58,16 +58,20 @@ def cut(request, folder):
 
 def pushes(cutter, material, feed_per_tooth, b, d, down, turns=720, n=400):
     """Normal force a length of a straight flank (turns, n) [N], positive where it pushes the wall away, and the heights
-    (n,) above the lower end of the contact line."""
+    (n,) above the lower end of the contact line. Chips lie between trochoids, begin f / (2 R) beyond the new wall, and
+    run out along the face that the tooth before has cut."""
     R, z = cutter.radius, (np.arange(n) + 0.5) * b / n
     psi = math.acos(1.0 - d / R)
     Ktc, Krc, _, Kte, Kre, _ = material.coefficients
     theta = np.arange(turns)[:, None] * math.tau / cutter.flutes / turns
     F = np.zeros((turns, n))
     for j in range(cutter.flutes):
-        phi = (theta + j * math.tau / cutter.flutes - z * math.tan(cutter.helix) / R) % math.tau
-        cuts = (phi > math.pi - psi) & (phi < math.pi) if down else phi < psi
-        chip = feed_per_tooth * np.sin(phi)
+        phi = (theta + j * math.tau / cutter.flutes - z * math.tan(cutter.helix) / R + 1.0) % math.tau - 1.0
+        beyond = 0.5 * feed_per_tooth / R
+        cuts = (phi > math.pi - psi) & (phi < math.pi + beyond) if down else (phi > -beyond) & (phi < psi)
+        chip = feed_per_tooth * np.sin(phi) * (1.0 - cutter.flutes * feed_per_tooth / math.tau * np.cos(phi) / R)
+        chip += (feed_per_tooth * np.cos(phi)) ** 2 / (2.0 * R)
+        chip = np.minimum(chip, R * (np.abs(np.cos(phi)) / math.cos(psi) - 1.0)).clip(0.0)
         radial, tangential = (Krc * chip + Kre) * np.abs(np.cos(phi)), (Ktc * chip + Kte) * np.sin(phi)
         F += np.where(cuts, radial + tangential * (1.0 if down else -1.0), 0.0) * b / n
     return F, z
