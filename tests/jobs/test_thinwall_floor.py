@@ -220,7 +220,7 @@ def test_the_example(done):
     assert tracks["unconstrained"].verdict is Verdict.EXCEEDS
     # the axial force and the lateral one of a level cut are known to a tenth
     for name in ("constant", "unconstrained"):
-        assert done.outcome.variants[name].load_error["force_normal_n"] < 0.05
+        assert done.outcome.variants[name].load_error["force_normal_n"] < 0.1
     assert len(done.outcome.variants["variable"].plan.maps) == 3
     variants = done.outcome.variants
     assert variants["variable"].seconds < 0.8 * variants["constant"].seconds

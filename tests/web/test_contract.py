@@ -182,7 +182,11 @@ def test_the_page_lists_the_limits_and_the_time_of_each_track(opened, page_of, n
     history = pq.read_table(folder / "history.parquet", columns=["track", "t_s"]).to_pandas()
     tracks = sorted((t for t in summary["tracks"] if t["rows"]), key=lambda t: not t["in_use"])
     assert tracks[0]["in_use"]
-    checks = {c.name: c.column for t in load_result(folder).tracks for c in t.limits}
+    checks = {
+        (t.name, c.name): c.column.label + ("" if c.coverage.whole else f", {c.coverage.name}")
+        for t in load_result(folder).tracks
+        for c in t.limits
+    }
     for k, track in enumerate(tracks):
         if k:
             page.keyboard.press("t")
@@ -198,7 +202,12 @@ def test_the_page_lists_the_limits_and_the_time_of_each_track(opened, page_of, n
             assert shown.startswith(track["name"])
             assert shown.endswith(", in use") == track["in_use"]
         wanted = [
-            (checks[c["name"]].label, number(c["worst"]), f"{c['limit']:g} {c['unit']}".strip(), c["state"])
+            (
+                checks[track["name"], c["name"]],
+                number(c["worst"]),
+                f"{c['limit']:g} {c['unit']}".strip(),
+                c["state"],
+            )
             for c in track["limits"]
         ]
         for _ in range(600):  # the table follows the name of the track
