@@ -29,7 +29,7 @@ LEVEL = 1e-3
 LARGE = 0.25
 #: piece of immersion that is left out, and half a piece below which a sinusoid through three values is a line [rad]
 NONE, SMALL = 1e-9, 1e-4
-#: rounding of angles [rad] and places [mm], and of chips as a share of it
+#: rounding of angles [rad], of places as a share of the greatest radius, and of chips as a share of that of places
 GRID, THICK = 1e-9, 1e-2
 
 
@@ -84,14 +84,19 @@ def like(i, k, start, rows, tooth, piece, slices):
 
 
 @njit(cache=True, nogil=True)
-def rounded(rows):
+def rounded(rows, slices):
     """Ranges rounded to :data:`GRID`, so that those of steps along a straight row are equal to the last bit: chips do
-    not depend on which steps are calculated together.
+    not depend on which steps are calculated together, nor on the unit of length.
     """
+    size = 0.0
+    for k in range(len(slices)):
+        size = max(size, slices[k, 1])
+    if size <= 0.0:
+        return rows.copy()
     out = np.empty_like(rows)
     for r in range(len(rows)):
         for d in range(7):
-            grid = GRID if d < 4 else GRID * THICK
+            grid = GRID if d < 2 else GRID * size if d < 4 else GRID * THICK * size
             out[r, d] = math.floor(rows[r, d] / grid + 0.5) * grid
     return out
 
@@ -164,7 +169,7 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
     """
     N = len(angles)
     e = runout[0]
-    rows = rounded(given)
+    rows = rounded(given, slices)
     line = np.empty((N + 2, 4))
     radii = np.zeros(N)
     cut = np.zeros((5, N, N, 3))
