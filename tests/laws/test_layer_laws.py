@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import astuple, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
+from engagement.tooth_paths import Cut, true_loads
 from laws.edge_sum import Sum, edge_sum
 from simulation.test_steps import five_axis
 
@@ -30,9 +31,16 @@ BALL = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=5.0)
 BULL = Cutter(12.0, 3, 0.4, 20.0, 30.0, 6e5, corner_radius=3.0)
 TAPER = Cutter(6.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=1.0, taper=0.1)
 FLAT = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
-AL = material_named("al7075-t6")
 NO_EDGE = Material("no edge", 1000.0, 300.0, 100.0, 0.0, 0.0, 0.0, source="made up for this test")
-FEED, SPINDLE = 20.0, 300.0
+#: the sums take h = f sin(phi): at 0.01 mm a tooth the true paths of the teeth are near enough to circles, also at the
+#: tip of a ball nose 0.02 mm deep. Edge coefficients are in proportion, so that they have their share of the force.
+FAST, FEED, SPINDLE = 20.0, 1.0, 300.0
+REAL = material_named("al7075-t6")
+AL = replace(REAL, **{name: getattr(REAL, name) * FEED / FAST for name in ("Kte", "Kre", "Kae")})
+#: for ball noses so shallow that the edge has most of the force: where one tooth leaves a slot the next has entered,
+#: at any feed, and both edges together are the peak, which a sum over circles does not have
+BARE = replace(REAL, Kte=0.0, Kre=0.0, Kae=0.0)
+SHALLOW = 0.1
 COLUMNS = ("torque_mean_nm", "torque_nm", "force_n", "chip_max_mm")
 
 
@@ -104,9 +112,23 @@ def test_a_straight_slot(cutter: Cutter, depth: float, step: float) -> None:
     length = 2.0 if step < 0.1 else 20.0
     begin = -cutter.diameter
     points = [[begin, 0, -depth], [10.0, 0, -depth], [10.0 + length, 0, -depth]]
-    history = run(path([points[0], points[1]]) if step >= 0.1 else path(points), cutter, step_mm=step)
-    exact = edge_sum(cutter, (0, 0, -depth), (0, 0, 1), per_tooth(cutter, (1, 0, 0)), lambda p: p[..., 2] < 0.0, AL)
+    metal = BARE if depth < SHALLOW else AL
+    program = path([points[0], points[1]]) if step >= 0.1 else path(points)
+    history = run(program, cutter, material=metal, step_mm=step)
+    exact = edge_sum(cutter, (0, 0, -depth), (0, 0, 1), per_tooth(cutter, (1, 0, 0)), lambda p: p[..., 2] < 0.0, metal)
     assert off(at(history, 9.0 if step < 3.0 else 7.0), exact, history.resolution_error) == {}
+
+
+@pytest.mark.parametrize(
+    ("cutter", "depth"), [(BALL, 0.3), (BALL, 1.0), (BALL, 1.874), (BALL, 5.0), (FLAT, 0.02), (FLAT, 5.0)]
+)
+def test_a_straight_slot_at_a_fast_feed(cutter: Cutter, depth: float) -> None:
+    """0.1 and 0.2 mm a tooth, against the trochoids of all earlier teeth."""
+    history = run(path([[-10.0, 0.0, -depth], [10.0, 0.0, -depth]], FAST), cutter, material=REAL, step_mm=0.5)
+    f = FAST * math.tau / (cutter.flutes * SPINDLE)
+    cut = Cut(10.0, cutter.flutes, math.degrees(cutter.helix), depth, 10.0, f, ball=cutter is BALL)
+    force, torque, mean, chip = true_loads(cut, astuple(REAL)[1:7], slices=2000)
+    assert off(at(history, 7.0), Sum(mean / 1e3, torque / 1e3, force, chip), history.resolution_error) == {}
 
 
 def test_points_of_a_program_however_near_cost_the_same() -> None:
@@ -187,15 +209,16 @@ def test_a_finishing_raster(depth: float, over: float, layer: float | None) -> N
     for k in range(3):
         ends = [[-7.0, (k - 2) * over, -depth], [20.0, (k - 2) * over, -depth]]
         points += [[ends[0][0], ends[0][1], 2.0], *ends, [ends[1][0], ends[1][1], 2.0]]
-    history = run(path(points), BALL, layer_mm=layer)
+    metal = BARE if depth < SHALLOW else AL
+    history = run(path(points), BALL, material=metal, layer_mm=layer)
     c = history.columns
     k = int(np.flatnonzero((c["x_mm"] > 9.0) & (c["z_mm"] == -depth) & (np.abs(c["y_mm"]) < 1e-9))[0])
     tip, way = (0.0, 0.0, -depth), per_tooth(BALL, (1, 0, 0))
-    exact = edge_sum(BALL, tip, (0, 0, 1), way, lambda p: raster(p, 2, over, depth), AL)
+    exact = edge_sum(BALL, tip, (0, 0, 1), way, lambda p: raster(p, 2, over, depth), metal)
     if layer is None:
         assert off({name: float(c[name][k]) for name in COLUMNS}, exact, history.resolution_error) == {}
     # the worst step is one of the first row, a slot
-    slot = edge_sum(BALL, tip, (0, 0, 1), way, lambda p: p[..., 2] < 0.0, AL)
+    slot = edge_sum(BALL, tip, (0, 0, 1), way, lambda p: p[..., 2] < 0.0, metal)
     assert uncovered(history, slot, int(np.flatnonzero((c["x_mm"] > 9.0) & (c["z_mm"] == -depth))[0])) == {}
 
 
@@ -251,7 +274,7 @@ def test_a_wall_that_a_line_meets_at_its_end_is_within_the_stated_error() -> Non
         words += [rapid((-8.0, y, 5.0), SPINDLE, 1, "link"), rapid((-8.0, y, -2.0), SPINDLE, 1, "link")]
         words += [plunge((15.0, y, -2.0), 2.0, SPINDLE, 1, "clear"), rapid((15.0, y, 5.0), SPINDLE, 1, "link")]
     words += [rapid((6.0, 0.0, 5.0), SPINDLE, 1, "link"), rapid((6.0, 0.0, -2.0), SPINDLE, 1, "link")]
-    program = Program.join([*words, plunge((15.45, 0.0, -2.0), FEED, SPINDLE, 1, "cut")])
+    program = Program.join([*words, plunge((15.45, 0.0, -2.0), FAST, SPINDLE, 1, "cut")])
     coarse, fine = (run(program, FLAT, step_mm=step) for step in (1.0, 0.05))
     error = coarse.resolution_error["force_n"]
     peak, truth = (float(history["force_n"].max()) for history in (coarse, fine))
