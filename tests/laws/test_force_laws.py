@@ -15,6 +15,7 @@ from chipload.cutting.force import forces_along, mean_forces
 from chipload.cutting.material import Material, material_named, material_names
 from chipload.cutting.wall_error import wall_error_along
 from chipload.engagement.tooth_engagement import engagement_of_arcs
+from engagement.tooth_paths import Cut, true_loads
 
 MILL = Cutter(10.0, 4, math.radians(30.0), 25.0, 35.0, 6e5)
 NO_EDGE = Material("no edge", 800.0, 250.0, 150.0, 0.0, 0.0, 0.0, source="made up")
@@ -32,13 +33,43 @@ def test_energy(arc, flutes, helix, feed, offset, direction):
     assert torque[0] * math.tau / (flutes * feed) == pytest.approx(NO_EDGE.Ktc * area, rel=1e-9)
 
 
-def test_energy_at_a_radial_depth():
-    """Depth s at an engagement of 1 - cos a = s/R is an area of s x axial depth, to the last digit."""
+def torque_energy(arc, feed, s, depth):
+    """Torque's work, and that of torque and feed, per mm of the path over that of the volume removed; less 1.
+
+    The machine gives T Omega - F v. A tooth sweeps h (Omega R + v_t) - Omega h^2 / 2 of the layer, v_t the feed along
+    its edge's velocity: the paths of the teeth are farther from the axis than the middle of their chip. Only the
+    tangential force does work here, as the chip is measured along the radius.
+    """
+    tangential = replace(NO_EDGE, Krc=0.0, Kac=0.0)
+    out = forces_along([arc[0]], [arc[1]], feed, [[1.0, 0.0]], MILL, tangential, depth, spindle_speed=300.0)
+    v = 4 * feed * 300.0 / math.tau
+    a = arc[1] - arc[0]
+    bend = 300.0 * 4 / math.tau * depth * 0.5 * feed**2 * (0.5 * a - 0.25 * math.sin(2.0 * a))
+    torque = 1000.0 * out["power_w"][0]
+    assert torque == pytest.approx(1000.0 * 300.0 * out["torque_mean_nm"][0], rel=1e-12)
+    whole = torque - out["force_x_mean_n"][0] * v
+    removed = s * depth * v
+    return torque / (tangential.Ktc * removed) - 1.0, whole / (tangential.Ktc * (removed + bend)) - 1.0
+
+
+@pytest.mark.parametrize("up", [True, False], ids=["up", "down"])
+def test_energy_at_a_radial_depth(up):
+    """Depth s at an engagement of 1 - cos a = s/R: torque and feed together do the work Ktc x volume, to the order of
+    the chips, (f / R)^2; the torque alone is off by the share of the feed, c / R, and agrees with true paths.
+    """
     a = math.acos(1.0 - 0.1 / 5.0)
-    out = forces_along([math.pi - a], [math.pi], 0.05, [[1.0, 0.0]], MILL, NO_EDGE, 8.0, spindle_speed=300.0)
-    assert out["torque_mean_nm"][0] * 1000.0 * math.tau / (4 * 0.05) == pytest.approx(800.0 * 0.1 * 8.0, rel=1e-12)
-    removed = 0.1 * 8.0 * 4 * 0.05 * 300.0 / math.tau
-    assert out["power_w"][0] == pytest.approx(800.0 * removed / 1000.0, rel=1e-12)
+    arc = (0.0, a) if up else (math.pi - a, math.pi)
+    feeds = np.array([0.05, 0.025, 0.0125])
+    alone, whole = np.transpose([torque_energy(arc, f, 0.1, 8.0) for f in feeds])
+    shares = 4 * feeds / math.tau / 5.0
+    assert (np.sign(alone) == (-1.0 if up else 1.0)).all()
+    assert ((abs(alone) > 0.7 * shares) & (abs(alone) < 1.1 * shares)).all()
+    assert (abs(whole) < 10.0 * (feeds / 5.0) ** 2).all()
+    assert np.log2(abs(whole[:-1] / whole[1:])) == pytest.approx(2.0, abs=0.1)
+    for f, off in zip(feeds, alone, strict=True):
+        paths = Cut(10.0, 4, 30.0, 8.0, 0.1, f, up=up)
+        torque = true_loads(paths, [NO_EDGE.Ktc, 0.0, 0.0, 0.0, 0.0, 0.0])[2]
+        assert NO_EDGE.Ktc * 0.1 * 8.0 * (1.0 + off) == pytest.approx(torque * math.tau / (4 * f), rel=1e-3), f
 
 
 def test_up_and_down_milling_are_mirror_images_in_the_mean():
