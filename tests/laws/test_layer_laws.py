@@ -120,14 +120,24 @@ def test_a_straight_slot(cutter: Cutter, depth: float, step: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("cutter", "depth"), [(BALL, 0.3), (BALL, 1.0), (BALL, 1.874), (BALL, 5.0), (FLAT, 0.02), (FLAT, 5.0)]
+    ("cutter", "depth", "feed"),
+    [
+        (BALL, 0.02, FEED),
+        (BALL, 0.05, FEED),
+        (BALL, 0.3, FAST),
+        (BALL, 1.0, FAST),
+        (BALL, 1.874, FAST),
+        (BALL, 5.0, FAST),
+        (FLAT, 0.02, FAST),
+        (FLAT, 5.0, FAST),
+    ],
 )
-def test_a_straight_slot_at_a_fast_feed(cutter: Cutter, depth: float) -> None:
-    """0.1 and 0.2 mm a tooth, against the trochoids of all earlier teeth."""
-    history = run(path([[-10.0, 0.0, -depth], [10.0, 0.0, -depth]], FAST), cutter, material=REAL, step_mm=0.5)
-    f = FAST * math.tau / (cutter.flutes * SPINDLE)
+def test_a_straight_slot_against_the_true_paths(cutter: Cutter, depth: float, feed: float) -> None:
+    """0.01, 0.1 and 0.2 mm a tooth, against the trochoids of all earlier teeth, with all of the edge force."""
+    history = run(path([[-10.0, 0.0, -depth], [10.0, 0.0, -depth]], feed), cutter, material=REAL, step_mm=0.5)
+    f = feed * math.tau / (cutter.flutes * SPINDLE)
     cut = Cut(10.0, cutter.flutes, math.degrees(cutter.helix), depth, 10.0, f, ball=cutter is BALL)
-    force, torque, mean, chip = true_loads(cut, astuple(REAL)[1:7], slices=2000)
+    force, torque, mean, chip = true_loads(cut, astuple(REAL)[1:7], rotations=1440, slices=2000)
     assert off(at(history, 7.0), Sum(mean / 1e3, torque / 1e3, force, chip), history.resolution_error) == {}
 
 
