@@ -123,8 +123,9 @@ def test_force_stays_below_the_threshold():
     limits = DepthRange(0.01, 1.5, 1e-6)
     found = largest_depths(posture, FULL, F, limits, measure="greatest")
     again = normal_force(posture, FULL, found.depth, measure="greatest")
-    assert (again <= F * (1.0 + 1e-12)).all()
-    assert_allclose(found.force, again, rtol=1e-12)
+    # chips are rounded to a share of the radius, and the force with them
+    assert (again <= F * (1.0 + 1e-7)).all()
+    assert_allclose(found.force, again, rtol=1e-7)
     inner = found.status == THRESHOLD
     assert inner.sum() > 3
     assert (normal_force(posture, FULL, found.depth[inner] + 2e-6, measure="greatest") > F[inner]).all()
