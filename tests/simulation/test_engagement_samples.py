@@ -8,6 +8,7 @@ import pytest
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import engagement_of_arcs
+from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 from chipload.simulation.engagement_samples import EngagementRecorder, engagement_samples, samples_from
 from chipload.simulation.loads import Cuts
@@ -24,7 +25,8 @@ def cuts_of(steps, cutter=MILL, tool=1):
     feed, wide = 0.05 + 1e-4 * np.asarray(steps), np.full(n, 1.2)
     own = engagement_of_arcs(np.zeros(n), wide, feed, cutter, DEPTH)
     own = replace(own, frame=np.tile(np.eye(3), (n, 1, 1)))
-    return Cuts(tool, cutter, np.asarray(steps), np.zeros((n, 12)), own, own, np.full(n, 300.0))
+    chips = chips_of_teeth(own, cutter)
+    return Cuts(tool, cutter, np.asarray(steps), np.zeros((n, 12)), chips, own, np.full(n, 300.0))
 
 
 def recorded(those, block, **most):
@@ -35,7 +37,8 @@ def recorded(those, block, **most):
 
 
 def test_volume_and_work_of_the_chips_are_those_of_the_material() -> None:
-    found = engagement_samples(cuts_of(np.array([4])).engagement, MILL, METAL, np.array([4]), 1)
+    # the front, whose chips are f sin(phi)
+    found = engagement_samples(cuts_of(np.array([4])).plain, MILL, METAL, np.array([4]), 1)
     low, high, along, offset, across, rho, z_low, _, z_high = found.ranges[0, :9]
     # of each tooth: feed times the width of the cut times its depth, R (1 - cos 1.2) wide
     chip = 0.0504 * 4.0 * (1.0 - np.cos(1.2)) * DEPTH
@@ -53,7 +56,13 @@ def test_what_is_kept_does_not_depend_on_the_blocks(block) -> None:
     # 700 steps cut: every eighth is the first stride that keeps 100 at most
     assert found.stride == 8
     assert found.row.tolist() == [k for k in steps.tolist() if k % 8 == 0]
-    assert np.unique(found.ranges[:, 2].round(9)).tolist() == np.unique((0.05 + 1e-4 * found.row).round(9)).tolist()
+    # each step has a feed of its own: the chips are those of its row
+    own = cuts_of(found.row).engagement
+    assert found.start.tolist() == own.start.tolist()
+    np.testing.assert_array_equal(found.ranges[:, [0, 1, 2, 3, 4]], own.rows[:, [0, 1, 4, 5, 6]])
+    thickest = found.ranges[found.start[:-1], 2]
+    np.testing.assert_allclose(thickest, 0.05 + 1e-4 * found.row, rtol=0.02)
+    assert (np.diff(thickest) > 0.0).all()
 
 
 def test_few_ranges_are_kept_and_two_tools_stand_in_the_order_of_their_rows() -> None:

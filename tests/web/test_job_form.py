@@ -41,7 +41,7 @@ def test_fields_state_unit_range_and_choices() -> None:
     fields = {f.path: f for f in job_fields(EXAMPLES / "chips" / "job.toml")}
     step = fields["operation.0.step_mm"]
     assert (step.kind, step.value, step.unit) == ("number", 0.5, "mm")
-    assert step.bounds == "number, at most 100, above 0"
+    assert step.bounds == "number, above 0, at most 100"
     assert "longest step" in step.meaning
     assert fields["cutter.0.modulus_gpa"].unit == "GPa"
     assert (fields["limits.power_w"].value, fields["limits.power_w"].unit) == (None, "W")
