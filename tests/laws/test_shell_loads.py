@@ -1,9 +1,11 @@
 """A level round outside a tube: torque, normal force and depth of cut from the chips against closed forms.
 
 Notation: D distance of the cutter's centre from the tube's, R its radius, R_s that of the stock; psi angle from the
-wall's normal. The rim is engaged over 0 .. alpha, cos alpha = (D^2 + R^2 - R_s^2) / (2 D R); because the path goes
-round the tube the chip is f sin psi exactly. Mean torque N b R / 2 pi [Ktc f (1 - cos alpha) + Kte alpha]; a straight
-tooth at psi presses on the wall with (Ktc f sin psi + Kte) b sin psi + (Krc f sin psi + Kre) b cos psi.
+wall's normal. A circle is engaged over 0 .. alpha, cos alpha = (D^2 + R^2 - R_s^2) / (2 D R), with the chip f sin psi,
+because the path goes round the tube. Mean torque N b R / 2 pi [Ktc f (1 - cos alpha) + Kte alpha]; a straight tooth at
+psi presses on the wall with (Ktc h + Kte) b sin psi + (Krc h + Kre) b cos psi. A tooth does not move on a circle: its
+chip h is found between its path round the tube and that of the tooth before, or the stock's edge, by Newton's method,
+and it leaves the cut about f / (2 R) behind psi = 0.
 """
 
 from __future__ import annotations
@@ -100,16 +102,44 @@ def done(job, program, centre=(0.0, 0.0)):
     return cut(job, program, shell_stock(job, program, centre), MATERIAL, 400.0, lambda *_: None)
 
 
+def paths(stock_radius):
+    """Angles psi (n,) and the chip (n,) [mm] between the path of a tooth and that of the one before; climb milling.
+
+    Time is the rotation t of the spindle, clockwise; the centre is at D exp(-i w t). At t = 0 the tooth is on the ray
+    from the centre along exp(i (pi + psi)); the one before was at this angle 2 pi / N earlier.
+    """
+    w = FEED / (CENTRE * SPEED)
+    psi = np.linspace(-0.03, 1.0, 50_001)
+    ray = np.exp(1j * (math.pi + psi))
+    late = np.zeros(len(psi))
+    for _ in range(20):
+        t = late - math.tau / 3.0
+        there = CENTRE * (np.exp(-1j * w * t) - 1.0) + R * ray * np.exp(-1j * late)
+        speed = -1j * w * CENTRE * np.exp(-1j * w * t) - 1j * R * ray * np.exp(-1j * late)
+        late -= (there / ray).imag / (speed / ray).imag
+    assert abs((there / ray).imag).max() < 1e-9
+    # where the ray enters the stock
+    along = (CENTRE / ray).real
+    edge = -along - np.sqrt(along**2 - CENTRE**2 + stock_radius**2 + 0j).real
+    inside = abs(CENTRE + R * ray) < stock_radius
+    return psi, np.where(inside, np.maximum(R - np.maximum((there / ray).real, edge), 0.0), 0.0)
+
+
 def closed(stock_radius):
     """Torque of edge and cut [N mm], greatest normal force of the edge and of all [N]."""
     f = FEED / (3.0 * SPEED / math.tau)
     alpha = math.acos((CENTRE**2 + R**2 - stock_radius**2) / (2.0 * CENTRE * R))
-    psi = np.linspace(0.0, alpha, 20_001)
+    psi, h = paths(stock_radius)
+    cuts = h > 0.0
+    # circles are the first order of it: the arc to f / R of its length, the volume to the share c / R of the feed
+    assert np.trapezoid(cuts.astype(float), psi) == pytest.approx(alpha, rel=f / R)
+    assert np.trapezoid(h, psi) == pytest.approx(f * (1.0 - math.cos(alpha)), rel=2.0 * 3.0 * f / math.tau / R)
     scale = 3.0 * DEPTH * R / math.tau
     m = MATERIAL
     edge = DEPTH * (m.Kte * np.sin(psi) + m.Kre * np.cos(psi))
-    whole = edge + DEPTH * f * np.sin(psi) * (m.Ktc * np.sin(psi) + m.Krc * np.cos(psi))
-    return scale * m.Kte * alpha, scale * m.Ktc * f * (1.0 - math.cos(alpha)), edge.max(), whole.max()
+    whole = edge + DEPTH * h * (m.Ktc * np.sin(psi) + m.Krc * np.cos(psi))
+    torque = scale * m.Kte * np.trapezoid(cuts.astype(float), psi), scale * m.Ktc * np.trapezoid(h, psi)
+    return *torque, edge[cuts].max(), whole[cuts].max()
 
 
 def at(made, degrees):
