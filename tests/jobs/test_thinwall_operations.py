@@ -67,7 +67,7 @@ FINISH = {
     "step_mm = 2.5": "step_mm = 3.0",
     "layer_mm = 0.4": "layer_mm = 0.25",
     "corner_slices = 100": "corner_slices = 60",
-    "reserve = 0.04": "reserve = 0.1",
+    "reserve = 0.09": "reserve = 0.1",
     "least_error = true\n": "refine = false\n",
     "compensate_um = 60.0\n": "",
 }

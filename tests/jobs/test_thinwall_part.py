@@ -182,10 +182,14 @@ def test_the_shank_beside_the_neighbour(folder, shank):
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    """The shipped example, which has the walls and the values of :func:`job`."""
-    folder = copy_example("part", tmp_path_factory.mktemp("example") / "part")
-    return run_job(load_job(folder / "walls.toml", ["operation.0.refine=false"]))
+def shipped(tmp_path_factory):
+    """Copy of the shipped example, which has the walls of :func:`job`."""
+    return copy_example("part", tmp_path_factory.mktemp("example") / "part") / "walls.toml"
+
+
+@pytest.fixture(scope="module")
+def done(shipped):
+    return run_job(load_job(shipped, ["operation.0.refine=false"]))
 
 
 def test_two_walls_in_one_job(done):
@@ -215,7 +219,7 @@ def test_deflection_is_force_over_stiffness_of_the_state(done, folder):
     assert C[:, row].min() < softness < C[:, min(row + 1, 3)].max() * 1.001
 
 
-def test_a_stopped_run_goes_on(folder, done, tmp_path):
+def test_a_stopped_run_goes_on(shipped, done, tmp_path):
     """Stopped in the second variant: the first one is not simulated again, and all columns are those of one run."""
     reached: list[str] = []
 
@@ -224,9 +228,11 @@ def test_a_stopped_run_goes_on(folder, done, tmp_path):
             raise Cancelled("stopped")
 
     with pytest.raises(Cancelled), Checkpoint(tmp_path / "kept", 0.0) as checkpoint:
-        run_job(job(folder), until, checkpoint)
+        run_job(load_job(shipped, ["operation.0.refine=false"]), until, checkpoint)
     with Checkpoint(tmp_path / "kept", 0.0) as checkpoint:
-        again = run_job(job(folder), lambda _, what: reached.append(what), checkpoint)
+        again = run_job(
+            load_job(shipped, ["operation.0.refine=false"]), lambda _, what: reached.append(what), checkpoint
+        )
     assert not any(what.startswith("unconstrained") for what in reached)
     assert any(what.startswith("constant") for what in reached)
     for name, one in done.outcome.variants.items():
