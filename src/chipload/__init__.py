@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from chipload.api.contours import FlatStock, plan_contour, plan_pocket
     from chipload.api.jobs import check_job, load_result, run_job, write_result
     from chipload.api.loads import fit_coefficients, hold_torque, optimise_feeds
+    from chipload.api.mechanics.chip import UndeformedChip, undeformed_chip
+    from chipload.api.mechanics.cut import CutEngagement, engagement_of_cut
+    from chipload.api.mechanics.forces import TurnForces, tooth_forces
     from chipload.api.planning import plan_impeller, plan_thin_wall
     from chipload.api.reading import read_machine, read_material, read_program
     from chipload.api.simulation import simulate
@@ -43,6 +46,7 @@ __all__ = [
     "CheckSettings",
     "Contour",
     "ContourLimits",
+    "CutEngagement",
     "Cutter",
     "Finding",
     "FinishedPart",
@@ -62,11 +66,14 @@ __all__ = [
     "SimulationSettings",
     "Stock",
     "Track",
+    "TurnForces",
+    "UndeformedChip",
     "Verdict",
     "Vibration",
     "Workpiece",
     "WorkpieceClamp",
     "check_job",
+    "engagement_of_cut",
     "fit_coefficients",
     "hold_torque",
     "load_result",
@@ -81,6 +88,8 @@ __all__ = [
     "read_program",
     "run_job",
     "simulate",
+    "tooth_forces",
+    "undeformed_chip",
     "write_result",
 ]
 
@@ -90,6 +99,7 @@ _PLACES = {
     "CheckSettings": ("chipload.checking.settings", "CheckSettings"),
     "Contour": ("chipload.geometry.contour", "Contour"),
     "ContourLimits": ("chipload.jobs.contour.tables", "ContourLimitsTable"),
+    "CutEngagement": ("chipload.api.mechanics.cut", "CutEngagement"),
     "Cutter": ("chipload.cutter.table", "CutterTable"),
     "Finding": ("chipload.errors", "Finding"),
     "FinishedPart": ("chipload.checking.workpiece", "FinishedPart"),
@@ -109,6 +119,8 @@ _PLACES = {
     "SimulationSettings": ("chipload.checking.settings", "SimulationSettings"),
     "Stock": ("chipload.checking.workpiece", "Stock"),
     "Track": ("chipload.result.track", "Track"),
+    "TurnForces": ("chipload.api.mechanics.forces", "TurnForces"),
+    "UndeformedChip": ("chipload.api.mechanics.chip", "UndeformedChip"),
     "Verdict": ("chipload.result.verdict", "Verdict"),
     "Vibration": ("chipload.checking.dynamics", "Vibration"),
     "Workpiece": ("chipload.checking.clamped", "Workpiece"),
@@ -123,6 +135,9 @@ _FUNCTIONS = {
         "jobs": "check_job load_result run_job write_result",
         "loads": "fit_coefficients hold_torque optimise_feeds",
         "contours": "plan_contour plan_pocket",
+        "mechanics.chip": "undeformed_chip",
+        "mechanics.cut": "engagement_of_cut",
+        "mechanics.forces": "tooth_forces",
         "planning": "plan_impeller plan_thin_wall",
         "reading": "read_machine read_material read_program",
         "simulation": "simulate",

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeAlias
 
 import numpy as np
 import trimesh
 
+from chipload.api.values import AnyCutter, cutter_of, material_of
 from chipload.checking.clamped import Workpiece
 from chipload.checking.dynamics import Vibration
 from chipload.checking.history import History
@@ -20,8 +20,7 @@ from chipload.checking.settings import CheckSettings, Limits, SimulationSettings
 from chipload.checking.stiffness import MachineStiffness
 from chipload.checking.workpiece import FinishedPart, Fixture, Stock, Surroundings
 from chipload.cutter.cutter import Cutter
-from chipload.cutter.table import CutterTable
-from chipload.cutting.material import Material, material_named, read_material
+from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.machine.ini import read_ini
 from chipload.machine.machine import Machine, machine_named, read_machine
@@ -33,9 +32,6 @@ from chipload.progress import Progress, silent
 from chipload.result.provenance import provenance_of
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min
-
-#: a cutter by numbers with units in their names, or by its profile
-AnyCutter: TypeAlias = CutterTable | Cutter
 
 #: longest step that is not stated, in diameters of the smallest cutter
 STEP = 0.25
@@ -108,7 +104,7 @@ def simulate(
     """
     if settings is not None and step_mm is not None:
         raise InputError(f"step_mm = {step_mm:g}: stated with settings, which state it: leave one out")
-    on, metal = _machine(machine), _material(material)
+    on, metal = _machine(machine), material_of(material)
     tolerance = SimulationSettings.tolerance_mm if settings is None else settings.tolerance_mm
     reading, tools = _with_cutters(program, on, cutters, dialect, feed_mm_min, tolerance)
     if settings is None:
@@ -178,10 +174,7 @@ def _by_number(cutters: AnyCutter | Sequence[AnyCutter], program: Program) -> di
     several = [cutters] if isinstance(cutters, AnyCutter) else list(cutters)
     if not several:
         raise InputError("cutters: missing: give at least one")
-    found = [cutter.cutter(Path()) if isinstance(cutter, CutterTable) else cutter for cutter in several]
-    for one in found:
-        if not isinstance(one, Cutter):
-            raise InputError(f"cutters: {type(one).__name__}: give a chipload.Cutter")
+    found = [cutter_of(cutter, "cutters") for cutter in several]
     if len(found) > 1:
         numbers = [cutter.number for cutter in found]
         if len(set(numbers)) < len(numbers):
@@ -200,10 +193,3 @@ def _machine(name: Machine | str | Path) -> Machine:
     if ending == ".ini":
         return read_ini(Path(name))[0]
     return read_machine(name) if isinstance(name, Path) or ending == ".toml" else machine_named(name)
-
-
-def _material(name: Material | str | Path) -> Material:
-    if isinstance(name, Material):
-        return name
-    is_file = isinstance(name, Path) or name.lower().endswith(".toml")
-    return read_material(name) if is_file else material_named(str(name))

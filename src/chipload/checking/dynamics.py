@@ -124,14 +124,8 @@ def dynamics_of(vibration: Vibration, cutters: Mapping[int, Cutter], workpiece: 
         where = f"dynamics.mode {k}"
         if mode.tool is not None and mode.tool not in cutters:
             raise InputError(f"{where}: tool = {mode.tool}: no [[cutter]] has this number")
-        if mode.stiffness_n_um is not None and mode.mass_kg is not None:
-            raise InputError(f"{where}: stiffness_n_um and mass_kg: state one of them")
-        stiffness = math.nan
-        if mode.stiffness_n_um is not None:
-            stiffness = PER_UM * mode.stiffness_n_um
-        elif mode.mass_kg is not None:
-            stiffness = PER_KG * mode.mass_kg * (math.tau * mode.frequency_hz) ** 2
-        else:
+        stiffness = modal_stiffness(mode, where)
+        if math.isnan(stiffness):
             unknown.append(f"stiffness of mode {k}")
         if mode.damping_ratio is None:
             unknown.append(f"damping of mode {k}")
@@ -146,7 +140,7 @@ def dynamics_of(vibration: Vibration, cutters: Mapping[int, Cutter], workpiece: 
         elif along := _missing_direction(across):
             unknown.append(f"modes of tool {tool} along {along}")
         if own:
-            modes[tool] = _modes(own)
+            modes[tool] = modes_with_stiffness(own)
             number[tool] = tuple(k for k, _, _ in own)
     damping = None
     if workpiece is not None:
@@ -190,8 +184,31 @@ def _direction(mode: Mode) -> tuple[float, ...]:
     return (*stated, 0.0)[:3]
 
 
-def _modes(some: Iterable[tuple[int, Mode, float]]) -> Modes:
-    """Return modes with directions in x, y and z if one moves along z, else in x and y."""
+def modal_stiffness(mode: Mode, where: str) -> float:
+    """Return the stiffness [N/mm] that a mode states, or that follows from its mass, k = m w^2; NaN: neither is stated.
+
+    Parameters
+    ----------
+    where : name of the mode in messages
+
+    Raises
+    ------
+    InputError
+        Both are stated.
+    """
+    if mode.stiffness_n_um is not None and mode.mass_kg is not None:
+        raise InputError(f"{where}: stiffness_n_um and mass_kg: state one of them")
+    if mode.stiffness_n_um is not None:
+        return PER_UM * mode.stiffness_n_um
+    if mode.mass_kg is not None:
+        return PER_KG * mode.mass_kg * (math.tau * mode.frequency_hz) ** 2
+    return math.nan
+
+
+def modes_with_stiffness(some: Iterable[tuple[int, Mode, float]]) -> Modes:
+    """Return modes, each with its number and stiffness [N/mm]; directions in x, y and z if one moves along z, else in x
+    and y.
+    """
     rows = list(some)
     direction = np.array([_direction(m) for _, m, _ in rows])
     return Modes(
