@@ -134,6 +134,14 @@ CASES = (
         "holds", "",
     ),
     Case(
+        "plate-standing", "a plate 3 mm thick stands 60 mm high and is milled on its upper edge",
+        stock(low_mm=(0.0, 18.5, -60.0), high_mm=(60.0, 21.5, 0.0)), "unproven", "slender-wall",
+    ),
+    Case(
+        "bar-standing", "nothing: a bar of 20 x 20 mm stands 60 mm high",
+        stock(low_mm=(0.0, 10.0, -60.0), high_mm=(20.0, 30.0, 0.0)), "holds", "",
+    ),
+    Case(
         "slender-wall", "a wall 2 mm thick and 15 mm high is left, which bends",
         text(*slots(-7.5, -15.0, y=14.0), *slots(-7.5, -15.0, y=26.0)), "unproven", "slender-wall",
     ),

@@ -2,7 +2,8 @@
 
 Notation: over each level floor L that the program cuts, the columns that stand higher are a plan; the thickness of a
 wall is the diameter of the greatest circle in that plan at its middle, its height that of its top over L. The
-slenderness of a wall is its height over its thickness; what stands beside the stock counts as air.
+slenderness of a wall is its height over its thickness; what stands beside the stock counts as air. The bottom of the
+stock is such a floor too: a thin plate that stands upright is a wall where the program cuts it.
 
 A long wall that is clamped along its foot alone deflects under a force at its free edge by w = 0.168 F H^2 / D, with
 the stiffness of a plate D = E t^3 / 10.9: at a slenderness of 5, of aluminium 2 mm thick, 0.33 um/N.
@@ -77,7 +78,9 @@ def slender_walls_of(
     hx, hy = float(x[1] - x[0]), float(y[1] - y[0])
     out: list[SlenderWall] = []
     taken = np.zeros(there.shape, dtype=np.bool_)
-    for level in (ALIKE * kept).tolist():
+    near_cut = ndimage.binary_dilation(before > np.where(np.isfinite(top), top, low), iterations=2)
+    bottom = float(low[there].min())
+    for level in [bottom, *(ALIKE * kept[ALIKE * kept > bottom + ALIKE]).tolist()]:
         standing = there & np.isfinite(top) & (top > level + 2.0 * ALIKE)
         if not standing.any():
             continue
@@ -91,6 +94,8 @@ def slender_walls_of(
             label, count = ndimage.label(thin & ~taken)
             for k, box in enumerate(ndimage.find_objects(label)[:count], start=1):
                 own = label[box] == k
+                if not (own & near_cut[box]).any():
+                    continue
                 thickness = max(2.0 * float(inner[box][own].max()) - max(hx, hy), max(hx, hy))
                 tops = top[box][own]
                 height = float(np.median(tops)) - level
