@@ -234,3 +234,54 @@ CASES = (
          "collision"),
     Case("shank-tilted-slim", "nothing: a shank as wide as the cutter", tilted(10.0), "holds", ""),
 )  # fmt: skip
+
+
+def fixtures(*bounds: tuple[float, ...]) -> Change:
+    """Blocks as fixtures, each by its low and its high corner."""
+
+    def change(job: Job) -> None:
+        bodies = job.tables.setdefault("fixture", [])
+        for corners in bounds:
+            name = f"fixture{len(bodies)}.stl"
+            body = trimesh.creation.box(bounds=[corners[:3], corners[3:]])
+            job.files[name] = body.export(file_type="stl")
+            bodies.append({"file": name, "units": "mm", "spacing_mm": 2.0})
+
+    return change
+
+
+def jaws(low: float, high: float, away: float = 0.0) -> Change:
+    """Two jaws on the long sides between two places along x."""
+    return fixtures((low, -10.0, -20.0, high, -away, -10.0), (low, 40.0 + away, -20.0, high, 50.0, -10.0))
+
+
+def clamps(*places: tuple[float, float], directions: str = "xyz") -> Change:
+    """Clamps of the lowest 5 mm between two places along x; the others than the first hold in some directions."""
+
+    def change(job: Job) -> None:
+        each = [{"low_mm": (a, 0.0, -20.0), "high_mm": (b, 40.0, -15.0)} for a, b in places]
+        each[1:] = [{**clamp, "directions": directions} for clamp in each[1:]]
+        job.tables["workpiece"] = {"modulus_gpa": 71.0, "poisson": 0.33, "cell_mm": 10.0, "clamp": each}
+
+    return change
+
+
+PARTED = text(*across(-8.0, -16.0, -20.0), *AFTER)
+CASES = (
+    *CASES,
+    Case("part-off-vise", "nothing: a vise holds both halves", changes(PARTED, jaws(0, 20), jaws(40, 60)), "holds", ""),
+    Case("part-off-half-vise", "a vise holds one half of two", changes(PARTED, jaws(0, 20)), "unproven", "loose-stock"),
+    Case("part-off-open-vise", "the jaws stand 1 mm away from one half",
+         changes(PARTED, jaws(0, 20), jaws(40, 60, away=1.0)), "unproven", "loose-stock"),
+    Case("part-off-parallels", "both halves lie on parallels, without a clamp",
+         changes(PARTED, fixtures((0, 0, -30, 20, 40, -20), (40, 0, -30, 60, 40, -20))), "unproven", "loose-stock"),
+    Case("part-off-straps", "nothing: a strap on each half",
+         changes(PARTED, fixtures((0, 0, 0, 8, 6, 4), (52, 0, 0, 60, 6, 4))), "holds", ""),
+    Case("part-off-one-strap", "a strap on one half of two", changes(PARTED, fixtures((0, 0, 0, 8, 6, 4))), "unproven",
+         "loose-stock"),
+    Case("part-off-clamps", "nothing: a clamp on each half", changes(PARTED, clamps((0, 5), (55, 60))), "holds", ""),
+    Case("part-off-one-clamp", "a clamp on one half of two", changes(PARTED, clamps((0, 5))), "unproven",
+         "loose-stock"),
+    Case("part-off-sliding-clamp", "a clamp that holds one half in height only",
+         changes(PARTED, clamps((0, 5), (55, 60), directions="z")), "unproven", "loose-stock"),
+)  # fmt: skip

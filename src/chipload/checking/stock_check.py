@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.clamped import placed_clamps
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.outcome import StockCheck
 from chipload.checking.part_place import find_misplaced_part
@@ -64,7 +65,7 @@ def check_stock(
             "missed between the columns of the stock that are compared"
         )
     if checks.loose_stock:
-        findings += _loose(found, max(c.resolved_diameter for c in inputs.cutters.values()))
+        findings += _loose(found, inputs, stock)
     if checks.slender_walls and inputs.elasticity.workpiece is None:
         findings += _thin(found, checks.wall_slenderness)
     return StockCheck((*placed, *findings), touched, hidden, tuple(unchecked))
@@ -122,14 +123,18 @@ def _leaning(inputs: CheckInputs, stock: LayeredStock) -> StockCheck:
     return StockCheck((), (), hidden, tuple(unchecked))
 
 
-def _loose(found: HeightMap, diameter: float) -> list[Finding]:
-    """Return a finding for each piece that is cut on after it was cut free."""
+def _loose(found: HeightMap, inputs: CheckInputs, stock: LayeredStock) -> list[Finding]:
+    """Return a finding for each piece that is cut on after it was cut free, and that nothing stated holds."""
     out = []
-    for piece in find_loose_stock(found, diameter):
+    workpiece, fixtures = inputs.elasticity.workpiece, [f.mesh for f in inputs.surroundings.fixtures]
+    clamps = () if workpiece is None else placed_clamps(workpiece, stock)
+    diameter = max(c.resolved_diameter for c in inputs.cutters.values())
+    for piece in find_loose_stock(found, diameter, clamps, fixtures):
         x, y = piece.size_mm
         text = (
-            f"cuts a piece of {x:.3g} x {y:.3g} mm that line {piece.freed_line} has cut free of the stock: what holds "
-            "it is not known: leave tabs or a floor, or cut it free last"
+            f"cuts a piece of {x:.3g} x {y:.3g} mm that line {piece.freed_line} has cut free of the stock, and no "
+            "stated clamp or fixture holds it: leave tabs or a floor, cut it free last, or state what holds it as a "
+            "[[fixture]] or a [[workpiece.clamp]]"
         )
         out.append(Finding("loose-stock", piece.line, text, Severity.UNPROVEN, piece.place, piece.step))
     return out

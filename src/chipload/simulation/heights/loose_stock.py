@@ -1,8 +1,9 @@
 """Pieces of the stock that a program cuts free, and later cuts in them.
 
 Notation: a column of the height map is there until the step that cuts it through. Two columns are joined if they are
-neighbours and both are there. The piece with the greatest volume after the program counts as clamped; a column is
-attached up to the last step before which a way of neighbours leads from it to that piece. Columns are joined whatever
+neighbours and both are there. The pieces that stated clamps or fixtures hold after the program are clamped
+(:mod:`chipload.simulation.heights.clamped_stock`), where these hold none that with the greatest volume; a column is
+attached up to the last step before which a way of neighbours leads from it to one of them. Columns are joined whatever
 the heights of their material: an overhang over a step in the bottom of the stock counts as joined.
 
 A cut in a column that is not attached any more is a cut in a loose piece. The cutter that parts a piece still cuts
@@ -12,13 +13,17 @@ its border on its way out: the first way of a cutter's diameter after the partin
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 from chipload.lazy import LateModule
+from chipload.simulation.heights.clamped_stock import find_clamped_stock
 from chipload.simulation.heights.height_map import NEVER, HeightMap
+from chipload.structure.cells.clamp import Clamp
 
 _lower = LateModule("chipload.simulation.heights._lower")
 
@@ -45,12 +50,15 @@ class LooseStock:
     size_mm: tuple[float, float]
 
 
-def find_loose_stock(found: HeightMap, diameter: float) -> tuple[LooseStock, ...]:
+def find_loose_stock(
+    found: HeightMap, diameter: float, clamps: Sequence[Clamp] = (), fixtures: Sequence[trimesh.Trimesh] = ()
+) -> tuple[LooseStock, ...]:
     """Return the pieces that a program cuts free and cuts again; O(columns x log).
 
     Parameters
     ----------
     diameter : of the largest cutter [mm], see the head of this file
+    clamps, fixtures : that may hold pieces
     """
     from scipy import ndimage
 
@@ -60,9 +68,10 @@ def find_loose_stock(found: HeightMap, diameter: float) -> tuple[LooseStock, ...
         return ()
     label, count = ndimage.label(stays)
     volume = ndimage.sum_labels(np.where(stays, found.top - found.low, 0.0), label, np.arange(1, count + 1))
-    i, j = np.argwhere(label == int(np.argmax(volume)) + 1)[0].tolist()
     until = np.full(found.gone.shape, -1.0)
-    _lower.attached_until(found.gone, found.low, i, j, until)
+    for k in find_clamped_stock(found, label, clamps, fixtures) or (int(np.argmax(volume)) + 1,):
+        i, j = np.argwhere(label == k)[0].tolist()
+        _lower.attached_until(found.gone, found.low, i, j, until)
     parted = there & (until < NEVER) & (found.last > until)
     if not parted.any():
         return ()
