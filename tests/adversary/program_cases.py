@@ -98,6 +98,27 @@ CASES = (
         "nc-length-missing",
     ),
     Case(
+        "length-h0-fanuc",
+        "H0 takes the length away on a Fanuc",
+        changes(
+            TABLE_OF_TOOLS,
+            stated("program", control="fanuc"),
+            replaced("G43 H1", "G43 H0"),
+            replaced("X-10 Y20 Z10", "X-10. Y20. Z10."),
+            replaced("Z-2\nG1 X70", "Z-2.\nG1 X70."),
+            replaced("G0 Z10\nM5", "G0 Z10.\nM5"),
+        ),
+        "unproven",
+        "nc-length-missing",
+    ),
+    Case(
+        "spindle-oriented-in-cut",
+        "M19 stops the spindle in the material, then the cutter goes up",
+        replaced("G1 X70 F900", "G1 X30 F900\nM19"),
+        "exceeds",
+        "spindle-stopped-in-cut",
+    ),
+    Case(
         "length-too-late",
         "a rapid goes down before G43",
         changes(TABLE_OF_TOOLS, replaced("G43 H1\n", ""), replaced("G0 Z-2", "G0 Z5\nG43 H1\nG0 Z-2")),

@@ -235,14 +235,13 @@ class BlockInterpreter:
         """Spindle, saved states, coolant, overrides and the builder's own codes."""
         c, state = self.c, self.c.state
         for m in block.m:
-            if m in (3, 4, 5):
-                state.sense = {3: 1, 4: -1, 5: 0}[m]
+            if m == 19 and not 0.0 <= block.words.get("r", 0.0) <= 360.0:
+                raise InputError(f"M19: R{block.words['r']:g}: must be from 0 to 360")
+            if m in (3, 4, 5, 19):
+                # an oriented spindle stands still
+                state.sense = {3: 1, 4: -1}.get(m, 0)
                 self.motion.drilling.started = False
                 c.changed()
-            elif m == 19:
-                if not 0.0 <= block.words.get("r", 0.0) <= 360.0:
-                    raise InputError(f"M19: R{block.words['r']:g}: must be from 0 to 360")
-                c.once("nc-ignored", "M19: orienting the spindle does not affect the path")
             elif m in (70, 71, 72, 73):
                 self._save(m)
             elif m in _IGNORED:

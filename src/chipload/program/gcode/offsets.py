@@ -243,12 +243,16 @@ def length_offset(c: Controller, block: Block, code: int, axes: Axes) -> None:
     elif state.tcp_by_length:
         state.tcp = state.tcp_by_length = False
         c.changed()
+    named = "h" in block.words
+    if code == 430 and named and block.words["h"] == 0.0 and not c.control.offsets.names_tools:
+        # H0 is no register: it takes the length away
+        code = 490
     if code == 490:
         new = ZERO
     elif code == 431:
         new = put(old, dict(axes))
     else:
-        if code == 432 and "h" not in block.words:
+        if code == 432 and not named:
             raise InputError("G43.2: H is missing: the tool whose offset is added")
         number = integer_of(block.words.get("h", 0.0), "H")
         if number == 0 and code == 430:

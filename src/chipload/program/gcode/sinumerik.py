@@ -277,6 +277,10 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
         if leaves_out(name) and NOTED not in block.g:
             block.g.append(NOTED)
         return
+    if name in ("SPOS", "SPOSA"):
+        # the spindle stops at an angle
+        block.m.append(19)
+        return
     if text.startswith('"') or name.startswith("$") or name in IDLE or name in ("OVR", "OVRRAP"):
         c.once("nc-ignored", f"{name}: does not affect the path; it is ignored")
         return

@@ -17,7 +17,7 @@ from chipload.units import MM_PER, rad_s_from_rpm
 
 TOOL_DIGITS = 9
 #: M functions that are carried out, or that do not concern the path
-KNOWN = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 13, 14, 30, 89, 91, 92, 99, 128, 129, 136, 137, 140)
+KNOWN = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 13, 14, 19, 30, 89, 91, 92, 99, 128, 129, 136, 137, 140)
 #: rotary axes by the shortest way, look-ahead, feeds on arcs and plunges, filters, handwheels, limits of axes
 SILENT = (90, 94, 101, 102, 103, 107, 108, 109, 110, 111, 114, 116, 117, 118, 120, 124, 126, 127, 134, 135, 138, 141,
           142, 143, 148, 149, 150, 200, 201, 202, 203, 204)  # fmt: skip
@@ -57,7 +57,7 @@ def before(s: ConversationalState, codes: list[int]) -> None:
 def after(s: ConversationalState, codes: list[int]) -> None:
     """M functions that act at the end of their block."""
     for m in codes:
-        if m == 5:
+        if m in (5, 19):
             s.sense = 0.0
         elif m in (0, 1, 6):
             s.note("nc-stop", f"M{m}: the program stops until it is started again")
