@@ -39,9 +39,9 @@ def test_comments_of_other_posts() -> None:
 
 
 def said_of(tools: str) -> dict[int, dict[str, object]]:
-    """What comments state about each tool, but for its name."""
+    """What comments state about each tool, but for its name and kind."""
     found = read_header(tools).cutters
-    return {n: {k: v for k, (v, _) in own.items() if k != "name"} for n, own in found.items()}
+    return {n: {k: v for k, (v, _) in own.items() if k not in ("name", "kind")} for n, own in found.items()}
 
 
 @pytest.mark.parametrize(

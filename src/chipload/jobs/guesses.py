@@ -22,6 +22,8 @@ FINDINGS = {
     "nothing-cut": PLACE,
     "tool-change-in-stock": PLACE,
     "plunge": PLACE,
+    "tap-pitch": ("program",),
+    "tap-cutter": ("cutter", "program"),
 }
 #: tables that a limit depends on besides :data:`LOAD`, by its name
 LIMITS = {"spindle_torque_nm": ("machine",), "spindle_power_w": ("machine",), "gouge_mm": ("part",)}

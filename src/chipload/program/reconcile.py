@@ -81,14 +81,14 @@ def _comments(text: str, own: float) -> Iterator[tuple[int, StatedDiameter]]:
             continue
         for comment in COMMENT.finditer(line):
             comment_text = (comment[1] if comment[1] is not None else comment[2]).upper()
-            hits = (pattern.search(_without_offsets(comment_text)) for pattern in _STATED)
+            hits = (pattern.search(without_offsets(comment_text)) for pattern in _STATED)
             hit = next((hit for hit in hits if hit is not None), None)
             if hit is not None and (value := length_of(hit["value"], hit["unit"], own)) > 0.0:
                 shown = " ".join(comment_text.split())[:60]
                 yield int(hit["tool"]), StatedDiameter(value, f"the comment ({shown})", number)
 
 
-def _without_offsets(comment: str) -> str:
+def without_offsets(comment: str) -> str:
     """A comment without the numbers of offsets, which are no diameters."""
     tool = re.search(TOOL, comment)
     both = _LENGTH_OFFSET.search(comment) is not None

@@ -1,8 +1,7 @@
 """Reading of cutters, stock and material from the comments and headers of a program.
 
-Read are the forms of common posts: Fusion 360 (``T1 D=10. CR=0. - flat end mill``), Mastercam (``T1 | 10. FLAT
-ENDMILL | H1``), FreeCAD (``TC: 5mm Endmill`` before ``M6 T1``), Carbide Create (``TOOL/MILL,3.17,0,0,0``,
-``stockMin``), FeatureCAM's APT (``INSERT/14MM CRB 2FL 32 LOC``, ``CSI_SET_FLUTE_LENGTH``, ``INSERT/Stock Size``),
+Read are the forms of common posts: comments about tools (:mod:`chipload.jobs.drafts.tool_comments`), Carbide Create
+(``stockMin``), FeatureCAM's APT (``INSERT/14MM CRB 2FL 32 LOC``, ``CSI_SET_FLUTE_LENGTH``, ``INSERT/Stock Size``),
 Heidenhain (``BLK FORM``), Sinumerik (``WORKPIECE``).
 """
 
@@ -12,24 +11,20 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from chipload.cutter.barrel import tip_of_barrel
 from chipload.cutter.bodies import Profile, apt_body
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
+from chipload.jobs.drafts.tool_comments import stated_tools
+from chipload.jobs.drafts.tool_words import Stated, describe_tool
 from chipload.program.apt.cutters import Shape, read_cutters
-from chipload.program.reconcile import length_of, tool_comments
-from chipload.program.setup import FIRST_NAMED
 from chipload.units import MM_PER
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
-#: value and where it stands, by key of the ``[[cutter]]``
-Stated = dict[str, tuple[Any, str]]
 
 _COMMENT = re.compile(r"\(([^()\n]*)\)|;([^\n]*)|^\s*(?:INSERT|PPRINT)\s*/?([^\n]*)", re.MULTILINE)
 _NUMBER = r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))"
-_FUSION = re.compile(rf"\bT(\d+)\s+D={_NUMBER}\s+CR={_NUMBER}(?:\s+TAPER={_NUMBER}DEG)?([^()\n;]*)", re.IGNORECASE)
 _BLK = re.compile(
     rf"BLK\s+FORM\s+0\.([12])\s+(?:[XYZ]\s+)?X\s*{_NUMBER}\s+Y\s*{_NUMBER}\s+Z\s*{_NUMBER}", re.IGNORECASE
 )
@@ -43,29 +38,8 @@ _STOCK_SIZE = re.compile(rf"Stock\s+Size\s+X{_NUMBER}\s*Y{_NUMBER}\s*Z{_NUMBER}"
 _MATERIAL_SIZE = re.compile(
     rf"Material\s+Size\s*\)?\s*\(?\s*X\s*=\s*{_NUMBER}\s*,?\s*Y\s*=\s*{_NUMBER}\s*,?\s*Z\s*=\s*{_NUMBER}", re.IGNORECASE
 )
-#: a comment, and the tool that is defined behind it (Heidenhain)
-_TOOL_DEF = re.compile(r";([^\n]*)\n[^\n]*\bTOOL\s+(?:DEF|CALL)\s+(\d{1,8})\b", re.IGNORECASE)
-#: a tool called by its name: Sinumerik, Heidenhain
-_NAMED = re.compile(r'(?:\bT\d*\s*=\s*|\bTOOL\s+CALL\s+)"([^"\n]+)"', re.IGNORECASE)
-#: a change of tools by number, and a motion
-_CHANGE = re.compile(r"(?<![A-Z_<\[#])M0?6(?![0-9.])", re.IGNORECASE)
-_TOOL_WORD = re.compile(r"(?<![A-Z_<\[#])T\s*([0-9]{1,8})(?![0-9.=])", re.IGNORECASE)
-_MOTION = re.compile(r"(?<![A-Z_<\[#])[XYZ]\s*[-+.0-9\[#]", re.IGNORECASE)
-#: a comment that describes a tool, and the length in it
-_TOOL_KIND = re.compile(
-    r"^\s*TC:|MILL|CUTTER|\bDRILL|\bREAM|\bBALL|\bBULL|V-?BIT|ENGRAV|FR[AÄ]E?S|BOHRER|FRAISE|FORET", re.IGNORECASE
-)
-_UNIT = r"(?:MM\b|IN(?:CH(?:ES)?)?\b|\")"
-_LENGTH = re.compile(
-    rf"(?<![-+.0-9/A-Z])(?P<value>[0-9]+/[0-9]+(?![0-9/])|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?=\s*{_UNIT}))"
-    rf"\s*(?P<unit>{_UNIT})?",
-    re.IGNORECASE,
-)
-#: Carbide Create: diameter and corner radius of the tool, corners of the stock
-_TOOL_MILL = re.compile(rf"TOOL/MILL\s*,\s*{_NUMBER}\s*,\s*{_NUMBER}\s*,", re.IGNORECASE)
+#: Carbide Create: corners of the stock
 _CORNER = re.compile(r"\(\s*stock(Min|Max)\s*:([^()\n]*)\)", re.IGNORECASE)
-#: lines above a change of tools whose comments may describe the tool
-ABOVE = 6
 #: signs that a number is not an alloy: a date, a time, the name of a file or a program
 _DATE = re.compile(
     r"\b(?:DATE|TIME|CREATED|OUTPUT|GENERATED|EXPORTED|POSTED|VERSION|COPYRIGHT|FILE|PROGRAM)\b|[0-9]{1,2}:[0-9]{2}|"
@@ -127,104 +101,9 @@ def read_header(text: str, apt: bool = False, mm: float = 1.0) -> Header:
     >>> read_header("BLK FORM 0.1 Z X+0 Y+0 Z-24\nBLK FORM 0.2 X+220 Y+220 Z+0").stock[0]
     ((0.0, 0.0, -24.0), (220.0, 220.0, 0.0))
     """
-    cutters = _apt_cutters(text) if apt else _nc_cutters(text, mm)
+    cutters = _apt_cutters(text) if apt else stated_tools(text, mm)
     material = _material(text)
     return Header(cutters, _stock(text, mm), material, "" if material else _unknown_material(text))
-
-
-def _nc_cutters(text: str, mm: float) -> dict[int, Stated]:
-    out: dict[int, Stated] = {}
-    for hit in _FUSION.finditer(text):
-        where = f"the comment ({' '.join(hit[0].split())[:50]})"
-        d, r = float(hit[2]) * mm, float(hit[3]) * mm
-        own = out.setdefault(int(hit[1]), {})
-        own.setdefault("diameter_mm", (d, where))
-        if r > 0.0:
-            own.setdefault("corner_radius_mm", (min(r, 0.5 * d), where))
-        if hit[4] and "drill" in hit[5].lower() and 0.0 < float(hit[4]) <= 180.0:
-            own.setdefault("bottom_deg", (90.0 - 0.5 * float(hit[4]), where))
-        elif hit[4] and 0.0 < float(hit[4]) < 80.0:
-            own.setdefault("taper_deg", (float(hit[4]), where))
-        own.setdefault("name", (_kind(hit[5]), where))
-    for number, statement in tool_comments(text).items():
-        out.setdefault(number, {}).setdefault("diameter_mm", (statement.diameter, statement.where))
-        if "BALL" in statement.where.upper():
-            out[number].setdefault("corner_radius_mm", (0.5 * statement.diameter, statement.where))
-        if "|" in statement.where:
-            out[number].setdefault("name", (statement.where.split("|")[1].strip(), statement.where))
-    for number, comment in _at_changes(text):
-        own = out.setdefault(number, {})
-        for key, stated in _described(comment, mm).items():
-            own.setdefault(key, stated)
-    for defined in _TOOL_DEF.finditer(text):
-        own = out.setdefault(int(defined[2]), {})
-        for key, stated in _described(defined[1], mm).items():
-            own.setdefault(key, stated)
-    for k, name in enumerate(dict.fromkeys(_NAMED.findall(re.sub(r";[^\n]*", "", text)))):
-        own = out.setdefault(FIRST_NAMED + k, {})
-        for key, stated in _described(name, mm, f"the name of the tool ({name[:50]})").items():
-            own.setdefault(key, stated)
-    return {n: {k: v for k, v in own.items() if v[0] != ""} for n, own in out.items()}
-
-
-def _at_changes(text: str) -> list[tuple[int, str]]:
-    """Tool numbers with the comment that describes the tool: on the line of its change, just above it, or below it and
-    before any motion.
-    """
-    out: list[tuple[int, str]] = []
-    above: list[str] = []
-    chosen = waiting = 0
-    for line in text.splitlines():
-        words = _COMMENT.sub(" ", line)
-        if found := _TOOL_WORD.search(words):
-            chosen = int(found[1])
-        comments = [hit[1] or hit[2] or "" for hit in _COMMENT.finditer(line)]
-        if _CHANGE.search(words) and chosen:
-            described = [c for c in (*comments, *reversed(above)) if _of_a_tool(c)]
-            out += [(chosen, described[0].strip())] if described else []
-            above, waiting = [], 0 if described else chosen
-        elif _MOTION.search(words):
-            above, waiting = [], 0
-        else:
-            below = [c for c in comments if waiting and _of_a_tool(c)]
-            if below:
-                out.append((waiting, below[0].strip()))
-                waiting = 0
-            above = [*above, *(comments or [""])][-ABOVE:]
-    return out
-
-
-def _of_a_tool(comment: str) -> bool:
-    """Whether a comment describes a tool with its size."""
-    return bool(_TOOL_MILL.match(comment) or (_TOOL_KIND.search(comment) and _LENGTH.search(comment)))
-
-
-def _described(name: str, mm: float, where: str = "") -> Stated:
-    """What the description of a tool states: ``14MM CRB 2FL 32 LOC FLUTE LEN 32.0 FLUTE EXT 60.0``."""
-    where = where or f"the comment ({' '.join(name.split())[:50]})"
-    out: Stated = {"name": (" ".join(name.split()), where)}
-    if found := _TOOL_MILL.match(name):
-        d, r = float(found[1]) * mm, float(found[2]) * mm
-        own: Stated = {"diameter_mm": (d, where)} if d > 0.0 else {}
-        return own | ({"corner_radius_mm": (r, where)} if 0.0 < r <= 0.5 * d else {})
-    if (found := _LENGTH.search(name)) and (diameter := length_of(found["value"], found["unit"], mm)) > 0.0:
-        out["diameter_mm"] = (diameter, where)
-        if re.search(r"\bBALL", name, re.IGNORECASE):
-            out["corner_radius_mm"] = (0.5 * diameter, where)
-    for word, key in (("LEN", "flute_length_mm"), ("EXT", "overhang_mm")):
-        if found := re.search(rf"FLUTE\s+{word}\s+{_NUMBER}", name, re.IGNORECASE):
-            out[key] = (float(found[1]) * mm, where)
-    flutes = re.search(r"\b(\d{1,2})\s*FL\b", name, re.IGNORECASE)
-    if flutes and 1 <= int(flutes[1]) <= 20:
-        out["flutes"] = (int(flutes[1]), where)
-    if re.search(r"\b(CRB|CARB|CARBIDE)\b", name, re.IGNORECASE):
-        out["modulus_gpa"] = (580.0, f"carbide: {where}")
-    return out
-
-
-def _kind(text: str) -> str:
-    words = [part.strip() for part in text.split(" - ") if part.strip() and "=" not in part]
-    return words[-1].lstrip("- ") if words else ""
 
 
 def _apt_cutters(text: str) -> dict[int, Stated]:
@@ -266,7 +145,7 @@ def _apt_cutters(text: str) -> dict[int, Stated]:
         elif word in ("LOAD", "LOADTL") and (found := re.search(r"(\d+)", rest)):
             tool = out.get(int(found[1]))
             if tool is not None and name:
-                for key, described in _described(name, mm).items():
+                for key, described in describe_tool(name, mm).items():
                     tool.setdefault(key, described)
             name = ""
         elif tool is not None and value and word == "CSI_SET_FLUTE_LENGTH":

@@ -17,11 +17,12 @@ from chipload.cutter.tool_bits import SPECIAL, special_shape
 from chipload.errors import InputError
 from chipload.geometry.brep import step_of_brep
 from chipload.geometry.mesh import read_mesh
-from chipload.jobs.drafts.comments import Box, Stated
+from chipload.jobs.drafts.comments import Box
 from chipload.jobs.drafts.document import Document, DocumentObject, read_document
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry
 from chipload.jobs.drafts.drawing import draft_model
 from chipload.jobs.drafts.program import Known, draft_program
+from chipload.jobs.drafts.tool_words import Stated
 
 _FEED = re.compile(r"\bF\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
 #: [mm] how far a triangle may leave a surface of the stock

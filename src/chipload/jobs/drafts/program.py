@@ -14,9 +14,10 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import cutter_from_table
 from chipload.errors import InputError, Severity, grouped
 from chipload.files import read_regular
-from chipload.jobs.drafts.comments import Box, Header, Stated, read_header
+from chipload.jobs.drafts.comments import Box, Header, read_header
 from chipload.jobs.drafts.cutters import cutter_table
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
+from chipload.jobs.drafts.tool_words import Stated, ToolKind
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.apt.reader import apt_text
 from chipload.program.gcode.reader import gcode_text
@@ -25,6 +26,7 @@ from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import ENDINGS, ProgramReading, read_program, read_tools
 from chipload.program.reconcile import unit_mm
 from chipload.program.setup import Setup
+from chipload.program.tapping import tapping_motions
 from chipload.program.tilt import NO_ROTARY
 from chipload.units import mm_s_from_mm_min, rpm_from_rad_s
 
@@ -116,6 +118,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
         n: block[1][2] - float(program.p_work[cuts & (program.tool == n), 2].min(initial=block[1][2])) for n in numbers
     }
     sizes = [_size(next((s for s in _stated(n, known, header) if s), {})) for n in numbers]
+    motions = {n: _kind_by_motions(program, cuts & (program.tool == n)) for n in numbers}
     tables = [
         _program_table(path, folder, chosen, known, min(sizes), text),
         _machine_table(chosen, known),
@@ -123,7 +126,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
             "stock", (*stock_entries, _layer(deepest, sizes)), note="the block that the program starts from [mm]"
         ),
         _material_table(header),
-        *(cutter_table(n, _stated(n, known, header), deepest[n]) for n in numbers),
+        *(cutter_table(n, _stated(n, known, header), deepest[n], motions[n]) for n in numbers),
         _operation_table(program, cuts, sizes),
         _limits_table(chosen.machine),
     ]
@@ -146,6 +149,23 @@ def _stated(number: int, known: Known, header: Header) -> list[Stated]:
     if number == 0 and len(header.cutters) == 1:  # a text without a change of tools cuts with the one that it names
         (stated,) = header.cutters.values()
     return [known.cutters.get(number, {}), _of_table(known.tools, number), stated]
+
+
+def _kind_by_motions(program: Program, cuts: np.ndarray) -> Stated:
+    """What the cuts of a tool show: one that turns back in its holes taps, one that only goes along its axis drills."""
+    rows = np.flatnonzero(cuts)
+    tapping = tapping_motions(program)
+    own = np.isin(tapping.rows, rows)
+    if own.any():
+        pitch = float(f"{tapping.pitch[own][0]:.5g}")
+        why = "it taps: the spindle turns back at the bottom of the hole"
+        return {"kind": (ToolKind.TAP, why), "thread_pitch_mm": (pitch, f"feed over speed; {why}")}
+    moves = program.p_work[rows] - program.p_work[np.maximum(rows - 1, 0)]
+    across = moves - (moves * program.axis[rows]).sum(axis=1)[:, None] * program.axis[rows]
+    along = np.linalg.norm(moves, axis=1)
+    if len(rows) and along.max() > 1e-6 and np.linalg.norm(across, axis=1).max() < 1e-6:
+        return {"kind": (ToolKind.DRILL, "it cuts along its axis only")}
+    return {}
 
 
 def _cutters(program: Program, known: Known, header: Header) -> dict[int, Cutter]:

@@ -1,0 +1,168 @@
+"""Which comment of an NC text describes which tool.
+
+A comment describes the tool whose number begins it (``T4 | 3/8 FLAT ENDMILL``, ``TOOL #3 - 0.25 DIA``, ``#7 D=6``),
+else the tool of the change on its line, just below it, or just above it before any motion. Heidenhain's comments stand
+above TOOL DEF; Sinumerik and Heidenhain also call tools by names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from chipload.jobs.drafts.tool_words import Stated, describe_tool, kind_of, names_diameter
+from chipload.program.reconcile import tool_comments, without_offsets
+from chipload.program.setup import FIRST_NAMED
+
+#: a comment of NC text, with one pair of brackets in it
+COMMENT = re.compile(r"\(((?:[^()\n]|\([^()\n]*\))*)\)|;([^\n]*)")
+#: the number of a tool at the beginning of a comment, and what follows
+_NUMBERED = re.compile(
+    r"^\W{0,3}(?:T(?:OOL)?\s*(?:NO\.?|NUMBER|NUM\.?)?\s*[-:#=]?\s*T?\s?(?P<tool>[0-9]{1,8})|#(?P<post>[0-9]{1,8})(?=\s+D=))"
+    r"(?![0-9./\"]|\s*(?:MM|IN|INCH)\b)\s*[-:=|,]*(?P<rest>.*)$",
+    re.IGNORECASE,
+)
+#: a comment, and the tool that is defined behind it (Heidenhain)
+_TOOL_DEF = re.compile(r";([^\n]*)\n[^\n]*\bTOOL\s+(?:DEF|CALL)\s+(\d{1,8})\b", re.IGNORECASE)
+#: a tool called by its name: Sinumerik, Heidenhain
+_NAMED = re.compile(r'(?:\bT\d*\s*=\s*|\bTOOL\s+CALL\s+)"([^"\n]+)"', re.IGNORECASE)
+#: a change of tools by number, and a motion
+_CHANGE = re.compile(r"(?<![A-Z_<\[#])M0?6(?![0-9.])", re.IGNORECASE)
+_TOOL_WORD = re.compile(r"(?<![A-Z_<\[#])T\s*([0-9]{1,8})(?![0-9.=])", re.IGNORECASE)
+_MOTION = re.compile(r"(?<![A-Z_<\[#])[XYZ]\s*[-+.0-9\[#]", re.IGNORECASE)
+#: CutViewer, Carbide Create: kind of the tool and its numbers
+_CUT_VIEWER = re.compile(r"^\s*TOOL/(MILL|DRILL)\s*,([^()\n]*)$", re.IGNORECASE)
+#: Mastercam's first form: the number, offsets and the diameter
+_OFFSETS = re.compile(
+    r"^\s*TOOL\s*-\s*([0-9]{1,8})\s+DIA\.?\s*OFF\.?\s*-\s*[0-9]+\s+LEN\.?\s*-\s*[0-9]+\s+(DIA\..*)$", re.IGNORECASE
+)
+#: a name or a size of the tool on a line of its own, without its number
+_OWN_LINE = re.compile(
+    r"^\s*(?:TOOL\s*(?:NAME|DESCRIPTION|DESC|DIAMETER|DIA|TYPE)?|TC|WERKZEUG|OUTIL)\b\.?\s*[-:=]", re.IGNORECASE
+)
+#: lines above a change of tools whose comments may describe the tool
+ABOVE = 6
+
+
+def stated_tools(text: str, mm: float) -> dict[int, Stated]:
+    """What the comments and names of an NC text state about each tool.
+
+    Parameters
+    ----------
+    mm : in the unit of the text
+    """
+    out: dict[int, Stated] = {}
+    for number, words, comment in _described(text):
+        own = out.setdefault(number, {})
+        for key, stated in _statement(words, mm, comment).items():
+            own.setdefault(key, stated)
+    for number, statement in tool_comments(text).items():
+        out.setdefault(number, {}).setdefault("diameter_mm", (statement.diameter, statement.where))
+    for k, name in enumerate(dict.fromkeys(_NAMED.findall(re.sub(r";[^\n]*", "", text)))):
+        own = out.setdefault(FIRST_NAMED + k, {})
+        described = describe_tool(name, mm, f"the name of the tool ({name[:50]})")
+        if "diameter_mm" in described and not names_diameter(name, unit=True):
+            described["number_mm"] = (described.pop("diameter_mm")[0], f"the number in its name, {name[:50]}")
+        for key, stated in described.items():
+            own.setdefault(key, stated)
+    return out
+
+
+def _described(text: str) -> Iterator[tuple[int, str, str]]:
+    """Number of a tool, words about it, and the comment that they stand in, the surest first."""
+    for line in text.splitlines():
+        for comment in _comments_of(line):
+            if (found := _OFFSETS.match(comment)) is not None:
+                yield int(found[1]), found[2], comment
+            elif (found := _NUMBERED.match(comment)) is not None and _describes(found["rest"], sure=True):
+                rest = without_offsets(comment.upper())
+                shorter = _NUMBERED.match(rest)
+                words = found["rest"] if shorter is None else shorter["rest"]
+                yield int(found["tool"] or found["post"]), words, comment
+    for number, comment in _at_changes(text):
+        yield number, comment, comment
+    for hit in _TOOL_DEF.finditer(text):
+        if _describes(hit[1]):
+            yield int(hit[2]), hit[1], hit[1]
+
+
+def _comments_of(line: str) -> list[str]:
+    return [hit[1] if hit[1] is not None else hit[2] for hit in COMMENT.finditer(line)]
+
+
+def _at_changes(text: str) -> Iterator[tuple[int, str]]:
+    """Tool numbers with the comments that describe the tool: on the line of its change, just above it, or below it and
+    before any motion.
+    """
+    above: list[str] = []
+    chosen = waiting = 0
+    for line in text.splitlines():
+        words = COMMENT.sub(" ", line)
+        if found := _TOOL_WORD.search(words):
+            chosen = int(found[1])
+        comments = [c for c in _comments_of(line) if not _names_another(c, chosen)]
+        if _CHANGE.search(words) and chosen:
+            near = [c for c in (*comments, *reversed(above)) if _describes(c) and not _names_another(c, chosen)]
+            for k, comment in enumerate(near):
+                if k == 0 or _OWN_LINE.match(comment):
+                    yield chosen, comment.strip()
+            above, waiting = [], 0 if near else chosen
+        elif _MOTION.search(words):
+            above, waiting = [], 0
+        else:
+            below = [c for c in comments if waiting and _describes(c)]
+            if below:
+                yield waiting, below[0].strip()
+                waiting = 0
+            above = [*above, *(_comments_of(line) or [""])][-ABOVE:]
+
+
+def _names_another(comment: str, number: int) -> bool:
+    """Whether a comment is about a tool of another number."""
+    found = _NUMBERED.match(comment)
+    return found is not None and number > 0 and int(found["tool"] or found["post"]) != number
+
+
+def _describes(comment: str, sure: bool = False) -> bool:
+    """Whether a comment describes a tool: by its kind and a size, or by either where it names the tool."""
+    if _CUT_VIEWER.match(comment):
+        return True
+    kind = kind_of(comment) is not None
+    if sure or _OWN_LINE.match(comment):
+        return kind or names_diameter(comment)
+    return kind and "diameter_mm" in describe_tool(comment, 1.0)
+
+
+def _statement(comment: str, mm: float, whole: str) -> Stated:
+    """What words about a tool state; ``whole`` is the comment with them."""
+    where = f"the comment ({' '.join(whole.split())[:60]})"
+    if (found := _CUT_VIEWER.match(comment)) is None:
+        return describe_tool(comment, mm, where) | {"name": (_name(comment, whole), where)}
+    try:
+        numbers = [float(part) for part in found[2].split(",")]
+    except ValueError:
+        return {}
+    if not numbers or numbers[0] <= 0.0:
+        return {}
+    d, second = numbers[0] * mm, numbers[1] if len(numbers) > 1 else 0.0
+    kind = "DRILL" if found[1].upper() == "DRILL" else "MILL"
+    out = describe_tool(kind, mm, where) | {"diameter_mm": (d, where), "name": (comment.strip(), where)}
+    if kind == "DRILL" and 0.0 < second < 180.0:
+        out["bottom_deg"] = (90.0 - 0.5 * second, where)
+    elif kind == "MILL" and 0.0 < second * mm <= 0.5 * d:
+        out["corner_radius_mm"] = (second * mm, where)
+    return out
+
+
+def _name(words: str, comment: str) -> str:
+    """The words of a comment that name the tool, as they stand there: of parts between signs the one with its kind.
+
+    >>> _name("D=10. CR=0. - ZMIN=-5. - FLAT END MILL", "T1 D=10. CR=0. - ZMIN=-5. - flat end mill")
+    'flat end mill'
+    """
+    plain = re.sub(r"^(?:[-:=|,\s]|\.(?![0-9]))*", "", " ".join(words.split()))
+    parts = [part.strip() for part in re.split(r"\|| - ", plain) if part.strip()]
+    named = [part for part in parts if "=" not in part and kind_of(part) is not None]
+    name = named[0] if len(parts) > 1 and named else plain
+    at = " ".join(comment.split()).upper().find(name.upper())
+    return name if at < 0 else " ".join(comment.split())[at : at + len(name)]

@@ -1,0 +1,149 @@
+"""Tools by the comments of posts: kind and numbers. Oracle: comments read by a person; tables of ASME and ISO."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from chipload.jobs.drafts.comments import read_header
+from chipload.jobs.drafts.tool_sizes import drill_size, thread_size
+from command import call
+
+IN = 25.4
+#: text, unit, kind, and the keys that it states besides name and modulus
+POSTS = [
+    # Fusion 360 and HSMWorks: Haas, Fanuc, Sinumerik, Heidenhain, GRBL
+    ("(T1 D=10. CR=0.5 - ZMIN=-5. - BULLNOSE END MILL)", 1.0, "bull nose", {"d": 10.0, "r": 0.5}),
+    ("(T4 D=4.2 CR=0. TAPER=118DEG - ZMIN=-17.2 - DRILL)", 1.0, "drill", {"d": 4.2, "bottom": 31.0}),
+    ("(T5 D=0.25 CR=0. - ZMIN=-0.6 - RIGHT HAND TAP)", IN, "tap", {"d": 6.35}),
+    ("(T9 D=10. CR=0. TAPER=45DEG - ZMIN=-1. - CHAMFER MILL)", 1.0, "chamfer mill", {"d": 10.0, "bottom": 45.0}),
+    ("(T9 D=6. CR=0. TAPER=90DEG - ZMIN=-1. - COUNTER SINK)", 1.0, "countersink", {"d": 6.0, "bottom": 45.0}),
+    ("(T1 D=2. CR=0. - ZMIN=0. - FACE MILL)", IN, "face mill", {"d": 50.8}),
+    ("(T12 D=8. CR=4. - ZMIN=-3. - BALL END MILL)", 1.0, "ball nose", {"d": 8.0, "r": 4.0}),
+    ("; T2 D=8 CR=0 - ZMIN=-24 - flat end mill", 1.0, "end mill", {"d": 8.0}),
+    (";  #7 D=6 TAPER=118deg - ZMIN=-9 - ZMAX=+12 - drill", 1.0, "drill", {"d": 6.0, "bottom": 31.0}),
+    ("( Tool 2: Flat End Mill 2 Flutes, Diam = 4mm, Len = 12.00mm)", 1.0, "end mill", {"d": 4.0, "flutes": 2}),
+    # Mastercam, new and old
+    ("(T4|3/8 FLAT ENDMILL|H4|D4|WEAR COMP|TOOL DIA. - .375)", IN, "end mill", {"d": 9.525}),
+    ("(TOOL - 4 DIA. OFF. - 5 LEN. - 6 DIA. - .375)", IN, None, {"d": 9.525}),
+    ("(T7 | NO. 7 DRILL | H7 )", IN, "drill", {"d": 5.1054}),
+    ("(T8 | 1/4-20 TAPRH | H8 )", IN, "tap", {"d": 6.35, "pitch": 1.27}),
+    ("(T3 | 3/8 BULL ENDMILL 0.0625 RAD | H3)", IN, "bull nose", {"d": 9.525, "r": 1.5875}),
+    ("(T6 | 1/4 SPOTDRILL | H6 )", IN, "spot drill", {"d": 6.35}),
+    ("(T2 | 1/2 CHAMFER MILL | H2)", IN, "chamfer mill", {"d": 12.7}),
+    # SolidWorks CAM, CAMWorks
+    ("T1 M6 (DIA-0.3750 3/8 ENDMILL)", IN, "end mill", {"d": 9.525}),
+    ("T1 M6 (3/8 EM CRB 4FL 1.25 LOC)", IN, "end mill", {"d": 9.525, "flutes": 4, "flute": 31.75}),
+    ("(T05  1/2 X 90DEG  CRB SPOT DRILL)", IN, "spot drill", {"d": 12.7, "bottom": 45.0}),
+    ("T5 M6 (#7 (0.201) JOBBER DRILL)", IN, "drill", {"d": 5.1054}),
+    ('T1 M6 (2.5" SHOULDER TYPE FACE MILL)', 1.0, "face mill", {"d": 63.5}),
+    ("T7 M6 (M8X1.25 TAP)", 1.0, "tap", {"d": 8.0, "pitch": 1.25}),
+    # FeatureCAM, Esprit, NX, hyperMILL, BobCAD, Edgecam
+    ("(TOOL #3 - 0.2500 DIA ENDMILL)", IN, "end mill", {"d": 6.35}),
+    ("(TOOL 5 : EM 0.5 R.03)", IN, "end mill", {"d": 12.7, "r": 0.762}),
+    ("(TOOL NAME : EM12R1)\nT1 M6", 1.0, "end mill", {"d": 12.0, "r": 1.0}),
+    ("(TOOL NAME : D16R0.8)\nT1 M6", 1.0, None, {"d": 16.0, "r": 0.8}),
+    ("; T12 | NAME / DM=8 CR=0.5 TL=142", 1.0, None, {"d": 8.0, "r": 0.5}),
+    ("(TOOL #1 0.5  1/2 FLAT ROUGH - STANDARD)", IN, "end mill", {"d": 12.7}),
+    ("(TOOL NO. 1 - 10MM SLOT DRILL)", 1.0, "end mill", {"d": 10.0}),
+    # Vectric, FreeCAD, Carbide, PathPilot
+    ("N120T1M06\n( V-Bit {90 deg 32mm})", 1.0, "chamfer mill", {"d": 32.0, "bottom": 45.0}),
+    ('(T1= End Mill {0.25"})', 1.0, "end mill", {"d": 6.35}),
+    ("(TC: 5mm Drill)\nM6 T2", 1.0, "drill", {"d": 5.0}),
+    ("(TOOL/MILL,6.35, 0.50, 0.00, 0.00)\nT2 M6", 1.0, "end mill", {"d": 6.35, "r": 0.5}),
+    ("(TOOL/DRILL,5., 118., 40.)\nT2 M6", 1.0, "drill", {"d": 5.0, "bottom": 31.0}),
+    ("( T5 : .250 DIA 4 FLUTE ENDMILL )", IN, "end mill", {"d": 6.35, "flutes": 4}),
+    ("(Tool Number = 3)\n(Tool Diameter = 0.2500)\n(Tool Description: 1/4 Drill)\nT3 M6", IN, "drill", {"d": 6.35}),
+    # by hand
+    ('(T7 = 1/4" DRILL)', 1.0, "drill", {"d": 6.35}),
+    ("(T22 .238 B DRILL)", IN, "drill", {"d": 6.0452}),
+    ("(T1 .5 ENDMILL)", IN, "end mill", {"d": 12.7}),
+    ("(T3 R3 BALL NOSE D6)", 1.0, "ball nose", {"d": 6.0, "r": 3.0}),
+    ("(T6 1/2 REAMER)", IN, "reamer", {"d": 12.7}),
+    ("(T9 PROBE)", 1.0, "probe", {}),
+    ("(T4 1-1/2 SHELL MILL 5 FLUTE)", IN, "face mill", {"d": 38.1, "flutes": 5}),
+    ("(T3 8.5 DRILL 135DEG)", 1.0, "drill", {"d": 8.5, "bottom": 22.5}),
+    ("(T3 M6 TAP DRILL 5.0)", 1.0, "drill", {"d": 5.0}),
+    ('T="DRILL_8.5"', 1.0, "drill", {"guess": 8.5}),
+]  # fmt: skip
+KEYS = {
+    "d": "diameter_mm", "r": "corner_radius_mm", "bottom": "bottom_deg", "flutes": "flutes", "flute": "flute_length_mm",
+    "pitch": "thread_pitch_mm", "guess": "number_mm",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "mm", "kind", "stated"), POSTS, ids=[text.split("\n")[0] for text, *_ in POSTS])
+def test_a_comment_of_a_post(text: str, mm: float, kind: str | None, stated: dict[str, float]) -> None:
+    (tool,) = read_header(text, mm=mm).cutters.values()
+    assert (tool["kind"][0].value if "kind" in tool else None) == kind
+    numbers = {key: tool[long][0] for key, long in KEYS.items() if long in tool}
+    assert numbers == {key: pytest.approx(value) for key, value in stated.items()}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "(T1 IS 5 MM ABOVE THE PART)\n",
+        "(DRILL 4 HOLES)\nG0 X1\nT3 M6",
+        "(G21 G90)",
+        "(OP 10 SIDE 2)\nT1 M6",
+        "(T100)",
+        "(Tool: 6 mm high)",
+    ],
+)
+def test_comments_that_describe_no_tool(text: str) -> None:
+    assert not [own for own in read_header(text).cutters.values() if "diameter_mm" in own]
+
+
+def test_sizes_by_name() -> None:
+    """Ends of the tables of ASME B94.11M, and threads whose pitch is one inch over the number."""
+    assert [round(drill_size(f"#{n} DRILL") / IN, 4) for n in (1, 29, 80)] == [0.228, 0.136, 0.0135]
+    assert [round(drill_size(f"{c} DRILL") / IN, 3) for c in "AFZ"] == [0.234, 0.257, 0.413]
+    assert thread_size("10-24") == pytest.approx((0.19 * IN, IN / 24))
+    assert thread_size("M10X1.25") == (10.0, 1.25)
+    assert thread_size("OP 20-30 NOTHING 99") is None or thread_size("2000-13") is None
+
+
+#: an end mill and a tap without comments, a drill by its motions, a face mill by its comment
+PROGRAM = """%
+O1 (PLATE)
+(T3 | 50. FACE MILL | H3)
+G21 G90 G94 G17 G54
+T1 M6
+S3000 M3
+G0 X0. Y0.
+G43 H1 Z5.
+G81 X5. Y5. Z-9. R2. F200.
+G80
+T2 M6
+S500 M3
+G43 H2 Z5.
+G84 X5. Y5. Z-8. R2. F500.
+G80
+T3 M6
+S1000 M3
+G0 X-40. Y0.
+G43 H3 Z5.
+G1 Z-1. F200.
+X40. F400.
+G0 Z50.
+M30
+%
+"""
+
+
+def test_tools_without_a_comment_by_their_motions(tmp_path: Path) -> None:
+    """A tap of 1 mm pitch has F500 at S500, the coarse thread of 6 mm; a face mill has low inserts."""
+    (tmp_path / "plate.nc").write_text(PROGRAM)
+    _, _, error = call("init", tmp_path / "plate.nc", tmp_path / "job")
+    assert not error
+    drill, tap, face = tomllib.loads((tmp_path / "job" / "job.toml").read_text())["cutter"]
+    assert (drill["name"], drill["bottom_deg"], drill["flutes"]) == ("drill", 31.0, 2)
+    assert (tap["name"], tap["thread_pitch_mm"]) == ("tap", 1.0)
+    # the minor diameter of M6: 6 - 1.0825 P
+    assert tap["body_mm"][0][0] == pytest.approx(0.5 * (6.0 - 1.0825), abs=1e-3)
+    assert (face["diameter_mm"], face["flute_length_mm"], face["flutes"]) == (50.0, 10.0, 4)
+    code, out, error = call("check", tmp_path / "job" / "job.toml")
+    assert code in (0, 3), out + error
