@@ -84,6 +84,7 @@ def test_version_and_unknown_names():
         ("import chipload", "numpy pydantic plotly OCP nicegui trimesh numba scipy"),
         ("from chipload import plan_contour, run_job, read_machine", "numpy pydantic plotly OCP nicegui trimesh numba"),
         ("from chipload import simulate", "plotly OCP nicegui ezdxf pandas matplotlib"),
+        ("from chipload import tooth_forces, undeformed_chip, fit", "plotly OCP nicegui trimesh ezdxf pandas shapely"),
         ("from chipload import Cutter, Material, Machine", "plotly OCP nicegui trimesh numba"),
     ],
 )

@@ -12,9 +12,20 @@ if TYPE_CHECKING:
     from chipload.api.contours import FlatStock, plan_contour, plan_pocket
     from chipload.api.jobs import check_job, load_result, run_job, write_result
     from chipload.api.loads import fit_coefficients, hold_torque, optimise_feeds
+    from chipload.api.mechanics.bodies import ClampedPart, NaturalModes, Plate, compliance, modes
     from chipload.api.mechanics.chip import UndeformedChip, undeformed_chip
     from chipload.api.mechanics.cut import CutEngagement, engagement_of_cut
+    from chipload.api.mechanics.fit import fit, measured_cut
     from chipload.api.mechanics.forces import TurnForces, tooth_forces
+    from chipload.api.mechanics.stability import (
+        LocationErrors,
+        SpeedMargins,
+        StabilityLobes,
+        stability_chart,
+        stability_margin,
+        surface_location_error,
+    )
+    from chipload.api.mechanics.wall import WallErrors, wall_form_error
     from chipload.api.planning import plan_impeller, plan_thin_wall
     from chipload.api.reading import read_machine, read_material, read_program
     from chipload.api.simulation import simulate
@@ -25,7 +36,9 @@ if TYPE_CHECKING:
     from chipload.checking.stiffness import MachineStiffness
     from chipload.checking.workpiece import FinishedPart, Fixture, Stock
     from chipload.cutter.table import CutterTable as Cutter
+    from chipload.cutting.fit import Fit
     from chipload.cutting.material import Material
+    from chipload.cutting.turns import MeasuredCut
     from chipload.errors import Finding, InputError
     from chipload.geometry.contour import Contour
     from chipload.geometry.dxf import read_dxf
@@ -44,39 +57,52 @@ if TYPE_CHECKING:
 __all__ = [
     "COLUMNS",
     "CheckSettings",
+    "ClampedPart",
     "Contour",
     "ContourLimits",
     "CutEngagement",
     "Cutter",
     "Finding",
     "FinishedPart",
+    "Fit",
     "Fixture",
     "FlatStock",
     "History",
     "InputError",
     "LimitCheck",
     "Limits",
+    "LocationErrors",
     "Machine",
     "MachineStiffness",
     "Material",
+    "MeasuredCut",
     "Mode",
+    "NaturalModes",
     "Operation",
+    "Plate",
     "Program",
     "Result",
     "SimulationSettings",
+    "SpeedMargins",
+    "StabilityLobes",
     "Stock",
     "Track",
     "TurnForces",
     "UndeformedChip",
     "Verdict",
     "Vibration",
+    "WallErrors",
     "Workpiece",
     "WorkpieceClamp",
     "check_job",
+    "compliance",
     "engagement_of_cut",
+    "fit",
     "fit_coefficients",
     "hold_torque",
     "load_result",
+    "measured_cut",
+    "modes",
     "optimise_feeds",
     "plan_contour",
     "plan_impeller",
@@ -88,8 +114,12 @@ __all__ = [
     "read_program",
     "run_job",
     "simulate",
+    "stability_chart",
+    "stability_margin",
+    "surface_location_error",
     "tooth_forces",
     "undeformed_chip",
+    "wall_form_error",
     "write_result",
 ]
 
@@ -97,32 +127,41 @@ __all__ = [
 _PLACES = {
     "COLUMNS": ("chipload.result.columns", "COLUMNS"),
     "CheckSettings": ("chipload.checking.settings", "CheckSettings"),
+    "ClampedPart": ("chipload.api.mechanics.bodies", "ClampedPart"),
     "Contour": ("chipload.geometry.contour", "Contour"),
     "ContourLimits": ("chipload.jobs.contour.tables", "ContourLimitsTable"),
     "CutEngagement": ("chipload.api.mechanics.cut", "CutEngagement"),
     "Cutter": ("chipload.cutter.table", "CutterTable"),
     "Finding": ("chipload.errors", "Finding"),
     "FinishedPart": ("chipload.checking.workpiece", "FinishedPart"),
+    "Fit": ("chipload.cutting.fit", "Fit"),
     "Fixture": ("chipload.checking.workpiece", "Fixture"),
     "FlatStock": ("chipload.api.contours", "FlatStock"),
     "History": ("chipload.checking.history", "History"),
     "InputError": ("chipload.errors", "InputError"),
     "LimitCheck": ("chipload.result.limits", "LimitCheck"),
     "Limits": ("chipload.checking.settings", "Limits"),
+    "LocationErrors": ("chipload.api.mechanics.stability", "LocationErrors"),
     "Machine": ("chipload.machine.machine", "Machine"),
     "MachineStiffness": ("chipload.checking.stiffness", "MachineStiffness"),
     "Material": ("chipload.cutting.material", "Material"),
+    "MeasuredCut": ("chipload.cutting.turns", "MeasuredCut"),
     "Mode": ("chipload.checking.dynamics", "Mode"),
+    "NaturalModes": ("chipload.api.mechanics.bodies", "NaturalModes"),
     "Operation": ("chipload.jobs.contour.tables", "OperationTable"),
+    "Plate": ("chipload.api.mechanics.bodies", "Plate"),
     "Program": ("chipload.program.program", "Program"),
     "Result": ("chipload.result.result", "Result"),
     "SimulationSettings": ("chipload.checking.settings", "SimulationSettings"),
+    "SpeedMargins": ("chipload.api.mechanics.stability", "SpeedMargins"),
+    "StabilityLobes": ("chipload.api.mechanics.stability", "StabilityLobes"),
     "Stock": ("chipload.checking.workpiece", "Stock"),
     "Track": ("chipload.result.track", "Track"),
     "TurnForces": ("chipload.api.mechanics.forces", "TurnForces"),
     "UndeformedChip": ("chipload.api.mechanics.chip", "UndeformedChip"),
     "Verdict": ("chipload.result.verdict", "Verdict"),
     "Vibration": ("chipload.checking.dynamics", "Vibration"),
+    "WallErrors": ("chipload.api.mechanics.wall", "WallErrors"),
     "Workpiece": ("chipload.checking.clamped", "Workpiece"),
     "WorkpieceClamp": ("chipload.checking.clamped", "WorkpieceClamp"),
     "read_dxf": ("chipload.geometry.dxf", "read_dxf"),
@@ -135,9 +174,13 @@ _FUNCTIONS = {
         "jobs": "check_job load_result run_job write_result",
         "loads": "fit_coefficients hold_torque optimise_feeds",
         "contours": "plan_contour plan_pocket",
+        "mechanics.bodies": "compliance modes",
+        "mechanics.wall": "wall_form_error",
         "mechanics.chip": "undeformed_chip",
         "mechanics.cut": "engagement_of_cut",
+        "mechanics.fit": "fit measured_cut",
         "mechanics.forces": "tooth_forces",
+        "mechanics.stability": "stability_chart stability_margin surface_location_error",
         "planning": "plan_impeller plan_thin_wall",
         "reading": "read_machine read_material read_program",
         "simulation": "simulate",
