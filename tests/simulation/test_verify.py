@@ -306,3 +306,40 @@ def test_the_edge_of_the_stock_is_displaced_too():
     thin = math.degrees(math.acos(1.0 - 5e-7 / R))
     assert check(0.0, 5e-7) == check(thin, 5e-7) == "proved"
     assert check(0.1, 5e-7) == check(0.0, 1e-4) == "failed"
+
+
+@pytest.mark.parametrize("aside", [0.5, 0.003, 0.0006])
+@pytest.mark.parametrize("angle", [0.0, 20.0, 36.87])
+def test_a_place_that_the_cutter_comes_back_to(aside, angle):
+    """A pass of radial depth 1 mm stops, goes back by ``aside`` and comes 2 nm beyond its end: the rim lies on the edge
+    that it has just cut, and its engagement is anything from nothing to acos(1 - 1 / 5) = 36.87 deg.
+    """
+    p = program(
+        [
+            (RAPID, -20, 1, SAFE, 0, 0),
+            (LINE, -20, 1, Z, 0, 0),
+            (LINE, 30, 1, Z, 0, 0),
+            (LINE, 30, 1, SAFE, 0, 0),
+            (RAPID, -20, 0, SAFE, 0, 0),
+            (LINE, -20, 0, Z, 0, 0),
+            (LINE, 0, 0, Z, 0, 0),
+            (LINE, -aside, 0, Z, 0, 0),
+            (LINE, 2e-9, 0, Z, 0, 0),
+            (LINE, 10, 0, Z, 0, 0),
+        ]
+    )
+
+    def check(planned, end=36.87):
+        rows = {
+            "x_mm": np.array([-10.0, 0.0, -aside, 2e-9, 5.0]),
+            "y_mm": np.zeros(5),
+            "z_mm": np.full(5, Z),
+            "engagement_deg": np.array([36.87, 36.87, 0.0, planned, end]),
+            "pass": np.full(5, "pocket", dtype=object),
+        }
+        return verify(p, rows, stock=None, wall=[], engagement_tolerance_deg=0.5)
+
+    assert check(angle).verdict == "proved"
+    for wrong in (check(37.5), check(angle, 36.2)):
+        assert wrong.verdict == "failed"
+        assert wrong.engagement_difference_deg == pytest.approx(0.65, abs=0.03)

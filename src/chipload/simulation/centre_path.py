@@ -32,8 +32,10 @@ Bools = NDArray[np.bool_]
 TOUCH_MM = 1e-9
 #: what a rim is asked for is displaced by at most so much [mm]
 DISPLACED_MM = 1e-5
-#: length of path [mm] behind the cutter that moves with it
-OWN_MM = 0.01
+#: length of path [mm] behind the cutter that moves with it: a displacement by d of what was cut a length s before moves
+#: the end of the engagement by d / s [rad], 0.06 deg for 1 nm and 1 um; a cutter may come back to a place sooner than
+#: after 0.01 mm
+OWN_MM = 0.001
 #: engaged pieces of the rim that are kept with their ends; ``angle`` always counts all of them
 PIECES = 4
 #: transitions on the rim are halved down to this [rad]
