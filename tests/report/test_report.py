@@ -26,6 +26,7 @@ from chipload.jobs.contour.scene import scene_bytes
 from chipload.planning.result import Event, StrategyResult
 from chipload.report.folder import write_result
 from chipload.report.page import limits_table, page_bytes
+from chipload.report.presentation import Presentation
 from chipload.report.shape import slab, stretches
 from chipload.result import Verdict
 from chipload.result.history import write_history
@@ -251,19 +252,33 @@ def test_the_page_states_the_verdict_before_all_else(outcome: Maker) -> None:
     order = [
         "<b>exceeds</b>",
         "engagement 18.74 deg exceeds 13 deg",
-        "<h2>Limits",
-        "<h2>Strategies",
-        "<h2>Operation 0",
+        "<h2>Not checked",
+        "<details open><summary><h2>Limits",
+        "<details><summary><h2>Strategies",
+        "<details><summary><h2>Operation 0",
         "Along the finish pass",
         "Plan view",
-        "<h2>Findings",
-        "<h2>Not checked",
-        "<h2>Provenance",
+        "<details><summary><h2>Notes",
+        "<details><summary><h2>Provenance",
     ]
     places = [body.index(x) for x in order]
     assert places == sorted(places)
     assert "limit torque_nm: not stated" in body
     assert "operation.0.x: a finding" in body
+
+
+def test_what_holds_is_folded_and_what_does_not_comes_first(outcome: Maker) -> None:
+    result = result_of(outcome("plain"))
+    presentation = Presentation(lambda _: ["<h2>More</h2><p>a picture</p>"], lambda: b"")
+    findings = (Finding("a", 3, "not known", Severity.UNPROVEN), Finding("b", 0, "a remark"))
+    html = page_bytes(replace(result, findings=findings), presentation).decode()
+    main = html[html.index("<main>") : html.index("</main>")]
+    shown = re.sub(r"<details>.*?</details>", "", main, flags=re.S)
+    assert "not known" in shown
+    assert "a remark" in main
+    for folded in ("a remark", "a picture", "<h2>Strategies", "<h2>Provenance"):
+        assert folded not in shown, folded
+    assert re.findall(r"<details>.*?<h2>(.*?)</h2>", main) == ["Strategies", "More", "Notes", "Provenance"]
 
 
 def test_limits_of_many_tracks_are_folded(outcome: Maker) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import struct
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +30,7 @@ from chipload.web.checks import bound_of, findings, limits, row_of
 from chipload.web.cutters import UNKNOWN, cutters_of
 from chipload.web.folder_access import find_by_hash, list_folder, open_path, resolve_name
 from chipload.web.page import target_in
-from chipload.web.panels.limits import finding_list, limit_table
+from chipload.web.panels.limits import finding_list, limit_table, time_line
 from chipload.web.result import TextColumn, open_result
 from chipload.web.source import followed, source_of
 from square import CL, FORCE, LINE, PROGRAM, ROWS, X, Y, make_result, square_result, two_variants, write_by_hand
@@ -321,6 +322,16 @@ def test_a_scene_that_cannot_be_read_is_said(root: Path) -> None:
     assert scene.bodies(open_result(root, "r")) == ((), "scene.glb cannot be read: only the path is shown.")
     (root / "r" / "scene.glb").unlink()
     assert scene.bodies(open_result(root, "r"))[1] == "This result has no scene; only its path is shown."
+
+
+def test_the_page_states_times_that_add_up(root: Path) -> None:
+    """The parts that the page shows add up to the time of the program, as in summary.json."""
+    model = json.loads((root / "r" / "summary.json").read_text())["tracks"][0]
+    text = re.sub("<[^>]*>", "", time_line(open_result(root, "r").tracks[0].times))
+    whole, *parts = (float(n) for n in re.findall(r"[\d.]+(?:e-?\d+)?", text))
+    assert whole == pytest.approx(model["time_s"], rel=1e-3)
+    assert len(parts) == 5
+    assert sum(parts) == pytest.approx(whole, rel=1e-3)
 
 
 def test_texts_are_escaped(root: Path) -> None:

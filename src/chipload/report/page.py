@@ -1,7 +1,8 @@
 """report.html: one layout for every capability.
 
-The verdict and its message come first, then the limits, the tracks, the sections of the capability, findings, what was
-not checked, and where the numbers come from.
+The verdict and its message come first, then what exceeds or is not proven, and what was not checked. The rest is
+folded: the limits (open where one does not hold), the tracks, the view in space (open), the sections of the capability,
+notes, and where the numbers come from.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import plotly.graph_objects as go
 
 from chipload.errors import Finding, Severity
 from chipload.report.presentation import Presentation
-from chipload.report.sheet import definitions, framed, heading, items, table
+from chipload.report.sheet import definitions, folded, framed, heading, items, table
 from chipload.report.view import viewer_script
 from chipload.report.view_section import DATA, VIEW
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
@@ -42,19 +43,24 @@ HEADINGS = {
 def page_bytes(result: Result, presentation: Presentation, view: Sequence[str] = ()) -> bytes:
     """report.html; ``view``: HTML of the 3D view, empty: it has none."""
     figures: dict[str, go.Figure] = {}
-    verdict = result.verdict
-    body = [
-        *heading(result.title, BANNERS[verdict], verdict.value, result.first_lines),
+    verdict, findings = result.verdict, _findings(result)
+    unheld = any(c.state is not Verdict.HOLDS for track in result.tracks if track.in_use for c in track.limits)
+    sections = [
         "<h2>Limits</h2>",
         *limits_table(result.tracks),
         *tracks_table(result.tracks),
         *view,
         *presentation.sections(figures),
-        *findings_table("Findings", _findings(result)),
-        "<h2>Not checked</h2>",
-        items(result.unchecked) if result.unchecked else "<p>Every limit and check is stated.</p>",
+        *findings_table("Notes", tuple(f for f in findings if f.severity is Severity.NOTE)),
         "<h2>Provenance</h2>",
         definitions(asdict(result.provenance)),
+    ]
+    body = [
+        *heading(result.title, BANNERS[verdict], verdict.value, result.first_lines),
+        *findings_table("Findings", tuple(f for f in findings if f.severity is not Severity.NOTE)),
+        "<h2>Not checked</h2>",
+        items(result.unchecked) if result.unchecked else "<p>Every limit and check is stated.</p>",
+        *folded(sections, ["In space", *(["Limits"] if unheld else [])]),
     ]
     shown = (VIEW, DATA, viewer_script()) if view else None
     return framed(result.title, verdict.value, body, figures, shown)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import lru_cache
 from html import escape
 from typing import Any
@@ -23,6 +24,8 @@ main { max-width: 1180px; margin: 0 auto; padding: 24px 32px 48px; background: v
 h1 { font-size: 15px; font-weight: 600; color: var(--soft); margin: 0 0 12px; }
 h2 { font-size: 18px; margin: 36px 0 8px; padding-top: 14px; border-top: 1px solid var(--line); }
 h3 { font-size: 14px; margin: 22px 0 4px; }
+details { border-top: 1px solid var(--line); margin-top: 14px; padding-top: 10px; }
+summary { cursor: pointer; } summary h2 { display: inline; border: 0; margin: 0; padding: 0; }
 p { margin: 4px 0 8px; max-width: 92ch; }
 .verdict { border-left: 6px solid; padding: 12px 18px; font-size: 17px; line-height: 1.45; margin: 0 0 16px; }
 .verdict b { display: block; font-size: 21px; }
@@ -62,7 +65,8 @@ async function library(id) {
   document.head.append(script);
 }
 """
-#: runs in the page: each figure is drawn when it comes near the window, and all of them before printing
+#: runs in the page: each figure is drawn when it comes near the window; before printing all of them are, and every
+#: folded section is opened
 _DRAW = """
 const figures = JSON.parse(document.getElementById("figures").textContent);
 const config = {displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"]};
@@ -75,7 +79,10 @@ function draw(id) {
 const seen = new IntersectionObserver(list => list.forEach(e => { if (e.isIntersecting) draw(e.target.id); }),
   {rootMargin: "800px"});
 Object.keys(figures).forEach(id => seen.observe(document.getElementById(id)));
-addEventListener("beforeprint", () => Object.keys(figures).forEach(draw));
+addEventListener("beforeprint", () => {
+  document.querySelectorAll("details").forEach(e => { e.open = true; });
+  Object.keys(figures).forEach(draw);
+});
 """
 
 
@@ -144,6 +151,20 @@ def figure(name: str, drawn: go.Figure, figures: dict[str, go.Figure]) -> str:
     """The place of a figure, which is put among ``figures``."""
     figures[name] = drawn
     return f'<div class="figure" id="{name}" style="height:{drawn.layout.height}px"></div>'
+
+
+def folded(body: Sequence[str], opened: Collection[str] = ()) -> list[str]:
+    """Each section of a body, from its <h2> to the next, folded under its heading; those in ``opened`` are open.
+
+    >>> folded(["<h2>Limits</h2>", "<p>none</p>"])
+    ['<details><summary><h2>Limits</h2></summary><p>none</p></details>']
+    """
+    before, *sections = re.split(r"<h2>(.*?)</h2>", "\n".join(body), flags=re.S)
+    out = [before] if before.strip() else []
+    for name, content in zip(sections[::2], sections[1::2], strict=True):
+        state = " open" if name in opened else ""
+        out.append(f"<details{state}><summary><h2>{name}</h2></summary>{content.strip()}</details>")
+    return out
 
 
 def table(

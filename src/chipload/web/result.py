@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.result import Result, Track, load_result, read_summary
 from chipload.result.load import HISTORY
+from chipload.result.summary import TimesModel
+from chipload.result.times import Times
 from chipload.web.folder_access import resolve_name
 
 Floats = NDArray[np.float64]
@@ -55,6 +57,7 @@ class PageTrack:
     axis : (n, 3) from the tip to the spindle
     line, tool : (n,), of the source and of the machine; None where the history has no such column
     apart : (n,) whether the path does not continue from the row before
+    times : the time of its program by what the machine does; None: not known
     """
 
     own: Track
@@ -67,6 +70,7 @@ class PageTrack:
     line: Ints | None
     tool: Ints | None
     apart: NDArray[np.bool_]
+    times: Times | None = None
 
     def __len__(self) -> int:
         return len(self.t)
@@ -138,7 +142,8 @@ def open_result(root: Path, name: str) -> PageResult:
         It is no result, or its history cannot be read.
     """
     folder = resolve_name(root, name)
-    rows = {track.name: track.rows for track in read_summary(folder).tracks}
+    models = {track.name: track for track in read_summary(folder).tracks}
+    rows = {name: model.rows for name, model in models.items()}
     result = load_result(folder)
     path = resolve_name(root, f"{name}/{HISTORY}")
     try:
@@ -159,7 +164,7 @@ def open_result(root: Path, name: str) -> PageResult:
     tracks, first = [], 0
     for track in result.tracks:
         if rows[track.name]:
-            tracks.append(_track(table, track, first, rows[track.name]))
+            tracks.append(_track(table, track, first, rows[track.name], models[track.name].times))
         first += rows[track.name]
     tracks.sort(key=lambda track: not track.own.in_use)
     return PageResult(name, root, result, drawn, tuple(tracks), table.num_rows)
@@ -190,7 +195,7 @@ def _column(table: Any, name: str) -> Floats | TextColumn:
     return TextColumn(coded.indices.cast(pa.int64()).fill_null(-1).to_numpy(zero_copy_only=False), words)
 
 
-def _track(table: Any, own: Track, first: int, count: int) -> PageTrack:
+def _track(table: Any, own: Track, first: int, count: int, times: TimesModel | None) -> PageTrack:
     have, rows = table.column_names, slice(first, first + count)
 
     def column(name: str) -> Floats:
@@ -219,6 +224,7 @@ def _track(table: Any, own: Track, first: int, count: int) -> PageTrack:
         _whole(table, "line")[rows] if "line" in have else None,
         _whole(table, "tool")[rows] if "tool" in have else None,
         apart & (np.arange(count) > 0),
+        None if times is None else Times(times.cut_s, times.air_s, times.rapid_s, times.dwell_s, times.other_s),
     )
 
 

@@ -11,6 +11,7 @@ from nicegui import ui
 from chipload.errors import Severity
 from chipload.result import Verdict
 from chipload.result.number_text import number_text
+from chipload.result.times import Times
 from chipload.web.checks import PageFinding, findings, limits, row_of
 from chipload.web.result import PageResult, PageTrack
 
@@ -37,7 +38,7 @@ class LimitPanel:
 
     def open(self, result: PageResult, track: PageTrack) -> None:
         """Show a track."""
-        self.html.set_content(limit_table(track) + finding_list(findings(result, track)))
+        self.html.set_content(limit_table(track) + time_line(track.times) + finding_list(findings(result, track)))
 
     def _clicked(self, event: Any) -> None:
         if isinstance(event.args, int) and event.args >= 0:
@@ -70,6 +71,20 @@ def limit_table(track: PageTrack) -> str:
         "<tr><th>limit</th><th class=n>worst</th><th class=n>limit</th><th>share</th><th>state</th><th>where</th></tr>"
     )
     return f'<table class="cl-limits cl-checks"><thead>{head}</thead><tbody>{"".join(out)}</tbody></table>'
+
+
+def time_line(times: Times | None) -> str:
+    """The time of a program and its parts, which add up to it, as HTML; empty: it is not known.
+
+    >>> time_line(Times(60.0, 6.5, 3.25, 0.0, 2.0))[21:]
+    'Time 71.75 s: in cut 60, in air 6.5, rapids 3.25, dwell 0, tool change, start-up and approach 2 s</div>'
+    """
+    if times is None:
+        return ""
+    parts = {"in cut": times.cut, "in air": times.air, "rapids": times.rapid, "dwell": times.dwell}
+    shown = ", ".join(f"{name} {number_text(value)}" for name, value in parts.items())
+    other = f"tool change, start-up and approach {number_text(times.other)}"
+    return f'<div class="cl-none">Time {number_text(times.whole)} s: {shown}, {other} s</div>'
 
 
 def finding_list(rows: list[PageFinding]) -> str:
