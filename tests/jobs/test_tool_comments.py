@@ -147,3 +147,46 @@ def test_tools_without_a_comment_by_their_motions(tmp_path: Path) -> None:
     assert (face["diameter_mm"], face["flute_length_mm"], face["flutes"]) == (50.0, 10.0, 4)
     code, out, error = call("check", tmp_path / "job" / "job.toml")
     assert code in (0, 3), out + error
+
+
+PECKS = """%
+O7
+(T3 D=0.25 CR=0. TAPER=90DEG - SPOT DRILL)
+(T4 D=0.201 CR=0. TAPER=118DEG - ZMIN=-0.85 - DRILL)
+G90 G94 G17 G20 G54
+T3 M6
+S5000 M3
+G0 X-1.4 Y-0.6
+G43 Z0.6 H3
+G98 G82 X-1.4 Y-0.6 Z-0.1 R0.1 P0.25 F10.
+G80
+T4 M6
+S4500 M3
+G0 X-1.4 Y-0.6
+G43 Z0.6 H4
+G98 G83 X-1.4 Y-0.6 Z-0.85 R0.1 Q0.1 F12.
+G80
+M30
+%
+"""
+
+
+@pytest.mark.slow  # 34 pecks whose chips are added to the hole of a spot drill
+def test_pecks_go_back_into_their_own_hole_in_layers(tmp_path: Path) -> None:
+    """Each peck returns in a rapid to where it has drilled: no rapid through material, as by moves."""
+    (tmp_path / "peck.nc").write_text(PECKS)
+    assert call("init", tmp_path / "peck.nc", tmp_path / "job")[0] == 0
+    job = tmp_path / "job" / "job.toml"
+    code, out, error = call(
+        "run",
+        job,
+        "--accept",
+        "--out",
+        tmp_path / "r",
+        "--set",
+        "operation.0.engine=layers",
+        "--set",
+        "stock.layer_mm=0.5",
+    )
+    assert "rapid" not in out.splitlines()[0], out + error
+    assert code in (0, 3)

@@ -67,6 +67,8 @@ from chipload.workers import Workers
 
 Floats = NDArray[np.float64]
 
+#: volume of a chip that is the rounding of its layers, whose areas are sums of products of coordinates [mm^3]
+ROUNDING_MM3 = 1e-9
 #: most steps of a simulation
 MOST_STEPS = 50_000_000
 #: blocks of steps that go together by moves
@@ -393,7 +395,8 @@ def _after(
 ) -> RunningSums:
     """Return the sums after some steps."""
     cuts = (removed[:, 0] > 0.0) & ~steps.rapid
-    lines = steps.line[steps.rapid & (removed[:, 1] > 0.0)].tolist()
+    # a chip that only takes back what the simplification of outlines had added is no material
+    lines = steps.line[steps.rapid & (removed[:, 1] > 0.0) & (removed[:, 0] > ROUNDING_MM3)].tolist()
     return replace(
         sums,
         steps=sums.steps + len(steps),
