@@ -28,9 +28,16 @@ def test_what_a_program_states_and_what_is_guessed(program: Path, tmp_path: Path
     assert job["stock"]["high_mm"] == [31.0, 16.0, 0.0]
     # the spindle of the machine bounds torque and power
     assert (job["limits"]["torque_nm"], job["limits"]["power_w"]) == (70.0, 11000.0)
-    assert "guess: cutter.0.flutes = 3: no file states them; a common number" in said
-    # what is stated is no guess
-    assert "cutter.0.diameter_mm" not in said
+    written = (tmp_path / "job" / "job.toml").read_text()
+    assert "flutes = 3                       # guess: no file states them; a common number" in written
+    # the greatest effects first, at most five; what is stated is no guess
+    asked = [line.split("?")[0] for line in said.splitlines() if line.startswith("question: ")]
+    assert asked == [
+        "question: [stock]: which block is it cut from",
+        "question: [machine]: which machine runs it",
+        "question: [material]: which material is it",
+        "question: [[cutter]]: flutes, helix_deg, flute_length_mm, overhang_mm, modulus_gpa of T3",
+    ]
 
 
 def test_a_draft_is_refused_until_confirmed(program: Path, tmp_path: Path) -> None:
@@ -76,7 +83,7 @@ def test_a_first_look_is_never_better_than_unproven(program: Path, tmp_path: Pat
     code, said, _ = call("simulate", program, "--set", "operation.0.step_mm=4", "--out", tmp_path / "out")
     assert code == 3
     lines = said.splitlines()
-    assert lines[1].startswith("guess: machine.name = ")
+    assert lines[1].startswith("question: [stock]: which block is it cut from? ")
     assert json.loads((tmp_path / "out" / "summary.json").read_bytes())["verdict"] == "unproven"
     # the same job with its guesses accepted is no worse than that, and writes nothing beside the program
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out", "slot.nc"]

@@ -90,7 +90,7 @@ def test_a_material_that_is_not_shipped_is_named(program: Path, tmp_path: Path) 
     program.write_text(FUSION.replace("STEEL 1045", ": DELRIN"))
     _, said, _ = call("init", program, tmp_path / "job")
     why = "no shipped material is like DELRIN; chipload materials lists all"
-    assert f'guess: material.name = "al7075-t6": {why}' in said
+    assert f'question: [material]: which material is it? name = "al7075-t6": {why}' in said
 
 
 def test_a_drill_has_a_point_and_two_flutes(program: Path, tmp_path: Path) -> None:

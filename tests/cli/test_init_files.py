@@ -126,7 +126,7 @@ def test_a_camotics_project(tmp_path: Path) -> None:
     (cutter,) = job["cutter"]
     assert (cutter["diameter_mm"], cutter["corner_radius_mm"], cutter["flute_length_mm"]) == (6.35, 3.175, 25.4)
     assert (job["stock"]["low_mm"], job["stock"]["high_mm"]) == ([-20.0, 0.0, -8.0], [40.0, 20.0, 0.0])
-    assert "guess: stock" not in said
+    assert "question: [stock]" not in said
 
 
 def test_a_camotics_project_whose_script_has_no_nc_text(tmp_path: Path) -> None:

@@ -76,7 +76,9 @@ def main():
     posted(operation, FOLDER / "posted.ngc")
     out["jobs"] = [o.Name for o in job_folder.jobs_of(document)]
     out["settings"] = job_folder.settings_of(job)
-    out["guesses"] = [line for line in job_folder.write_job(job, folder, command) if line.startswith("guess: ")]
+    job_folder.write_job(job, folder, command)
+    written = (folder / "job.toml").read_text().splitlines()
+    out["guesses"] = [line.split()[0] for line in written if "# guess: " in line]
     job.ChiploadSettings = ["machine.name", "# no setting"]
     out["not_a_setting"] = refused(job_folder.check, job, folder, command)
     job.ChiploadSettings = [

@@ -73,8 +73,8 @@ def init(
         show(draft.title)
         for note in draft.notes:
             show(f"found: {note}")
-        for guess in draft.guesses:
-            show(f"guess: {guess}")
+        for question in draft.questions:
+            show(f"question: {question}")
         show(f"written: {written}: {len(draft.guesses)} guesses to confirm; then chipload run {written} --out result")
         return 0
 
@@ -131,14 +131,17 @@ def simulate(
                 draft = draft_of(file, folder, machine=machine, tools=tools)
                 job = write_draft(draft, folder)
                 show(draft.title)
+                for question in draft.questions:
+                    show(f"question: {question}")
             loaded = load_job(job, sets or ())
-            for guess in loaded.guesses:
-                show(f"guess: {guess.rpartition(' (line')[0]}")
+            if written:
+                for guess in loaded.guesses:
+                    show(f"guess: {guess.rpartition(' (line')[0]}")
             with bar() as progress:
                 done = run_job(loaded, progress, guesses=Severity.UNPROVEN)
                 target = write_finished(done.result, done.presentation, out) if out is not None else None
         show_verdict(done.result, worst=True)
-        more = "" if written else f"; chipload init {file} DIR writes the job"
+        more = "" if written else f"; chipload init {file} DIR writes the job and marks {len(loaded.guesses)} guesses"
         show(f"{done.result.verdict.value}: a first result{more}")
         if target is not None:
             show(f"report: {target / 'report.html'}")

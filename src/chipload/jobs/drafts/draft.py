@@ -110,6 +110,13 @@ class Draft:
             out += [f"{name}.{e.key} = {toml(e.value)}: {e.note}" for e in table.guesses]
         return tuple(out)
 
+    @property
+    def questions(self) -> tuple[str, ...]:
+        """What the user is asked before a first verdict, see :mod:`chipload.jobs.drafts.questions`."""
+        from chipload.jobs.drafts.questions import questions
+
+        return questions(self.tables)
+
     def text(self) -> str:
         """The whole job file."""
         head = [

@@ -342,7 +342,9 @@ def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known, smal
         entries.append(Entry("dialect", chosen.dialect, "the one that leaves the fewest words unread", True))
     elif chosen.reading.recognition is not None and not chosen.reading.recognition.stated:
         found = chosen.reading.recognition
-        entries.append(Entry("control", found.control.name, ", ".join(found.reasons), True))
+        # another control that may be meant reads the text in the same way, or not
+        matters = any(f.code == "nc-control" and f.severity >= Severity.UNPROVEN for f in chosen.reading.findings)
+        entries.append(Entry("control", found.control.name, ", ".join(found.reasons), matters))
     else:
         entries.append(Entry("dialect", note="else by the ending of the file and the machine", example='"fanuc"'))
     entries += _guesses(chosen.reading)
