@@ -1,0 +1,147 @@
+"""What a shop sees the first time: each program of a folder is drafted and run as it is, with nothing stated.
+
+    python benchmarks/first_time.py FOLDER [--seconds 60] [--saving] [--drafts]
+
+For each program: read (drafted), tools whose size a comment states and that the draft has from it, questions asked,
+verdict of the job with its guesses, seconds from the file to the verdict; with ``--saving`` the times before and after
+the feeds are chosen, and the verdict of the new ones; with ``--drafts`` nothing is run. Files in folders named ``bad``
+are to be refused and left out. The last lines are the shares of all programs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+#: endings of programs
+ENDINGS = (".nc", ".ngc", ".h", ".mpf", ".apt", ".gcode", ".tap", ".cnc", ".eia", ".min", ".camotics", ".i", ".txt")
+#: words of a comment about a tool, and a number that may be its size; not the reader of the product
+_TOOL = re.compile(r"(?i)mill|drill|\btap\b|ream|\bball|fräs|bohrer|\bD=[0-9.]|\bdia\b")
+_COMMENT = re.compile(r"\(([^\n]*)\)|;([^\n]*)")
+_NUMBERED = re.compile(r"(?i)^\W{0,3}(?:T|TOOL\s*[-#:]?\s*|#)(?P<tool>[0-9]{1,4})\b(?P<rest>.*[0-9].*)$")
+FEEDS = "[operation.feeds]\nslowest_percent = 50.0\nfastest_percent = 200.0\n\n"
+
+
+@dataclass
+class Row:
+    """What came out of a program."""
+
+    name: str
+    read: bool = False
+    verdict: str = ""
+    named: int = 0
+    sized: int = 0
+    questions: int = 0
+    seconds: float = 0.0
+    saving: str = ""
+
+
+def programs(folder: Path) -> Iterator[Path]:
+    """Programs of a folder, but for those that are to be refused."""
+    for path in sorted(folder.rglob("*")):
+        if path.suffix.lower() in ENDINGS and path.is_file() and "bad" not in path.parts:
+            yield path
+
+
+def named_tools(path: Path) -> set[int]:
+    """Numbers of tools that a comment names with a size."""
+    out = set[int]()
+    for hit in _COMMENT.finditer(path.read_text(encoding="latin-1")):
+        found = _NUMBERED.match(hit[1] if hit[1] is not None else hit[2])
+        if found is not None and _TOOL.search(found["rest"]):
+            out.add(int(found["tool"]))
+    return out
+
+
+def called(words: list[str], seconds: float) -> tuple[int, str, str]:
+    """Exit code, output and errors of a command; 124: it took longer."""
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "chipload", *words], capture_output=True, text=True, timeout=max(seconds, 1.0)
+        )
+    except subprocess.TimeoutExpired:
+        return 124, "", "takes longer"
+    return done.returncode, done.stdout, done.stderr
+
+
+def first_time(path: Path, folder: Path, seconds: float, saving: bool, drafts: bool = False) -> Row:
+    """Draft and run a program."""
+    row = Row(str(path.name))
+    begun = time.monotonic()
+    code, out, error = called(["init", str(path), str(folder / "job")], seconds)
+    if code != 0:
+        row.verdict = error.strip().splitlines()[-1][:110] if error.strip() else f"exit code {code}"
+        row.seconds = time.monotonic() - begun
+        return row
+    row.read, row.questions = True, out.count("\nquestion: ")
+    text = (folder / "job" / "job.toml").read_text()
+    job = tomllib.loads(text)
+    named = named_tools(path)
+    guessed = {
+        int(part.split("number = ")[1].split()[0])
+        for part in text.split("[[cutter]]")[1:]
+        if re.search(r"^diameter_mm = .*# guess", part, re.MULTILINE)
+    }
+    own = {c["number"] for c in job.get("cutter", [])} & named
+    row.named, row.sized = len(own), len(own - guessed)
+    if drafts:
+        row.seconds = time.monotonic() - begun
+        return row
+    left = seconds - (time.monotonic() - begun)
+    code, out, error = called(["run", str(folder / "job" / "job.toml"), "--accept", "--out", str(folder / "r")], left)
+    row.seconds = time.monotonic() - begun
+    if code not in (0, 3):
+        row.verdict = "no verdict in time" if code == 124 else f"run: {error.strip()[:100]}"
+        return row
+    row.verdict = out.splitlines()[0][:110]
+    if saving:
+        (folder / "job" / "job.toml").write_text(text.replace("[limits]", f"{FEEDS}[limits]"))
+        words = ["run", str(folder / "job" / "job.toml"), "--accept", "--out", str(folder / "feeds")]
+        if called(words, seconds - row.seconds)[0] in (0, 3):
+            tracks = json.loads((folder / "feeds" / "summary.json").read_text())["tracks"]
+            if len(tracks) > 1:
+                times = [float(t["time_s"]) for t in tracks[:2]]
+                row.saving = f"{times[0]:.1f} -> {times[1]:.1f} s, {tracks[1]['verdict']}"
+    return row
+
+
+def main() -> None:
+    """Print a row for each program, then the shares."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--saving", action="store_true")
+    parser.add_argument("--drafts", action="store_true")
+    options = parser.parse_args()
+    rows = []
+    print("| program | read | tools by comment | questions | verdict | s | saving |\n|---|---|---|---:|---|---:|---|")
+    for path in programs(options.folder):
+        with tempfile.TemporaryDirectory() as above:
+            row = first_time(path, Path(above), options.seconds, options.saving, options.drafts)
+        rows.append(row)
+        tools = f"{row.sized} of {row.named}" if row.named else ""
+        verdict = row.verdict.replace("|", "/")
+        read = "yes" if row.read else "no"
+        print(
+            f"| {row.name} | {read} | {tools} | {row.questions} | {verdict} | {row.seconds:.1f} | {row.saving} |",
+            flush=True,
+        )
+    drafted = sum(row.read for row in rows)
+    verdicts = sum(row.verdict.startswith(("Holds", "Exceeds", "Unproven")) for row in rows)
+    sized, named = sum(row.sized for row in rows), sum(row.named for row in rows)
+    print(f"\ndrafted: {drafted} of {len(rows)}; with a verdict in {options.seconds:g} s: {verdicts}")
+    print(f"tools that a comment states: {sized} of {named} read")
+    print(f"most questions: {max((row.questions for row in rows), default=0)}")
+
+
+if __name__ == "__main__":
+    main()
