@@ -15,6 +15,7 @@ from chipload.errors import InputError
 #: extra of the package -> the module that it installs, and what needs it
 EXTRAS: Mapping[str, tuple[str, str]] = {
     "cad": ("OCP", "reading STEP files"),
+    "mcp": ("mcp", "the server of the Model Context Protocol"),
     "web": ("nicegui", "the page in the browser"),
     "notebook": ("pandas", "a table of pandas or a dataset of xarray"),
     "cluster": ("distributed", "a sweep on a Dask cluster"),
