@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from chipload.api.loads import fit_coefficients, hold_torque, optimise_feeds
     from chipload.api.mechanics.bodies import ClampedPart, NaturalModes, Plate, compliance, modes
     from chipload.api.mechanics.chip import UndeformedChip, undeformed_chip
+    from chipload.api.mechanics.coefficients import fit, measured_cut
     from chipload.api.mechanics.cut import CutEngagement, engagement_of_cut
-    from chipload.api.mechanics.fit import fit, measured_cut
     from chipload.api.mechanics.forces import TurnForces, tooth_forces
     from chipload.api.mechanics.stability import (
         LocationErrors,
@@ -178,7 +178,7 @@ _FUNCTIONS = {
         "mechanics.wall": "wall_form_error",
         "mechanics.chip": "undeformed_chip",
         "mechanics.cut": "engagement_of_cut",
-        "mechanics.fit": "fit measured_cut",
+        "mechanics.coefficients": "fit measured_cut",
         "mechanics.forces": "tooth_forces",
         "mechanics.stability": "stability_chart stability_margin surface_location_error",
         "planning": "plan_impeller plan_thin_wall",
