@@ -30,7 +30,7 @@ MATERIALS = """# Shipped materials
 
 `[material] name` names one of these. Each holds in the range of chip thickness that is shown: in steps with thicker or
 thinner chips its loads are unproven. The spread is the relative standard deviation of the coefficients; `confidence`
-compares limits with loads at its upper band ([how](how-to/confidence.md)). A group of VDI 3323 has the tangential force
+holds limits with it ([how](how-to/confidence.md)). A group of VDI 3323 has the tangential force
 alone: it proves torque and power; force direction, deflection and stability are unproven. Which group an alloy belongs
 to is stated where its source states it; a group never has the name of an alloy.
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
+from statistics import NormalDist
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +13,9 @@ import pytest
 
 from chipload.checking.default_checks import PEAKS, DefaultChecks, with_peaks
 from chipload.checking.limits import program_limits
+from chipload.checking.load_budget import TURNS
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.load_parts import LoadParts
 from chipload.cutting.material import material_named, material_text, read_material
 from chipload.errors import InputError
 from chipload.jobs import load_job, run_job
@@ -104,23 +109,29 @@ def test_means_are_not_peaks() -> None:
 
 
 def test_the_stress_of_a_workpiece_has_the_band_of_the_force() -> None:
-    """0.5 MPa per N: 300 N with a deviation of 20 % count as 300 (1 + 0.2) N at one deviation; then peaks by 40 %."""
+    """0.5 MPa per N: 300 N with a deviation of 20 % count as 300 exp(0.2) N at one deviation; then peaks by 40 %."""
     strained = SimpleNamespace(strength=200.0, worst=lambda force: (0, 0.5 * float(force[0]), (0.0, 0.0, 0.0)))
     own = replace(material_named("al7075-t6"), peak_excess=0.0)
-    columns = {"line": np.array([1]), "t_s": np.zeros(1), "force_n": np.array([300.0]), "force_sd_n": np.array([60.0])}
+    columns = {"line": np.array([1]), "t_s": np.zeros(1), "force_n": np.array([300.0])}
+    parts = {(1, "force_n"): LoadParts(300.0, coefficients=0.2)}
+    mill = Cutter(6.0, 2, 0.5, 15.0, 25.0, 5.8e5)
 
     def stress(sigma: float, excess: float = 0.0) -> LimitCheck:
         simulation = SimpleNamespace(
             workpiece=SimpleNamespace(strained=strained, error=0.0), errors={"force_n": 0.0}, limits={}, stability=None,
-            machine=None, left=None, checks=DefaultChecks({}, replace(own, peak_excess=excess), ("spindle",), sigma),
+            machine=None, left=None, checks=DefaultChecks(
+                {1: mill}, replace(own, peak_excess=excess), ("spindle",), NormalDist().cdf(sigma), parts
+            ),
         )  # fmt: skip
         (found,) = program_limits(simulation, columns, "program")
         return found
 
-    assert (stress(0.0).worst, stress(1.0).worst) == (150.0, pytest.approx(180.0))
+    assert stress(0.0).worst == stress(1.0).worst == 150.0
+    held = stress(1.0)
+    assert held.budget.value(150.0) == pytest.approx(150.0 * math.exp(math.hypot(0.2, TURNS)))
     assert stress(0.0, 0.3).state is Verdict.HOLDS
     assert stress(0.0, 0.4).state is Verdict.UNPROVEN
-    assert stress(2.0).state is Verdict.EXCEEDS
+    assert stress(2.0).state is Verdict.UNPROVEN
 
 
 def cut(use: str, seen: float, *, axis: bool = True) -> SimpleNamespace:

@@ -309,10 +309,14 @@ def test_plain_values_give_margins_too() -> None:
     history = chipload.simulate(Program.join(path), dynamics=modes, step_mm=6.0, **values)
     (check,) = (c for c in history.limits if c.name == "stability_margin")
     assert check.worst == history["stability_margin"].min()
-    settings = chipload.SimulationSettings(6.0, confidence=0.95)
-    sure = chipload.simulate(Program.join(path), dynamics=modes, settings=settings, **values)
+    sure = chipload.simulate(
+        Program.join(path), dynamics=modes, step_mm=6.0, checks=chipload.CheckSettings(confidence=0.95), **values
+    )
     (lower,) = (c for c in sure.limits if c.name == "stability_margin")
-    assert lower.worst == pytest.approx(check.worst / (1.0 + 1.6448536 * 0.25))  # the material has a spread of 25 %
+    # the material has a spread of 25 %, and the margin is inversely proportional to its coefficients
+    expected = check.worst / (1.0 + check.resolution_error) / math.exp(1.6448536 * 0.25)
+    assert lower.worst == check.worst
+    assert lower.value_at_confidence == pytest.approx(expected)
     with pytest.raises(InputError, match=r"limits.stability_margin: needs modes"):
         chipload.simulate(Program.join(path), limits=chipload.Limits(stability_margin=1.2), **values)
 

@@ -141,9 +141,12 @@ def test_reads_a_covariance(tmp_path):
     assert hash(material) == hash(read_material(path))
 
 
-def test_a_spread_is_a_diagonal_covariance():
+def test_a_spread_is_a_covariance_with_correlated_errors():
     material = Material("mine", 700.0, 200.0, 50.0, 10.0, 8.0, 1.0, source="own", spread=0.1)
-    np.testing.assert_allclose(material.variances, np.diag([4900.0, 400.0, 25.0, 1.0, 0.64, 0.01]))
+    found = np.array(material.variances)
+    np.testing.assert_allclose(np.diagonal(found), [4900.0, 400.0, 25.0, 1.0, 0.64, 0.01])
+    deviation = np.sqrt(np.diagonal(found))
+    np.testing.assert_allclose((found / np.outer(deviation, deviation))[~np.eye(6, dtype=bool)], 0.5)
 
 
 @pytest.mark.parametrize(

@@ -97,7 +97,7 @@ def test_samples_have_the_spread_of_the_material():
     stated = np.array(material.coefficients)
     np.testing.assert_allclose(drawn.mean(axis=0), stated, rtol=0.01)
     np.testing.assert_allclose(drawn.std(axis=0), material.spread * stated, rtol=0.05)
-    assert np.abs(np.corrcoef(drawn.T) - np.eye(6)).max() < 0.05
+    np.testing.assert_allclose(np.corrcoef(drawn.T)[~np.eye(6, dtype=bool)], 0.5, atol=0.05)
     assert [m.coefficients for m in Samples(8, seed=3).of(material)] == [
         m.coefficients for m in Samples(8, seed=3).of(material)
     ]
@@ -179,7 +179,8 @@ def test_the_probability_is_that_of_the_normal_distribution(tmp_path):
     (combination,) = done.combinations
     low, high = combination.interval
     assert low <= norm.cdf((limit - torque.mean()) / torque.std()) <= high
-    assert combination.holding == int((torque <= limit).sum())
+    # a sample within the resolution error of its limit is unproven
+    assert int((1.02 * torque <= limit).sum()) <= combination.holding <= int((torque <= limit).sum())
     assert done.best is None
 
 

@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from statistics import NormalDist
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chipload.checking.load_budget import budget_of
 from chipload.checking.rubbing import over_feed, rubbing, spindle_speed
 from chipload.checking.settings import CheckSettings
 from chipload.cutter.cutter import Cutter
+from chipload.cutting.load_parts import LoadParts
 from chipload.cutting.material import Material
 from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
 from chipload.cutting.strength import allowed_stress, cutter_stress
-from chipload.errors import Finding, InputError, Severity
+from chipload.errors import Finding, Severity
 from chipload.machine.machine import Machine
 from chipload.result import CoveredRows, LimitCheck, Verdict, check_limit, error_of
-from chipload.result.limits import Columns
+from chipload.result.limits import Columns, hold_at_confidence
 from chipload.result.number_text import percent_text
 from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.loads import Cuts, Floats, Ints
 from chipload.simulation.ramp import ramp_angle
-from chipload.simulation.removal import BANDED
 from chipload.units import mm_min_from_mm_s
 
 #: columns that these checks add to those of the simulation
@@ -65,14 +65,16 @@ class DefaultChecks:
     cutters : by tool number
     material : whose coefficients the loads have
     off : names of checks that are switched off
-    sigma : limits of loads are checked at the value plus so many standard deviations
+    confidence : one-sided, at which limits of loads are held; 0.5: at their nominal values
+    parts : of the errors of the worst loads of the run, by tool and load; what is not among them has upper bounds
     of_feed, of_depth : deflection over feed per tooth and radial depth up to which the rigid model holds
     """
 
     cutters: Mapping[int, Cutter]
     material: Material
     off: tuple[str, ...] = ()
-    sigma: float = 0.0
+    confidence: float = 0.5
+    parts: Mapping[tuple[int, str], LoadParts] = field(default_factory=dict)
     of_feed: float = OF_FEED
     of_depth: float = OF_DEPTH
 
@@ -88,29 +90,12 @@ class DefaultChecks:
         return np.array([own.get(int(n), math.inf) for n in numbers.tolist()])[of]
 
 
-def default_checks(
-    settings: CheckSettings, cutters: Mapping[int, Cutter], material: Material, confidence: float
-) -> DefaultChecks:
-    """Checks in addition to the stated limits.
-
-    Parameters
-    ----------
-    confidence : one-sided, from 0.5 (limits of loads are held at the mean) to below 1
-
-    Raises
-    ------
-    InputError
-        More than the mean is requested of a material that does not state the uncertainty of its coefficients.
-    """
-    sigma = NormalDist().inv_cdf(confidence)
-    if sigma > 0.0 and not material.has_band:
-        raise InputError(
-            f"operation.0.confidence = {confidence:g}: material {material.name} states neither spread nor covariance: "
-            "state one (spread = 0.25 for a table value), or leave confidence out"
-        )
+def default_checks(settings: CheckSettings, cutters: Mapping[int, Cutter], material: Material) -> DefaultChecks:
+    """Checks in addition to the stated limits."""
     return DefaultChecks(
-        cutters, material, settings.off, max(sigma, 0.0), settings.deflection_of_feed, settings.deflection_of_depth
-    )
+        cutters, material, settings.off, settings.confidence, {}, settings.deflection_of_feed,
+        settings.deflection_of_depth,
+    )  # fmt: skip
 
 
 def with_checks(
@@ -302,18 +287,18 @@ def default_limits(
     errors : relative error of columns by the resolution
     """
     out: list[LimitCheck] = []
-    upper = upper_loads(columns, checks.sigma)
     if "spindle" not in checks.off:
-        out += _spindle(machine, upper, track, errors)
+        out += _spindle(machine, columns, track, errors)
     if "flute_fill" in columns and "chip_space" not in checks.off:
         out.append(check_limit("flute_fill", 1.0, columns, track=track, error=error_of("flute_fill", errors)))
     direction = checks.unknown_direction
     if "cutter_strength" not in checks.off and "cutter_stress_mpa" in columns:
         allowed = checks.allowed_stress(columns["tool"])
-        k = int(np.argmax(upper["cutter_stress_mpa"] / allowed))
+        k = int(np.argmax(columns["cutter_stress_mpa"] / allowed))
         if np.isfinite(allowed[k]):
             limit, error = float(allowed[k]), error_of("cutter_stress_mpa", errors)
-            out.append(check_limit("cutter_stress_mpa", limit, upper, track=track, at=k, error=error, reason=direction))
+            check = check_limit("cutter_stress_mpa", limit, columns, track=track, at=k, error=error, reason=direction)
+            out.append(check)
     if "flute_length" not in checks.off and "axial_overrun_mm" in columns:
         # what stands in material above the flutes is found to half a layer, see simulation.shank
         out.append(check_limit("axial_overrun_mm", 0.0, columns, track=track, error=0.0))
@@ -324,7 +309,7 @@ def default_limits(
         why = direction or ("" if rows.mask.any() else "nothing is cut")
         check = check_limit("deflection_share", 1.0, columns, track=track, rows=rows, error=error, reason=why)
         out.append(_rigid(check, checks, columns))
-    return tuple(with_peaks(check, checks, columns) for check in out)
+    return tuple(with_budget(check, checks, columns) for check in out)
 
 
 def _ramp(checks: DefaultChecks, columns: Columns, track: str) -> list[LimitCheck]:
@@ -397,6 +382,20 @@ def peak_excess(material: Material, column: str) -> float:
     return material.peak_excess if column in PEAKS else 0.0
 
 
+def with_budget(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> LimitCheck:
+    """Return the check of a load with the parts of its error, held at the confidence of the checks, and as
+    :func:`with_peaks`.
+
+    Parameters
+    ----------
+    columns : of the track, one row for each step
+    """
+    peaks = peak_excess(checks.material, check.column.name)
+    budget = budget_of(check, checks.confidence, checks.cutters, checks.material, checks.parts, columns, peaks)
+    held = with_peaks(check, checks, columns)
+    return held if budget is None else hold_at_confidence(held, budget)
+
+
 def with_peaks(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> LimitCheck:
     """A check of a peak that holds by prediction alone is unproven where measured peaks were that far above, and where
     a chip is thicker than any that was measured: how far peaks are above there is not known.
@@ -416,33 +415,3 @@ def with_peaks(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> Li
         return check
     reason = f"measured peaks of {material.name} were up to {percent_text(excess)} above predicted ones"
     return replace(check, state=Verdict.UNPROVEN, reason=reason)
-
-
-def upper_loads(columns: Columns, sigma: float) -> Columns:
-    """The columns with ``sigma`` standard deviations added to those that have a band, on request."""
-    return columns if sigma == 0.0 else _UpperLoads(columns, sigma)
-
-
-class _UpperLoads(Mapping[str, NDArray[np.float64]]):
-    """Columns that are read, and have their bands added, on request."""
-
-    def __init__(self, columns: Columns, sigma: float) -> None:
-        self._columns, self._sigma = columns, sigma
-
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
-        return _upper(name, self._columns, self._sigma) if name in BANDED else self._columns[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._columns)
-
-    def __len__(self) -> int:
-        return len(self._columns)
-
-
-def _upper(name: str, columns: Columns, sigma: float) -> NDArray[np.float64]:
-    """(n,) size of a column with ``sigma`` standard deviations added."""
-    size, band = np.abs(np.asarray(columns[name], dtype=np.float64)), BANDED[name]
-    if band not in columns:
-        return size
-    base = np.asarray(columns["force_n"] if band == "force_sd_n" else columns[name])
-    return np.asarray(size + sigma * size * np.divide(columns[band], base, out=np.zeros(len(size)), where=base > 0.0))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chipload.checking.default_checks import DIRECTED, default_limits, upper_loads, with_peaks
+from chipload.checking.default_checks import DIRECTED, default_limits, with_budget
 from chipload.checking.outcome import SimulationResult
 from chipload.checking.stability import STABILITY_LIMITS, StabilityResult, stability_limits
 from chipload.machine.machine import Machine
@@ -34,17 +34,16 @@ def program_limits(
     track : its name
     stability : of the track; None: that of the simulation
     """
-    upper = upper_loads(columns, simulation.checks.sigma)
     loads = {name: limit for name, limit in simulation.limits.items() if name not in STABILITY_LIMITS}
     direction = simulation.checks.unknown_direction
     own = stability or simulation.stability
     return (
-        *(_stated(simulation, upper, track, name, limit) for name, limit in loads.items()),
+        *(_stated(simulation, columns, track, name, limit) for name, limit in loads.items()),
         *_default_gouge(simulation, columns, track),
         *stability_limits(
-            own, simulation.limits, columns, track, simulation.errors, direction, simulation.checks.sigma
+            own, simulation.limits, columns, track, simulation.errors, direction, simulation.checks.confidence
         ),
-        *_yield_limit(simulation, upper, track),
+        *_yield_limit(simulation, columns, track),
         *default_limits(simulation.checks, simulation.machine, columns, track, simulation.errors),
     )
 
@@ -62,7 +61,7 @@ def _yield_limit(simulation: SimulationResult, columns: Columns, track: str) -> 
     line, t = int(columns["line"][k]), float(columns["t_s"][k])
     known = error if math.isfinite(error) else 0.0
     check = LimitCheck("stress_mpa", own.strength, stress, state, track, k, line, place, t, known, why)
-    return (with_peaks(check, simulation.checks, columns),)
+    return (with_budget(check, simulation.checks, columns),)
 
 
 def spindle_limits(machine: Machine, speeds: ArrayLike = ()) -> dict[str, float]:
@@ -100,7 +99,7 @@ def _stated(simulation: SimulationResult, columns: Columns, track: str, name: st
         reason = "no point of the part is finished"
     error = error_of(column_of(name).name, simulation.errors)
     check = check_limit(name, limit, columns, track=track, error=error, reason=reason)
-    return with_peaks(check, simulation.checks, columns)
+    return with_budget(check, simulation.checks, columns)
 
 
 def _default_gouge(simulation: SimulationResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:

@@ -68,7 +68,7 @@ def bodies_of(inputs: CheckInputs, reading: ProgramReading, stock: LayeredStock)
     """
     op, cutters, machine = inputs.settings, inputs.cutters, inputs.machine
     require_steps(reading.program, op.step_mm)
-    checks = default_checks(inputs.checks, cutters, inputs.material, op.confidence)
+    checks = default_checks(inputs.checks, cutters, inputs.material)
     stiffness = stiffness_of(inputs.elasticity.stiffness, cutters)
     require_clamped(inputs.elasticity.workpiece, stock)
     program, times = timed(reading, cutters, machine)

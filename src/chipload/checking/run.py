@@ -161,8 +161,9 @@ def simulate_program(
     skipped = None
     if reading.skipped is not None and initial is not None:
         skipped = simulate_program(inputs, reading.skipped, initial, workers=workers)
+    checks = replace(bodies.checks, parts=removal.load_parts)
     return SimulationResult(
-        removal, stock, machine, inputs.limits, {"kind": "simulate", **op.stated}, bodies.checks, touched, left,
+        removal, stock, machine, inputs.limits, {"kind": "simulate", **op.stated}, checks, touched, left,
         gives.unknown, None if stability_watch is None else stability_of(inputs, stability_watch), compliance,
         skipped,
     )  # fmt: skip

@@ -30,7 +30,6 @@ class SimulationSettings:
     resolution_error : estimate the error of the loads; without it limits on loads are unproven
     stock_points_mm : greatest distance of the columns or points of the stock that are compared with shank and holder;
         None: from the cutters and the size of the stock
-    confidence : one-sided confidence of the loads that are compared with limits; 0.5: mean loads
     """
 
     step_mm: float = number_field(above=0.0, most=100.0)
@@ -42,7 +41,6 @@ class SimulationSettings:
     flank_mm: float | None = number_field(None, above=0.0)
     resolution_error: bool = True
     stock_points_mm: float | None = number_field(None, above=0.0)
-    confidence: float = number_field(0.5, least=0.5, below=1.0)
 
     def __post_init__(self) -> None:
         """Refuse values out of range, and processes for a simulation that they cannot share."""
@@ -112,6 +110,8 @@ class CheckSettings:
 
     Parameters
     ----------
+    confidence : one-sided, at which limits of loads are held: with resolution, runout that is not known, coefficients,
+        bending, thin chips and turns; 0.5: at nominal values, with their resolution alone
     cutter_strength : stress of the cutter against its strength
     flute_length : the cutter does not cut above its flutes
     chip_space : the chip space, where ``gullet_mm2`` of a cutter is stated
@@ -129,6 +129,7 @@ class CheckSettings:
         its foot: 0.33 um/N at its edge (:mod:`chipload.simulation.heights.slender_walls`)
     """
 
+    confidence: float = number_field(0.5, least=0.5, below=1.0)
     cutter_strength: bool = True
     flute_length: bool = True
     chip_space: bool = True

@@ -20,9 +20,12 @@ from chipload.checking.dynamics import dynamics_of
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.stability_watch import PROBABILITY, StabilityWatch, relative_covariance
 from chipload.checking.workpiece_compliance import WorkpieceCompliance
+from chipload.cutting.load_parts import with_spread
+from chipload.cutting.material import Material
 from chipload.machine.machine import Machine
 from chipload.result import CoveredRows, LimitCheck, check_limit, error_of
-from chipload.result.limits import Columns
+from chipload.result.budget import ErrorBudget, ErrorPart
+from chipload.result.limits import Columns, hold_at_confidence
 from chipload.stability.cuts import joined
 from chipload.stability.margin import MOST_MARGIN, stability_margins
 from chipload.stability.probability import stable_probability, variance_shares
@@ -165,7 +168,7 @@ def stability_limits(
     track: str,
     errors: Mapping[str, float],
     direction: str,
-    sigma: float,
+    confidence: float,
 ) -> tuple[LimitCheck, ...]:
     """Return the checks of :data:`STABILITY_LIMITS`: those of the job, and a margin of 1 if modes are stated.
 
@@ -175,7 +178,7 @@ def stability_limits(
     stated : limits of the job
     errors : relative error of columns by the resolution of the simulation
     direction : why the direction of forces is not known; empty: it is
-    sigma : number of standard deviations that are added to the coefficients for the margin
+    confidence : one-sided, at which the margin is held with the spread of the coefficients; 0.5: at the nominal margin
     """
     limits = {name: stated[name] for name in STABILITY_LIMITS if name in stated}
     if stability is None:
@@ -183,9 +186,7 @@ def stability_limits(
             check_limit(name, v, {}, track=track, reason="no [dynamics] is stated") for name, v in limits.items()
         )
     limits.setdefault("stability_margin", DEFAULT_MARGIN)
-    spread = float(np.sqrt(np.diag(relative_covariance(stability.watch.material)).max())) if sigma > 0.0 else 0.0
-    margin = np.asarray(columns["stability_margin"]) / (1.0 + sigma * spread)
-    columns = {**columns, "stability_margin": margin}
+    margin = np.asarray(columns["stability_margin"])
     cutting = cutting_rows(columns)
     reason = direction or stability.reason(np.unique(np.asarray(columns["tool"])[cutting]))
     if not reason and (margin[cutting] == 0.0).any():
@@ -210,8 +211,21 @@ def stability_limits(
         if name == "sle_um":
             rows = CoveredRows(cutting, "cuts at a feed", "where a wall is made")
         known = 0.0 if name == PROBABILITY else error
-        out.append(check_limit(name, limit, columns, track=track, rows=rows, error=known, reason=why))
+        check = check_limit(name, limit, columns, track=track, rows=rows, error=known, reason=why)
+        if name == "stability_margin" and check.worst is not None:
+            check = hold_at_confidence(check, _margin_budget(stability.watch.material, confidence, error))
+        out.append(check)
     return tuple(out)
+
+
+def _margin_budget(material: Material, confidence: float, error: float) -> ErrorBudget:
+    """Return the error budget of the stability margin: it is inversely proportional to the coefficients."""
+    spread = float(np.sqrt(np.diag(relative_covariance(with_spread(material))).max()))
+    fit = "measure the coefficients in a test cut (chipload fit)" if material.covariance is None else ""
+    name = "coefficients" if material.has_band else "coefficients, whose spread is not stated"
+    known = error if math.isfinite(error) else 0.0
+    parts = (ErrorPart("resolution and frequencies", bound=known), ErrorPart(name, deviation=spread, remedy=fit))
+    return ErrorBudget(confidence, tuple(part for part in parts if part.bound or part.deviation))
 
 
 def cutting_rows(columns: Columns) -> NDArray[np.bool_]:

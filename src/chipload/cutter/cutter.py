@@ -57,6 +57,8 @@ class Cutter:
     bottom : alpha [rad], 0 <= alpha, alpha + beta < 90 deg
     taper : beta [rad], 0 <= beta
     runout : offset of the cutter's axis from that of the spindle [mm], and its direction from tooth 0 [rad]
+    runout_size : [mm] of a runout whose direction is not known: loads are those without it, their errors have it; None:
+        it is as ``runout`` states, and not known where that is 0
     pitch : angle [rad] between each tooth and the tooth that cuts before it, beginning with tooth 0, which follows the
         last one; their sum is a revolution; empty: all equal
     shank_diameter : [mm]; None: equal to the diameter
@@ -113,6 +115,7 @@ class Cutter:
     max_speed: float | None = None
     thread_pitch: float | None = None
     hole_depth: float | None = None
+    runout_size: float | None = None
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: float, limit: str) -> None:
@@ -161,6 +164,8 @@ class Cutter:
         need(self.corner_radius >= 0.0, "corner_radius_mm", self.corner_radius, "must be at least 0")
         self._check_corner()
         need(self.runout[0] >= 0.0, "runout_mm", self.runout[0], "must be at least 0")
+        size = self.runout_size or 0.0
+        need(0.0 <= size <= self.diameter / 2.0, "runout_mm", size, "must be from 0 to diameter_mm / 2")
         self._check_pitch()
         if self.body:
             wide = check_body(self.body, self.flute_length)

@@ -98,8 +98,14 @@ class CutterTable(BaseModel):
     )
     bottom_deg: float | None = Field(None, description="angle of the bottom, APT parameter alpha; default 0")
     taper_deg: float | None = Field(None, description="half angle of a tapered flank, APT parameter beta; default 0")
-    runout_mm: float | None = Field(None, description="offset of the cutter's axis from the spindle's axis; default 0")
-    runout_deg: float | None = Field(None, description="direction of the runout, from tooth 0; required with runout_mm")
+    runout_mm: float | None = Field(
+        None,
+        description="offset of the cutter's axis from the spindle's axis, half the reading of a dial gauge; default: "
+        "none in the loads, 0.010 (above 10 mm of diameter 0.0125) in their error",
+    )
+    runout_deg: float | None = Field(
+        None, description="direction of the runout, from tooth 0; default: not known, runout_mm counts as an error"
+    )
     pitch_deg: Annotated[tuple[float, ...] | None, BeforeValidator(_rows)] = Field(
         None, description="angle from the previous tooth to each tooth, tooth 0 first, 360 in all; default: equal"
     )
@@ -151,9 +157,10 @@ class CutterTable(BaseModel):
         ]
         if missing:
             raise InputErrors(*missing) if len(missing) > 1 else InputError(missing[0])
-        if ("runout_mm" in values) != ("runout_deg" in values):
-            lacks, has = ("runout_deg", "runout_mm") if "runout_mm" in values else ("runout_mm", "runout_deg")
-            raise InputError(f"cutter.{lacks} is missing: state it with {has}, or leave both out")
+        if "runout_deg" in values and "runout_mm" not in values:
+            raise InputError("cutter.runout_mm is missing: state it with runout_deg, or leave both out")
+        runout = float(values.get("runout_mm", 0.0))
+        offset = runout if "runout_deg" in values else 0.0
         return Cutter(
             diameter=values["diameter_mm"],
             flutes=values["flutes"],
@@ -167,7 +174,8 @@ class CutterTable(BaseModel):
             barrel_radius=values.get("barrel_radius_mm"),
             bottom=math.radians(values.get("bottom_deg", 0.0)),
             taper=math.radians(values.get("taper_deg", 0.0)),
-            runout=(values.get("runout_mm", 0.0), math.radians(values.get("runout_deg", 0.0))),
+            runout=(offset, math.radians(values.get("runout_deg", 0.0))),
+            runout_size=runout if "runout_mm" in values and offset == 0.0 else None,
             pitch=tuple(math.radians(x) for x in values.get("pitch_deg", ())),
             shank_diameter=values.get("shank_diameter_mm"),
             holder=tuple(tuple(part) for part in values.get("holder_mm", ())),

@@ -3,9 +3,9 @@
 Notation: K = (Ktc, Krc, Kac, Kte, Kre, Kae) with the covariance C (6, 6); a load L (force along T, n, the axis, and
 torque) is linear in K: L = B K, B (4, 6) the loads of unit coefficients, so that cov(L) = B C B', exactly.
 
-A fitted material has its own C. If only a spread sigma / K is known, the same for all coefficients, their errors are
-taken as independent: C = diag(spread^2 K^2). Real errors are correlated, which makes the band wider or narrower. The
-exponents of a size effect, runout and engagement are taken as exact.
+A fitted material has its own C. If only a spread sigma / K is known, the same for all coefficients, their errors have
+the correlation of :data:`chipload.cutting.material.CORRELATION`. The exponents of a size effect, runout and engagement
+are taken as exact.
 """
 
 from __future__ import annotations

@@ -175,6 +175,12 @@ def _switch(name: str, description: str) -> Any:
 class ChecksTable(Table):
     """Default checks. `false` switches a check off; the report lists the checks that are off."""
 
+    confidence: Number = setting(
+        CheckSettings,
+        "confidence",
+        "one-sided confidence at which limits of loads are held, with runout that is not known, coefficients, bending, "
+        "thin chips and turns; 0.5: at nominal values, with their resolution alone",
+    )
     cutter_strength: bool = _switch("cutter_strength", "check the stress of the cutter against its strength")
     flute_length: bool = _switch("flute_length", "check that the cutter does not cut above its flutes")
     chip_space: bool = _switch("chip_space", "check the chip space, if gullet_mm2 is stated")

@@ -19,6 +19,7 @@ from chipload.report.sheet import definitions, folded, framed, heading, items, t
 from chipload.report.view import viewer_script
 from chipload.report.view_section import DATA, VIEW
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
+from chipload.result.budget import SHOWN, level_text
 from chipload.result.number_text import number_text, percent_text
 
 #: findings and limits that the report lists
@@ -85,12 +86,18 @@ def limits_table(tracks: Iterable[Track]) -> list[str]:
     if not checks:
         return ["<p>No limit was checked.</p>"]
     rows = [_limit_row(track, check) for track, check in checks[:LISTED]]
-    head = ["track", "limit", "state", "limit value", "worst", "resolution", "line", "time [s]", "place [mm]"]
-    head += ["reason", "covers"]
+    head = ["track", "limit", "state", "limit value", "worst", "resolution", _level(checks), "parts", "line"]
+    head += ["time [s]", "place [mm]", "reason", "covers"]
     kept = [k for k in range(len(head)) if k < 5 or any(row[k] for row in rows)]
-    numbers = tuple(i for i, k in enumerate(kept) if k in (3, 4, 5, 6, 7))
+    numbers = tuple(i for i, k in enumerate(kept) if k in (3, 4, 5, 6, 8, 9))
     cells = [[row[k] for k in kept] for row in rows]
     return [table([head[k] for k in kept], cells, numbers, [t.in_use for t, _ in checks[:LISTED]])]
+
+
+def _level(checks: Iterable[tuple[Track, LimitCheck | None]]) -> str:
+    """Head of the column of values at a confidence: all limits of a job have one."""
+    levels = {x.budget.shown_at for _, x in checks if x is not None and x.budget is not None}
+    return f"at {level_text(max(levels, default=SHOWN))}"
 
 
 def _limit_row(track: Track, check: LimitCheck | None) -> list[str]:
@@ -100,7 +107,7 @@ def _limit_row(track: Track, check: LimitCheck | None) -> list[str]:
         passing = [x.column.label for x in track.limits if x.state is Verdict.HOLDS]
         others = "all limits" if len(passing) == len(track.limits) else "the other limits"
         text = f'<span title="{escape(", ".join(passing))}">{others} ({len(passing)})</span>'
-        return [name, text, state_cell(Verdict.HOLDS), *[""] * 8]
+        return [name, text, state_cell(Verdict.HOLDS), *[""] * 10]
     return [
         name,
         f'<span class="name">{escape(check.column.title)}</span>',
@@ -108,6 +115,8 @@ def _limit_row(track: Track, check: LimitCheck | None) -> list[str]:
         number_text(check.limit, 6),
         "not known" if check.worst is None else number_text(check.worst),
         percent_text(check.error) if check.error else "",
+        "" if check.value_at_confidence is None else number_text(check.value_at_confidence, 3),
+        escape("" if check.budget is None or check.worst is None else check.budget.parts_text(check.worst)),
         str(check.line or ""),
         "" if check.t_s is None else f"{check.t_s:.4g}",
         place_cell(check),

@@ -6,8 +6,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from chipload.errors import Finding, Severity
+from chipload.result.budget import level_text
 from chipload.result.coverage import Coverage
 from chipload.result.limits import LimitCheck
+from chipload.result.number_text import number_text
 from chipload.result.track import Track
 from chipload.result.verdict import Verdict
 
@@ -38,7 +40,8 @@ def headline(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Tra
     )
     if verdict is Verdict.HOLDS:
         held = _critical_text(*critical) if critical else ", ".join(of + check.text for of, check in checks)
-        return f"Holds: {held}."
+        levels = {c.budget.confidence for _, c in checks if c.budget is not None and c.by_confidence}
+        return f"Holds at {level_text(min(levels))}: {held}." if levels else f"Holds: {held}."
     found = list(dict.fromkeys(_texts(verdict, findings, tracks))) or ["no limit was checked"]
     more = f"; and {len(found) - 1} more" if len(found) > 1 else ""
     line = f"{verdict.value.capitalize()}: {found[0]}{more}."
@@ -59,6 +62,19 @@ def coverage_line(tracks: Sequence[Track]) -> str:
                 left.setdefault(key, []).append(covered.excluded_text(column.label, column.unit, check.limit))
     parts = [f"{of}{covered.outside}: {', '.join(texts)}" for (of, covered), texts in left.items()]
     return f"Not covered: {'; '.join(parts)}." if parts else ""
+
+
+def confidence_line(tracks: Sequence[Track]) -> str:
+    """Return the value at the confidence, with the parts of its error, of the limit that it uses most; empty: no limit
+    has an error budget.
+    """
+    checks = [(_of(track, tracks), c) for track in tracks for c in track.limits if c.limit > 0.0]
+    known = [(of, c, c.value_at_confidence / c.limit) for of, c in checks if c.value_at_confidence is not None]
+    if not known:
+        return ""
+    of, check, _ = max(known, key=lambda each: each[2])
+    text = check.confidence_text
+    return f"{of}{text[0].upper()}{text[1:]}, the limit is {number_text(check.limit, 6)}."
 
 
 def unchecked_line(unchecked: Iterable[str]) -> str:

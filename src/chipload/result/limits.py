@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.result.budget import ErrorBudget, level_text
 from chipload.result.columns import Column, column_of, error_of
 from chipload.result.coverage import FAR_BEYOND, WHOLE, Coverage, CoveredRows, coverage_of
 from chipload.result.number_text import number_text, percent_text
@@ -43,6 +44,7 @@ class LimitCheck:
     reason : why it is unproven; empty otherwise
     absolute_error : how much worse a value between the points that are checked may be, in the unit of the column
     coverage : rows of the history that the limit covers
+    budget : parts of the error of ``worst``, and the confidence at which the limit is held; None: it is no load
 
     Raises
     ------
@@ -64,6 +66,7 @@ class LimitCheck:
     reason: str = ""
     absolute_error: float = 0.0
     coverage: Coverage = WHOLE
+    budget: ErrorBudget | None = None
 
     def __post_init__(self) -> None:
         """Refuse numbers that are not finite, a missing worst value without a reason, and an unknown error."""
@@ -93,15 +96,49 @@ class LimitCheck:
         return self.resolution_error or 0.0
 
     @property
+    def by_confidence(self) -> bool:
+        """Whether the limit is held at a confidence above 0.5, so that its value there counts."""
+        held = self.budget is not None and self.budget.confidence > 0.5
+        return held and self.worst is not None and self.state is not Verdict.EXCEEDS
+
+    @property
+    def value_at_confidence(self) -> float | None:
+        """What the worst value may be at the confidence that is shown; None: it has no budget or no value."""
+        if self.budget is None or self.worst is None:
+            return None
+        return self.budget.value(abs(self.worst), self.budget.shown_at, least=self.column.least)
+
+    @property
+    def confidence_text(self) -> str:
+        """The value at the confidence that is shown, with its parts in falling order; empty where there is none.
+
+        >>> from chipload.result.budget import ErrorPart
+        >>> parts = (ErrorPart("resolution", bound=0.02), ErrorPart("coefficients", deviation=0.1))
+        >>> check = LimitCheck("force_n", 200.0, 150.0, Verdict.HOLDS, resolution_error=0.02)
+        >>> hold_at_confidence(check, ErrorBudget(0.5, parts)).confidence_text
+        'at 95 %: force 180 N (coefficients 27, resolution 3)'
+        """
+        value = self.value_at_confidence
+        if value is None or self.budget is None or self.worst is None:
+            return ""
+        parts = self.budget.parts_text(self.worst)
+        text = f"at {level_text(self.budget.shown_at)}: {self.column.label} {number_text(value, 3)}{self._unit}"
+        return f"{text} ({parts})" if parts else text
+
+    @property
     def margin(self) -> float | None:
-        """How far the worst value lies within the limit, over the limit; below 0: beyond it; None: it has none.
+        """How far the worst value, at the confidence of the limit, lies within the limit, over the limit; below 0:
+        beyond it; None: it has none.
 
         >>> LimitCheck("force_n", 500.0, 412.0, Verdict.HOLDS, resolution_error=0.01).margin
         0.176
         """
         if self.worst is None or self.limit == 0.0:
             return None
-        beyond = (abs(self.worst) if self.column.signed else self.worst) / self.limit - 1.0
+        worst = abs(self.worst) if self.column.signed else self.worst
+        if self.by_confidence and self.budget is not None:
+            worst = self.budget.value(worst, least=self.column.least)
+        beyond = worst / self.limit - 1.0
         return round(beyond if self.column.least else -beyond, 12)
 
     @property
@@ -168,7 +205,11 @@ class LimitCheck:
         label, limit = self.column.label, f"{number_text(self.limit, 6)}{self._unit}"
         if self.worst is None:
             return f"{label} of {limit}"
-        text = f"{label} {number_text(self.worst)} of {'at least ' if self.column.least else ''}{limit}"
+        worst = number_text(self.worst)
+        if self.by_confidence and self.budget is not None:
+            more = self.budget.value(abs(self.worst), least=self.column.least) - abs(self.worst)
+            worst += f" {'-' if more < 0.0 else '+'} {number_text(abs(more), 2)}"
+        text = f"{label} {worst} of {'at least ' if self.column.least else ''}{limit}"
         if self.worst == self.limit == 0.0:
             text = f"no {label}"
         elif self.state is Verdict.UNPROVEN and self.margin is not None and self.margin < -FAR_BEYOND:
@@ -178,6 +219,32 @@ class LimitCheck:
     @property
     def _unit(self) -> str:
         return f" {self.column.unit}" if self.column.unit else ""
+
+
+def hold_at_confidence(check: LimitCheck, budget: ErrorBudget) -> LimitCheck:
+    """Return a check with the budget of its load: what holds at the nominal value holds if its value at the confidence
+    does, else it is unproven.
+
+    >>> from chipload.result.budget import ErrorPart
+    >>> check = LimitCheck("force_n", 200.0, 150.0, Verdict.HOLDS, resolution_error=0.0)
+    >>> fit = ErrorPart("coefficients", deviation=0.1, remedy="fit them")
+    >>> hold_at_confidence(check, ErrorBudget(0.95, (fit,))).text
+    'force 150 + 27 of 200 N'
+    >>> hold_at_confidence(check, ErrorBudget(0.999, (fit,))).text
+    'force 150 + 54 of 200 N, unproven: at 99.9 % it may be 204 N (coefficients 54): fit them'
+    """
+    out = replace(check, budget=budget)
+    if check.worst is None or check.state is not Verdict.HOLDS or budget.confidence <= 0.5:
+        return out
+    least = check.column.least
+    value = budget.value(abs(check.worst), least=least)
+    if value >= check.limit if least else value <= check.limit:
+        return out
+    unit = f" {check.column.unit}" if check.column.unit else ""
+    remedy = budget.remedy(abs(check.worst), check.limit, least=least)
+    parts = budget.parts_text(check.worst)
+    reason = f"at {level_text(budget.confidence)} it may be {number_text(value, 3)}{unit} ({parts})"
+    return replace(out, state=Verdict.UNPROVEN, reason=f"{reason}: {remedy}" if remedy else reason)
 
 
 def state_of(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chipload.errors import Finding, InputError
 from chipload.result.columns import COLUMNS
 from chipload.result.display import result_html
-from chipload.result.first_lines import coverage_line, guesses_line, headline, unchecked_line
+from chipload.result.first_lines import confidence_line, coverage_line, guesses_line, headline, unchecked_line
 from chipload.result.limits import Columns, LimitCheck
 from chipload.result.tabular import pandas_of, xarray_of
 from chipload.result.track import Track
@@ -154,8 +154,10 @@ class Result:
 
     @cached_property
     def first_lines(self) -> tuple[str, ...]:
-        """The lines that every page and terminal shows first: the message, and what is not checked."""
-        return tuple(filter(None, (self.message, unchecked_line(self.unchecked))))
+        """The lines that every page and terminal shows first: the message, the critical load at the confidence with the
+        parts of its error, and what is not checked.
+        """
+        return tuple(filter(None, (self.message, confidence_line(self.in_use), unchecked_line(self.unchecked))))
 
     def _repr_html_(self) -> str:
         """HTML for notebooks: the message, and tables of limits, tracks and findings."""

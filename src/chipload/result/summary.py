@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from chipload.errors import Finding, Severity
+from chipload.result.budget import ErrorBudget, ErrorPart
 from chipload.result.columns import column_of
 from chipload.result.coverage import Coverage
 from chipload.result.limits import LimitCheck
@@ -44,6 +45,25 @@ class CoverageModel(_SummaryPart):
     )
 
 
+class ErrorPartModel(_SummaryPart):
+    """A part of the error of a load, relative to its nominal value."""
+
+    name: str = Field(description="name of the part")
+    bound: float = Field(description="its greatest size; bounds add linearly")
+    rise: float = Field(description="what it adds on average; it multiplies")
+    deviation: float = Field(description="standard deviation; random parts add as the root of their squares")
+    remedy: str = Field(description="what can be stated to make it less; empty: nothing")
+
+
+class BudgetModel(_SummaryPart):
+    """The error budget of a load."""
+
+    confidence: float = Field(description="confidence at which the limit is held; 0.5: at the nominal value")
+    shown_at: float = Field(description="confidence of value")
+    value: float = Field(description="value at that confidence, in the unit of the limit")
+    parts: tuple[ErrorPartModel, ...] = Field(description="parts of the error, the greatest first")
+
+
 class LimitModel(_SummaryPart):
     """A limit, and the worst value of its column."""
 
@@ -65,6 +85,7 @@ class LimitModel(_SummaryPart):
     )
     coverage: CoverageModel = Field(description="rows that the limit covers")
     reason: str = Field(description="why the limit is unproven")
+    budget: BudgetModel | None = Field(description="parts of the error of worst; null: it is not that of a load")
 
 
 class FindingModel(_SummaryPart):
@@ -221,8 +242,14 @@ def limit_from(model: LimitModel) -> LimitCheck:
         Its numbers do not agree.
     """
     column_of(model.name)
-    own = model.model_dump(exclude={"column", "unit", "margin", "coverage"})
-    return LimitCheck(**own, coverage=Coverage(**model.coverage.model_dump()))
+    own = model.model_dump(exclude={"column", "unit", "margin", "coverage", "budget"})
+    return LimitCheck(**own, coverage=Coverage(**model.coverage.model_dump()), budget=_budget_from(model.budget))
+
+
+def _budget_from(model: BudgetModel | None) -> ErrorBudget | None:
+    if model is None:
+        return None
+    return ErrorBudget(model.confidence, tuple(ErrorPart(**part.model_dump()) for part in model.parts))
 
 
 def finding_from(model: FindingModel) -> Finding:
@@ -237,8 +264,16 @@ def provenance_from(model: ProvenanceModel) -> Provenance:
 
 
 def _limit(check: LimitCheck) -> LimitModel:
-    own = {**vars(check), "coverage": CoverageModel(**vars(check.coverage))}
+    own = {**vars(check), "coverage": CoverageModel(**vars(check.coverage)), "budget": _budget(check)}
     return LimitModel(**own, column=check.column.name, unit=check.column.unit, margin=check.margin)
+
+
+def _budget(check: LimitCheck) -> BudgetModel | None:
+    own, value = check.budget, check.value_at_confidence
+    if own is None or value is None:
+        return None
+    parts = tuple(ErrorPartModel(**vars(part)) for part, _ in own.in_order())
+    return BudgetModel(confidence=own.confidence, shown_at=own.shown_at, value=value, parts=parts)
 
 
 def _finding(f: Finding) -> FindingModel:

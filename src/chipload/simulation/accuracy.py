@@ -48,13 +48,18 @@ thickest chip of teeth with runout is that of parts of the edge, and may be off 
 :data:`chipload.engagement.tooth_surfaces.SHARE` more.
 
 Deflection and form error are proportional to the force and have its error.
+
+**Other parts** of the error of a load (:mod:`chipload.cutting.load_parts`) are calculated from the tooth engagement of
+the steps that are computed a second time: of each tool and load those of the step whose load is greatest with them.
+For them a worst step of each tool is computed too, and the one that would be worst with the runout that is not known,
+as many earlier steps as they need at most.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,6 +67,9 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import slices
+from chipload.cutting.load_parts import CHIP as THICKEST
+from chipload.cutting.load_parts import LoadParts, load_parts, runout_of
+from chipload.cutting.material import Material
 from chipload.engagement.tooth_surfaces import SHARE as PARTS_OF_EDGE
 from chipload.engagement.tooth_surfaces import chip_error
 from chipload.simulation.checkpoint import in_rows
@@ -80,9 +88,13 @@ Ints = NDArray[np.int64]
 Columns = Mapping[str, NDArray[Any]]
 #: columns of some steps in a stock, which changes
 Remove = Callable[[Steps, LayeredStock, "RunSettings"], Columns]
+#: parts of the errors of the loads of some cuts, by column
+SomeParts = list[dict[str, tuple[LoadParts, ...]]]
 #: greatest loads of a step that is computed a second time, by column: at the instants of the run (none if that is not
-#: compared), and in its parts
-Again = Callable[["Window"], tuple[Mapping[str, float], Mapping[str, float]]]
+#: compared), and in its parts; and the parts of their errors
+Again = Callable[["Window"], tuple[Mapping[str, float], Mapping[str, float], SomeParts]]
+#: parts of the error of the worst load of a tool, by tool and column
+PartsOfTools = dict[tuple[int, str], LoadParts]
 
 #: columns that are compared; columns of other limits that are proportional to the force
 COMPARED = ("force_n", "torque_nm", "torque_mean_nm", "power_w", "chip_max_mm")
@@ -197,8 +209,9 @@ def resolution_error(
     setting: RunSettings,
     again: Again,
     names: Sequence[str] = COMPARED,
-) -> dict[str, float]:
-    """Return the relative resolution error of the worst value of each column of loads: see the module.
+) -> tuple[dict[str, float], PartsOfTools]:
+    """Return the relative resolution error of the worst value of each column of loads, and the other parts: see the
+    module.
 
     Parameters
     ----------
@@ -212,17 +225,21 @@ def resolution_error(
     Returns
     -------
     mapping of ``names`` and :data:`WITH_FORCE` to at least 0; inf where the run has a load of 0 and the finer
-    one has not
+    one has not; parts by tool and column
     """
     chosen, count = _chosen_steps(columns, before, names)
     missed = _missed_steps(columns) if setting.moves is None else []
     chosen = list(dict.fromkeys([*chosen[:1], *missed, *chosen[1:]]))
     found = dict.fromkeys((*names, *WITH_FORCE), 0.0)
-    excess, chip = dict.fromkeys(names, 0.0), dict.fromkeys(names, 0.0)
+    excess, chip, parts = dict.fromkeys(names, 0.0), dict.fromkeys(names, 0.0), PartsOfTools()
     worst = {name: float(np.max(columns[name], initial=0.0)) for name in names}
     budget, spent = max(int(SHARE * count), LEAST), 0
     left = max(int(MISSED_SHARE * count), MISSED_LEAST)
-    windows = {w.step: replace(w, parts=PARTS if w.step in missed else 2) for w in _windows(blocks, chosen, setting)}
+    of_tools = [k for k in _worst_of_tools(columns, setting.cutters, setting.material) if k not in chosen]
+    windows = {
+        w.step: replace(w, parts=PARTS if w.step in missed else 2)
+        for w in _windows(blocks, [*chosen, *of_tools], setting)
+    }
     for number, step in enumerate(chosen):
         window = windows[step]
         if step in missed and window.cost <= left:
@@ -231,7 +248,8 @@ def resolution_error(
             spent += window.cost
         else:
             continue
-        alike, halves = again(window)
+        alike, halves, some = again(window)
+        _keep_worst(parts, int(window.own.tool[0]), some)
         for name in names:
             c, w = float(columns[name][step]), worst[name]
             same = alike.get(name, c)
@@ -239,6 +257,11 @@ def resolution_error(
             excess[name] = max(excess[name], window.factor * off)
             if max(c, halves[name]) >= 0.5 * w:
                 chip[name] = max(chip[name], halves[CHIP])
+    spent = 0
+    for step in dict.fromkeys(of_tools):
+        spent += windows[step].cost
+        if spent <= budget:
+            _keep_worst(parts, int(windows[step].own.tool[0]), again(windows[step])[2])
     # the flank of a flat mill is cut into slices where its contact changes: exact
     straight = all(
         c.corner_radius == c.taper == c.bottom == 0.0 and c.barrel_radius is None for c in _used(windows, setting)
@@ -256,7 +279,25 @@ def resolution_error(
             found[name] = excess[name] / worst[name] + floor + films / (1.0 - films) + chip[name]
         elif excess[name] > 0.0 or films > 0.0:
             found[name] = math.inf
-    return found | dict.fromkeys(WITH_FORCE, found["force_n"])
+    return found | dict.fromkeys(WITH_FORCE, found["force_n"]), _of_worst(parts, columns)
+
+
+def _keep_worst(parts: PartsOfTools, tool: int, some: SomeParts) -> None:
+    """Keep of each load of a tool the parts with which it is greatest."""
+    for each in some:
+        for name, steps in each.items():
+            parts[tool, name] = max((*steps, parts.get((tool, name), steps[0])), key=lambda x: x.load * (1.0 + x.rise))
+
+
+def _of_worst(parts: PartsOfTools, columns: Columns) -> PartsOfTools:
+    """Return the parts relative to the worst load of their tool."""
+    tool, out = np.asarray(columns["tool"]), PartsOfTools()
+    for (number, name), own in parts.items():
+        by = "torque_mean_nm" if name == "power_w" else name
+        worst = float(np.max(np.asarray(columns[by])[tool == number], initial=0.0)) if by in columns else own.load
+        # a step that is light in the run has parts of its own only
+        out[number, name] = own if own.load >= worst else own.relative_to(worst)
+    return out
 
 
 def _used(windows: Mapping[int, Window], setting: RunSettings) -> list[Cutter]:
@@ -285,6 +326,20 @@ def _chosen_steps(columns: Columns, before: LayeredStock, names: Sequence[str]) 
     if len(idle):
         out += idle[((np.arange(IDLE) + 0.5) / IDLE * len(idle)).astype(np.int64)].tolist()
     return list(dict.fromkeys(out)), len(force)
+
+
+def _worst_of_tools(columns: Columns, cutters: Mapping[int, Cutter], material: Material) -> list[int]:
+    """Return of each tool the step with the greatest force, and the one whose force is greatest with a runout that is
+    not known, as thin chips rise by most: by e / (h + Kte / Ktc).
+    """
+    tool, force, thick = (np.asarray(columns[name]) for name in ("tool", "force_n", THICKEST))
+    sharp, out = material.Kte / material.Ktc, []
+    for number in np.unique(tool[force > 0.0]).tolist():
+        own = np.flatnonzero((tool == number) & (force > 0.0))
+        chip = thick[own] + sharp
+        rise = np.divide(runout_of(cutters[number])[0], chip, out=np.zeros(len(own)), where=chip > 0.0)
+        out += [int(own[_among_worst(x)]) for x in (force[own], force[own] * (1.0 + rise))]
+    return out
 
 
 def _missed_steps(columns: Columns) -> list[int]:
@@ -339,9 +394,10 @@ def _rows(steps: Steps, rows: Ints) -> Steps:
 def layers_again(before: LayeredStock, setting: RunSettings, remove: Remove) -> Again:
     """Compute steps again in a finer stock of layers; ``remove`` returns the columns of some steps."""
 
-    def again(window: Window) -> tuple[Mapping[str, float], Mapping[str, float]]:
-        fine = _finer_layers(window, before, setting, remove)
-        return (fine if window.parts == 2 else {}), fine
+    def again(window: Window) -> tuple[Mapping[str, float], Mapping[str, float], SomeParts]:
+        watch = _PartsWatch(setting.material)
+        fine = _finer_layers(window, before, replace(setting, watch=watch), remove)
+        return (fine if window.parts == 2 else {}), fine, watch.found
 
     return again
 
@@ -353,10 +409,12 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
     flank = {n: length / MORE for n, length in run.flank_mm.items()}
     rotation = 0.5 * setting.resolution.rotation
 
-    def loads_of(window: Window, own: Steps, more: tuple[int, int] | None) -> tuple[Mapping[str, float], float]:
+    def loads_of(
+        window: Window, own: Steps, more: tuple[int, int] | None
+    ) -> tuple[Mapping[str, float], float, list[Cuts]]:
         stock = run.stock.cropped(window.low, window.high)
         if stock is None:
-            return dict.fromkeys((*COMPARABLE, CHIP), 0.0), 0.0
+            return dict.fromkeys((*COMPARABLE, CHIP), 0.0), 0.0, []
         stock.more = stock.more if more is None else more
         finer = replace(run, stock=stock, corner_slices=MORE * run.corner_slices, flank_mm=flank)
         for some in window.earlier:
@@ -364,13 +422,14 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
         found = moved(own, finer, 0, setting.cutters, setting.material, rotation)
         worst = {name: float(found.loads[:, LOADS.index(name)].max()) for name in COMPARABLE}
         worst[CHIP] = max((float(chip_error(c.plain, c.cutter).max(initial=0.0)) for c in found.cuts), default=0.0)
-        return worst, float(found.removed[:, 0].sum())
+        return worst, float(found.removed[:, 0].sum()), found.cuts
 
-    def again(window: Window) -> tuple[Mapping[str, float], Mapping[str, float]]:
+    def again(window: Window) -> tuple[Mapping[str, float], Mapping[str, float], SomeParts]:
         volume = float(columns["chip_volume_mm3"][window.step])
         alike = [loads_of(window, window.own, (n, n)) for n in (1, *run.stock.more)]
-        same = min(alike, key=lambda each: abs(each[1] - volume))[0]
-        return same, loads_of(window, _parts(window.own, window.parts), None)[0]
+        same, _, cuts = min(alike, key=lambda each: abs(each[1] - volume))
+        own = [load_parts(c.plain, c.cutter, setting.material) for c in cuts if len(c)]
+        return same, loads_of(window, _parts(window.own, window.parts), None)[0], own
 
     return again
 
@@ -406,7 +465,7 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
         flank_mm=fine.flank_mm,
         grading=max(fine.grading, 2.0) if window.upright else fine.grading,
     )
-    again = replace(setting, profiles={tool: profile}, resolution=fine, watch=_chip_errors)
+    again = replace(setting, profiles={tool: profile}, resolution=fine)
     tolerance = fine.tolerance
     for some in window.earlier:
         tiles = TileRings(stock)
@@ -418,9 +477,16 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
     return worst | {CHIP: float(np.max(columns.get(CHIP, 0.0)))}
 
 
-def _chip_errors(cuts: Cuts) -> dict[str, Floats]:
-    """Return the error of the chip of each step, a watch."""
-    return {CHIP: chip_error(cuts.plain, cuts.cutter)}
+@dataclass(eq=False)
+class _PartsWatch:
+    """A watch that gives the error of the chip of each step, and keeps the parts of the errors of its loads."""
+
+    material: Material
+    found: SomeParts = field(default_factory=list)
+
+    def __call__(self, cuts: Cuts) -> dict[str, Floats]:
+        self.found.append(load_parts(cuts.plain, cuts.cutter, self.material))
+        return {CHIP: chip_error(cuts.plain, cuts.cutter)}
 
 
 def axial_force(columns: Columns) -> Floats:

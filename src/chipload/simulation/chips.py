@@ -32,6 +32,7 @@ from chipload.progress import Progress, silent
 from chipload.simulation.accuracy import (
     COMPARED,
     WITH_FORCE,
+    PartsOfTools,
     energy_balance,
     layers_again,
     moves_again,
@@ -238,10 +239,12 @@ def with_accuracy(removal: Removal, program: Program, before: LayeredStock | Non
     """Add energy balance and resolution error to a removal; ``before`` is the stock before it, None: add nothing."""
     if before is None:
         return removal
+    errors, parts = resolution_error_of(program, before, removal.columns, setting)
     return replace(
         removal,
         energy_balance=energy_balance(removal.columns, setting.material.Ktc),
-        resolution_error=resolution_error_of(program, before, removal.columns, setting),
+        resolution_error=errors,
+        load_parts=parts,
     )
 
 
@@ -251,13 +254,14 @@ def resolution_error_of(
     columns: Columns,
     setting: RunSettings,
     names: Sequence[str] = COMPARED,
-) -> dict[str, float]:
-    """Return the relative error of the worst value of columns of a removal (:mod:`chipload.simulation.accuracy`).
+) -> tuple[dict[str, float], PartsOfTools]:
+    """Return the relative error of the worst value of columns of a removal, and the other parts of their error
+    (:mod:`chipload.simulation.accuracy`).
 
     It is inf, not known, where the resolution states that it is not estimated.
     """
     if not setting.resolution.estimated:
-        return dict.fromkeys((*names, *WITH_FORCE), math.inf)
+        return dict.fromkeys((*names, *WITH_FORCE), math.inf), {}
     blocks = StepBlocks(program, setting.resolution.step_mm, setting.resolution.tolerance)
     if setting.moves is None:
         again = layers_again(

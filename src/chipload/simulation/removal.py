@@ -13,6 +13,7 @@ from shapely import Polygon
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import Slices
+from chipload.cutting.load_parts import LoadParts
 from chipload.cutting.material import Material
 from chipload.engagement.chips.move import Move
 from chipload.errors import Finding
@@ -124,6 +125,7 @@ class Removal:
         was cut or it was not asked for
     resolution_error : relative error of the worst value of a column, by its name; empty unless it was asked for; both
         as :mod:`chipload.simulation.accuracy` says
+    load_parts : other parts of the error of the worst load of a tool, by tool and column; empty like it
     samples : tooth engagement of some steps, to be shown; None: none was asked for, or nothing cut
     """
 
@@ -137,6 +139,7 @@ class Removal:
     cuts: tuple[Cuts, ...] = ()
     energy_balance: Mapping[int, float] = field(default_factory=dict)
     resolution_error: Mapping[str, float] = field(default_factory=dict)
+    load_parts: Mapping[tuple[int, str], LoadParts] = field(default_factory=dict)
     samples: EngagementSamples | None = None
 
     @property

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.checking.default_checks import DefaultChecks, default_limits
+from chipload.checking.default_checks import DefaultChecks, default_limits, with_budget
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.engagement.contact import PIECES, Engagement
@@ -126,7 +126,9 @@ def _exceeded(
     )
     columns["tool"] = np.full(PLACES, cut.cutter.number)
     found = [
-        check_limit(name, limit, columns, error=error_of(column_of(name).name, PLANNED_ERRORS))
+        with_budget(
+            check_limit(name, limit, columns, error=error_of(column_of(name).name, PLANNED_ERRORS)), checks, columns
+        )
         for name, limit in limits.items()
         if name != "engagement_deg"
     ]

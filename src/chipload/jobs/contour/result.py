@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from chipload.checking.default_checks import (
     ramp_findings,
     range_findings,
     unchecked_checks,
-    with_peaks,
+    with_budget,
 )
 from chipload.errors import Finding, Severity
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
@@ -97,10 +98,11 @@ def limits_of(machine: Machine, op: Operation, strategy: StrategyResult, track: 
         )
         for name, limit in op.limits.items()
     )  # fmt: skip
-    if op.checks is not None:
-        stated = tuple(with_peaks(check, op.checks, columns) for check in stated)
-    own = () if op.checks is None else default_limits(op.checks, machine, columns, track, errors)
-    return (*stated, *own)
+    if op.checks is None:
+        return stated
+    checks = op.checks if simulated is None else replace(op.checks, parts=simulated.load_parts)
+    stated = tuple(with_budget(check, checks, columns) for check in stated)
+    return (*stated, *default_limits(checks, machine, columns, track, errors))
 
 
 def _wall_rows(op: Operation, strategy: StrategyResult) -> CoveredRows | None:

@@ -276,7 +276,7 @@ def _operation(
     result = _plan(job, inputs, op, cutter, planned, lambda done, what: progress(0.5 * done, what))
     result = replace(result, findings=(*result.findings, *advice))
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
-    checks = default_checks(value_of(CheckSettings, job.table.checks), {cutter.number: cutter}, inputs.material, 0.5)
+    checks = default_checks(value_of(CheckSettings, job.table.checks), {cutter.number: cutter}, inputs.material)
     depth = op.depth_mm or op.axial_depth_mm
     made = Operation(result, settings, cutter, inputs.top, depth, {}, {}, job.limits, checks)
     written = WrittenOperation(title_of(job.path), inputs.machine, len(planned), op.milling, op.step_mm)
@@ -328,9 +328,7 @@ def _resolved(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[Oper
     cutter = job.cutters[op.cutter]
     found: tuple[str, ...] = ()
     if op.engagement_deg == "limit":
-        checks = default_checks(
-            value_of(CheckSettings, job.table.checks), {cutter.number: cutter}, inputs.material, 0.5
-        )
+        checks = default_checks(value_of(CheckSettings, job.table.checks), {cutter.number: cutter}, inputs.material)
         advice = greatest_engagement(op, cutter, inputs.material, inputs.machine, job.limits, checks, _rigid(job))
         angle, found = advice.engagement, (advice.text,)
     else:

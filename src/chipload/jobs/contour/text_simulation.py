@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from chipload.checking.stock_check import contact_findings
 from chipload.checking.workpiece import insides, stock_box
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import greatest_forces
+from chipload.cutting.load_parts import LoadParts
 from chipload.cutting.rigid import deflection_share
 from chipload.cutting.strength import cutter_stress
 from chipload.cutting.wall_error import Milling, greatest_wall_error
@@ -95,6 +96,7 @@ class SimulatedText:
     findings : of the reader, of the machine's limits and of the simulation
     resolution_error : relative error of columns
     samples : tooth engagement of some steps; None: nothing is cut
+    load_parts : other parts of the error of the worst loads, by tool and load
     """
 
     program: Program
@@ -102,6 +104,7 @@ class SimulatedText:
     findings: tuple[Finding, ...]
     resolution_error: Mapping[str, float]
     samples: EngagementSamples | None
+    load_parts: Mapping[tuple[int, str], LoadParts] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +279,7 @@ def simulate_text(
         *reversed_cuts(steps, removal.columns, cutters),
         *program_findings(program, steps, removal.columns, cutters, around),
     )
-    return SimulatedText(program, found, findings, errors, recorder.samples())
+    return SimulatedText(program, found, findings, errors, recorder.samples(), removal.load_parts)
 
 
 def _findings(reading: ProgramReading) -> tuple[Finding, ...]:

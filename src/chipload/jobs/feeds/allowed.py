@@ -9,16 +9,18 @@ factors. The caller proves the limits by simulating the new program from fresh s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.checking.default_checks import DefaultChecks, peak_excess, upper_loads
+from chipload.checking.default_checks import DefaultChecks, peak_excess
+from chipload.checking.load_budget import BUDGETED, factors_of_steps
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
+from chipload.cutting.load_parts import LoadParts, load_parts
 from chipload.cutting.material import Material
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.engagement.tooth_surfaces import thickest_of_teeth
@@ -49,6 +51,8 @@ STRESS = "cutter_stress_mpa"
 CHIP = "chip_max_mm"
 #: angles kappa at which a chip with runout is evaluated, and halvings of the chip without runout
 KAPPAS, HALVINGS = 41, 40
+#: how often the parts of the errors of loads are calculated, each time at the feeds found before
+PARTS_AGAIN = 2
 #: lags of the edge at which its runout is evaluated
 LAGS = 12
 #: columns of the removal in which a watch states what each step allows
@@ -82,6 +86,27 @@ class FeedRequest:
         """Names of the limits that restrict the feed: ``limits``, then the stress of the cutter."""
         return (*self.limits, *(() if "cutter_strength" in self.checks.off else (STRESS,)))
 
+    def factors(
+        self, limit: str, parts: Mapping[str, Sequence[LoadParts]], loads: Mapping[str, Floats], bends: Floats
+    ) -> Floats | float:
+        """Return what the value of each step at the confidence of the checks is over the nominal one.
+
+        Parameters
+        ----------
+        parts : of the errors of the loads of the steps
+        loads : nominal, at the feeds that are tried
+        bends : (c,) deflection over force [um/N] of the steps
+        """
+        column = column_of(limit).name
+        if self.checks.confidence <= 0.5 or column not in BUDGETED:
+            return 1.0 + self.error(limit)
+        error, peaks, kind = error_of(column, self.errors), peak_excess(self.checks.material, column), BUDGETED[column]
+        nominal = loads["torque_mean_nm" if kind == "power_w" else kind]
+        return factors_of_steps(
+            parts[kind], column, nominal, self.checks.confidence, error if math.isfinite(error) else 0.0, peaks,
+            1e-3 * bends * loads["force_n"],
+        )  # fmt: skip
+
     def error(self, limit: str) -> float:
         """Return the relative error of the column that a limit bounds, including the peak excess of the material.
 
@@ -111,7 +136,7 @@ def watching(
 
     def watch(cuts: Cuts) -> dict[str, Floats]:
         low, high = least[cuts.step], most[cuts.step]
-        there = greatest_loads(cuts, material, request.rotation, False)
+        there = greatest_loads(cuts, material, request.rotation)
         beyond = {
             name: np.maximum(np.divide(before[name][cuts.step], x, out=np.ones(len(x)), where=x > 0.0), 1.0)
             for name, x in there.items()
@@ -120,28 +145,43 @@ def watching(
         chip = np.where(beyond.get(CHIP, 1.0) > 1.0, before[CHIP][cuts.step], 0.0) if CHIP in before else 0.0
         chip_at = _chip_of_instant(np.broadcast_to(chip, low.shape), cuts.cutter, cuts.engagement.slices[:, 3])
 
-        def ratios(factor: Floats) -> Floats:
+        force = np.asarray(before["force_n"])[cuts.step]
+        deflection = (
+            np.asarray(before["deflection_um"])[cuts.step] if "deflection_um" in before else np.zeros(len(force))
+        )
+        bends = np.divide(deflection, force, out=np.zeros(len(force)), where=force > 0.0)
+
+        def ratios(factor: Floats, parts: Mapping[str, Sequence[LoadParts]]) -> Floats:
             thickest = chip_at(factor)
             moved = at_feeds(cuts, factor)
-            loads: dict[str, Floats] = greatest_loads(moved, material, request.rotation, request.checks.sigma > 0.0)
+            loads: dict[str, Floats] = greatest_loads(moved, material, request.rotation)
             if request.more is not None:
                 loads |= request.more(moved)
             if STRESS in request.feed_limits and STRESS not in loads:
                 loads[STRESS] = cutter_stress(moved.engagement, moved.cutter, material)
-            upper = upper_loads(loads, request.checks.sigma)
             limits = {**request.limits, STRESS: allowed_stress(moved.cutter)}
             return np.array(
                 [
-                    np.maximum(upper[column] * beyond.get(column, 1.0), thickest if column == CHIP else 0.0)
-                    * (1.0 + request.error(name))
+                    np.maximum(loads[column] * beyond.get(column, 1.0), thickest if column == CHIP else 0.0)
+                    * request.factors(name, parts, loads, bends)
                     / limits[name]
                     for name in request.feed_limits
                     for column in (column_of(name).name,)
                 ]
             )
 
-        factor = greatest_factor(lambda k: np.asarray(ratios(k).max(axis=0)), low, high)
-        worst = LIMITED + ratios(np.where(np.isnan(factor), low, factor)).argmax(axis=0)
+        def greatest(parts: Mapping[str, Sequence[LoadParts]]) -> Floats:
+            return greatest_factor(lambda k: np.asarray(ratios(k, parts).max(axis=0)), low, high)
+
+        parts, factor = {}, np.ones(len(low))
+        if request.checks.confidence > 0.5:
+            # at the programmed feeds, then at those that are found with them
+            for _ in range(PARTS_AGAIN):
+                parts = load_parts(at_feeds(cuts, factor).plain, cuts.cutter, material)
+                factor = greatest(parts)
+                factor = np.where(np.isnan(factor), low, factor)
+        factor = greatest(parts)
+        worst = LIMITED + ratios(np.where(np.isnan(factor), low, factor), parts).argmax(axis=0)
         return {_FACTOR: factor, _BY: np.where(factor == high, by[cuts.step], worst).astype(np.float64)}
 
     return watch

@@ -98,7 +98,7 @@ def _new_feeds(
         limits |= spindle_limits(machine, turning)
     gives = stiffness_of(inputs.elasticity.stiffness, cutters, None if compliance is None else compliance.steps)
     bends = with_checks(inputs.checks, material, deflecting(gives, material))
-    checks = default_checks(inputs.checks, cutters, material, op.confidence)
+    checks = default_checks(inputs.checks, cutters, material)
     program, times = timed(reading, cutters, machine)
     # as it is: what its loads are, and how well they are known
     before = remove(

@@ -192,11 +192,6 @@ class SimulateTable(Table):
         "shank and holder; default: from the cutters and the size of the stock",
     )
     speeds: SpeedsTable | None = Field(None, description="new spindle speeds; needs [dynamics]; default: unchanged")
-    confidence: Number = setting(
-        SimulationSettings,
-        "confidence",
-        "one-sided confidence of the loads that are compared with limits; 0.5: mean loads",
-    )
 
 
 def _limit(name: str, description: str) -> Any:

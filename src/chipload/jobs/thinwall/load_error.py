@@ -71,7 +71,7 @@ def load_error(passes: Sequence[SimulatedPass], material: Material) -> dict[str,
     for k in sorted({int(values.argmax()) for values in worst.values()}):
         p = passes[k]
         setting = setting_of({p.cutter.number: p.cutter}, material, p.resolution, "slerp", None, 1)
-        found = resolution_error_of(p.program, p.before, {**p.columns, **compared[k]}, setting, names)
+        found = resolution_error_of(p.program, p.before, {**p.columns, **compared[k]}, setting, names)[0]
         for name in names:
             whole = float(worst[name].max())
             share = float(worst[name][k]) / whole if whole > 0.0 else 1.0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.checking.default_checks import default_limits, range_findings, unchecked_checks, with_peaks
+from chipload.checking.default_checks import default_limits, range_findings, unchecked_checks, with_budget
 from chipload.errors import Finding, Severity
 from chipload.jobs.thinwall.chatter import FIRST_STATE, chatter_limits, chatter_numbers
 from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, remedy_text
@@ -102,16 +102,16 @@ def limits_of(walled: ThinWallResult, one: Variant) -> tuple[LimitCheck, ...]:
     c, out = one.columns, []
     for name, limit in walled.limits.items():
         if name == "form_error_um":
-            out.append(with_peaks(_form_error(walled, one, limit), walled.checks, c))
+            out.append(with_budget(_form_error(walled, one, limit), walled.checks, c))
         else:
             check = check_limit(name, limit, c, track=one.name, error=limit_error(walled, one, name))
-            out.append(with_peaks(check, walled.checks, c))
+            out.append(with_budget(check, walled.checks, c))
     over, cuts = "force_over_allowable", c["force_normal_n"] > 0.0
     pressing = CoveredRows(cuts, "cuts that press on the wall", "where the wall is bent")
     force = check_limit(over, 1.0 + OVER, c, track=one.name, rows=pressing, error=limit_error(walled, one, over))
     strength = float(walled.settings["yield_mpa"])
     stress = _limit_check("stress_mpa", strength, one.stress, one, limit_error(walled, one, "stress_mpa"))
-    out += [with_peaks(check, walled.checks, c) for check in (force, stress)]
+    out += [with_budget(check, walled.checks, c) for check in (force, stress)]
     gouge, tolerance = max(one.shape.gouge, -one.shape.nearest, 0.0), float(walled.settings["gouge_tolerance_mm"])
     place = (float(one.shape.at[0]), float(one.shape.at[1]), float(one.shape.at[2]))
     state, why = state_of(gouge, tolerance + one.shift, 0.0)[0], ""

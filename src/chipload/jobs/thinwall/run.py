@@ -117,7 +117,7 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
         variants=made,
         findings=_findings(inputs),
         settings=settings,
-        checks=default_checks(value_of(CheckSettings, job.table.checks), cutters, inputs.cut.material, 0.5),
+        checks=default_checks(value_of(CheckSettings, job.table.checks), cutters, inputs.cut.material),
         provenance=provenance,
     )
     return with_texts_read_back(walled)

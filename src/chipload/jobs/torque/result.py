@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from chipload.checking.default_checks import default_limits, range_findings, unchecked_checks, with_peaks
+from chipload.checking.default_checks import default_limits, range_findings, unchecked_checks, with_budget
 from chipload.control.override import STATUS
 from chipload.errors import Finding, Severity
 from chipload.jobs.torque.numbers import operation_numbers
@@ -97,7 +97,7 @@ def limits_of(outcome: TorqueResult, columns: Columns, track: str) -> tuple[Limi
         for name, limit in outcome.job.limits.items()
     )
     checks = outcome.job.checks
-    stated_checks = (with_peaks(check, checks, columns) for check in stated)
+    stated_checks = (with_budget(check, checks, columns) for check in stated)
     found = (*stated_checks, *default_limits(checks, outcome.job.machine, columns, track, errors))
     return tuple(over_allowable(x, columns, errors["torque_nm"]) if x.name == OVER else x for x in found)
 

@@ -165,7 +165,7 @@ def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Materi
         settings=job.table.model_dump(exclude_none=True, exclude={"cutter", "surprise"}),
         surprises=tuple(_text_of(x.model_dump(exclude_none=True)) for x in job.table.surprise),
         surprise_angles=tuple((x.at_deg, x.kind) for x in job.table.surprise if x.at_deg is not None),
-        checks=default_checks(value_of(CheckSettings, job.table.checks), job.cutters, material, 0.5),
+        checks=default_checks(value_of(CheckSettings, job.table.checks), job.cutters, material),
         check_settings=value_of(CheckSettings, job.table.checks),
         provenance=_provenance(job, machine, material),
     )
