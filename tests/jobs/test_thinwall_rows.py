@@ -232,3 +232,22 @@ def test_depth_of_all_is_planned_for_rows(folder):
     places = places_of(inputs)
     (leg,) = linked(inputs, unlimited_plan(places).plan, places.grid)
     assert leg.points[leg.contact][:, 1] == pytest.approx(-0.85, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda lines: [*lines[:2], "GOTARC/1,2,3", *lines[2:]], "line 3: GOTARC"),
+        (lambda lines: [x for x in lines if not x.startswith("UNITS")], "line 8: no UNITS before it"),
+    ],
+)
+def test_findings_of_the_text_of_the_rows_are_findings_of_the_job(folder, change, text):
+    """A statement that is not read, and no unit. The line is of the text of the rows, not of a program of the job."""
+    keys = (*SMALL, "wall.allowance_mm=[0.0, 0.3]")
+    lines = zigzag().splitlines()
+    (folder / "finish.apt").write_text("\n".join(lines) + "\n")
+    plain = read_wall(load_job(folder / "rows.toml", keys).job).findings
+    (folder / "finish.apt").write_text("\n".join(change(lines)) + "\n")
+    (found,) = (f for f in read_wall(load_job(folder / "rows.toml", keys).job).findings if f not in plain)
+    assert found.line == 0
+    assert found.text.startswith(f"operation.0.rows = finish.apt: {text}")

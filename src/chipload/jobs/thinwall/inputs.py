@@ -310,7 +310,7 @@ def read_wall(job: ThinWallJob) -> WallInputs:
         title=title_of(job.path),
         body=_part_body(job, shape, step_over) if isinstance(shape, PartShape) else _wall_body(job, shape, sides, foot),
         operations=tuple(operations),
-        findings=findings,
+        findings=(*findings, *(f for o in operations if o.rows is not None for f in o.rows.findings)),
         neighbours={name: points for name, (points, _) in neighbours.items()},
         neighbour_meshes={name: mesh for name, (_, mesh) in neighbours.items()},
     )

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.errors import InputError
+from chipload.errors import Finding, InputError
 from chipload.geometry.thin_wall import ThinWall
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_shape import PartShape
@@ -27,6 +27,7 @@ from chipload.planning.thinwall.read_rows import sides_of_program
 from chipload.program.gcode.tools import Tool, ToolTable
 from chipload.program.program import RAPID, Program
 from chipload.program.read import read_program
+from chipload.result.first_lines import located
 
 Floats = NDArray[np.float64]
 
@@ -47,11 +48,14 @@ class ProgramRows:
     sides : in the order of those with stock
     step_over : greatest distance of neighbouring rows [mm]
     stands : sign of the step-over, lead and tilt [rad] of each pose
+    findings : on the text of the program; their lines stand in their texts, as those of the result are of its own
+        programs
     """
 
     sides: tuple[FinishSide, ...]
     step_over: float
     stands: tuple[tuple[int, float, float], ...]
+    findings: tuple[Finding, ...] = ()
 
     def poses(self, cutter: Cutter, feed_per_tooth: float) -> tuple[CutterPose, ...]:
         """Poses of the cutter along the rows."""
@@ -92,12 +96,15 @@ def program_rows(
     lengths = ToolTable(
         {n: Tool(n, diameter=c.diameter, offset=(0.0, 0.0, c.overhang, *NO_OFFSET)) for n, c in job.cutters.items()}
     )
-    program = read_program(file, machine, tools=lengths).program
+    reading = read_program(file, machine, tools=lengths)
+    program = reading.program
     tool = _tool_of(program, op.cutter, name)
     at = [side_at(shape, s) for s in side_numbers]
     sides, step_over = sides_of_program(program, cutter, at, foot, op.step_mm, name, tool)
     stands = [one for k, side in enumerate(sides) for one in _stands(side, f"{name}: side {k + 1}")]
-    return ProgramRows(sides, step_over, tuple(dict.fromkeys(stands)))
+    # limits of the machine are checked on the job's own programs, which follow the rows
+    found = (replace(f, text=f"{name}: {located(f)}", line=0, row=None) for f in reading.findings)
+    return ProgramRows(sides, step_over, tuple(dict.fromkeys(stands)), tuple(dict.fromkeys(found)))
 
 
 def side_at(shape: ThinWall | PartShape, number: int) -> SideAt:
