@@ -3,8 +3,8 @@
     CHIPLOAD_DATA=... python tools/real_programs.py [NAME ...] [--limit-s 600] [--again] [--kept DIR]
 
 ``chipload init`` drafts a job of each file of :data:`FILES`; ``chipload check`` estimates its run; ``chipload run
---accept`` runs it, the shortest first, in a process of its own. What a file does not state is guessed, and the guesses
-are accepted. A file that takes more processor time than the limit, or that is refused, is recorded as such; a
+--accept`` runs it, the shortest first, in a process of its own. What a file does not state is guessed.
+A file that takes more processor time than the limit, or that is refused, is recorded as such; a
 simulation that was stopped, or that the system ended, goes on from its checkpoint the next time. Files that have a
 verdict on the page are not run again unless ``--again`` asks for it. Times are processor times of a file, all its parts
 together.
@@ -66,8 +66,9 @@ HEAD = """# Real programs, run whole
 
 This page shows what chipload makes of whole files of other people, for users who want to know how far their own files
 will lead. `chipload init FILE DIR` drafts a job for each file, and `chipload run DIR/job.toml --accept` runs it from
-beginning to end. What a file does not state (cutter, stock, machine) is guessed and accepted. A verdict therefore
-depends on guesses: a gouge, or a rapid through stock, may be one of a guessed stock.
+beginning to end. What a file does not state (cutter, stock, machine) is guessed. What rests on a guess of a program
+neither holds nor exceeds: it is unproven until the guess is confirmed. The plans of a drawing or a model are made for
+the guessed cutter and material, which `--accept` accepts.
 
 `make real` runs all files that have no verdict, the shortest first by the estimate of `chipload check`, and writes this
 page. A stopped file continues where it was. Times are processor times. They include the compilation of kernels where a

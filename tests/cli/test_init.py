@@ -64,19 +64,28 @@ def test_an_option_is_a_guess_no_more(program: Path, tmp_path: Path) -> None:
     assert [g for g in before if g not in after] == [next(g for g in before if g.startswith("cutter.0.flutes"))]
 
 
-def test_accepted_guesses_stand_in_the_result(program: Path, tmp_path: Path) -> None:
+def test_accepted_guesses_of_a_program_leave_it_unproven(program: Path, tmp_path: Path) -> None:
     call("init", program, tmp_path / "job")
     job = tmp_path / "job" / "job.toml"
     code, said, _ = call("run", job, "--accept", "--out", tmp_path / "out", "--set", "operation.0.step_mm=4")
-    assert code in (0, 3)
+    assert code == 3
     summary = json.loads((tmp_path / "out" / "summary.json").read_bytes())
-    notes = [f for f in summary["findings"] if f["code"] == "job-guess"]
-    assert len(notes) == len(load_job(job).guesses) > 5
+    guesses = [f for f in summary["findings"] if f["code"] == "job-guess"]
+    assert len(guesses) == len(load_job(job).guesses) > 5
+    assert {f["severity"] for f in guesses} == {"unproven"}
+    assert {c["state"] for c in summary["limits"]} == {"unproven"}
     lines, holds = check_job(load_job(job))
     assert not holds
     assert lines[0].startswith("guess: machine.name = ")
     assert "report:" in said
-    assert f" {len(notes)} guesses of the job were accepted." in said.splitlines()[0]
+    assert said.startswith("Unproven: ")
+    # confirmed, the same values are those of the user
+    (tmp_path / "job" / "own.toml").write_text(job.read_text().replace("confirm = true", ""))
+    code, said, _ = call(
+        "run", tmp_path / "job" / "own.toml", "--out", tmp_path / "own", "--set", "operation.0.step_mm=4"
+    )
+    summary = json.loads((tmp_path / "own" / "summary.json").read_bytes())
+    assert "holds" in {c["state"] for c in summary["limits"]}
 
 
 def test_a_first_look_is_never_better_than_unproven(program: Path, tmp_path: Path) -> None:

@@ -74,7 +74,9 @@ ToleranceMm = Annotated[
     float,
     typer.Option("--tolerance-mm", help="greatest deviation of the tip where a move with rotary axes is divided"),
 ]
-Accept = Annotated[bool, typer.Option("--accept", help="accept the guesses of a draft; the report lists them")]
+Accept = Annotated[
+    bool, typer.Option("--accept", help="run with the guesses of a draft; what they decide of a program is unproven")
+]
 Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an error in chipload")]
 
 

@@ -240,7 +240,8 @@ def run_job(
     ----------
     checkpoint : keeps finished work, so that a stopped run continues; used by the capabilities that can resume
     guesses : what a guess of a draft is in the result: a note where its user accepts it, UNPROVEN for a first look;
-        None: a job with guesses is refused
+        None: a job with guesses is refused. What is guessed of a program that exists (its stock, zero, cutters, unit,
+        control, material) is no choice of the user: there an accepted guess is UNPROVEN too
     workers : processes or a cluster that compute parts of the run; None: this process alone. What is found is the same
 
     Raises
@@ -269,7 +270,8 @@ def run_job(
     if guesses is not None:
         from chipload.jobs.guesses import with_guesses
 
-        result = with_guesses(result, loaded.guesses, guesses)
+        chosen = capability.key != "program"
+        result = with_guesses(result, loaded.guesses, guesses if chosen else Severity.UNPROVEN)
     return FinishedJob(result, capability.module("figures").presentation_of(outcome), outcome)
 
 

@@ -37,8 +37,8 @@ def with_guesses(result: Result, guesses: Sequence[str], severity: Severity) -> 
     Parameters
     ----------
     guesses : a line each, as ``cutter.0.flutes = 3: no file states them``
-    severity : NOTE where the user accepts the guesses, which are then stated values; UNPROVEN where nobody has: then
-        what exceeds or holds by a guessed value is unproven
+    severity : NOTE where the user accepts the guesses of a plan, which are then stated values; UNPROVEN where nobody
+        has, and for a program that exists: then what exceeds or holds by a guessed value is unproven
     """
     found = tuple(Finding(GUESS, 0, f"guess: {text}", severity) for text in guesses)
     if severity is not Severity.NOTE and guesses:

@@ -123,7 +123,7 @@ class Draft:
             self.title,
             "",
             "Every value is one that the file states, or a guess. A guess is marked by a comment; correct it, then",
-            "delete `confirm = true` of its table. `chipload run --accept` takes all guesses as they are.",
+            "delete `confirm = true` of its table. `chipload run --accept` runs with all guesses as they are.",
             "All keys: chipload's docs/jobs.md.",
         ]
         notes = ["", "Found in the file:", *(f"* {note}" for note in self.notes)] if self.notes else []
