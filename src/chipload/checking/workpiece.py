@@ -174,11 +174,13 @@ class Fixture:
     mesh : closed body [mm]
     spacing_mm : longest side of the triangles whose corners are compared
     file : from which it was read
+    name : in the report; empty: ``fixture`` and its number
     """
 
     mesh: trimesh.Trimesh
     spacing_mm: float = number_field(above=0.0)
     file: Path | None = None
+    name: str = ""
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -221,7 +223,7 @@ class Surroundings:
 
     def fixture_meshes(self, machine: Machine) -> dict[str, trimesh.Trimesh]:
         """Return the meshes of the fixtures by name, followed by that of the machine table."""
-        out = {f"fixture {k}": fixture.mesh for k, fixture in enumerate(self.fixtures)}
+        out = {fixture.name or f"fixture {k}": fixture.mesh for k, fixture in enumerate(self.fixtures)}
         if (block := self.machine_table or machine.table) is not None:
             out[MACHINE_TABLE] = trimesh.creation.box(bounds=[block.low, block.high])
         return out

@@ -12,6 +12,7 @@ from chipload.checking.inputs import contradictions
 from chipload.checking.settings import Limits
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
+from chipload.jobs.simulation.fixtures import fixture_errors
 from chipload.jobs.simulation.tables import ProgramLimitsTable, SimulationJobTable
 from chipload.jobs.simulation.values import elasticity_of, settings_of
 from chipload.jobs.sources import Limited, cutters, sources_of
@@ -83,6 +84,7 @@ def program_job(
             for n, cutter in tools.items()
             if cutter.body and changed
         ]
+        errors.texts += [text for k, f in enumerate(table.fixture) for text in fixture_errors(f, f"fixture.{k}")]
         with errors.collect("operation.0."):
             settings_of(table.operation[0])
         with errors.collect():

@@ -13,9 +13,10 @@ from chipload.checking.preparation import bodies_of
 from chipload.checking.program_text import changeable, straight
 from chipload.checking.run import simulation_estimate
 from chipload.checking.settings import CheckSettings, Limits
-from chipload.checking.workpiece import FinishedPart, Fixture, Surroundings
+from chipload.checking.workpiece import FinishedPart, Surroundings
 from chipload.cutting.material import Material, material_named, read_material
 from chipload.errors import Finding, InputError, Severity, grouped, worst_severity
+from chipload.jobs.simulation.fixtures import fixtures_of
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.simulation.tables import ProgramTable
 from chipload.jobs.simulation.values import elasticity_of, settings_of, stock_of
@@ -60,15 +61,13 @@ def inputs_of(job: ProgramJob, machine: Machine) -> CheckInputs:
         part = FinishedPart.read(
             folder / of.file, of.spacing_mm, of.excess_range_mm, units=of.units, chord_mm=of.chord_mm
         )
-    fixtures = (
-        Fixture.read(folder / f.file, f.spacing_mm, units=f.units, chord_mm=f.chord_mm, key=f"fixture.{k}.file")
-        for k, f in enumerate(table.fixture)
-    )
+    stock = stock_of(stated(table.stock, "stock"), folder)
+    fixtures = [body for k, f in enumerate(table.fixture) for body in fixtures_of(f, k, folder, stock)]
     return CheckInputs(
         cutters=job.cutters,
         material=material_of(job),
         machine=machine,
-        stock=stock_of(stated(table.stock, "stock"), folder),
+        stock=stock,
         settings=settings_of(op),
         limits=value_of(Limits, table.limits),
         checks=value_of(CheckSettings, table.checks),

@@ -136,6 +136,48 @@ class FixtureTable(Table):
     spacing_mm: Positive = Field(description="longest side of the triangles whose corners are compared")
 
 
+class WorkholdingTable(Table):
+    """A fixture, which no part of a tool may touch: the body of a file, or a vise, a clamp or a block by its numbers.
+
+    A vise holds the block of the stock between its jaws; a clamp is a strap with its bolt; a block is any box, such as
+    a plate or a parallel.
+    """
+
+    kind: Literal["file", "vise", "clamp", "block"] = Field("file", description="what it is")
+    file: Text | None = Field(None, description="file: .stl or .step, a closed body")
+    units: Unit | None = Field(None, description="file: unit of an STL file, which does not state its unit")
+    chord_mm: Positive = Field(0.1, le=1.0, description="file: greatest deviation of facets from the faces of a model")
+    spacing_mm: Positive | None = Field(
+        None, description="longest side of the triangles whose corners are compared; default: 2, of a file none"
+    )
+    closes: Literal["x", "y"] | None = Field(None, description="vise: axis along which it closes; default y")
+    jaw_mm: Point | None = Field(None, description="vise: width, height and thickness of a jaw")
+    grip_mm: Positive | None = Field(None, description="vise: height of the stock between the jaws")
+    fixed: Literal["x-", "x+", "y-", "y+"] | None = Field(
+        None, description="vise: side of the stock at the fixed jaw; default: the upper one"
+    )
+    opening_mm: Positive | None = Field(
+        None, description="vise: distance between the jaws; default: the stock; must agree with it within 0.1"
+    )
+    step_mm: tuple[Positive, Positive] | None = Field(
+        None, description="vise: height and depth of the step of the jaws that the stock rests on"
+    )
+    parallels_mm: Positive | None = Field(
+        None, description="vise: thickness of the parallels that the stock rests on; as high as the jaw less grip_mm"
+    )
+    at_mm: Number | None = Field(None, description="vise: middle of the jaws along their width; default: of the stock")
+    point_mm: Point | None = Field(None, description="clamp: middle of the end of the strap, on the stock")
+    strap_mm: Point | None = Field(None, description="clamp: length, width and thickness of the strap")
+    angle_deg: Number | None = Field(
+        None, description="clamp: direction of the strap from point_mm, from X to Y; default 0, along X+"
+    )
+    bolt_mm: tuple[Positive, Positive] | None = Field(
+        None, description="clamp: diameter of the bolt in the middle of the strap, and its height above the strap"
+    )
+    low_mm: Point | None = Field(None, description="block: lower corner")
+    high_mm: Point | None = Field(None, description="block: upper corner")
+
+
 class MachineTableTable(Table):
     """The table or pallet under the workpiece, which no part of a tool may touch. It moves with the workpiece, and
     replaces the table of the machine file.
@@ -315,7 +357,7 @@ class SimulationJobTable(Table):
     machine: SourceTable
     stock: SolidTable | None = None
     part: TargetTable | None = None
-    fixture: tuple[FixtureTable, ...] = ()
+    fixture: tuple[WorkholdingTable, ...] = ()
     machine_table: MachineTableTable | None = None
     material: SourceTable | None = None
     cutter: tuple[CutterTable, ...] = ()
