@@ -384,3 +384,18 @@ def test_what_is_said_to_hold_holds(tmp_path_factory, data) -> None:
     np.testing.assert_array_equal(one.position, two.position)
     assert re.sub(r" F[\d.]+", "", held.text) == re.sub(r" F[\d.]+", "", text)
     np.testing.assert_allclose(held.before.columns["chip_max_mm"] > 0.0, c["chip_max_mm"] > 0.0)
+
+
+@pytest.mark.parametrize("name", ["force_n", "torque_nm", "power_w", "chip_max_mm"])
+def test_feeds_at_a_confidence_hold_at_it_and_use_it(tmp_path: Path, name: str) -> None:
+    """Planned and checked with one budget: the value at 95 % is within the limit, and short of it by the room for the
+    resolution error alone.
+    """
+    limit = LIMITS[name] * (1.0 if name == "chip_max_mm" else 2.0)
+    read = done(tmp_path, SLOT, f"{name} = {limit}\n[checks]\nconfidence = 0.95\ncutter_strength = false\n")
+    (check,) = (c for c in read.result.limits if c.name == name)
+    assert check.state is Verdict.HOLDS, check.text
+    assert read.outcome.feeds.by == (name,)
+    assert 0.95 * limit < check.value_at_confidence <= limit
+    assert read.result.headline.startswith("Holds at 95 %: ")
+    assert feed_of(read.outcome.feeds.text, 6) < 0.9 * slot_feed(name, limit)

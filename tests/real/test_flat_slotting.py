@@ -9,15 +9,20 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from chipload.checking.load_budget import budget_parts
 from chipload.cutting.fit import fit_average
+from chipload.cutting.load_parts import load_parts
 from chipload.cutting.measured import read_forces
+from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.jobs import load_job
 from chipload.jobs.fit.run import read_cuts, run
+from chipload.result.budget import ErrorBudget
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
 FOLDER = DATA / "measured" / "li_flat_slotting"
@@ -125,3 +130,23 @@ def test_means_without_runout_are_no_straight_line(tmp_path):
 def test_what_is_inferred_hardly_matters(tmp_path, diameter, helix):
     third = next(c for c in run(job(tmp_path, diameter, helix)).comparisons if c.use == "predict")
     assert np.all(np.abs(third.mean_percent) < 6.5), third.mean_percent
+
+
+def test_peaks_of_the_third_feed_are_within_their_value_at_95_percent(tmp_path):
+    """The cut that was not fitted: the greatest force across, in the direction in which the dynamometer rings least, is
+    within the value at 95 % in at least 93 of 100 turns; few are within the nominal value and its resolution error. The
+    value is 10 to 16 % above the nominal one: with one cut of each feed the coefficients are known to 7 %.
+    """
+    done = run(job(tmp_path))
+    third = next(c for c in done.comparisons if c.use == "predict")
+    cutter, metal = done.fit.cutter, done.material
+    slot = engagement_of_arcs([0.0], [math.pi], 900.0 / 6000.0 / 2, cutter, 3.0)
+    (own,) = load_parts(replace(slot, frame=np.eye(3)[None]), cutter, metal)["force_n"]
+    assert own.rise == 0.0  # the fit knows the runout
+    parts = budget_parts(own, "force_n", cutter, metal, 0.01, 0.0, 0.0)
+    factor = ErrorBudget(0.95, parts).value(1.0)
+    assert 1.10 < factor < 1.16
+    peaks, nominal = third.turns.high[:, 1], third.predicted.high[1]
+    assert len(peaks) == 100
+    assert np.mean(peaks <= factor * nominal) >= 0.93
+    assert np.mean(peaks <= 1.01 * nominal) < 0.2
