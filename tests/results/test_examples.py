@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 from chipload.cli import app
 from chipload.errors import InputError
 from chipload.machine.machine import machine_named
+from chipload.number_text import number_text
 from chipload.program.read import line_times, read_program, read_tools
 from chipload.report.page import HEADINGS, WHOLE
 from chipload.result import COLUMNS, Verdict
 from chipload.result.columns import unit_of
-from chipload.result.number_text import number_text
 from chipload.web.result import open_result
 
 NAMES = (

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from chipload.number_text import number_text
 from chipload.result import load_result
-from chipload.result.number_text import number_text
 from results.test_examples import NAMES
 from web_served import Served
 

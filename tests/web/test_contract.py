@@ -16,8 +16,8 @@ import pytest
 from typer.testing import CliRunner
 
 from chipload.cli import app
+from chipload.number_text import number_text
 from chipload.result import Verdict, load_result
-from chipload.result.number_text import number_text
 from square import two_variants, write_by_hand
 from web_lists import press_until
 from web_served import Served

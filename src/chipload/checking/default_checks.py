@@ -19,9 +19,9 @@ from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.errors import Finding, Severity
 from chipload.machine.machine import Machine
+from chipload.number_text import percent_text
 from chipload.result import CoveredRows, LimitCheck, Verdict, check_limit, error_of
 from chipload.result.limits import Columns, hold_at_confidence
-from chipload.result.number_text import percent_text
 from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.loads import Cuts, Floats, Ints
 from chipload.simulation.ramp import ramp_angle

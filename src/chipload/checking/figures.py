@@ -21,6 +21,7 @@ from chipload.checking.result import APT
 from chipload.checking.rows import motion_rows
 from chipload.checking.stability_figures import stability_sections
 from chipload.checking.workpiece_figures import workpiece_section
+from chipload.number_text import number_text
 from chipload.program.apt.writer import write_apt
 from chipload.program.program import RAPID, Program
 from chipload.report.diagram import diagram_figure
@@ -122,7 +123,7 @@ def _sections(program: ProgramResult, speeds: SpeedResult | None, figures: dict[
     body = [
         f"<h2>{escape(program.name)} on {escape(program.machine.name)}</h2>",
         f"<p>{what['motions']} motions, {what['cutting_mm']:.5g} mm at feed and {what['rapid_mm']:.5g} mm of rapids, "
-        f"{time_s / 60.0:.4g} min; {box} mm; tools {escape(', '.join(map(str, what['tools'])))}.</p>",
+        f"{number_text(time_s / 60.0)} min; {box} mm; tools {escape(', '.join(map(str, what['tools'])))}.</p>",
         "<h3>Feed over time</h3>",
         figure("feed", feed_figure(program), figures),
         "<h3>Slowest lines</h3>",
@@ -157,9 +158,11 @@ def _load_sections(simulation: SimulationResult, time_s: float, figures: dict[st
         f"<p>{what['steps']} steps; {what['chip_volume_mm3']:.6g} mm\u00b3 of chips, stock less by "
         f"{what['removed_mm3']:.6g} mm\u00b3; greatest chip thickness {what['chip_max_mm']['max']:.4g} mm; "
         f"{what['films_mm3']:.2g} mm\u00b3 in films thinner than the tolerance.</p>",
-        f"<p>Time on the machine: {what['cutting_s']:.4g} s in cut, {what['air_cut_s']:.4g} s in air, "
-        f"{what['rapid_s']:.4g} s of rapids, {what['dwell_s']:.4g} s of dwells, {what['other_s']:.4g} s of tool "
-        f"changes and start-up; {what['time_s']:.4g} s in all.</p>",
+        f"<p>Time on the machine: {number_text(what['cutting_s'])} s in cut, {number_text(what['air_cut_s'])} "
+        "s in air, "
+        f"{number_text(what['rapid_s'])} s of rapids, {number_text(what['dwell_s'])} s of dwells, "
+        f"{number_text(what['other_s'])} s of tool "
+        f"changes and start-up; {number_text(what['time_s'])} s in all.</p>",
         table(["", "mean", "greatest", "least"], rows, numbers=(1, 2, 3)),
         f'<p class="note">{SPREAD if torque["mean_sd"] is not None else NO_SPREAD}{escape(rigid)}</p>',
         figure("loads", along(simulation), figures),

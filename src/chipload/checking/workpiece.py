@@ -17,6 +17,7 @@ from chipload.errors import InputError
 from chipload.geometry.mesh import read_mesh
 from chipload.machine.machine import Machine
 from chipload.machine.table import MachineTable
+from chipload.number_text import number_text
 from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program
 from chipload.ranges import number_field, require_ranges
@@ -255,7 +256,8 @@ def stock_points(stock: LayeredStock, pitch: float) -> NDArray[np.float64]:
     count = float(np.prod(np.ceil((high - low) / pitch)))
     if not count <= MOST_POINTS:
         raise InputError(
-            f"operation.0.stock_points_mm = {pitch:g}: {count:.4g} points: must be at most {MOST_POINTS}: state a "
+            f"operation.0.stock_points_mm = {pitch:g}: {number_text(count)} points: must be at most "
+            f"{MOST_POINTS}: state a "
             "larger one"
         )
     x, y, z = (np.arange(a + 0.5 * pitch, b, pitch) for a, b in zip(low, high, strict=True))

@@ -24,6 +24,7 @@ from chipload.checking.contact_lines import CutAhead, cut_ahead
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import Finding, Severity
+from chipload.number_text import number_text
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.simulation.deflection_jumps import jump_findings
@@ -210,7 +211,7 @@ def workpiece_compliance(
         strained = _strained(found, ahead, grid, build, elastic, workpiece.yield_mpa)
     findings: tuple[Finding, ...] = ()
     if found.loose > 1e-6 * stock.volume():
-        text = f"{found.loose:.3g} mm3 of the workpiece are connected to nothing and carry no force"
+        text = f"{number_text(found.loose, 3)} mm3 of the workpiece are connected to nothing and carry no force"
         findings = (Finding("loose-material", 0, text, Severity.UNPROVEN),)
     return WorkpieceCompliance(
         found,

@@ -85,7 +85,7 @@ def show_verdict(result: Result, *, worst: bool = False) -> None:
 
 def show_limits(result: Result) -> None:
     """Show the worst value of each limit in one line; the message of an unproven result may omit it."""
-    from chipload.result.number_text import number_text
+    from chipload.number_text import number_text
 
     known = [c for c in result.limits if c.worst is not None]
     worst = ", ".join(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from chipload.cli.inputs import feed_of, machine_of
 from chipload.errors import InputError, Severity, grouped
+from chipload.number_text import number_text
 from chipload.terminal import EXCEEDED, bar, show
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def check_program(
     _, seconds = line_times(reading, on)
     show(
         f"{path.name}: {len(reading.commands)} motions on machine {on.name}, {lengths(reading.program).sum():.6g} mm, "
-        f"{seconds.sum() / 60.0:.4g} min; {box} mm"
+        f"{number_text(seconds.sum() / 60.0)} min; {box} mm"
     )
     count = len(reading.violations)
     state = f"unproven: {gaps[0]}" if gaps else f"the program stays within the limits of machine {on.name}"

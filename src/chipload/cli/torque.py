@@ -13,6 +13,7 @@ import typer
 
 from chipload.cli.app import Debug, app
 from chipload.errors import InputError
+from chipload.number_text import number_text
 from chipload.terminal import EXCEEDED, guarded, show
 
 if TYPE_CHECKING:
@@ -236,7 +237,7 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
     if found.constant_known is not None:
         least, most = (1e-3 * x for x in found.torque)
         out.append(
-            f"valid for torques from {least:.3g} to {most:.4g} N m, {low:.5g} to {high:.5g} rpm, below "
+            f"valid for torques from {least:.3g} to {most:.4g} N m, {low:.5g} to {number_text(high, 5)} rpm, below "
             f"{sensor.bandwidth:.3g} Hz"
             if most < math.inf
             else f"valid for torques above {least:.3g} N m, below {sensor.bandwidth:.3g} Hz; no log has a cut above "

@@ -19,6 +19,7 @@ from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.geometry.isolated import Isolated
 from chipload.geometry.step import LARGEST_FILE, Part, opened
+from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ class Face:
         corners = np.stack([self.low, self.high]).round(4) + 0.0
         box = ", ".join(f"{a} {p:.6g} to {q:.6g}" for a, p, q in zip("xyz", *corners, strict=True))
         holes = "" if not self.holes else f", {self.holes} {'hole' if self.holes == 1 else 'holes'}"
-        return f"face {self.number}: {self.kind}, {self.area:.5g} mm2, {self.edges} edges{holes}; {box} mm"
+        return f"face {self.number}: {self.kind}, {number_text(self.area, 5)} mm2, {self.edges} edges{holes}; {box} mm"
 
     def distance(self, point: Sequence[float]) -> float:
         """Distance [mm] of the face from a point (3,) [mm]."""

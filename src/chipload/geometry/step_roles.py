@@ -15,6 +15,7 @@ from chipload.errors import InputError
 from chipload.geometry.step import Part
 from chipload.geometry.step_faces import Face, Model, kernel_face
 from chipload.geometry.step_meridian import meridian_in
+from chipload.number_text import number_text
 
 #: greatest relative difference of successive areas in a group of similar faces
 LIKE = 0.01
@@ -43,7 +44,7 @@ def roles_of(model: Model) -> list[str]:
         return []
     numbers = ", ".join(str(f.number) for f in sides)
     low, high = min(f.area for f in sides), max(f.area for f in sides)
-    return [f"{len(sides)} similar faces of {low:.4g} to {high:.4g} mm2: sides of blades?: {numbers}", hub]
+    return [f"{len(sides)} similar faces of {low:.4g} to {number_text(high)} mm2: sides of blades?: {numbers}", hub]
 
 
 def _similar(faces: Sequence[Face]) -> list[list[Face]]:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from chipload.errors import InputError
+from chipload.number_text import number_text
 from chipload.result.columns import COLUMNS
-from chipload.result.number_text import number_text
 
 #: size of a row of the picture, its margins, and most rows [pixels]
 WIDE, HIGH, LEFT, RIGHT, UPPER, LOWER, MOST = 960, 200, 84, 16, 28, 24, 5
@@ -64,7 +64,7 @@ def columns_picture(time_s: NDArray[Any], columns: Mapping[str, NDArray[Any]], l
             draw.text((WIDE - RIGHT, k * HIGH + 6), f"limit {limit:g}", fill=LIMIT, font=font, anchor="ra")
     for t, anchor in ((first, "ls"), (last, "rs")):
         at = LEFT + (t - first) / span * (WIDE - LEFT - RIGHT)
-        draw.text((at, image.height - 6), f"{t:.4g} s", fill=INK, font=font, anchor=anchor)
+        draw.text((at, image.height - 6), f"{number_text(t)} s", fill=INK, font=font, anchor=anchor)
     out = io.BytesIO()
     image.save(out, "PNG", optimize=True)
     return out.getvalue()

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
+from chipload.number_text import number_text
 from chipload.program.commands import ARC, DWELL, LINE, PROBE, Commands, extents
 from chipload.program.control import Control
 from chipload.program.gcode.tools import ToolTable
@@ -103,7 +104,9 @@ def control_findings(found: Recognition, text: str, commands: Commands, other: C
         difference = f"{found.other.title} does not read it"
     else:
         a, b = (programmed_minutes(x) for x in (commands, other))
-        difference = f"{found.other.title} reads it otherwise: {b:.4g} min at the programmed feeds instead of {a:.4g}"
+        difference = (
+            f"{found.other.title} reads it otherwise: {number_text(b)} min at the programmed feeds instead of {a:.4g}"
+        )
     return (Finding("nc-control", 0, f"{said}; {difference}: {remedy}", Severity.UNPROVEN),)
 
 
@@ -136,7 +139,9 @@ def time_findings(commands: Commands, control: Control, stated: bool) -> tuple[F
     out = []
     if len(seconds) and seconds.max() > LONGEST_BLOCK:
         k = int(np.argmax(seconds))
-        message = f"the block takes {seconds[k] / 60.0:.4g} min at its feed: must be at most 1e4 min: correct F"
+        message = (
+            f"the block takes {number_text(seconds[k] / 60.0)} min at its feed: must be at most 1e4 min: correct F"
+        )
         out.append(Finding("nc-block-time", int(commands.line[k]), message, Severity.UNPROVEN))
     rests = np.where(commands.motion == DWELL, seconds, 0.0)
     if rests.sum() > LONGEST_DWELL * DWELL_SHARE and (
@@ -145,7 +150,10 @@ def time_findings(commands: Commands, control: Control, stated: bool) -> tuple[F
         k = int(np.argmax(rests))
         unit = control.dwell.get("p")
         counts = "" if unit is None else f"P counts {unit.whole_s:g} s, with a decimal point {unit.point_s:g} s, on "
-        message = f"a dwell of {rests[k]:.4g} s: {counts}{control.title}: state program.settings.dwell_s if it does not"
+        message = (
+            f"a dwell of {number_text(rests[k])} s: {counts}{control.title}: state program.settings.dwell_s "
+            "if it does not"
+        )
         severity = Severity.NOTE if stated else Severity.UNPROVEN
         out.append(Finding("nc-dwell-time", int(commands.line[k]), message, severity))
     return tuple(out)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding
+from chipload.number_text import number_text
 from chipload.report.view import ViewMark
 from chipload.result import LimitCheck, Result, Track, Verdict
-from chipload.result.number_text import number_text
 
 #: collisions that are marked at most
 MARKED = 200

@@ -14,13 +14,13 @@ from html import escape
 import plotly.graph_objects as go
 
 from chipload.errors import Finding, Severity
+from chipload.number_text import number_text, percent_text
 from chipload.report.presentation import Presentation
 from chipload.report.sheet import definitions, folded, framed, heading, items, table
 from chipload.report.view import viewer_script
 from chipload.report.view_section import DATA, VIEW
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
 from chipload.result.budget import SHOWN, level_text
-from chipload.result.number_text import number_text, percent_text
 
 #: findings and limits that the report lists
 LISTED = 300

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from html import escape
 
 from chipload.errors import InputError
+from chipload.number_text import number_text
 from chipload.report.page import BANNERS, limits_table
 from chipload.report.pdf import Block, SheetLine, SheetTable, one_page
 from chipload.report.sheet import definitions, heading, items, style, table
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
-from chipload.result.number_text import number_text
 
 #: guesses, things not checked and limits that a page has room for
 ROOM = 12

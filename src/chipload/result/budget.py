@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 from statistics import NormalDist
 
-from chipload.result.number_text import number_text
+from chipload.number_text import number_text
 
 #: confidence of the value that is shown beside the nominal one where limits are held at the nominal one
 SHOWN = 0.95

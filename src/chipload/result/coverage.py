@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.result.number_text import number_text
+from chipload.number_text import number_text
 
 Bools = NDArray[np.bool_]
 Columns = Mapping[str, NDArray[Any]]

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from chipload.result.number_text import number_text
+from chipload.number_text import number_text
 from chipload.result.verdict import Verdict
 
 if TYPE_CHECKING:

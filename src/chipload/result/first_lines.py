@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from chipload.errors import Finding, Severity
+from chipload.number_text import number_text
 from chipload.result.budget import level_text
 from chipload.result.coverage import Coverage
 from chipload.result.limits import LimitCheck
-from chipload.result.number_text import number_text
 from chipload.result.track import Track
 from chipload.result.verdict import Verdict
 

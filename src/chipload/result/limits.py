@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.number_text import number_text, percent_text
 from chipload.result.budget import ErrorBudget, level_text
 from chipload.result.columns import Column, column_of, error_of
 from chipload.result.coverage import FAR_BEYOND, WHOLE, Coverage, CoveredRows, coverage_of
-from chipload.result.number_text import number_text, percent_text
 from chipload.result.verdict import Verdict
 
 Columns = Mapping[str, NDArray[Any]]

@@ -26,6 +26,7 @@ from chipload.cutting.material import Material
 from chipload.engagement.moves.stock import Engaged
 from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import Finding, InputError
+from chipload.number_text import number_text
 from chipload.program.motions import lengths
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
@@ -309,7 +310,8 @@ def require_steps(program: Program, step_mm: float) -> float:
     least = float(np.sum(lengths(program))) / step_mm
     if not least <= MOST_STEPS:
         raise InputError(
-            f"operation.0.step_mm = {step_mm:g}: {least:.4g} steps: must be at most {MOST_STEPS}: state a longer one, "
+            f"operation.0.step_mm = {step_mm:g}: {number_text(least)} steps: must be at most {MOST_STEPS}: "
+            "state a longer one, "
             "or split the program"
         )
     return least

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
+from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -78,7 +79,8 @@ def jump_findings(
     out = []
     for k, ratio in zip(*(x.tolist() for x in jumps(place, f, d, compliance, reach)), strict=True):
         text = (
-            f"the workpiece bends by {d[k]:.4g} µm under {f[k]:.4g} N, {ratio:.3g} times as much per newton as in the "
+            f"the workpiece bends by {number_text(d[k])} µm under {f[k]:.4g} N, {ratio:.3g} times as much per "
+            "newton as in the "
             "steps next to it: its deflection is not known; state a smaller step_mm"
         )
         row, (x, y, z) = int(step[k]), place[k].tolist()

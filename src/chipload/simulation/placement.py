@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, InputError, Severity
+from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
 #: share of the time at feed that is spent in air
@@ -162,7 +163,7 @@ def stock_placement(
     at = placement_of(columns, bounds, cutters)
     if at.in_air + at.too_deep + bool(at.outside_axes) < 2 and not (at.first is None and at.outside_axes):
         return None
-    parts = [f"{at.air_s:.4g} of {at.feed_s:.4g} s at feed are in air"]
+    parts = [f"{at.air_s:.4g} of {number_text(at.feed_s)} s at feed are in air"]
     if at.too_deep:
         line = int(columns["line"][at.first]) if "line" in columns else 0
         where = f" (line {line})" if line else ""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import Cancelled, InputError
 from chipload.geometry.contour import Contour, Region
+from chipload.number_text import number_text
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
 from chipload.progress import Progress, silent
 from chipload.simulation import _centre_path
@@ -195,7 +196,9 @@ def _verification(
     """The verdict on ``what`` was compared, from what was found."""
     verdict: Literal["proved", "failed", "unproven"] = "failed" if failed else "unproven" if open_ else "proved"
     against = (
-        f"gouge {cleft.value_mm * 1e3:.3g} µm, excess {remains.value_mm * 1e3:.3g} µm" if wall else "no wall given"
+        f"gouge {number_text(cleft.value_mm * 1e3, 3)} µm, excess {number_text(remains.value_mm * 1e3, 3)} µm"
+        if wall
+        else "no wall given"
     )
     within = f"engagement within {difference.value_mm:.3g} deg"
     text = f"{verdict}: {what}, {within}; {against}; {len(hits)} rapids through stock"

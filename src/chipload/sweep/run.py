@@ -10,6 +10,7 @@ from typing import Any
 
 from chipload.errors import InputError
 from chipload.files import hash_of, is_file, read_regular
+from chipload.number_text import number_text
 from chipload.progress import Progress, silent
 from chipload.result import Verdict
 from chipload.sweep.case_run import REFUSED, Record, case_key, case_record, kept_record
@@ -119,7 +120,7 @@ class SweepResult:
         if best is None:
             return f"{head}; none holds" + (f" in {self.confidence:.0%} of its samples" if self._sampled else "")
         values = ", ".join(f"{key}={value}" for key, value in best.values) or "the job as stated"
-        time = "" if best.time_s is None else f" in {best.time_s:.4g} s"
+        time = "" if best.time_s is None else f" in {number_text(best.time_s)} s"
         low, high = best.interval
         chance = f" with a probability of {best.probability:.3g} ({low:.3g} to {high:.3g})" if self._sampled else ""
         return f"{head}; best: {values}: holds{time}{chance}"

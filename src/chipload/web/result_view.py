@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
+from chipload.number_text import number_text
 from chipload.result import Verdict
 from chipload.web.asset_cache import AssetCache
 from chipload.web.comparison import COLOURS, MOST, Side
@@ -308,7 +309,7 @@ class ResultView:
         if self.table.value == "tools":
             self.tools.at(k)
         x, y, z = track.place[k].tolist()
-        clock = f"{track.t[k]:.3f} of {track.t[-1]:.5g} s \u00b7 "
+        clock = f"{track.t[k]:.3f} of {number_text(track.t[-1], 5)} s \u00b7 "
         line = f" \u00b7 line {int(self.source.text.of_row[k])}" if self.source.text is not None else ""
         self.where.set_text(f"{clock}step {k + 1} of {len(track)}{line} \u00b7 X {x:.3f} Y {y:.3f} Z {z:.3f}")
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from chipload.number_text import number_text
 from chipload.planning.result import Event, StrategyResult
 from chipload.result import LimitCheck, Verdict
 from chipload.units import mm_min_from_mm_s
@@ -38,7 +39,10 @@ def with_entry_feed(strategy: StrategyResult, share: float) -> StrategyResult:
     most = mm_min_from_mm_s(1.0) * float(program.feed[entry].max())
     k = int(np.flatnonzero(entry)[0])
     x, y = (float(v) for v in program.p_work[k, :2])
-    text = f"the feed of entries is lowered from {most:.4g} to {share * most:.4g} mm/min so that the limits hold there"
+    text = (
+        f"the feed of entries is lowered from {most:.4g} to {number_text(share * most)} mm/min so that the "
+        "limits hold there"
+    )
     return replace(
         strategy,
         program=replace(program, feed=feed),

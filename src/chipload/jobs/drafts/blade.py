@@ -16,6 +16,7 @@ from chipload.geometry.step_faces import Face, Model
 from chipload.geometry.step_patch import patch_of
 from chipload.jobs.drafts.cutters import cutter_table
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
+from chipload.number_text import number_text
 from chipload.units import MM_PER
 
 #: endings of sections of TurboGrid
@@ -94,8 +95,8 @@ def draft_blade_model(file: Path, folder: Path, model: Model, machine: str | Non
     entries = [
         Entry("shape", "step"),
         Entry("file", relative(file, folder)),
-        Entry("front", front.number, f"{front.kind} of {front.area:.4g} mm2, the largest", True),
-        Entry("back", back.number, f"{back.kind} of {back.area:.4g} mm2, the next", True),
+        Entry("front", front.number, f"{front.kind} of {number_text(front.area)} mm2, the largest", True),
+        Entry("back", back.number, f"{back.kind} of {number_text(back.area)} mm2, the next", True),
         Entry("clamp", clamp.number if clamp is not None else 1, "the lowest face beside them", True),
         Entry("edge_share", 0.12, "part left out at each edge", True),
     ]

@@ -21,6 +21,7 @@ from chipload.geometry.step_faces import Face, read_faces
 from chipload.jobs.drafts.cutters import cutter_table
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
 from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.number_text import number_text
 from chipload.planning.contour.offsets import centre_paths, walls_of
 from chipload.planning.contour.passes import run_on_length
 from chipload.units import MM_PER, rpm_from_rad_s
@@ -77,7 +78,9 @@ def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft
         if len(contours) > 1:
             notes = (f"{len(contours)} closed contours: {NESTED}", *notes)
         return Draft(
-            f"Clear the pocket of {file.name}: {region:.4g} mm2 at constant engagement.", (*tables, *rest), notes
+            f"Clear the pocket of {file.name}: {number_text(region)} mm2 at constant engagement.",
+            (*tables, *rest),
+            notes,
         )
     size, side = _side_of(contours)
     rest = _rest(on, machine, size, _axial(size), "contour", side)
@@ -207,7 +210,7 @@ def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
     stock = DraftTable("stock", (Entry("top_mm", round(level + (depth or axial), 6), stands, True),))
     tables = (part, stock, *_rest(_machine(machine), machine, size, axial, "pocket", narrow=narrow, depth=depth))
     notes = (*thin_rings(model.faces), *(str(f) for f in drawing.findings[:8]))
-    return Draft(f"Clear the face at z = {level:g} mm of {file.name}: {region:.4g} mm2.", tables, notes)
+    return Draft(f"Clear the face at z = {level:g} mm of {file.name}: {number_text(region)} mm2.", tables, notes)
 
 
 def thin_rings(faces: Sequence[Face]) -> tuple[str, ...]:
@@ -299,7 +302,8 @@ def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float, bool]:
         raise InputError("the contours enclose no area")
     if not float(_reachable_area(area, DIAMETERS[-1]).area) > 0.0:
         raise InputError(
-            f"the contours enclose {whole:.3g} mm2, too narrow for a cutter of {DIAMETERS[-1]:g} mm: if the drawing "
+            f"the contours enclose {number_text(whole, 3)} mm2, too narrow for a cutter of {DIAMETERS[-1]:g} "
+            "mm: if the drawing "
             "is in another unit than it states, write the job by hand with part.units"
         )
     able = [d for d in DIAMETERS if float(_reachable_area(area, d).area) >= REACH * whole] or [DIAMETERS[-1]]

@@ -12,6 +12,7 @@ from chipload.checking.rows import step_rows
 from chipload.errors import Finding, Severity
 from chipload.jobs.feeds.numbers import feed_numbers
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
+from chipload.number_text import number_text
 from chipload.result import Result
 from chipload.result.limits import Columns
 
@@ -25,7 +26,7 @@ def result_of(program: FeedsProgram) -> Result:
         found=_rubbing(own), blocks=lambda: _with_cause(simulation, own),
     )  # fmt: skip
     numbers = {"feeds": feed_numbers(own, simulation, tracks[0].limits, time_s, name)}
-    note = f"The program takes {time_s:.4g} s instead of {own.seconds_before:.4g} s."
+    note = f"The program takes {number_text(time_s)} s instead of {number_text(own.seconds_before)} s."
     return program_result("feeds", program, tracks, numbers, note)
 
 

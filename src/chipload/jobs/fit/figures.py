@@ -17,6 +17,7 @@ from chipload.cutting.material import material_text
 from chipload.jobs.fit.job import CHANNELS
 from chipload.jobs.fit.outcome import FitResult
 from chipload.jobs.fit.result import MATERIAL, UNITS
+from chipload.number_text import number_text
 from chipload.report.presentation import Content, Presentation
 from chipload.report.scene import TOOL
 from chipload.report.sheet import definitions, figure, table
@@ -65,7 +66,7 @@ def sections(done: FitResult, figures: dict[str, go.Figure]) -> list[str]:
     known: dict[str, str] = {"method": fit.method, "degrees of freedom": str(fit.search.freedom)}
     if fit.method == "instantaneous":
         known["harmonics of the spindle speed that are used"] = str(fit.search.harmonics)
-        known["runout"] = f"{fit.cutter.runout[0] * 1000.0:.3g} µm"
+        known["runout"] = f"{number_text(fit.cutter.runout[0] * 1000.0, 3)} µm"
         for key, (w0, zeta) in zip(CHANNELS, fit.channels.resonance, strict=True):
             rings = f"{w0 / math.tau:.4g} Hz, damping {zeta:.3g}" if math.isfinite(w0) else "taken as rigid"
             known[f"dynamometer, {key}"] = rings

@@ -13,6 +13,7 @@ from chipload.checking.result import (
 )
 from chipload.jobs.program.numbers import speed_numbers
 from chipload.jobs.program.outcome import SpeedsProgram
+from chipload.number_text import number_text
 from chipload.result import Result, Track
 
 
@@ -31,6 +32,6 @@ def result_of(program: ProgramResult) -> Result:
             f"tool {t.tool} {f'in lines {t.lines[0]} to {t.lines[1]} ' if count[t.tool] > 1 else ''}{t.rpm:g} rpm"
             for t in own.tools
         )
-        note = f"The program takes {time_s:.4g} s instead of {own.seconds_before:.4g} s; {tools}."
+        note = f"The program takes {number_text(time_s)} s instead of {number_text(own.seconds_before)} s; {tools}."
         return program_result("program", program, tracks, numbers, note)
     return checked_result(program)

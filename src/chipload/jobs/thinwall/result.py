@@ -13,6 +13,7 @@ from chipload.errors import Finding, Severity
 from chipload.jobs.thinwall.chatter import FIRST_STATE, chatter_limits, chatter_numbers
 from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, remedy_text
 from chipload.jobs.thinwall.part_shape import PartShape
+from chipload.number_text import number_text
 from chipload.report.programs import ENDINGS, program_name
 from chipload.result import (
     CoveredRows,
@@ -388,8 +389,14 @@ def _faces(shape: tuple[int, ...]) -> NDArray[np.int64]:
 def _note(walled: ThinWallResult) -> str:
     """Variable against constant depth."""
     v, c = walled.variants[USED], walled.variants["constant"]
-    minutes = f"{v.seconds / 60.0:.4g} min with variable depth, {c.seconds / 60.0:.4g} min with constant depth"
+    minutes = (
+        f"{number_text(v.seconds / 60.0)} min with variable depth, {number_text(c.seconds / 60.0)} min with "
+        "constant depth"
+    )
     if v.deflection > c.deflection * (1.0 + 1e-9):
-        minutes += f", which bends the wall by {1e3 * c.deflection:.4g} µm instead of {1e3 * v.deflection:.4g} µm"
+        minutes += (
+            f", which bends the wall by {number_text(1e3 * c.deflection)} µm instead of "
+            f"{number_text(1e3 * v.deflection)} µm"
+        )
     bad = failures_of(walled, c)
     return f"{minutes}, which does not hold: {bad[0]}." if bad else f"{minutes} within the same limits."

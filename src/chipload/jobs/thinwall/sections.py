@@ -11,6 +11,7 @@ from chipload.jobs.thinwall.outcome import OVER, USED, ThinWallResult, Variant, 
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.result import verdict_of
 from chipload.jobs.thinwall.wall_figures import COLOURS, along, bars, maps, space
+from chipload.number_text import number_text
 from chipload.report.page import state_cell
 from chipload.report.programs import program_name
 from chipload.report.sheet import figure, items, table, value_text
@@ -230,9 +231,10 @@ def _checked(walled: ThinWallResult) -> str:
     used = walled.variants[USED]
     s = used.shape
     texts = [
-        f"Path of {USED} against the finished wall: the cutter comes no nearer than {1000.0 * s.nearest:.3g} µm "
+        f"Path of {USED} against the finished wall: the cutter comes no nearer than "
+        f"{number_text(1000.0 * s.nearest, 3)} µm "
         f"(below 0 it would gouge; {walled.settings['gouge_tolerance_mm']:g} mm is allowed for chords).",
-        f"Remaining stock against the finished wall: at most {1000.0 * s.gouge:.3g} µm into it, "
-        f"{1000.0 * s.left:.3g} µm over it above the foot ({s.points} points of its sections).",
+        f"Remaining stock against the finished wall: at most {number_text(1000.0 * s.gouge, 3)} µm into it, "
+        f"{number_text(1000.0 * s.left, 3)} µm over it above the foot ({s.points} points of its sections).",
     ]
     return items(texts)

@@ -25,6 +25,7 @@ from chipload.jobs.torque.cut import (
 )
 from chipload.jobs.torque.job import TorqueJob
 from chipload.machine.machine import Machine
+from chipload.number_text import number_text
 from chipload.program.program import Program
 from chipload.progress import Progress, part_of, silent
 from chipload.structure.shell import Ritz, Shell, ritz
@@ -173,8 +174,12 @@ def coarser(job: TorqueJob) -> TorqueJob:
 
 def limit_text(planned: CutSteps, limit: PathLimit, where: str) -> str:
     """The limit of a coarse simulation, in a sentence."""
-    feed = feed_at(planned, limit, limit.step)
+    feed, programmed = feed_at(planned, limit, limit.step), mm_min_from_mm_s(float(planned.feed[limit.step]))
+    own = f"{number_text(programmed)} mm/min are programmed"
     return (
         f"a coarse simulation gives a torque limit of about {1e-3 * limit.torque:.2g} N m, {where}; the feed there "
-        f"must be at most {feed:.3g} mm/min, {mm_min_from_mm_s(float(planned.feed[limit.step])):.4g} are programmed"
+        f"must be at most {number_text(feed)} mm/min, {own}"
+        if feed < programmed * (1.0 - 1e-3)
+        else f"a coarse simulation gives a torque limit of about {1e-3 * limit.torque:.2g} N m, {where}; {own} there, "
+        "which is within it"
     )

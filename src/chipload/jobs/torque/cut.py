@@ -23,6 +23,7 @@ from chipload.jobs.tables import stated
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable
 from chipload.machine.machine import Machine
+from chipload.number_text import number_text
 from chipload.planning.hand import clockwise_milling, require_hand, signed_speed
 from chipload.program.build import helix, plunge, rapid
 from chipload.program.program import RAPID, Program
@@ -216,7 +217,7 @@ def round_program(table: RoundTable, place: Place, cutter: Cutter) -> Program:
         if turns * n > MOST_POINTS:
             raise InputError(
                 f"round.pitch_mm = {table.pitch_mm:g}: {turns:.4g} rounds from top_mm = {top:g} to "
-                f"bottom_mm = {low:g}, {turns * n:.4g} points: must be at most {MOST_POINTS}: "
+                f"bottom_mm = {low:g}, {number_text(turns * n)} points: must be at most {MOST_POINTS}: "
                 "state a larger pitch, or a lower top"
             )
         z = np.concatenate([np.linspace(top, low, turns * n + 1)[1:], np.full(n, low)])

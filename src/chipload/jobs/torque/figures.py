@@ -26,6 +26,7 @@ from chipload.jobs.torque.outcome import (
 from chipload.jobs.torque.result import track_name
 from chipload.jobs.torque.scene import scene_bytes
 from chipload.jobs.torque.unrolled_figure import unrolled
+from chipload.number_text import number_text
 from chipload.report.presentation import Blank, Presentation
 from chipload.report.sheet import figure, items, table
 
@@ -153,7 +154,8 @@ def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[s
     plain, late = outcome.control.cases
     time_cost = late.runs[HELD].outcome.time - plain.runs[HELD].outcome.time
     body += [
-        f"<p>Latency and override steps cost {time_cost:.3g} s with the model, and change its greatest torque from "
+        f"<p>Latency and override steps cost {number_text(time_cost, 3)} s with the model, and change its "
+        "greatest torque from "
         f"{1e-3 * plain.runs[HELD].outcome.load_max:.4g} to {1e-3 * late.runs[HELD].outcome.load_max:.4g} N m.</p>",
         '<p class="note">The constant feed and the derated schedule are the fastest that keep the limit everywhere '
         "with all deviations, which are unknown beforehand. The last row is the shortest time that is physically "
@@ -222,13 +224,15 @@ def _wall(wall: ShellWall, outcome: TorqueResult, figures: dict[str, go.Figure])
     a, b, c = solid.counts
     share = 100.0 * float(wall.oval.share[1]) / whole
     beam = (
-        f"A beam with shear gives {1e3 * wall.oval.beam:.3g} µm, {whole / wall.oval.beam:.3g} times too little."
+        f"A beam with shear gives {number_text(1e3 * wall.oval.beam, 3)} µm, {whole / wall.oval.beam:.3g} "
+        "times too little."
         if wall.oval.beam is not None
         else f"There is no beam model of a cone; its first harmonic, the bending of a beam, is {share:.3g} % of it."
     )
     return [
         "<h2>Compliance of the wall</h2>",
-        f"<p>A force of 1 N at the free end deflects the wall of {wall.thinnest:.4g} mm by {1e3 * whole:.4g} µm, "
+        f"<p>A force of 1 N at the free end deflects the wall of {wall.thinnest:.4g} mm by "
+        f"{number_text(1e3 * whole)} µm, "
         f"nearly all of it because the section becomes oval. {beam}</p>",
         figure("oval", drawn.ovalised(wall), figures),
         "<h3>Comparison with finite elements</h3>",

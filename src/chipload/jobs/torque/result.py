@@ -25,6 +25,7 @@ from chipload.jobs.torque.outcome import (
     TorqueResult,
 )
 from chipload.jobs.torque.step_checks import check_columns
+from chipload.number_text import number_text
 from chipload.report.programs import ENDINGS
 from chipload.result import (
     LimitCheck,
@@ -197,7 +198,8 @@ def _run_findings(case: ControllerCase, run: ControllerRun) -> tuple[Finding, ..
         out.append(Finding("override-above-cap", 0, text, Severity.EXCEEDS))
     if o.finished and plain.finished and o.time > plain.time:
         text = (
-            f"takes {o.time:.4g} s, longer than the {plain.time:.4g} s of the constant feed that keeps the limit "
+            f"takes {number_text(o.time)} s, longer than the {number_text(plain.time)} s of the constant feed "
+            "that keeps the limit "
             "everywhere"
         )
         out.append(Finding("slower-than-constant", 0, text, Severity.EXCEEDS))
@@ -220,7 +222,7 @@ def _findings(outcome: TorqueResult) -> tuple[Finding, ...]:
     elif outcome.wall.surface is None:
         out.append(Finding("wall-not-finished", 0, "the program finishes no part of the wall", Severity.EXCEEDS))
     elif outcome.wall.surface[0] < -outcome.wall.tolerance:
-        text = f"the program cuts {-1e3 * outcome.wall.surface[0]:.4g} µm into the wall"
+        text = f"the program cuts {number_text(-1e3 * outcome.wall.surface[0])} µm into the wall"
         out.append(Finding("wall-gouged", 0, text, Severity.EXCEEDS))
     return tuple(out)
 

@@ -45,6 +45,7 @@ from chipload.jobs.torque.step_checks import step_checks
 from chipload.jobs.torque.workpiece_cut import allowable_on_workpiece, real_stock_body
 from chipload.jobs.torque.workpiece_limit import allowable_torque, clamped_workpiece, preview_on_workpiece
 from chipload.machine.machine import Machine, machine_named, read_machine
+from chipload.number_text import number_text
 from chipload.program.program import Program
 from chipload.program.read_back import text_findings
 from chipload.program.release import NOT_SIMULATED
@@ -199,7 +200,7 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     count, number = counted(program, job.cutters, resolution_of(job)), len(job.table.surprise)
     return [
         f"{job.path.name}: {what}; "
-        f"{len(program)} motions on machine {machine.name}, stock of {stock.volume():.5g} mm3, material "
+        f"{len(program)} motions on machine {machine.name}, stock of {number_text(stock.volume(), 5)} mm3, material "
         f"{material.name}, controller {table.name}, {number} surprise{'' if number == 1 else 's'}",
         f"the controller can hold torque limits from {1e-3 * least:.3g} N m up",
         text,

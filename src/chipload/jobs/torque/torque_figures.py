@@ -11,6 +11,7 @@ from plotly.subplots import make_subplots
 
 from chipload.control.fuzzy import FuzzyTable, surface
 from chipload.jobs.torque.outcome import HELD, ControllerCase, ShellWall, TorqueResult
+from chipload.number_text import number_text
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SCALE, STOCK
 from chipload.result.thinning import thinned
 from chipload.units import mm_min_from_mm_s
@@ -122,7 +123,7 @@ def ovalised(wall: ShellWall) -> go.Figure:
     )
     if wall.oval.beam is not None:
         style = {"color": LIMIT, "width": 1.4, "dash": "dash"}
-        whole = f"a beam with shear, in all {1e3 * wall.oval.beam:.3g} µm"
+        whole = f"a beam with shear, in all {number_text(1e3 * wall.oval.beam, 3)} µm"
         ends = [-0.5, float(n[-1]) + 0.5]
         figure.add_trace(
             go.Scatter(x=ends, y=[1e3 * wall.oval.beam] * 2, mode="lines", line=style, name=whole), row=1, col=2

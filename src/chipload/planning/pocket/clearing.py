@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.geometry.contour import Region
 from chipload.lazy import LateModule
+from chipload.number_text import number_text
 from chipload.planning.pocket import trochoid
 from chipload.planning.pocket.clearing_path import (
     CUT,
@@ -349,7 +350,8 @@ class _Run:
         x, y = 0.5 * (low + high)
         self.starts.abandon(np.array([x, y]), 2.0 * self.radius)
         text = (
-            f"{SLOW_PASSES} passes took {took[:, 0].sum():.3g} mm2 here, hardly wider than the cutter: the rest is left"
+            f"{SLOW_PASSES} passes took {number_text(took[:, 0].sum(), 3)} mm2 here, hardly wider than the "
+            "cutter: the rest is left"
         )
         self.events.append(Event("pocket-narrow", float(x), float(y), text))
 
@@ -456,7 +458,7 @@ class _Run:
         area, contours, places = self._left().parts()
         events = list(self.events)
         for mm2, (x, y) in places:
-            events.append(Event("pocket-leftover", x, y, f"{mm2:.4g} mm2 that the cutter can reach is left"))
+            events.append(Event("pocket-leftover", x, y, f"{number_text(mm2)} mm2 that the cutter can reach is left"))
         names = {"entry": ENTRY, "cut": CUT, "link": LINK, "lift": LIFT}
         whole = self.whole
         path = ClearingPath(

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour, Region
 from chipload.geometry.offset import offset_region
+from chipload.number_text import number_text
 from chipload.stock.planar import PlanarStock
 
 Floats = NDArray[np.float64]
@@ -133,7 +134,8 @@ def _reached(region: Region, radius: float, what: str) -> Region:
     missed = region.area - opened.area
     if missed > CORNERS * region.area:
         raise InputError(
-            f"{what} has inner corners that the cutter of radius {radius:g} mm does not reach ({missed:.4g} mm2): "
+            f"{what} has inner corners that the cutter of radius {radius:g} mm does not reach "
+            f"({number_text(missed)} mm2): "
             "round them off by that radius"
         )
     return region

@@ -20,6 +20,7 @@ from chipload.geometry.contour import Contour, Region
 from chipload.geometry.distance import distance
 from chipload.geometry.offset import offset_region
 from chipload.machine.machine import Machine
+from chipload.number_text import number_text
 from chipload.planning.cost import CutConditions, cost
 from chipload.planning.hand import clockwise_milling, engagement_of_hand, signed_speed
 from chipload.planning.link_rows import row_ends, with_last_link
@@ -297,7 +298,8 @@ def misses(
         x, y = path.leftover[0].start if path.leftover else (float(path.x[-1]), float(path.y[-1]))
         text = (
             f"only {1.0 - path.leftover_mm2 / within:.2%} of what the cutter can reach is cleared, "
-            f"{path.leftover_mm2:.4g} mm2 left: state {'' if strategy == TROCHOIDAL else CIRCLES}a smaller cutter"
+            f"{number_text(path.leftover_mm2)} mm2 left: state {'' if strategy == TROCHOIDAL else CIRCLES}a "
+            "smaller cutter"
         )
         out.append(Event("pocket-uncleared", float(x), float(y), text, failure=True))
     return out

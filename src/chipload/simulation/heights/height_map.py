@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.lazy import LateModule
+from chipload.number_text import number_text
 from chipload.simulation.clearance.body import above_cutting, cutting_part
 from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.steps import Steps
@@ -266,7 +267,8 @@ def require_columns(stock: LayeredStock, pitch: float) -> tuple[Floats, Floats]:
     count = np.maximum(np.ceil((box[1] - box[0]) / pitch), 2.0)
     if not count.prod() <= 4 * MOST:
         raise InputError(
-            f"operation.0.stock_points_mm = {pitch:g}: {count.prod():.4g} columns of the stock: must be at most "
+            f"operation.0.stock_points_mm = {pitch:g}: {number_text(count.prod())} columns of the stock: must "
+            "be at most "
             f"{4 * MOST}: state a larger one"
         )
     return box, count

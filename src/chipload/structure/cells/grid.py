@@ -24,6 +24,7 @@ from numpy.polynomial import legendre
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
+from chipload.number_text import number_text
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -170,7 +171,8 @@ def grid_between(faces: Planes, cell_mm: float, order: int = 2) -> CellGrid:
     total = math.prod(int(n.sum()) for n in counts)
     if total > MOST_CELLS:
         raise InputError(
-            f"workpiece.cell_mm = {cell_mm:g}: {total:.4g} cells: must be at most {MOST_CELLS}: state larger cells"
+            f"workpiece.cell_mm = {cell_mm:g}: {number_text(total)} cells: must be at most {MOST_CELLS}: "
+            "state larger cells"
         )
     x, y, z = (_divided(v, n) for v, n in zip(faces, counts, strict=True))
     return CellGrid((x, y, z), order, faces)

@@ -9,8 +9,8 @@ from typing import Any
 from nicegui import ui
 
 from chipload.errors import Severity
+from chipload.number_text import number_text
 from chipload.result import Verdict
-from chipload.result.number_text import number_text
 from chipload.result.times import Times
 from chipload.web.checks import PageFinding, findings, limits, row_of
 from chipload.web.result import PageResult, PageTrack

@@ -8,6 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
+from chipload.number_text import number_text
 from chipload.web.checks import label_and_unit
 from chipload.web.loads import Ints, LineLoad, ToolUse, line_loads, shown_loads, tool_uses
 from chipload.web.panels import RELEASE
@@ -121,7 +122,7 @@ def tool_table(
         label = f"{track.own.name}, {tool}" if names else tool
         bars = "".join(
             f'<b data-track="{number}" data-row="{p.first}" title="{escape(label)}: {starts[number] + p.begin:.4g} to '
-            f'{starts[number] + p.end:.4g} s" style="left:{100.0 * (starts[number] + p.begin) / whole:.3f}%;'
+            f'{number_text(starts[number] + p.end)} s" style="left:{100.0 * (starts[number] + p.begin) / whole:.3f}%;'
             f'width:{max(100.0 * (p.end - p.begin) / whole, THIN):.3f}%;background:{COLOURS[k % len(COLOURS)]}"></b>'
             for p in use.periods
         )
@@ -149,7 +150,7 @@ def tool_table(
     first = "<th>program</th>" if names else ""
     return (
         f'<div class="cl-times">{"".join(rows)}<div class="cl-time"><span></span><div class="cl-ends"><span>0 s</span>'
-        f"<span>{whole:.4g} s</span></div></div></div>"
+        f"<span>{number_text(whole)} s</span></div></div></div>"
         f'<table class="cl-limits cl-tools"><thead><tr>{first}<th>tool</th><th class=n>time [s]</th>'
         f"<th class=n>in cut [s]</th><th class=n>[%]</th><th class=n>length in cut [mm]</th>{head}</tr></thead>"
         f"<tbody>{''.join(body)}</tbody></table>"

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
+from chipload.number_text import number_text
 from chipload.planning.impeller.blocks import BLOCK, in_blocks
 from chipload.planning.impeller.clearance import nearest
 from chipload.planning.impeller.covering import _clear_parts
@@ -229,7 +230,8 @@ def first_edge(impeller: Impeller, tolerance: float, corner: float, around: int)
     count = _area(impeller, around) / edge**2
     if count > _MOST_NODES:
         raise InputError(
-            f"a corner radius of {corner:g} mm needs about {count:.2g} points of the walls: must be at most "
+            f"a corner radius of {corner:g} mm needs about {number_text(count, 2)} points of the walls: must "
+            "be at most "
             f"{_MOST_NODES:g}: raise it, or leave cutters of so small a corner radius out of the catalogue"
         )
     return edge
