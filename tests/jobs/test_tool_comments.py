@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from chipload.jobs.drafts.comments import read_header
-from chipload.jobs.drafts.tool_sizes import drill_size, thread_size
+from chipload.program.tool_sizes import drill_size, thread_size
 from command import call
 
 IN = 25.4

@@ -30,13 +30,15 @@ from chipload.program.heidenhain.reader import heidenhain_text, read_heidenhain,
 from chipload.program.nc_text import NcText, read_nc
 from chipload.program.program import Program
 from chipload.program.recognise import Recognition, recognise
-from chipload.program.reconcile import agree
+from chipload.program.reconcile import agree, unit_mm
 from chipload.program.setup import Setup
 from chipload.program.swivel import Swivel
 from chipload.program.tapping import tapping_findings, thread_comments
 from chipload.program.time import row_times
 from chipload.program.to_axes import LIMITS, to_axes
 from chipload.program.to_work import TOLERANCE_MM, axes_of, to_work, work_frame
+from chipload.program.tool_comments import stated_tools
+from chipload.program.tool_kinds import compare_kinds
 from chipload.program.travel import offset_stated, travel_findings
 from chipload.progress import Progress, silent
 from chipload.units import mm_min_from_mm_s
@@ -194,6 +196,8 @@ def read_program(
             agreed = agree(path.name, setup.cutters, tools=nc.table, comments=nc.stated)
             rate = None if feed is None else mm_min_from_mm_s(feed)
             commands, findings, said = read_nc(nc, rate, strict, swivel, progress)
+        if setup.cutters and comments:
+            agreed += compare_kinds(setup.cutters, stated_tools(text, unit_mm(text)))
         if len(commands) == 0:
             left_out = next((f": {f}" for f in findings if f.severity >= Severity.UNPROVEN), "")
             raise InputError(f"{path.name}: no motion: nothing to check{left_out}")

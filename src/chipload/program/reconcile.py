@@ -40,6 +40,7 @@ _STATED = (
 #: D and the number of an offset: no point, no sign between them, no unit
 _OFFSET = re.compile(r"\bD([0-9]{1,8})\b(?![./]|\s*(?:MM|INCH|IN\b|\"))")
 _LENGTH_OFFSET = re.compile(r"\bH\s*[0-9]+\b")
+_INCH_PROGRAM = re.compile(r"BEGIN PGM[^\n]*\bINCH\b", re.IGNORECASE)
 _UNITS = re.compile(r"\bG\s*(20|21|70|71|700|710)\b(?!\.)")
 
 
@@ -66,11 +67,13 @@ def tool_comments(text: str) -> dict[int, StatedDiameter]:
 
 
 def unit_mm(text: str) -> float:
-    """The unit [mm] that an NC text selects first; mm where it selects none.
+    """The unit [mm] that an NC text selects first, or that of a Heidenhain program; mm where it selects none.
 
     >>> unit_mm("(G20) G21 G0 X1"), unit_mm("G20 G0 X1")
     (1.0, 25.4)
     """
+    if _INCH_PROGRAM.search(text[:1000]) is not None:
+        return MM_PER["inch"]
     found = _UNITS.search(COMMENT.sub(" ", text).upper())
     return MM_PER["inch"] if found is not None and found[1] in ("20", "70", "700") else 1.0
 

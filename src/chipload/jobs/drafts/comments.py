@@ -1,6 +1,6 @@
 """Reading of cutters, stock and material from the comments and headers of a program.
 
-Read are the forms of common posts: comments about tools (:mod:`chipload.jobs.drafts.tool_comments`), Carbide Create
+Read are the forms of common posts: comments about tools (:mod:`chipload.program.tool_comments`), Carbide Create
 (``stockMin``), FeatureCAM's APT (``INSERT/14MM CRB 2FL 32 LOC``, ``CSI_SET_FLUTE_LENGTH``, ``INSERT/Stock Size``),
 Heidenhain (``BLK FORM``), Sinumerik (``WORKPIECE``).
 """
@@ -16,9 +16,9 @@ from chipload.cutter.barrel import tip_of_barrel
 from chipload.cutter.bodies import Profile, apt_body
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.jobs.drafts.tool_comments import stated_tools
-from chipload.jobs.drafts.tool_words import Stated, describe_tool
 from chipload.program.apt.cutters import Shape, read_cutters
+from chipload.program.tool_comments import stated_tools
+from chipload.program.tool_words import Stated, describe_tool
 from chipload.units import MM_PER
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]

@@ -9,8 +9,8 @@ from typing import Any
 
 from chipload.cutter.bodies import cylinder, tap_core
 from chipload.jobs.drafts.draft import DraftTable, Entry
-from chipload.jobs.drafts.tool_words import Stated, ToolKind, kind_of
 from chipload.program.tapping import COARSE
+from chipload.program.tool_words import Stated, ToolKind, kind_of
 
 #: keys that a cutter has, in the order of the file
 KEYS = (

@@ -22,7 +22,7 @@ from chipload.jobs.drafts.document import Document, DocumentObject, read_documen
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry
 from chipload.jobs.drafts.drawing import draft_model
 from chipload.jobs.drafts.program import Known, draft_program
-from chipload.jobs.drafts.tool_words import Stated
+from chipload.program.tool_words import Stated
 
 _FEED = re.compile(r"\bF\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
 #: [mm] how far a triangle may leave a surface of the stock

@@ -17,7 +17,6 @@ from chipload.files import read_regular
 from chipload.jobs.drafts.comments import Box, Header, read_header
 from chipload.jobs.drafts.cutters import cutter_table
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
-from chipload.jobs.drafts.tool_words import Stated, ToolKind
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.apt.reader import apt_text
 from chipload.program.gcode.reader import gcode_text
@@ -28,6 +27,7 @@ from chipload.program.reconcile import unit_mm
 from chipload.program.setup import Setup
 from chipload.program.tapping import tapping_motions
 from chipload.program.tilt import NO_ROTARY
+from chipload.program.tool_words import Stated, ToolKind
 from chipload.units import mm_s_from_mm_min, rpm_from_rad_s
 
 #: machines that a program is read for where none is stated: the first that has its axes

@@ -33,9 +33,8 @@ from chipload.program.heidenhain.formula import NotKnownError, q_number
 from chipload.program.heidenhain.q_cycles import MAX
 from chipload.program.heidenhain.state import KEPT, ConversationalState
 from chipload.program.path_mode import PathControl
-from chipload.program.reconcile import StatedDiameter
+from chipload.program.reconcile import StatedDiameter, unit_mm
 from chipload.program.swivel import Swivel
-from chipload.units import MM_PER
 
 __all__ = ["KEPT", "read_heidenhain", "read_heidenhain_file", "tool_definitions"]
 
@@ -126,12 +125,12 @@ def tool_definitions(text: str) -> dict[int, StatedDiameter]:
     >>> tool_definitions("BEGIN PGM A MM\nTOOL DEF 5 L+30 R+2")[5].diameter
     4.0
     """
-    inch = re.search(r"BEGIN PGM[^\n]*\bINCH\b", text[:1000].upper()) is not None
+    mm = unit_mm(text)
     out: dict[int, StatedDiameter] = {}
     for line, raw in enumerate(text.splitlines(), start=1):
         found = _DEFINED.match(raw.upper())
         if found is not None and float(found[2]) > 0.0:
-            diameter = 2.0 * float(found[2]) * MM_PER["inch" if inch else "mm"]
+            diameter = 2.0 * float(found[2]) * mm
             out.setdefault(int(found[1]), StatedDiameter(diameter, "TOOL DEF", line))
     return out
 

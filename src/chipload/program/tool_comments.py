@@ -10,9 +10,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from chipload.jobs.drafts.tool_words import Stated, describe_tool, kind_of, names_diameter
 from chipload.program.reconcile import tool_comments, without_offsets
 from chipload.program.setup import FIRST_NAMED
+from chipload.program.tool_words import Stated, describe_tool, kind_of, names_diameter
 
 #: a comment of NC text, with one pair of brackets in it
 COMMENT = re.compile(r"\(((?:[^()\n]|\([^()\n]*\))*)\)|;([^\n]*)")

@@ -15,8 +15,8 @@ import re
 from enum import Enum
 from typing import Any
 
-from chipload.jobs.drafts.tool_sizes import drill_size, thread_size
 from chipload.program.reconcile import length_of
+from chipload.program.tool_sizes import drill_size, thread_size
 
 #: value and where it stands, by key of the ``[[cutter]]``; ``kind`` is a
 #: :class:`ToolKind`, ``number_mm`` a number that may be the diameter
