@@ -1,4 +1,4 @@
-"""The pages of docs/ that are made from the source are current; the migration names keys that exist."""
+"""The pages of docs/ that are made from the source are current."""
 
 from __future__ import annotations
 
@@ -43,12 +43,3 @@ def test_the_table_of_columns_names_each_once():
     text = (ROOT / "docs" / "columns.md").read_text()
     names = re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)
     assert sorted(names) == sorted([*COLUMNS, *BOUNDED])
-
-
-def test_the_migration_leads_to_columns_that_exist_and_from_those_that_do_not():
-    text = (ROOT / "docs" / "migration.md").read_text().split("## Columns and limits")[1].split("\n## ")[0]
-    rows = re.findall(r"^\| `(\w+)` \| `(\w+)` \|", text, re.MULTILINE)
-    assert len(rows) > 15
-    for old, new in rows:
-        assert new in COLUMNS, new
-        assert old not in COLUMNS, old
