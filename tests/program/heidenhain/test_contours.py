@@ -109,8 +109,55 @@ def test_polar_coordinates():
     np.testing.assert_allclose(np.degrees(arc_sweeps(c)[3:]), [90, -90], atol=1e-9)
 
 
-def test_an_approach_is_a_straight_line():
-    c, findings = read(*TOOL, "APPR LT X+0 Y+0 LEN10 RL F300", "L X+0 Y+30", "DEP LT LEN10", "L X-20 Y-20 R0 FMAX")
-    np.testing.assert_allclose(xy(c), [[-20, -20], [-4, 0], [-4, 30], [-20, -20]], atol=1e-12)
-    assert [f.code for f in findings] == ["heidenhain-approach", "heidenhain-corner"]
-    assert all(f.severity == Severity.UNPROVEN for f in findings)
+def test_straight_approaches_and_departures():
+    """LT along the contour, LN square to it and the radius of 4 mm farther; the tool stays left of X0."""
+    c, findings = read(*TOOL, "APPR LT X+0 Y+0 LEN10 RL F300", "L X+0 Y+30", "DEP LT LEN6", "L X-20 Y-20 R0 FMAX")
+    np.testing.assert_allclose(xy(c), [[-20, -20], [-4, -10], [-4, 0], [-4, 30], [-4, 36], [-20, -20]], atol=1e-12)
+    assert not findings
+    # to the point between with the feed before, at rapid after FMAX
+    assert c.motion.tolist() == [RAPID, RAPID, LINE, LINE, LINE, RAPID]
+    c, findings = read(*TOOL, "APPR LN X+0 Y+0 LEN10 RL F300", "L X+0 Y+30", "DEP LN LEN6 F900")
+    np.testing.assert_allclose(xy(c), [[-20, -20], [-14, 0], [-4, 0], [-4, 30], [-10, 30]], atol=1e-12)
+    np.testing.assert_allclose(c.feed[-3:] * 60.0, [300, 300, 900])
+    assert not findings
+
+
+@pytest.mark.parametrize("side", ["RL", "RR"])
+def test_round_approaches_and_departures(side):
+    """A quarter of R10 that touches X0 at its start and end: the path of the centre has R10 - 4 about (-+10, 0)."""
+    s = 1 if side == "RL" else -1
+    c, findings = read(*TOOL, f"APPR CT X+0 Y+0 CCA90 R10 {side} F300", "L X+0 Y+30", "DEP CT CCA90 R10")
+    assert not findings
+    expected = [[-20, -20], [-10 * s, -6], [-4 * s, 0], [-4 * s, 30], [-10 * s, 36]]
+    np.testing.assert_allclose(xy(c), expected, atol=1e-9)
+    np.testing.assert_allclose(np.degrees(arc_sweeps(c)[[2, 4]]), [90 * s, 90 * s])
+
+
+def test_lines_touch_the_arcs_of_lct():
+    """The lines to and from the arcs are square to their radii, and go on in the sense of the arcs."""
+    c, findings = read(*TOOL, "APPR LCT X+0 Y+0 R10 RL F300", "L X+0 Y+30", "DEP LCT X-40 Y+20 R7", "L Z+9 FMAX")
+    assert not findings
+    z = c.position[:, 0] + 1j * c.position[:, 1]
+    for line, arc, start, centre, radius in ((1, 2, 0, -10.0, 6.0), (5, 4, 4, -7.0 + 30.0j, 3.0)):
+        touch = z[line] if line < arc else z[arc]
+        along = z[line] - z[start]
+        assert abs(touch - centre) == pytest.approx(radius)
+        assert (along / (1j * (touch - centre))).real > 0.0
+        assert (along / (touch - centre)).real == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(xy(c)[[2, 3, 5]], [[-4, 0], [-4, 30], [-40, 20]], atol=1e-9)
+
+
+def test_an_approach_goes_down_above_the_point_between():
+    c, _ = read(*TOOL, "APPR LT X+0 Y+0 Z-9 LEN10 RL F300", "L X+0 Y+30")
+    np.testing.assert_allclose(c.position[1:4, :3], [[-4, -10, -5], [-4, -10, -9], [-4, 0, -9]], atol=1e-12)
+
+
+def test_approaches_that_cannot_be_carried_out():
+    _, findings = read(*TOOL, "APPR LCT X+0 Y+0 R3 RL F300", "L X+0 Y+30", lenient=True)
+    assert "LCT: an arc of the radius -1 mm cannot be reached" in findings[0].text
+    _, findings = read(*TOOL, "APPR LT X+0 Y+0 LEN10 RL F300", "L Z-5 FMAX", lenient=True)
+    assert [f.code for f in findings] == ["heidenhain-approach"]
+    assert "no motion follows it" in findings[0].text
+    assert findings[0].severity == Severity.UNPROVEN
+    _, findings = read(*TOOL, "DEP LT LEN10", lenient=True)
+    assert "no compensated contour is before it" in findings[0].text

@@ -1,9 +1,9 @@
 """Motions of conversational programs: L and LP, C, CR, CT and CP about poles CC, approach and departure.
 
 Notation: ``text`` is a block without its first word; DR+ counter-clockwise; PR, PA polar coordinates about the pole.
-Approaches (APPR) go straight to the start of the contour, departures (DEP) are left out: findings say so. Roundings
-(RND) and chamfers (CHF) are in :mod:`~chipload.program.corners`; one that the contour has no room for stays
-sharp. A motion in the machine's own coordinates (M91) is left out: where they lie in the work is not known.
+Approaches and departures (APPR, DEP) are in :mod:`~chipload.program.heidenhain.approaches`, roundings (RND) and
+chamfers (CHF) in :mod:`~chipload.program.corners`; one that the contour has no room for stays sharp. A motion in the
+machine's own coordinates (M91) is left out: where they lie in the work is not known.
 
 Reference: Heidenhain, iTNC 530 User's Manual HEIDENHAIN Conversational, "Programming: Programming Contours".
 """
@@ -17,7 +17,7 @@ import re
 from chipload.errors import InputError
 from chipload.program.commands import LINE, PLANE_AXES, RAPID, XY, YZ, ZX
 from chipload.program.corners import Corner
-from chipload.program.heidenhain import tilted_plane, words
+from chipload.program.heidenhain import approaches, tilted_plane, words
 from chipload.program.heidenhain.formula import NotKnownError
 from chipload.program.heidenhain.state import FARTHEST, ConversationalState
 from chipload.program.heidenhain.switches import after, before, m_codes
@@ -38,6 +38,12 @@ def line(s: ConversationalState, text: str) -> None:
 def polar_line(s: ConversationalState, text: str) -> None:
     """LP: a straight motion to polar coordinates; the one that is missing stays."""
     codes, fast = _read(s, text)
+    end, named = _polar_end(s, text)
+    _straight(s, text, end, named, codes, fast)
+
+
+def _polar_end(s: ConversationalState, text: str) -> tuple[list[float], set[int]]:
+    """The end of a motion in polar coordinates, and the axes that it names."""
     end, named = s.ends(words.POLAR.sub(" ", text))
     x, y = _centre(s)
     if s.pole_plane != XY:
@@ -52,7 +58,7 @@ def polar_line(s: ConversationalState, text: str) -> None:
         else:
             angle = math.radians(amount) + (angle if step else 0.0)
     end[0], end[1] = x + radius * math.cos(angle), y + radius * math.sin(angle)
-    _straight(s, text, end, named | {0, 1}, codes, fast)
+    return end, named | {0, 1}
 
 
 def _straight(
@@ -194,12 +200,26 @@ def helix(s: ConversationalState, text: str) -> None:
 
 
 def approach(s: ConversationalState, text: str) -> None:
-    """APPR: straight to the start of the contour."""
-    s.unproven("heidenhain-approach", f"APPR {text.strip()[:40]}: the approach is taken as a straight line")
-    found = re.match(r"\s*(P?L?C?[TN]|PLCT|LCT)\s*(.*)", text)
-    rest = re.sub(rf"\b(?:LEN|CCA)\s*[-+]?(?:{words.VALUE})", " ", found[2] if found else text)
-    rest = words.RADIUS.sub(" ", rest)
-    (polar_line if words.POLAR.search(rest) else line)(s, rest)
+    """APPR: to the start of the contour, once the motion behind it is known."""
+    found = approaches.FORM.match(text)
+    if found is None:
+        raise InputError(f"APPR{text[:20]}: must be LT, LN, CT or LCT")
+    form, rest = approaches.form_of(s, found[2], found[3])
+    lasting, moved = s.feed, s.last_motion()
+    codes, fast = _read(s, rest)
+    end, named = _polar_end(s, rest) if found[1] else s.ends(rest)
+    before(s, codes)
+    side = _side(s, rest)
+    if s.left_out:
+        s.unknown |= {k for k in named if k < 3}
+    elif not side or s.unknown & {0, 1}:
+        raise NotKnownError("APPR: needs RL or RR and a known position: move there first")
+    else:
+        s.end_contour()
+        quick = fast or moved in (None, RAPID)
+        s.approaching = approaches.Approach(s, form, f"APPR{text}", end, side, lasting, quick)
+        s.at, s.unknown = end, s.unknown - named
+    after(s, codes)
 
 
 def corner(s: ConversationalState, text: str) -> None:
@@ -219,9 +239,19 @@ def corner(s: ConversationalState, text: str) -> None:
 
 
 def departure(s: ConversationalState, text: str) -> None:
-    """DEP: left out."""
-    s.unproven("heidenhain-corner", f"{text[:40]}: the departure is left out")
-    s.feed_of(text)
+    """DEP: away from the end of the contour; R0 after it."""
+    found = approaches.FORM.match(text[3:])
+    if found is None:
+        raise InputError(f"{text[:20]}: must be DEP LT, LN, CT or LCT")
+    form, rest = approaches.form_of(s, found[2], found[3])
+    codes, fast = _read(s, rest)
+    end, named = _polar_end(s, rest) if found[1] else s.ends(rest)
+    before(s, codes)
+    if s.left_out:
+        s.unknown |= {0, 1} | {k for k in named if k < 3}
+    else:
+        approaches.depart(s, form, end, named, fast)
+    after(s, codes)
 
 
 def _read(s: ConversationalState, text: str) -> tuple[list[int], bool]:

@@ -4,7 +4,8 @@ Notation: a block is a line; X Y Z [mm], A B C [rad].
 
 | subject | blocks |
 |---|---|
-| motions (:mod:`~chipload.program.heidenhain.motions`) | L, LP, CC, C, CR, CT, CP, RND, CHF, RL, RR; APPR as a line |
+| motions (:mod:`~chipload.program.heidenhain.motions`) | L, LP, CC, C, CR, CT, CP, RND, CHF, RL, RR |
+| approach (:mod:`~chipload.program.heidenhain.approaches`) | APPR and DEP with LT, LN, CT, LCT |
 | planes (:mod:`~chipload.program.heidenhain.tilted_plane`) | PLANE SPATIAL, EULER, VECTOR, RELATIV, RESET; cycle 19 |
 | cycles (:mod:`~chipload.program.heidenhain.cycles`) | 1, 7, 9, 200 to 203, 205 to 209, 220, 221, 240, 262 |
 | switches (:mod:`~chipload.program.heidenhain.switches`) | TOOL DEF, TOOL CALL, M functions, FUNCTION TCPM |

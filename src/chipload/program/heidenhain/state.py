@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import cast
+from typing import Protocol, cast
 
 from chipload.errors import Finding, InputError, Severity
 from chipload.program.commands import ARC, DWELL, LINE, RAPID, XY, YZ, Frame, Row
@@ -28,6 +28,15 @@ FARTHEST = 1e6
 AXES = "XYZABC"
 #: the parameter that holds the radius of the tool
 RADIUS_Q = 108
+
+
+class Pending(Protocol):
+    """What the first motion of a contour completes: ``side`` of the tool beside that contour."""
+
+    side: int
+
+    def carry_out(self, first: Piece | None) -> None:
+        """Carry it out before a motion, or alone."""
 
 
 class ConversationalState:
@@ -85,6 +94,8 @@ class ConversationalState:
         self.before_corner = False
         self._waiting: Piece | None = None
         self._corner: Corner | None = None
+        #: an approach that the next motion completes
+        self.approaching: Pending | None = None
 
     # -- findings ---------------------------------------------------------------------------------------------
     def note(self, code: str, text: str, severity: Severity = Severity.NOTE) -> None:
@@ -172,6 +183,8 @@ class ConversationalState:
     # -- rows -------------------------------------------------------------------------------------------------
     def select(self, side: int, moves: set[int]) -> None:
         """Radius compensation of a block: side +1 left, -1 right, 0 none; ``moves`` the axes that it names."""
+        if self.approaching is not None and side == self.approaching.side:
+            return
         if side != self.side or (side and self._beside is None):
             self.end_contour()
             self.side = side
@@ -210,7 +223,7 @@ class ConversationalState:
         """RAPID or LINE to the programmed ``end``."""
         feed = 0.0 if motion == RAPID else self.cutting_feed()
         self._turn_to(complex(end[0] - self.at[0], end[1] - self.at[1]))
-        self._piece(Piece(motion, self.at, end, (0.0, 0.0), 0, feed, self._tail()))
+        self._piece(Piece(motion, self.at, end, (0.0, 0.0), 0, feed, self.tail()))
         self.at = end
 
     def arc(self, end: list[float], centre: tuple[float, float], turns: int) -> None:
@@ -218,7 +231,7 @@ class ConversationalState:
         feed = self.cutting_feed()
         out = complex(end[0] - centre[0], end[1] - centre[1]) * (1j if turns > 0 else -1j)
         self._turn_to(out)
-        self._piece(Piece(ARC, self.at, end, centre, turns, feed, self._tail()))
+        self._piece(Piece(ARC, self.at, end, centre, turns, feed, self.tail()))
         self.at = end
 
     def upright_arc(self, end: list[float], centre: tuple[float, float], turns: int, plane: int) -> None:
@@ -228,9 +241,15 @@ class ConversationalState:
         self._flush()
         x, y = self.lag
         at = (centre[0] + y, centre[1]) if plane == YZ else (centre[0], centre[1] + x)
-        self._row(ARC, end, self.cutting_feed(), at, turns, self._tail(), plane)
+        self._row(ARC, end, self.cutting_feed(), at, turns, self.tail(), plane)
         self.heading = None
         self.at = end
+
+    def last_motion(self) -> int | None:
+        """The motion that was programmed last; None: none."""
+        if self._waiting is not None:
+            return self._waiting.motion
+        return self.rows[-1][0] if self.rows else None
 
     def corner(self, corner: Corner) -> bool:
         """Round or chamfer the corner between the piece before and the next one; whether there is one before."""
@@ -239,6 +258,7 @@ class ConversationalState:
 
     def _piece(self, piece: Piece) -> None:
         """A piece of the contour; it waits where its end is to be rounded."""
+        self._approach(piece)
         before, corner = self._waiting, self._corner
         self._waiting = self._corner = None
         if before is not None:
@@ -246,27 +266,35 @@ class ConversationalState:
             if corner is not None and made is None:
                 self.sharp(corner.text)
             for some in (before,) if made is None else made[:-1]:
-                self._carry(some)
+                self.carry(some)
             piece = piece if made is None else made[-1]
         if self.before_corner and piece.motion != RAPID:
             self._waiting = piece
         else:
-            self._carry(piece)
+            self.carry(piece)
 
     def sharp(self, text: str) -> None:
         """Report that a corner stays sharp; ``text`` is the block that requests another."""
         self.unproven("heidenhain-corner", f"{text[:40]}: the corner stays sharp: its rounding or chamfer is left out")
 
+    def _approach(self, first: Piece | None) -> None:
+        """Carry out the approach that waits for a motion."""
+        waiting, self.approaching = self.approaching, None
+        if waiting is not None:
+            waiting.carry_out(first)
+
     def _flush(self) -> None:
         """Execute the motion that waits for a corner block."""
+        self._approach(None)
         waiting, corner = self._waiting, self._corner
         self._waiting = self._corner = None
         if waiting is not None:
             if corner is not None:
                 self.sharp(corner.text)
-            self._carry(waiting)
+            self.carry(waiting)
 
-    def _carry(self, piece: Piece) -> None:
+    def carry(self, piece: Piece) -> None:
+        """Execute a piece of the contour, beside it or on it."""
         if self._beside is None:
             self._row(piece.motion, piece.end, piece.feed, piece.centre, piece.turns, piece.tail)
         elif piece.motion == ARC:
@@ -282,9 +310,9 @@ class ConversationalState:
         """DWELL where the tool stands."""
         self._flush()
         if self._beside is not None:
-            self._emit(self._beside.pause((seconds, self._tail())))
+            self._emit(self._beside.pause((seconds, self.tail())))
         else:
-            self._row(DWELL, self.at, seconds, (0.0, 0.0), 0, self._tail())
+            self._row(DWELL, self.at, seconds, (0.0, 0.0), 0, self.tail())
 
     def row(
         self,
@@ -296,7 +324,7 @@ class ConversationalState:
     ) -> None:
         """A motion of the tool's own centre."""
         self._flush()
-        self._row(motion, end, feed, centre, turns, self._tail())
+        self._row(motion, end, feed, centre, turns, self.tail())
 
     def _row(
         self,
@@ -311,7 +339,8 @@ class ConversationalState:
         x, y = end[0] + self.lag[0], end[1] + self.lag[1]
         self.rows.append((motion, (x, y, *end[2:]), plane, centre, turns, feed, *tail))
 
-    def _tail(self) -> tuple[object, ...]:
+    def tail(self) -> tuple[object, ...]:
+        """What a row has behind its motion."""
         spindle = self.speed * self.sense
         tip = self.tcp or (self.tilt is not None and self.swivel is not None and self.swivel.turns)
         return (spindle, self.tool, tip, len(self.frames) - 1, self.line, len(self.labels) - 1)
