@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chipload.checking.load_budget import budget_parts, factors_of_steps
+from chipload.checking.load_budget import bounded_factors, budget_parts, factors_of_steps
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.load_parts import LoadParts, bounded_parts, load_parts
 from chipload.cutting.material import Material
@@ -164,3 +164,15 @@ def test_factors_of_many_steps_are_those_of_one_budget_each(load: str) -> None:
         for own, bent in zip(parts, (0.01, 0.0), strict=True)
     ]
     np.testing.assert_allclose(found, expected)
+
+
+def test_bounds_of_many_steps_are_those_of_one_each() -> None:
+    """What thin walls plan with is what their check holds a force at."""
+    mills = {1: Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5), 2: Cutter(16.0, 3, 0.5, 20.0, 30.0, 6e5, runout_size=0.002)}
+    columns = {"tool": np.array([1, 2, 1]), "chip_max_mm": np.array([0.05, 0.1, 0.0])}
+    expected = []
+    for tool, chip in zip(columns["tool"].tolist(), columns["chip_max_mm"].tolist(), strict=True):
+        own = bounded_parts(mills[tool], metal(), chip)
+        expected.append(at_95(own, "force_over_allowable", mills[tool], metal(), 1.0))
+    np.testing.assert_allclose(bounded_factors(columns, mills, metal(), 0.95), expected)
+    assert bounded_factors(columns, mills, metal(), 0.5).tolist() == [1.0, 1.0, 1.0]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.load_parts import CHIP, MEANS, LoadParts, bounded_parts
+from chipload.cutting.load_parts import CHIP, MEANS, SCATTER, LoadParts, bounded_parts, bounded_rise
 from chipload.cutting.material import Material
 from chipload.result.budget import ErrorBudget, ErrorPart
 from chipload.result.limits import Columns, LimitCheck
@@ -105,6 +105,21 @@ def factors_of_steps(
     bounds = 1.0 + error + (0.0 if mean or geometric else peaks) + bends
     quantile = NormalDist().inv_cdf(confidence)
     return np.asarray(bounds * (1.0 + rise) * np.exp(quantile * np.sqrt(random + (scatter * rise) ** 2)))
+
+
+def bounded_factors(columns: Columns, cutters: Mapping[int, Cutter], material: Material, confidence: float) -> Floats:
+    """Return (n,) what the peak of each step may be at a confidence over its nominal value with its bounds, from upper
+    bounds of the parts of its error; 1 at 0.5.
+    """
+    chip, tool = (np.asarray(columns[name]) for name in (CHIP, "tool"))
+    out = np.ones(len(chip))
+    for number in np.unique(tool).tolist() if confidence > 0.5 else ():
+        own, cutter = tool == number, cutters.get(int(number), cutters[min(cutters)])
+        rise, worst = bounded_rise(cutter, material, chip[own]), bounded_parts(cutter, material, 0.0)
+        scatter = SCATTER if worst.assumed_runout else 0.0
+        deviation = np.sqrt(worst.coefficients**2 + TURNS**2 + (scatter * rise) ** 2)
+        out[own] = (1.0 + rise) * np.exp(NormalDist().inv_cdf(confidence) * deviation)
+    return out
 
 
 def budget_of(

@@ -131,13 +131,19 @@ def bounded_parts(cutter: Cutter, material: Material, chip: float) -> LoadParts:
     >>> round(own.rise, 12), own.coefficients
     (0.4, 0.1)
     """
-    e, assumed = runout_of(cutter)
-    mean, known = 0.5 * chip, with_spread(material)
-    more = min(2.0 * e * math.sin(math.pi / cutter.flutes), (cutter.flutes - 1) * mean) if e > 0.0 else 0.0
-    whole = mean + material.Kte / material.Ktc
+    known = with_spread(material)
     values, sizes = np.sqrt(np.diagonal(known.variances)), np.abs(known.coefficients)
     spread = float(np.max(np.divide(values, sizes, out=np.zeros(6), where=sizes > 0.05 * sizes[[0, 0, 0, 3, 3, 3]])))
-    return LoadParts(1.0, more / whole if whole > 0.0 else 0.0, spread, 0.0, assumed, not material.has_band)
+    rise = float(bounded_rise(cutter, material, np.array([chip]))[0])
+    return LoadParts(1.0, rise, spread, 0.0, runout_of(cutter)[1], not material.has_band)
+
+
+def bounded_rise(cutter: Cutter, material: Material, chip: Floats) -> Floats:
+    """Return the rise of :func:`bounded_parts` of steps with the thickest chips (n,) [mm]."""
+    e, mean = runout_of(cutter)[0], 0.5 * chip
+    more = np.minimum(2.0 * e * math.sin(math.pi / cutter.flutes), (cutter.flutes - 1) * mean)
+    whole = mean + material.Kte / material.Ktc
+    return np.asarray(np.divide(more, whole, out=np.zeros(len(chip)), where=whole > 0.0))
 
 
 def with_spread(material: Material) -> Material:

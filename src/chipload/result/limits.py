@@ -102,6 +102,13 @@ class LimitCheck:
         return held and self.worst is not None and self.state is not Verdict.EXCEEDS
 
     @property
+    def factor(self) -> float:
+        """What the worst value may be, at the confidence of the limit, over its nominal value."""
+        if self.budget is None or self.budget.confidence <= 0.5:
+            return 1.0 + self.error
+        return self.budget.value(1.0)
+
+    @property
     def value_at_confidence(self) -> float | None:
         """What the worst value may be at the confidence that is shown; None: it has no budget or no value."""
         if self.budget is None or self.worst is None:

@@ -64,11 +64,12 @@ def entry_share(at_full: Sequence[LimitCheck], checks_at: Callable[[float], Sequ
     below = {c.name: c for c in checks_at(TRIED) if c.worst is not None}
     share = 1.0
     for name, full in exceeded.items():
-        half, most, error = below[name].worst if name in below else None, full.worst, full.resolution_error
-        if half is None or most is None or error is None:
+        half, most = below[name].worst if name in below else None, full.worst
+        if half is None or most is None:
             return 1.0
         slope = (most - half) / (1.0 - TRIED)
-        edge, limit = most - slope, full.limit / (1.0 + error)
+        # thinner chips rise by more: the greater of the two errors
+        edge, limit = most - slope, full.limit / max(full.factor, below[name].factor)
         if slope <= 0.0 or limit <= edge:
             return 1.0
         share = min(share, TAKEN * (limit - edge) / slope)

@@ -30,9 +30,9 @@ def exceeding(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[
         column = check.column.name
         if column not in before or column in ("axial_overrun_mm", "deflection_share"):
             continue
-        held = check.budget is not None and check.budget.confidence > 0.5
-        factor_at = check.budget.value(1.0) if held and check.budget is not None else 1.0
-        values = factor_at * np.abs(np.asarray(c[column], dtype=np.float64))
+        # what leaves a limit unproven by its resolution alone does not exceed it
+        more = check.factor / (1.0 + check.error)
+        values = more * np.abs(np.asarray(c[column], dtype=np.float64))
         allowed = simulation.checks.allowed_stress(c["tool"]) if column == "cutter_stress_mpa" else check.limit
         over = np.flatnonzero(values > allowed)
         order = over[np.argsort(-values[over], kind="stable")]

@@ -156,6 +156,7 @@ class Variant:
     stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
     find_load_error : calculates ``load_error`` at its first use: it takes longer than the simulation
     shift : greatest way [mm] by which the last passes were moved against the form error
+    at_confidence : (n,) or for all steps, what a force may be at the confidence of the checks over its nominal value
     """
 
     name: str
@@ -170,6 +171,7 @@ class Variant:
     stress: float
     find_load_error: Callable[[], Mapping[str, float]]
     shift: float = 0.0
+    at_confidence: NDArray[np.float64] | float = 1.0
 
     @cached_property
     def load_error(self) -> Mapping[str, float]:
@@ -184,7 +186,8 @@ class Variant:
         return np.asarray(bad[np.argsort(-ratio[bad], kind="stable")])
 
     def over_with_error(self, modelled: bool, assumed: float | None = None) -> float:
-        """Greatest F_n over F_th with the error of the loads and, where F_th is modelled, that of the mesh.
+        """Greatest F_n over F_th at the confidence of the checks with the error of the loads and, where F_th is
+        modelled, that of the mesh.
 
         Parameters
         ----------
@@ -193,7 +196,7 @@ class Variant:
         """
         c = self.columns
         unsure = c["compliance_error"] if modelled else 0.0
-        most = float((c["force_over_allowable"] * (1.0 + unsure)).max(initial=0.0))
+        most = float((c["force_over_allowable"] * self.at_confidence * (1.0 + unsure)).max(initial=0.0))
         return most * (1.0 + (self.load_error["force_normal_n"] if assumed is None else assumed))
 
     @property

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.load_budget import bounded_factors
 from chipload.jobs.kept_parts import KeptRecords
 from chipload.jobs.thinwall.comparison import compensated, least_error
 from chipload.jobs.thinwall.kept_proofs import RECORDS, kept_proof
@@ -113,12 +114,14 @@ def _thresholds(places: Places, depths: DepthRules, share: float) -> ThresholdOf
 
 
 def _room(one: Variant) -> tuple[float, float]:
-    """Error of the normal force of a variant, and the share of the limit that leaves room for it; no room is left for
-    an error that is not known.
+    """Error of the normal force of a variant, and the share of the limit that leaves room for it and for what the force
+    may be at the confidence of the checks where it is greatest; no room is left for an error that is not known.
     """
     error = one.load_error["force_normal_n"]
     error = error if math.isfinite(error) else 0.0
-    return error, 1.0 / (1.0 + error)
+    worst = int(np.argmax(one.columns["force_over_allowable"] * one.at_confidence))
+    more = float(np.broadcast_to(one.at_confidence, one.columns["force_over_allowable"].shape)[worst])
+    return error, 1.0 / ((1.0 + error) * more)
 
 
 def _overload(one: Variant, modelled: bool, assumed: float) -> tuple[float, bool]:
@@ -298,7 +301,11 @@ def _variant(places: Places, planned: Planned, program: Program, run: OnMachine,
         proof.shape,
         proof.stress,
         proof.find_load_error,
-    )
+        at_confidence=bounded_factors(
+            proof.columns, places.inputs.job.cutters, places.inputs.cut.material,
+            places.inputs.job.table.checks.confidence,
+        ),
+    )  # fmt: skip
 
 
 def _infeasible(places: Places, plan: Plan, deflection: float) -> tuple[Help, ...]:
