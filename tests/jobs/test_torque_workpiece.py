@@ -176,6 +176,15 @@ def test_a_workpiece_from_the_command_line(folder, tmp_path):
     assert 0.0 < work.max() < both.max() < 1.2 * work.max()
     names = {p.name for p in (tmp_path / "r").iterdir()}
     assert {"path.csv", "hal.toml", "controller.toml", "0-override.ngc", "0-feedforward.ngc", "report.html"} <= names
+    # the schedule of the model is a variant that is not released, whatever the verdict of the controller
+    fed = {t["name"]: t["programs"] for t in summary["tracks"] if t["programs"]}
+    used = summary["tracks"][0]["name"]
+    assert fed == {
+        used: ["0-override.ngc"],
+        used.replace("fuzzy_feedforward", "model_not_derated"): ["0-feedforward.ngc"],
+    }
+    head = (tmp_path / "r" / "0-feedforward.ngc").read_text()[:600]
+    assert f"NOT VERIFIED: not released: the job uses {used}" in head
     page = (tmp_path / "r" / "report.html").read_text()
     assert "Deflection of the workpiece" in page
     assert "ovalis" not in page.lower()

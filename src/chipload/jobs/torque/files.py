@@ -1,7 +1,8 @@
 """The files of a torque job for the machine: path and controller for `chipload hal`, and two programs.
 
 `0-override.ngc` has the programmed feeds and takes the override. `0-feedforward.ngc` has the feeds that the model
-allows written into it, for a machine without a controller, where nothing is measured.
+allows written into it, for a machine without a controller, where nothing is measured: it belongs to the feed schedule
+of the model, a variant beside the controller of the verdict, and is not released.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from chipload.machine.machine import Machine
 from chipload.program.gcode.writer import write_commands, write_gcode
 from chipload.program.motions import is_arc
 from chipload.program.program import DWELL, RAPID, Program
-from chipload.program.release import NOT_SIMULATED, Release
+from chipload.program.release import Release
 from chipload.program.to_axes import to_axes
 from chipload.report.programs import ENDINGS
 from chipload.result import Result, release_of
@@ -43,7 +44,7 @@ CONTROLLER_FILES = (PATH, TABLE, HAL)
 
 def program_files(outcome: TorqueResult, result: Result) -> dict[str, bytes]:
     """All files by name."""
-    machine, ending = outcome.job.machine, ENDINGS[outcome.job.machine.dialect]
+    machine = outcome.job.machine
     name = override_file(machine)
     release = replace(release_of(result, name), condition="with chipload hal")
     text = override_text(outcome.job.title, outcome.job.program, machine, release)
@@ -52,7 +53,8 @@ def program_files(outcome: TorqueResult, result: Result) -> dict[str, bytes]:
         return out
     fed = feed_forward(outcome, outcome.control.controller)
     title = f"{outcome.job.title}, feeds that the planned torque allows, nothing is measured"
-    out[f"0-feedforward.{ending}"] = write_gcode(fed, machine, title=title, release=NOT_SIMULATED).encode("ascii")
+    name = feed_forward_file(machine)
+    out[name] = write_gcode(fed, machine, title=title, release=release_of(result, name)).encode("ascii")
     case = outcome.control.cases[-1]
     job = HalJob(
         path=outcome.allowable.path, override=case.runs["fuzzy_feedforward"].config, table=outcome.control.table,
@@ -69,6 +71,11 @@ def program_files(outcome: TorqueResult, result: Result) -> dict[str, bytes]:
 def override_file(machine: Machine) -> str:
     """Name of the file of the program that takes the override."""
     return f"0-override.{ENDINGS[machine.dialect]}"
+
+
+def feed_forward_file(machine: Machine) -> str:
+    """Name of the file of the program with the feeds that the model allows."""
+    return f"0-feedforward.{ENDINGS[machine.dialect]}"
 
 
 def override_text(title: str, program: Program, machine: Machine, release: Release) -> str:

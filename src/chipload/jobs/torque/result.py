@@ -14,9 +14,11 @@ import numpy as np
 from chipload.checking.default_checks import default_limits, range_findings, unchecked_checks, with_budget
 from chipload.control.override import STATUS
 from chipload.errors import Finding, Severity
+from chipload.jobs.torque.files import feed_forward_file, override_file
 from chipload.jobs.torque.numbers import operation_numbers
 from chipload.jobs.torque.outcome import (
     HELD,
+    MODEL_FULL,
     PLAIN,
     ClampedWorkpiece,
     ControllerCase,
@@ -26,7 +28,6 @@ from chipload.jobs.torque.outcome import (
 )
 from chipload.jobs.torque.step_checks import check_columns
 from chipload.number_text import number_text
-from chipload.report.programs import ENDINGS
 from chipload.result import (
     LimitCheck,
     Result,
@@ -138,7 +139,7 @@ def _track(outcome: TorqueResult, case: ControllerCase, name: str) -> Track:
         time_s=run.outcome.time,
         limits=limits_of(outcome, columns, track),
         findings=(*_run_findings(case, run), *range_findings(outcome.job.checks, columns)),
-        programs=_programs(outcome) if used else (),
+        programs=_programs(outcome, case, name),
         parameters={"latency_s": case.loop.latency, "override_step": case.quantum},
         energy_balance=outcome.energy_balance["real"],
         blocks=in_memory(columns),
@@ -151,11 +152,13 @@ def _not_run(outcome: TorqueResult) -> Track:
     limits = (
         LimitCheck(name, x, None, Verdict.UNPROVEN, HELD, reason=reason) for name, x in outcome.job.limits.items()
     )
-    return Track(HELD, TrackKind.CONTROLLER, True, None, tuple(limits), programs=_programs(outcome))
+    return Track(HELD, TrackKind.CONTROLLER, True, None, tuple(limits), programs=(override_file(outcome.job.machine),))
 
 
-def _programs(outcome: TorqueResult) -> tuple[str, ...]:
-    return (f"0-override.{ENDINGS[outcome.job.machine.dialect]}",)
+def _programs(outcome: TorqueResult, case: ControllerCase, name: str) -> tuple[str, ...]:
+    """Files of a controller: the one in use takes the override, the schedule of the model has its feeds written."""
+    files = {HELD: override_file, MODEL_FULL: feed_forward_file}
+    return (files[name](outcome.job.machine),) if case is outcome.control.cases[-1] and name in files else ()
 
 
 def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
