@@ -154,10 +154,10 @@ class Result:
 
     @cached_property
     def first_lines(self) -> tuple[str, ...]:
-        """The lines that every page and terminal shows first: the message, the critical load at the confidence with the
-        parts of its error, and what is not checked.
+        """The lines that every page and terminal shows first: the message, what is not checked, and the load that uses
+        most of its limit at the confidence, with the parts of its error.
         """
-        return tuple(filter(None, (self.message, confidence_line(self.in_use), unchecked_line(self.unchecked))))
+        return tuple(filter(None, (self.message, unchecked_line(self.unchecked), confidence_line(self.in_use))))
 
     def _repr_html_(self) -> str:
         """HTML for notebooks: the message, and tables of limits, tracks and findings."""
