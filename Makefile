@@ -35,7 +35,9 @@ COLLECTED := $(VENV)/collected.log
 # assertions of the tests. Each worker would do it again
 test: setup
 	$(BIN)/ruff check . && $(BIN)/ruff format --check .
-	{ $(BIN)/mypy && $(BIN)/lint-imports && $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site; } \
+	{ $(BIN)/mypy && $(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 \
+	  && $(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin \
+	  && $(BIN)/lint-imports && $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site; } \
 	  > $(CHECKED) 2>&1 & checks=$$!; \
 	{ $(BIN)/pytest -p no:xdist --collect-only -qq > $(COLLECTED) 2>&1 || { cat $(COLLECTED); false; }; } \
 	&& OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal -ra; tested=$$?; \

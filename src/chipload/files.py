@@ -23,9 +23,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from chipload.errors import InputError, OutputError
-
-if sys.platform != "win32":
-    import fcntl
+from chipload.processes import lock_file
 
 if TYPE_CHECKING:
     from hashlib import _Hash as Hash
@@ -229,7 +227,7 @@ def sweep(above: Path) -> None:
                     continue
                 handle = os.open(entry.path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW)
                 try:
-                    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    lock_file(handle)
                     if entry.is_dir(follow_symlinks=False):
                         shutil.rmtree(entry.path, ignore_errors=True)
                     elif entry.is_file(follow_symlinks=False):
@@ -259,7 +257,7 @@ def _lock_of(folder: Path) -> int | None:
     except FileNotFoundError:
         return _GONE
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        lock_file(handle)
         if os.stat(folder).st_ino == os.fstat(handle).st_ino:
             return handle
     except (BlockingIOError, FileNotFoundError):
@@ -276,4 +274,4 @@ def _lock(handle: int) -> None:
     """Mark a file as being written, where the file system has locks."""
     if sys.platform != "win32":
         with contextlib.suppress(OSError):
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_file(handle)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -189,6 +190,19 @@ def test_an_example_overwrites_nothing(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("")
     code, _, err = call("example", "contour", tmp_path)
     assert (code, err) == (2, f"chipload: {tmp_path}: is not empty: name a folder that is new or empty\n")
+
+
+def test_the_demo_overwrites_nothing_and_runs_the_examples_of_make(tmp_path: Path) -> None:
+    from chipload.cli.results import DEMO
+
+    (tmp_path / "pocket").mkdir()
+    (tmp_path / "pocket" / "mine.txt").write_text("mine")
+    code, _, err = call("demo", tmp_path)
+    assert code == 2
+    assert "pocket" in err
+    assert [path.name for path in tmp_path.iterdir()] == ["pocket"]
+    makefile = (Path(__file__).parents[2] / "Makefile").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"\bjob (\w+)", makefile.split("\ndemo:")[1])) == sorted(DEMO)
 
 
 def test_an_unknown_example_names_the_nearest(tmp_path: Path) -> None:

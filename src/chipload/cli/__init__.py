@@ -22,7 +22,7 @@ __all__ = ["app", "main"]
 #: the commands in the order of the help
 ORDER = (
     "init", "run", "simulate", "check", "sweep", "convert", "filter", "fit", "spindle", "mtconnect", "tap", "chatter",
-    "cuts", "example", "examples", "machines", "materials", "cutters", "view", "mcp", "export", "hal",
+    "cuts", "demo", "example", "examples", "machines", "materials", "cutters", "view", "mcp", "export", "hal",
 )  # fmt: skip
 app.registered_commands.sort(key=lambda c: ORDER.index(c.name or getattr(c.callback, "__name__", "")))
 
@@ -30,7 +30,7 @@ app.registered_commands.sort(key=lambda c: ORDER.index(c.name or getattr(c.callb
 def main() -> NoReturn:
     """Run the command ``chipload``."""
     try:
-        for name in ("SIGTERM", "SIGHUP"):
+        for name in ("SIGTERM", "SIGHUP", "SIGBREAK"):
             # under nohup a terminal that closes is ignored
             number = getattr(signal, name, None)
             if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
@@ -43,5 +43,5 @@ def main() -> NoReturn:
 
 
 def _stop(_number: int, _frame: object) -> NoReturn:
-    """Treat SIGTERM and SIGHUP as Ctrl-C."""
+    """Treat SIGTERM, SIGHUP and Ctrl-Break (Windows) as Ctrl-C."""
     raise KeyboardInterrupt

@@ -11,6 +11,9 @@ from chipload.cli.app import Debug, app
 from chipload.errors import InputError
 from chipload.terminal import guarded, show
 
+#: examples that ``chipload demo`` runs
+DEMO = ("contour", "pocket", "chips")
+
 
 @app.command()
 def example(
@@ -30,6 +33,36 @@ def example(
         if folder is None:
             raise InputError(f"example {name}: the folder is missing: use chipload example {name} DIR")
         show(f"copied: chipload run {copy_example(name, folder) / 'job.toml'} --out result")
+        return 0
+
+    guarded(work, debug)
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Argument(metavar="DIR", help="folder for the results")] = Path("result"),
+    debug: Debug = False,
+) -> None:
+    """Run three examples (contour, pocket, chips) and write their results. Exit code 0: they were run."""
+
+    def work() -> int:
+        from importlib import resources
+
+        from chipload.cli.inputs import show_verdict
+        from chipload.jobs import load_job, run_job
+        from chipload.report.folder import check_target, write_finished
+        from chipload.terminal import bar
+
+        for name in DEMO:
+            check_target(out / name)
+        for name in DEMO:
+            with resources.as_file(resources.files("chipload.examples") / name) as folder, bar() as progress:
+                done = run_job(load_job(folder / "job.toml"), progress)
+                out.mkdir(parents=True, exist_ok=True)
+                target = write_finished(done.result, done.presentation, out / name)
+            show_verdict(done.result)
+            show(f"report: {target / 'report.html'}")
+        show(f"the page: chipload view {out}")
         return 0
 
     guarded(work, debug)

@@ -30,6 +30,7 @@ import numpy as np
 
 from chipload.errors import InputError
 from chipload.lazy import require_extra
+from chipload.processes import own_group
 
 #: modules whose functions a child executes; their parameters are the shape and plain values
 SERVED = ("brep", "step", "step_faces", "step_meridian", "step_patch", "step_roles", "step_side")
@@ -227,7 +228,7 @@ def _start() -> subprocess.Popen[bytes]:
     threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
         return subprocess.Popen(
-            words, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, start_new_session=True,
+            words, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, **own_group(),
             env={**os.environ, **threads, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
         )  # fmt: skip
     except OSError as err:
@@ -250,7 +251,10 @@ def _limit() -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        # macOS has the constant, and refuses the limit
+        refused = (ValueError, OSError) if sys.platform == "darwin" else ()
+        with contextlib.suppress(*refused):
+            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
 
 def _allow(seconds: float) -> None:

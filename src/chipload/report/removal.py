@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import multiprocessing
-import os
 import re
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from chipload.arrays import read_arrays
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
+from chipload.processes import cores
 from chipload.report.presentation import Blank
 from chipload.report.view import parts_of
 from chipload.result import Result, Track
@@ -71,7 +71,7 @@ def removal_meshes(result: Result, blanks: Mapping[str, Blank]) -> ShownStocks:
 
 def threads() -> int:
     """Threads for the stocks of tracks: one for each core; one in a process that shares the cores with others."""
-    return 1 if multiprocessing.parent_process() is not None else len(os.sched_getaffinity(0))
+    return 1 if multiprocessing.parent_process() is not None else cores()
 
 
 def _removal(

@@ -16,7 +16,6 @@ import json
 import math
 import os
 import shutil
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
@@ -30,9 +29,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.files import FRESH, cannot_write, sweep, write_whole
-
-if sys.platform != "win32":
-    import fcntl
+from chipload.processes import lock_file
 
 #: seconds of work between two states
 EVERY_S = 10.0
@@ -328,8 +325,7 @@ class Checkpoint:
         except OSError as err:
             raise cannot_write(self.folder, err) from None
         try:
-            if sys.platform != "win32":
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_file(self._lock)
         except OSError:
             self.close()
             raise InputError(

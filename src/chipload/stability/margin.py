@@ -9,7 +9,6 @@ At the margin the eigenvector of mu determines the mode that chatters, and the a
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
 from chipload.lazy import LateModule
+from chipload.processes import cores
 from chipload.stability.cuts import DynamicCuts
 from chipload.stability.delays import several_multipliers
 
@@ -198,7 +198,7 @@ def _margins(cuts: DynamicCuts, per_wave: float) -> Floats:
 def shared(part: Callable[[int, int], None], count: int) -> None:
     """Call ``part(first, last)`` on chunks of ``count`` things in threads."""
     ends = [(k, min(k + CHUNK, count)) for k in range(0, count, CHUNK)]
-    threads = min(os.cpu_count() or 1, MOST_THREADS, len(ends))
+    threads = min(cores(), MOST_THREADS, len(ends))
     if threads < 2:
         for first, last in ends:
             part(first, last)

@@ -10,12 +10,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import os
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
+
+from chipload.processes import own_group, stop_group
 
 #: seconds that a run has to stop by itself
 PATIENCE = 8.0
@@ -53,9 +53,7 @@ class JobRun:
         words = [sys.executable, "-m", "chipload.web.worker", str(job), str(out), *self.overrides]
         pipe = asyncio.subprocess.PIPE
         try:
-            process = await asyncio.create_subprocess_exec(
-                *words, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
-            )
+            process = await asyncio.create_subprocess_exec(*words, stdin=pipe, stdout=pipe, stderr=pipe, **own_group())
         except OSError as err:
             self.state, self.code, self.message = "failed", 1, f"no process could be started: {err.strerror}"
             return
@@ -103,17 +101,11 @@ async def _end(process: asyncio.subprocess.Process) -> None:
     """Ask a process to stop, and kill it where it does not."""
     if process.returncode is not None:
         return
-    _signal(process.pid, signal.SIGTERM)
+    stop_group(process.pid)
     try:
         await asyncio.wait_for(process.wait(), PATIENCE)
     except TimeoutError:
-        _signal(process.pid, signal.SIGKILL)
-
-
-def _signal(pid: int, number: int) -> None:
-    """To the process and all that it started: they are a session of their own."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(pid, number)
+        stop_group(process.pid, kill=True)
 
 
 async def _tail(stream: asyncio.StreamReader) -> str:

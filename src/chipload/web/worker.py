@@ -99,6 +99,8 @@ def _watch() -> None:
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGTERM, _stop)
+    for name in ("SIGTERM", "SIGBREAK"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _stop)
     threading.Thread(target=_watch, daemon=True).start()
     _write(work(*sys.argv[1:]))

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,10 +25,11 @@ from chipload.planning.impeller.kept import Keep, PlanTask
 from chipload.planning.impeller.surfaces import ContactSurface
 from chipload.planning.impeller.tables import IndexTable
 from chipload.planning.impeller.unreached import with_fits
+from chipload.processes import cores
 from chipload.progress import Progress, part_of, silent
 
 #: threads of a search in this process; its answer does not depend on them
-WORKERS = len(os.sched_getaffinity(0))
+WORKERS = cores()
 #: least number of pairs of contact point and table angle of a task, so that it takes 0.1 s or more (0.15 s at least for
 #: the example, by ``python benchmarks/impeller.py --tasks``): handing it over takes milliseconds
 PAIRS = 750

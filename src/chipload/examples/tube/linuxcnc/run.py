@@ -40,6 +40,9 @@ from pathlib import Path
 
 import numpy as np
 
+if sys.platform == "win32":
+    sys.exit("LinuxCNC runs on Linux alone")
+
 from chipload.control.hal import COLUMNS, HalJob
 from chipload.control.hal_file import load_hal
 from chipload.control.linuxcnc.path import locate
