@@ -46,6 +46,31 @@ def test_a_mirror_turns_the_side_of_compensation():
     assert ends(commands)[1:3, 0].tolist() == [-6, -6]
 
 
+@pytest.mark.parametrize("rest", ["G91 Y120.\nY120.", "G91 Y120. K2", "G91 Y120.\nG90 Y270."])
+def test_angles_in_g91_turn_on_about_the_pole(rest):
+    """Three holes on a circle of 50 mm, 120 deg apart from 30 deg; R and Z keep their places in G91."""
+    commands, findings = read(f"G16\nG81 X50. Y30. Z-5. R2. F100.\n{rest}\nG90 G15 G80\nG0 X1. Y2.")
+    assert findings == []
+    deep = ends(commands)[ends(commands)[:, 2] == -5.0]
+    angles = np.radians([30.0, 150.0, 270.0])
+    np.testing.assert_allclose(deep[:, :2], 50.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1), atol=1e-9)
+
+
+@pytest.mark.parametrize(("body", "bottoms"), [
+    ("G81 X10. Z-5. R2. F100.\nG91 X10. K3\nG90 X60.", 5),
+    ("G91 G81 X10. Z-7. R-3. F100. K2\nG90 X60.\nX70.", 4),
+])  # fmt: skip
+def test_a_row_of_holes_in_g91(body, bottoms):
+    """Stated in G90 or G91, R is at 2 and the bottom at -5 in each hole; the holes of K are 10 mm apart."""
+    commands, findings = read(f"G0 Z5.\n{body}\nG80")
+    assert findings == []
+    holes = ends(commands)[ends(commands)[:, 2] == -5.0]
+    assert len(holes) == bottoms
+    assert ends(commands)[:, 2].min() == -5.0
+    row = holes[holes[:, 0] < 55.0, 0]
+    np.testing.assert_allclose(np.diff(row), 10.0)
+
+
 def test_polar_coordinates_about_the_present_point_are_left_out():
     commands, findings = read("G91\nG16\nX5. Y30.\nG15\nG90\nX7.")
     assert ends(commands)[-1, 0] == 7.0

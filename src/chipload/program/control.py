@@ -95,6 +95,7 @@ class CycleRules:
     dwell_optional : P may be missing
     starts_spindle : ``none``, ``tapping``, or ``all``: cycles that start a spindle at rest
     peck_letters : I, J and K of G73 and G83 are pecks that become shorter
+    keeps_places : a cycle keeps the places of R and its bottom where G90 and G91 change; else their values
     """
 
     repeat_letter: str
@@ -102,6 +103,7 @@ class CycleRules:
     dwell_optional: bool
     starts_spindle: str
     peck_letters: bool
+    keeps_places: bool
 
 
 @dataclass(frozen=True)

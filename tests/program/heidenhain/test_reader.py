@@ -220,8 +220,6 @@ def test_what_is_not_read_is_left_out_and_the_rest_is_carried_out(block, code):
     [
         ("PLANE SPATIAL SPA+0 SPB+30 SPC+0 STAY", "PLANE RESET STAY"),
         ("CYCL DEF 19.1 A+10 B+0 C+0", "CYCL DEF 19.1 A+0 B+0 C+0"),
-        ("CYCL DEF 8.1 X Y", "CYCL DEF 8.1"),
-        ("CYCL DEF 11.1 SCL 0.75", "CYCL DEF 11.1 SCL 1"),
     ],
 )
 def test_motions_in_changed_coordinates_are_left_out_until_they_end(on, off):

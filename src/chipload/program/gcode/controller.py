@@ -100,6 +100,9 @@ class Controller:
         self.pointless: re.Pattern[str] | None = None
         #: radius and angle [mm, deg] of polar coordinates (G16); None: they are off
         self.polar: tuple[float, float] | None = None
+        #: the words that led there, and from where: a block may be read more than once
+        self.polar_words: dict[str, float] | None = None
+        self.polar_before = (0.0, 0.0)
         #: factors along X Y Z and the point [mm] that stays (G51, G51.1); None: none
         self.scaled: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
         #: macro that is called after each motion (G66), and the level of calls at which it was stated

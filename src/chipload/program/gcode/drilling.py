@@ -96,7 +96,7 @@ class Drilling:
             self.series = series
             return
         r, bottom, level = series.r, series.bottom, series.level
-        if not state.absolute:
+        if not state.absolute and not c.control.cycles.keeps_places:
             r += level
             bottom += r
         back = code == cycles.FANUC_BACK_BORING
@@ -117,7 +117,11 @@ class Drilling:
         height = max(height, clear)
         a, b = state.at[first], state.at[second]
         pole = "@" in words or "^" in words
-        for _ in range(repeats):
+        for count in range(repeats):
+            if count and c.polar is not None and not state.absolute:
+                # each hole turns on about the pole
+                c.polar_words = None
+                given = axes(c, block)
             if pole:
                 to = put(state.at, polar(self.c, block, given))
                 a, b = to[first], to[second]
@@ -153,6 +157,9 @@ class Drilling:
             new = Series(code, here if old is None else old.level, words["r"], words[normal])
         else:
             new = replace(old, r=words.get("r", old.r), bottom=words.get(normal, old.bottom))
+        if self.c.control.cycles.keeps_places and not self.c.state.absolute:
+            r = new.level + words["r"] if "r" in words else new.r
+            new = replace(new, r=r, bottom=r + words[normal] if normal in words else new.bottom)
         new = replace(
             new,
             peck=words.get("q", new.peck),

@@ -3,7 +3,8 @@
 Notation: a word is in units of the text; targets are in mm and degrees. ``@`` is a distance from the origin in X and Y,
 ``^`` an angle about it.
 
-Reference: LinuxCNC 2.9, "Polar Coordinates" and "G90, G91", "G93, G94, G95".
+References: Fanuc B-63944EN-1, "Polar Coordinate Command"; LinuxCNC 2.9, "Polar Coordinates", "G90, G91" and "G93, G94,
+G95".
 """
 
 from __future__ import annotations
@@ -34,17 +35,26 @@ def axes(c: Controller, block: Block) -> dict[int, float]:
 
 
 def from_polar(c: Controller, words: dict[str, float]) -> dict[int, float]:
-    """Coordinates in the plane [mm] by radius and angle (G16): the first axis is the radius, the second the angle."""
+    """Coordinates in the plane [mm] by radius and angle (G16): the first axis is the radius, the second the angle.
+
+    With G91 an angle counts from the one before, about the same pole; the way there from where the tool stands.
+    """
     first, second, _ = PLANE_AXES[PLANES[c.state.plane]]
     radius, angle = AXES[first], AXES[second]
     if c.polar is None or (radius not in words and angle not in words):
         return {}
-    if not c.state.absolute:
-        raise InputError("G16 with G91: polar coordinates about the present point are not read: write G90")
-    r = words[radius] * c.state.scale if radius in words else c.polar[0]
-    degrees = words.get(angle, c.polar[1])
+    if not c.state.absolute and radius in words:
+        raise InputError("G16 with a radius in G91: polar coordinates about the present point are not read: write G90")
+    if c.polar_words is not words:
+        c.polar_words, c.polar_before = words, c.polar
+    before = c.polar_before
+    r = words[radius] * c.state.scale if radius in words else before[0]
+    degrees = words.get(angle, 0.0 if not c.state.absolute else before[1]) + (0.0 if c.state.absolute else before[1])
     c.polar = r, degrees
-    return {first: r * math.cos(math.radians(degrees)), second: r * math.sin(math.radians(degrees))}
+    x, y = r * math.cos(math.radians(degrees)), r * math.sin(math.radians(degrees))
+    if c.state.absolute:
+        return {first: x, second: y}
+    return {first: x - c.state.at[first], second: y - c.state.at[second]}
 
 
 def scaled(c: Controller, given: dict[int, float]) -> dict[int, float]:

@@ -63,7 +63,7 @@ def form_of(s: ConversationalState, kind: str, text: str) -> tuple[Form, str]:
         span = math.radians(s.amount(angle[1]))
     if not (size > 0.0 and 0.0 < span <= math.tau):
         raise InputError(f"{kind}: {name} must be above 0, CCA above 0 and at most 360 deg")
-    return Form(kind, size * s.scale, span), words.rest_of(text, pattern, _ANGLE)
+    return Form(kind, size * s.scale * abs(s.size_factor()), span), words.rest_of(text, pattern, _ANGLE)
 
 
 class Approach:

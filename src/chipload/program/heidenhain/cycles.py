@@ -3,9 +3,13 @@
 Notation of cycle 1 (pecking): the tool stands the set-up clearance DIST above the surface; DEPTH of the hole and PLNGNG
 of each plunge are counted from the surface down; before each plunge it stops ``advanced_stop`` above what is drilled.
 
-Cycles 7 (datum shift), 9 (dwell), 10 (turned coordinates), 19 (working plane, by spatial angles) and 220, 221
-(patterns) act where they are defined. Mirrored and scaled coordinates (8, 11, 26) are not read: motions are left out
-until they end. A cycle that is not read is left out where it is called.
+Cycles 7 (datum shift), 8 (mirrored), 9 (dwell), 10 (turned coordinates), 11 and 26 (scaled), 19 (working plane, by
+spatial angles) and 220, 221 (patterns) act where they are defined. Coordinates are mirrored and scaled about the datum,
+by cycle 26 about its own point; which of shift, turn and mirror comes first is a matter of the control where both are
+there, which leaves the program unproven. In a tilted plane they are not read: motions are left out until they end. A
+cycle that is not read is left out where it is called.
+
+Reference: Heidenhain, iTNC 530 User's Manual, "Cycles: Coordinate Transformations".
 """
 
 from __future__ import annotations
@@ -28,11 +32,16 @@ from chipload.units import mm_s_from_mm_min
 MOST_PLUNGES, MOST_HOLES = 10_000, 10_000
 #: cycles that move nothing and set nothing that concerns the path
 SILENT = (13, 14, 20, 32)
-#: by what the coordinates are changed, and the value that leaves them as they are
-CHANGES = {8: ("mirrored", 0.0), 10: ("turned", 0.0), 11: ("scaled", 1.0), 26: ("scaled", 1.0)}
+#: by what the coordinates are changed
+CHANGES = {8: "mirrored", 10: "turned", 11: "scaled", 26: "scaled"}
+MIRROR, SCALING = 8, 11
+#: factors of scaling
+LEAST_FACTOR, MOST_FACTOR = 1e-6, 100.0
 PRESET, PATTERNS, WORKING_PLANE, ROTATION = 247, (220, 221), 19, 10
 _VALUE = re.compile(r"([A-Z. ]*?)\s*([-+]?\d*\.?\d+)\s*$")
 _SPATIAL = re.compile(rf"\b([ABC])\s*([-+]?)\s*({words.VALUE})")
+_FACTOR = re.compile(rf"(?<![A-Z])([XYZ])\s*\+?\s*({words.VALUE})")
+_FIXED = re.compile(rf"\bCC([XYZ])\s*([-+]?)\s*({words.VALUE})")
 _CHANGED = re.compile(rf"(?:\b|(?<=\s))[A-Z]*\s*([-+]?)\s*({words.VALUE})")
 
 
@@ -56,6 +65,9 @@ class Cycles:
         self.preset: float | None = None
         #: turn of the coordinates about Z [deg]
         self.turned = 0.0
+        #: mirrored axes, the factor of cycle 11, and factors and fixed point of cycle 26
+        self.mirrored, self.scaled = set[int](), 1.0
+        self.axis_scaled: tuple[list[float], list[float]] = ([1.0] * 3, [0.0] * 3)
 
     def define(self, text: str) -> None:
         """Carry out one block of a definition."""
@@ -66,6 +78,7 @@ class Cycles:
         if number == 7:
             if part > 0:
                 datum_shift(s, text, body)
+                self._mixed(text)
             return
         for letters, digits, value in words.Q_VALUE.findall(body):
             s.q.set(q_number(letters, digits), self._q_value(value))
@@ -110,20 +123,59 @@ class Cycles:
         return value
 
     def _change(self, text: str, number: int, part: int, body: str) -> None:
-        """Coordinates that are not read, or the end of them."""
-        how, none = CHANGES[number]
+        """Mirrored, turned and scaled coordinates, or the end of them."""
+        how, s = CHANGES[number], self.s
         if part == 0:
             return
-        values = [self.s.signed(sign, value) for sign, value in _CHANGED.findall(body)]
-        if number == ROTATION and values and (self.s.tilt is None or self.s.tilt.upright):
-            self.turned = values[0] + (self.turned if re.search(r"\bIROT", body) else 0.0)
-            enter(self.s, spatial(0.0, 0.0, self.turned))
+        values = [s.signed(sign, value) for sign, value in _CHANGED.findall(body)]
+        if number == ROTATION:
+            if values and (s.tilt is None or s.tilt.upright):
+                self.turned = values[0] + (self.turned if re.search(r"\bIROT", body) else 0.0)
+                enter(s, spatial(0.0, 0.0, self.turned))
+                self._mixed(text)
+            elif any(values):
+                leave_out(s, f"{text[:60]}: {how} coordinates are not read: motions are left out until they end")
             return
-        changes = bool(re.search(r"[XYZ]", body)) if number == 8 else any(value != none for value in values)
-        if changes:
-            leave_out(self.s, f"{text[:60]}: {how} coordinates are not read: motions are left out until they end")
-        elif how in self.s.left_out:
-            self.s.left_out = ""
+        if number == MIRROR:
+            self.mirrored = {"XYZ".index(letter) for letter in re.findall(r"[XYZ]", body)}
+        elif number == SCALING:
+            self.scaled = self._factor(text, values[0] if values else 1.0)
+        else:
+            factors, fixed = [1.0] * 3, [0.0] * 3
+            for letter, value in _FACTOR.findall(_FIXED.sub(" ", body)):
+                factors["XYZ".index(letter)] = self._factor(text, s.amount(value))
+            for letter, sign, value in _FIXED.findall(body):
+                fixed["XYZ".index(letter)] = s.signed(sign, value) * s.scale
+            self.axis_scaled = (factors, fixed)
+        self._take_factors(text, how)
+
+    def _factor(self, text: str, value: float) -> float:
+        if not LEAST_FACTOR <= value <= MOST_FACTOR:
+            raise InputError(f"{text[:60]}: the factor must be from {LEAST_FACTOR:g} to {MOST_FACTOR:g}")
+        return value
+
+    def _take_factors(self, text: str, how: str) -> None:
+        """Let the coordinates be mirrored and scaled from here on."""
+        s, (factors, fixed) = self.s, self.axis_scaled
+        if s.tilt is not None and not s.tilt.upright:
+            leave_out(s, f"{text[:60]}: {how} coordinates in a tilted plane are not read: motions are left out")
+            return
+        if how in s.left_out:
+            s.left_out = ""
+        s.end_contour()
+        signed = [(-self.scaled if k in self.mirrored else self.scaled) for k in range(3)]
+        s.factor = [a * f for a, f in zip(signed, factors, strict=True)]
+        s.origin = [a * (1.0 - f) * c for a, f, c in zip(signed, factors, fixed, strict=True)]
+        self._mixed(text)
+
+    def _mixed(self, text: str) -> None:
+        """Report a turn or a shift of mirrored coordinates, whose order depends on the control."""
+        changed = self.s.factor != [1.0] * 3 or self.s.origin != [0.0] * 3
+        if changed and (self.turned != 0.0 or text.startswith(("CYCL DEF 7", "CYCLE DEF 7"))):
+            self.s.unproven(
+                "heidenhain-plane",
+                f"{text[:60]}: a turn or shift of mirrored or scaled coordinates: taken as the outer one",
+            )
 
     def _tilt(self, text: str, body: str) -> None:
         """Cycle 19: the working plane; the rotary axes stay until a motion names them."""
@@ -152,6 +204,8 @@ class Cycles:
         s.end_contour()
         if number is None:
             raise InputError("a cycle is called and none is defined: give CYCL DEF 1")
+        if s.factor[2] != 1.0 or (number in bore_cycles.CYCLES and (s.factor[0] != 1.0 or s.factor[1] != 1.0)):
+            raise NotKnownError("a cycle is called in mirrored or scaled coordinates: what it cuts here is left out")
         if number == 1:
             for motion, z, value in self._pecks(s.at[2]):
                 s.plunge(motion, z, value)
@@ -217,6 +271,8 @@ class Cycles:
     def _pattern(self, number: int) -> None:
         """220 (holes on a circle) and 221 (rows): the cycle defined last, at each hole."""
         s = self.s
+        if s.factor[2] != 1.0:
+            raise NotKnownError("a pattern is called in scaled coordinates: what it cuts here is left out")
         surface = s.scale * self._q(203, None)
         away = surface + s.scale * max(abs(self._q(200, None)), self._q(204, 0.0))
         between = surface + s.scale * abs(self._q(200, None)) if self._q(301, 1.0) == 0.0 else away
@@ -226,6 +282,7 @@ class Cycles:
             if 2 in s.unknown or s.at[2] < level:
                 s.plunge(RAPID, level, 0.0)
             s.unknown.clear()
+            x, y = s.factor[0] * x + s.origin[0], s.factor[1] * y + s.origin[1]
             s.straight(RAPID, [x, y, *s.at[2:]])
             self.call()
             level = between

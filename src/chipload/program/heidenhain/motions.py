@@ -48,7 +48,8 @@ def _polar_end(s: ConversationalState, text: str) -> tuple[list[float], set[int]
     x, y = _centre(s)
     if s.pole_plane != XY:
         raise NotKnownError("LP: polar coordinates in a plane along the tool's axis are not read")
-    radius, angle = cmath.polar(complex(s.at[0] - x, s.at[1] - y))
+    a, b, _ = s.factor
+    radius, angle = cmath.polar(complex((s.at[0] - x) / a, (s.at[1] - y) / b))
     if {0, 1} & s.unknown and len(words.POLAR.findall(text)) < 2:
         raise NotKnownError("LP: the position of the tool is not known: give PR and PA")
     for step, letter, sign, value in words.POLAR.findall(text):
@@ -57,7 +58,7 @@ def _polar_end(s: ConversationalState, text: str) -> tuple[list[float], set[int]
             radius = amount * s.scale + (radius if step else 0.0)
         else:
             angle = math.radians(amount) + (angle if step else 0.0)
-    end[0], end[1] = x + radius * math.cos(angle), y + radius * math.sin(angle)
+    end[0], end[1] = x + a * radius * math.cos(angle), y + b * radius * math.sin(angle)
     return end, named | {0, 1}
 
 
@@ -128,7 +129,7 @@ def pole(s: ConversationalState, text: str) -> None:
 def arc(s: ConversationalState, text: str) -> None:
     """C: an arc about the pole."""
     codes, fast = _read(s, text)
-    sense = _sense(text, "C")
+    sense = _sense(text, "C") * _turned(s, s.pole_plane)
     end, _ = s.ends(text)
     _arc(s, text, end, _centre(s), sense, codes, fast, about_pole=True)
 
@@ -140,10 +141,10 @@ def arc_of_radius(s: ConversationalState, text: str) -> None:
         raise InputError("CR: R is missing: the radius")
     without = words.RADIUS.sub(" ", text)
     codes, fast = _read(s, without)
-    sense = _sense(text, "CR")
+    sense = _sense(text, "CR") * _turned(s, XY)
     end, _ = s.ends(without)
     _placed(s)
-    radius = s.signed(found[1], found[2]) * s.scale
+    radius = s.signed(found[1], found[2]) * s.scale * abs(s.size_factor())
     start, chord = complex(*s.at[:2]), complex(end[0] - s.at[0], end[1] - s.at[1])
     under = radius**2 - 0.25 * abs(chord) ** 2
     if abs(chord) < 1e-9 or under < -ROUNDED * abs(radius):
@@ -182,7 +183,8 @@ def helix(s: ConversationalState, text: str) -> None:
     first, second, _ = PLANE_AXES[s.pole_plane]
     if {first, second} & s.unknown:
         raise NotKnownError("an arc begins at a position that is not known: move there first")
-    vx, vy = s.at[first] - x, s.at[second] - y
+    a, b = s.factor[first], s.factor[second]
+    vx, vy = (s.at[first] - x) / a, (s.at[second] - y) / b
     if sweep is not None:
         angle = math.radians(s.signed(sweep[1], sweep[2]))
         if angle * sense < 0.0:
@@ -191,8 +193,9 @@ def helix(s: ConversationalState, text: str) -> None:
         angle = sense * ((sense * (math.radians(s.signed(to[3], to[4])) - math.atan2(vy, vx))) % math.tau or math.tau)
     else:
         raise InputError("CP: IPA or PA must be given")
-    end[first] = x + vx * math.cos(angle) - vy * math.sin(angle)
-    end[second] = y + vx * math.sin(angle) + vy * math.cos(angle)
+    end[first] = x + a * (vx * math.cos(angle) - vy * math.sin(angle))
+    end[second] = y + b * (vx * math.sin(angle) + vy * math.cos(angle))
+    sense *= _turned(s, s.pole_plane)
     turns = max(1, math.ceil(abs(angle) / math.tau - 1e-9))
     if turns > MOST_TURNS:
         raise InputError(f"CP: {turns} turns: must be at most {MOST_TURNS}")
@@ -231,7 +234,7 @@ def corner(s: ConversationalState, text: str) -> None:
     found = re.match(rf"(?:RND\s*R|CHF)\s*(\+?)\s*({words.VALUE})", text)
     if found is None:
         raise InputError(f"{text!r}: must be RND R and a radius, or CHF and a length")
-    size = s.amount(found[2]) * s.scale
+    size = s.amount(found[2]) * s.scale * abs(s.size_factor())
     if s.left_out:
         return
     if not 0.0 < size <= FARTHEST or not s.corner(Corner(round_off, size, feed, text)):
@@ -269,7 +272,11 @@ def _read(s: ConversationalState, text: str) -> tuple[list[int], bool]:
 def _side(s: ConversationalState, text: str) -> int:
     """Side of the tool: that of the block, else the one that lasts."""
     found = words.SIDE.search(text)
-    return s.side if found is None else {"L": 1, "R": -1, "0": 0}[found[1]]
+    if found is None:
+        return s.side
+    # a mirrored contour lies on the other side
+    mirrored = s.factor[0] * s.factor[1] < 0.0
+    return {"L": 1, "R": -1, "0": 0}[found[1]] * (-1 if mirrored else 1)
 
 
 def _sense(text: str, word: str) -> int:
@@ -277,6 +284,11 @@ def _sense(text: str, word: str) -> int:
     if turn is None:
         raise InputError(f"{word}: DR+ or DR- is missing")
     return 1 if turn[1] == "+" else -1
+
+
+def _turned(s: ConversationalState, plane: int) -> int:
+    """-1 where mirrored coordinates turn an arc of a plane the other way."""
+    return 1 if s.size_factor(plane) > 0.0 else -1
 
 
 def _centre(s: ConversationalState) -> tuple[float, float]:

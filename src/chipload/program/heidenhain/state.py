@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Protocol, cast
 
 from chipload.errors import Finding, InputError, Severity
-from chipload.program.commands import ARC, DWELL, LINE, RAPID, XY, YZ, Frame, Row
+from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, XY, YZ, Frame, Row
 from chipload.program.compensation import CentreMove, Compensation
 from chipload.program.corners import Corner, Piece, joined
 from chipload.program.heidenhain.formula import NotKnownError, QParameters, q_number
@@ -75,6 +75,8 @@ class ConversationalState:
         self.heading: complex | None = None
         self.shift = [0.0] * 9
         self.scale = 1.0
+        #: programmed X Y Z become factor * value + origin: mirrored and scaled coordinates
+        self.factor, self.origin = [1.0] * 3, [0.0] * 3
         self.feed = feed
         self.feed_of_turn = False
         self.speed, self.sense = 0.0, 0.0
@@ -132,9 +134,26 @@ class ConversationalState:
                 raise InputError(f"{letter} = {amount:g}: must be at most {FARTHEST:g}")
             if step and k in self.unknown:
                 raise NotKnownError(f"I{letter}: the position of the axis is not known: give {letter} first")
+            if k < 3:
+                amount = self.factor[k] * amount + (0.0 if step else self.origin[k])
             end[k] = end[k] + amount if step else amount
             named.add(k)
         return end, named
+
+    def size_factor(self, plane: int = XY) -> float:
+        """By what mirrored and scaled coordinates multiply a length in a plane; below 0 they turn the other way.
+
+        Raises
+        ------
+        InputError
+            The two axes have different factors.
+        """
+        a, b = (self.factor[k] for k in PLANE_AXES[plane][:2])
+        if abs(abs(a) - abs(b)) > 1e-12:
+            raise InputError(
+                f"arcs, lengths and roundings in a plane with factors {abs(a):g} and {abs(b):g}: must have one factor"
+            )
+        return math.copysign(abs(a), a * b)
 
     def feed_of(self, text: str) -> bool:
         """Take the feed of a block; whether it goes at rapid."""
