@@ -285,3 +285,49 @@ CASES = (
     Case("part-off-sliding-clamp", "a clamp that holds one half in height only",
          changes(PARTED, clamps((0, 5), (55, 60), directions="z")), "unproven", "loose-stock"),
 )  # fmt: skip
+
+
+def leaning_slots(*slots: tuple[float, float], degrees: float = 20.0) -> Change:
+    """Slots along y with the axis leaning towards x: how far each is from X30 Y20 Z0 across the axis, and its depth
+    along the axis.
+    """
+
+    def change(job: Job) -> None:
+        lean = math.radians(degrees)
+        axis = f"{math.sin(lean):.9f},0,{math.cos(lean):.9f}"
+        rows = ["PARTNO/T", "UNITS/MM", "LOADTL/1", "SPINDL/6000,CLW", "MULTAX/ON", "RAPID", f"GOTO/30,-30,30,{axis}"]
+        for across_mm, deep in slots:
+            x, z = (30.0 + across_mm * math.cos(lean) - deep * math.sin(lean),
+                    -across_mm * math.sin(lean) - deep * math.cos(lean))  # fmt: skip
+            high = f"{x + 40.0 * math.sin(lean):.6f}", f"{z + 40.0 * math.cos(lean):.6f}"
+            rows += ["RAPID", f"GOTO/{high[0]},-30,{high[1]},{axis}", "RAPID", f"GOTO/{x:.6f},-30,{z:.6f},{axis}"]
+            rows += [
+                "FEDRAT/900,MMPM",
+                f"GOTO/{x:.6f},70,{z:.6f},{axis}",
+                "RAPID",
+                f"GOTO/{high[0]},70,{high[1]},{axis}",
+            ]
+            rows += ["RAPID", f"GOTO/{high[0]},-30,{high[1]},{axis}"]
+        job.files["p.apt"] = "\n".join([*rows, "SPINDL/OFF", "FINI"]) + "\n"
+        job.tables["program"] = {"file": "p.apt"}
+        job.tables["machine"] = {"name": "xyzbc-trunnion"}
+        job.cutter.update(shank_diameter_mm=10.0)
+
+    return change
+
+
+THROUGH = leaning_slots((0.0, 8.0), (0.0, 16.0), (0.0, 26.0), (12.0, 4.0))
+DEEP = fixtures((0.0, -10.0, -40.0, 8.0, 0.0, -10.0), (0.0, 40.0, -40.0, 8.0, 50.0, -10.0),
+                (48.0, -10.0, -40.0, 60.0, 0.0, -10.0), (48.0, 40.0, -40.0, 60.0, 50.0, -10.0))  # fmt: skip
+CASES = (
+    *CASES,
+    Case("part-off-leaning", "a half is cut free with a leaning axis, then milled on", THROUGH, "unproven",
+         "loose-stock"),
+    Case("part-off-leaning-vise", "nothing: a vise holds both halves", changes(THROUGH, DEEP), "holds", ""),
+    Case("part-off-leaning-floor", "nothing: a floor of 1 mm is left",
+         leaning_slots((0.0, 8.0), (0.0, 16.0), (0.0, 18.3), (12.0, 4.0)), "holds", ""),
+    Case("wall-leaning", "a wall 1.5 mm thick and 16 mm high between two slots with a leaning axis",
+         leaning_slots((-5.75, 8.0), (5.75, 8.0), (-5.75, 16.0), (5.75, 16.0)), "unproven", "slender-wall"),
+    Case("wall-leaning-thick", "nothing: the same wall 5 mm thick",
+         leaning_slots((-7.5, 8.0), (7.5, 8.0), (-7.5, 16.0), (7.5, 16.0)), "holds", ""),
+)  # fmt: skip

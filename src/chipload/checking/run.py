@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from chipload.checking.default_checks import PROGRAM_COLUMNS, with_checks
 from chipload.checking.form_error import forming
 from chipload.checking.inputs import CheckInputs
+from chipload.checking.leaning_stock import check_leaning_stock
 from chipload.checking.limits import GOUGE
 from chipload.checking.outcome import CollisionCheck, SimulationResult, StockCheck
 from chipload.checking.preparation import Bodies, bodies_of, resolution_of, timed
@@ -150,6 +151,11 @@ def simulate_program(
             ),
         )  # fmt: skip
     removal = with_columns(removal, (*watched(gives, formed=made is not None), *PROGRAM_COLUMNS))
+    if leans(program).any():
+        found, unchecked = check_leaning_stock(inputs, program, before, stock)
+        stock_check = replace(
+            stock_check, findings=(*stock_check.findings, *found), unchecked=(*stock_check.unchecked, *unchecked)
+        )
     errors = with_compliance_error(removal.resolution_error, removal.columns, compliance)
     around = program_surroundings(inputs, reading, before, stock_box(stock))
     findings = (*removal.findings, *_findings_of(program, steps, removal.columns, cutters, around, compliance))

@@ -1,7 +1,8 @@
 """Checks against the stock as it is at each moment: shank and holder, rapids, loose stock, slender walls.
 
 An upright axis is followed over columns of the stock (:mod:`chipload.simulation.heights.height_map`). Where the axis
-leans, shank and holder are compared with points of the stock; loose stock and slender walls are then not checked.
+leans, shank and holder are compared with points of the stock, and the stock that is left is checked for pieces and
+slender walls (:mod:`chipload.checking.leaning_stock`).
 """
 
 from __future__ import annotations
@@ -116,10 +117,6 @@ def _leaning(inputs: CheckInputs, stock: LayeredStock) -> StockCheck:
             f"shank and holder in the stock: a contact less than {hidden:.2g} mm deep, or with what is thinner, may be "
             "missed between the points of the stock that are compared"
         )
-    if checks.loose_stock:
-        unchecked.append("pieces that are cut free: the axis leans")
-    if checks.slender_walls and inputs.elasticity.workpiece is None:
-        unchecked.append("deflection of slender walls: the axis leans and no [workpiece] is stated")
     return StockCheck((), (), hidden, tuple(unchecked))
 
 
