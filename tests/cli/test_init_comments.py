@@ -38,6 +38,24 @@ def test_comments_of_other_posts() -> None:
     assert read_header("(T1 HSS STEEL END MILL)").material is None
 
 
+@pytest.mark.parametrize(
+    ("text", "mm", "low", "high"),
+    [
+        # size, then the zero from the lower corner
+        ("(STOCK/BLOCK,90.00, 60.00, 8.00,0.00, 0.00, 8.00)", 1.0, (0, 0, -8), (90, 60, 0)),
+        ("(STOCK/BLOCK,4., 2., 1., 2., 1., 1.)", 25.4, (-50.8, -25.4, -25.4), (50.8, 25.4, 0)),
+        ("(STOCK 6061 DX 4.00IN DY 2.00IN DZ 1.00IN)", 1.0, (0, 0, -25.4), (101.6, 50.8, 0)),
+        ("(STOCK LOWER X=-50. Y=-30. Z=-20.)\n(STOCK UPPER X=50. Y=30. Z=1.)", 1.0, (-50, -30, -20), (50, 30, 1)),
+    ],
+)
+def test_blocks_of_comments(
+    text: str, mm: float, low: tuple[float, float, float], high: tuple[float, float, float]
+) -> None:
+    found = read_header(text, mm=mm).stock
+    assert found is not None
+    assert found[0] == (pytest.approx(low), pytest.approx(high))
+
+
 def said_of(tools: str) -> dict[int, dict[str, object]]:
     """What comments state about each tool, but for its name and kind."""
     found = read_header(tools).cutters

@@ -2,7 +2,7 @@
 
 Read are the forms of common posts: comments about tools (:mod:`chipload.program.tool_comments`), Carbide Create
 (``stockMin``), FeatureCAM's APT (``INSERT/14MM CRB 2FL 32 LOC``, ``CSI_SET_FLUTE_LENGTH``, ``INSERT/Stock Size``),
-Heidenhain (``BLK FORM``), Sinumerik (``WORKPIECE``).
+Heidenhain (``BLK FORM``), Sinumerik (``WORKPIECE``), CutViewer (``STOCK/BLOCK``), ``STOCK LOWER`` and ``UPPER``.
 """
 
 from __future__ import annotations
@@ -38,6 +38,13 @@ _STOCK_SIZE = re.compile(rf"Stock\s+Size\s+X{_NUMBER}\s*Y{_NUMBER}\s*Z{_NUMBER}"
 _MATERIAL_SIZE = re.compile(
     rf"Material\s+Size\s*\)?\s*\(?\s*X\s*=\s*{_NUMBER}\s*,?\s*Y\s*=\s*{_NUMBER}\s*,?\s*Z\s*=\s*{_NUMBER}", re.IGNORECASE
 )
+#: CutViewer: size of a block, and the program's zero from its lower corner
+_BLOCK = re.compile(r"\(\s*STOCK/BLOCK\s*,([^()\n]*)\)", re.IGNORECASE)
+#: by hand: size of the block; posts: its corners, ``STOCK LOWER X=.. Y=.. Z=..``
+_SIDE = rf"\s*=?\s*{_NUMBER}\s*(MM|IN)?"
+_SIDES = re.compile(rf"\bSTOCK\b[^()\n]*?\bDX{_SIDE}[ ,]*\bDY{_SIDE}[ ,]*\bDZ{_SIDE}", re.IGNORECASE)
+_AT = rf"\s*[=:]?\s*{_NUMBER}"
+_BOUND = re.compile(rf"\bSTOCK\s+(LOWER|UPPER|MIN|MAX)\b[^()\n;]*?X{_AT}[ ,]+Y{_AT}[ ,]+Z{_AT}", re.IGNORECASE)
 #: Carbide Create: corners of the stock
 _CORNER = re.compile(r"\(\s*stock(Min|Max)\s*:([^()\n]*)\)", re.IGNORECASE)
 #: signs that a number is not an alloy: a date, a time, the name of a file or a program
@@ -180,6 +187,8 @@ def _stock(text: str, mm: float) -> tuple[Box, str] | None:
         low, high = stated["min"], stated["max"]
         if len(low) == len(high) == 3 and all(a < b for a, b in zip(low, high, strict=True)):
             return ((low[0], low[1], low[2]), (high[0], high[1], high[2])), "stockMin, stockMax"
+    if (box := _block_of_comments(text, mm)) is not None:
+        return box
     if (hit := _WORKPIECE.search(text)) and (box := _workpiece(hit[1].upper(), hit[2], mm)):
         return box, "WORKPIECE" if hit[1].upper() == "BOX" else "the box around the cylinder of WORKPIECE"
     if (hit := _BLK_CYLINDER.search(text)) and float(hit[1]) > 0.0 and float(hit[2]) > 0.0:
@@ -193,6 +202,26 @@ def _stock(text: str, mm: float) -> tuple[Box, str] | None:
         x, y, z = (float(hit[k]) * mm for k in (1, 2, 3))
         if min(x, y, z) > 0.0:
             return ((0.0, 0.0, -z), (x, y, 0.0)), "Stock Size, with the program's zero at its upper corner"
+    return None
+
+
+def _block_of_comments(text: str, mm: float) -> tuple[Box, str] | None:
+    """The block that a comment states by its corners, or by its size with the zero of the program."""
+    bounds = {hit[1].upper(): tuple(mm * float(hit[k]) for k in (2, 3, 4)) for hit in _BOUND.finditer(text)}
+    low, high = bounds.get("LOWER", bounds.get("MIN")), bounds.get("UPPER", bounds.get("MAX"))
+    if low is not None and high is not None and all(a < b for a, b in zip(low, high, strict=True)):
+        return ((low[0], low[1], low[2]), (high[0], high[1], high[2])), "stock of a comment, its corners"
+    if (hit := _BLOCK.search(text)) is not None:
+        numbers = _corner(hit[1], mm)
+        if len(numbers) >= 6 and min(numbers[:3]) > 0.0:
+            zero = [-x for x in numbers[3:6]]
+            top = [a + b for a, b in zip(zero, numbers, strict=False)]
+            return ((zero[0], zero[1], zero[2]), (top[0], top[1], top[2])), "stock of STOCK/BLOCK"
+    if (hit := _SIDES.search(text)) is not None:
+        own = next((MM_PER["mm" if u.upper() == "MM" else "inch"] for u in (hit[2], hit[4], hit[6]) if u), mm)
+        x, y, z = (own * float(hit[k]) for k in (1, 3, 5))
+        if min(x, y, z) > 0.0:
+            return ((0.0, 0.0, -z), (x, y, 0.0)), "DX DY DZ, with the program's zero at its lower left and top"
     return None
 
 

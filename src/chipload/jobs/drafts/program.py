@@ -274,7 +274,7 @@ def _stock(program: Program, known: Known, header: Header) -> tuple[Box, tuple[E
     for stated in (known.stock, header.stock):
         if stated is not None:
             (low, high), where = stated
-            sure = where.startswith(("BLK", "workpiece", "stock of", "stockMin"))
+            sure = where == "WORKPIECE" or where.startswith(("BLK", "workpiece", "stock of", "stockMin"))
             note = f"{where}" if sure else f"{where}: check it against the program's zero"
             return (low, high), (
                 Entry("low_mm", list(low), note, not sure), Entry("high_mm", list(high), note, not sure)
