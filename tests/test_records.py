@@ -20,6 +20,8 @@ KEYS = {
     "control/override.Override": "[torque_control.override] and hal.toml",
     "control/_override.Rules": "the same, as plain numbers for the compiled controller",
     "control/spindle_model.Spindle": "[spindle] and spindle.toml",
+    "cutter/catalogue.CatalogueCutter": "[[cutter]] of a catalogue's file, in mm and rad",
+    "cutter/catalogue._Cutter": "[[cutter]] of a catalogue's file",
     "cutter/cutter.Cutter": "[[cutter]] in mm and rad",
     "cutter/table.CutterTable": "[[cutter]]",
     "cutting/material.Material": "a material's file",

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from adversary import control_cases, geometry_cases, planner_cases, program_cases, text_cases
+from adversary import control_cases, geometry_cases, impeller_cases, planner_cases, program_cases, text_cases
 from adversary.base import Case
 
 #: tables of cases, one a subject
-SUBJECTS = (text_cases, program_cases, control_cases, geometry_cases, planner_cases)
+SUBJECTS = (text_cases, program_cases, control_cases, geometry_cases, planner_cases, impeller_cases)
 CASES: tuple[Case, ...] = tuple(case for subject in SUBJECTS for case in subject.CASES)
 #: where the table stands in the page
 BEGIN, END = "<!-- cases: python benchmarks/adversary.py --page -->\n", "<!-- end of cases -->\n"

@@ -26,6 +26,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import BARREL_NAMES
 from chipload.errors import InputError
 from chipload.tables import Labelled, nearest, read_table, shipped_table
+from chipload.units import rad_s_from_rpm, rpm_from_rad_s
 
 #: cylinders round a cone: length of the lowest [mm], of their height by how much they are longer
 _SLICE, _GROWS = 0.4, 0.3
@@ -49,6 +50,8 @@ class CatalogueCutter:
     name : as the shop calls it
     taper : half angle of the flank [rad]
     barrel_radius : of the flank arc of a barrel cutter [mm], whose corner's centre is on the axis; None: no such arc
+    max_speed : greatest spindle speed [rad/s]; None: not known
+    length : from the nose of the spindle to the tip [mm], above the reach; None: not known
 
     Raises
     ------
@@ -67,6 +70,8 @@ class CatalogueCutter:
     name: str = ""
     taper: float = 0.0
     barrel_radius: float | None = None
+    max_speed: float | None = None
+    length: float | None = None
 
     def __post_init__(self) -> None:
         what = f"cutter {self.name or self.label}"
@@ -77,9 +82,11 @@ class CatalogueCutter:
                 raise InputError(f"{what}: {key} {shown}: {limit}")
 
         keys = ("diameter", "cutting_length", "neck_diameter", "neck_length", "shank_diameter", "reach")
-        for key in (*keys, "holder_diameter"):
+        for key in (*keys, "holder_diameter", "length"):
             value = getattr(self, key)
             need(value is None or 0.0 < value < math.inf, f"{key}_mm", value, "must be above 0 and finite")
+        rpm = None if self.max_speed is None else rpm_from_rad_s(self.max_speed)
+        need(rpm is None or 0.0 < rpm < math.inf, "max_rpm", rpm, "must be above 0 and finite")
         half = 0.5 * self.diameter
         r = self.corner_radius
         if self.straight:
@@ -96,7 +103,7 @@ class CatalogueCutter:
         need(bounded or self.neck_length is None, "cutting_length_mm", None, "give it with a neck")
         need(bounded or self.shank_diameter is None, "cutting_length_mm", None, "give it with a shank")
         last, least = r, "corner_radius_mm"
-        for key in ("cutting_length", "neck_length", "reach"):
+        for key in ("cutting_length", "neck_length", "reach", "length"):
             value = getattr(self, key)
             if value is not None:
                 need(value >= last, f"{key}_mm", value, f"must be at least {least} = {last:g}")
@@ -142,6 +149,29 @@ class CatalogueCutter:
         return Cutter(
             self.diameter, 1, 0.0, self.cutting_length, self.cutting_length, _MODULUS,
             corner_radius=self.corner_radius, taper=self.taper, barrel_radius=self.barrel_radius,
+        )  # fmt: skip
+
+    def assembled(self, number: int, length: float) -> Cutter:
+        """The tool with neck, shank and holder, its stiffness not known; what has no end ends ``length`` mm above.
+
+        A neck stands as the shank of the cutter, the shank over it as the lowest part of the holder.
+
+        >>> cutter = CatalogueCutter(10.0, 1.0, 20.0, shank_diameter=8.0, reach=50.0, holder_diameter=40.0)
+        >>> cutter.assembled(3, 90).holder
+        ((90, 40.0),)
+        """
+        flutes = self.cutting_length or self.reach or length
+        ends = self.reach or (flutes if self.cutting_length is None else max(flutes, self.neck_length or 0.0) + length)
+        shank = self.top_diameter if self.shank_diameter is None else self.shank_diameter
+        holder = () if self.holder_diameter is None else ((length, self.holder_diameter),)
+        neck = self.neck_diameter
+        if neck is not None and self.neck_length is not None:
+            parts = ((ends - self.neck_length, shank),) if ends > self.neck_length else ()
+            shank, ends, holder = neck, self.neck_length, (*parts, *holder)
+        return Cutter(
+            self.diameter, 1, 0.0, flutes, ends, _MODULUS, corner_radius=self.corner_radius, taper=self.taper,
+            barrel_radius=self.barrel_radius, shank_diameter=shank, holder=holder, number=number, name=self.name,
+            max_speed=self.max_speed,
         )  # fmt: skip
 
     @property
@@ -290,6 +320,8 @@ class _Cutter(BaseModel):
     shank_diameter_mm: float | None = None
     reach_mm: float | None = None
     holder_diameter_mm: float | None = None
+    max_rpm: float | None = None
+    length_mm: float | None = None
     name: str = ""
 
 
@@ -364,7 +396,11 @@ def _cutter(k: int, row: Any) -> CatalogueCutter:
             f"cutter {k}: diameter_mm = {d:g}: with taper_deg it is the diameter where flank line and bottom meet, "
             f"{ball:.6g} of a tapered ball: leave it out"
         )
-    return CatalogueCutter(taper=beta, **{key.removesuffix("_mm"): value for key, value in given.items()})
+    rpm = given.pop("max_rpm")
+    speed = None if rpm is None else rad_s_from_rpm(rpm)
+    return CatalogueCutter(
+        taper=beta, max_speed=speed, **{key.removesuffix("_mm"): value for key, value in given.items()}
+    )
 
 
 _WANTED = {"name": "text"}

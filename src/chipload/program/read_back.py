@@ -1,8 +1,8 @@
 """Comparison of a written program text with the program that was simulated: the text is read as a controller reads it.
 
 Notation: a row of the planned program is found in the text where the tip, its axis, the tool and the spindle are those
-at its end. Rows that round to nothing may be missing from the text; further rows may lie between two that are found (a
-motion of rotary axes is written in pieces), if they stay near the straight line.
+at its end. Rows that move less than the text is rounded are missing from it, of whatever kind; further rows may lie
+between two that are found (a motion of rotary axes is written in pieces), if they stay near the straight line.
 """
 
 from __future__ import annotations
@@ -17,10 +17,16 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, InputError, Severity
 from chipload.machine.machine import Machine
+from chipload.program.commands import Commands
+from chipload.program.control import control_named
 from chipload.program.gcode.tools import Tool, ToolTable
 from chipload.program.motions import is_arc
+from chipload.program.nc_text import NcText, read_nc
 from chipload.program.program import RAPID, Program
 from chipload.program.read import ProgramReading, read_program
+from chipload.program.recognise import Recognition
+from chipload.program.setup import Setup
+from chipload.program.swivel import Swivel
 
 Floats = NDArray[np.float64]
 
@@ -28,6 +34,8 @@ Floats = NDArray[np.float64]
 UNITS, TURNED_MM = 4.0, 0.02
 #: directions of the axis agree within this [rad]
 AXIS_RAD = 1e-3
+#: an axis that turns less [rad] stands
+STANDS_RAD = 1e-7
 #: speeds of the spindle agree within this share
 SPEED_SHARE = 1e-3
 #: rows of the text among which the end of a planned row is sought first
@@ -52,13 +60,27 @@ def read_back(
     InputError
         The text cannot be read.
     """
-    table = ToolTable(
+    table = _tool_table(cutters, lengths)
+    return read_program(
+        Path(name), machine, text=text, tools=table, comments=False, strict=True, dialect=machine.dialect
+    )
+
+
+def commands_back(text: str, name: str, machine: Machine, cutters: Mapping[int, Cutter]) -> Commands:
+    """Read what a written text sends the axes to, as the controller of a machine does; else as :func:`read_back`."""
+    recognition = Recognition(control_named(machine.dialect), True)
+    nc = NcText(Path(name), text, recognition, Setup(), _tool_table(cutters, False), False, {}, {})
+    return read_nc(nc, None, True, Swivel(machine, None))[0]
+
+
+def _tool_table(cutters: Mapping[int, Cutter], lengths: bool) -> ToolTable:
+    """Tools as long as their overhang, or without a length."""
+    return ToolTable(
         {
             n: Tool(n, diameter=c.diameter, offset=(0.0, 0.0, c.overhang if lengths else 0.0, *NO_OFFSET))
             for n, c in cutters.items()
         }
     )
-    return read_program(Path(name), machine, text=text, tools=table, comments=False, strict=True)
 
 
 def text_findings(
@@ -73,7 +95,17 @@ def text_findings(
     try:
         reading = read_back(text, name, machine, cutters, lengths=lengths)
     except InputError as err:
-        return (Finding("text-unread", 0, f"the written text cannot be read back: {err}", Severity.EXCEEDS),)
+        return (unread(err),)
+    return reading_findings(reading, cutters, planned)
+
+
+def unread(refusal: InputError) -> Finding:
+    """Return the finding that a written text is refused."""
+    return Finding("text-unread", 0, f"the written text cannot be read back: {refusal}", Severity.EXCEEDS)
+
+
+def reading_findings(reading: ProgramReading, cutters: Mapping[int, Cutter], planned: Program) -> tuple[Finding, ...]:
+    """Return the findings of :func:`text_findings` from the reading of a text."""
     return (
         *(f for f in reading.findings if f.severity > Severity.NOTE),
         *(replace(f, severity=Severity.EXCEEDS) for f in reading.violations if f.code != "machine-offset"),
@@ -107,11 +139,13 @@ def text_differences(planned: Program, reading: ProgramReading) -> tuple[Finding
     """
     read = reading.program
     turned = bool(np.abs(np.diff(planned.axis, axis=0)).max(initial=0.0) > 0.0)
-    near = UNITS * 10.0**-reading.machine.decimals + (TURNED_MM if turned else 0.0)
+    rounded = UNITS * 10.0**-reading.machine.decimals
+    near = rounded + (TURNED_MM if turned else 0.0)
+    still = _stands(planned, rounded)
     last, row = -1, -1
     for k in range(len(planned)):
         place = planned.p_work[k]
-        if row >= 0 and np.abs(place - planned.p_work[row]).max() <= near and _alike(planned, k, planned, row):
+        if still[k]:
             continue
         found = _next(read, last, planned, k, near)
         if found is None:
@@ -127,6 +161,17 @@ def text_differences(planned: Program, reading: ProgramReading) -> tuple[Finding
         text = f"the written text goes on for {rest:.4g} mm after the end of the simulated program"
         return (Finding("text-differs", int(read.line[last + 1]), text, Severity.EXCEEDS),)
     return ()
+
+
+def _stands(program: Program, rounded: float) -> NDArray[np.bool_]:
+    """Rows (n,) that do not move, or less than the text is rounded, with the tool and the spindle of the row before."""
+    out = np.zeros(len(program), dtype=np.bool_)
+    step = np.abs(np.diff(program.p_work, axis=0)).max(axis=1)
+    turn = np.abs(np.diff(program.axis, axis=0)).max(axis=1)
+    out[1:] = (
+        (step <= rounded) & (turn <= STANDS_RAD) & (np.diff(program.tool) == 0) & (np.diff(program.spindle) == 0.0)
+    )
+    return out & ~is_arc(program)
 
 
 def _alike(a: Program, i: int, b: Program, j: int) -> bool:

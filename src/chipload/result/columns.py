@@ -48,6 +48,7 @@ class Column:
     error : where its relative error comes from; a limit on a column whose error nothing states is unproven
     signed : whether a limit bounds its size, whatever the sign
     least : whether a limit is the least value that is allowed
+    none : of a count, what it says in words where it is 0; empty: "no" and the label
     """
 
     name: str
@@ -57,6 +58,7 @@ class Column:
     error: ErrorSource = ErrorSource()
     signed: bool = False
     least: bool = False
+    none: str = ""
 
     @property
     def title(self) -> str:
@@ -213,9 +215,10 @@ _ROWS = (
     ("pallet_deg", "deg", "pallet angle", "direction of the tool axis about the axis of the pallet", PATH),
     ("largest_diameter_mm", "mm", "largest diameter", "diameter of the largest cutter that reaches a contact point",
      STATED),
-    ("unreached_points", "", "unreached contact points", "number of contact points that no cutter reaches", COUNT),
-    ("uncertified_points", "", "uncertified contact points", "number of points whose largest cutter is uncertified",
-     COUNT),
+    ("unreached_points", "", "contact points not reached", "number of contact points that no cutter reaches", COUNT,
+     False, False, "all contact points reached"),
+    ("uncertified_points", "", "contact points not certified", "number of points whose largest cutter is uncertified",
+     COUNT, False, False, "all contact points certified"),
     ("time_s", "s", "program time", "time of the program on the machine", STATED),
 )  # fmt: skip
 

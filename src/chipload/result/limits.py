@@ -194,17 +194,24 @@ class LimitCheck:
         'no cut above the flutes'
         >>> LimitCheck("torque_nm", 3.0, 2.9, Verdict.UNPROVEN, line=7, reason="coarse").text
         'torque 2.9 of 3 N m in line 7, unproven: coarse'
+        >>> [LimitCheck("unreached_points", 0.0, n, s).text for n, s in ((0.0, Verdict.HOLDS), (3.0, Verdict.EXCEEDS))]
+        ['all contact points reached', '3 contact points not reached']
         """
         if self.worst is None:
             bound = "at least" if self.column.least else "at most"
             return f"{self.column.label} of {bound} {number_text(self.limit, 6)}{self._unit} is unknown: {self.reason}"
-        if self.state is Verdict.EXCEEDS:
+        if self.state is Verdict.EXCEEDS and not self._counts_none:
             beyond = "is below" if self.column.least else "exceeds"
             worst, limit = number_text(self.worst), number_text(self.limit, 6)
             return f"{self.column.label} {worst}{self._unit} {beyond} {limit}{self._unit} {self.where}".rstrip()
         if self.state is Verdict.UNPROVEN:
             return f"{self.value_text} {self.where}".rstrip() + f", unproven: {self.reason}"
         return self.value_text
+
+    @property
+    def _counts_none(self) -> bool:
+        """Whether the limit allows none of what is counted, so that there is no margin."""
+        return self.limit == 0.0 and bool(self.column.none)
 
     @property
     def value_text(self) -> str:
@@ -218,7 +225,9 @@ class LimitCheck:
             worst += f" {'-' if more < 0.0 else '+'} {number_text(abs(more), 2)}"
         text = f"{label} {worst} of {'at least ' if self.column.least else ''}{limit}"
         if self.worst == self.limit == 0.0:
-            text = f"no {label}"
+            text = self.column.none or f"no {label}"
+        elif self._counts_none:
+            text = f"{number_text(self.worst)} {label}"
         elif self.state is Verdict.UNPROVEN and self.margin is not None and self.margin < -FAR_BEYOND:
             text = f"{label} far beyond {limit}"
         return text if self.coverage.whole or self.state is not Verdict.HOLDS else f"{text} in the {self.coverage.name}"

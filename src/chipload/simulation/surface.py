@@ -70,7 +70,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Collision:
-    """A collision: the bodies that touch, the depth, the step, the line and the place."""
+    """A collision: the bodies that touch, the depth, below 0 where they are only too near, step, line and place."""
 
     what: str
     into: str
@@ -158,6 +158,7 @@ def collisions(
     tolerance: float,
     *,
     above_only: frozenset[str] = frozenset(),
+    clearance: float = 0.0,
     progress: Callable[[int], None] = lambda done: None,
     kept: KeptPasses = ALONE,
 ) -> tuple[Collision, ...]:
@@ -169,6 +170,7 @@ def collisions(
     solids : points (p, 3) [mm] by name
     tolerance : what is less deep [mm] is none
     above_only : names of solids that the cutting part may touch, as the part
+    clearance : least distance of shank and holder from a solid [mm]
     progress : is told how many steps are done
     kept : where the pass keeps what it has found, and goes on from
     """
@@ -177,7 +179,8 @@ def collisions(
         for what, body in ((ABOVE, above_cutting), ("cutting part", cutting_part)):
             if what == ABOVE or name not in above_only:
                 bodies = {n: body(c) for n, c in cutters.items()}
-                watched.append((what, name, LeastDistance(bodies, points, tolerance, tolerance), {}))
+                far = max(tolerance, clearance) if what == ABOVE else tolerance
+                watched.append((what, name, LeastDistance(bodies, points, far, tolerance), {}))
 
     def state() -> dict[str, NDArray[Any]]:
         out = dict[str, NDArray[Any]]()
@@ -196,12 +199,13 @@ def collisions(
             ):
                 best[line] = Collision(what, name, depth, step, line, (at[0], at[1], at[2]))
 
-    depends = (dict(solids), sorted(above_only), tolerance)
+    depends = (dict(solids), sorted(above_only), tolerance, clearance)
     for block in kept.blocks("collisions", steps, depends, state, restore) if watched else ():
         progress(watched[0][2].done)
         for what, name, near, best in watched:
             first = near.done
-            _by_line(block, first, what, name, near.take(block), tolerance, best)
+            apart = clearance if what == ABOVE else 0.0
+            _by_line(block, first, what, name, near.take(block), tolerance - apart, best)
     return tuple(sorted((c for *_, best in watched for c in best.values()), key=lambda c: (c.step, c.what, c.into)))
 
 
@@ -265,7 +269,7 @@ def in_stock(
 def _by_line(
     steps: Steps, first: int, what: str, into: str, deepest: Floats, tolerance: float, best: dict[int, Collision]
 ) -> None:
-    """Put the deepest of each line among ``best``; the steps begin with number ``first``."""
+    """Put the deepest of each line among ``best``, if deeper than ``tolerance``; the steps begin with ``first``."""
     for k in np.flatnonzero(deepest < -tolerance).tolist():
         line, depth, tip = int(steps.line[k]), float(-deepest[k]), steps.p1[k].tolist()
         if line not in best or depth > best[line].depth_mm:

@@ -17,6 +17,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.jobs.impeller.channels import turned
 from chipload.jobs.impeller.five_axis_outcome import AllChannels
+from chipload.jobs.impeller.machine_check import MachineCheck, axes_check
 from chipload.jobs.impeller.paths import EDGE, gouge_by, left_by, walls_of
 from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.tables import PathsTable, SurfaceTable
@@ -64,11 +65,11 @@ def five_axis_machine(source: str | Path | None, key: str) -> Machine:
 
 @dataclass(frozen=True, eq=False)
 class ProgramCheck:
-    """Result of the check of a program: gouge, excess, findings on the machine's limits, time [s]."""
+    """Result of the check of a program: gouge, excess, what it does on the machine, time [s]."""
 
     gouge: Gouge
     left: Remainder
-    findings: tuple[str, ...]
+    machine_check: MachineCheck
     seconds: float
 
 
@@ -82,8 +83,7 @@ def program_check(
     left = left_by(how, [at], program, cutter, depth, keep)[0]
     gouge = gouge_by(how, walls_of(how.impeller, how.ahead), program, cutter, depth, paths.gouge_mm, keep)
     _, beyond = to_axes(program, machine)
-    texts = tuple(f.text for f in (*beyond, *check_program(program, machine)))
-    return ProgramCheck(gouge, left, texts, float(times_on(program, machine).sum()))
+    return ProgramCheck(gouge, left, axes_check(*beyond), float(times_on(program, machine).sum()))
 
 
 def surface_points(how: FinishSettings, side: SurfaceTable, apart: float = _SPACING) -> SurfacePoints:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from chipload.cutter.catalogue import CatalogueCutter
+from chipload.jobs.impeller.machine_check import MachineCheck, verdict_of
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.flank import FlankPass
 from chipload.planning.impeller.point_milling import PointPath
@@ -41,7 +42,7 @@ class FiveAxisProgram:
     program : of one channel, to above the beginning of the next
     gouge, left : as of every program
     allowed, most : gouge, and what may be left [mm]
-    findings : violations of the machine's limits
+    machine_check : what it does on the machine, and what its text shows
     seconds : of one channel
     channels : how many there are
     every : of all channels; a text why there is none
@@ -55,7 +56,7 @@ class FiveAxisProgram:
     left: Remainder
     allowed: float
     most: float
-    findings: tuple[str, ...]
+    machine_check: MachineCheck
     seconds: float
     channels: int
     every: AllChannels | str
@@ -71,7 +72,7 @@ class FiveAxisProgram:
     @property
     def fails(self) -> tuple[str, ...]:
         """Conditions that do not hold."""
-        out = [f"{self.name}: {f}" for f in self.findings]
+        out = [f"{self.name}: {f}" for f in self.machine_check.fails]
         if self.gouge.bound > self.allowed:
             out.append(f"{self.name}: {self.gouge.message}: gouge_mm = {self.allowed:g} is allowed")
         if self.excess > self.most:
@@ -80,8 +81,10 @@ class FiveAxisProgram:
 
     @property
     def verified(self) -> bool:
-        """Whether there is no gouge, no excess above the allowed one, and no motion beyond the machine."""
-        return not self.fails
+        """Whether there is no gouge, no excess above the allowed one, no motion beyond the machine, and its text shows
+        nothing that is wrong or unproven.
+        """
+        return not (self.fails or self.machine_check.doubts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,6 +201,6 @@ def _found(one: FiveAxisProgram) -> dict[str, Any]:
     return {
         "gouge_mm": one.gouge.found,
         "gouge_bound_mm": one.gouge.bound if math.isfinite(one.gouge.bound) else None,
-        "verdict": "holds" if one.verified else "exceeds",
+        "verdict": verdict_of(one.fails, one.machine_check.doubts).value,
         "reason": None,
     }

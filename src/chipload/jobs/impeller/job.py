@@ -16,6 +16,8 @@ from chipload.jobs.impeller.tables import (
     SurfaceTable,
 )
 from chipload.jobs.messages import Errors
+from chipload.jobs.simulation.fixtures import fixture_errors
+from chipload.jobs.simulation.values import machine_table_errors
 from chipload.jobs.sources import source, sources_of
 
 #: of flank passes and point milling, whose feeds forces do not find
@@ -95,7 +97,8 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
         errors.texts += _wrong_surface(f"surface.{k}", surface, part)
         if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
             errors.add(f"surface.{k}: {surface.body} {surface.side} appears twice: list each surface once")
-    errors.texts += _wrong_paths(table.operation[0])
+    errors.texts += [*_wrong_paths(table.operation[0]), *machine_table_errors(table.machine_table)]
+    errors.texts += [text for k, f in enumerate(table.fixture) for text in fixture_errors(f, f"fixture.{k}")]
     if part.sections is not None:
         errors.texts += _wrong_sections(part.sections)
     if part.step is not None:

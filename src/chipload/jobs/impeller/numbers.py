@@ -9,6 +9,7 @@ import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.jobs.impeller.five_axis_outcome import flank_numbers, points_numbers
+from chipload.jobs.impeller.machine_check import verdict_of
 from chipload.jobs.impeller.names import flank_names, points_names, program_name
 from chipload.jobs.impeller.outcome import Checked, ImpellerResult, Searched, unreached_text
 from chipload.planning.impeller.compare import Partition
@@ -88,8 +89,8 @@ def checked_of(milled: ImpellerResult, partition: Partition) -> dict[str, Any]:
         "changes_min": checked.changes / 60.0,
         "time_min": checked.seconds / 60.0,
         "scallop_mean_share": checked.scallop,
-        "verdict": "holds" if checked.verified else "exceeds",
-        "fails": list(checked.fails),
+        "verdict": verdict_of(checked.fails, checked.doubts).value,
+        "fails": [*checked.fails, *checked.doubts],
     }
 
 

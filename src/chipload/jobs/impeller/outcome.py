@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints, NoFiveAxisPath
+from chipload.jobs.impeller.machine_check import MachineCheck
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.answer import Answer, Unreachable
@@ -162,7 +163,7 @@ class Checked:
     gouge : deepest that any part of the tool comes below a surface, between bounds
     allowed : what of it is allowed [mm]
     scallops : of each patch
-    findings : violations of the machine's limits
+    machine_check : what it does on the machine, and what its text shows
     seconds : time of one channel, as the text takes it on the machine [s]
     cutting : of that in tracks; the rest is leads, links and rapids [s]
     between : from the end of one channel to the beginning of the next [s]
@@ -173,7 +174,7 @@ class Checked:
     gouge: Gouge
     allowed: float
     scallops: tuple[Scallop, ...]
-    findings: tuple[str, ...]
+    machine_check: MachineCheck
     seconds: float
     cutting: float
     between: float
@@ -181,8 +182,10 @@ class Checked:
 
     @property
     def verified(self) -> bool:
-        """Whether there is no gouge, no motion beyond the machine, no scallop above the aim, no overloaded cutter."""
-        return not self.fails
+        """Whether there is no gouge, no motion beyond the machine, no scallop above the aim, no overloaded cutter,
+        and its text shows nothing that is wrong or unproven.
+        """
+        return not (self.fails or self.machine_check.doubts)
 
     @property
     def missed(self) -> float:
@@ -199,7 +202,7 @@ class Checked:
     @property
     def fails(self) -> tuple[str, ...]:
         """Conditions that do not hold."""
-        out = [f"{self.name}: {f}" for f in self.findings]
+        out = [f"{self.name}: {f}" for f in self.machine_check.fails]
         if self.gouge.bound > self.allowed:
             out.append(f"{self.name}: {self.gouge.message}: gouge_mm = {self.allowed:g} is allowed")
         for m, s in zip(self.setting.millings, self.scallops, strict=True):
@@ -326,9 +329,14 @@ class CheckedPartition:
         return (*(f for p in self.programs for f in p.fails), *(f for c in self.covered for f in c.fails))
 
     @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is not proven of its programs."""
+        return tuple(f"{p.name}: {text}" for p in self.programs for text in p.machine_check.doubts)
+
+    @property
     def verified(self) -> bool:
         """Whether every program holds, and together they leave no more excess than the limit."""
-        return not self.fails
+        return not (self.fails or self.doubts)
 
     @property
     def scallop(self) -> float | None:
@@ -340,14 +348,15 @@ class CheckedPartition:
 
 @dataclass(frozen=True, eq=False)
 class StatedJob:
-    """Values that the job states: its title, the keys of its operation, the outer diameter [mm], and the length of the
-    hub ahead of the blade's leading edge [mm].
+    """Values that the job states: its title, the keys of its operation, the outer diameter [mm], the length of the hub
+    ahead of the blade's leading edge [mm], and the names of fixtures and table, which no tool may touch.
     """
 
     title: str
     settings: Mapping[str, Any]
     outer_diameter: float
     ahead: float = 0.0
+    around: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,7 +408,7 @@ class ImpellerResult:
     def used_checked(self) -> CheckedPartition | None:
         """Partition that is milled: of those that hold, or else of all, the one with the least program time."""
         able = [w for w in self.checked or () if w.name != PICKED]
-        return min(able, key=lambda w: (not w.verified, w.seconds), default=None)
+        return min(able, key=lambda w: (bool(w.fails), bool(w.doubts), w.seconds), default=None)
 
     @property
     def used(self) -> Partition | None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.jobs.impeller.channels import between_channels, channel_repeat
+from chipload.jobs.impeller.machine_check import axes_check
 from chipload.jobs.impeller.outcome import Checked, Covered, Scallop
 from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable
@@ -30,7 +31,6 @@ from chipload.planning.impeller.programs import pallet_rate, too_fast
 from chipload.planning.impeller.settings import FinishSettings, Milling, channel_scene
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling
 from chipload.planning.impeller.tables import IndexTable
-from chipload.program.check import check_program
 from chipload.program.program import Program
 from chipload.program.read import times_on
 from chipload.program.to_axes import to_axes
@@ -107,15 +107,13 @@ def checked_programs(
         program = setting.program
         scallops = tuple(_scallop(m, next(others), scallop) for m in setting.millings)
         _, findings = to_axes(program, machine)
-        problems = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
+        on_machine = axes_check(*findings, *too_fast(program, machine))
         gouge = gouge_by(job, coarse, program, setting.cutter, depth, paths.gouge_mm, keep)
         rows = times_on(program, machine)
         seconds, cutting = float(rows.sum()), float(rows[in_cut(program)].sum())
         between = between_channels(program, machine, impeller.blades)
         repeat = channel_repeat(program, machine, job.table, impeller.blades)
-        out.append(
-            Checked(setting, gouge, paths.gouge_mm, scallops, tuple(problems), seconds, cutting, between, repeat)
-        )
+        out.append(Checked(setting, gouge, paths.gouge_mm, scallops, on_machine, seconds, cutting, between, repeat))
     covered = tuple(
         Covered(face[0], face[1], left, scallop, _SPACING, plan.unreached[face])
         for face, left in zip(faces, rest[len(dense) :], strict=True)

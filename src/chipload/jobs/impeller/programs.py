@@ -15,6 +15,7 @@ from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.program.apt.writer import write_apt
 from chipload.program.gcode.writer import Repeat, write_gcode
 from chipload.program.program import Program
+from chipload.program.release import Release
 from chipload.report.programs import ENDINGS
 from chipload.result import Result, release_of
 
@@ -22,81 +23,103 @@ from chipload.result import Result, release_of
 def program_files(milled: ImpellerResult, result: Result) -> dict[str, bytes]:
     """All further files by name."""
     out = {"proof.npz": proof_bytes(milled), "contact_points.parquet": contact_points_bytes(milled)}
-    for stem, cutter, table, checked, program, empty in _programs(milled):
-        if empty:
-            continue
-        number, title = int(program.tool[0]), f"{milled.title}, {checked.name}"
+    for stem, checked in table_programs(milled):
+        program = program_of(checked)
         for name, repeat in ((stem, None), (f"{stem}{ALL}", checked.repeat)):
-            if name != stem and repeat is None:
-                continue
-            file = f"{name}.{ENDINGS[milled.machine.dialect]}"
-            text = write_gcode(
-                program, milled.machine, title=title, release=release_of(result, file),
-                comments=_comments(milled, checked, cutter, table, number, repeat), number=100 + number, repeat=repeat,
-            )  # fmt: skip
-            out[file] = text.encode("ascii")
-        cl = write_apt(program, None, title=title, release=release_of(result, f"{stem}.apt"))
+            if name == stem or repeat is not None:
+                file = f"{name}.{ENDINGS[milled.machine.dialect]}"
+                out[file] = table_text(milled, checked, repeat, release_of(result, file)).encode("ascii")
+        cl = write_apt(program, None, title=_title(milled, checked), release=release_of(result, f"{stem}.apt"))
         out[f"{stem}.apt"] = cl.encode("ascii")
-    for first, named in ((200, flank_names(milled)), (300, points_names(milled))):
-        for stem, p in named:
-            out |= _five_axis_files(milled, result, stem, p, first)
+    for stem, p in five_axis_programs(milled):
+        ending = ENDINGS[p.machine.dialect]
+        for more in ("", *(() if isinstance(p.every, str) else (ALL,))):
+            file = f"{stem}{more}.{ending}"
+            out[file] = five_axis_text(milled, p, bool(more), release_of(result, file)).encode("ascii")
+        release = release_of(result, f"{stem}.apt")
+        out[f"{stem}.apt"] = write_apt(p.program, None, title=_five_axis_title(milled, p), release=release).encode(
+            "ascii"
+        )
     return out
 
 
-def _five_axis_files(
-    milled: ImpellerResult, result: Result, stem: str, p: CheckedFlank | CheckedPoints, first: int
-) -> dict[str, bytes]:
-    """The texts of a program on five axes: one channel, all channels, APT."""
-    number, n = int(p.program.tool[0]), milled.impeller.blades
-    if isinstance(p, CheckedFlank):
-        what, of = f"deviation of the flank {p.deviation:.4f} mm", "flank pass"
-    else:
-        what, of = f"{p.path.lines} lines, scallop at most {p.excess:.4f} mm", "point milling"
-    title = f"{milled.title}, {of} of {p.name}"
-    head = [
-        f"T{number}: {p.cutter.label} mm, tool length 0: positions of the tip",
-        f"five axes at once, {what}",
-    ]
-    turn = f"{np.degrees(milled.impeller.pitch):.6f} deg each"
-    one = f"one channel: the others with the part turned by {turn}, {n} in all"
-    texts: list[tuple[str, Program, Repeat | None, str]] = [("", p.program, None, one)]
-    if not isinstance(p.every, str):
-        repeat = p.every.repeat
+def table_text(milled: ImpellerResult, checked: Checked | CheckedRough, repeat: Repeat | None, release: Release) -> str:
+    """The text of a program of the index table: of one channel, or with ``repeat`` of all; its lines do not depend on
+    ``release``.
+    """
+    program = program_of(checked)
+    number = int(program.tool[0])
+    return write_gcode(
+        program, milled.machine, title=_title(milled, checked), release=release,
+        comments=_comments(milled, checked, number, repeat), number=100 + number, repeat=repeat,
+    )  # fmt: skip
+
+
+def five_axis_text(milled: ImpellerResult, p: CheckedFlank | CheckedPoints, whole: bool, release: Release) -> str:
+    """The text of a program on five axes: of one channel, or of all where there is such a program."""
+    n, turn = milled.impeller.blades, f"{np.degrees(milled.impeller.pitch):.6f} deg each"
+    what = (
+        f"deviation of the flank {p.deviation:.4f} mm"
+        if isinstance(p, CheckedFlank)
+        else f"{p.path.lines} lines, scallop at most {p.excess:.4f} mm"
+    )
+    number, first = int(p.program.tool[0]), 200 if isinstance(p, CheckedFlank) else 300
+    program, repeat = p.program, None
+    line = f"one channel: the others with the part turned by {turn}, {n} in all"
+    if whole and not isinstance(p.every, str):
+        program, repeat = p.every.program, p.every.repeat
         by = "row by row" if repeat is None else f"axis {repeat.letter} advanced by {turn}"
-        texts.append((ALL, p.every.program, repeat, f"all {n} channels: {by}"))
-    ending, out = ENDINGS[p.machine.dialect], {}
-    for more, program, repeat, line in texts:
-        file = f"{stem}{more}.{ending}"
-        text = write_gcode(
-            program, p.machine, title=title, release=release_of(result, file), number=first + number,
-            comments=[*head, line], repeat=repeat,
-        )  # fmt: skip
-        out[file] = text.encode("ascii")
-    release = release_of(result, f"{stem}.apt")
-    out[f"{stem}.apt"] = write_apt(p.program, None, title=title, release=release).encode("ascii")
-    return out
+        line = f"all {n} channels: {by}"
+    comments = [
+        f"T{number}: {p.cutter.label} mm, tool length 0: positions of the tip", f"five axes at once, {what}", line,
+    ]  # fmt: skip
+    return write_gcode(
+        program, p.machine, title=_five_axis_title(milled, p), release=release, number=first + number,
+        comments=comments, repeat=repeat,
+    )  # fmt: skip
 
 
-def _programs(
-    milled: ImpellerResult,
-) -> Iterator[tuple[str, CatalogueCutter, float, Checked | CheckedRough, Program, bool]]:
-    """Name, cutter, table angle, check and program of all; whether there is nothing in it.
+def program_of(checked: Checked | CheckedRough) -> Program:
+    """The program of one channel."""
+    return checked.rough.program if isinstance(checked, CheckedRough) else checked.setting.program
 
-    Roughing first, then the partition that is milled, then all others.
+
+def cutter_of(checked: Checked | CheckedRough) -> CatalogueCutter:
+    """The cutter of a program."""
+    return checked.rough.cutter if isinstance(checked, CheckedRough) else checked.setting.cutter
+
+
+def table_programs(milled: ImpellerResult) -> Iterator[tuple[str, Checked | CheckedRough]]:
+    """File names without endings and programs of the index table that have rows: roughing first, then the partition
+    that is milled, then all others.
     """
     for name, rough in zip(rough_names(milled), milled.roughs or (), strict=True):
-        yield name, rough.rough.cutter, rough.rough.table, rough, rough.rough.program, not rough.rough.machined
+        if rough.rough.machined:
+            yield name, rough
     for name, p in finish_names(milled):
-        s = p.setting
-        yield name, s.cutter, s.table, p, s.program, not s.machined
+        if p.setting.machined:
+            yield name, p
 
 
-def _comments(
-    milled: ImpellerResult, checked: Checked | CheckedRough, c: CatalogueCutter, alpha: float, number: int,
-    repeat: Repeat | None,
-) -> list[str]:  # fmt: skip
+def five_axis_programs(milled: ImpellerResult) -> Iterator[tuple[str, CheckedFlank | CheckedPoints]]:
+    """File names without endings and programs on five axes."""
+    yield from flank_names(milled)
+    yield from points_names(milled)
+
+
+def _title(milled: ImpellerResult, checked: Checked | CheckedRough) -> str:
+    return f"{milled.title}, {checked.name}"
+
+
+def _five_axis_title(milled: ImpellerResult, p: CheckedFlank | CheckedPoints) -> str:
+    of = "flank pass" if isinstance(p, CheckedFlank) else "point milling"
+    return f"{milled.title}, {of} of {p.name}"
+
+
+def _comments(milled: ImpellerResult, checked: Checked | CheckedRough, number: int, repeat: Repeat | None) -> list[str]:
     """Comments for the machine operator."""
-    table = milled.surfaces[0].table
+    table, c = milled.surfaces[0].table, cutter_of(checked)
+    alpha = checked.rough.table if isinstance(checked, CheckedRough) else checked.setting.table
     position = float(table.position[np.abs(table.angle - alpha).argmin()])
     out = [
         f"T{number}: {c.label} mm, tool length 0: positions of the tip",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import Finding, Severity
 from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints, FiveAxisProgram
+from chipload.jobs.impeller.machine_check import CONTACT
 from chipload.jobs.impeller.maps import maps_of
 from chipload.jobs.impeller.names import ALL, finish_names, flank_names, points_names, rough_names
 from chipload.jobs.impeller.numbers import operation_numbers
@@ -29,6 +30,7 @@ from chipload.jobs.impeller.paths import walls_of
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.jobs.impeller.tool_clearance import clearance_blocks
 from chipload.program.program import Program
+from chipload.report.bodies import MACHINE_TABLE
 from chipload.report.programs import ENDINGS
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, state_of
 from chipload.result.motions import motion_blocks
@@ -118,7 +120,7 @@ def _roughing(milled: ImpellerResult, walls: Walls) -> list[Track]:
 def _finishing(milled: ImpellerResult, walls: Walls) -> list[Track]:
     out, used = [], {id(p) for p in milled.programs or ()}
     for name, p in finish_names(milled):
-        findings = tuple(Finding("machine", 0, text, Severity.EXCEEDS) for text in p.findings)
+        findings = p.machine_check.findings
         limits = (_gouge(name, p), *_scallops(name, p), *_loads(name, p))
         in_use = id(p) in used and not name.startswith("way-")
         out.append(
@@ -146,7 +148,7 @@ def _five_axis(milled: ImpellerResult) -> list[Track]:
     for name, p in named:
         state = state_of(p.excess, p.most, 0.0)[0]
         limits = (_gouge(name, p), LimitCheck(p.limit, p.most, p.excess, state, name, resolution_error=0.0))
-        findings = tuple(Finding("machine", 0, text, Severity.EXCEEDS) for text in p.findings)
+        findings = p.machine_check.findings
         ending = ENDINGS[p.machine.dialect]
         every = () if isinstance(p.every, str) else (f"{name}{ALL}.{ending}",)
         files = (f"{name}.{ending}", f"{name}.apt", *every)
@@ -222,10 +224,10 @@ def _loads(track: str, p: Checked) -> tuple[LimitCheck, ...]:
 
 
 def _rough_findings(r: CheckedRough) -> tuple[Finding, ...]:
-    texts = [*r.findings, *(f"{p}: touch_mm3 = {r.touch:g} is allowed" for p in r.taken.problems(r.touch))]
+    texts = [*(f"{p}: touch_mm3 = {r.touch:g} is allowed" for p in r.taken.problems(r.touch))]
     if not r.rough.machined:
         texts.append("no row can be milled")
-    return tuple(Finding("impeller-roughing", 0, text, Severity.EXCEEDS) for text in texts)
+    return (*(Finding("impeller-roughing", 0, text, Severity.EXCEEDS) for text in texts), *r.machine_check.findings)
 
 
 def _left(c: Covered) -> tuple[Finding, ...]:
@@ -241,9 +243,33 @@ def _unchecked(milled: ImpellerResult) -> tuple[str, ...]:
         "chatter; forces of roughing; deflection of the blades: not calculated"
         if fed
         else "forces, torque, deflection and chatter: not calculated",
-        "fixtures, pallet and linear axes: no collision check",
+        *(_unchecked_machine(milled) if milled.programs is not None else ()),
     ]
     out += milled.not_on_five_axes
     if milled.programs is None:
         out.append("programs: the job states no [operation.paths]")
+        out += [f"{name}: without a program nothing is held against it" for name in milled.stated.around]
     return tuple(out)
+
+
+def _unchecked_machine(milled: ImpellerResult) -> Iterator[str]:
+    """What is around the part and is not stated; lengths of tools on which the travel depends."""
+    if not any(name.startswith("fixture") for name in milled.stated.around):
+        yield "fixtures: none is stated"
+    if MACHINE_TABLE not in milled.stated.around:
+        yield "pallet and machine table: none is stated"
+    if milled.stated.around:
+        yield (
+            "fixtures and table: what is thinner than their spacing_mm, and a contact less deep, may be missed; one of "
+            f"less than {CONTACT:g} mm is none"
+        )
+    used = [(p.setting.cutter, p.machine_check) for p in milled.programs or ()]
+    used += [(r.rough.cutter, r.machine_check) for r in milled.roughs or ()]
+    bare = dict.fromkeys(cutter.label for cutter, _ in used if cutter.reach is None)
+    if bare:
+        yield f"holders of {', '.join(bare)}: not stated"
+    for label in dict.fromkeys(cutter.label for cutter, check in used if check.lengths is not None):
+        each = [c.lengths for cutter, c in used if cutter.label == label and c.lengths is not None]
+        low, high = max(a for a, _ in each), min(b for _, b in each)
+        within = f"a length from {low:.4g} to {high:.4g} mm" if low <= high else "no one length"
+        yield f"travel along the tool: length_mm of {label} is not stated: with {within} it stays within its travel"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.jobs.impeller.channels import between_channels, channel_repeat
+from chipload.jobs.impeller.machine_check import axes_check
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable, RoughTable
 from chipload.machine.machine import Machine
@@ -26,7 +27,6 @@ from chipload.planning.impeller.rough_settings import RoughingSetting, roughed
 from chipload.planning.impeller.roughing import RoughingSettings, uncut
 from chipload.planning.impeller.surfaces import hub_range
 from chipload.planning.impeller.tables import IndexTable
-from chipload.program.check import check_program
 from chipload.program.read import times_on
 from chipload.program.to_axes import to_axes
 from chipload.progress import Progress
@@ -137,11 +137,11 @@ def _checked(
         least = min(r for w, r in zip(walls, rest, strict=True) if w.name.startswith("floor") == hub)
         stands.append(least if least < _HEIGHT else None)
     _, findings = to_axes(program, machine)
-    problems = [f.text for f in (*findings, *check_program(program, machine), *too_fast(program, machine))]
+    on_machine = axes_check(*findings, *too_fast(program, machine))
     seconds = float(times_on(program, machine).sum())
     return CheckedRough(
         plan, gouge, allowed, (stands[0], stands[1]), removal, touch,
-        tuple(problems), seconds, between_channels(program, machine, blades),
+        on_machine, seconds, between_channels(program, machine, blades),
         channel_repeat(program, machine, table, blades), blank,
     )  # fmt: skip
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from chipload.jobs.impeller.machine_check import MachineCheck, check_cell
 from chipload.planning.impeller.rough_settings import RoughingSetting
 from chipload.program.gcode.writer import Repeat
 from chipload.report.sheet import table
@@ -30,7 +31,7 @@ class CheckedRough:
     stands : least that is left on the blades and on the hub where rows were milled [mm]; None: nowhere within reach
     taken : from the blank as the programs before it leave it, row by row
     touch : [mm3] that a rapid, and what is above the cutting part, may take in one row
-    findings : violations of the machine's limits
+    machine_check : what it does on the machine, and what its text shows
     seconds : time of one channel [s]
     between : from the end of one channel to the beginning of the next [s]
     repeat : how the text goes through all channels; None: it is of one channel
@@ -43,7 +44,7 @@ class CheckedRough:
     stands: tuple[float | None, float | None]
     taken: ChannelRemoval
     touch: float
-    findings: tuple[str, ...]
+    machine_check: MachineCheck
     seconds: float
     between: float
     repeat: Repeat | None
@@ -59,7 +60,7 @@ class CheckedRough:
     @property
     def verified(self) -> bool:
         """Whether there is no gouge, no motion beyond the machine, and no cut by rapids or above the cutting part."""
-        return not self.fails
+        return not (self.fails or self.machine_check.doubts)
 
     @property
     def missed(self) -> float:
@@ -77,7 +78,7 @@ class CheckedRough:
     @property
     def fails(self) -> tuple[str, ...]:
         """Conditions that do not hold."""
-        out = [f"{self.name}: {f}" for f in self.findings]
+        out = [f"{self.name}: {f}" for f in self.machine_check.fails]
         if self.gouge.bound > self.allowed:
             out.append(f"{self.name}: {self.gouge.message}: gouge_mm = {self.allowed:g} is allowed")
         out += [f"{self.name}: {p}: touch_mm3 = {self.touch:g} is allowed" for p in self.taken.problems(self.touch)]
@@ -95,7 +96,7 @@ class CheckedRough:
             "corner_radius_mm": c.corner_radius,
             "table_deg": round(float(np.degrees(rough.table)), 9),
             "verified": self.verified,
-            "fails": list(self.fails),
+            "fails": [*self.fails, *self.machine_check.doubts],
             "layers": rough.layers,
             "rows": len(rough.program),
             "path_mm": self.length,
@@ -129,7 +130,7 @@ def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) ->
                 f"<code>{escape(name)}</code>", str(v["layers"]), str(v["rows"]), f"{v['path_mm']:.0f}",
                 f"{v['time_min']:.2f}", f"{v['taken_mm3'] / 1e3:.2f}", stands, f"{v['gouge_mm']:.3f}",
                 f"{v['rapids_take_mm3']:.2f}, {v['above_takes_mm3']:.2f}", f"{v['missed_mm']:.0f}",
-                '<span class="ok">holds</span>' if r.verified else '<span class="no">does not hold</span>',
+                check_cell(r.fails, r.machine_check.doubts),
             ]
         )  # fmt: skip
     return [

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from chipload.checking.workpiece import Surroundings
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
 from chipload.jobs.impeller.channel_depth import reach_line
@@ -29,6 +30,9 @@ from chipload.jobs.impeller.ray_depth import ray_depth
 from chipload.jobs.impeller.roughing import checked_roughing
 from chipload.jobs.impeller.surface_search import WORKERS, SearchInputs, SurfaceSearch, searched_surfaces
 from chipload.jobs.impeller.tables import ImpellerOperationTable
+from chipload.jobs.impeller.written_programs import with_texts_read_back
+from chipload.jobs.simulation.fixtures import fixtures_of
+from chipload.jobs.simulation.values import machine_table_of
 from chipload.jobs.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.impeller.answer import Answer, one_cutter_of
@@ -82,6 +86,8 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     _checkable(job, impeller)
     forces = force_terms(job, catalogue)
     _five_axis_machines(job)
+    surroundings = surroundings_of(job)
+    surroundings.fixture_points(machine)
     op = job.operation
     provenance = _provenance(job, machine, catalogue, part)
     keep = KeptParts(checkpoint, digest(job.table.model_dump_json(), provenance.inputs, versions(), sources()), team)
@@ -104,7 +110,10 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     feeds = cutter_feeds(job, catalogue, forces)
     choices = _choices(job, done, catalogue, impeller, feeds, part_of(second, 0.0, 0.5), keep)
     partitions = tuple(choice.partition(WORKERS, part_of(second, 0.5, 1.0), keep) for choice in choices)
-    stated = StatedJob(title_of(job.path), _settings(op), job.table.impeller.outer_diameter_mm, _ahead(job))
+    stated = StatedJob(
+        title_of(job.path), _settings(op), job.table.impeller.outer_diameter_mm, _ahead(job),
+        tuple(surroundings.fixture_meshes(machine)),
+    )  # fmt: skip
     milled = ImpellerResult(
         stated, impeller, catalogue, machine, tuple(done), one, partitions, None, None, provenance,
     )  # fmt: skip
@@ -126,7 +135,16 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     points = checked_points(job, how, cutters, keep=keep) if op.point_milling is not None else None
     keep.write(at_once=True)
     milled = replace(milled, flanks=flanks, points=points)
-    return replace(milled, checked=checked, roughs=roughs, partitions=tuple(chosen.get(p.name, p) for p in partitions))
+    partitions = tuple(chosen.get(p.name, p) for p in partitions)
+    milled = replace(milled, checked=checked, roughs=roughs, partitions=partitions)
+    return with_texts_read_back(milled, surroundings, op.clearance_mm)
+
+
+def surroundings_of(job: ImpellerJob) -> Surroundings:
+    """Fixtures, and the table or pallet, that the job states; their files are read."""
+    table = job.table
+    bodies = [one for k, f in enumerate(table.fixture) for one in fixtures_of(f, k, job.path.parent, None)]
+    return Surroundings(fixtures=tuple(bodies), machine_table=machine_table_of(table.machine_table))
 
 
 def _five_axis_machines(job: ImpellerJob) -> None:
@@ -146,6 +164,7 @@ def _checkable(job: ImpellerJob, impeller: Impeller) -> None:
 def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: ImpellerPart) -> Provenance:
     files = dict(job.files)
     files |= {key: p for key, p in _named(job) if not isinstance(p, str)}
+    files |= {f"fixture {k}": job.path.parent / f.file for k, f in enumerate(job.table.fixture) if f.file is not None}
     own = provenance_of(files, job.overrides, machine)
     cutters = f"{catalogue.name}: {catalogue.note}" if catalogue.note else catalogue.name
     faces = {f"face {k}": line for k, line in enumerate(part.faces)}
@@ -172,12 +191,14 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     _checkable(job, impeller)
     force_terms(job, catalogue)
     _five_axis_machines(job)
+    around = surroundings_of(job).fixture_points(machine)
     lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}", *part.faces]
     table = _tables(machine, job.operation)
     angles = np.degrees(table.angle)
     lines.append(
         f"machine {machine.name}: {len(angles)} table angles from {angles.min():.6g} to {angles.max():.6g} deg"
     )
+    lines += [f"{name}: {len(points)} points" for name, points in around.items()]
     surfaces = _surfaces(job, impeller)
     for k, surface in enumerate(surfaces):
         s = surface.scene

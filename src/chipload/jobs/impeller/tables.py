@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from chipload.jobs.simulation.tables import MachineTableTable, WorkholdingTable
 from chipload.jobs.tables import (
     Count,
     FaceName,
@@ -280,4 +281,6 @@ class ImpellerJobTable(Table):
     surface: tuple[SurfaceTable, ...] = Field(min_length=1)
     catalogue: SourceTable
     machine: SourceTable
+    fixture: tuple[WorkholdingTable, ...] = ()
+    machine_table: MachineTableTable | None = None
     operation: tuple[ImpellerOperationTable, ...] = Field(min_length=1, max_length=1)

@@ -37,8 +37,12 @@ def fixture_errors(table: WorkholdingTable, key: str) -> list[str]:
     return [*out, *(f'{key}.{name}: not used with kind = "{table.kind}": leave it out' for name in others)]
 
 
-def fixtures_of(table: WorkholdingTable, number: int, folder: Path, stock: Stock) -> tuple[Fixture, ...]:
+def fixtures_of(table: WorkholdingTable, number: int, folder: Path, stock: Stock | None) -> tuple[Fixture, ...]:
     """Return the bodies of a fixture; its file is read.
+
+    Parameters
+    ----------
+    stock : that a vise holds; None: of a part that a vise cannot hold
 
     Raises
     ------
@@ -52,6 +56,8 @@ def fixtures_of(table: WorkholdingTable, number: int, folder: Path, stock: Stock
         file = folder / str(table.file)
         return (Fixture.read(file, spacing, units=table.units, chord_mm=table.chord_mm, key=f"{key}.file"),)
     if table.kind == "vise":
+        if stock is None:
+            raise InputError(f"{key}.kind: a vise holds a block of stock, which this job has not: state clamp or block")
         vise = Vise(
             cast(Any, table.jaw_mm), cast(float, table.grip_mm), table.closes or "y", table.fixed,
             table.opening_mm, table.step_mm, table.parallels_mm, table.at_mm,

@@ -14,7 +14,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
 from chipload.jobs.simulation.fixtures import fixture_errors
 from chipload.jobs.simulation.tables import ProgramLimitsTable, SimulationJobTable
-from chipload.jobs.simulation.values import elasticity_of, settings_of
+from chipload.jobs.simulation.values import elasticity_of, machine_table_errors, settings_of
 from chipload.jobs.sources import Limited, cutters, sources_of
 from chipload.jobs.tables import value_of
 
@@ -140,10 +140,7 @@ def _contradictions(table: SimulationJobTable) -> Iterator[str]:
         saved = stock.file is not None and stock.file.lower().endswith(".npz")
         if saved and stock.layer_mm is not None:
             yield "stock.layer_mm: leave it out: the layers of an earlier result stay"
-    plate = table.machine_table
-    for axis, low, high in zip("XYZ", plate.low_mm, plate.high_mm, strict=True) if plate is not None else ():
-        if not low < high:
-            yield f"machine_table.low_mm: {axis} = {low:g}: must be below high_mm, {axis} = {high:g}"
+    yield from machine_table_errors(table.machine_table)
     if table.dynamics is None and table.operation[0].speeds is not None:
         yield "operation.0.speeds: needs modes of vibration: state [dynamics] or leave it out"
     if not table.limits.stated:

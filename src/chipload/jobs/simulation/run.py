@@ -19,12 +19,11 @@ from chipload.errors import Finding, InputError, Severity, grouped, worst_severi
 from chipload.jobs.simulation.fixtures import fixtures_of
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.simulation.tables import ProgramTable
-from chipload.jobs.simulation.values import elasticity_of, settings_of, stock_of
+from chipload.jobs.simulation.values import elasticity_of, machine_table_of, settings_of, stock_of
 from chipload.jobs.tables import stated, value_of
 from chipload.machine.ini import read_ini
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.machine.saved_offsets import saved_offsets
-from chipload.machine.table import MachineTable
 from chipload.program.control import ControlSettings
 from chipload.program.read import ProgramReading, line_times, read_program, read_tools
 from chipload.program.setup import Setup, StatedControl
@@ -56,7 +55,7 @@ def inputs_of(job: ProgramJob, machine: Machine) -> CheckInputs:
         A file cannot be read.
     """
     table, folder = job.table, job.path.parent
-    op, block, part = table.operation[0], table.machine_table, None
+    op, part = table.operation[0], None
     if (of := table.part) is not None:
         part = FinishedPart.read(
             folder / of.file, of.spacing_mm, of.excess_range_mm, units=of.units, chord_mm=of.chord_mm
@@ -71,11 +70,7 @@ def inputs_of(job: ProgramJob, machine: Machine) -> CheckInputs:
         settings=settings_of(op),
         limits=value_of(Limits, table.limits),
         checks=value_of(CheckSettings, table.checks),
-        surroundings=Surroundings(
-            part,
-            tuple(fixtures),
-            None if block is None else MachineTable(block.low_mm, block.high_mm, block.spacing_mm),
-        ),
+        surroundings=Surroundings(part, tuple(fixtures), machine_table_of(table.machine_table)),
         elasticity=elasticity_of(table, folder),
         speeds_rpm=(None, None) if op.speeds is None else (op.speeds.least_rpm, op.speeds.most_rpm),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,16 @@ from chipload.checking.stiffness import MachineStiffness
 from chipload.checking.workpiece import Stock
 from chipload.jobs.simulation.dynamics_tables import DynamicsTable
 from chipload.jobs.simulation.modes_file import read_modes
-from chipload.jobs.simulation.tables import ClampTable, SimulateTable, SimulationJobTable, SolidTable, WorkpieceTable
+from chipload.jobs.simulation.tables import (
+    ClampTable,
+    MachineTableTable,
+    SimulateTable,
+    SimulationJobTable,
+    SolidTable,
+    WorkpieceTable,
+)
 from chipload.jobs.tables import stated, value_of
+from chipload.machine.table import MachineTable
 from chipload.stability.process_damping import ProcessDamping
 
 
@@ -29,6 +37,18 @@ def stock_of(table: SolidTable, folder: Path) -> Stock:
     if table.file is None:
         return Stock.block(stated(table.low_mm, "stock.low_mm"), stated(table.high_mm, "stock.high_mm"), table.layer_mm)
     return Stock.read(folder / table.file, units=table.units, chord_mm=table.chord_mm, layer_mm=table.layer_mm)
+
+
+def machine_table_of(table: MachineTableTable | None) -> MachineTable | None:
+    """Return the table or pallet that a job states."""
+    return None if table is None else MachineTable(table.low_mm, table.high_mm, table.spacing_mm)
+
+
+def machine_table_errors(table: MachineTableTable | None) -> Iterator[str]:
+    """Yield a message for each axis along which the corners of a table are in the wrong order."""
+    for axis, low, high in zip("XYZ", table.low_mm, table.high_mm, strict=True) if table is not None else ():
+        if not low < high:
+            yield f"machine_table.low_mm: {axis} = {low:g}: must be below high_mm, {axis} = {high:g}"
 
 
 def clamps_of(tables: Sequence[ClampTable]) -> tuple[WorkpieceClamp, ...]:

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.lazy import LateModule
@@ -40,6 +40,22 @@ class Body:
         """Greatest rho [mm]."""
         corner = (self.arcs[:, 0] + self.arcs[:, 2]).max(initial=0.0)
         return float(max(self.lines[:, [0, 2]].max(initial=0.0), corner))
+
+    def box(self, axis: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the low and high corner (n, 3) [mm], from the tip, of the boxes round it for unit axes (n, 3).
+
+        >>> shank = Body(np.array([[10.0, 25.0, 10.0, 75.0]]), np.zeros((0, 5)), 75.0)
+        >>> shank.box([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])[0].tolist()
+        [[25.0, -10.0, -10.0], [-10.0, -10.0, 25.0]]
+        """
+        up = np.asarray(axis, dtype=np.float64)
+        aside = np.sqrt(np.clip(1.0 - up**2, 0.0, None))
+        low, high = np.full(up.shape, np.inf), np.full(up.shape, -np.inf)
+        rings = [(rho, z, 0.0) for rho, z in self.lines.reshape(-1, 2).tolist()]
+        for rho, z, r in [*rings, *((e, f, r) for e, f, r, *_ in self.arcs.tolist())]:
+            low = np.minimum(low, z * up - rho * aside - r)
+            high = np.maximum(high, z * up + rho * aside + r)
+        return low, high
 
     def distance(self, rho: float, z: float) -> float:
         """Signed distance [mm] of a point from the surface, below 0 inside."""

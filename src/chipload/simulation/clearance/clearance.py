@@ -78,7 +78,7 @@ class LeastDistance:
         self.distance, self.step = np.full(count, np.inf), np.full(count, -1, dtype=np.int64)
         self.first = np.full(count, NEVER)
         self.done = 0
-        self._grid = _cells(self.points, max(b.widest for b in bodies.values()) + far) if count else None
+        self._sorted: Grid | None = None
 
     def take(self, steps: Steps, some: NDArray[np.bool_] | None = None) -> Floats:
         """(n,) float [mm], least distance of any point at each of the steps that follow; inf: none as near as looked.
@@ -88,16 +88,16 @@ class LeastDistance:
         some : (n,) bool, the steps that count; None: all
         """
         deepest = np.full(len(steps), np.inf)
-        grid = self._grid
-        if grid is None:
+        if not len(self.points):
             self.done += len(steps)
             return deepest
         for number in np.unique(steps.tool).tolist():
             body = self.bodies[number]
             own = np.flatnonzero((steps.tool == number) & (True if some is None else some))
             if len(body.lines):
+                own = own[self._near(steps, own, body)]
                 for begin in range(0, len(own), BLOCK):
-                    self._lower(grid, steps, own[begin : begin + BLOCK], body, deepest)
+                    self._lower(self._grid, steps, own[begin : begin + BLOCK], body, deepest)
         self.done += len(steps)
         return deepest
 
@@ -109,6 +109,23 @@ class LeastDistance:
         """Replace the state by one of :meth:`state` for the same points."""
         self.distance, self.step, self.first = (state[k].copy() for k in ("distance", "step", "first"))
         self.done = int(state["done"][0])
+
+    @property
+    def _grid(self) -> Grid:
+        """The points in cells, sorted when a tool first comes near them."""
+        if self._sorted is None:
+            self._sorted = _cells(self.points, max(b.widest for b in self.bodies.values()) + self.far)
+        return self._sorted
+
+    def _near(self, steps: Steps, own: Ints, body: Body) -> NDArray[np.bool_]:
+        """Whether the box round a tool in some steps meets that of the points; elsewhere no place can be near one."""
+        p0, p1, a0, a1 = (x[own] for x in (steps.p0, steps.p1, steps.a0, steps.a1))
+        (low0, high0), (low1, high1) = body.box(a0), body.box(a1)
+        # between two axes that stand an angle t apart a ring of the tool leaves its chord by at most its size t^2 / 8
+        more = self.far + 0.15 * (body.top + body.widest) * np.square(a1 - a0).sum(axis=1)[:, None]
+        low, high = np.minimum(p0 + low0, p1 + low1) - more, np.maximum(p0 + high0, p1 + high1) + more
+        meets = (low <= self.points.max(axis=0)) & (high >= self.points.min(axis=0))
+        return np.asarray(meets.all(axis=1))
 
     def _lower(self, grid: Grid, steps: Steps, own: Ints, body: Body, deepest: Floats) -> None:
         tips, axes, rows = _places(steps, own, body, self.tolerance)
