@@ -61,7 +61,7 @@ def read_part(job: ImpellerJob) -> ImpellerPart:
     """
     part = job.table.impeller
     plain = _without_fillets(job)
-    if part.shape is None:
+    if part.step is not None or (part.sections is not None and part.sections.flow_along_x is not None):
         _require_narrow_end_up(plain.impeller.hub, part)
     if part.fillet_mm is None:
         return plain
@@ -77,8 +77,7 @@ def _require_narrow_end_up(hub: Revolved, part: ImpellerTable) -> None:
     """Refuse a part whose hub widens upwards: the stated flow contradicts the geometry, and no cutter from above would
     reach between the blades.
     """
-    ends = hub.meridian[[int(hub.meridian[:, 1].argmin()), int(hub.meridian[:, 1].argmax())]]
-    (low, _), (high, _) = ends.tolist()
+    low, high = _end_radii(hub)
     if high <= (1.0 + SAME_RADIUS) * low:
         return
     key, value, other = "impeller.sections.flow_along_x", "true", "false"
@@ -93,12 +92,39 @@ def _require_narrow_end_up(hub: Revolved, part: ImpellerTable) -> None:
     )
 
 
+def _end_radii(hub: Revolved) -> tuple[float, float]:
+    """Radii of a hub at its lower and at its upper end [mm]."""
+    z = hub.meridian[:, 1]
+    return float(hub.meridian[z.argmin(), 0]), float(hub.meridian[z.argmax(), 0])
+
+
+def _flow_of(folder: Path, given: SectionsTable) -> bool:
+    """Whether the flow comes along +X of the files: the part is milled with the narrow end of its hub upwards.
+
+    Raises
+    ------
+    InputError
+        The ends of the hub are as wide as one another.
+    """
+    low, high = _end_radii(Revolved(read_meridian(folder / given.hub, given.unit, False, False), 1))
+    if max(low, high) <= (1.0 + SAME_RADIUS) * min(low, high):
+        raise InputError(
+            f"impeller.sections.flow_along_x: missing: the hub is {low:.4g} and {high:.4g} mm in radius at its ends, "
+            "which do not tell where the flow comes from: state true where it comes along +X of the files, else false"
+        )
+    return high > low
+
+
 def _without_fillets(job: ImpellerJob) -> ImpellerPart:
     part = job.table.impeller
     if part.step is not None:
         return _of_step(job.files, part.step, part.blades, part.outer_diameter_mm)
     if part.sections is not None:
-        return ImpellerPart(_of_sections(job.path.parent, part.sections, part.blades, part.outer_diameter_mm))
+        folder, given = job.path.parent, part.sections
+        over = given.flow_along_x if given.flow_along_x is not None else _flow_of(folder, given)
+        made = _of_sections(folder, given, over, part.blades, part.outer_diameter_mm)
+        found = f"flow: along {'+' if over else '-'}X of the files, by the hub, whose narrow end is up"
+        return ImpellerPart(made, (found,) if given.flow_along_x is None else ())
     return ImpellerPart(_of_shape(stated(part.shape, "impeller.shape"), part.blades, part.outer_diameter_mm))
 
 
@@ -110,8 +136,8 @@ def _of_shape(given: ShapeTable, blades: int, outer_diameter: float) -> Impeller
     return impeller_of(shape)
 
 
-def _of_sections(folder: Path, given: SectionsTable, blades: int, outer_diameter: float) -> Impeller:
-    over = given.flow_along_x
+def _of_sections(folder: Path, given: SectionsTable, over: bool, blades: int, outer_diameter: float) -> Impeller:
+    """The impeller through sections of points; ``over``: the flow comes along +X of the files."""
 
     def blade(names: tuple[str, ...], key: str) -> tuple[Blade, tuple[Floats, ...]]:
         try:

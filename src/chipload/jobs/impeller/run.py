@@ -198,7 +198,6 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     lines.append(
         f"machine {machine.name}: {len(angles)} table angles from {angles.min():.6g} to {angles.max():.6g} deg"
     )
-    lines += [f"{name}: {len(points)} points" for name, points in around.items()]
     surfaces = _surfaces(job, impeller)
     for k, surface in enumerate(surfaces):
         s = surface.scene
@@ -209,6 +208,7 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
         lines.append(f"between check points: certified within {within:g} mm for corner radii from {corner:g} mm")
     corners = ", ".join(f"{r:g}" for r in catalogue.families)
     lines.append(f"catalogue {catalogue.name}: {len(catalogue.cutters)} cutters, corner radii {corners} mm")
+    lines += [f"{name}: {len(points)} points" for name, points in around.items()]
     more = [c.label for c in cutters.cutters if c not in catalogue.cutters]
     if more:
         lines.append(f"for point milling on five axes alone: {', '.join(more)}")

@@ -59,7 +59,11 @@ class SectionsTable(Table):
     columns: Literal["X R*THETA R", "X R THETA_DEG", "X Y Z"] | None = Field(
         None, description="columns of files that do not name them"
     )
-    flow_along_x: bool = Field(description="true: the flow comes along +X of the files; the part is then turned over")
+    flow_along_x: bool | None = Field(
+        None,
+        description="true: the flow comes along +X of the files; the part is then turned over; default: so that the "
+        "narrow end of the hub is up",
+    )
     hub_ahead_mm: NotNegative = Field(description="length of the hub upstream of the leading edge")
 
 
