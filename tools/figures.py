@@ -146,6 +146,10 @@ def main() -> None:
             write_tutorials()
         if not given.numbers:
             write_pictures(names, results)
+            if not given.names:
+                import mechanics_pictures
+
+                mechanics_pictures.write(list(mechanics_pictures.FIGURES))
 
 
 if __name__ == "__main__":
