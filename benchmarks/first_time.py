@@ -5,7 +5,8 @@
 For each program: read (drafted), tools whose size a comment states and that the draft has from it, questions asked,
 verdict of the job with its guesses, seconds from the file to the verdict; with ``--saving`` the times before and after
 the feeds are chosen, and the verdict of the new ones; with ``--drafts`` nothing is run. Files in folders named ``bad``
-are to be refused and left out. The last lines are the shares of all programs.
+are to be refused and left out. The last lines are the shares of all programs but those that move nothing by themselves:
+subprograms whose parameters come from the controller, and texts that only set offsets.
 """
 
 from __future__ import annotations
@@ -109,8 +110,8 @@ def first_time(path: Path, folder: Path, seconds: float, saving: bool, drafts: b
         if called(words, seconds - row.seconds)[0] in (0, 3):
             tracks = json.loads((folder / "feeds" / "summary.json").read_text())["tracks"]
             if len(tracks) > 1:
-                times = [float(t["time_s"]) for t in tracks[:2]]
-                row.saving = f"{times[0]:.1f} -> {times[1]:.1f} s, {tracks[1]['verdict']}"
+                after, before = tracks[:2]
+                row.saving = f"{before['time_s']:.1f} -> {after['time_s']:.1f} s, {after['verdict']}"
     return row
 
 
@@ -135,10 +136,13 @@ def main() -> None:
             f"| {row.name} | {read} | {tools} | {row.questions} | {verdict} | {row.seconds:.1f} | {row.saving} |",
             flush=True,
         )
+    still = [row for row in rows if "no motion" in row.verdict]
+    rows = [row for row in rows if row not in still]
     drafted = sum(row.read for row in rows)
     verdicts = sum(row.verdict.startswith(("Holds", "Exceeds", "Unproven")) for row in rows)
     sized, named = sum(row.sized for row in rows), sum(row.named for row in rows)
-    print(f"\ndrafted: {drafted} of {len(rows)}; with a verdict in {options.seconds:g} s: {verdicts}")
+    print(f"\nmove nothing by themselves: {len(still)}")
+    print(f"drafted: {drafted} of {len(rows)}; with a verdict in {options.seconds:g} s: {verdicts}")
     print(f"tools that a comment states: {sized} of {named} read")
     print(f"most questions: {max((row.questions for row in rows), default=0)}")
 

@@ -136,12 +136,18 @@ class OffsetRules:
     kept_in_parameters : origins of the work offsets stand in parameters, so that unset ones are 0
     length_with_tool : a tool brings its length, without G43
     offset_holds : what an offset for G41 holds: ``diameter`` of the tool, or ``unknown``: it, or wear alone
+    work_codes : patterns of the codes of work offsets, with a number
+    work_bases : by pattern, what added to that number is the number of the work offset, 1 for G54
+    work_names : the codes, for messages; empty: there are none
     """
 
     names_tools: bool
     kept_in_parameters: bool
     length_with_tool: bool
     offset_holds: str
+    work_codes: tuple[str, ...]
+    work_bases: tuple[int, ...]
+    work_names: str
 
 
 @dataclass(frozen=True)

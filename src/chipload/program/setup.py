@@ -15,13 +15,12 @@ from dataclasses import dataclass, field
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.program.control import ControlSettings
+from chipload.program.control import CONTROLS, ControlSettings, control_named
 
 #: number from which tools that have only a name count
 FIRST_NAMED = 9001
 _HASH = re.compile(r"#?([0-9]{1,6})|#<([a-z_][^<>]*)>|(_[^<>]*)")
 _LETTER = {"sinumerik": "r", "heidenhain": "q"}
-_OFFSET = re.compile(r"G(5[4-9])(?:\.([123]))?(?:\s*P([0-9]{1,3}))?|G(5[0-9]{2})")
 
 Nine = tuple[float, ...]
 
@@ -137,17 +136,13 @@ def offset_number(name: str, dialect: str, key: str = "work_offsets") -> int:
     >>> offset_number("G59.3", "linuxcnc"), offset_number("G54.1 P7", "fanuc"), offset_number("G505", "sinumerik")
     (9, 16, 5)
     """
-    found = _OFFSET.fullmatch(" ".join(name.split()).upper())
-    if found is not None and dialect in ("linuxcnc", "fanuc", "sinumerik"):
-        code, point, extended, siemens = found.groups()
-        if siemens and dialect == "sinumerik" and int(siemens) >= 505:
-            return int(siemens) - 500
-        if extended and dialect == "fanuc" and code == "54" and point == "1" and 1 <= int(extended) <= 300:
-            return 9 + int(extended)
-        if code and not extended and (point is None or (code == "59" and dialect == "linuxcnc")):
-            number = int(code) - 53 + int(point or 0)
-            if dialect != "sinumerik" or number <= 4:
-                return number
-    known = {"linuxcnc": "G54 to G59.3", "fanuc": "G54 to G59 or G54.1 P1 to P300", "sinumerik": "G54 to G57, G505 on"}
-    text = f"must be {known[dialect]}" if dialect in known else f"{dialect} has none: leave it out"
+    plain = " ".join(name.split()).upper()
+    rules = control_named(dialect).offsets if dialect in CONTROLS else None
+    if rules is not None:
+        for pattern, base in zip(rules.work_codes, rules.work_bases, strict=True):
+            if (found := re.fullmatch(pattern, plain)) is not None:
+                return int(found[1]) + base
+    text = (
+        f"must be {rules.work_names}" if rules is not None and rules.work_names else f"{dialect} has none: leave it out"
+    )
     raise InputError(f"program.{key}: {name!r}: {text}")
