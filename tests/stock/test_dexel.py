@@ -13,7 +13,7 @@ import trimesh
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.stock import _dexels
-from chipload.stock.dexel import TriDexel, cutter_shape
+from chipload.stock.dexel import TriDexel, _rays_of_mesh, cutter_shape
 
 FLAT = Cutter(10.0, 4, 0.5, 30.0, 40.0, 6e5)
 BALL = Cutter(10.0, 2, 0.5, 30.0, 40.0, 6e5, corner_radius=5.0)
@@ -329,3 +329,22 @@ def test_a_path_takes_what_its_parts_take(bend):
             left.append([np.where(w, s, 0.0).sum(axis=1) for w, s in zip(within, lengths, strict=True)])
         for whole, two in zip(*left, strict=True):
             assert np.abs(whole - two).max() < 0.02
+
+
+class Grazing:
+    """A caster whose rays enter a face along its edge at first, and then meet nothing beside it."""
+
+    tries = 0
+
+    def intersects_location(self, origins: np.ndarray, ahead: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        self.tries += 1
+        hits = 1 if self.tries == 1 else 0
+        return np.zeros((hits, 3)), np.zeros(hits, dtype=np.int64), np.zeros(hits, dtype=np.int64)
+
+
+def test_a_ray_along_an_edge_beside_which_there_is_nothing() -> None:
+    """It is empty: a bracket of NIST has such an edge, at the border of its projection."""
+    body, caster = trimesh.creation.box((1.0, 1.0, 1.0)), Grazing()
+    rays = _rays_of_mesh(body, caster, 2, np.array([9.0, 0.0, 1.0, 1.0, 1.0, 1.0]))
+    assert caster.tries == 2
+    assert rays.count.tolist() == [0]

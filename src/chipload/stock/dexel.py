@@ -272,6 +272,8 @@ def _rays_of_mesh(mesh: trimesh.Trimesh, caster: RayMeshIntersector, k: int, gri
         ahead = np.zeros((len(left), 3))
         ahead[:, k] = 1.0
         where, ray, face = caster.intersects_location(origins, ahead)
+        if not len(ray):  # aside of the edge that they ran along nothing is met
+            return Rays(k, grid, ends, count)
         order = np.lexsort((where[:, k], ray))
         s, ray, sense = where[order, k], ray[order], np.where(normals[face[order]] < 0.0, 1, -1)
         depth = np.cumsum(sense)
