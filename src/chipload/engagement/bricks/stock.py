@@ -19,7 +19,7 @@ from shapely import MultiPolygon
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.moves.net import area_of, nodes_of, rings
-from chipload.engagement.moves.stock import INSTANT, Engaged, corner_parts, faces_of
+from chipload.engagement.moves.stock import INSTANT, Engaged, corner_parts, faces_of, walls_of
 from chipload.engagement.moves.stock import cutter_row as upright_row
 from chipload.lazy import LateModule
 
@@ -137,6 +137,7 @@ class BrickStock:
             self.ids = np.empty(int(self.first[-1]), dtype=np.int32)
             initial.over(self.faces, self.plan, self.plan_shape, self.first, self.ids)
             initial.levels(self.faces, self.plan, self.plan_shape, self.first, self.ids, self.level)
+            initial.beside_walls(walls_of(body), self.plan, self.plan_shape, self.level)
 
     def cropped(self, low: Floats, high: Floats) -> BrickStock | None:
         """The initial body in a box, in which no move was made; None where it does not reach into it.

@@ -1,7 +1,7 @@
 """Compiled loops over the faces of the initial body; arrays and scalars only.
 
-Notation: a face is a row of nine corners x, y, z and its normal, which is not upright to z; cells and levels as in
-:mod:`chipload.engagement.moves._sweep`.
+Notation: a face is a row of nine corners x, y, z and its normal, which is not upright to z; an upright face is a
+segment in the plan; cells and levels as in :mod:`chipload.engagement.moves._sweep`.
 """
 
 from __future__ import annotations
@@ -97,3 +97,30 @@ def levels(faces, grid, shape, first, ids, level):
             if base < under and in_solid(x, y, 0.5 * (base + under), low, low, first, ids, faces, cell):
                 level[cell, 0] = under
                 level[cell, 2] = base
+
+
+@njit("void(float64[:,::1], float64[::1], int64[::1], float64[:,::1])", cache=True, nogil=True)
+def beside_walls(walls, grid, shape, level):
+    """Withdraw the range of material of each cell that an upright face stands in: beside the face is air.
+
+    Parameters
+    ----------
+    walls : (m, 4) from x, y to x, y of each upright face
+    """
+    for w in range(len(walls)):
+        x0, y0, x1, y1 = walls[w]
+        i0 = max(math.floor((min(x0, x1) - MARGIN - grid[0]) / grid[2]), 0)
+        i1 = min(math.floor((max(x0, x1) + MARGIN - grid[0]) / grid[2]), shape[0] - 1)
+        j0 = max(math.floor((min(y0, y1) - MARGIN - grid[1]) / grid[3]), 0)
+        j1 = min(math.floor((max(y0, y1) + MARGIN - grid[1]) / grid[3]), shape[1] - 1)
+        # normal of the segment, as long as it is
+        nx = y1 - y0
+        ny = x0 - x1
+        reach = 0.5 * (abs(nx) * grid[2] + abs(ny) * grid[3]) + MARGIN * math.hypot(nx, ny)
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                x = grid[0] + (i + 0.5) * grid[2]
+                y = grid[1] + (j + 0.5) * grid[3]
+                if abs(nx * (x - x0) + ny * (y - y0)) <= reach:
+                    level[i * shape[1] + j, 0] = -math.inf
+                    level[i * shape[1] + j, 2] = math.inf

@@ -157,6 +157,24 @@ def faces_of(body: trimesh.Trimesh) -> Floats:
     return np.ascontiguousarray(np.hstack([corners[seen].reshape(-1, 9), normal[seen]]))
 
 
+def walls_of(body: trimesh.Trimesh) -> Floats:
+    """(m, 4) ends x, y of the segment in the plan of each upright face, one of those that share it.
+
+    >>> len(walls_of(trimesh.creation.box((4.0, 3.0, 2.0))))
+    4
+    """
+    corners = np.asarray(body.vertices, dtype=np.float64)[np.asarray(body.faces)]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    plan = corners[np.abs(normal[:, 2]) <= 1e-12 * np.linalg.norm(normal, axis=1), :, :2]
+    length = np.linalg.norm(np.roll(plan, -1, axis=1) - plan, axis=2)
+    row, first = np.arange(len(plan)), length.argmax(axis=1)
+    ends = np.stack([plan[row, first], plan[row, (first + 1) % 3]], axis=1)
+    # either end first, so that both triangles of a rectangle give one segment
+    later = (ends[:, 0, 0] > ends[:, 1, 0]) | ((ends[:, 0, 0] == ends[:, 1, 0]) & (ends[:, 0, 1] > ends[:, 1, 1]))
+    ends[later] = ends[later][:, ::-1]
+    return np.ascontiguousarray(np.unique(ends.reshape(-1, 4), axis=0))
+
+
 class MoveStock:
     """An initial body and the moves that were made in it.
 
@@ -230,6 +248,7 @@ class MoveStock:
         self.ids = np.empty(int(self.first[-1]), dtype=np.int32)
         initial.over(self.faces, self.grid, self.shape, self.first, self.ids)
         initial.levels(self.faces, self.grid, self.shape, self.first, self.ids, self.level)
+        initial.beside_walls(walls_of(body), self.grid, self.shape, self.level)
 
     def _index(self) -> tuple[NDArray[np.generic], ...]:
         body = (self.low, self.high, self.first, self.ids, self.faces)
