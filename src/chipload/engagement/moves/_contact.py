@@ -23,8 +23,9 @@ PI = math.pi
 TAU = 2.0 * math.pi
 #: distance from the end of the front at which the contact is tested [rad]
 BESIDE = 1e-4
-#: greatest angle between two samples [rad]
-APART = 0.35
+#: greatest angle between two samples [rad], and least number of intervals between them: the range that is searched is
+#: little wider than what may be in material, and an edge of the stock may lie between its ends alone
+APART, FEWEST = 0.35, 4
 #: greatest number of heights of the stock at which the flank is divided; above it the slices are equally thick
 LEVELS = 16
 #: greatest relative change of the volume per length between two steps that cut alike, and least change of one that
@@ -56,7 +57,7 @@ def intervals(p, T, rho, z, low, high, end, apart, index, out, begin):
     count = begin
     first = max(low, BESIDE - end) if end < PI else low
     last = min(high, end - BESIDE) if end < PI else high
-    n = max(math.ceil((last - first) / apart), 1) if last > first else -1
+    n = max(math.ceil((last - first) / apart), FEWEST) if last > first else -1
     d = (last - first) / n
     c = math.cos(first)
     s = math.sin(first)

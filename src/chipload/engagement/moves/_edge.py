@@ -14,8 +14,8 @@ from chipload.engagement.moves._sweep import CORNER, FLUTE, RHO1, RHO2, TA, TB, 
 PI = math.pi
 #: heights closer than this count as one [mm]
 SAME = 1e-6
-#: number of slices of the part of a corner that cuts all round in a downward motion
-ROUND = 2
+#: number of slices of the part of a corner whose circles cut all round in a downward motion, where there is material
+ROUND = 4
 
 
 @njit(cache=True, nogil=True)

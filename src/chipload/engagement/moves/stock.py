@@ -94,7 +94,9 @@ def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tupl
         cells = max(cells, (int(2.0 * c[_sweep.WIDE] / grid[2]) + 3) * (int(2.0 * c[_sweep.WIDE] / grid[3]) + 3))
         sk = math.cos(math.atan(c[_sweep.TB]))
         most = max(most, 3 * pieces + front.LEVELS + edge.ROUND + int(c[_sweep.FLUTE] / sk / longest) + 4)
-        samples = max(samples, int(math.tau / min(min(grid[2], grid[3]) / c[_sweep.WIDE], front.APART)) + 4)
+        samples = max(
+            samples, int(math.tau / min(min(grid[2], grid[3]) / c[_sweep.WIDE], front.APART)) + 4 + front.FEWEST
+        )
     spans = most * (samples + 1)
     return (
         np.empty((cells, 6)), np.empty(front.LEVELS), np.empty((most, 11)), np.empty((spans, 2)),
