@@ -109,7 +109,7 @@ def test_the_errors_cover_layers_and_steps_of_a_quarter(job):
         real = load_job(job, sets).job
         machine, material, _, program, _ = opened(real)
         stock = shell_stock(real, program, off_centre(real.shell.stock_mm, real.table.surprise))
-        found.append(cut(real, program, stock, material, machine.rapid, silent, keep=True))
+        found.append(cut(real, program, stock, material, machine.rapid, silent, accuracy=True))
     coarse, fine = ([each.loads.torque_edge + each.loads.torque_cut, each.loads.force_edge + each.loads.force_cut]
                     for each in found)  # fmt: skip
     errors = found[0].removal.resolution_error
@@ -302,3 +302,12 @@ def test_both_programs_go_the_same_way(result, what):
     seconds = (lengths(fed)[fed.motion != RAPID] / feeds).sum()
     alone = what["controllers"]["model_not_derated"]["time_s"]
     assert alone - 0.5 < seconds < 1.25 * alone
+
+
+def test_a_shank_in_the_stock_is_a_collision(job, tmp_path):
+    """Flutes of 1.2 mm, 2 mm below the rim: a shank of 16 mm is 3 mm wider, and goes into the wall."""
+    wide = ["--set", "cutter.0.flute_length_mm=1.2", "--set", "cutter.0.shank_diameter_mm=16"]
+    code, out, err = call("run", job, "--out", tmp_path / "r", *wide)
+    assert code == 3, out + err
+    summary = json.loads((tmp_path / "r" / "summary.json").read_text())
+    assert "collision" in {finding["code"] for finding in summary["findings"]}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,13 @@ from chipload.checking.outcome import ChangedText, ProgramResult, SimulationResu
 from chipload.checking.rows import motion_rows, step_rows
 from chipload.checking.stability import StabilityResult
 from chipload.checking.workpiece import stock_box
+from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, Severity
 from chipload.program.block_delete import with_block_delete
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, in_memory
 from chipload.result.limits import Columns
 from chipload.simulation.placement import nothing_cut, stock_placement
+from chipload.simulation.surface import Collision
 
 #: names of the tracks of a program as it was, and with another text
 ORIGINAL, OPTIMISED = "original", "optimised"
@@ -142,8 +144,7 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
         out.append("fixtures: none is stated")
     else:
         out.append("fixtures: what is thinner than their spacing_mm, and a contact less deep, may be missed")
-    if simulation.collisions.no_holder:
-        out.append(f"holders of tools {', '.join(map(str, simulation.collisions.no_holder))}: not stated")
+    out += holders_not_stated(simulation.checks.cutters)
     if simulation.rigid:
         out.append(f"stiffness not stated, taken as rigid: {', '.join(simulation.rigid)}")
     return tuple(out)
@@ -162,10 +163,7 @@ def findings_of(program: ProgramResult, simulation: SimulationResult) -> tuple[F
 def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
     """Return findings of the simulation: rapids in material, collisions, chips beyond the range of the coefficients."""
     out = [exceeding(f) if f.code == "rapid-cuts" else f for f in simulation.removal.findings]
-    for c in simulation.collisions.found:
-        place = (float(c.at[0]), float(c.at[1]), float(c.at[2]))
-        text = f"{c.what} goes {c.depth_mm:.3g} mm into {c.into}"
-        out.append(Finding("collision", c.line, text, Severity.EXCEEDS, place, int(c.step)))
+    out += collision_findings(simulation.collisions.found)
     known = {(f.code, f.line) for f in out}
     out += [f for f in simulation.collisions.stock.findings if f.code != "rapid-cuts" or (f.code, f.line) not in known]
     if simulation.workpiece is not None:
@@ -176,6 +174,23 @@ def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
     if simulation.skipped is not None:
         out += _skipped_findings(simulation.skipped, out)
     return tuple(out)
+
+
+def collision_findings(touched: Iterable[Collision]) -> list[Finding]:
+    """Return a finding for each collision."""
+    return [
+        Finding(
+            "collision", c.line, f"{c.what} goes {c.depth_mm:.3g} mm into {c.into}", Severity.EXCEEDS,
+            (float(c.at[0]), float(c.at[1]), float(c.at[2])), int(c.step),
+        )
+        for c in touched
+    ]  # fmt: skip
+
+
+def holders_not_stated(cutters: Mapping[int, Cutter]) -> list[str]:
+    """Return a sentence on the tools whose holder is not stated; none where all are."""
+    missing = [str(number) for number, cutter in sorted(cutters.items()) if not cutter.holder]
+    return [f"holders of tools {', '.join(missing)}: not stated"] if missing else []
 
 
 def _skipped_findings(skipped: SimulationResult, known: list[Finding]) -> list[Finding]:

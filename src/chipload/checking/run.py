@@ -114,7 +114,7 @@ def simulate_program(
     blank = None if stock.cut.any() else stock.body()
     kept = KeptPasses(checkpoint, passes_key(inputs, bodies.program) if checkpoint is not None else "")
     steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
-    stock_check = replace(check_stock(inputs, bodies, stock, steps, kept, progress), blank=blank)
+    stock_check = replace(check_stock(inputs, bodies.program, stock, steps, kept, progress), blank=blank)
     watches = [with_checks(inputs.checks, material, deflecting(gives, material))]
 
     def passing(share: float, what: str) -> Counted:

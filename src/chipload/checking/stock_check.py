@@ -18,7 +18,6 @@ from chipload.checking.clamped import placed_clamps
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.outcome import StockCheck
 from chipload.checking.part_place import find_misplaced_part
-from chipload.checking.preparation import Bodies
 from chipload.checking.workpiece import default_spacing, stock_box
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, Severity
@@ -42,14 +41,14 @@ NAMED = 3
 
 
 def check_stock(
-    inputs: CheckInputs, bodies: Bodies, stock: LayeredStock, steps: StepBlocks, kept: KeptPasses, progress: Progress
+    inputs: CheckInputs, program: Program, stock: LayeredStock, steps: StepBlocks, kept: KeptPasses, progress: Progress
 ) -> StockCheck:
     """Return the findings on the stock along a program; ``stock`` is that before it."""
     checks, op, part = inputs.checks, inputs.settings, inputs.surroundings.part
     placed = () if part is None else find_misplaced_part(part.mesh.bounds, part.mesh.volume, *stock_box(stock))
-    if leans(bodies.program).any():
+    if leans(program).any():
         return replace(_leaning(inputs, stock), findings=placed)
-    pitch = pitch_at(inputs.cutters, bodies.program, stock, op.stock_points_mm)
+    pitch = pitch_at(inputs.cutters, program, stock, op.stock_points_mm)
     what = "shank and holder in the stock"
     progress(0.0, what)
     found = follow_heights(steps, inputs.cutters, stock, pitch, op.tolerance_mm, lambda done: progress(0.0, what), kept)

@@ -26,6 +26,14 @@ def contact_height(engagement: ToothEngagement) -> Floats:
     return _greatest(engagement, z0 + sine * (engagement.rows[:, 3] - s0))
 
 
+def contact_range(engagement: ToothEngagement) -> tuple[Floats, Floats]:
+    """Return the heights (n,) [mm] above the tip of the lowest and highest point that cuts; 0 where nothing is cut."""
+    s0, _, z0, sine = engagement.slices[engagement.slice, :4].T
+    low = np.full(len(engagement), np.inf)
+    np.minimum.at(low, _owner(engagement), z0 + sine * (engagement.rows[:, 2] - s0))
+    return np.where(np.isfinite(low), low, 0.0), contact_height(engagement)
+
+
 def tooth_feed(engagement: ToothEngagement) -> Floats:
     """Return the feed per tooth (n,) [mm] of engagement ranges without runout; 0 where nothing is cut.
 
@@ -35,6 +43,8 @@ def tooth_feed(engagement: ToothEngagement) -> Floats:
     >>> from chipload.cutter.cutter import Cutter
     >>> from chipload.engagement.tooth_engagement import engagement_of_arcs
     >>> slot = engagement_of_arcs([0.0], [math.pi], 0.1, Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5), 2.0)
+    >>> [z.tolist() for z in contact_range(slot)]
+    [[0.0], [2.0]]
     >>> tooth_feed(slot).tolist(), radial_depth(slot).round(9).tolist(), contact_height(slot).tolist()
     ([0.1], [10.0], [2.0])
     """

@@ -92,7 +92,7 @@ def allowable(
     planned = cut(job, program, shell_stock(job, program), material, machine.rapid, part_of(progress, 0.0, 0.5))
     real = cut(
         job, program, shell_stock(job, program, off_centre(job.shell.stock_mm, surprises), thinner), material,
-        machine.rapid, part_of(progress, 0.5, 1.0), keep=True,
+        machine.rapid, part_of(progress, 0.5, 1.0), accuracy=True,
     )  # fmt: skip
     loads = true_loads(real.loads, real.points, place, surprises)
     shell = wall_of(job)

@@ -14,10 +14,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.checking.preparation import with_tool
+from chipload.checking.preparation import resolution_of, with_tool
+from chipload.checking.settings import SimulationSettings
 from chipload.control.wall import Loads, two_parts
 from chipload.cutter.cutter import Cutter
+from chipload.cutting.force import mean_forces
 from chipload.cutting.material import Material
+from chipload.engagement.extent import contact_range
 from chipload.errors import InputError, Severity
 from chipload.jobs.tables import stated
 from chipload.jobs.torque.job import TorqueJob
@@ -49,6 +52,9 @@ MOST_POINTS = 2_000_000
 LITTLE_MPA = 10.0
 #: a flank within so much of the finished surface makes it [mm]
 MAKES_MM = 0.05
+#: slices of a corner or a bottom: of a flat mill that goes down a helix the whole bottom cuts, and half as many leave
+#: 7 % of its greatest force unknown instead of 2 %
+SLICES = 48
 #: layers where no cutter comes are so many times as thick
 COARSE = 8.0
 
@@ -263,10 +269,15 @@ def shell_stock(
     )
 
 
-def resolution_of(job: TorqueJob) -> Resolution:
-    """Resolution of the chips in the simulation."""
-    table, smallest = job.table.simulation, min(c.radius for c in job.cutters.values())
-    return Resolution(table.step_mm, table.tolerance_mm, 6, 0.5 * smallest)
+def settings_of(job: TorqueJob) -> SimulationSettings:
+    """Settings of the simulations, in the stock of a wall or of a workpiece."""
+    table = job.table.simulation
+    return SimulationSettings(table.step_mm, table.tolerance_mm, corner_slices=SLICES)
+
+
+def resolution_in_stock(job: TorqueJob, program: Program) -> Resolution:
+    """Resolution of the simulations."""
+    return resolution_of(settings_of(job), job.cutters, program)
 
 
 def require_linear(material: Material) -> None:
@@ -294,14 +305,14 @@ def cut(
     rapids: float,
     progress: Progress,
     *,
-    keep: bool = False,
+    accuracy: bool = False,
 ) -> Cut:
     """Simulate the program in the stock, which changes.
 
     Parameters
     ----------
     rapids : feed of the rapids between two cuts [mm/s]
-    keep : the removal keeps what the teeth cut, and finds the error of its loads
+    accuracy : find the error of the loads
 
     Raises
     ------
@@ -309,31 +320,31 @@ def cut(
         As :func:`chipload.simulation.chips.remove`; the material has a size effect, the tip stands while it cuts.
     """
     require_linear(material)
-    fine = resolution_of(job)
-    before = stock.state()
+    fine = resolution_in_stock(job, program)
+    edge = edge_material(material)
     less = remove(
-        program, stock, job.cutters, edge_material(material), fine, accuracy=False,
+        program, stock.copied(), job.cutters, edge, fine, keep=True, accuracy=False, engine="auto",
         progress=lambda x, what: progress(0.5 * x, what),
-    ).columns  # fmt: skip
-    stock.restore(before)
+    )  # fmt: skip
     removal = remove(
         program,
         stock,
         job.cutters,
         material,
         fine,
-        keep=keep,
-        accuracy=keep,
+        keep=True,
+        accuracy=accuracy,
+        engine="auto",
         progress=lambda x, what: progress(0.5 + 0.5 * x, what),
     )
     c, own, little = removal.columns, feed_rows(removal), LITTLE_MPA / material.Ktc
     points = step_points(removal, program)
     loads = two_parts(
-        1e3 * c["torque_mean_nm"][own], c["force_normal_n"][own],
-        1e3 * less["torque_mean_nm"][own], less["force_normal_n"][own], little,
+        torque_of_cuts(removal, material)[own], c["force_normal_n"][own],
+        torque_of_cuts(less, edge)[own], less.columns["force_normal_n"][own], little,
     )  # fmt: skip
     feed = step_feeds(removal, rapids)
-    near, far, height = _depths(Place(job.shell), stock.bounds, points, c["chip_layers"][own])
+    near, far, height = _depths(Place(job.shell), points, removal, job.table.simulation.layer_mm)
     tools = c["tool"][own]
     makes, soft = np.zeros(len(feed), dtype=np.bool_), np.zeros(len(feed))
     for number in np.unique(tools).tolist():
@@ -349,6 +360,16 @@ def edge_material(material: Material) -> Material:
     return replace(
         material, Ktc=LITTLE_MPA, Krc=little * material.Krc, Kac=little * material.Kac, spread=None, covariance=None
     )
+
+
+def torque_of_cuts(removal: Removal, material: Material) -> Floats:
+    """Mean torque over a revolution (n,) [N mm] of each row, at the instant of a step at which its force is greatest,
+    so that torque and force of a step that enters or leaves the stock are those of one engagement.
+    """
+    out = np.zeros(len(removal.columns["line"]))
+    for cuts in removal.cuts:
+        out[cuts.step] = mean_forces(cuts.engagement, cuts.cutter, material)[1]
+    return out
 
 
 def feed_rows(removal: Removal) -> slice:
@@ -382,17 +403,23 @@ def step_feeds(removal: Removal, rapids: float) -> Floats:
     return np.where(c["rapid"][own], rapids, mm_s_from_mm_min(1.0) * c["feed_mm_min"][own])
 
 
-def _depths(place: Place, bounds: Floats, points: Floats, layers: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
-    """S of both ends of each step's depth of cut, and its height: as many layers from the tip up as lost something."""
-    tip = 0.5 * (points[1:, 2] + points[:-1, 2])
-    first = np.clip(np.searchsorted(0.5 * (bounds[1:] + bounds[:-1]), tip), 0, len(bounds) - 1)
-    top = bounds[np.clip(first + layers, 0, len(bounds) - 1)]
-    low = bounds[first]
-    cuts = (layers > 0) & (top > low)
-    a, b = place.along(low), place.along(top)
-    near = np.clip(np.minimum(a, b), 0.0, place.table.length_mm)
-    far = np.clip(np.maximum(a, b), 0.0, place.table.length_mm)
-    return np.where(cuts, near, 0.0), np.where(cuts, far, 0.0), np.where(cuts, top - low, 0.0)
+def _depths(place: Place, points: Floats, removal: Removal, within: float) -> tuple[Floats, Floats, Floats]:
+    """S of both ends of each step's depth of cut, and its height: between the lowest and the highest point of the edge
+    that cuts, on the wall.
+
+    The ends are known to half of ``within`` [mm], so that steps of nearly one depth share the response of the wall.
+    """
+    own, n = feed_rows(removal), len(points) - 1
+    low, high, tip = np.zeros(n), np.zeros(n), 0.5 * (points[1:, 2] + points[:-1, 2])
+    for cuts in removal.cuts:
+        row = cuts.step - own.start
+        low[row], high[row] = contact_range(cuts.plain)
+    a, b = place.along(tip + low), place.along(tip + high)
+    ends = np.clip(np.column_stack([np.minimum(a, b), np.maximum(a, b)]), 0.0, place.table.length_mm)
+    round_ends = np.clip(np.round(ends / within) * within, 0.0, place.table.length_mm)
+    ends = np.where((round_ends[:, 1] > round_ends[:, 0])[:, None], round_ends, ends)
+    near, far = np.where((high > low)[:, None], ends, 0.0).T
+    return near, far, high - low
 
 
 def _finished_surface(

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.checking.default_checks import DefaultChecks
+from chipload.checking.outcome import StockCheck
 from chipload.checking.settings import CheckSettings
 from chipload.checking.workpiece_compliance import WorkpieceCompliance
 from chipload.control import plant
@@ -278,8 +279,9 @@ class TorqueResult:
     wall : the thin wall, or the workpiece, that limits the torque
     step_checks : the steps for the checks in addition to the stated limits
     blank : the stock as it really is before the program, with the cutters
-    findings : of the simulations of the plan and of the truth
-    resolution_error : relative error of loads by layers and steps, by column of the simulation of the truth
+    stock_check : of the real stock as it is at each moment
+    findings : of the simulations of the plan and of the truth, and on the real stock
+    resolution_error : relative error of loads by column of the simulation of the truth
     energy_balance : work over the specific energy of the volume removed, less 1, by tool number: as planned, and real
     """
 
@@ -289,6 +291,7 @@ class TorqueResult:
     control: ControlComparison
     step_checks: StepChecks
     blank: Blank
+    stock_check: StockCheck
     findings: tuple[Finding, ...]
     resolution_error: Mapping[str, float]
     energy_balance: Mapping[str, Mapping[int, float]]

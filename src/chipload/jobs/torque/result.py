@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from chipload.checking.default_checks import default_limits, range_findings, unchecked_checks, with_budget
+from chipload.checking.result import holders_not_stated
 from chipload.control.override import STATUS
 from chipload.errors import Finding, Severity
 from chipload.jobs.torque.files import feed_forward_file, override_file
@@ -70,6 +71,8 @@ def result_of(outcome: TorqueResult) -> Result:
             *unchecked_checks(outcome.job.checks),
             *(f"limit {name}: not stated" for name in outcome.job.unchecked),
             *(() if outcome.control.cases else ("cutter strength, chips and spindle: no controller was run",)),
+            *outcome.stock_check.unchecked,
+            *holders_not_stated(outcome.job.checks.cutters),
             "chatter, and runout beyond that of the cutter: not calculated",
             "the wall is taken with its final thickness throughout"
             if isinstance(outcome.wall, ShellWall)

@@ -11,8 +11,12 @@ import numpy as np
 
 from chipload.checking.clamped import require_clamped
 from chipload.checking.default_checks import default_checks
+from chipload.checking.inputs import CheckInputs
+from chipload.checking.outcome import StockCheck
+from chipload.checking.result import collision_findings
 from chipload.checking.settings import CheckSettings
-from chipload.checking.workpiece import insides, stock_box
+from chipload.checking.stock_check import check_stock
+from chipload.checking.workpiece import Stock, insides, stock_box
 from chipload.control.fuzzy import FuzzyTable, read_fuzzy, standard
 from chipload.control.identification import aliased, bandwidth
 from chipload.control.override import Override
@@ -26,7 +30,7 @@ from chipload.jobs.simulation.values import workpiece_of
 from chipload.jobs.tables import value_of
 from chipload.jobs.torque.allowable import allowable, wall_of
 from chipload.jobs.torque.controllers import cases_of, controller_of, shortest
-from chipload.jobs.torque.cut import CutSteps, program_of, read_file, require_linear, resolution_of
+from chipload.jobs.torque.cut import CutSteps, program_of, read_file, require_linear, resolution_in_stock, settings_of
 from chipload.jobs.torque.files import override_file, override_text
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.outcome import (
@@ -56,6 +60,7 @@ from chipload.result.provenance import provenance_of, title_of
 from chipload.simulation.accuracy import energy_balance
 from chipload.simulation.chips import counted
 from chipload.simulation.estimate import estimate
+from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.program_findings import ProgramSurroundings, program_findings
 from chipload.simulation.steps import StepBlocks
 from chipload.stock.blank_mesh import blank_mesh
@@ -92,6 +97,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         cases = cases_of(job, path, controller, table, spindle, torque, own.walls, acceleration, progress)
         shortest_time = shortest(path, controller, torque, acceleration)
     both = (("planned", own.planned), ("real", own.real))
+    in_stock = _stock_check(job, program, machine, material)
     return TorqueResult(
         job=_inputs(job, program, machine, material),
         wall=wall,
@@ -108,9 +114,9 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         ),
         step_checks=step_checks(own.real, own.loads, material, _fastest(cases)),
         blank=Blank(blank_mesh(_real_stock(job, program)), job.cutters),
+        stock_check=in_stock,
         findings=(
-            *own.planned.removal.findings,
-            *(own.real.removal.findings if own.real is not own.planned else ()),
+            *_of_removals(own, in_stock),
             *_of_program(job, program, machine, own.real),
             *_text_findings(job, program, machine),
         ),
@@ -119,9 +125,30 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
     )
 
 
+def _stock_check(job: TorqueJob, program: Program, machine: Machine, material: Material) -> StockCheck:
+    """Rapids, shank and holder, and loose pieces in the real stock as it is at each moment.
+
+    The deflection of the wall is what the job calculates, so that no wall counts as too slender to be rigid.
+    """
+    stock, settings = _real_stock(job, program), settings_of(job)
+    checks = replace(value_of(CheckSettings, job.table.checks), slender_walls=False)
+    inputs = CheckInputs(job.cutters, material, machine, Stock(stock), settings, checks=checks)
+    steps = StepBlocks(program, settings.step_mm, settings.tolerance_mm)
+    return check_stock(inputs, program, stock, steps, KeptPasses(), silent)
+
+
+def _of_removals(own: Followed, in_stock: StockCheck) -> tuple[Finding, ...]:
+    """Findings of both removals and on the stock, a rapid that cuts once."""
+    removals = (own.planned,) if own.real is own.planned else (own.planned, own.real)
+    out = [f for each in removals for f in each.removal.findings]
+    known = {(f.code, f.line) for f in out}
+    out += [f for f in in_stock.findings if f.code != "rapid-cuts" or (f.code, f.line) not in known]
+    return (*out, *collision_findings(in_stock.touched))
+
+
 def _of_program(job: TorqueJob, program: Program, machine: Machine, real: CutSteps) -> tuple[Finding, ...]:
     """Findings on the whole program in the real stock, besides its loads."""
-    stock, fine = _real_stock(job, program), resolution_of(job)
+    stock, fine = _real_stock(job, program), resolution_in_stock(job, program)
     around = ProgramSurroundings(insides(stock), *stock_box(stock), machine.table is not None)
     if job.program_file is not None:
         reading = read_file(job, job.program_file, machine)
@@ -197,7 +224,7 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     least = torque_resolution(spindle, 1e-3 * job.table.loop.period_ms).total / granted if granted > 0.0 else math.inf
     # below this set point the readings count as air, or the estimate is not valid
     least = max(least, estimate_range(job, spindle)[0] / job.table.torque_control.override.hold)
-    count, number = counted(program, job.cutters, resolution_of(job)), len(job.table.surprise)
+    count, number = counted(program, job.cutters, resolution_in_stock(job, program)), len(job.table.surprise)
     return [
         f"{job.path.name}: {what}; "
         f"{len(program)} motions on machine {machine.name}, stock of {number_text(stock.volume(), 5)} mm3, material "
@@ -226,7 +253,7 @@ def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spin
     if job.table.limits.torque_nm is not None:
         # the limit is at most this one, so that a spindle that cannot hold this one holds none
         require_resolved(job, spindle, 1e3 * job.table.limits.torque_nm)
-    counted(program, job.cutters, resolution_of(job))
+    counted(program, job.cutters, resolution_in_stock(job, program))
     if job.workpiece is not None:
         require_clamped(workpiece_of(job.workpiece), real_stock_body(job, program))
     return machine, material, table, program, spindle

@@ -13,7 +13,7 @@ from chipload.jobs.torque.cut import (
     Place,
     cut,
     off_centre,
-    resolution_of,
+    resolution_in_stock,
     shell_stock,
     thinner_share,
 )
@@ -75,7 +75,7 @@ def real_shell_stock(job: TorqueJob, program: Program) -> LayeredStock:
 def preview_of_shell(job: TorqueJob, program: Program, material: Material, machine: Machine) -> tuple[str, bool]:
     """Torque limit by a coarse simulation of the plan, in a sentence, and whether there is one."""
     rough = coarser(job)
-    if counted(program, job.cutters, resolution_of(rough)) > MOST_PREVIEWED:
+    if counted(program, job.cutters, resolution_in_stock(rough, program)) > MOST_PREVIEWED:
         return "the run finds the torque limit", True
     planned = cut(rough, program, shell_stock(rough, program), material, machine.rapid, silent)
     _, limit = limit_of(rough, planned)

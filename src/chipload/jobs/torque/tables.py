@@ -222,7 +222,10 @@ class SimulationTable(Table):
     """Resolution of the simulation."""
 
     step_mm: Positive = Field(le=10.0, description="longest step of the tip")
-    layer_mm: Positive = Field(le=10.0, description="thickness of the layers of the stock in reach of the cutter")
+    layer_mm: Positive = Field(
+        le=10.0,
+        description="thickness of layers of stock in reach of the cutter, and step between depths of cut on a wall",
+    )
     tolerance_mm: Positive = Field(
         0.005, ge=1e-6, le=0.1, description="greatest deviation of chords from the edges of chips"
     )

@@ -18,8 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.checking.preparation import resolution_of
-from chipload.checking.settings import SimulationSettings
 from chipload.checking.workpiece import Stock
 from chipload.checking.workpiece_compliance import WorkpieceCompliance, workpiece_compliance
 from chipload.control.linuxcnc.path import ToolPath
@@ -45,9 +43,11 @@ from chipload.jobs.torque.cut import (
     edge_material,
     feed_rows,
     require_linear,
+    resolution_in_stock,
     step_feeds,
     step_points,
     surprise_factors,
+    torque_of_cuts,
 )
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.tables import SurpriseTable
@@ -56,7 +56,7 @@ from chipload.program.program import Program
 from chipload.progress import Progress, part_of, silent
 from chipload.simulation.chips import remove
 from chipload.simulation.deflection import contacts, step_deflections, tip_deflections
-from chipload.simulation.removal import Removal, Resolution
+from chipload.simulation.removal import Removal
 from chipload.stock.layers import LayeredStock
 from chipload.structure.spindle import Bar, tool_bars
 
@@ -138,12 +138,6 @@ def stock_of_workpiece(job: TorqueJob, solid: SolidTable) -> Stock:
     return stock if isinstance(stock.body, LayeredStock) else Stock(stock.body, job.table.simulation.layer_mm)
 
 
-def resolution_on_workpiece(job: TorqueJob, program: Program) -> Resolution:
-    """Resolution of the simulation in the stock of the workpiece."""
-    fine = job.table.simulation
-    return resolution_of(SimulationSettings(fine.step_mm, fine.tolerance_mm), job.cutters, program)
-
-
 def workpiece_cut(
     job: TorqueJob,
     solid: SolidTable,
@@ -165,16 +159,16 @@ def workpiece_cut(
     """
     require_linear(material)
     stock = stock_of_workpiece(job, solid).layered(program, job.cutters)
-    fine, elastic = resolution_on_workpiece(job, program), workpiece_of(stated(job.workpiece, "workpiece"))
+    fine, elastic = resolution_in_stock(job, program), workpiece_of(stated(job.workpiece, "workpiece"))
     known = workpiece_compliance(
-        elastic, program, stock, job.cutters, material, fine, "layers", progress=part_of(progress, 0.0, 0.5)
+        elastic, program, stock, job.cutters, material, fine, "auto", progress=part_of(progress, 0.0, 0.5)
     )
     if known.strained is None:
         raise InputError("stock: the program cuts nothing from the workpiece: check its corners and the work offset")
     less, removal = (
         remove(
             program, body, job.cutters, metal, fine, keep=True, accuracy=metal is material,
-            progress=part_of(progress, share, share + 0.25),
+            engine="auto", progress=part_of(progress, share, share + 0.25),
         )
         for body, metal, share in ((stock.copied(), edge_material(material), 0.5), (stock, material, 0.75))
     )  # fmt: skip
@@ -187,8 +181,8 @@ def workpiece_cut(
         TwoParts(*edge_and_cut(a[rows], b[rows], little)) for a, b in zip(whole, edge, strict=True)
     )
     loads = two_parts(
-        1e3 * c["torque_mean_nm"][rows], c["force_n"][rows],
-        1e3 * light["torque_mean_nm"][rows], light["force_n"][rows], little,
+        torque_of_cuts(removal, material)[rows], c["force_n"][rows],
+        torque_of_cuts(less, edge_material(material))[rows], light["force_n"][rows], little,
     )  # fmt: skip
     return WorkpieceCut(
         removal, stock, step_points(removal, program), step_feeds(removal, rapids), loads, error, all_of_it, work,

@@ -16,6 +16,7 @@ from chipload.control.wall import PathLimit
 from chipload.cutting.material import Material
 from chipload.jobs.tables import stated
 from chipload.jobs.torque.allowable import coarser, limit_text
+from chipload.jobs.torque.cut import resolution_in_stock
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.outcome import AllowableTorque, ClampedWorkpiece
 from chipload.jobs.torque.remedies import MARGIN
@@ -23,7 +24,6 @@ from chipload.jobs.torque.workpiece_cut import (
     AllowableWorkpiece,
     WorkpieceCut,
     limit_on_workpiece,
-    resolution_on_workpiece,
     responses_of,
     workpiece_cut,
 )
@@ -60,7 +60,7 @@ def preview_on_workpiece(job: TorqueJob, program: Program, material: Material, m
     few = stated(rough.workpiece, "workpiece").model_copy(update={"states": STATES})
     rough = replace(rough, table=rough.table.model_copy(update={"workpiece": few}))
     stock = stated(rough.table.stock, "stock")
-    if counted(program, job.cutters, resolution_on_workpiece(rough, program)) > MOST_PREVIEWED:
+    if counted(program, job.cutters, resolution_in_stock(rough, program)) > MOST_PREVIEWED:
         return "the run finds the torque limit", True
     planned = workpiece_cut(rough, stock, program, material, machine.rapid)
     margin = planned.compliance.error
