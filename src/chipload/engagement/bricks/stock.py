@@ -137,7 +137,7 @@ class BrickStock:
             self.ids = np.empty(int(self.first[-1]), dtype=np.int32)
             initial.over(self.faces, self.plan, self.plan_shape, self.first, self.ids)
             initial.levels(self.faces, self.plan, self.plan_shape, self.first, self.ids, self.level)
-            initial.beside_walls(walls_of(body), self.plan, self.plan_shape, self.level)
+            initial.mark_upright_faces(walls_of(body), self.plan, self.plan_shape, self.level)
 
     def cropped(self, low: Floats, high: Floats) -> BrickStock | None:
         """The initial body in a box, in which no move was made; None where it does not reach into it.

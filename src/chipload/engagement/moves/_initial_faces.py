@@ -100,7 +100,7 @@ def levels(faces, grid, shape, first, ids, level):
 
 
 @njit("void(float64[:,::1], float64[::1], int64[::1], float64[:,::1])", cache=True, nogil=True)
-def beside_walls(walls, grid, shape, level):
+def mark_upright_faces(walls, grid, shape, level):
     """Withdraw the range of material of each cell that an upright face stands in: beside the face is air.
 
     Parameters

@@ -250,7 +250,7 @@ class MoveStock:
         self.ids = np.empty(int(self.first[-1]), dtype=np.int32)
         initial.over(self.faces, self.grid, self.shape, self.first, self.ids)
         initial.levels(self.faces, self.grid, self.shape, self.first, self.ids, self.level)
-        initial.beside_walls(walls_of(body), self.grid, self.shape, self.level)
+        initial.mark_upright_faces(walls_of(body), self.grid, self.shape, self.level)
 
     def _index(self) -> tuple[NDArray[np.generic], ...]:
         body = (self.low, self.high, self.first, self.ids, self.faces)
