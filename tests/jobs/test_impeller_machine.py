@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -23,6 +23,8 @@ from chipload.jobs.impeller.programs import table_text
 from chipload.jobs.impeller.result import result_of
 from chipload.machine.machine import machine_named
 from chipload.machine.table import MachineTable
+from chipload.program.gcode.writer import write_gcode
+from chipload.program.program import LINE, RAPID
 from chipload.program.release import NOT_SIMULATED
 from chipload.result import release_of
 from impeller_job import impeller_job
@@ -134,6 +136,20 @@ def test_a_text_that_is_not_the_plan_is_not_released(milled, written) -> None:
         assert old in every
         (f,) = every_channel_findings(one, every.replace(old, new, 1), FILE, MACHINE, TOOL, repeat)
         assert f.code == "text-differs"
+
+
+def test_a_row_that_only_begins_a_feed_is_no_difference(milled, written) -> None:
+    """A row at the end of a rapid, fed and without a motion, has no words in the text."""
+    checked, _, _ = written
+    p = checked.setting.program
+    k = int(np.flatnonzero(p.motion == RAPID)[1])
+    rows = np.insert(np.arange(len(p)), k + 1, k)
+    fed = replace(p, **{f.name: getattr(p, f.name)[rows] for f in fields(p) if f.name != "labels"})
+    motion, feed = fed.motion.copy(), fed.feed.copy()
+    motion[k + 1], feed[k + 1] = LINE, 20.0
+    fed = replace(fed, motion=motion, feed=feed)
+    text = write_gcode(fed, MACHINE, title="fed", release=NOT_SIMULATED)
+    assert not text_check(text, FILE, MACHINE, TOOL, fed, plate(milled, -90.0)).findings
 
 
 def test_the_way_between_channels_is_that_of_the_pallet(written) -> None:
