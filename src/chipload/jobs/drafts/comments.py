@@ -187,8 +187,8 @@ def _stock(text: str, mm: float) -> tuple[Box, str] | None:
         low, high = stated["min"], stated["max"]
         if len(low) == len(high) == 3 and all(a < b for a, b in zip(low, high, strict=True)):
             return ((low[0], low[1], low[2]), (high[0], high[1], high[2])), "stockMin, stockMax"
-    if (box := _block_of_comments(text, mm)) is not None:
-        return box
+    if (commented := _block_of_comments(text, mm)) is not None:
+        return commented
     if (hit := _WORKPIECE.search(text)) and (box := _workpiece(hit[1].upper(), hit[2], mm)):
         return box, "WORKPIECE" if hit[1].upper() == "BOX" else "the box around the cylinder of WORKPIECE"
     if (hit := _BLK_CYLINDER.search(text)) and float(hit[1]) > 0.0 and float(hit[2]) > 0.0:
