@@ -128,6 +128,8 @@ class VariantPlan:
     maps : a pass each, in the order of cutting
     force, deflection : greatest [N], [mm]; None: compliance not known
     infeasible : places where even the smallest depth is too great
+    at_confidence : (n,) of the steps, or for all, what a force may be at the confidence of the checks over its nominal
+        value
     """
 
     order: str
@@ -137,6 +139,7 @@ class VariantPlan:
     force: float
     deflection: float | None
     infeasible: tuple[Help, ...]
+    at_confidence: NDArray[np.float64] | float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +159,6 @@ class Variant:
     stress : greatest equivalent stress at the clamp [MPa] under the simulated forces
     find_load_error : calculates ``load_error`` at its first use: it takes longer than the simulation
     shift : greatest way [mm] by which the last passes were moved against the form error
-    at_confidence : (n,) or for all steps, what a force may be at the confidence of the checks over its nominal value
     """
 
     name: str
@@ -171,7 +173,6 @@ class Variant:
     stress: float
     find_load_error: Callable[[], Mapping[str, float]]
     shift: float = 0.0
-    at_confidence: NDArray[np.float64] | float = 1.0
 
     @cached_property
     def load_error(self) -> Mapping[str, float]:
@@ -196,7 +197,7 @@ class Variant:
         """
         c = self.columns
         unsure = c["compliance_error"] if modelled else 0.0
-        most = float((c["force_over_allowable"] * self.at_confidence * (1.0 + unsure)).max(initial=0.0))
+        most = float((c["force_over_allowable"] * self.plan.at_confidence * (1.0 + unsure)).max(initial=0.0))
         return most * (1.0 + (self.load_error["force_normal_n"] if assumed is None else assumed))
 
     @property

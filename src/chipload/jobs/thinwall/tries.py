@@ -119,8 +119,8 @@ def _room(one: Variant) -> tuple[float, float]:
     """
     error = one.load_error["force_normal_n"]
     error = error if math.isfinite(error) else 0.0
-    worst = int(np.argmax(one.columns["force_over_allowable"] * one.at_confidence))
-    more = float(np.broadcast_to(one.at_confidence, one.columns["force_over_allowable"].shape)[worst])
+    worst = int(np.argmax(one.columns["force_over_allowable"] * one.plan.at_confidence))
+    more = float(np.broadcast_to(one.plan.at_confidence, one.columns["force_over_allowable"].shape)[worst])
     return error, 1.0 / ((1.0 + error) * more)
 
 
@@ -281,6 +281,9 @@ def _variant(places: Places, planned: Planned, program: Program, run: OnMachine,
         )
         for p, threshold in zip(plan.passes, proof.thresholds, strict=True)
     )
+    inputs = places.inputs
+    level = inputs.job.table.checks.confidence
+    factors = bounded_factors(proof.columns, inputs.job.cutters, inputs.cut.material, level)
     return Variant(
         plan.name,
         VariantPlan(
@@ -291,6 +294,7 @@ def _variant(places: Places, planned: Planned, program: Program, run: OnMachine,
             plan.force_max,
             plan.deflection_max,
             _infeasible(places, plan, planned.deflection) if plan.name == "variable" else (),
+            factors,
         ),
         program,
         run.commands,
@@ -301,11 +305,7 @@ def _variant(places: Places, planned: Planned, program: Program, run: OnMachine,
         proof.shape,
         proof.stress,
         proof.find_load_error,
-        at_confidence=bounded_factors(
-            proof.columns, places.inputs.job.cutters, places.inputs.cut.material,
-            places.inputs.job.table.checks.confidence,
-        ),
-    )  # fmt: skip
+    )
 
 
 def _infeasible(places: Places, plan: Plan, deflection: float) -> tuple[Help, ...]:
