@@ -12,8 +12,14 @@ theta_0 of each cut and the runout. Omega is found first, as the speed whose har
 Harmonics up to a stated band are used, and each channel of each cut is weighted by its own size. Where the dynamometer
 rings, w0 and zeta are found from all harmonics, alternating with the rest; intervals take them as known.
 
-Intervals: covariance (J'J)^-1 J' diag(r^2 / (1 - l)^2) J (J'J)^-1 with residuals r and leverages l, which is also valid
-where the model fits some harmonics worse than others.
+Intervals: the covariance has two parts. A strong tooth is strong in all harmonics and channels of a turn, so that their
+errors are not independent: with P = (J'J)^-1 J', B blocks of whole turns in each cut and y_b the amplitudes of a block,
+
+    C_turns = sum over cuts of sum_b g_b g_b' / (B (B - 1)),   g_b = P (y_b - mean y).
+
+What the model does not fit is in the residuals r, with leverages l: C_fit = P diag(r^2 / (1 - l)) P', which is also
+valid where some harmonics are fitted worse than others. Noise of the samples is in both: C is the greater of them in
+each direction, C_turns + the part of C_fit - C_turns whose eigenvalues are above 0.
 
 Reference: [Kline1983], runout.
 """
@@ -278,8 +284,8 @@ def _final_fit(problem: _Problem, q: Floats, converged: bool) -> Fit:
     u, s, vt = np.linalg.svd(jacobian / scale, full_matrices=False)
     sure = s > WEAK * s[0]
     leverage = np.minimum(np.sum(u[:, sure] ** 2, axis=1), 1.0 - 1e-6)
-    turned = (vt[sure].T / s[sure]) @ (u[:, sure].T * (left / (1.0 - leverage)))
-    covariance = (turned @ turned.T) / np.outer(scale, scale)
+    inverse = (vt[sure].T / s[sure]) @ u[:, sure].T / scale[:, None]
+    covariance = _covariance(problem, inverse, left / np.sqrt(1.0 - leverage))
     free = np.sum(vt[sure] ** 2, axis=0) > 1.0 - WEAK
     linear = x[:6]
     identified = (there & determined)[:6] & free[f + m : f + m + 6]
@@ -299,6 +305,39 @@ def _final_fit(problem: _Problem, q: Floats, converged: bool) -> Fit:
     found = np.concatenate([runout_of(runout), linear])
     search = FitSearch(found, spread, len(y) - int(sure.sum()), problem.harmonics, converged)
     return concluded("instantaneous", problem.cuts, problem.turns, runout, linear, identified, channels, search, notes)
+
+
+def _covariance(problem: _Problem, inverse: Floats, left: Floats) -> Floats:
+    """Return the covariance of all unknowns: see the module.
+
+    Parameters
+    ----------
+    inverse : (unknowns, m) P
+    left : (m,) residuals over the root of 1 - leverage
+    """
+    turns, at = np.zeros((len(inverse), len(inverse))), 0
+    size = 2 * problem.harmonics + 1
+    for cut, one in zip(problem.cuts, problem.turns, strict=True):
+        some, many = np.flatnonzero(cut.measured), len(one.blocks)
+        differ = np.zeros((many, len(some) * size))
+        rows = slice(at, at + len(some) * size)
+        for j, c in enumerate(some):
+            weight = 1.0 / math.sqrt(float(np.sum(as_real(one.amplitude[: problem.harmonics + 1, c])[1:] ** 2)))
+            differ[:, j * size : (j + 1) * size] = weight * np.array(
+                [as_real(block[: problem.harmonics + 1, c]) for block in one.blocks]
+            )
+        at += len(some) * size
+        g = differ @ inverse[:, rows].T
+        g -= g.mean(axis=0)
+        if many > 1:
+            turns += g.T @ g / (many * (many - 1))
+    fit = (inverse * left**2) @ inverse.T
+    if not turns.any():  # a turn each: how they differ is not known
+        return np.asarray(fit)
+    scale = np.sqrt(np.maximum(np.diagonal(fit), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh((fit - turns) / np.outer(scale, scale))
+    more = (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale)
+    return np.asarray(turns + more)
 
 
 def _quality(problem: _Problem, q: Floats, x: Floats) -> tuple[Floats, Floats]:

@@ -21,6 +21,10 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 
+#: blocks of whole turns of a cut, whose harmonics are compared
+BLOCKS = 12
+
+
 @dataclass(frozen=True, eq=False)
 class MeasuredCut:
     """A steady cut that was measured.
@@ -91,7 +95,8 @@ class Turns:
 
     ``speed`` [rad/s] that was found; ``amplitude`` (H + 1, 3) complex [N], c_k; ``mean``, ``high`` and ``low`` (r, 3)
     [N] of each turn; ``plane`` (r,) [N] greatest in-plane force of each turn; ``scatter`` (3,) [N] standard deviation
-    of the samples about the harmonics. NaN: not measured.
+    of the samples about the harmonics; ``blocks`` (B, H + 1, 3) complex [N], by how much c_k of each block of whole
+    turns differs, B at most :data:`BLOCKS`. NaN: not measured.
     """
 
     speed: float
@@ -101,6 +106,7 @@ class Turns:
     low: Floats
     plane: Floats
     scatter: Floats
+    blocks: Complexes
 
 
 def turns_of(cut: MeasuredCut, harmonics: int, search: float = 0.01, seek: int = 8) -> Turns:
@@ -144,7 +150,12 @@ def turns_of(cut: MeasuredCut, harmonics: int, search: float = 0.01, seek: int =
     plane = np.array([np.hypot(*cut.force[a:b, :2].T).max() for a, b in pairwise(edges)])
     scatter = np.full(3, np.nan)
     scatter[given] = np.sqrt(np.sum(left**2, axis=0) / max(len(whole) - design.shape[1], 1))
-    return Turns(speed, amplitude, mean, high, low, plane, scatter)
+    blocks = np.full((min(BLOCKS, count), harmonics + 1, 3), np.nan, dtype=np.complex128)
+    turned = np.concatenate([np.ones((len(whole), 1)), np.conj(basis)], axis=1)
+    ends = edges[np.round(np.linspace(0, count, len(blocks) + 1)).astype(int)]
+    for i, (a, b) in enumerate(pairwise(ends)):
+        blocks[i, :, given] = (turned[a:b].T @ left[a:b] / (b - a)).T
+    return Turns(speed, amplitude, mean, high, low, plane, scatter, blocks)
 
 
 def _speed(force: Floats, rate: float, nominal: float, search: float, top: int) -> float:
