@@ -153,6 +153,16 @@ def test_an_error_of_the_wall_is_no_number_where_the_step_chatters(tmp_path: Pat
     assert check_of(read, "sle_um").state is Verdict.UNPROVEN
 
 
+def test_harmonics_that_do_not_reach_a_mode_leave_the_error_of_the_wall_unproven(tmp_path: Path) -> None:
+    # 400 harmonics of three teeth reach 4 times 720 Hz from 144 rpm on
+    states = []
+    for rpm in (140, 150):
+        text = TEXT.replace("S9000", f"S{rpm}").replace("F1350", f"F{0.15 * rpm:g}")
+        check = check_of(done(tmp_path, text=text, limits="sle_um = 500.0"), "sle_um")
+        states.append((check.state, "harmonics" in check.reason))
+    assert states == [(Verdict.UNPROVEN, True), (Verdict.HOLDS, False)]
+
+
 def test_new_speeds_are_written_read_and_simulated_again(tmp_path: Path) -> None:
     text = TEXT.replace("S9000", "S8000").replace("Z-1.5", "Z-3").replace("F1350", "F1200")
     read = done(

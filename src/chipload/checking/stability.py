@@ -197,6 +197,8 @@ def stability_limits(
         why = reason
         if name == "sle_um" and not why and (margin[cutting] < 1.0).any():
             why = "the error of a step that chatters is undefined"
+        if name == "sle_um" and not why and (slow := stability.watch.slow_tool()) is not None:
+            why = f"tool {slow} turns so slowly that the harmonics of its force do not reach its modes"
         if name == "sle_um" and any(stability.watch.material.exponents):
             why = f"material {stability.watch.material.name} has a size effect"
         uneven = [t for t in np.unique(np.asarray(columns["tool"])[cutting]).tolist() if stability.watch.uneven(int(t))]

@@ -25,7 +25,7 @@ from chipload.stability.grouping import grouped
 from chipload.stability.margin import stability_margins
 from chipload.stability.modes import Modes
 from chipload.stability.probability import stable_probability
-from chipload.stability.surface_error import force_rows, wall_errors
+from chipload.stability.surface_error import force_rows, harmonics_reach, wall_errors
 from chipload.structure.cells.followed import FollowedModes
 
 Floats = NDArray[np.float64]
@@ -111,6 +111,11 @@ class StabilityWatch:
     def uneven(self, tool: int) -> bool:
         """Return whether the teeth of a tool differ."""
         return any(c.uneven for c in self.cuts.get(tool, []))
+
+    def slow_tool(self) -> int | None:
+        """Return the first tool with a cut whose surface location error is not resolved; None: there is none."""
+        slow = (tool for tool, some in sorted(self.cuts.items()) if not all(harmonics_reach(c).all() for c in some))
+        return next(slow, None)
 
     def spatial(self, tool: int) -> bool:
         """Return whether cutter and workpiece also move along the axis."""

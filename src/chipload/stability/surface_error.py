@@ -30,6 +30,15 @@ _surface_location = LateModule("chipload.stability._surface_location")
 
 Floats = NDArray[np.float64]
 
+#: how many times the highest mode the harmonics of the force reach at least; the rest of a jump is then 1 % of it
+RESOLVED = 4.0
+
+
+def harmonics_reach(cuts: DynamicCuts) -> NDArray[np.bool_]:
+    """Return a mask (n,) of the cuts whose harmonics reach :data:`RESOLVED` times the highest of their modes."""
+    highest = cuts.omega.max(axis=1, initial=0.0)
+    return np.asarray(_surface_location.HARMONICS * math.tau / cuts.period >= RESOLVED * highest)
+
 
 def force_rows(engagement: ToothEngagement, material: Material) -> Floats:
     """Return rows (b, 11) for the kernel.

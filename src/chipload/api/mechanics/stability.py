@@ -32,10 +32,7 @@ from chipload.stability import chart as chart_of_cut
 from chipload.stability.cuts import DynamicCuts, dynamic_cuts
 from chipload.stability.margin import stability_margins
 from chipload.stability.modes import Modes
-from chipload.stability.surface_error import force_rows, wall_errors
-
-#: how many times the highest mode the harmonics of the force reach at least; the rest of a jump is then 1 % of it
-RESOLVED = 4.0
+from chipload.stability.surface_error import RESOLVED, force_rows, wall_errors
 
 
 @dataclass(frozen=True, eq=False)
