@@ -172,9 +172,10 @@ def read_program(
     if recognition is None:
         lengths = tools.lengths() if tools is not None else {}
         text = apt_text(path) if text is None else text
-        shapes = read_cutters(text)[0] if setup.cutters else {}
+        units = cast("Literal['mm', 'inch'] | None", setup.control.unit)
+        shapes = read_cutters(text, units=units or "mm")[0] if setup.cutters else {}
         agreed = agree(path.name, setup.cutters, tools=tools, shapes=shapes)
-        program, findings = read_apt(text, name=path.stem, feed=feed)
+        program, findings = read_apt(text, name=path.stem, units=units, feed=feed)
         commands, found = to_axes(program, machine, tool_lengths=lengths, tolerance=tolerance)
         more = tuple(f for f in found if f.code not in LIMITS)
     else:

@@ -38,7 +38,7 @@ OWN = 5.0 + 60.0 + 5.0 * math.pi + 5.0
 
 
 def unproven(text: str) -> list[str]:
-    return [f.code for f in read_apt(text)[1] if f.severity is Severity.UNPROVEN]
+    return [f.code for f in read_apt(text, units="mm")[1] if f.severity is Severity.UNPROVEN]
 
 
 def test_two_operations_are_read_whole() -> None:

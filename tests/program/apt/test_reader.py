@@ -51,7 +51,10 @@ def test_inches():
 def test_no_units_is_said_and_can_be_given():
     program, findings = read_apt("RAPID\nGOTO/1,0,0\nFINI", units="inch")
     assert program.p_work[0, 0] == 25.4
-    assert [(f.code, f.line) for f in findings] == [("apt-units", 2)]
+    assert findings == ()
+    program, findings = read_apt("RAPID\nGOTO/1,0,0\nFINI")
+    assert program.p_work[0, 0] == 1.0
+    assert [(f.code, f.line, f.severity) for f in findings] == [("apt-units", 2, Severity.UNPROVEN)]
 
 
 def test_rapid_holds_for_one_motion():

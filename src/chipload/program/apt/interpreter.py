@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.errors import Finding
+from chipload.errors import Finding, Severity
 from chipload.program.apt.arcs import SWEEP, Circle, read_circle, read_tlon, sweep_of
 from chipload.program.apt.cutters import Shape, length_unit, nx_shape, shape, tool_number
 from chipload.program.apt.cycles import FEEDS, Cycle, read_cycle
@@ -50,9 +50,9 @@ _SILENT = frozenset({"PARTNO"})
 class AptInterpreter:
     """Modal state between records; ``ended`` is the record that ends the text, once it is read."""
 
-    def __init__(self, track: AptRows, mm: float, coordinates: Coordinates) -> None:
+    def __init__(self, track: AptRows, mm: float, coordinates: Coordinates, units_stated: bool) -> None:
         self.track, self.mm, self.ended = track, mm, ""
-        self._units_said = self._path_ended = False
+        self._units_stated, self._path_ended = units_stated, False
         self._msys: tuple[str, ...] | None = None  # of NX: each of its operations states it
         self._in = coordinates
         self._resolved: tuple[Floats, Floats, Floats] | None = None
@@ -178,9 +178,10 @@ class AptInterpreter:
             text = f"{self._changed}: no LOADTL follows the new cutter: tool {self.track.tool} stays loaded"
             self.track.note("apt-cutter", self._changed.line, text)
         self._changed, self._loaded = None, False
-        if not self._units_said:
-            unit_name = next(key for key, mm in MM_PER.items() if mm == self.mm)
-            self.track.note_once("apt-units", record.line, f"no UNITS before it: lengths are read as {unit_name}")
+        if not self._units_stated:
+            text = "no UNITS before it: lengths are read as mm: state UNITS, or program.unit of the job"
+            self.track.note("apt-units", record.line, text, Severity.UNPROVEN)
+            self._units_stated = True
         R, t, natural = self._frame()
         if self._in.note:
             self.track.note_once("apt-coordinates", record.line, self._in.note)
@@ -354,7 +355,7 @@ class AptInterpreter:
         self.track.spindle = 0.0 if "OFF" in words else self._sense * self._speed + 0.0
 
     def _units(self, record: AptRecord) -> None:
-        self.mm, self._units_said = MM_PER[length_unit(record)], True
+        self.mm, self._units_stated = MM_PER[length_unit(record)], True
 
     def _load(self, record: AptRecord) -> None:
         self.track.tool, self._loaded = tool_number(record), True

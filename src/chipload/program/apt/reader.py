@@ -34,7 +34,7 @@ def read_apt(
     text: str,
     *,
     name: str = "program",
-    units: Literal["mm", "inch"] = "mm",
+    units: Literal["mm", "inch"] | None = None,
     feed: float | None = None,
     spindle: float = 0.0,
     tool: int = 0,
@@ -46,7 +46,7 @@ def read_apt(
     ----------
     text : of the CL data
     name : for messages, and of the rows before any PPRINT
-    units : of lengths before the first UNITS
+    units : of lengths before the first UNITS; None: not stated, so that a text without UNITS is read in mm and unproven
     feed : [mm/s] of cuts before the first FEDRAT; None: such a cut is refused
     spindle, tool : [rad/s] and number before the first SPINDL and LOAD
     csys : coordinates of points under a CSYS before the first TRNTYP; None: such a point is refused
@@ -62,13 +62,14 @@ def read_apt(
     >>> program.motion.tolist(), program.p_work[-1].tolist(), float(program.feed[-1]), findings
     ([0, 1, 2], [10.0, 0.0, 0.0], 10.0, ())
     """
-    if units not in ("mm", "inch"):
+    if units not in (None, "mm", "inch"):
         raise InputError(f"units = {units!r}: must be mm or inch")
     if csys not in (None, "work", "csys"):
         raise InputError(f"csys = {csys!r}: must be work or csys")
     if feed is not None and not 0.0 < feed < math.inf:
         raise InputError(f"feed = {feed:g} mm/s: must be above 0")
-    reader = AptInterpreter(AptRows(name, feed, spindle, tool, name), MM_PER[units], Coordinates(points_in=csys))
+    rows = AptRows(name, feed, spindle, tool, name)
+    reader = AptInterpreter(rows, MM_PER[units or "mm"], Coordinates(points_in=csys), units_stated=units is not None)
     for record in records(text):
         if reader.ended:
             reader.track.note(
