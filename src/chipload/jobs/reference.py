@@ -104,6 +104,8 @@ EXAMPLES = {
     "part.labels": '["(WALL)", "(WALL END)"]',
     "operation.rows": '"finish.apt"', "origin_mm": "[20.0, 15.0]",
     "holes_mm": "[[20.0, 15.0, 8.0]]", "tabs.at_mm": "[[30.0, 17.0], [10.0, 17.0]]",
+    "jaw_mm": "[125.0, 40.0, 20.0]", "fixture.step_mm": "[10.0, 3.0]", "fixture.at_mm": "30.0",
+    "point_mm": "[-5.0, 20.0, 0.0]", "strap_mm": "[80.0, 25.0, 15.0]", "bolt_mm": "[12.0, 25.0]",
 }  # fmt: skip
 #: of a number by the unit at the end of its key, where none is stated above
 BY_UNIT = {

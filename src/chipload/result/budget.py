@@ -65,7 +65,7 @@ class ErrorBudget:
     Parameters
     ----------
     confidence : one-sided, at which the limit is held; 0.5: at the nominal value
-    parts : of the error
+    parts : of the error; kept are those that add something, the greatest first
 
     Examples
     --------
@@ -80,6 +80,7 @@ class ErrorBudget:
     def __post_init__(self) -> None:
         if not 0.5 <= self.confidence < 1.0:
             raise ValueError(f"confidence = {self.confidence}: must be at least 0.5 and below 1")
+        object.__setattr__(self, "parts", tuple(part for part, _ in self.in_order()))
 
     @property
     def shown_at(self) -> float:

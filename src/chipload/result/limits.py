@@ -249,8 +249,10 @@ def hold_at_confidence(check: LimitCheck, budget: ErrorBudget) -> LimitCheck:
     >>> hold_at_confidence(check, ErrorBudget(0.999, (fit,))).text
     'force 150 + 54 of 200 N, unproven: at 99.9 % it may be 204 N (coefficients 54): fit them'
     """
+    if check.worst is None:
+        return check
     out = replace(check, budget=budget)
-    if check.worst is None or check.state is not Verdict.HOLDS or budget.confidence <= 0.5:
+    if check.state is not Verdict.HOLDS or budget.confidence <= 0.5:
         return out
     least = check.column.least
     value = budget.value(abs(check.worst), least=least)

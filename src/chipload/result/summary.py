@@ -272,7 +272,7 @@ def _budget(check: LimitCheck) -> BudgetModel | None:
     own, value = check.budget, check.value_at_confidence
     if own is None or value is None:
         return None
-    parts = tuple(ErrorPartModel(**vars(part)) for part, _ in own.in_order())
+    parts = tuple(ErrorPartModel(**vars(part)) for part in own.parts)
     return BudgetModel(confidence=own.confidence, shown_at=own.shown_at, value=value, parts=parts)
 
 
