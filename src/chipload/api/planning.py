@@ -19,6 +19,8 @@ def plan_impeller(
     catalogue: Source,
     machine: Source,
     operation: Tables,
+    fixture: Tables = (),
+    machine_table: Values | None = None,
     folder: str | Path = ".",
     progress: Progress = silent,
 ) -> FinishedJob:
@@ -31,6 +33,7 @@ def plan_impeller(
     catalogue : of cutters: a shipped name, a file, or keys of the table
     machine : a shipped name, a file, or keys of the table
     operation : keys of the ``[[operation]]``
+    fixture, machine_table : keys of the table of this name; None: it is left out
     folder : that file names are relative to
 
     Returns
@@ -47,7 +50,7 @@ def plan_impeller(
     """
     return run_tables(
         "impeller", folder, progress, impeller=impeller, surface=surface, catalogue=catalogue, machine=machine,
-        operation=operation,
+        operation=operation, fixture=fixture, machine_table=machine_table,
     )  # fmt: skip
 
 
