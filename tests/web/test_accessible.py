@@ -35,6 +35,7 @@ def test_nothing_lies_beside_a_narrow_window(cut) -> None:
         for part in (".cl-header", ".cl-verdict", ".cl-space", ".cl-plots", ".cl-tables", ".cl-source", ".cl-foot"):
             # plots take their new width after the page does
             cut.wait_for_function(INSIDE, arg=[part, width])
+            assert cut.evaluate(INSIDE, [part, width]), (part, width)
     cut.set_viewport_size({"width": 1280, "height": 720})
 
 

@@ -24,7 +24,7 @@ from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program
 from chipload.simulation.heights.clamped_stock import find_clamped_stock
 from chipload.simulation.heights.height_map import NEVER, HeightMap
-from chipload.simulation.heights.slender_walls import SlenderWall, slender_walls_of
+from chipload.simulation.heights.slender_walls import SlenderWall, slender_wall_findings, slender_walls_of
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
@@ -40,8 +40,6 @@ DIRECTIONS, LEAST_PATH = 6, 0.01
 SAME = 1e-6
 #: a piece has so many points, and the volume of a cube of this share of the least diameter, at least
 POINTS, CUBE = 64, 0.25
-#: slender walls that are named
-NAMED = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +98,7 @@ def check_leaning_stock(
             frame = _frame(axis)
             after, initial = (grid_along(points, low, high, frame, pitch) for points in (inside, before))
             found += _walls(after, initial, checks.wall_slenderness)
-        findings += _named(found, checks.wall_slenderness)
+        findings += slender_wall_findings(_distinct(found), checks.wall_slenderness)
         unchecked.append(f"deflection of slender walls: one thinner than {pitch:.2g} mm may be missed{left}")
     return tuple(findings), tuple(unchecked)
 
@@ -150,21 +148,13 @@ def _walls(after: StockGrid, start: StockGrid, slenderness: float) -> list[Slend
     return out
 
 
-def _named(walls: list[SlenderWall], slenderness: float) -> list[Finding]:
-    """A finding for the most slender walls, each once: two whose places are nearer than their height are one."""
+def _distinct(walls: list[SlenderWall]) -> list[SlenderWall]:
+    """The walls, the most slender first, each once: two whose places are nearer than their height are one."""
     kept = list[SlenderWall]()
     for wall in sorted(walls, key=lambda w: -w.slenderness):
         if all(np.linalg.norm(np.subtract(wall.place, other.place)) > other.height_mm for other in kept):
             kept.append(wall)
-    return [
-        Finding(
-            "slender-wall", 0,
-            f"leaves a wall {wall.height_mm:.3g} mm high and {wall.thickness_mm:.2g} mm thick, {wall.slenderness:.2g} "
-            "times as high as thick: its deflection is not checked: state [workpiece], or a greater "
-            f"checks.wall_slenderness than {slenderness:g}", Severity.UNPROVEN, wall.place,
-        )
-        for wall in kept[:NAMED]
-    ]  # fmt: skip
+    return kept
 
 
 def _loose(inputs: CheckInputs, stock: LayeredStock, after: StockGrid, start: StockGrid, least: float) -> list[Finding]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.load_parts import CHIP, MEANS, SCATTER, LoadParts, bounded_parts, bounded_rise
 from chipload.cutting.material import Material
-from chipload.result.budget import ErrorBudget, ErrorPart
+from chipload.result.budget import ErrorBudget, ErrorPart, factor_at
 from chipload.result.limits import Columns, LimitCheck
 
 Floats = NDArray[np.float64]
@@ -33,7 +32,7 @@ BUDGETED = {
 def budget_parts(
     own: LoadParts, load: str, cutter: Cutter, material: Material, error: float, peaks: float, deflection_mm: float
 ) -> tuple[ErrorPart, ...]:
-    """Return the parts of the error of a load that are not 0.
+    """Return the parts of the error of a load.
 
     Parameters
     ----------
@@ -50,7 +49,7 @@ def budget_parts(
     fit += ", or chipload spindle by its power)" if mean else ")"
     textbook = material.covariance is None
     spread = "coefficients, whose spread is not stated" if own.assumed_spread else "coefficients"
-    parts = (
+    return (
         ErrorPart("resolution and chip", bound=error),
         ErrorPart("measured peaks", bound=0.0 if mean or geometric else peaks),
         ErrorPart("bending", bound=own.bending(deflection_mm)),
@@ -64,7 +63,6 @@ def budget_parts(
         ErrorPart("thin chips", deviation=0.0 if geometric else own.thin_chips),
         ErrorPart("turns", deviation=0.0 if mean or geometric else TURNS),
     )
-    return tuple(part for part in parts if part.bound or part.rise or part.deviation)
 
 
 def factors_of_steps(
@@ -102,9 +100,8 @@ def factors_of_steps(
     if not mean and not geometric:
         random = random + TURNS**2
     bends = np.divide(deflection_mm, depth, out=np.zeros(n), where=depth > 0.0)
-    bounds = 1.0 + error + (0.0 if mean or geometric else peaks) + bends
-    quantile = NormalDist().inv_cdf(confidence)
-    return np.asarray(bounds * (1.0 + rise) * np.exp(quantile * np.sqrt(random + (scatter * rise) ** 2)))
+    bounds = error + (0.0 if mean or geometric else peaks) + bends
+    return factor_at(confidence, bounds, rise, np.sqrt(random + (scatter * rise) ** 2))
 
 
 def bounded_factors(columns: Columns, cutters: Mapping[int, Cutter], material: Material, confidence: float) -> Floats:
@@ -118,7 +115,7 @@ def bounded_factors(columns: Columns, cutters: Mapping[int, Cutter], material: M
         rise, worst = bounded_rise(cutter, material, chip[own]), bounded_parts(cutter, material, 0.0)
         scatter = SCATTER if worst.assumed_runout else 0.0
         deviation = np.sqrt(worst.coefficients**2 + TURNS**2 + (scatter * rise) ** 2)
-        out[own] = (1.0 + rise) * np.exp(NormalDist().inv_cdf(confidence) * deviation)
+        out[own] = factor_at(confidence, 0.0, rise, deviation)
     return out
 
 

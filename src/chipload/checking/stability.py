@@ -227,7 +227,7 @@ def _margin_budget(material: Material, confidence: float, error: float) -> Error
     name = "coefficients" if material.has_band else "coefficients, whose spread is not stated"
     known = error if math.isfinite(error) else 0.0
     parts = (ErrorPart("resolution and frequencies", bound=known), ErrorPart(name, deviation=spread, remedy=fit))
-    return ErrorBudget(confidence, tuple(part for part in parts if part.bound or part.deviation))
+    return ErrorBudget(confidence, parts)
 
 
 def cutting_rows(columns: Columns) -> NDArray[np.bool_]:

@@ -25,7 +25,7 @@ from chipload.program.program import Program
 from chipload.progress import Progress
 from chipload.simulation.heights.height_map import HeightMap, bands_of, follow_heights, pitch_of
 from chipload.simulation.heights.loose_stock import find_loose_stock
-from chipload.simulation.heights.slender_walls import find_slender_walls
+from chipload.simulation.heights.slender_walls import find_slender_walls, slender_wall_findings
 from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.moves import leans
 from chipload.simulation.steps import StepBlocks
@@ -36,8 +36,6 @@ Floats = NDArray[np.float64]
 
 #: columns stand so many times as close where a shank or holder wider than its cutter goes below the top of the stock
 CLOSER = 3.0
-#: slender walls that are named
-NAMED = 3
 
 
 def check_stock(
@@ -67,7 +65,8 @@ def check_stock(
     if checks.loose_stock:
         findings += _loose(found, inputs, stock)
     if checks.slender_walls and inputs.elasticity.workpiece is None:
-        findings += _thin(found, checks.wall_slenderness)
+        walls = find_slender_walls(found, checks.wall_slenderness)
+        findings += slender_wall_findings(walls, checks.wall_slenderness)
     return StockCheck((*placed, *findings), touched, hidden, tuple(unchecked))
 
 
@@ -133,19 +132,4 @@ def _loose(found: HeightMap, inputs: CheckInputs, stock: LayeredStock) -> list[F
             "[[fixture]] or a [[workpiece.clamp]]"
         )
         out.append(Finding("loose-stock", piece.line, text, Severity.UNPROVEN, piece.place, piece.step))
-    return out
-
-
-def _thin(found: HeightMap, slenderness: float) -> list[Finding]:
-    """Return a finding for the thinnest walls that are left, whose deflection is not calculated."""
-    out = []
-    walls = find_slender_walls(found, slenderness)
-    for wall in walls[:NAMED]:
-        more = f" (the most slender of {len(walls)})" if wall is walls[0] and len(walls) > 1 else ""
-        text = (
-            f"leaves a wall {wall.height_mm:.3g} mm high and {wall.thickness_mm:.2g} mm thick{more}, "
-            f"{wall.slenderness:.2g} times as high as thick: its deflection is not checked: state [workpiece], or a "
-            f"greater checks.wall_slenderness than {slenderness:g}"
-        )
-        out.append(Finding("slender-wall", 0, text, Severity.UNPROVEN, wall.place))
     return out

@@ -41,7 +41,7 @@ def limit_answer(check: LimitCheck) -> dict[str, Any]:
         "name": check.name, "label": check.column.label, "unit": check.column.unit, "limit": check.limit,
         "worst": check.worst, "state": check.state.value, "margin": check.margin_text, "track": check.track,
         "line": check.line, "place_mm": None if check.place is None else list(check.place), "t_s": check.t_s,
-        "relative_error": check.error, "reason": check.reason,
+        "relative_error": check.error, "at_confidence": check.confidence_text, "reason": check.reason,
     }  # fmt: skip
 
 

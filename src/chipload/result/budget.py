@@ -15,6 +15,9 @@ import math
 from dataclasses import dataclass
 from statistics import NormalDist
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from chipload.number_text import number_text
 
 #: confidence of the value that is shown beside the nominal one where limits are held at the nominal one
@@ -127,12 +130,28 @@ class ErrorBudget:
 
 
 def _factor(parts: tuple[ErrorPart, ...], confidence: float) -> float:
-    bounds = 1.0 + sum(part.bound for part in parts)
-    if confidence <= 0.5:
-        return bounds
-    rise = math.prod(1.0 + part.rise for part in parts)
+    bounds = sum(part.bound for part in parts)
+    rise = math.prod(1.0 + part.rise for part in parts) - 1.0
     deviation = math.sqrt(sum(part.deviation**2 for part in parts))
-    return bounds * rise * math.exp(NormalDist().inv_cdf(confidence) * deviation)
+    return float(factor_at(confidence, bounds, rise, deviation))
+
+
+def factor_at(confidence: float, bounds: ArrayLike, rise: ArrayLike, deviation: ArrayLike) -> NDArray[np.float64]:
+    """Return what values may be at a confidence over their nominal ones: the formula of this module.
+
+    Parameters
+    ----------
+    bounds : (n,) or a number, sum of the bounds
+    rise, deviation : likewise; the deviation of independent parts is the root of the sum of their squares
+
+    >>> factor_at(0.95, [0.02, 0.02], 0.0, [0.1, 0.0]).round(3).tolist()
+    [1.202, 1.02]
+    """
+    known = 1.0 + np.asarray(bounds, dtype=np.float64)
+    if confidence <= 0.5:
+        return np.asarray(known + np.zeros(np.broadcast(bounds, rise, deviation).shape))
+    quantile = NormalDist().inv_cdf(confidence)
+    return np.asarray(known * (1.0 + np.asarray(rise)) * np.exp(quantile * np.asarray(deviation)))
 
 
 def level_text(confidence: float) -> str:

@@ -12,11 +12,13 @@ Reference: [Jaramillo1950].
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.errors import Finding, Severity
 from chipload.simulation.heights.height_map import HeightMap
 
 Floats = NDArray[np.float64]
@@ -27,6 +29,8 @@ COLUMNS = 250_000
 #: a wall is at least so many times as long as it is thick, and covers so many squares of the radius of the circle that
 #: it is too thin for: a right corner that the circle does not reach covers 0.2 of them
 LONG, COVER = 2.0, 0.75
+#: walls that are named
+NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,26 @@ class SlenderWall:
     def slenderness(self) -> float:
         """Height over thickness."""
         return self.height_mm / self.thickness_mm
+
+
+def slender_wall_findings(walls: Sequence[SlenderWall], slenderness: float) -> list[Finding]:
+    """Return a finding for each of the most slender walls, whose deflection is not calculated.
+
+    Parameters
+    ----------
+    walls : the most slender first
+    slenderness : above which a wall is slender
+    """
+    out = []
+    for wall in walls[:NAMED]:
+        more = f" (the most slender of {len(walls)})" if wall is walls[0] and len(walls) > 1 else ""
+        text = (
+            f"leaves a wall {wall.height_mm:.3g} mm high and {wall.thickness_mm:.2g} mm thick{more}, "
+            f"{wall.slenderness:.2g} times as high as thick: its deflection is not checked: state [workpiece], or a "
+            f"greater checks.wall_slenderness than {slenderness:g}"
+        )
+        out.append(Finding("slender-wall", 0, text, Severity.UNPROVEN, wall.place))
+    return out
 
 
 def find_slender_walls(found: HeightMap, slenderness: float) -> tuple[SlenderWall, ...]:
