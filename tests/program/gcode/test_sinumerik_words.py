@@ -8,6 +8,7 @@ from __future__ import annotations
 import pytest
 
 from chipload.errors import Severity
+from chipload.program.control import control_named
 from chipload.program.gcode.reader import read_gcode
 
 HEAD = "G17 G90 G71 G94 G40\nT1 D1\nM6\nS5000 M3\nG54\nG0 X0 Y0 Z10\nG1 Z-1 F500\n"
@@ -58,3 +59,11 @@ def test_the_end_of_coordinates_along_the_tool_is_read() -> None:
     assert read("TOROT\nTOROTOF")[0] == 0
     # it ends no tilted coordinates
     assert read("ROT X30\nTOROTOF")[0] == -3
+
+
+@pytest.mark.parametrize("block", ["SPOS=90", "SPOSA=0", "SPOS[1]=DC(0)", "M5 SPOS=90", "SPOS=0 M5", "M19"])
+def test_a_positioned_spindle_stands_still(block: str) -> None:
+    text = f"S1000 M3\nG1 X1 F100\n{block}\nG1 X2\nM30\n"
+    commands, findings = read_gcode(text, control=control_named("sinumerik"), lenient=True)
+    assert (commands.spindle > 0.0).tolist() == [True, False]
+    assert findings == ()

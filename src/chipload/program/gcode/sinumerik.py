@@ -159,6 +159,9 @@ class Sinumerik(Dialect):
             clockwise = (words.get("k", 1.0) > 0.0) != c.reversed
             block.m = [m for m in block.m if m not in (3, 4, 5)] + [3 if clockwise else 4]
             c.reversed = None
+        if 19 in block.m:
+            # SPOS stands beside M3 to M5: the spindle stops at its angle
+            block.m = [m for m in block.m if m not in (3, 4, 5, 19)] + [19]
         for letter, mode, value in values:
             k = AXES.find(letter) if letter in AXES else "ijk".find(letter)
             here = state.at[k] / (scale if k in LINEAR else 1.0)
