@@ -1,9 +1,15 @@
 """The profiles as data: every control reads the same part, and its table is what the manuals state."""
 
+import re
+from pathlib import Path
+
 import pytest
 
+import chipload
 from chipload.errors import InputError
-from chipload.program.control import CONTROLS, FOLDER, ControlSettings, control_named
+from chipload.program.control import CONTROLS, FOLDER, ControlSettings, control_named, is_cl_data
+
+SOURCE = Path(chipload.__file__).parent
 
 
 @pytest.mark.parametrize("name", CONTROLS)
@@ -52,3 +58,34 @@ def test_what_is_refused():
         control_named("fagor")
     with pytest.raises(InputError, match=r"program.settings.point = 'half': must be increment or whole"):
         control_named("haas").with_settings(ControlSettings(point="half"))
+
+
+def test_code_asks_a_profile_and_no_name():
+    """Which control it is decides by its profile: no comparison with the name of a control or of a language."""
+    names = "|".join((*CONTROLS, "apt"))
+    compared = re.compile(rf'(?:==|!=|\bin) *[(\[{{]?"(?:{names})"|"(?:{names})" *(?:==|!=|\bin\b)')
+    found = [
+        f"{path.name}: {line.strip()}"
+        for path in sorted(SOURCE.rglob("*.py"))
+        if "examples" not in path.parts
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if compared.search(line) and not line.strip().startswith((">>>", "for "))
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "comment", "override"),
+    [
+        ("linuxcnc", "blocks", ("(", ")"), "M52 P1"),
+        ("grbl", "blocks", ("(", ")"), ""),
+        ("haas", "blocks", ("(", ")"), ""),
+        ("sinumerik", "blocks", ("; ", ""), ""),
+        ("heidenhain", "conversational", ("; ", ""), ""),
+    ],
+)
+def test_form_of_the_lines(name, form, comment, override):
+    lines = control_named(name).lines
+    assert (lines.form, lines.comment, lines.override_on) == (form, comment, override)
+    assert is_cl_data("apt")
+    assert not is_cl_data(name)

@@ -11,14 +11,12 @@ from chipload.checking.outcome import ChangedText
 from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.machine.machine import Machine
+from chipload.program.control import control_named, is_cl_data
 from chipload.program.gcode.feed_words import with_feeds
 from chipload.program.gcode.reader import LARGEST_FILE
 from chipload.program.program import Program
 from chipload.program.read import dialect_of
 from chipload.program.release import Release
-
-#: dialects whose texts take new F and S words
-WORDS = ("linuxcnc", "fanuc", "sinumerik")
 
 
 def changeable(path: Path, machine: Machine, dialect: str | None, key: str) -> tuple[str, str]:
@@ -35,7 +33,7 @@ def changeable(path: Path, machine: Machine, dialect: str | None, key: str) -> t
     """
     words = key.split(".")[-1]
     kind = dialect_of(path, machine, dialect)
-    if kind not in WORDS:
+    if is_cl_data(kind) or control_named(kind).lines.form != "blocks":
         raise InputError(
             f"{key}: {path.name} is {kind}: {words} are changed in NC texts of LinuxCNC, Fanuc or Sinumerik: "
             "convert it first (chipload convert)"
@@ -87,7 +85,7 @@ def program_text(changed: ChangedText, release: Release) -> str:
     if release.verified:
         return changed.text
     plain = "".join(ch if ch.isascii() and ch.isprintable() and ch not in "()" else "_" for ch in release.text)
-    comment = f"; {plain}" if changed.dialect == "sinumerik" else f"({plain})"
+    comment = plain.join(control_named(changed.dialect).lines.comment)
     lines = changed.text.split("\n")
     for k, line in enumerate(lines):
         body = line.rstrip()

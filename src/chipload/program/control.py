@@ -202,6 +202,28 @@ class TextRules:
 
 
 @dataclass(frozen=True)
+class LineRules:
+    """Form of the lines of a text.
+
+    Parameters
+    ----------
+    form : ``blocks`` of words with G codes, or ``conversational``
+    numbered : lines begin with their number, without gaps
+    comment : what stands around a comment that may follow a block
+    parameter : pattern of the name of a parameter, in lower case; a group is its number, or its name
+    parameter_example : for messages
+    override_on : block from which the override of the feed acts that a program outside gives; empty: none
+    """
+
+    form: str
+    numbered: bool
+    comment: tuple[str, str]
+    parameter: str
+    parameter_example: str
+    override_on: str
+
+
+@dataclass(frozen=True)
 class Evidence:
     """Patterns by which a text shows its control: names in comments, decisive words, and hints."""
 
@@ -256,6 +278,7 @@ class Control:
     compensation: CompensationRules
     feed: FeedRule
     text: TextRules
+    lines: LineRules
     evidence: Evidence
     settings: ControlSettings = ControlSettings()
 
@@ -284,6 +307,7 @@ _RECORDS: dict[str, Any] = {
     "compensation": CompensationRules,
     "feed": FeedRule,
     "text": TextRules,
+    "lines": LineRules,
     "evidence": Evidence,
 }
 _OPTIONAL: dict[str, Any] = {"arguments": {}, "tool_variables": {}}
@@ -308,6 +332,15 @@ def control_named(name: str) -> Control:
     dwell = {letter: DwellWord(**words) for letter, words in data.pop("dwell").items()}
     ask = tuple(data.pop("ask"))
     return Control(name=name, ask=ask, dwell=MappingProxyType(dwell), **data, **made)
+
+
+def is_cl_data(dialect: str) -> bool:
+    """Whether a text is CL data, which is written for no control.
+
+    >>> is_cl_data("apt"), is_cl_data("haas")
+    (True, False)
+    """
+    return dialect not in CONTROLS
 
 
 def _read(name: str) -> dict[str, Any]:

@@ -123,7 +123,7 @@ def read_nc(
 
 def _read_otherwise(nc: NcText, read: _Read, other: Control, unit: str, compensation: str | None) -> Commands | None:
     """The commands as another control reads the text; None where it does not."""
-    if other.language not in ("linuxcnc", "fanuc", "sinumerik") or len(nc.text) > LONG:
+    if other.lines.form != "blocks" or len(nc.text) > LONG:
         return None
     try:
         return read(control=other, units=unit, compensation=compensation)[0]

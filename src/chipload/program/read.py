@@ -23,7 +23,7 @@ from chipload.program.apt.reader import apt_text, read_apt
 from chipload.program.block_delete import WITH, same_motions, with_block_delete, without_deleted_blocks
 from chipload.program.check import check_program
 from chipload.program.commands import PROBE, Commands
-from chipload.program.control import CONTROLS, control_named
+from chipload.program.control import CONTROLS, control_named, is_cl_data
 from chipload.program.gcode.reader import gcode_text
 from chipload.program.gcode.tools import ToolTable, read_tool_table
 from chipload.program.heidenhain.reader import heidenhain_text, read_heidenhain, tool_definitions
@@ -62,8 +62,6 @@ ENDINGS: dict[str, Dialect | None] = {
 OF_LENGTHS = ("nc-length-unknown", "heidenhain-tool-unknown")
 #: findings on retractions to positions of the machine that are not known, and so have no row
 OF_RETRACTIONS = ("nc-machine-retraction", "heidenhain-m91")
-#: languages that are RS-274
-TEXTS_OF_AXES = ("linuxcnc", "fanuc", "sinumerik")
 #: largest tool table [bytes]
 LARGEST_TABLE = 10_000_000
 
@@ -179,7 +177,7 @@ def read_program(
         commands, found = to_axes(program, machine, tool_lengths=lengths, tolerance=tolerance)
         more = tuple(f for f in found if f.code not in LIMITS)
     else:
-        if kind not in TEXTS_OF_AXES:
+        if recognition.control.lines.form == "conversational":
             text = heidenhain_text(path) if text is None else text
             stated = tool_definitions(text) if setup.cutters and comments else {}
             agreed = agree(path.name, setup.cutters, tools=tools, comments=stated)
@@ -208,12 +206,12 @@ def read_program(
     if speed is not None:
         commands = replace(commands, spindle=_turning(commands.spindle, speed))
         program = replace(program, spindle=_turning(program.spindle, speed))
-    taps = tapping_findings(program, setup.cutters, thread_comments(text) if kind != "apt" else {})
+    taps = tapping_findings(program, setup.cutters, {} if is_cl_data(kind) else thread_comments(text))
     breaks = tuple(f for f in taps if f.severity is Severity.EXCEEDS)
     findings += tuple(f for f in taps if f.severity is not Severity.EXCEEDS)
     reading = _checked(commands, program, machine, (*said, *agreed, *findings), more, placed)
     reading = replace(reading, violations=(*reading.violations, *breaks), of_text=True, recognition=recognition)
-    other = without_deleted_blocks(text) if kind != "apt" else text
+    other = text if is_cl_data(kind) else without_deleted_blocks(text)
     if other == text:
         return reading
     try:

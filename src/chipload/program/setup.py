@@ -15,12 +15,10 @@ from dataclasses import dataclass, field
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.program.control import CONTROLS, ControlSettings, control_named
+from chipload.program.control import ControlSettings, control_named, is_cl_data
 
 #: number from which tools that have only a name count
 FIRST_NAMED = 9001
-_HASH = re.compile(r"#?([0-9]{1,6})|#<([a-z_][^<>]*)>|(_[^<>]*)")
-_LETTER = {"sinumerik": "r", "heidenhain": "q"}
 
 Nine = tuple[float, ...]
 
@@ -84,18 +82,17 @@ class Setup:
         ({100: 2.5, 'depth': 1.0}, {10: 3.0})
         """
         out: dict[int | str, float] = {}
+        lines = None if is_cl_data(dialect) else control_named(dialect).lines
         for name, value in self.parameters.items():
             plain = "".join(name.split()).lower()
-            letter = _LETTER.get(dialect, "")
-            found = re.fullmatch(rf"{letter}([0-9]{{1,6}})", plain) if letter else _HASH.fullmatch(plain)
-            if found is None or dialect == "apt":
-                shown = {"apt": "no parameters", "sinumerik": "R10", "heidenhain": "Q10"}.get(
-                    dialect, "#100 or #<name>"
-                )
+            found = None if lines is None else re.fullmatch(lines.parameter, plain)
+            if found is None:
+                shown = "no parameters" if lines is None else lines.parameter_example
                 raise InputError(f"program.parameters: {name!r}: must be as {dialect} names them: {shown}")
             if not math.isfinite(value):
                 raise InputError(f"program.parameters: {name} = {value:g}: must be a finite number")
-            out[int(found[1]) if found[1] else found[2] or found[3]] = float(value)
+            own = next(group for group in found.groups() if group)
+            out[int(own) if own.isdigit() else own] = float(value)
         return out
 
     def origins(self, dialect: str) -> dict[int, tuple[Nine, float]]:
@@ -137,7 +134,7 @@ def offset_number(name: str, dialect: str, key: str = "work_offsets") -> int:
     (9, 16, 5)
     """
     plain = " ".join(name.split()).upper()
-    rules = control_named(dialect).offsets if dialect in CONTROLS else None
+    rules = None if is_cl_data(dialect) else control_named(dialect).offsets
     if rules is not None:
         for pattern, base in zip(rules.work_codes, rules.work_bases, strict=True):
             if (found := re.fullmatch(pattern, plain)) is not None:

@@ -20,6 +20,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import ChiploadError, InputError
 from chipload.jobs import load_job
 from chipload.program.apt.cutters import read_cutters
+from chipload.program.control import is_cl_data
 from chipload.program.read import ENDINGS
 from chipload.report.removal import REMOVAL, read_cutter_parts
 from chipload.report.view import parts_of, pointer_parts
@@ -108,7 +109,8 @@ def _of_apt(result: PageResult, track: PageTrack, size: float) -> dict[int, Part
         with contextlib.suppress(InputError):
             if name.endswith(".apt") and (shapes := _shapes(result.file(name), size)):
                 return shapes
-    return _shapes(program, size) if program is not None and ENDINGS.get(program.suffix.lower()) == "apt" else {}
+    kind = ENDINGS.get(program.suffix.lower()) if program is not None else None
+    return _shapes(program, size) if program is not None and kind is not None and is_cl_data(kind) else {}
 
 
 def _shapes(path: Path, size: float) -> dict[int, Parts]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.program.apt.writer import write_apt
+from chipload.program.control import control_named, is_cl_data
 from chipload.program.gcode.blocks import decimal
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
 from chipload.program.read import Dialect
@@ -32,9 +33,9 @@ def inserted_lines(dialect: Dialect, planned: Program, rows: Ints, p: Program, k
     """Lines that run the ``rows`` of a plan and leave the machine where, and in the modes in which, row k of the old
     program ``p`` left it.
     """
-    if dialect == "apt":
+    if is_cl_data(dialect):
         return _cl_data(planned, rows, p, k)
-    if dialect == "heidenhain":
+    if control_named(dialect).lines.form == "conversational":
         return _conversational(planned, rows, p, k, decimals)
     return _blocks(planned, rows, p, k, decimals)
 
@@ -45,7 +46,8 @@ def put_in(dialect: Dialect, old: Sequence[str], line: int, new: Sequence[str]) 
     >>> put_in("heidenhain", ["0 BEGIN PGM A MM", "1 L Z+9", "2 END PGM A MM"], 2, ["L X+1"])
     ['0 BEGIN PGM A MM', '1 L Z+9', '2 L X+1', '3 END PGM A MM']
     """
-    if dialect != "heidenhain" or not old or _NUMBERED.match(old[line - 1]) is None:
+    numbered = not is_cl_data(dialect) and control_named(dialect).lines.numbered
+    if not numbered or not old or _NUMBERED.match(old[line - 1]) is None:
         return [*old[:line], *new, *old[line:]]
     first = int(old[line - 1].split()[0])
     rest = [re.sub(r"^(\s*)(\d+)(?=\s)", lambda m: f"{m[1]}{int(m[2]) + len(new)}", text) for text in old[line:]]

@@ -37,6 +37,7 @@ from chipload.geometry.contour import Contour, Region
 from chipload.geometry.distance import distance
 from chipload.machine.machine import Machine
 from chipload.planning.result import StrategyResult
+from chipload.program.control import control_named
 from chipload.program.gcode.blocks import comment
 from chipload.program.program import Program
 from chipload.program.read import ProgramReading, read_program, times_of
@@ -297,7 +298,8 @@ def labels_of_lines(text: str, labels: Sequence[str], machine: Machine) -> NDArr
     >>> labels_of_lines("(link)\nG0 X1\n(finish)\nG1 X2", ["link", "finish"], machine_named("vmc")).tolist()
     ['link', 'link', 'link', 'finish', 'finish']
     """
-    names = {comment(label, machine.dialect == "fanuc"): label for label in labels}
+    numbered = control_named(machine.dialect).text.program_number
+    names = {comment(label, numbered): label for label in labels}
     out, now = ["link"], "link"
     for line in text.splitlines():
         now = names.get(line.strip(), now)

@@ -19,6 +19,7 @@ from chipload.jobs.drafts.cutters import cutter_table
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.apt.reader import apt_text
+from chipload.program.control import is_cl_data
 from chipload.program.gcode.reader import gcode_text
 from chipload.program.motions import bounds, lengths
 from chipload.program.program import DWELL, RAPID, Program
@@ -102,7 +103,8 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     """
     known = known or Known()
     chosen = _read(path, known)
-    apt = ENDINGS.get(path.suffix.lower()) == "apt" or chosen.dialect == "apt"
+    kind = chosen.dialect or ENDINGS.get(path.suffix.lower())
+    apt = kind is not None and is_cl_data(kind)
     text = known.text if known.text is not None else _text(path, apt)
     header = read_header(text, apt, unit_mm(text))
     if any(f.code == "nc-diameter-unknown" for f in chosen.reading.findings):

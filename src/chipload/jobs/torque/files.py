@@ -19,6 +19,7 @@ from chipload.control.linuxcnc.path import write_path
 from chipload.control.override import Override
 from chipload.jobs.torque.outcome import TorqueResult
 from chipload.machine.machine import Machine
+from chipload.program.control import control_named
 from chipload.program.gcode.writer import write_commands, write_gcode
 from chipload.program.motions import is_arc
 from chipload.program.program import DWELL, RAPID, Program
@@ -81,7 +82,8 @@ def feed_forward_file(machine: Machine) -> str:
 def override_text(title: str, program: Program, machine: Machine, release: Release) -> str:
     """The text of the program with the programmed feeds; its lines do not depend on ``release``."""
     commands, _ = to_axes(program, machine)
-    takes = [(0, "M52 P1")] if machine.dialect == "linuxcnc" else []
+    on = control_named(machine.dialect).lines.override_on
+    takes = [(0, on)] if on else []
     title = f"{title}, programmed feeds, to be run with chipload hal"
     return write_commands(commands, machine, title=title, release=release, words=takes)
 
