@@ -58,6 +58,21 @@ GUESS = "must be given, a machine's limits are never guessed"
             "corner_tolerance_mm = 5",
             "machine.corner_tolerance_mm = 5: must be from 0 to 1 mm",
         ),
+        (
+            "decimals = 6",
+            "decimals = 6\nblock_time_ms = 0.0",
+            "machine.block_time_ms = 0: must be above 0, at most 1000 ms",
+        ),
+        (
+            "decimals = 6",
+            "decimals = 6\nblock_time_ms = 2.0\ntrajectory_planner.cycle_ms = 1.0",
+            "machine.block_time_ms = 2: must be left out with [trajectory_planner]: its cycle_ms limits short segments",
+        ),
+        (
+            "decimals = 6",
+            "decimals = 6\njerk_mm_s3 = 4e4\njerk_low_mm_s3 = 2e4",
+            "machine.jerk_low_mm_s3 = 20000: must be left out where jerk_mm_s3 is stated",
+        ),
     ],
 )
 def test_refused(tmp_path, old, new, message):

@@ -190,3 +190,13 @@ def test_rapids_from_nowhere_take_no_time(tmp_path):
     reading = read_program(tmp_path / "p.ngc", VMC)
     wanted = [0.0, 0.0, 2 * math.sqrt(45 / 3000), 10 / 20 + 20 / 2500]
     np.testing.assert_allclose(times_of(reading, VMC), wanted)
+
+
+def test_a_control_that_needs_10_ms_for_a_block():
+    """Rows of 0.1 mm at 50 mm/s run at 10 mm/s, in a trapezoid over all of them; longer rows are not concerned."""
+    slow = replace(VMC, block_time=0.01)
+    fine = cut([[0.1 * k, 0.0, 0.0] for k in range(101)], feed=50.0)
+    assert program_time(fine, slow).sum() == pytest.approx(10.0 / 10.0 + 10.0 / 3000.0, rel=1e-9)
+    assert peak_speed(fine, slow).max() == pytest.approx(10.0)
+    coarse = cut([[k, 0.0, 0.0] for k in range(11)], feed=50.0)
+    assert program_time(coarse, slow).sum() == program_time(coarse, VMC).sum()

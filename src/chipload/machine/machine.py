@@ -45,8 +45,9 @@ class Machine:
     torque_curve : (speed [rad/s], torque [N mm]) of the spindle at rising speeds that cover its range, linear between
         them; empty: not known
     note : source of its numbers, and which of them are assumed
-    jerk : greatest jerk along the path [mm/s^3], > 0; None: not known. A feed schedule respects it; the
-        cycle time ignores it
+    jerk : greatest jerk along the path [mm/s^3], > 0; None: not known. Feed schedules and the cycle time respect it
+    jerk_low : what the jerk is at least where it is not known [mm/s^3], > 0; with it the cycle time has an upper end
+    block_time : least time that the control takes for a block [s], > 0; None: it is never slower than the motion
     planner : settings of LinuxCNC's trajectory planner; None: another controller, judged by its corner tolerance
     table : the block under the workpiece; None: not known
     tcp_words : blocks that begin and end tool centre point control, ``{tool}`` for the tool's number; None: it has none
@@ -74,6 +75,8 @@ class Machine:
     torque_curve: tuple[tuple[float, float], ...] = ()
     planner: TrajectoryPlanner | None = None
     jerk: float | None = None
+    jerk_low: float | None = None
+    block_time: float | None = None
     table: MachineTable | None = None
     counter_clockwise: bool = True
 
@@ -103,7 +106,15 @@ class Machine:
                 value is None or 0.0 < value < math.inf, f"spindle.{key}", (value or 0.0) * factor, "must be above 0"
             )
 
-        require(self.jerk is None or 0.0 < self.jerk < math.inf, "jerk_mm_s3", self.jerk, "must be above 0")
+        for key, value in (("jerk_mm_s3", self.jerk), ("jerk_low_mm_s3", self.jerk_low)):
+            require(value is None or 0.0 < value < math.inf, key, value, "must be above 0")
+        both = self.jerk is not None and self.jerk_low is not None
+        require(not both, "jerk_low_mm_s3", self.jerk_low, "must be left out where jerk_mm_s3 is stated")
+        if self.block_time is not None:
+            shown = 1e3 * self.block_time
+            require(0.0 < self.block_time <= 1.0, "block_time_ms", shown, "must be above 0, at most 1000 ms")
+            text = "must be left out with [trajectory_planner]: its cycle_ms limits short segments"
+            require(self.planner is None, "block_time_ms", shown, text)
         self._check_curve()
 
     def _check_curve(self) -> None:
@@ -176,13 +187,20 @@ def _from_table(label: str, table: Row) -> Machine:
             torque_curve=tuple((rad_s_from_rpm(n), 1e3 * t) for n, t in spindle.get("torque_curve", ())),
             tcp_words=_tcp_words(top),
             planner=_planner(label, top),
-            jerk=float(top["jerk_mm_s3"]) if "jerk_mm_s3" in top else None,
+            jerk=_optional(top, "jerk_mm_s3"),
+            jerk_low=_optional(top, "jerk_low_mm_s3"),
+            block_time=_optional(top, "block_time_ms", 1e-3),
             table=_machine_table(label, top),
             counter_clockwise=bool(spindle.get("counter_clockwise", True)),
         )
     except InputError as err:
         text = str(err)
         raise InputError(text if text.startswith(label) else f"{label}: {text}") from None
+
+
+def _optional(top: Row, key: str, factor: float = 1.0) -> float | None:
+    """A number of the file times ``factor``; None: it is not stated."""
+    return factor * float(top[key]) if key in top else None
 
 
 def _planner(label: str, top: Row) -> TrajectoryPlanner | None:
@@ -222,8 +240,10 @@ def read_machine(path: str | Path) -> Machine:
     """Read a machine from a TOML file, or from LinuxCNC's `.ini` (:func:`chipload.machine.ini.read_ini`).
 
     Keys: ``name``, ``dialect``, ``decimals``, ``rapid_mm_min``, ``feed_max_mm_min``, ``corner_tolerance_mm``, optional
-    ``note``, ``jerk_mm_s3`` (along the path, for feed schedules), ``tcp_on`` and ``tcp_off`` (words that begin and end
-    tool centre point control), and ``chain``, the letters of the axes from the workpiece to the tool (XYZ if left out).
+    ``note``, ``jerk_mm_s3`` (along the path), ``jerk_low_mm_s3`` (what it is at least, where it is not known),
+    ``block_time_ms`` (least time of the control for a block; not with a trajectory planner), ``tcp_on`` and
+    ``tcp_off`` (words that begin and end tool centre point control), and ``chain``, the letters of the axes from the
+    workpiece to the tool (XYZ if left out).
 
     In ``[axis.x]`` and the tables of the other linear axes: ``min_mm``, ``max_mm``, ``acceleration_mm_s2``, optional
     ``rate_mm_min`` (else the rapid rate), ``direction`` (else the letter's own), ``side`` (`table` or `head`, else

@@ -26,6 +26,8 @@ _MACHINE = {
     "chain?": _TEXT,
     "note?": _TEXT,
     "jerk_mm_s3?": _NUMBER,
+    "jerk_low_mm_s3?": _NUMBER,
+    "block_time_ms?": _NUMBER,
     "tcp_on?": _TEXT,
     "tcp_off?": _TEXT,
 }

@@ -13,6 +13,8 @@ that of G64 P; without it the machine's corner tolerance; 0 for G61; under G61.1
 and a feed, at a dwell, a change of tool or of spindle, and at both ends, the machine stands. Acceleration is constant
 in pieces (no jerk limit), and to change the tool or to run up the spindle takes no time.
 
+A control that needs the time t_b for a block runs no row faster than its length / t_b.
+
 Where a rotary axis moves, the rows of a line of the text take together at least what the rates of all axes need, and
 what the controller gives them.
 """
@@ -187,6 +189,8 @@ def _speeds(program: Program, machine: Machine) -> _Speeds:
         inward = (limit / swing).min(axis=1, initial=np.inf)
         around = np.minimum(speed[at], np.sqrt(inward * radii(program)[at]) / level)
     speed[at] = np.where(sweeps(program)[at] != 0.0, around, speed[at])
+    if machine.block_time is not None:
+        speed = np.minimum(speed, length / machine.block_time)
     # joints between rows that have a length
     here, there = row[:-1], row[1:]
     cos = (last[here] * first[there]).sum(axis=1)
