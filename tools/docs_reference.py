@@ -29,13 +29,15 @@ This page is made from `src/chipload/result/columns.py` by `make reference`.
 MATERIALS = """# Shipped materials
 
 `[material] name` names one of these. Each holds in the range of chip thickness that is shown: in steps with thicker or
-thinner chips its loads are unproven. The spread is the relative standard deviation of the coefficients; `confidence`
-holds limits with it ([how](how-to/confidence.md)). A group of VDI 3323 has the tangential force
-alone: it proves torque and power; force direction, deflection and stability are unproven. Which group an alloy belongs
-to is stated where its source states it; a group never has the name of an alloy.
+thinner chips its loads are unproven. The spread is the relative standard deviation of the coefficients, where three are
+stated of the tangential, radial and axial ones; limits are held with it ([how](how-to/confidence.md)).
 
-Titanium is not among them: for group 37, two editions of the same catalogue state 2110 and 1245 MPa. Measure your own
-by `chipload fit` ([how](how-to/material.md)).
+* `group-*`: a group of VDI 3323. It has the tangential force alone and proves torque and power; force direction,
+  deflection and stability are unproven.
+* `ALLOY-from-*`: six coefficients by a rule from a group or a sister alloy, with the spread of the rule
+  ([which](design/materials.md)). They prove all loads, with much room: the last column but one is the share of a limit
+  that the nominal value may reach.
+* the others: six measured coefficients. Measure your own by `chipload fit` ([how](how-to/material.md)).
 
 This page is made from `src/chipload/data/materials` by `make reference`; `chipload materials` prints it.
 """

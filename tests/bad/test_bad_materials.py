@@ -89,7 +89,9 @@ def test_another_metal_is_no_slip_of_the_pen(name):
 def test_a_part_of_the_name_is_enough():
     with pytest.raises(InputError) as err:
         material_named("steel")
-    assert str(err.value).startswith("material steel: not known: the nearest are group-2-steel, group-3-steel, group-6")
+    assert str(err.value).startswith(
+        "material steel: not known: the nearest are group-1-steel, group-10-tool-steel, group-2"
+    )
 
 
 def test_what_has_no_direction_says_so():

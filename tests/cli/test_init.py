@@ -22,7 +22,7 @@ def test_what_a_program_states_and_what_is_guessed(program: Path, tmp_path: Path
     assert job["program"] == {"file": "../slot.nc"}
     (cutter,) = job["cutter"]
     assert (cutter["number"], cutter["diameter_mm"], cutter["confirm"]) == (3, 8.0, True)
-    assert job["material"]["name"] == "group-2-steel"
+    assert job["material"]["name"] == "steel-1045-from-group-2"
     # the centre path goes from (-10, 5, -2) to (30, 15, -2); program zero is the top; 1 mm around it
     assert job["stock"]["low_mm"] == [-11.0, 4.0, -3.0]
     assert job["stock"]["high_mm"] == [31.0, 16.0, 0.0]

@@ -40,14 +40,31 @@ def test_materials_with_their_numbers_and_sources() -> None:
     _, found = rows_of("materials")
     assert tuple(found) == shipped_names("material")
     six, group = found["al6082-t6"], found["group-2-steel"]
-    assert (six["Ktc Krc Kac [MPa]"], six["Kte Kre Kae [N/mm]"], six["holds for"]) == (
-        "631 99 273", "13 10 2.8", "all loads",
+    assert (six["Ktc Krc Kac [MPa]"], six["Kte Kre Kae [N/mm]"], six["proves at 95 % [of limit]"]) == (
+        "631 99 273", "13 10 2.8", "torque, power to 0.68, force to 0.70",
     )  # fmt: skip
     assert (group["Ktc Krc Kac [MPa]"], group["exponent"], group["chip [mm]"], group["spread [%]"]) == (
-        "1500", "0.22", "0.05..1", "20",
+        "1500", "0.22", "0.05..1", "30",
     )  # fmt: skip
-    assert group["holds for"] == "torque, power"
+    # exp(-1.645 * 0.3)
+    assert group["proves at 95 % [of limit]"] == "torque, power to 0.61"
+    assert found["steel-1045-from-group-2"]["spread [%]"] == "30 50 58"
     assert all("doi" in row["source"] or "catalogue" in row["source"] for row in found.values())
+
+
+def test_a_material_in_full() -> None:
+    code, said, _ = call("materials", "group-2-steel")
+    assert code == 0
+    assert "Ktc 1500 MPa +- 30 %, size effect h^-0.22" in said
+    assert "torque, power: nominal value up to 0.61 of the limit" in said
+    assert "force: unproven: the radial and axial coefficients are not known" in said
+    _, said, _ = call("materials", "steel-1045-from-group-2")
+    assert "force: nominal value up to 0.61 of the limit" in said
+    assert "surface location error: unproven: the coefficients have a size effect" in said
+    assert "chips of 0.05 to 1 mm; outside loads are unproven" in said
+    code, _, error = call("materials", "stel")
+    assert code == 2
+    assert "material stel: not known" in error
 
 
 def test_cutters_and_examples() -> None:

@@ -130,7 +130,9 @@ def test_teeth_of_unlike_radii_agree_with_like_ones_as_the_runout_vanishes():
 
 
 @pytest.mark.parametrize("depth", [5.0, 10.0])
-@pytest.mark.parametrize("name", [name for name in material_names() if not material_named(name).tangential])
+@pytest.mark.parametrize(
+    "name", [n for n in material_names() if not (material_named(n).tangential or any(material_named(n).exponents))]
+)
 def test_the_paper_s_reduction_of_the_range_of_force(name, depth):
     """R 5, s 0.1, corner of 8 mm [Uddin2007]: 11.478 to 12.91 deg instead of 18.737 takes 75 to 84 % off the range."""
     a = np.radians([11.478, 12.91, 18.737])

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from chipload.cli.app import Debug, app
 from chipload.terminal import guarded, plain, show
@@ -20,9 +22,12 @@ def machines(debug: Debug = False) -> None:
 
 
 @app.command()
-def materials(debug: Debug = False) -> None:
-    """List the materials that come with chipload: coefficients, range, spread, source."""
-    guarded(lambda: _shown("materials"), debug)
+def materials(
+    name: Annotated[str, typer.Argument(help="material to show in full: what each check proves with it")] = "",
+    debug: Debug = False,
+) -> None:
+    """List the materials that come with chipload: coefficients, range, spread, what they prove, source."""
+    guarded(lambda: _shown_material(name) if name else _shown("materials"), debug)
 
 
 @app.command()
@@ -35,6 +40,14 @@ def cutters(debug: Debug = False) -> None:
 def examples(debug: Debug = False) -> None:
     """List the examples. `chipload example NAME DIR` copies one."""
     guarded(lambda: _shown("examples"), debug)
+
+
+def _shown_material(name: str) -> int:
+    from chipload.cutting.material import material_named
+    from chipload.jobs.material_proofs import proofs_text
+
+    show(proofs_text(material_named(name)))
+    return 0
 
 
 def _shown(name: str) -> int:

@@ -37,7 +37,11 @@ _DIRECTIONS = ("krc_mpa", "kac_mpa", "kre_n_mm", "kae_n_mm")
 _TEXTS = ("name", "source", "conditions", "workpiece", "cutter")
 _EXPONENTS = ("exponent_t", "exponent_r", "exponent_a")
 _RANGES = {"chip": ("chip_min_mm", "chip_max_mm"), "speed": ("speed_min_m_min", "speed_max_m_min")}
-_KEYS = (*_TEXTS, *_NUMBERS, *_EXPONENTS, *_RANGES["chip"], *_RANGES["speed"], "spread", "covariance", "peak_excess")
+_SPREADS = ("spread_radial", "spread_axial")
+_KEYS = (
+    *_TEXTS, *_NUMBERS, *_EXPONENTS, *_RANGES["chip"], *_RANGES["speed"], "spread", *_SPREADS, "covariance",
+    "peak_excess",
+)  # fmt: skip
 
 #: correlation of the errors of two coefficients whose material states a spread: between independent errors and one
 #: error that all share; with it 95 of 100 random cuts are within their value at 95 % (tests/laws/test_load_budget.py)
@@ -68,6 +72,8 @@ class Material:
         worst of the runs; 0: not measured, or not above
     tangential : only the tangential force is known; the other coefficients are 0 and mean nothing: torque and power can
         be proved, directions and sizes of forces, deflections and stability cannot
+    spread_directions : relative standard deviations of the radial and of the axial coefficients, where they are less
+        sure than the tangential ones, whose ``spread`` then is; None: as ``spread``
     covariance : (6, 6), of (Ktc, Krc, Kac, Kte, Kre, Kae) in products of MPa and N/mm, from a fit; instead of
         ``spread``; None: not known
 
@@ -95,6 +101,7 @@ class Material:
     covariance: Covariance | None = None
     tangential: bool = False
     peak_excess: float = 0.0
+    spread_directions: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         for key, (name, low, high) in _NUMBERS.items():
@@ -114,6 +121,9 @@ class Material:
             )
         if self.spread is not None and not 0.0 <= self.spread < 1.0:
             raise InputError(f"material.spread = {self.spread:g}: must be from 0 to below 1 (0.1 is 10 %)")
+        for key, value in zip(_SPREADS, self.spread_directions or (0.0, 0.0), strict=True):
+            if not 0.0 <= value < 1.0:
+                raise InputError(f"material.{key} = {value:g}: must be from 0 to below 1 (0.1 is 10 %)")
         for key, value in zip(_EXPONENTS, self.exponents, strict=True):
             if not 0.0 <= value < 1.0:
                 raise InputError(f"material.{key} = {value:g}: must be from 0 (no size effect) to below 1")
@@ -146,8 +156,8 @@ class Material:
 
     @property
     def variances(self) -> NDArray[np.float64]:
-        """Covariance (6, 6) of the coefficients: the fitted one, or spread^2 ((1 - r) diag(K^2) + r K K'), r the
-        :data:`CORRELATION` of their errors.
+        """Covariance (6, 6) of the coefficients: the fitted one, or (1 - r) diag(d^2) + r d d', d the spread of each
+        times the coefficient, r the :data:`CORRELATION` of their errors.
 
         Raises
         ------
@@ -161,13 +171,19 @@ class Material:
                 f"material {self.name}: neither spread nor covariance is known, so the uncertainty of its "
                 "coefficients is unknown: give spread, or fit them"
             )
-        deviation = self.spread * np.array(self.coefficients)
+        own = (self.spread, *(self.spread_directions or (self.spread, self.spread)))
+        deviation = np.array(own * 2) * self.coefficients
         return np.asarray(np.where(np.eye(6, dtype=np.bool_), 1.0, CORRELATION) * np.outer(deviation, deviation))
 
     @property
     def has_band(self) -> bool:
         """Whether the uncertainty of the coefficients is known, as a spread or a covariance."""
         return self.spread is not None or self.covariance is not None
+
+    @property
+    def greatest_spread(self) -> float:
+        """Greatest relative standard deviation that is stated; 0: none is."""
+        return max(self.spread or 0.0, *(self.spread_directions or (0.0,)))
 
     @property
     def law(self) -> tuple[float, ...]:
@@ -224,6 +240,9 @@ def _from_table(label: str, table: dict[str, Any]) -> Material:
     if (speed := ranges["speed"]) is not None:
         ranges["speed"] = (mm_s_from_mm_min(1000.0 * speed[0]), mm_s_from_mm_min(1000.0 * speed[1]))
     spread = _number(label, "spread", table["spread"]) if "spread" in table else None
+    ranges["spread_directions"] = _range(label, table, *_SPREADS)
+    if ranges["spread_directions"] is not None and spread is None:
+        raise InputError(f"{label}: spread is missing: spread_radial and spread_axial state what differs from it")
     exponents: Any = tuple(_number(label, key, table.get(key, 0.0)) for key in _EXPONENTS)
     covariance: Any = _matrix(label, table["covariance"]) if "covariance" in table else None
     texts: dict[str, Any] = {key: table.get(key, "") for key in _TEXTS}
@@ -239,8 +258,8 @@ def read_material(path: str | Path) -> Material:
     Keys: ``name``, ``ktc_mpa``, ``krc_mpa``, ``kac_mpa``, ``kte_n_mm``, ``kre_n_mm``, ``kae_n_mm`` (N per mm of
     depth), ``source``; without all four radial and axial ones only the tangential force is known; optional
     ``workpiece``, ``conditions``, ``cutter``, ``chip_min_mm`` with ``chip_max_mm``, ``speed_min_m_min`` with
-    ``speed_max_m_min``, ``exponent_t``, ``exponent_r``, ``exponent_a``, ``spread`` or ``covariance`` (6 rows of 6), and
-    ``peak_excess``.
+    ``speed_max_m_min``, ``exponent_t``, ``exponent_r``, ``exponent_a``, ``spread`` (with ``spread_radial`` and
+    ``spread_axial`` where these differ) or ``covariance`` (6 rows of 6), and ``peak_excess``.
 
     Raises
     ------
@@ -265,6 +284,7 @@ def material_text(material: Material) -> str:
         values["peak_excess"] = material.peak_excess
     if material.spread is not None:
         values["spread"] = material.spread
+        values |= dict(zip(_SPREADS, material.spread_directions or (), strict=False))
     if material.covariance is not None:
         values["covariance"] = [list(row) for row in material.covariance]
     return "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in values.items())
@@ -315,7 +335,7 @@ def material_names() -> tuple[str, ...]:
     """Return the names of the shipped materials, sorted.
 
     >>> material_names()[:5]
-    ('al6082-t6', 'al7075-carbide', 'al7075-hss', 'al7075-t6', 'group-13-stainless')
+    ('al2024-t3-from-group-22', 'al6061-t6-from-al6082-t6', 'al6082-t6', 'al7075-carbide', 'al7075-hss')
     """
     return shipped_names("material")
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from chipload.cutter.catalogue import catalogue_named
 from chipload.cutting.material import Material, material_named
 from chipload.examples import example_titles
+from chipload.jobs.material_proofs import proved_shares
 from chipload.machine.machine import Machine, machine_named
 from chipload.tables import shipped_names
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
@@ -41,19 +42,23 @@ def _machine(m: Machine) -> tuple[str, ...]:
 
 
 def materials() -> Listing:
-    """Coefficients, range, spread and source of each material."""
+    """Coefficients, range, spread and source of each material, and up to which share of a limit its coefficients prove
+    it at 95 %.
+    """
     head = ("name", "workpiece", "Ktc Krc Kac [MPa]", "Kte Kre Kae [N/mm]", "exponent", "chip [mm]", "spread [%]")
     rows = [_material(material_named(name)) for name in shipped_names("material")]
-    return Listing((*head, "holds for", "source"), tuple(rows))
+    return Listing((*head, "proves at 95 % [of limit]", "source"), tuple(rows))
 
 
 def _material(m: Material) -> tuple[str, ...]:
     cutting = f"{m.Ktc:g}" if m.tangential else f"{m.Ktc:g} {m.Krc:g} {m.Kac:g}"
     edge = f"{m.Kte:g}" if m.tangential else f"{m.Kte:g} {m.Kre:g} {m.Kae:g}"
-    holds = "torque, power" if m.tangential else "all loads"
+    torque, force = proved_shares(m)
+    holds = f"torque, power to {torque:.2f}" + ("" if m.tangential else f", force to {force:.2f}")
+    spreads = () if m.spread is None else (m.spread, *(m.spread_directions or ()))
     return (
         m.name, m.workpiece, cutting, edge, f"{m.exponents[0]:g}" if m.exponents[0] else "",
-        "" if m.chip is None else f"{m.chip[0]:g}..{m.chip[1]:g}", "" if m.spread is None else f"{100 * m.spread:g}",
+        "" if m.chip is None else f"{m.chip[0]:g}..{m.chip[1]:g}", " ".join(f"{100 * x:g}" for x in spreads),
         holds, f"{m.source}; {m.conditions}",
     )  # fmt: skip
 

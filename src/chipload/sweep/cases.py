@@ -94,10 +94,12 @@ class Samples:
             normal = ndtri(np.clip(self.points(6), 1e-9, 1.0 - 1e-9))
         drawn = normal @ factor.T + np.array(material.coefficients)
         drawn[:, 0], drawn[:, 3] = np.clip(drawn[:, 0], 10.0, 2e4), np.clip(drawn[:, 3], 0.0, 1e3)
+        drawn[:, 1] = np.clip(drawn[:, 1], 0.0, 2e4)
         names = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
         return [
             replace(
-                material, spread=0.0, covariance=None, source=f"sample {k} of {material.name}; {material.source}",
+                material, spread=0.0, spread_directions=None, covariance=None,
+                source=f"sample {k} of {material.name}; {material.source}",
                 **dict(zip(names, row.tolist(), strict=True)),
             )
             for k, row in enumerate(drawn, 1)

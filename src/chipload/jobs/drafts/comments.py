@@ -61,19 +61,27 @@ _ALLOY = re.compile(
 )
 _NAMED_MATERIAL = re.compile(r"\b(?:MATERIAL|WERKSTOFF|STOCK\s+MATERIAL)\s*[-:=]+\s*([^-:=\s][^\n]*)", re.IGNORECASE)
 _MATERIALS = (
-    (r"STAINLESS|\b304L?\b|\b316L?\b|1\.43\d\d|1\.44\d\d|INOX", "group-14-stainless"),
+    (r"\b304L?\b|\b316L?\b|1\.430[0-9]|1\.440[0-9]", "stainless-304-316l-from-group-14"),
+    (r"STAINLESS|1\.43\d\d|1\.44\d\d|INOX", "group-14-stainless"),
+    (r"INCONEL\s*-?718|\bIN718\b|2\.4668", "nickel-718-from-group-34"),
     (r"INCONEL|NIMONIC|HASTELLOY", "group-34-nickel"),
+    (r"TI-?6AL-?4V|TI-?AL6-?V4|3\.7165|TITANIUM\s+GRADE\s*5", "titanium-6al4v-from-group-37"),
+    (r"TITANIUM", "group-37-titanium"),
     (r"NODULAR|DUCTILE IRON|\bGGG\d*\b", "group-17-nodular-iron"),
-    (r"CAST IRON|GREY IRON|GRAY IRON|\bGG\d\d\b", "group-15-grey-iron"),
-    (r"(?<![0-9])4140(?![0-9])|(?<![0-9])4340(?![0-9])|42CRMO4", "group-7-steel"),
-    (r"STEEL|(?<![0-9])1045(?![0-9])|\bC45\b|(?<![0-9])1018(?![0-9])|\bS235|\bST37", "group-2-steel"),
+    (r"CAST IRON|GREY IRON|GRAY IRON|\bGG\d\d\b", "grey-iron-from-group-15"),
+    (r"(?<![0-9])4140(?![0-9])|42CRMO4", "steel-4140-from-group-7"),
+    (r"(?<![0-9])4340(?![0-9])", "group-7-steel"),
+    (r"\bH13\b|1\.2344", "steel-h13-from-group-10"),
+    (r"\bP20\b|1\.2311", "steel-p20-from-group-8"),
+    (r"(?<![0-9])1018(?![0-9])", "steel-1018-from-group-1"),
+    (r"(?<![0-9])1045(?![0-9])|\bC45\b", "steel-1045-from-group-2"),
+    (r"STEEL|\bS235|\bST37", "group-2-steel"),
     (r"BRASS", "group-27-brass"),
     (r"(?<![0-9])7075(?![0-9])", "al7075-t6"),
     (r"(?<![0-9])6082(?![0-9])", "al6082-t6"),
-    (
-        r"\bALU|\bEN[ -]?AW\b|(?<![0-9])6061(?![0-9])|(?<![0-9])2024(?![0-9])|(?<![0-9])5083(?![0-9])",
-        "group-22-aluminium",
-    ),
+    (r"(?<![0-9])6061(?![0-9])", "al6061-t6-from-al6082-t6"),
+    (r"(?<![0-9])2024(?![0-9])", "al2024-t3-from-group-22"),
+    (r"\bALU|\bEN[ -]?AW\b|(?<![0-9])5083(?![0-9])", "group-22-aluminium"),
 )
 
 

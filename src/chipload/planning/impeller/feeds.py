@@ -80,7 +80,7 @@ class ForceTerms:
     @property
     def error(self) -> float:
         """Relative error of the loads: of the samples, and the spread of the coefficients."""
-        return ERROR + (self.material.spread or 0.0)
+        return ERROR + self.material.greatest_spread
 
     def cutter(self, size: CatalogueCutter) -> Cutter:
         """A cutter of the catalogue as a bar with teeth; above its cutting part it has the diameter of its thinnest
