@@ -27,8 +27,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.force import forces_over_turn, mean_forces
-from chipload.cutting.material import Material
+from chipload.cutting import _unit_loads
 from chipload.cutting.turns import MeasuredCut, Turns, turns_of
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
 from chipload.engagement.tooth_surfaces import chips_of_teeth
@@ -47,10 +46,6 @@ LOOSE = 1e-6
 #: singular value over the greatest below which the error of the chip, 0.3 %, would determine a coefficient, not the
 #: measurement: four teeth in a slot with a free zero have 0.002, three teeth 0.014
 WEAK = 4e-3
-
-_PLAIN = Material("unit", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="a difference of two materials")
-_STEPS = (1000.0, 1000.0, 1000.0, 100.0, 100.0, 100.0)
-_MORE = tuple(replace(_PLAIN, **{name: getattr(_PLAIN, name) + step}) for name, step in zip(NAMES, _STEPS, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,20 +164,21 @@ def _chips(cut: MeasuredCut, cutter: Cutter) -> ToothEngagement:
 
 def unit_forces(cut: MeasuredCut, cutter: Cutter, theta: Floats) -> Floats:
     """Return the forces on the cutter for unit coefficients, (m, 3, 6) float: force = unit_forces @ x."""
-    engagement = _chips(cut, cutter)
-    return _columns(lambda material: forces_over_turn(engagement, cutter, material, theta)[0][0])
+    chips, m = _chips(cut, cutter), len(theta)
+    out = np.zeros((m, 4, 6))
+    # the same rows for each rotation
+    rows, tooth, piece = np.tile(chips.rows, (m, 1)), np.tile(chips.tooth, m), np.tile(chips.slice, m)
+    start = len(chips.rows) * np.arange(m + 1)
+    angles = np.ascontiguousarray(theta, dtype=np.float64)
+    _unit_loads.bases_at(start, rows, tooth, piece, chips.slices, angles, cutter.flutes, out)
+    return out[:, :3]
 
 
 def unit_means(cut: MeasuredCut, cutter: Cutter) -> Floats:
     """Return :func:`unit_forces` averaged over the turn in closed form, (3, 6) float."""
-    engagement = _chips(cut, cutter)
-    return _columns(lambda material: mean_forces(engagement, cutter, material)[0][0])
-
-
-def _columns(force: Callable[[Material], Floats]) -> Floats:
-    """Return the force of each unit coefficient as the difference of the forces of two materials."""
-    plain = force(_PLAIN)
-    return np.stack([(force(more) - plain) / step for more, step in zip(_MORE, _STEPS, strict=True)], axis=-1)
+    chips, out = _chips(cut, cutter), np.zeros((1, 4, 6))
+    _unit_loads.mean_bases(chips.start, chips.rows, chips.tooth, chips.slice, chips.slices, cutter.flutes, out)
+    return out[0, :3]
 
 
 def unit_harmonics(cut: MeasuredCut, cutter: Cutter, harmonics: int) -> Complexes:
