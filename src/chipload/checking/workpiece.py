@@ -46,6 +46,7 @@ class Stock:
     body : two corners of a block [mm], a mesh [mm], or layers, which do not change
     layer_mm : thickness of the layers of a block or a mesh; None: from depths of cut and cutters
     file : from which it was read
+    refined_mm : thickness to which layers that were cut before are divided where cutters move; None: they stay
 
     Examples
     --------
@@ -56,6 +57,7 @@ class Stock:
     body: tuple[Corner, Corner] | trimesh.Trimesh | LayeredStock
     layer_mm: float | None = number_field(None, above=0.0)
     file: Path | None = None
+    refined_mm: float | None = number_field(None, above=0.0)
 
     def __post_init__(self) -> None:
         """Refuse what is no body, a thickness out of range, and one for layers that there are."""
@@ -108,7 +110,8 @@ class Stock:
         heights at which an upright cutter cuts level.
         """
         if isinstance(self.body, LayeredStock):
-            return self.body.copied()
+            stock = self.body.copied()
+            return stock if self.refined_mm is None else _refined(stock, program, cutters, self.refined_mm)
         # a tapered cutter is wider above its tip
         tile = TILE * max(c.diameter + 2.0 * c.flute_length * math.tan(c.taper) for c in cutters.values())
         if isinstance(self.body, tuple):
@@ -118,10 +121,7 @@ class Stock:
         else:
             layer = self.layer_mm or layer_thickness(program, cutters, float(self.body.bounds[1, 2]))
             stock = LayeredStock.of_mesh(self.body, COARSE * layer, tile)
-        top = float(stock.bounds[-1])
-        stock.refine(min(_lowest(program, cutters), top), top, layer)
-        stock.refine_at(_levels(program, cutters, layer))
-        return stock
+        return _refined(stock, program, cutters, layer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,6 +278,14 @@ def insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.b
         return out
 
     return contains
+
+
+def _refined(stock: LayeredStock, program: Program, cutters: Mapping[int, Cutter], layer: float) -> LayeredStock:
+    """Return the stock with layers of a thickness where cutters move, divided where they cut level; it changes."""
+    top = float(stock.bounds[-1])
+    stock.refine(min(_lowest(program, cutters), top), top, layer)
+    stock.refine_at(_levels(program, cutters, layer))
+    return stock
 
 
 def layer_thickness(program: Program, cutters: Mapping[int, Cutter], top: float) -> float:

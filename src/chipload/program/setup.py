@@ -127,6 +127,22 @@ class Setup:
         return {number: cutter.diameter for number, cutter in self.cutters.items()}
 
 
+def offset_name(number: int, dialect: str) -> str:
+    """The code that selects a work offset, 1 for G54.
+
+    >>> offset_name(2, "fanuc"), offset_name(16, "fanuc"), offset_name(9, "linuxcnc"), offset_name(5, "sinumerik")
+    ('G55', 'G54.1 P7', 'G59.3', 'G505')
+    """
+    codes = (f"G{53 + number}", f"G59.{number - 6}", f"G54.1 P{number - 9}", f"G{500 + number}")
+    for code in codes:
+        try:
+            if offset_number(code, dialect) == number:
+                return code
+        except InputError:
+            continue
+    return codes[0]
+
+
 def offset_number(name: str, dialect: str, key: str = "work_offsets") -> int:
     """Number of a work offset that a code selects; ``key`` of the job for messages.
 

@@ -17,10 +17,12 @@ from chipload.files import read_regular
 from chipload.jobs.drafts.comments import Box, Header, read_header
 from chipload.jobs.drafts.cutters import cutter_table
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
+from chipload.jobs.drafts.setups import lines_of_setups, setup_tables
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.apt.reader import apt_text
 from chipload.program.control import is_cl_data
 from chipload.program.gcode.reader import gcode_text
+from chipload.program.lines_of import reading_of_lines
 from chipload.program.motions import bounds, lengths
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import ENDINGS, ProgramReading, read_program, read_tools
@@ -113,7 +115,9 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     if not float(lengths(program).sum()) > 0.0:
         left_out = next((f": {f}" for f in chosen.reading.findings if f.severity >= Severity.UNPROVEN), "")
         raise InputError(f"{path.name}: no motion that can be read: nothing to simulate{left_out}")
-    block, stock_entries = _stock(program, known, header)
+    setups = lines_of_setups(chosen.reading, text)
+    first = reading_of_lines(chosen.reading, setups[0], setups[1:]).program if setups else program
+    block, stock_entries = _stock(first, known, header)
     cuts = _cutting(program)
     numbers = [int(n) for n in np.unique(program.tool[cuts])] if cuts.any() else [int(program.tool[-1])]
     deepest = {
@@ -130,6 +134,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
         _material_table(header),
         *(cutter_table(n, _stated(n, known, header), deepest[n], motions[n]) for n in numbers),
         _operation_table(program, cuts, sizes),
+        *setup_tables(chosen.reading, text, setups, block),
         _limits_table(chosen.machine),
     ]
     found = [f for f in chosen.reading.findings if f.severity >= Severity.UNPROVEN]

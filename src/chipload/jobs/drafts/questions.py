@@ -51,6 +51,9 @@ def questions(tables: Sequence[DraftTable]) -> tuple[str, ...]:
     out = [_one("program", program[key], effect) for key, effect in PROGRAM.items() if key in program][:4]
     sizes = [t for t in cutters if any(e.key in SHAPE for e in t.guesses)]
     asked = [_table(guessed[name], *TABLES[name]) for name in ("part", "wall", "stock") if name in guessed]
+    turned = [t for t in tables if t.name == "setup" and t.guesses]
+    if turned:
+        asked.append(_table(turned[0], "how does the part lie in its later setups", "what they cut of it"))
     if sizes:
         asked.append(_sizes(sizes))
     asked += [_table(guessed[n], *TABLES[n]) for n in ("machine", "material", "workpiece") if n in guessed]

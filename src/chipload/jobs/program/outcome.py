@@ -1,4 +1,4 @@
-"""A program with new spindle speeds."""
+"""A program with new spindle speeds, and a part that is cut in several setups."""
 
 from __future__ import annotations
 
@@ -13,3 +13,10 @@ class SpeedsProgram(ProgramResult):
 
     simulated: SimulationResult = field(kw_only=True)
     speeds: SpeedResult = field(kw_only=True)
+
+
+@dataclass(frozen=True, eq=False)
+class SetupsProgram(ProgramResult):
+    """The last of several setups of a part; ``setups`` are all of them in their order."""
+
+    setups: tuple[ProgramResult, ...] = field(kw_only=True)

@@ -12,13 +12,16 @@ from chipload.checking.result import (
     program_result,
 )
 from chipload.jobs.program.numbers import speed_numbers
-from chipload.jobs.program.outcome import SpeedsProgram
+from chipload.jobs.program.outcome import SetupsProgram, SpeedsProgram
+from chipload.jobs.program.setups_result import result_of_setups
 from chipload.number_text import number_text
 from chipload.result import Result, Track
 
 
 def result_of(program: ProgramResult) -> Result:
     """Return the result of a program."""
+    if isinstance(program, SetupsProgram):
+        return result_of_setups(program)
     simulation = program.simulated
     if isinstance(program, SpeedsProgram) and simulation is not None and simulation.stability is not None:
         own = program.speeds

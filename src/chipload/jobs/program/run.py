@@ -6,9 +6,10 @@ from dataclasses import replace
 
 from chipload.checking.outcome import ProgramResult
 from chipload.checking.run import compliance_of_workpiece, simulate_program
+from chipload.jobs.program.job import SetupsJob
 from chipload.jobs.program.outcome import SpeedsProgram
+from chipload.jobs.program.setups import jobs_of_setups, reading_of_setup, run_setups
 from chipload.jobs.program.speeds import new_speeds, text_with_speeds
-from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.simulation.run import (
     check_lines,
     inputs_of,
@@ -24,7 +25,7 @@ from chipload.workers import Workers
 
 
 def run(
-    job: ProgramJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: Workers | None = None
+    job: SetupsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: Workers | None = None
 ) -> ProgramResult:
     """Read the program of a job for its machine; simulate it if the job states an operation, and change its speeds.
 
@@ -39,6 +40,8 @@ def run(
         A file cannot be read, the controller would refuse the program, or the stock and the cutters cannot be used.
     """
     require_layers(job, workers)
+    if job.table.setup:
+        return run_setups(job, progress, checkpoint, workers)
     machine, begin = machine_of(job), 0.1 if job.simulates else 1.0
     reading = read_for(job, machine, part_of(progress, 0.0, begin))
     if not job.simulates:
@@ -63,7 +66,7 @@ def run(
     return program if speeds is None else SpeedsProgram(**vars(program), speeds=speeds)
 
 
-def check(job: ProgramJob) -> tuple[list[str], bool]:
+def check(job: SetupsJob) -> tuple[list[str], bool]:
     """Return lines on the files of a job and on time and memory of its simulation, without simulating it.
 
     Raises
@@ -72,9 +75,26 @@ def check(job: ProgramJob) -> tuple[list[str], bool]:
         As :func:`run`, but for a cut with the spindle at rest, which only the simulation finds.
     """
     machine = machine_of(job)
+    if job.table.setup:
+        return _check_setups(job)
     reading, passes = read_for(job, machine), 1
     if job.simulates and job.table.operation[0].speeds is not None:
         inputs = inputs_of(job, machine)
         text_with_speeds(job, inputs, reading, inputs.stock.layered(reading.program, inputs.cutters))
         passes = 2
     return check_lines(job, program_of(job, machine, reading), passes)
+
+
+def _check_setups(job: SetupsJob) -> tuple[list[str], bool]:
+    """Return lines on each setup; time and memory of the first alone, as the others begin with what it leaves."""
+    machine = machine_of(job)
+    lines: list[str] = []
+    valid = True
+    for k, one in enumerate(jobs_of_setups(job)):
+        reading = reading_of_setup(job, one, k, machine)
+        # only the stock of the first one is known
+        shown = one if k == 0 else replace(one, table=one.table.model_copy(update={"operation": ()}))
+        own, holds = check_lines(shown, program_of(one, machine, reading), 1)
+        lines += [f"setup {k + 1}: {text}" for text in own]
+        valid &= holds
+    return lines, valid

@@ -13,7 +13,7 @@ from chipload.checking.settings import Limits
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.messages import Errors
 from chipload.jobs.simulation.fixtures import fixture_errors
-from chipload.jobs.simulation.tables import ProgramLimitsTable, SimulationJobTable
+from chipload.jobs.simulation.tables import ProgramLimitsTable, SimulationJobTable, SolidTable
 from chipload.jobs.simulation.values import elasticity_of, machine_table_errors, settings_of
 from chipload.jobs.sources import Limited, cutters, sources_of
 from chipload.jobs.tables import value_of
@@ -105,8 +105,9 @@ def program_job(
                 "stiffness",
                 "dynamics",
                 "workpiece",
+                "setup",
             )
-            if getattr(table, key)
+            if getattr(table, key, None)
         ]
     errors.refuse()
     tool_table = table.program.tools
@@ -132,20 +133,24 @@ def missing(values: Mapping[str, Any]) -> list[str]:
 
 def _contradictions(table: SimulationJobTable) -> Iterator[str]:
     """Yield a message for each contradiction between values of a simulation, and if nothing is checked."""
-    stock = table.stock
-    if stock is not None:
-        block = (stock.low_mm is not None, stock.high_mm is not None)
-        if any(block) == (stock.file is not None) or any(block) != all(block):
-            yield "stock: state either low_mm and high_mm of a block, or a file"
-        saved = stock.file is not None and stock.file.lower().endswith(".npz")
-        if saved and stock.layer_mm is not None:
-            yield "stock.layer_mm: leave it out: the layers of an earlier result stay"
+    if table.stock is not None:
+        yield from stock_errors(table.stock)
     yield from machine_table_errors(table.machine_table)
     if table.dynamics is None and table.operation[0].speeds is not None:
         yield "operation.0.speeds: needs modes of vibration: state [dynamics] or leave it out"
     if not table.limits.stated:
         names = ", ".join(ProgramLimitsTable.model_fields)
         yield f"limits: none is stated, so nothing would be checked: state at least one of {names}"
+
+
+def stock_errors(stock: SolidTable) -> Iterator[str]:
+    """Yield a message for each contradiction of a stock."""
+    block = (stock.low_mm is not None, stock.high_mm is not None)
+    if any(block) == (stock.file is not None) or any(block) != all(block):
+        yield "stock: state either low_mm and high_mm of a block, or a file"
+    saved = stock.file is not None and stock.file.lower().endswith(".npz")
+    if saved and stock.layer_mm is not None:
+        yield "stock.layer_mm: leave it out: the layers of an earlier result stay"
 
 
 def note_of_passes(job: ProgramJob, *passes: str) -> str:

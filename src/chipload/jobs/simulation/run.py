@@ -13,7 +13,7 @@ from chipload.checking.preparation import bodies_of
 from chipload.checking.program_text import changeable, straight
 from chipload.checking.run import simulation_estimate
 from chipload.checking.settings import CheckSettings, Limits
-from chipload.checking.workpiece import FinishedPart, Surroundings
+from chipload.checking.workpiece import FinishedPart, Stock, Surroundings
 from chipload.cutting.material import Material, material_named, read_material
 from chipload.errors import Finding, InputError, Severity, grouped, worst_severity
 from chipload.jobs.simulation.fixtures import fixtures_of
@@ -46,8 +46,12 @@ def material_of(job: ProgramJob) -> Material:
     return material_named(stated(job.material, "material"))
 
 
-def inputs_of(job: ProgramJob, machine: Machine) -> CheckInputs:
+def inputs_of(job: ProgramJob, machine: Machine, stock: Stock | None = None) -> CheckInputs:
     """Return the tables of a simulation as values; every file that they name is read.
+
+    Parameters
+    ----------
+    stock : that an earlier setup left; None: that of the table
 
     Raises
     ------
@@ -60,7 +64,7 @@ def inputs_of(job: ProgramJob, machine: Machine) -> CheckInputs:
         part = FinishedPart.read(
             folder / of.file, of.spacing_mm, of.excess_range_mm, units=of.units, chord_mm=of.chord_mm
         )
-    stock = stock_of(stated(table.stock, "stock"), folder)
+    stock = stock_of(stated(table.stock, "stock"), folder) if stock is None else stock
     fixtures = [body for k, f in enumerate(table.fixture) for body in fixtures_of(f, k, folder, stock)]
     return CheckInputs(
         cutters=job.cutters,
