@@ -106,7 +106,8 @@ def changes(job, spindle, torque):
 
 def robustness(name: str) -> None:
     job = load_job(Path(chipload.examples.__file__).parent / name / "job.toml").job
-    machine, material, table, program, spindle = opened(job)
+    machine, material, table, written, spindle = opened(job)
+    program = written.program
     found = allowable(job, program, material, machine)
     config, acceleration = controller_of(job, found.torque), min(machine.acceleration[:2])
     acceleration = job.table.loop.acceleration_mm_s2 or acceleration
@@ -143,7 +144,8 @@ def depths(name: str, pitches: list[float]) -> None:
     for pitch in pitches:
         made = found.table.round.model_copy(update={"pitch_mm": pitch})
         job = replace(found, table=found.table.model_copy(update={"round": made}))
-        machine, material, table, program, spindle = opened(job)
+        machine, material, table, written, spindle = opened(job)
+        program = written.program
         a = allowable(job, program, material, machine)
         if a.torque <= 0.0:
             print(f"| {pitch:g} | no torque is allowable | | | | | | |", flush=True)

@@ -66,9 +66,8 @@ HEAD = """# Real programs, run whole
 
 This page shows what chipload makes of whole files of other people, for users who want to know how far their own files
 will lead. `chipload init FILE DIR` drafts a job for each file, and `chipload run DIR/job.toml --accept` runs it from
-beginning to end. What a file does not state (cutter, stock, machine) is guessed. What rests on a guess of a program
-neither holds nor exceeds: it is unproven until the guess is confirmed. The plans of a drawing or a model are made for
-the guessed cutter and material, which `--accept` accepts.
+beginning to end. What a file does not state (cutter, stock, machine) is guessed. What rests on a guess neither
+holds nor exceeds: it is unproven until the guess is confirmed.
 
 `make real` runs all files that have no verdict, the shortest first by the estimate of `chipload check`, and writes this
 page. A stopped file continues where it was. Times are processor times. They include the compilation of kernels where a

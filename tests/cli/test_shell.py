@@ -21,10 +21,10 @@ from chipload.jobs.torque.run import opened
 from chipload.machine.machine import machine_named
 from chipload.program.motions import lengths
 from chipload.program.program import RAPID
-from chipload.program.read import read_program
+from chipload.program.read import read_program, times_of
 from chipload.progress import silent
 from chipload.report.removal import read_removal
-from chipload.result import LimitCheck, Verdict
+from chipload.result import LimitCheck, Verdict, load_result
 from chipload.structure import beam
 from chipload.structure.shell import Shell, compliance, ritz
 from command import call
@@ -107,7 +107,8 @@ def test_the_errors_cover_layers_and_steps_of_a_quarter(job):
     for share in (1.0, 0.25):
         sets = (f"simulation.step_mm={2.0 * share}", f"simulation.layer_mm={0.5 * share}")
         real = load_job(job, sets).job
-        machine, material, _, program, _ = opened(real)
+        machine, material, _, written, _ = opened(real)
+        program = written.program
         stock = shell_stock(real, program, off_centre(real.shell.stock_mm, real.table.surprise))
         found.append(cut(real, program, stock, material, machine.rapid, silent, accuracy=True))
     coarse, fine = ([each.loads.torque_edge + each.loads.torque_cut, each.loads.force_edge + each.loads.force_cut]
@@ -280,8 +281,36 @@ def test_it_can_be_handed_to_the_machine(result, what):
         relief=job.path.relief,
         deviation=job.deviation,
     )
-    assert again.time == pytest.approx(late["controllers"]["fuzzy_feedforward"]["time_s"], rel=1e-3)
+    # hal.toml has the feeds alone; the rapids before and behind them are timed by the text
+    machine = machine_named("vmc")
+    reading = read_program(result / "0-override.ngc", machine)
+    around = float(times_of(reading, machine)[reading.program.motion == RAPID].sum())
+    assert around > 0.1
+    assert again.time + around == pytest.approx(late["controllers"]["fuzzy_feedforward"]["time_s"], rel=1e-3)
     assert 1e-3 * again.load_max == pytest.approx(late["controllers"]["fuzzy_feedforward"]["torque_nm_max"], rel=2e-3)
+
+
+def test_the_history_is_the_whole_program(result):
+    """From the place to which the first lines go to where the last one retracts; its times are those of the text."""
+    machine = machine_named("vmc")
+    reading = read_program(result / "0-override.ngc", machine)
+    program, seconds = reading.program, times_of(reading, machine)
+    tracks = load_result(result).tracks
+    assert len(tracks) == 2 * len(NAMES)
+    for track in tracks:
+        c = track.columns
+        places = np.column_stack([c[f"{x}_mm"] for x in "xyz"])
+        assert c["duration_s"].sum() == pytest.approx(c["t_s"][-1], rel=1e-12)
+        assert c["t_s"][-1] == pytest.approx(track.time_s, rel=1e-12)
+        assert (c["override_state"] == "rapid").sum() == 2
+        np.testing.assert_allclose(places[0], program.p_work[1], atol=1e-9)
+        if c["override_state"][-1] != "rapid":
+            continue
+        np.testing.assert_allclose(places[-1], program.p_work[-1], atol=1e-9)
+        assert c["s_mm"][-1] == pytest.approx(lengths(program)[2:].sum(), rel=1e-3)
+        # down to the first feed, and away behind the last
+        assert c["t_s"][1] == pytest.approx(seconds[:3].sum(), rel=1e-6)
+        assert c["duration_s"][-1] == pytest.approx(seconds[-1], rel=1e-6)
 
 
 def test_both_programs_go_the_same_way(result, what):

@@ -19,7 +19,7 @@ from chipload.jobs.thinwall.places import places_of
 from chipload.jobs.thinwall.tries import unlimited_plan
 from chipload.jobs.thinwall.wall_program import linked, on_machine
 from chipload.jobs.torque.cut import program_of
-from chipload.jobs.torque.files import override_text
+from chipload.jobs.torque.written_program import override_text
 from chipload.machine.machine import machine_named
 from chipload.program.gcode.writer import write_commands
 from chipload.program.program import LINE, RAPID, Program

@@ -20,7 +20,8 @@ def test_the_contact_of_a_helix_reaches_up_to_the_turn_before(tmp_path) -> None:
     folder = copy_example("tube", tmp_path / "tube")
     sets = ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01")
     job = load_job(folder / "job.toml", sets).job
-    machine, material, _, program, _ = opened(job)
+    machine, material, _, written, _ = opened(job)
+    program = written.program
     found = cut(job, program, shell_stock(job, program), material, machine.rapid, silent)
     p = found.points
     angle = np.unwrap(np.arctan2(p[:, 1], p[:, 0]))

@@ -143,10 +143,10 @@ def test_limits_name_the_worst_row():
     q[3, 3] = math.radians(12.5)
     found = limit_findings(machine_named("horizontal-b"), q, [7, 8, 9, 10])
     assert [(f.code, f.line, f.text) for f in found] == [
-        ("machine-index", 10, "row 3: A = 12.5 deg: machine horizontal-b stands at multiples of 5 deg"),
+        ("machine-index", 10, "A = 12.5 deg: machine horizontal-b stands at multiples of 5 deg"),
         (
             "machine-limit",
             9,
-            "row 2: X = 450 mm: machine horizontal-b travels from -400 mm to 400 mm (2 rows, the first is 1)",
+            "X = 450 mm: machine horizontal-b travels from -400 mm to 400 mm (2 motions, the first in line 8)",
         ),
     ]

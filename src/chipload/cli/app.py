@@ -75,7 +75,7 @@ ToleranceMm = Annotated[
     typer.Option("--tolerance-mm", help="greatest deviation of the tip where a move with rotary axes is divided"),
 ]
 Accept = Annotated[
-    bool, typer.Option("--accept", help="run with the guesses of a draft; what they decide of a program is unproven")
+    bool, typer.Option("--accept", help="run with the guesses of a draft; what rests on them is unproven")
 ]
 Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an error in chipload")]
 

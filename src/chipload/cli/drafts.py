@@ -112,7 +112,6 @@ def simulate(
     def work() -> int:
         from tempfile import TemporaryDirectory
 
-        from chipload.errors import Severity
         from chipload.jobs import load_job, run_job
         from chipload.jobs.drafts.draft import write_draft
         from chipload.jobs.drafts.make import draft_of
@@ -138,7 +137,7 @@ def simulate(
                 for guess in loaded.guesses:
                     show(f"guess: {guess.rpartition(' (line')[0]}")
             with bar() as progress:
-                done = run_job(loaded, progress, guesses=Severity.UNPROVEN)
+                done = run_job(loaded, progress, accept=True)
                 target = write_finished(done.result, done.presentation, out) if out is not None else None
         show_verdict(done.result, worst=True)
         more = "" if written else f"; chipload init {file} DIR writes the job and marks {len(loaded.guesses)} guesses"

@@ -10,7 +10,7 @@ import typer
 
 from chipload.cli.app import Accept, Debug, JobFile, Sets, app
 from chipload.cli.inputs import show_verdict
-from chipload.errors import Cancelled, InputError, Severity
+from chipload.errors import Cancelled, InputError
 from chipload.terminal import bar, guarded, show, write_line
 
 #: [s] between two states of a simulation
@@ -77,7 +77,7 @@ def run(
                 with bar(resume_note(loaded)) as progress:
                     done = run_job(
                         loaded, lambda part, what: progress(0.8 * part, what), kept,
-                        guesses=Severity.NOTE if accept else None, workers=where,
+                        accept=accept, workers=where,
                     )  # fmt: skip
                     done = marked(done) if coarse else done
                     target = write_finished(

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from chipload.errors import InputError, InputErrors, Severity
+from chipload.errors import InputError, InputErrors
 from chipload.files import read_regular, require_utf8
 from chipload.jobs.confirm import guesses_of, take_confirm
 from chipload.jobs.messages import Errors, left_missing, renamed_tables, table_errors
@@ -231,7 +231,7 @@ def run_job(
     progress: Progress = silent,
     checkpoint: Checkpoint | None = None,
     *,
-    guesses: Severity | None = None,
+    accept: bool = False,
     workers: Workers | None = None,
 ) -> FinishedJob:
     """Run a job; nothing is written.
@@ -239,9 +239,7 @@ def run_job(
     Parameters
     ----------
     checkpoint : keeps finished work, so that a stopped run continues; used by the capabilities that can resume
-    guesses : what a guess of a draft is in the result: a note where its user accepts it, UNPROVEN for a first look;
-        None: a job with guesses is refused. What is guessed of a program that exists (its stock, zero, cutters, unit,
-        control, material) is no choice of the user: there an accepted guess is UNPROVEN too
+    accept : run a job with guesses of a draft, which is refused else; nothing holds or exceeds by them
     workers : processes or a cluster that compute parts of the run; None: this process alone. What is found is the same
 
     Raises
@@ -253,7 +251,7 @@ def run_job(
         By ``progress``.
     """
     capability = loaded.capability
-    if loaded.guesses and guesses is None:
+    if loaded.guesses and not accept:
         raise InputErrors(*loaded.guesses, unconfirmed(loaded))
     more: dict[str, Any] = {"checkpoint": checkpoint} if capability.resumes else {}
     if workers is not None and not workers.alone:
@@ -267,11 +265,10 @@ def run_job(
     result: Result = capability.module("result").result_of(outcome)
     inputs = {"job": loaded.source, **result.provenance.inputs}
     result = replace(result, provenance=replace(result.provenance, inputs=inputs))
-    if guesses is not None:
+    if loaded.guesses:
         from chipload.jobs.guesses import with_guesses
 
-        chosen = capability.key != "program"
-        result = with_guesses(result, loaded.guesses, guesses if chosen else Severity.UNPROVEN)
+        result = with_guesses(result, loaded.guesses, plan=capability.key != "program")
     return FinishedJob(result, capability.module("figures").presentation_of(outcome), outcome)
 
 

@@ -31,46 +31,46 @@ LIMITS = {"spindle_torque_nm": ("machine",), "spindle_power_w": ("machine",), "g
 RAPID = "would be a rapid through the guessed"
 
 
-def with_guesses(result: Result, guesses: Sequence[str], severity: Severity) -> Result:
+def with_guesses(result: Result, guesses: Sequence[str], *, plan: bool = False) -> Result:
     """Return a result with a finding for each guess of its job.
 
     Parameters
     ----------
     guesses : a line each, as ``cutter.0.flutes = 3: no file states them``
-    severity : NOTE where the user accepts the guesses of a plan, which are then stated values; UNPROVEN where nobody
-        has, and for a program that exists: then what exceeds or holds by a guessed value is unproven
+    plan : the job plans its program, which then rests on all of them
     """
-    found = tuple(Finding(GUESS, 0, f"guess: {text}", severity) for text in guesses)
-    if severity is not Severity.NOTE and guesses:
+    found = tuple(Finding(GUESS, 0, f"guess: {text}", Severity.UNPROVEN) for text in guesses)
+    if guesses:
         tables = tuple(dict.fromkeys(text.partition(" ")[0].partition(".")[0].rstrip(":") for text in guesses))
         result = replace(
             result,
-            tracks=tuple(_of_track(track, tables) for track in result.tracks),
-            findings=tuple(_of_finding(f, tables) for f in result.findings),
+            tracks=tuple(_of_track(track, tables, plan) for track in result.tracks),
+            findings=tuple(_of_finding(f, tables, plan) for f in result.findings),
         )
     return replace(result, findings=(*found, *result.findings))
 
 
-def _of_track(track: Track, tables: Collection[str]) -> Track:
+def _of_track(track: Track, tables: Collection[str], plan: bool) -> Track:
     return replace(
         track,
-        limits=tuple(_of_limit(check, tables) for check in track.limits),
-        findings=tuple(_of_finding(f, tables) for f in track.findings),
+        limits=tuple(_of_limit(check, tables, plan) for check in track.limits),
+        findings=tuple(_of_finding(f, tables, plan) for f in track.findings),
     )
 
 
-def _of_limit(check: LimitCheck, tables: Collection[str]) -> LimitCheck:
+def _of_limit(check: LimitCheck, tables: Collection[str], plan: bool) -> LimitCheck:
     """A check that rests on a guess is unproven."""
-    own = _guessed((*LOAD, *LIMITS.get(check.name, ()), "limits"), tables)
+    own = _guessed(tables if plan else (*LOAD, *LIMITS.get(check.name, ()), "limits"), tables)
     if check.state is Verdict.UNPROVEN or not own:
         return check
     would = "it would exceed the limit with the guessed" if check.state is Verdict.EXCEEDS else HELD_BY_GUESS
     return replace(check, state=Verdict.UNPROVEN, reason=f"{would} {own}")
 
 
-def _of_finding(f: Finding, tables: Collection[str]) -> Finding:
+def _of_finding(f: Finding, tables: Collection[str], plan: bool) -> Finding:
     """A finding that exceeds by a guess is unproven."""
-    own = _guessed(FINDINGS.get(f.code, tuple(t for t in tables if t not in ("limits", "operation"))), tables)
+    every = tuple(t for t in tables if t not in ("limits", "operation"))
+    own = _guessed(tables if plan else FINDINGS.get(f.code, every), tables)
     if f.severity is not Severity.EXCEEDS or not own:
         return f
     text = f"{RAPID} {own}" if f.code == "rapid-cuts" else f"{f.text}, with the guessed {own}"

@@ -23,7 +23,7 @@ job file.
 `chipload check job.toml` lists all errors in a job and in the files that it names. `--set key.path=value` changes a key
 for one run. `chipload init FILE DIR` writes a job for a program, a drawing, a model or the sections of a blade. It
 marks each table that holds guesses with `confirm = true`; `chipload run` refuses the job until you delete that key, or
-runs it with all guesses as they are with `--accept`: of a program, what rests on them is then unproven. The most
+runs it with all guesses as they are with `--accept`: what rests on them is then unproven. The most
 common job simulates a program in a stock:
 
 ```toml

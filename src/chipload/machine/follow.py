@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.errors import Finding, InputError
 from chipload.machine.axis import Axis
 from chipload.machine.kinematics import Solutions, inverse, with_tip
-from chipload.machine.limits import SLACK, beyond, limit_findings, written
+from chipload.machine.limits import SLACK, beyond, limit_findings, text_of_rows, written
 from chipload.machine.machine import Machine
 from chipload.machine.orientation import angle_between, wrapped
 
@@ -255,11 +255,6 @@ def _with_turns(axis: Axis, q: Floats, begin: float | None) -> Floats:
     return out
 
 
-def _row_text(rows: NDArray[np.intp], worst: int, text: str) -> str:
-    more = f" ({len(rows)} rows, the first is {rows[0]})" if len(rows) > 1 else ""
-    return f"row {worst}: {text}{more}"
-
-
 def _reach(found: Solutions, lines: Ints) -> list[Finding]:
     rows = np.flatnonzero(found.miss > REACH)
     if len(rows) == 0:
@@ -269,7 +264,7 @@ def _reach(found: Solutions, lines: Ints) -> list[Finding]:
     verb = "reaches" if len(found.free) == 1 else "reach"
     means = f"{names} {verb} no nearer one" if found.free else "there is no rotary axis to reach it"
     text = f"the tool's axis is out of reach by {math.degrees(found.miss[worst]):.6g} deg: {means}"
-    return [Finding("machine-reach", int(lines[worst]), _row_text(rows, worst, text))]
+    return [Finding("machine-reach", int(lines[worst]), text_of_rows(rows, worst, text, lines))]
 
 
 def _singular(
@@ -281,7 +276,7 @@ def _singular(
     if len(rows):
         letter = found.free[0].letter
         text = f"the tool's axis lies along that of {letter}: {letter} is free and stays as it was"
-        out.append(Finding("machine-singular", int(lines[rows[0]]), _row_text(rows, int(rows[0]), text)))
+        out.append(Finding("machine-singular", int(lines[rows[0]]), text_of_rows(rows, int(rows[0]), text, lines)))
     turned = angle_between(directions[1:], directions[:-1])
     for one in found.free:
         swing = np.abs(np.diff(axes[:, one.column]))
@@ -292,7 +287,7 @@ def _singular(
                 f"{one.letter} swings by {math.degrees(swing[worst - 1]):.6g} deg while the tool's axis turns by "
                 f"{math.degrees(turned[worst - 1]):.6g} deg: retract before it, or go round the pole"
             )
-            out.append(Finding("machine-singular", int(lines[worst]), _row_text(rows, worst, text)))
+            out.append(Finding("machine-singular", int(lines[worst]), text_of_rows(rows, worst, text, lines)))
     return out
 
 
@@ -304,6 +299,7 @@ def _rewinds(free: tuple[Axis, ...], axes: Floats, lines: Ints) -> list[Finding]
         turns = np.round((change - wrapped(change)) / math.tau).astype(np.int64)
         for row in (np.flatnonzero((turns != 0) & (np.abs(change) > math.pi + SLACK)) + 1).tolist():
             a, b = (written(one, float(axes[row - k, one.column])) for k in (1, 0))
-            text = f"row {row}: {one.letter} goes back from {a} to {b}: retract before it"
+            text = f"{one.letter} goes back from {a} to {b}: retract before it"
+            text = text_of_rows(np.array([row]), row, text, lines)
             out.append(Finding("machine-rewind", int(lines[row]), text))
     return out

@@ -29,6 +29,24 @@ def beyond(axis: Axis, q: Floats) -> Floats:
     return np.asarray(np.maximum(np.maximum(axis.low - q, q - axis.high), 0.0))
 
 
+def text_of_rows(rows: NDArray[np.int64], worst: int, text: str, line: NDArray[np.int64]) -> str:
+    """Return the text of a finding on the worst of some rows; rows are named only where their source has no lines.
+
+    Parameters
+    ----------
+    rows : rising
+    line : of the source (n,), of each row; 0: none
+
+    >>> text_of_rows(np.array([1, 4]), 4, "X = 450 mm", np.array([3, 5, 6, 7, 9]))
+    'X = 450 mm (2 motions, the first in line 5)'
+    >>> text_of_rows(np.array([1, 4]), 4, "X = 450 mm", np.zeros(5, dtype=np.int64))
+    'row 4: X = 450 mm (2 rows, the first is 1)'
+    """
+    if line[worst] == 0:
+        return f"row {worst}: {text}{f' ({len(rows)} rows, the first is {rows[0]})' if len(rows) > 1 else ''}"
+    return f"{text}{f' ({len(rows)} motions, the first in line {line[rows[0]]})' if len(rows) > 1 else ''}"
+
+
 def written(axis: Axis, q: float) -> str:
     """A position of an axis as text, in mm or deg.
 
@@ -80,7 +98,6 @@ def limit_findings(
             rows = np.flatnonzero(excess > SLACK)
             if len(rows):
                 worst = int(rows[np.argmax(excess[rows])])
-                more = f" ({len(rows)} rows, the first is {rows[0]})" if len(rows) > 1 else ""
                 what = f"{axis.letter} = {written(axis, float(values[worst]))}: machine {machine.name} {text}"
-                found.append(Finding(code, int(lines[worst]), f"row {worst}: {what}{more}"))
+                found.append(Finding(code, int(lines[worst]), text_of_rows(rows, worst, what, lines)))
     return tuple(found)

@@ -82,19 +82,15 @@ def server_of(tools: ClientTools) -> MCPServer[Any]:
         ctx: Context[Any, Any],
         overrides: list[str] | None = None,
         coarse: bool = False,
-        accept_guesses: bool = False,
     ) -> CallToolResult:
         """Run a job and write its result folder with report.html; returns verdict, reason, limits, findings, a picture.
 
         result: a new folder, or that of an older result, which is replaced. coarse: larger steps, a first result that
-        is never better than unproven. accept_guesses: only if a person has confirmed the guesses of the draft.
+        is never better than unproven. Guesses of a draft leave it unproven until
+        overrides state their values, or a person deletes `confirm = true`.
         """
         return _with_picture(
-            *answered(
-                lambda: tools.simulate(
-                    job, result, overrides or (), coarse=coarse, accept_guesses=accept_guesses, progress=_reported(ctx)
-                )
-            )
+            *answered(lambda: tools.simulate(job, result, overrides or (), coarse=coarse, progress=_reported(ctx)))
         )
 
     @server.tool()
@@ -105,7 +101,6 @@ def server_of(tools: ClientTools) -> MCPServer[Any]:
         slowest_percent: float = 30.0,
         fastest_percent: float = 200.0,
         overrides: list[str] | None = None,
-        accept_guesses: bool = False,
     ) -> CallToolResult:
         """Give each line of the program the fastest feed that the limits allow, simulate it again, write both.
 
@@ -115,7 +110,7 @@ def server_of(tools: ClientTools) -> MCPServer[Any]:
         return _with_picture(
             *answered(
                 lambda: tools.feeds(
-                    job, result, slowest_percent, fastest_percent, overrides or (), accept_guesses=accept_guesses,
+                    job, result, slowest_percent, fastest_percent, overrides or (),
                     progress=_reported(ctx),
                 )
             )

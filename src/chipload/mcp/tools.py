@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from chipload.errors import InputError, Severity
+from chipload.errors import InputError
 from chipload.jobs import LoadedJob, check_job, load_job, run_job
 from chipload.jobs.coarse import coarser, marked
 from chipload.jobs.drafts.draft import write_draft
@@ -85,7 +85,6 @@ class ClientTools:
         overrides: Sequence[str] = (),
         *,
         coarse: bool = False,
-        accept_guesses: bool = False,
         progress: Progress = silent,
     ) -> tuple[dict[str, Any], bytes | None]:
         """Run a job, write its result folder, and return its verdict and a picture of its loads."""
@@ -93,8 +92,7 @@ class ClientTools:
         if coarse:
             loaded = self._loaded(job, (*overrides, *coarser(loaded)))
         check_target(target)
-        guesses = Severity.NOTE if accept_guesses else Severity.UNPROVEN
-        done = run_job(loaded, lambda part, what: progress(0.8 * part, what), guesses=guesses)
+        done = run_job(loaded, lambda part, what: progress(0.8 * part, what), accept=True)
         done = marked(done) if coarse else done
         written = write_finished(
             done.result, done.presentation, target, lambda part, what: progress(0.8 + 0.2 * part, what)
@@ -109,7 +107,6 @@ class ClientTools:
         fastest_percent: float = 200.0,
         overrides: Sequence[str] = (),
         *,
-        accept_guesses: bool = False,
         progress: Progress = silent,
     ) -> tuple[dict[str, Any], bytes | None]:
         """Give the lines of a program the fastest feeds that the limits of its job allow, simulated again."""
@@ -117,7 +114,7 @@ class ClientTools:
             f"operation.0.feeds.slowest_percent={float(slowest_percent)}",
             f"operation.0.feeds.fastest_percent={float(fastest_percent)}",
         ]
-        return self.simulate(job, result, (*overrides, *feeds), accept_guesses=accept_guesses, progress=progress)
+        return self.simulate(job, result, (*overrides, *feeds), progress=progress)
 
     def read_result(self, result: str) -> dict[str, Any]:
         """Return the verdict of a result folder, its reason, limits, findings and programs."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding
+from chipload.machine.limits import text_of_rows
 from chipload.machine.machine import AXES, Machine
 from chipload.program.motions import bounds, is_arc
 from chipload.program.program import DWELL, LINE, RAPID, Program
@@ -51,8 +52,7 @@ def check_program(
             return
         worst = int(at[np.argmax(excess[at])])
         shown = text.format(np.asarray(values)[worst])
-        more = f" ({len(at)} rows, the first is {at[0]})" if len(at) > 1 else ""
-        found.append(Finding(code, int(program.line[worst]), f"row {worst}: {shown}{more}"))
+        found.append(Finding(code, int(program.line[worst]), text_of_rows(at, worst, shown, program.line)))
 
     low, high = bounds(program)
     slack = 1e-9

@@ -1,4 +1,4 @@
-"""Comparison of a written program text with the program that was simulated: the text is read as a controller reads it.
+"""Comparison of a written program text with the planned program: the text is read as a controller reads it.
 
 Notation: a row of the planned program is found in the text where the tip, its axis, the tool and the spindle are those
 at its end. Rows that move less than the text is rounded are missing from it, of whatever kind; further rows may lie
@@ -20,9 +20,9 @@ from chipload.machine.machine import Machine
 from chipload.program.commands import Commands
 from chipload.program.control import control_named
 from chipload.program.gcode.tools import Tool, ToolTable
-from chipload.program.motions import is_arc
+from chipload.program.motions import is_arc, lengths
 from chipload.program.nc_text import NcText, read_nc
-from chipload.program.program import RAPID, Program
+from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import ProgramReading, read_program
 from chipload.program.recognise import Recognition
 from chipload.program.setup import Setup
@@ -38,6 +38,8 @@ AXIS_RAD = 1e-3
 STANDS_RAD = 1e-7
 #: speeds of the spindle agree within this share
 SPEED_SHARE = 1e-3
+#: feeds agree within this share, or by less than the text is rounded
+FEED_SHARE = 0.01
 #: rows of the text among which the end of a planned row is sought first
 AHEAD = 400
 #: tool lengths along A B C U V W
@@ -89,14 +91,23 @@ def text_findings(
     """Return the findings of a written text that keep it from being released.
 
     They are what its reader finds that is more than a note, violations of the machine's limits, cuts with the spindle
-    turning against the hand of the cutter, and the first place that differs from the ``planned`` program, which was
-    simulated. For ``name``, ``cutters`` and ``lengths`` see :func:`read_back`.
+    turning against the hand of the cutter, the first place that differs from the ``planned`` program, and a missing
+    end. For ``name``, ``cutters`` and ``lengths`` see :func:`read_back`.
     """
     try:
         reading = read_back(text, name, machine, cutters, lengths=lengths)
     except InputError as err:
         return (unread(err),)
-    return reading_findings(reading, cutters, planned)
+    return (*reading_findings(reading, cutters, planned), *no_end(text))
+
+
+def no_end(text: str) -> tuple[Finding, ...]:
+    """Return a finding if a text does not end by M2 or M30."""
+    lines = [line.strip() for line in text.splitlines()]
+    last = next((line for line in reversed(lines) if line and line != "%"), "")
+    if last.split()[-1:] in (["M2"], ["M30"]):
+        return ()
+    return (Finding("text-differs", len(lines), "the written text does not end by M2 or M30", Severity.EXCEEDS),)
 
 
 def unread(refusal: InputError) -> Finding:
@@ -130,18 +141,37 @@ def _against_hand(reading: ProgramReading, cutters: Mapping[int, Cutter]) -> tup
 
 
 def text_differences(planned: Program, reading: ProgramReading) -> tuple[Finding, ...]:
-    """Return a finding for the first place where a text differs from the program that was simulated; none: it agrees.
+    """Return a finding for the first place where a text differs from the program that was planned; none: it agrees.
 
     Parameters
     ----------
-    planned : the program that was simulated
+    planned : the program that was written
     reading : of the text that was written from it
     """
+    return compared_rows(planned, reading)[0]
+
+
+def lines_of_source(planned: Program, reading: ProgramReading) -> NDArray[np.int64]:
+    """Line of the planned program (m,) that each row of a text comes from; behind a difference the last that agrees."""
+    ends = compared_rows(planned, reading)[1]
+    known = np.flatnonzero(ends >= 0)
+    if not len(known):
+        return np.asarray(reading.program.line)
+    at = np.searchsorted(ends[known], np.arange(len(reading.program)))
+    return np.asarray(planned.line[known[np.minimum(at, len(known) - 1)]])
+
+
+def compared_rows(planned: Program, reading: ProgramReading) -> tuple[tuple[Finding, ...], NDArray[np.int64]]:
+    """Return the first difference of a text, as :func:`text_differences`, and the row of the text (n,) at which each
+    planned row ends; -1: it is not in the text, or behind a difference.
+    """
     read = reading.program
+    ends = np.full(len(planned), -1)
     turned = bool(np.abs(np.diff(planned.axis, axis=0)).max(initial=0.0) > 0.0)
     rounded = UNITS * 10.0**-reading.machine.decimals
     near = rounded + (TURNED_MM if turned else 0.0)
     still = _stands(planned, rounded)
+    wanted, given = _seconds(planned), _seconds(read)
     last, row = -1, -1
     for k in range(len(planned)):
         place = planned.p_work[k]
@@ -150,17 +180,30 @@ def text_differences(planned: Program, reading: ProgramReading) -> tuple[Finding
         found = _next(read, last, planned, k, near)
         if found is None:
             line = int(read.line[min(last + 1, len(read) - 1)])
-            return (_finding(line, k, place, read, last),)
+            return (_finding(line, k, place, read, last),), ends
         off = _away(read, last, found, planned, k) if row >= 0 else 0.0
         if off > near:
-            text = f"the written text leaves the simulated path by {off:.4g} mm"
-            return (Finding("text-differs", int(read.line[found]), text, Severity.EXCEEDS, _place(place), k),)
-        last, row = found, k
+            text = f"the written text leaves the planned path by {off:.4g} mm"
+            return (Finding("text-differs", int(read.line[found]), text, Severity.EXCEEDS, _place(place), k),), ends
+        if row >= 0 and int(planned.motion[k]) not in (RAPID, DWELL):
+            seconds = float(given[found + 1] - given[last + 1])
+            share = seconds / max(float(wanted[k + 1] - wanted[row + 1]), np.finfo(np.float64).tiny)
+            if abs(share - 1.0) > FEED_SHARE and abs(seconds * (1.0 - 1.0 / share)) * planned.feed[k] > near:
+                text = f"the written text moves at {1.0 / share:.4g} of the planned feed"
+                return (Finding("text-differs", int(read.line[found]), text, Severity.EXCEEDS, _place(place), k),), ends
+        last, row, ends[k] = found, k, found
     rest = np.abs(read.p_work[last + 1 :] - read.p_work[last]).max(initial=0.0)
     if rest > near:
-        text = f"the written text goes on for {rest:.4g} mm after the end of the simulated program"
-        return (Finding("text-differs", int(read.line[last + 1]), text, Severity.EXCEEDS),)
-    return ()
+        text = f"the written text goes on for {rest:.4g} mm after the end of the planned program"
+        return (Finding("text-differs", int(read.line[last + 1]), text, Severity.EXCEEDS),), ends
+    return (), ends
+
+
+def _seconds(program: Program) -> Floats:
+    """Time at the programmed feed (n + 1,) [s] before each row, and behind the last; rapids and dwells take none."""
+    cuts = (program.motion != RAPID) & (program.motion != DWELL) & (program.feed > 0.0)
+    own = np.divide(lengths(program), program.feed, out=np.zeros(len(program)), where=cuts)
+    return np.concatenate([[0.0], np.cumsum(own)])
 
 
 def _stands(program: Program, rounded: float) -> NDArray[np.bool_]:
@@ -213,7 +256,7 @@ def _finding(line: int, k: int, place: Floats, read: Program, last: int) -> Find
     what = (
         "with another tool, spindle, axis or kind of motion"
         if len(close)
-        else "nowhere: the simulated program goes there"
+        else "nowhere: the planned program goes there"
     )
     return Finding("text-differs", line, f"the written text reaches ({at}) {what}", Severity.EXCEEDS, _place(place), k)
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+
+#: a comment of RS-274
+COMMENT = re.compile(r"\([^)]*\)")
 
 
 @dataclass(frozen=True)
@@ -40,3 +44,21 @@ class Release:
 
 #: of a program that was only written
 NOT_SIMULATED = Release("no simulation has checked this program")
+
+
+def released(text: str, simulated: str, release: Release) -> Release:
+    r"""Return what a text may state: ``release`` if it has the blocks of the ``simulated`` text, comments aside.
+
+    >>> released("(a)\nG0 X1\nM2", "(b)\nG0 X1\nM2", Release("")).verified
+    True
+    >>> released("(a)\nG0 X2\nM2", "(b)\nG0 X1\nM2", Release("")).text
+    'NOT VERIFIED: its text is not the one that was simulated'
+    """
+    if _blocks(text) == _blocks(simulated):
+        return release
+    return Release("its text is not the one that was simulated")
+
+
+def _blocks(text: str) -> list[str]:
+    """The lines of a text without comments."""
+    return [block for line in text.splitlines() if (block := COMMENT.sub("", line).strip())]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from chipload.errors import Finding, Severity
+from chipload.errors import Finding
 from chipload.number_text import number_text
 from chipload.result.budget import level_text
 from chipload.result.coverage import Coverage
@@ -91,13 +91,6 @@ def unchecked_line(unchecked: Iterable[str]) -> str:
     if len(shown) > LISTED:
         shown = [*shown[:LISTED], f"{len(shown) - LISTED} more"]
     return f"Not checked: {'; '.join(shown)}." if shown else ""
-
-
-def guesses_line(findings: Iterable[Finding]) -> str:
-    """Return the number of accepted guesses of a draft in a sentence; empty if there are none."""
-    guesses = sum(f.code == GUESS and f.severity is Severity.NOTE for f in findings)
-    many = f"{guesses} guesses of the job were" if guesses > 1 else "1 guess of the job was"
-    return f"{many} accepted." if guesses else ""
 
 
 def _texts(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Track]) -> Iterator[str]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chipload.errors import Finding, InputError
 from chipload.result.columns import COLUMNS
 from chipload.result.display import result_html
-from chipload.result.first_lines import confidence_line, coverage_line, guesses_line, headline, unchecked_line
+from chipload.result.first_lines import confidence_line, coverage_line, headline, unchecked_line
 from chipload.result.limits import Columns, LimitCheck
 from chipload.result.tabular import pandas_of, xarray_of
 from chipload.result.track import Track
@@ -149,7 +149,7 @@ class Result:
     def message(self) -> str:
         """The verdict in a few sentences: its first line, what the limits do not cover, and the note."""
         note = self.note if self.verdict is Verdict.HOLDS else ""
-        lines = (self.headline, coverage_line(self.in_use), note, guesses_line(self.findings))
+        lines = (self.headline, coverage_line(self.in_use), note)
         return " ".join(filter(None, lines))
 
     @cached_property

@@ -173,7 +173,7 @@ def _table(outcome: TorqueResult, case: ControllerCase) -> str:
     torque_nm = 1e-3 * outcome.allowable.torque
     most = torque_nm * (1.0 + 1e-2 * outcome.job.limits["torque_over_percent"])
     for name, run in case.runs.items():
-        n = run.numbers()
+        n = outcome.numbers_of(run)
 
         def cell(value: float, limit: float, digits: str = ".4g") -> str:
             return f'<span class="{"ok" if value <= limit else "no"}">{value:{digits}}</span>'

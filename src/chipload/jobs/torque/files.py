@@ -18,13 +18,12 @@ from chipload.control.hal_file import write_hal
 from chipload.control.linuxcnc.path import write_path
 from chipload.control.override import Override
 from chipload.jobs.torque.outcome import TorqueResult
+from chipload.jobs.torque.written_program import override_file, override_text
 from chipload.machine.machine import Machine
-from chipload.program.control import control_named
-from chipload.program.gcode.writer import write_commands, write_gcode
+from chipload.program.gcode.writer import write_gcode
 from chipload.program.motions import is_arc
 from chipload.program.program import DWELL, RAPID, Program
-from chipload.program.release import Release
-from chipload.program.to_axes import to_axes
+from chipload.program.release import released
 from chipload.report.programs import ENDINGS
 from chipload.result import Result, release_of
 
@@ -47,8 +46,12 @@ def program_files(outcome: TorqueResult, result: Result) -> dict[str, bytes]:
     """All files by name."""
     machine = outcome.job.machine
     name = override_file(machine)
+    written = outcome.job.written
     release = replace(release_of(result, name), condition="with chipload hal")
-    text = override_text(outcome.job.title, outcome.job.program, machine, release)
+    text = override_text(outcome.job.title, written.planned, machine, release)
+    given = released(text, written.text, release)
+    if given is not release:
+        text = override_text(outcome.job.title, written.planned, machine, given)
     out = {name: text.encode("ascii")}
     if not outcome.attainable or outcome.control.controller is None:
         return out
@@ -69,23 +72,9 @@ def program_files(outcome: TorqueResult, result: Result) -> dict[str, bytes]:
     return out
 
 
-def override_file(machine: Machine) -> str:
-    """Name of the file of the program that takes the override."""
-    return f"0-override.{ENDINGS[machine.dialect]}"
-
-
 def feed_forward_file(machine: Machine) -> str:
     """Name of the file of the program with the feeds that the model allows."""
     return f"0-feedforward.{ENDINGS[machine.dialect]}"
-
-
-def override_text(title: str, program: Program, machine: Machine, release: Release) -> str:
-    """The text of the program with the programmed feeds; its lines do not depend on ``release``."""
-    commands, _ = to_axes(program, machine)
-    on = control_named(machine.dialect).lines.override_on
-    takes = [(0, on)] if on else []
-    title = f"{title}, programmed feeds, to be run with chipload hal"
-    return write_commands(commands, machine, title=title, release=release, words=takes)
 
 
 def planned_override(outcome: TorqueResult, config: Override) -> Floats:
@@ -101,7 +90,7 @@ def planned_override(outcome: TorqueResult, config: Override) -> Floats:
 
 def feed_forward(outcome: TorqueResult, config: Override) -> Program:
     """Program with its cutting rows split into parts of one feed each; arcs stay arcs."""
-    p, override = outcome.job.program, planned_override(outcome, config)
+    p, override = outcome.job.written.program, planned_override(outcome, config)
     arc, points, at = is_arc(p), outcome.allowable.path.points, 0
     row_of, end, feed = [], [], []
     for k in range(len(p)):

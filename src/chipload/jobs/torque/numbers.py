@@ -13,7 +13,7 @@ def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
     """The operation in summary.json."""
     answer: dict[str, Any] = {
         "kind": "torque",
-        "program": {"file": outcome.job.program_name, "motions": len(outcome.job.program)},
+        "program": {"file": outcome.job.program_name, "motions": len(outcome.job.written.program)},
         "torque_limit_nm": 1e-3 * outcome.allowable.torque,
         "torque_limit": {
             "source": outcome.source,
@@ -34,16 +34,16 @@ def operation_numbers(outcome: TorqueResult) -> dict[str, Any]:
     if outcome.control.cases:
         plain, late = outcome.control.cases
         answer |= {
-            "controllers": _controllers(plain),
+            "controllers": _controllers(outcome, plain),
             "compared": outcome.compared(plain),
             "with_latency": {
                 "latency_ms": 1e3 * late.loop.latency,
                 "override_step": late.quantum,
-                "controllers": _controllers(late),
+                "controllers": _controllers(outcome, late),
                 "compared": outcome.compared(late),
                 "lost": {
                     name: {
-                        "time_s": late.runs[name].outcome.time - run.outcome.time,
+                        "time_s": outcome.time_of(late.runs[name]) - outcome.time_of(run),
                         "torque_nm": 1e-3 * (late.runs[name].outcome.load_max - run.outcome.load_max),
                         "form_error_um": 1e3 * float(late.runs[name].error.max() - run.error.max()),
                     }
@@ -119,5 +119,5 @@ def _wall_models(wall: ShellWall) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _controllers(case: ControllerCase) -> dict[str, Any]:
-    return {name: run.numbers() for name, run in case.runs.items()}
+def _controllers(outcome: TorqueResult, case: ControllerCase) -> dict[str, Any]:
+    return {name: outcome.numbers_of(run) for name, run in case.runs.items()}

@@ -28,8 +28,8 @@ from chipload.control.spindle_model import Spindle, SpindleDeviation
 from chipload.control.wall import PathLimit
 from chipload.errors import Finding
 from chipload.jobs.torque.step_checks import StepChecks
+from chipload.jobs.torque.written_program import WrittenProgram
 from chipload.machine.machine import Machine
-from chipload.program.program import Program
 from chipload.report.presentation import Blank
 from chipload.result import Provenance
 from chipload.stock.layers import LayeredStock
@@ -70,9 +70,8 @@ class ControllerRun:
     workpiece: Floats | None = None
 
     def numbers(self) -> dict[str, Any]:
-        """Numbers in summary.json."""
+        """Numbers in summary.json, besides the time of the whole program."""
         return {
-            "time_s": self.outcome.time,
             "torque_nm_max": 1e-3 * self.outcome.load_max,
             "torque_raw_nm_max": 1e-3 * self.outcome.torque_max,
             "torque_over_limit_s": self.outcome.time_over,
@@ -158,6 +157,7 @@ class TorqueInputs:
     limits : stated limits by name
     unchecked : names of those that are not stated
     settings : the keys of the job but cutters and surprises
+    written : the program, as its text was read and simulated
     surprises : a text each
     surprise_angles : of those that have one, its angle round the wall [deg] and its kind
     checks, check_settings : checks in addition to the stated limits, and their switches
@@ -165,7 +165,7 @@ class TorqueInputs:
 
     title: str
     program_name: str
-    program: Program
+    written: WrittenProgram
     machine: Machine
     limits: Mapping[str, float]
     unchecked: tuple[str, ...]
@@ -257,7 +257,7 @@ class ControlComparison:
     identified_from : what the spindle was identified from
     deviation : of the real spindle from what is believed
     estimate : of the torque, in the case of the verdict; None: likewise
-    ideal_time : with the feed at the limit at every instant [s]; inf where no torque is allowable
+    ideal_time : of the whole program, with the feed at the limit at every instant [s]; inf where no torque is allowable
     """
 
     cases: tuple[ControllerCase, ...]
@@ -306,16 +306,26 @@ class TorqueResult:
         """Source of the limit: `deflection`, `strength`, `workpiece deflection` or `stated`."""
         return "stated" if self.allowable.torque < self.allowable.limit.torque else self.allowable.limit.by
 
+    def time_of(self, run: ControllerRun) -> float:
+        """Time of the whole program with a controller [s], with the rapids before and behind its feeds."""
+        written = self.job.written
+        return written.approach + run.outcome.time + (written.retract if run.outcome.finished else 0.0)
+
+    def numbers_of(self, run: ControllerRun) -> dict[str, Any]:
+        """Numbers of a controller in summary.json."""
+        return {"time_s": self.time_of(run), **run.numbers()}
+
     def compared(self, case: ControllerCase) -> dict[str, float]:
         """How much shorter than the constant feed and than the model alone, the share of what is possible, and by how
         much the error differs from the constant feed's, all in percent.
         """
         controlled, plain, model = case.runs[HELD], case.runs[PLAIN], case.runs[MODEL]
         least = float(plain.error.max())
-        saved, possible = plain.outcome.time - controlled.outcome.time, plain.outcome.time - self.control.ideal_time
+        took, longest = self.time_of(controlled), self.time_of(plain)
+        saved, possible = longest - took, longest - self.control.ideal_time
         return {
-            "shorter_percent": 100.0 * (1.0 - controlled.outcome.time / plain.outcome.time),
-            "shorter_than_model_percent": 100.0 * (1.0 - controlled.outcome.time / model.outcome.time),
+            "shorter_percent": 100.0 * (1.0 - took / longest),
+            "shorter_than_model_percent": 100.0 * (1.0 - took / self.time_of(model)),
             "of_possible_percent": 100.0 * saved / possible if possible > 0.0 else 0.0,
             "form_error_change_percent": 100.0 * (float(controlled.error.max()) / least - 1.0) if least > 0.0 else 0.0,
         }

@@ -15,7 +15,7 @@ from chipload.checking.default_checks import default_limits, range_findings, unc
 from chipload.checking.result import holders_not_stated
 from chipload.control.override import STATUS
 from chipload.errors import Finding, Severity
-from chipload.jobs.torque.files import feed_forward_file, override_file
+from chipload.jobs.torque.files import feed_forward_file
 from chipload.jobs.torque.numbers import operation_numbers
 from chipload.jobs.torque.outcome import (
     HELD,
@@ -28,7 +28,9 @@ from chipload.jobs.torque.outcome import (
     TorqueResult,
 )
 from chipload.jobs.torque.step_checks import check_columns
+from chipload.jobs.torque.written_program import override_file
 from chipload.number_text import number_text
+from chipload.program.motions import lengths
 from chipload.result import (
     LimitCheck,
     Result,
@@ -139,7 +141,7 @@ def _track(outcome: TorqueResult, case: ControllerCase, name: str) -> Track:
         name=track,
         kind=TrackKind.CONTROLLER,
         in_use=used,
-        time_s=run.outcome.time,
+        time_s=outcome.time_of(run),
         limits=limits_of(outcome, columns, track),
         findings=(*_run_findings(case, run), *range_findings(outcome.job.checks, columns)),
         programs=_programs(outcome, case, name),
@@ -165,6 +167,35 @@ def _programs(outcome: TorqueResult, case: ControllerCase, name: str) -> tuple[s
 
 
 def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
+    """(n,) columns of the whole program with a controller: rapids, a row for each step of the controller, rapids."""
+    found, written, own = _controlled(outcome, run), outcome.job.written, outcome.job.written.controlled
+    rows = list(range(own.start - 1)), list(range(own.stop, len(written.program) if run.outcome.finished else 0))
+    before, after = (_rapids(outcome, found, r, end) for r, end in zip(rows, (0, -1), strict=True))
+    out = {name: np.concatenate([before[name], values, after[name]]) for name, values in found.items()}
+    far, seconds = np.cumsum(lengths(written.program)), np.cumsum(written.times)
+    first = max(own.start - 1, 0)
+    for name, values, sums in (("t_s", run.outcome.t, seconds), ("s_mm", run.outcome.s, far)):
+        behind = sums[first] + values[-1] + sums[rows[1]] - sums[own.stop - 1]
+        out[name] = np.concatenate([sums[rows[0]], sums[first] + values, behind])
+    return out | {"duration_s": np.diff(out["t_s"], prepend=0.0)}
+
+
+def _rapids(outcome: TorqueResult, found: Columns, rows: list[int], end: int) -> Columns:
+    """Columns of rapids outside the feeds: they have no loads, and the allowable torque of the nearest feed."""
+    program = outcome.job.written.program
+    stated = {
+        **{f"{x}_mm": program.p_work[rows, k] for k, x in enumerate("xyz")},
+        "feed_mm_min": np.full(len(rows), mm_min_from_mm_s(outcome.job.machine.rapid)),
+        "override": np.ones(len(rows)),
+        "override_state": np.full(len(rows), "rapid", dtype=object),
+        "spindle_rpm": np.abs(rpm_from_rad_s(1.0) * program.spindle[rows]),
+        "tool": program.tool[rows],
+        "torque_allowable_nm": np.full(len(rows), found["torque_allowable_nm"][end]),
+    }
+    return {name: stated.get(name, np.zeros(len(rows), dtype=values.dtype)) for name, values in found.items()}
+
+
+def _controlled(outcome: TorqueResult, run: ControllerRun) -> Columns:
     """(n,) columns of a controller, one row for each step of it."""
     o, path = run.outcome, outcome.allowable.path
     relief = np.interp(o.s, path.model.s, path.relief)

@@ -30,8 +30,7 @@ from chipload.jobs.simulation.values import workpiece_of
 from chipload.jobs.tables import value_of
 from chipload.jobs.torque.allowable import allowable, wall_of
 from chipload.jobs.torque.controllers import cases_of, controller_of, shortest
-from chipload.jobs.torque.cut import CutSteps, program_of, read_file, require_linear, resolution_in_stock, settings_of
-from chipload.jobs.torque.files import override_file, override_text
+from chipload.jobs.torque.cut import CutSteps, require_linear, resolution_in_stock, settings_of
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.outcome import (
     HELD,
@@ -48,11 +47,10 @@ from chipload.jobs.torque.spindle import deviation_of, estimate_range, identifie
 from chipload.jobs.torque.step_checks import step_checks
 from chipload.jobs.torque.workpiece_cut import allowable_on_workpiece, real_stock_body
 from chipload.jobs.torque.workpiece_limit import allowable_torque, clamped_workpiece, preview_on_workpiece
+from chipload.jobs.torque.written_program import WrittenProgram, written_program
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.number_text import number_text
 from chipload.program.program import Program
-from chipload.program.read_back import text_findings
-from chipload.program.release import NOT_SIMULATED
 from chipload.progress import Progress, part_of, silent
 from chipload.report.presentation import Blank
 from chipload.result import Provenance
@@ -75,7 +73,8 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
     InputError
         A file cannot be read, or values do not go together.
     """
-    machine, material, table, program, spindle = opened(job)
+    machine, material, table, written, spindle = opened(job)
+    program = written.program
     cutting = part_of(progress, 0.0, 0.65)
     wall: ShellWall | ClampedWorkpiece
     if job.workpiece is not None:
@@ -95,11 +94,11 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         require_resolved(job, spindle, torque)
         controller, acceleration = controller_of(job, torque), _acceleration(job, machine)
         cases = cases_of(job, path, controller, table, spindle, torque, own.walls, acceleration, progress)
-        shortest_time = shortest(path, controller, torque, acceleration)
+        shortest_time = written.approach + shortest(path, controller, torque, acceleration) + written.retract
     both = (("planned", own.planned), ("real", own.real))
     in_stock = _stock_check(job, program, machine, material)
     return TorqueResult(
-        job=_inputs(job, program, machine, material),
+        job=_inputs(job, written, machine, material),
         wall=wall,
         allowable=found,
         control=ControlComparison(
@@ -117,8 +116,8 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
         stock_check=in_stock,
         findings=(
             *_of_removals(own, in_stock),
-            *_of_program(job, program, machine, own.real),
-            *_text_findings(job, program, machine),
+            *_of_program(job, written, machine, own.real),
+            *written.findings,
         ),
         resolution_error=own.real.removal.resolution_error,
         energy_balance={name: energy_balance(cut.removal.columns, material.Ktc) for name, cut in both},
@@ -146,21 +145,15 @@ def _of_removals(own: Followed, in_stock: StockCheck) -> tuple[Finding, ...]:
     return (*out, *collision_findings(in_stock.touched))
 
 
-def _of_program(job: TorqueJob, program: Program, machine: Machine, real: CutSteps) -> tuple[Finding, ...]:
+def _of_program(job: TorqueJob, written: WrittenProgram, machine: Machine, real: CutSteps) -> tuple[Finding, ...]:
     """Findings on the whole program in the real stock, besides its loads."""
+    program = written.program
     stock, fine = _real_stock(job, program), resolution_in_stock(job, program)
-    around = ProgramSurroundings(insides(stock), *stock_box(stock), machine.table is not None)
-    if job.program_file is not None:
-        reading = read_file(job, job.program_file, machine)
-        around = replace(around, stops=reading.stops, retractions=reading.retractions, text=reading.program)
+    around = ProgramSurroundings(
+        insides(stock), *stock_box(stock), machine.table is not None, written.stops, written.retractions, written.whole
+    )
     steps = StepBlocks(program, fine.step_mm, fine.tolerance)
     return program_findings(program, steps, real.removal.columns, job.cutters, around)
-
-
-def _text_findings(job: TorqueJob, program: Program, machine: Machine) -> tuple[Finding, ...]:
-    """Findings of the text that takes the override, read back and compared with the simulated program."""
-    text = override_text(title_of(job.path), program, machine, NOT_SIMULATED)
-    return text_findings(text, override_file(machine), machine, job.cutters, program)
 
 
 def _real_stock(job: TorqueJob, program: Program) -> LayeredStock:
@@ -178,7 +171,7 @@ class Followed:
     walls: tuple[WallPath, ...]
 
 
-def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Material) -> TorqueInputs:
+def _inputs(job: TorqueJob, written: WrittenProgram, machine: Machine, material: Material) -> TorqueInputs:
     """What the job states."""
     limits = job.table.limits
     return TorqueInputs(
@@ -186,7 +179,7 @@ def _inputs(job: TorqueJob, program: Program, machine: Machine, material: Materi
         program_name=job.program_file.name
         if job.program_file is not None
         else "generated: a helix down the wall and one turn at the bottom",
-        program=program,
+        written=written,
         machine=machine,
         limits=limits.stated,
         unchecked=limits.unstated,
@@ -207,7 +200,8 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     InputError
         As :func:`run`, but for what only the exact limit of torque shows.
     """
-    machine, material, table, program, spindle = opened(job)
+    machine, material, table, written, spindle = opened(job)
+    program = written.program
     if job.workpiece is not None:
         stock = real_stock_body(job, program)
         what, count = "a workpiece", len(job.workpiece.clamp)
@@ -235,8 +229,8 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     ], attainable
 
 
-def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spindle]:
-    """Machine, material, fuzzy table, program and spindle of a job, checked against one another.
+def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, WrittenProgram, Spindle]:
+    """Machine, material, fuzzy table, written program and spindle of a job, checked against one another.
 
     Raises
     ------
@@ -246,7 +240,8 @@ def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spin
     machine, material, table = _named(job)
     require_linear(material)
     _acceleration(job, machine)
-    program = program_of(job, machine)
+    written = written_program(job, machine)
+    program = written.program
     spindle = spindle_of(job, program.spindle)
     period = 1e-3 * job.table.loop.period_ms
     check_light(spindle, period, 1e3 * job.table.torque_control.override.light_nm)
@@ -256,7 +251,7 @@ def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, Program, Spin
     counted(program, job.cutters, resolution_in_stock(job, program))
     if job.workpiece is not None:
         require_clamped(workpiece_of(job.workpiece), real_stock_body(job, program))
-    return machine, material, table, program, spindle
+    return machine, material, table, written, spindle
 
 
 def _acceleration(job: TorqueJob, machine: Machine) -> float:
