@@ -8,6 +8,7 @@ helix_deg = 30.0
 flute_length_mm = 20.0
 overhang_mm = 30.0
 modulus_gpa = 580.0
+runout_mm = 0.0
 """
 
 

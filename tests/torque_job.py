@@ -31,7 +31,7 @@ period_ms = 10.0
 latency_ms = 50.0
 override_step = 0.01
 """
-#: rounds of a thin tube with three surprises
+#: rounds of a thin tube with three surprises, planned by the nominal loads
 TUBE_JOB = (
     """
 [round]
@@ -92,6 +92,8 @@ idle_percent = 0.5
 step_mm = 2.0
 layer_mm = 0.5
 tolerance_mm = 0.02
+[checks]
+confidence = 0.5
 [limits]
 form_error_um = 30.0
 strength_share = 0.9

@@ -90,7 +90,7 @@ def slot_job() -> Job:
         "material": {"name": "al7075-t6"},
         "cutter": [dict(END_MILL)],
         "operation": [{"kind": "simulate", "step_mm": 2.0}],
-        "limits": {"force_n": 1500.0, "torque_nm": 6.0},
+        "limits": {"force_n": 1500.0, "torque_nm": 9.0},
     }
     return Job(tables, {"p.ngc": SLOT})
 

@@ -83,7 +83,7 @@ def test_a_slot_in_numbers(history) -> None:
     assert [x.name for x in history.limits] == [
         "force_n", "spindle_torque_nm", "spindle_power_w", "cutter_stress_mpa", "axial_overrun_mm", "deflection_share"
     ]  # fmt: skip
-    assert history.message.startswith("Holds: force ")
+    assert history.message.startswith("Holds at 95 %: force ")
     assert len(history) == len(history["force_n"]) == said["steps"]
     assert history["force_n"].max() == said["force_n"]["max"] == history.limits[0].worst
 
@@ -197,7 +197,7 @@ def test_pandas_has_every_column(history) -> None:
 
 def test_a_notebook_shows_the_verdict_and_text_is_escaped(history) -> None:
     html = history._repr_html_()
-    assert "color:#0b6b4f'>Holds: force " in html
+    assert "color:#0b6b4f'>Holds at 95 %: force " in html
     assert "greatest force [N]" in html
 
 

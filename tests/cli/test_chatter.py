@@ -19,7 +19,7 @@ def test_the_example_chatters_as_posted_and_holds_at_the_new_speed(tmp_path: Pat
     coarse = ["--set", "operation.0.step_mm=6", "--set", "stock.layer_mm=2"]
     code, out, _ = call("run", folder / "job.toml", "--out", tmp_path / "new", *coarse)
     assert code == 0, out
-    assert out.startswith("Holds: ")
+    assert out.startswith("Holds at 95 %: ")
     told = json.loads((tmp_path / "new" / "summary.json").read_text())["operations"][0]
     assert told["speeds"]["before"]["margin_min"] < 0.95
     assert told["speeds"]["after"]["margin_min"] == told["stability"]["margin_min"] > 2.0

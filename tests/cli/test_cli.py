@@ -135,7 +135,7 @@ def test_check_reads_and_plans_nothing(job_dir: Path) -> None:
     code, out, err = call("check", job_dir / "job.toml", *(word for text in pocket for word in ("--set", text)))
     assert (code, out) == (2, "")
     assert "a closed contour is needed" in err
-    assert sorted(p.name for p in job_dir.iterdir()) == ["README.md", "corner.dxf", "job.toml"]
+    assert sorted(p.name for p in job_dir.iterdir()) == ["README.md", "al7075-carbide.toml", "corner.dxf", "job.toml"]
 
 
 @pytest.mark.parametrize(

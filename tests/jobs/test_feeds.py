@@ -33,7 +33,11 @@ HEAD = "G21 G90 G94 G17\nT1 M6\nS3000 M3\n"
 SLOT = HEAD + "G0 X-8 Y0 Z5\nG0 Z-3\nG1 X34 F600 (slot)\nG0 Z5\nM2\n"
 
 
-def done(folder: Path, text: str, limits: str, changes: tuple[str, ...] = (), job: str = JOB) -> FinishedJob:
+#: closed forms give nominal loads; the budget at 95 % has tests of its own
+NOMINAL = "checks.confidence=0.5"
+
+
+def done(folder: Path, text: str, limits: str, changes: tuple[str, ...] = (NOMINAL,), job: str = JOB) -> FinishedJob:
     (folder / "m.toml").write_text(MATERIAL)
     (folder / "a.ngc").write_bytes(text.encode())
     (folder / "job.toml").write_text(job + limits)
@@ -180,7 +184,7 @@ M2
 
 
 def test_each_line_is_held_by_what_the_job_and_the_machine_say(tmp_path: Path) -> None:
-    more = ("operation.0.feeds.air_mm_min=4000", "operation.0.feeds.fastest_mm_min=900")
+    more = ("operation.0.feeds.air_mm_min=4000", "operation.0.feeds.fastest_mm_min=900", NOMINAL)
     read = done(tmp_path, WAYS, "force_n = 620.0\n", more)
     held = dict(zip(read.outcome.feeds.line.tolist(), read.outcome.feeds.by, strict=True))
     # 0.02 mm from full feed to rest: sqrt(2 a s) is asked, no more
@@ -215,7 +219,7 @@ def test_what_no_feed_can_hold_is_listed_and_said_in_the_first_line(tmp_path: Pa
 
 def test_lines_that_would_rub_are_listed(tmp_path: Path) -> None:
     """The least feed per tooth is a floor under limits, and what the fastest feed keeps below it is said."""
-    least = ("operation.0.feeds.tooth_feed_least_mm=0.05",)
+    least = ("operation.0.feeds.tooth_feed_least_mm=0.05", NOMINAL)
     slow = done(tmp_path, SLOT, "force_n = 50.0\n", least)
     assert feed_of(slow.outcome.feeds.text, 6) == pytest.approx(0.05 * 2 * 3000, rel=1.2e-3)
     assert slow.outcome.feeds.rubs == ()
@@ -392,7 +396,7 @@ def test_feeds_at_a_confidence_hold_at_it_and_use_it(tmp_path: Path, name: str) 
     resolution error alone.
     """
     limit = LIMITS[name] * (1.0 if name == "chip_max_mm" else 2.0)
-    read = done(tmp_path, SLOT, f"{name} = {limit}\n[checks]\nconfidence = 0.95\ncutter_strength = false\n")
+    read = done(tmp_path, SLOT, f"{name} = {limit}\n[checks]\ncutter_strength = false\n", ())
     (check,) = (c for c in read.result.limits if c.name == name)
     assert check.state is Verdict.HOLDS, check.text
     assert read.outcome.feeds.by == (name,)

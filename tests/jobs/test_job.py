@@ -26,7 +26,7 @@ def loaded(path: str | Path, overrides: Sequence[str] = ()) -> ContourJob:
 def test_the_example_is_read_whole(job_dir: Path) -> None:
     job = loaded(job_dir / "job.toml")
     assert job.part_file == job_dir / "corner.dxf"
-    assert (job.machine, job.material) == ("vmc", "al7075-carbide")
+    assert (job.machine, job.material) == ("vmc", job_dir / "al7075-carbide.toml")
     assert job.cutters[1].diameter == 10.0
     assert job.cutters[1].helix == pytest.approx(math.radians(30.0))
     assert job.operations[0].strategies == ("plain", "backward", "feed")

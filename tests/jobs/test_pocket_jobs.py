@@ -13,6 +13,9 @@ import shapely
 from chipload.errors import InputError
 from pocket_job import SQUARE, checked, done, operation, swept, written
 
+#: the limits are used up by the nominal loads
+NOMINAL = "\n[checks]\nconfidence = 0.5\n"
+
 
 def test_levels(tmp_path):
     """10 mm in levels of at most 4: three of 3.333 mm, each the same path, and three times the cutting time."""
@@ -135,7 +138,7 @@ def _ring(allowance: float) -> float:
 def test_the_engagement_that_the_limits_allow(tmp_path, limits, by):
     """The limit is used, and nowhere exceeded."""
     (pocket,), outcome = done(
-        written(tmp_path, {"part": [SQUARE]}, operation('engagement_deg = "limit"'), limits=limits)
+        written(tmp_path, {"part": [SQUARE]}, operation('engagement_deg = "limit"'), limits=limits + NOMINAL)
     )
     (text,) = outcome.operations[0].result.findings
     assert f"by {by}" in text
@@ -145,7 +148,7 @@ def test_the_engagement_that_the_limits_allow(tmp_path, limits, by):
     (tighter,), _ = done(
         written(
             tmp_path, {"part": [SQUARE]}, operation('engagement_deg = "limit"'),
-            limits=limits.replace(str(limit), str(0.9 * limit)),
+            limits=limits.replace(str(limit), str(0.9 * limit)) + NOMINAL,
         )
     )  # fmt: skip
     assert tighter.summary["engagement_deg"]["wanted"] < pocket.summary["engagement_deg"]["wanted"]

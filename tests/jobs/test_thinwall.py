@@ -41,6 +41,7 @@ SMALL = (
     "operation.0.corner_slices=60",
     "operation.0.reserve=0.1",
     "limits.deflection_workpiece_um=38.0",
+    "checks.confidence=0.5",
 )
 
 

@@ -28,6 +28,7 @@ SMALL = (
     "wall.allowance_mm=[0.3, 0.3]",
     "wall.elements=[6, 6]",
     "limits.deflection_workpiece_um=15.0",
+    "checks.confidence=0.5",
 )
 
 

@@ -38,6 +38,8 @@ STEEPER = 1e-3
 #: steps with less than this share of the greatest load of their tool are not judged by their deflection: the cutter
 #: only touches there
 LOADED = 0.1
+#: what is not checked at a confidence of 0.5
+NOMINAL = "at 50 % the spread of coefficients and runout: not counted, checks.confidence is 0.5"
 #: share by which the thickest chip between the paths of two teeth may be above the feed, by which a range was measured
 RANGE_SLACK = 1e-3
 #: the column by which :func:`_could_be_greatest` judges a step, the first that a track has
@@ -73,7 +75,7 @@ class DefaultChecks:
     cutters: Mapping[int, Cutter]
     material: Material
     off: tuple[str, ...] = ()
-    confidence: float = 0.5
+    confidence: float = CheckSettings.confidence
     parts: Mapping[tuple[int, str], LoadParts] = field(default_factory=dict)
     of_feed: float = OF_FEED
     of_depth: float = OF_DEPTH
@@ -142,8 +144,9 @@ def check_columns(
 
 
 def unchecked_checks(checks: DefaultChecks) -> tuple[str, ...]:
-    """Checks that are switched off, and cutters whose chip space is not stated."""
-    out = [f"check {name}: switched off by the job" for name in checks.off]
+    """Checks that are switched off, what a confidence of 0.5 leaves out, and cutters whose chip space is not stated."""
+    out = [] if checks.confidence > 0.5 else [NOMINAL]
+    out += [f"check {name}: switched off by the job" for name in checks.off]
     roomless = [n for n, c in sorted(checks.cutters.items()) if c.gullet is None and not c.body]
     if roomless:
         out.append(f"chip space of tools {', '.join(map(str, roomless))}: gullet_mm2 is not stated")

@@ -111,7 +111,8 @@ class CheckSettings:
     Parameters
     ----------
     confidence : one-sided, at which limits of loads are held: with resolution, runout that is not known, coefficients,
-        bending, thin chips and turns; 0.5: at nominal values, with their resolution alone
+        bending, thin chips and turns; 0.5: at nominal values, so that the spread of coefficients and runout is not
+        counted
     cutter_strength : stress of the cutter against its strength
     flute_length : the cutter does not cut above its flutes
     chip_space : the chip space, where ``gullet_mm2`` of a cutter is stated
@@ -129,7 +130,7 @@ class CheckSettings:
         its foot: 0.33 um/N at its edge (:mod:`chipload.simulation.heights.slender_walls`)
     """
 
-    confidence: float = number_field(0.5, least=0.5, below=1.0)
+    confidence: float = number_field(0.95, least=0.5, below=1.0)
     cutter_strength: bool = True
     flute_length: bool = True
     chip_space: bool = True

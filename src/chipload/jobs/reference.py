@@ -96,7 +96,7 @@ EXAMPLES = {
     "density_kg_m3": "4430.0", "diameter_mm": "10.0", "flutes": "4", "helix_deg": "30.0", "feed_mm_min": "600.0",
     "speed_rpm": "6000.0", "overhang_mm": "40.0", "flute_length_mm": "22.0", "axial_depth_mm": "5.0",
     "radial_depth_mm": "0.5", "step_mm": "0.5", "layer_mm": "0.5", "force_n": "800.0", "torque_nm": "4.0",
-    "power_w": "3000.0", "number": "1", "cutter": "1", "confidence": "0.95", "fastest_percent": "200.0",
+    "power_w": "3000.0", "number": "1", "cutter": "1", "confidence": "0.99", "fastest_percent": "200.0",
     "dynamics.file": '"modes.toml"', "frequency_hz": "812.0", "damping_ratio": "0.02", "stiffness_n_um": "8.0",
     "mass_kg": "0.3", "least_rpm": "5000.0", "most_rpm": "12000.0", "stability_margin": "1.2",
     "stable_probability": "0.95", "frequency_percent": "2.0", "fit_mm": "0.001", "reserve": "0.1",

@@ -179,7 +179,7 @@ class ChecksTable(Table):
         CheckSettings,
         "confidence",
         "one-sided confidence at which limits of loads are held, with runout that is not known, coefficients, bending, "
-        "thin chips and turns; 0.5: at nominal values, with their resolution alone",
+        "thin chips and turns; 0.5: at nominal values, so that the spread of coefficients and runout is not counted",
     )
     cutter_strength: bool = _switch("cutter_strength", "check the stress of the cutter against its strength")
     flute_length: bool = _switch("flute_length", "check that the cutter does not cut above its flutes")

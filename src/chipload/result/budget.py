@@ -22,6 +22,8 @@ from chipload.number_text import number_text
 
 #: confidence of the value that is shown beside the nominal one where limits are held at the nominal one
 SHOWN = 0.95
+#: begins a remedy where one part alone takes the value beyond its limit
+ALONE = "only by "
 
 
 @dataclass(frozen=True)
@@ -116,17 +118,26 @@ class ErrorBudget:
         return ", ".join(f"{name} {number_text(x, 2)}" for name, x in shown)
 
     def remedy(self, nominal: float, limit: float, *, least: bool = False) -> str:
-        """Return the one statement that brings the value within its limit, or does most for it; empty: none does."""
-        stated = [(part, part.alone(self.confidence)) for part in self.parts if part.remedy]
-        if not stated:
-            return ""
+        """Return the one statement that brings the value within its limit, or does most for it; empty: none does.
+
+        Where one part alone takes the value beyond the limit, the text says so.
+
+        >>> fit = ErrorPart("coefficients", deviation=0.1, remedy="fit them")
+        >>> own = ErrorBudget(0.95, (fit, ErrorPart("turns", deviation=0.015)))
+        >>> own.remedy(180.0, 190.0)
+        'only by coefficients: fit them'
+        """
         settling = []
-        for part, x in stated:
+        for part in self.parts:
             rest = ErrorBudget(self.confidence, tuple(p for p in self.parts if p is not part))
             value = rest.value(nominal, least=least)
             if value >= limit if least else value <= limit:
-                settling.append((part, x))
-        return max(settling or stated, key=lambda each: each[1])[0].remedy
+                settling.append(part)
+        stated = [part for part in settling if part.remedy] or [part for part in self.parts if part.remedy]
+        if not stated:
+            return ""
+        text = max(stated, key=lambda part: part.alone(self.confidence)).remedy
+        return f"{ALONE}{settling[0].name}: {text}" if len(settling) == 1 and settling[0].remedy else text
 
 
 def _factor(parts: tuple[ErrorPart, ...], confidence: float) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.number_text import number_text, percent_text
-from chipload.result.budget import ErrorBudget, level_text
+from chipload.result.budget import ALONE, ErrorBudget, level_text
 from chipload.result.columns import Column, column_of, error_of
 from chipload.result.coverage import FAR_BEYOND, WHOLE, Coverage, CoveredRows, coverage_of
 from chipload.result.verdict import Verdict
@@ -247,7 +247,7 @@ def hold_at_confidence(check: LimitCheck, budget: ErrorBudget) -> LimitCheck:
     >>> hold_at_confidence(check, ErrorBudget(0.95, (fit,))).text
     'force 150 + 27 of 200 N'
     >>> hold_at_confidence(check, ErrorBudget(0.999, (fit,))).text
-    'force 150 + 54 of 200 N, unproven: at 99.9 % it may be 204 N (coefficients 54): fit them'
+    'force 150 + 54 of 200 N, unproven: at 99.9 % it may be 204 N (coefficients 54), only by coefficients: fit them'
     """
     if check.worst is None:
         return check
@@ -262,7 +262,8 @@ def hold_at_confidence(check: LimitCheck, budget: ErrorBudget) -> LimitCheck:
     remedy = budget.remedy(abs(check.worst), check.limit, least=least)
     parts = budget.parts_text(check.worst)
     reason = f"at {level_text(budget.confidence)} it may be {number_text(value, 3)}{unit} ({parts})"
-    return replace(out, state=Verdict.UNPROVEN, reason=f"{reason}: {remedy}" if remedy else reason)
+    joint = ", " if remedy.startswith(ALONE) else ": "
+    return replace(out, state=Verdict.UNPROVEN, reason=f"{reason}{joint}{remedy}" if remedy else reason)
 
 
 def state_of(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from chipload.control.linuxcnc.path import ToolPath, tool_path
 from chipload.control.wall import Loads, PathLimit, UnitResponse, WallPath, path_limit, row_means, unit_response
 from chipload.cutting.material import Material
+from chipload.jobs.torque.confidence import limit_at_confidence
 from chipload.jobs.torque.cut import (
     Cut,
     CutSteps,
@@ -97,7 +98,7 @@ def allowable(
     loads = true_loads(real.loads, real.points, place, surprises)
     shell = wall_of(job)
     width = contact_width(job.shell.stock_mm, job.cutters)
-    thin, limit = limit_of(job, planned)
+    thin, limit = limit_of(job, planned, material)
     thickness = shell.thickness * (1.0 - thinner)
     true = thin if thin.shell.thickness == thickness else ritz(replace(shell, thickness=thickness))
     stated = job.table.limits.torque_nm
@@ -121,12 +122,17 @@ def thinnest(job: TorqueJob) -> Shell:
     return replace(shell, thickness=shell.thickness - job.shell.wall_tolerance_mm)
 
 
-def limit_of(job: TorqueJob, planned: Cut) -> tuple[Ritz, PathLimit]:
-    """The thinnest wall and the allowable torque along the plan."""
+def limit_of(job: TorqueJob, planned: Cut, material: Material) -> tuple[Ritz, PathLimit]:
+    """The thinnest wall and the allowable torque along the plan, with the forces at the confidence of the checks."""
     thin = ritz(thinnest(job))
     width = contact_width(job.shell.stock_mm, job.cutters)
     wall = unit_response(thin, planned.near, planned.far, width, planned.tool)
-    return thin, path_limit(planned.loads, wall, *allowed(job))
+
+    def limit(factors: Floats) -> PathLimit:
+        more = UnitResponse(factors * wall.compliance, factors * wall.stress)
+        return path_limit(planned.loads, more, *allowed(job))
+
+    return thin, limit_at_confidence(job, planned, material, limit)[0]
 
 
 def allowed(job: TorqueJob) -> tuple[float, float]:

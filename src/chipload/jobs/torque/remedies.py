@@ -2,7 +2,7 @@
 
 Notation: F_e edge force at a step, in proportion to its depth of cut; F_lim = min(d / (C_w + C_t), S / g) as in
 :mod:`chipload.control.wall`, for another depth of cut, wall, free length or overhang. A change would do where F_lim
-exceeds F_e by :data:`MARGIN`, which leaves something for the chip.
+exceeds F_e, at the confidence of the checks, by :data:`MARGIN`, which leaves something for the chip.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from chipload.control.wall import PathLimit, unit_response
+from chipload.cutting.material import Material
+from chipload.jobs.torque.confidence import force_factors
 from chipload.jobs.torque.cut import Cut, contact_width
 from chipload.jobs.torque.job import TorqueJob
 from chipload.structure.shell import Ritz, Shell, ritz
@@ -35,14 +37,15 @@ class HardestPlace:
     edge: float
 
 
-def remedies(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) -> list[str]:
+def remedies(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit, material: Material) -> list[str]:
     """Changes each of which alone would do; ``shell``: the wall for which the limit is calculated."""
+    margin = MARGIN * float(force_factors(job, planned, material, 0.0).max())
     places = _hardest_places(planned, limit)
     k = limit.step
     depth, tolerance, modes = float(planned.far[k] - planned.near[k]), job.shell.wall_tolerance_mm, ritz(shell)
 
     def allowed(modes: Ritz, *changed: HardestPlace) -> bool:
-        return all(_allowed(job, modes, at) >= MARGIN * at.edge for at in changed)
+        return all(_allowed(job, modes, at) >= margin * at.edge for at in changed)
 
     def shallower(share: float) -> bool:
         return allowed(modes, *(
@@ -89,9 +92,9 @@ def _hardest_places(planned: Cut, limit: PathLimit) -> list[HardestPlace]:
     ]
 
 
-def remedy_text(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit) -> str:
+def remedy_text(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit, material: Material) -> str:
     """Remedies in a sentence."""
-    found = remedies(job, shell, planned, limit)
+    found = remedies(job, shell, planned, limit, material)
     if not found:
         return (
             "no feed keeps the limits, and no change of depth of cut, wall, clamp or overhang alone does: state a "

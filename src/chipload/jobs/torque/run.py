@@ -79,7 +79,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
     wall: ShellWall | ClampedWorkpiece
     if job.workpiece is not None:
         work = allowable_on_workpiece(job, program, material, machine, cutting)
-        found, wall = allowable_torque(job, work), clamped_workpiece(job, work)
+        found, wall = allowable_torque(job, work, material), clamped_workpiece(job, work)
         own = Followed(work.planned, work.real, work.loads, work.walls)
     else:
         a = allowable(job, program, material, machine, cutting)

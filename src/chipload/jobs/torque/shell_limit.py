@@ -60,7 +60,7 @@ def shell_torque(job: TorqueJob, a: Allowable, material: Material) -> AllowableT
         torque=a.torque,
         true_torque=path_limit(a.loads, a.response, *allowed(job)).torque,
         one_tooth=_one_tooth(a.limit, a.planned, material, job),
-        remedy="" if a.torque > 0.0 else remedy_text(job, a.thin.shell, a.planned, a.limit),
+        remedy="" if a.torque > 0.0 else remedy_text(job, a.thin.shell, a.planned, a.limit, material),
         path=a.path,
     )
 
@@ -78,11 +78,11 @@ def preview_of_shell(job: TorqueJob, program: Program, material: Material, machi
     if counted(program, job.cutters, resolution_in_stock(rough, program)) > MOST_PREVIEWED:
         return "the run finds the torque limit", True
     planned = cut(rough, program, shell_stock(rough, program), material, machine.rapid, silent)
-    _, limit = limit_of(rough, planned)
+    _, limit = limit_of(rough, planned, material)
     where = f"by the wall's {limit.by}, {planned.far[limit.step]:.3g} mm from the clamp"
     if limit.torque <= 0.0:
         shell = thinnest(rough)
-        return f"no torque is allowable, {where}: {remedy_text(rough, shell, planned, limit)}", False
+        return f"no torque is allowable, {where}: {remedy_text(rough, shell, planned, limit, material)}", False
     return limit_text(planned, limit, where), True
 
 

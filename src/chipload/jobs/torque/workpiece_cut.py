@@ -37,6 +37,7 @@ from chipload.jobs.simulation.tables import SolidTable
 from chipload.jobs.simulation.values import stock_of, workpiece_of
 from chipload.jobs.tables import stated
 from chipload.jobs.torque.allowable import path_of, relief_of
+from chipload.jobs.torque.confidence import limit_at_confidence
 from chipload.jobs.torque.cut import (
     LITTLE_MPA,
     CutSteps,
@@ -211,14 +212,14 @@ def deflections(
 
 
 def responses_of(
-    job: TorqueJob, cut: WorkpieceCut, factors: tuple[Floats, Floats] | None = None, margin: float = 0.0
+    job: TorqueJob, cut: WorkpieceCut, factors: tuple[Floats, Floats] | None = None, margin: Floats | float = 0.0
 ) -> list[LimitedResponse]:
     """Limited responses of a cut by the limits of the job.
 
     Parameters
     ----------
     factors : (n,) of the parts of the edge and of the feed
-    margin : share by which compliance and stress count as greater
+    margin : (n,) or a number, share by which compliance and stress count as greater
     """
     limits, ones = job.table.limits, np.ones(len(cut.feed))
     e, c = factors or (ones, ones)
@@ -249,6 +250,18 @@ def limit_on_workpiece(loads: Loads, responses: list[LimitedResponse]) -> PathLi
     return found
 
 
+def planned_limit(job: TorqueJob, planned: WorkpieceCut, material: Material) -> tuple[PathLimit, Floats]:
+    """Allowable torque along the plan with the forces at the confidence of the checks, and the (n,) share by which the
+    responses count as greater for it.
+    """
+    wider = 1.0 + planned.compliance.error
+    limit, factors = limit_at_confidence(
+        job, planned, material,
+        lambda x: limit_on_workpiece(planned.loads, responses_of(job, planned, margin=wider * x - 1.0)),
+    )  # fmt: skip
+    return limit, wider * factors - 1.0
+
+
 def allowable_on_workpiece(
     job: TorqueJob, program: Program, material: Material, machine: Machine, progress: Progress = silent
 ) -> AllowableWorkpiece:
@@ -269,7 +282,7 @@ def allowable_on_workpiece(
     loads = Loads(
         real.loads.torque_edge * e, real.loads.torque_cut * c, real.loads.force_edge * e, real.loads.force_cut * c
     )
-    limit = limit_on_workpiece(planned.loads, responses_of(job, planned, margin=planned.compliance.error))
+    limit, _ = planned_limit(job, planned, material)
     most = table.limits.torque_nm
     torque = limit.torque if most is None else min(limit.torque, 1e3 * most)
     return AllowableWorkpiece(

@@ -23,7 +23,7 @@ from chipload.jobs.torque.remedies import MARGIN
 from chipload.jobs.torque.workpiece_cut import (
     AllowableWorkpiece,
     WorkpieceCut,
-    limit_on_workpiece,
+    planned_limit,
     responses_of,
     workpiece_cut,
 )
@@ -42,14 +42,14 @@ def clamped_workpiece(job: TorqueJob, a: AllowableWorkpiece) -> ClampedWorkpiece
     return ClampedWorkpiece(planned, real, (a.planned.strained, a.real.strained), strength, a.real.stock)
 
 
-def allowable_torque(job: TorqueJob, a: AllowableWorkpiece) -> AllowableTorque:
+def allowable_torque(job: TorqueJob, a: AllowableWorkpiece, material: Material) -> AllowableTorque:
     """Allowable torque of the workpiece, in the result."""
     return AllowableTorque(
         limit=a.limit,
         torque=a.torque,
         true_torque=a.true_limit.torque,
         one_tooth=None,
-        remedy="" if a.torque > 0.0 else remedy_on_workpiece(job, a.planned, a.limit),
+        remedy="" if a.torque > 0.0 else remedy_on_workpiece(job, a.planned, a.limit, material),
         path=a.path,
     )
 
@@ -63,18 +63,17 @@ def preview_on_workpiece(job: TorqueJob, program: Program, material: Material, m
     if counted(program, job.cutters, resolution_in_stock(rough, program)) > MOST_PREVIEWED:
         return "the run finds the torque limit", True
     planned = workpiece_cut(rough, stock, program, material, machine.rapid)
-    margin = planned.compliance.error
-    limit = limit_on_workpiece(planned.loads, responses_of(rough, planned, margin=margin))
+    limit, _ = planned_limit(rough, planned, material)
     line = int(planned.removal.columns["line"][planned.rows][limit.step])
     where = f"by the {limit.by.removeprefix('workpiece ')} of the workpiece in line {line}"
     if limit.torque <= 0.0:
-        return f"no torque is allowable, {where}: {remedy_on_workpiece(rough, planned, limit)}", False
+        return f"no torque is allowable, {where}: {remedy_on_workpiece(rough, planned, limit, material)}", False
     return limit_text(planned, limit, where), True
 
 
-def remedy_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit) -> str:
+def remedy_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit, material: Material) -> str:
     """Remedies where no torque is allowable, in a sentence."""
-    found = remedies_on_workpiece(job, planned, limit)
+    found = remedies_on_workpiece(job, planned, limit, material)
     if not found:
         return (
             "no feed keeps the limits, and no change of depth of cut, clamp, wall or overhang alone does: state a "
@@ -83,10 +82,11 @@ def remedy_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit)
     return f"no feed keeps the limits; one of these changes does: {'; '.join(found)}; or a sharper cutter"
 
 
-def remedies_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit) -> list[str]:
+def remedies_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimit, material: Material) -> list[str]:
     """Changes each of which alone would do."""
-    k, margin = limit.step, planned.compliance.error
-    response = next(r for r in responses_of(job, planned, margin=margin) if r.by == limit.by)
+    k, margins = limit.step, planned_limit(job, planned, material)[1]
+    response = next(r for r in responses_of(job, planned, margin=margins) if r.by == limit.by)
+    margin = float(margins[k])
     edge, allowed = float(response.edge[k]), response.most / MARGIN
     out = [_depth_text(planned, k, allowed / edge)]
     if limit.by == "strength":
