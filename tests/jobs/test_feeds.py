@@ -26,6 +26,7 @@ JOB = made_up_job(
 slowest_percent = 10.0
 fastest_percent = 900.0
 change_least_percent = 0.0
+divide = false
 [limits]
 """,
 )

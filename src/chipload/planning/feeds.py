@@ -62,8 +62,8 @@ class LineFeeds:
     by: Ints
 
 
-#: codes of what holds a line beside those of the caller
-SLOWEST, KEPT = -1, -2
+#: codes of what holds a line besides limits, whose codes follow
+SLOWEST, KEPT, FASTEST, MACHINE, AIR, LIMITED = -1, -2, 0, 1, 2, 3
 
 
 def greatest_factor(

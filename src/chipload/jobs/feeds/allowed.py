@@ -24,12 +24,25 @@ from chipload.cutting.load_parts import LoadParts, load_parts
 from chipload.cutting.material import Material
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.engagement.tooth_surfaces import thickest_of_teeth
+from chipload.jobs.feeds.division import Allowed, DividedProgram, divide_lines, undivided, whole_feeds
 from chipload.jobs.feeds.outcome import FeedResult
 from chipload.jobs.feeds.tables import FeedsTable
 from chipload.jobs.feeds.verify import require_same, rubbing_lines, speeds_of, tooth_feeds
 from chipload.machine.feed import row_time_limited
 from chipload.machine.machine import Machine
-from chipload.planning.feeds import KEPT, SLOWEST, LineFeeds, StepContact, greatest_factor, line_feeds, steady_feeds
+from chipload.planning.feeds import (
+    AIR,
+    FASTEST,
+    KEPT,
+    LIMITED,
+    MACHINE,
+    SLOWEST,
+    LineFeeds,
+    StepContact,
+    greatest_factor,
+    line_feeds,
+    steady_feeds,
+)
 from chipload.program.gcode.feed_words import DIGITS, with_feeds
 from chipload.program.program import DWELL, RAPID
 from chipload.program.read import ProgramReading
@@ -43,8 +56,6 @@ from chipload.units import mm_s_from_mm_min
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: what holds a line besides limits, whose codes follow
-FASTEST, MACHINE, AIR, LIMITED = 0, 1, 2, 3
 #: the limit, and the column, of the stress of a cutter
 STRESS = "cutter_stress_mpa"
 #: the thickest chip of a step
@@ -256,12 +267,20 @@ def with_new_feeds(
     cuts = feeds & (touch == StepContact.CUT)
     if cuts.any():
         most, by = np.where(cuts, allowed[_FACTOR], most), np.where(cuts, allowed[_BY].astype(np.int64), by)
-    lines = line_feeds(*(x[feeds] for x in (steps.line, touch, least, most, by)))
-    lines = _in_air(lines, steps, feeds, request.table, machine)
-    factor, useful = _feed_factors(lines, reading, machine, request.table)
-    new = with_feeds(text, dict(zip(lines.line.tolist(), factor.tolist(), strict=True)))
+    of_steps = Allowed(touch, least, most, by)
+    if request.table.divide:
+        air = np.where(feeds, _air_factor(speeds_of(steps), request.table, machine), 1.0)
+        divided = divide_lines(text, reading, steps, of_steps, air, machine, read)
+    else:
+        divided = undivided(text, reading, steps, of_steps)
+    of_steps, at = divided.allowed, divided.step
+    lines = line_feeds(divided.line, of_steps.touch[at], of_steps.least[at], of_steps.most[at], of_steps.by[at])
+    lines = _in_air(lines, divided, speeds_of(steps), request.table, machine)
+    segments = np.isin(lines.line, [line for lines_of in divided.segments.values() for line in lines_of])
+    factor, useful = _feed_factors(lines, divided.reading, machine, request.table, segments)
+    new = with_feeds(divided.text, dict(zip(lines.line.tolist(), factor.tolist(), strict=True)))
     after = read(new)
-    require_same(reading.program, after.program, lines.line, factor)
+    require_same(divided.reading.program, after.program, lines.line, factor)
     names = {FASTEST: "fastest", MACHINE: "machine", AIR: "air", SLOWEST: "slowest", KEPT: "programmed"}
     names |= {LIMITED + k: name for k, name in enumerate(request.feed_limits)}
     limited_by = np.where((useful < lines.allowed) & (lines.by != SLOWEST), MACHINE, lines.by)
@@ -272,8 +291,10 @@ def with_new_feeds(
         factor=factor,
         by=tuple(names[k] for k in limited_by.tolist()),
         before=before,
-        rubs=rubbing_lines(lines, factor, steps, cuts, request.table, cutters),
+        rubs=rubbing_lines(lines, factor, divided, steps, cuts, request.table, cutters),
         tooth_feed_least=request.table.tooth_feed_least_mm,
+        segments=divided.segments,
+        not_divided=divided.kept,
         seconds_before=seconds,
     )
     return fed, after
@@ -297,23 +318,36 @@ def _bounds(
     return np.minimum(least, most), most, by
 
 
-def _in_air(lines: LineFeeds, steps: Steps, feeds: NDArray[np.bool_], table: FeedsTable, machine: Machine) -> LineFeeds:
+def _air_factor(speed: Floats, table: FeedsTable, machine: Machine) -> Floats:
+    """Return the feed factor in air (n,) of speeds [mm/s]: 1 for those that are no slower than the feed in air."""
+    if table.air_mm_min is None:
+        return np.ones(len(speed))
+    feed = min(mm_s_from_mm_min(table.air_mm_min), machine.feed_max)
+    return np.where((speed > 0.0) & (speed < feed), feed / np.where(speed > 0.0, speed, 1.0), 1.0)
+
+
+def _in_air(lines: LineFeeds, divided: DividedProgram, speed: Floats, table: FeedsTable, machine: Machine) -> LineFeeds:
     """Raise the feed of lines that cut nothing to the feed in air of the job; faster lines keep theirs."""
     air = lines.touch == StepContact.AIR
     allowed, by = np.where(air, 1.0, lines.allowed), np.where(air, KEPT, lines.by)
     if table.air_mm_min is not None:
-        air_feed, fastest = mm_s_from_mm_min(table.air_mm_min), np.zeros(len(lines.line))
-        np.maximum.at(fastest, np.searchsorted(lines.line, steps.line[feeds]), speeds_of(steps)[feeds])
-        faster = air & (fastest > 0.0) & (fastest < min(air_feed, machine.feed_max))
-        allowed = np.where(faster, min(air_feed, machine.feed_max) / np.where(faster, fastest, 1.0), allowed)
-        by = np.where(faster, MACHINE if air_feed > machine.feed_max else AIR, by)
+        fastest = np.zeros(len(lines.line))
+        np.maximum.at(fastest, np.searchsorted(lines.line, divided.line), speed[divided.step])
+        factor = _air_factor(fastest, table, machine)
+        allowed = np.where(air, factor, allowed)
+        by = np.where(
+            air & (factor > 1.0), MACHINE if mm_s_from_mm_min(table.air_mm_min) > machine.feed_max else AIR, by
+        )
     return replace(lines, least=np.where(air, 1.0, lines.least), allowed=allowed, by=by)
 
 
 def _feed_factors(
-    lines: LineFeeds, reading: ProgramReading, machine: Machine, table: FeedsTable
+    lines: LineFeeds, reading: ProgramReading, machine: Machine, table: FeedsTable, segments: NDArray[np.bool_]
 ) -> tuple[Floats, Floats]:
-    """Return factors (m,) to write, and those above which the machine is no faster (at least 1 or the allowed)."""
+    """Return factors (m,) to write, and those above which the machine is no faster (at least 1 or the allowed).
+
+    ``segments`` (m,) are the lines that are segments of one: each was cut off to have a feed of its own.
+    """
     program = reading.program
     row = np.flatnonzero(np.isin(program.line, lines.line) & (program.motion != RAPID) & (program.motion != DWELL))
     of, m = np.searchsorted(lines.line, program.line[row]), len(lines.line)
@@ -330,8 +364,11 @@ def _feed_factors(
         reach = np.minimum(reach, _by_rates(lines, reading, machine))
     useful = np.minimum(lines.allowed, np.maximum(reach, 1.0))
     # a line whose feed changes within it (a rotary axis moves) is no neighbour of others
-    one = (fast > 0.0) & (fast - slow <= 1e-9 * fast)
+    one = (fast > 0.0) & (fast - slow <= 1e-9 * fast) & ~segments
     out = useful.copy()
+    whole = segments & (fast > 0.0)
+    written = 60.0 * fast[whole] * useful[whole]
+    out[whole] = useful[whole] * whole_feeds(written) / written
     was = fast[one]
     most, enough, least = (was * x[one] for x in (lines.allowed, useful, lines.least))
     out[one] = steady_feeds(most, enough, least, was, 0.01 * table.change_least_percent) / was

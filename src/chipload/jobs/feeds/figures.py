@@ -14,7 +14,7 @@ from chipload.checking.outcome import SimulationResult
 from chipload.checking.result import changed_name
 from chipload.jobs.feeds.numbers import COMPARED, exceeding, feed_numbers
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
-from chipload.jobs.feeds.result import result_of
+from chipload.jobs.feeds.result import division_notes, result_of
 from chipload.report.presentation import Presentation
 from chipload.report.sheet import figure, table
 from chipload.result import COLUMNS, LimitCheck
@@ -69,7 +69,7 @@ def feed_sections(
         "<h2>Feeds</h2>",
         f"<p>{what['lines_changed']} of {what['lines']} lines with a feed have a new one: {what['lines_slower']} are "
         f"slower, {what['lines_faster']} faster. The program takes {abs(gain):.3g} % "
-        f"{'less' if gain >= 0.0 else 'more'} time. "
+        f"{'less' if gain >= 0.0 else 'more'} time. {escape(' '.join((*division_notes(feeds), '')))}"
         f"<b>{escape(program)}</b> is its text; it was read again and simulated from fresh stock.</p>",
         table(["", "before", "after", "limit"], rows, numbers=(1, 2, 3)),
         figure("feeds", along(feeds, simulation, checks), figures),
@@ -95,21 +95,20 @@ def feed_sections(
 def along(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck]) -> go.Figure:
     """Plot the feed and the limited loads along the path, before and after the change."""
     c = simulation.removal.columns
-    s = np.asarray(c["s_mm"])
     rows: list[tuple[str, str, float | None]] = [("feed_mm_min", "feed [mm/min]", None)]
     rows += [(check.name, check.column.title, check.limit) for check in checks if check.name in COMPARED]
     if len(rows) == 1:
         rows.append(("force_n", "force [N]", None))
     out = make_subplots(rows=len(rows), cols=1, shared_xaxes=True, vertical_spacing=0.04)
-    at_feed = ~np.asarray(c["rapid"])
     for k, (column, title, most) in enumerate(rows, start=1):
         for values, name, colour in ((feeds.before.columns, "before", BEFORE), (c, "after", AFTER)):
-            y = np.where(at_feed, np.asarray(values[column], dtype=np.float64), 0.0)
+            s = np.asarray(values["s_mm"])
+            y = np.where(~np.asarray(values["rapid"]), np.asarray(values[column], dtype=np.float64), 0.0)
             keep = thinned(y, LINE_POINTS)
             out.add_trace(
                 go.Scatter(
                     x=s[keep].astype(np.float32), y=y[keep].astype(np.float32), name=name, mode="lines",
-                    line={"color": colour, "width": 1.2, "shape": "vh"}, customdata=c["line"][keep],
+                    line={"color": colour, "width": 1.2, "shape": "vh"}, customdata=values["line"][keep],
                     hovertemplate=f"{name}: %{{y:.4g}}, line %{{customdata}}<extra>{title}</extra>",
                     showlegend=k == 1,
                 ),

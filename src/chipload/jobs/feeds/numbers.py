@@ -17,14 +17,31 @@ from chipload.result import LimitCheck
 COMPARED = (
     "force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um", "deflection_workpiece_um", "cutter_stress_mpa",
 )  # fmt: skip
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: places on the paths before and after agree within this [mm]: points at which lines are divided are rounded
+SAME_MM = 0.01
 #: lines that summary.json lists
 MOST_LINES = 2000
+
+
+def steps_before(after: Floats, before: Floats) -> Ints:
+    """Return the step (n,) of the program as it was at the end of each step of the new one, by the path [mm].
+
+    >>> steps_before(np.array([1.0, 1.5, 2.0, 4.0]), np.array([1.0, 2.0, 4.0])).tolist()
+    [0, 1, 1, 2]
+    """
+    if len(after) == len(before):
+        return np.arange(len(after))
+    return np.searchsorted(before, after - SAME_MM).clip(0, len(before) - 1)
 
 
 def exceeding(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck]) -> list[dict[str, Any]]:
     """Return the lines of the new program that exceed a load limit, each with its worst step."""
     c, before, out = simulation.removal.columns, feeds.before.columns, []
     factor = dict(zip(feeds.line.tolist(), zip(feeds.factor.tolist(), feeds.by, strict=True), strict=True))
+    was = steps_before(np.asarray(c["s_mm"]), np.asarray(before["s_mm"]))
     place = np.column_stack([c[f"{x}_mm"] for x in "xyz"])
     for check in checks:
         column = check.column.name
@@ -45,7 +62,7 @@ def exceeding(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[
                     "limit": check.name,
                     "allowed": check.limit,
                     "worst": float(values[k]),
-                    "before": float(before[column][k]),
+                    "before": float(before[column][was[k]]),
                     "feed_mm_min": float(c["feed_mm_min"][k]),
                     "factor": times,
                     "slowest": by == "slowest",
@@ -68,10 +85,9 @@ def feed_numbers(
     program : its file
     """
     c, listed = simulation.removal.columns, exceeding(feeds, simulation, checks)
-    cuts = (c["chip_areas"] > 0) & ~c["rapid"]
 
     def loads(columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-        some = columns["feed_mm_min"][cuts]
+        some = columns["feed_mm_min"][(columns["chip_areas"] > 0) & ~columns["rapid"]]
         span = {"min": float(some.min()), "max": float(some.max())} if len(some) else None
         return {k: float(columns[k].max(initial=0.0)) for k in COMPARED if k in columns} | {"feed_mm_min": span}
 
@@ -90,4 +106,7 @@ def feed_numbers(
         "still_exceeding_count": len(listed),
         "rubbing": [{"line": line, "tooth_feed_mm": feed} for line, feed in feeds.rubs[:MOST_LINES]],
         "rubbing_count": len(feeds.rubs),
+        "lines_divided": len(feeds.segments),
+        "segments": sum(len(lines) for lines in feeds.segments.values()),
+        "not_divided": dict(sorted(feeds.not_divided.items())),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,11 +17,13 @@ class FeedResult(ChangedText):
 
     Parameters
     ----------
-    line : (m,) int, lines that move at a feed
+    line : (m,) int, lines of the new text that move at a feed
     factor : (m,) float, the new feed of each over the programmed one
     by : (m,) what holds each: a limit by its name or ``fastest``, ``machine``, ``air``, ``slowest``, ``programmed``
     rubs : lines that cut below the least feed per tooth, and their feeds per tooth [mm]
     tooth_feed_least : [mm]; None: not stated
+    segments : lines of the new text of each divided line, by the line of the old text
+    not_divided : number of lines that would be faster in segments but keep one feed, by the reason
     """
 
     line: NDArray[np.int64]
@@ -28,6 +31,8 @@ class FeedResult(ChangedText):
     by: tuple[str, ...]
     rubs: tuple[tuple[int, float], ...]
     tooth_feed_least: float | None
+    segments: Mapping[int, range]
+    not_divided: Mapping[str, int]
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,20 @@ def result_of(program: FeedsProgram) -> Result:
     )  # fmt: skip
     numbers = {"feeds": feed_numbers(own, simulation, tracks[0].limits, time_s, name)}
     note = f"The program takes {number_text(time_s)} s instead of {number_text(own.seconds_before)} s."
-    return program_result("feeds", program, tracks, numbers, note)
+    return program_result("feeds", program, tracks, numbers, " ".join((note, *division_notes(own))))
+
+
+def division_notes(feeds: FeedResult) -> tuple[str, ...]:
+    """Return sentences on the lines that are divided, and on those that would be faster in segments."""
+    out = []
+    if feeds.segments:
+        segments, lines = sum(len(x) for x in feeds.segments.values()), len(feeds.segments)
+        out.append(f"Divided: {segments} segments in {lines} {'line' if lines == 1 else 'lines'}.")
+    if feeds.not_divided:
+        count = sum(feeds.not_divided.values())
+        why = ", ".join(f"{reason} {n}" for reason, n in sorted(feeds.not_divided.items()))
+        out.append(f"Not divided: {count} {'line that changes' if count == 1 else 'lines that change'} load ({why}).")
+    return tuple(out)
 
 
 def _rubbing(feeds: FeedResult) -> tuple[Finding, ...]:

@@ -29,6 +29,9 @@ class FeedsTable(Table):
         lt=100.0,
         description="a line keeps the feed of the previous line if its own could be faster by less than this",
     )
+    divide: bool = Field(
+        True, description="divide lines into segments of one feed each where the engagement changes; the path stays"
+    )
 
 
 class FeedsOperationTable(SimulateTable):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from chipload.checking.program_text import differing
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
+from chipload.jobs.feeds.division import DividedProgram
 from chipload.jobs.feeds.tables import FeedsTable
 from chipload.planning.feeds import LineFeeds
 from chipload.program.gcode.feed_words import DIGITS
@@ -46,19 +47,22 @@ def require_same(old: Program, new: Program, line: Ints, factor: Floats) -> None
 def rubbing_lines(
     lines: LineFeeds,
     factor: Floats,
+    divided: DividedProgram,
     steps: Steps,
     cuts: NDArray[np.bool_],
     table: FeedsTable,
     cutters: Mapping[int, Cutter],
 ) -> tuple[tuple[int, float], ...]:
-    """Return the lines that cut below the least feed per tooth, and their feeds per tooth [mm]."""
+    """Return the lines of the new text that cut below the least feed per tooth, and their feeds per tooth [mm]."""
     if table.tooth_feed_least_mm is None:
         return ()
-    new = tooth_feeds(steps, cutters)[cuts] * factor[np.searchsorted(lines.line, steps.line[cuts])]
+    at = cuts[divided.step]
+    step, line = divided.step[at], divided.line[at]
+    new = tooth_feeds(steps, cutters)[step] * factor[np.searchsorted(lines.line, line)]
     low = new < table.tooth_feed_least_mm * (1.0 - 2.0 * 10.0 ** (1 - DIGITS))
     worst: dict[int, float] = {}
-    for line, feed in zip(steps.line[cuts][low].tolist(), new[low].tolist(), strict=True):
-        worst[line] = min(worst.get(line, math.inf), feed)
+    for number, feed in zip(line[low].tolist(), new[low].tolist(), strict=True):
+        worst[number] = min(worst.get(number, math.inf), feed)
     return tuple(sorted(worst.items()))
 
 
