@@ -10,12 +10,12 @@ row where the log has no column of time:
     column = "S1_ActualVelocity"
     unit = "rev/s"
 
-Quantities are ``time``, ``speed``, ``current``, ``power``, ``torque``, ``feed`` and ``label`` (a text, without a unit;
-its key ``cutting`` lists how the texts of rows in the cut begin). Currents that were written in steps of a converter
-have the unit ``count``; what is made of them is in counts too. Without a table the columns are known by their names, as
-`time_s`, `speed_rpm`, `current_a`, `power_w`, `torque_nm`: what `chipload hal --out` writes is read so. A log without a
-head, as LinuxCNC's `halsampler` writes it, has ``head = false``; its columns are numbered from 1, and are separated by
-spaces.
+Quantities are ``time``, ``speed``, ``current``, ``power``, ``torque``, ``feed``, ``line`` (of the program),
+``override`` (feed over programmed feed) and ``label`` (a text, without a unit; its key ``cutting`` lists how the texts
+of rows in the cut begin). Currents that were written in steps of a converter have the unit ``count``; what is made of
+them is in counts too. Without a table the columns are known by their names, as `time_s`, `speed_rpm`, `current_a`,
+`power_w`, `torque_nm`: what `chipload hal --out` writes is read so. A log without a head, as LinuxCNC's `halsampler`
+writes it, has ``head = false``; its columns are numbered from 1, and are separated by spaces.
 """
 
 from __future__ import annotations
@@ -46,6 +46,8 @@ UNITS: dict[str, dict[str, float]] = {
     "power": {"W": 1e3, "kW": 1e6},
     "torque": {"N mm": 1.0, "N m": 1e3},
     "feed": {"mm/s": 1.0, "mm/min": 1.0 / 60.0},
+    "line": {"": 1.0},
+    "override": {"": 1.0, "%": 1e-2},
 }
 _QUANTITIES = (*UNITS, "label")
 #: columns that are known by their names: name -> quantity, unit
@@ -55,6 +57,7 @@ KNOWN = {
     "current_a": ("current", "A"), "power_w": ("power", "W"), "power_kw": ("power", "kW"),
     "torque_nm": ("torque", "N m"), "torque_mean_nm": ("torque", "N m"), "torque_nmm": ("torque", "N mm"),
     "feed_mm_min": ("feed", "mm/min"), "feed_mm_s": ("feed", "mm/s"), "label": ("label", ""),
+    "line": ("line", ""), "override": ("override", ""), "override_percent": ("override", "%"),
 }  # fmt: skip
 
 
@@ -70,6 +73,8 @@ class Log:
     speed : (n,) float [rad/s]
     torque : (n,) float [N mm]
     feed : (n,) float [mm/s]
+    line : (n,) float, line of the program
+    override : (n,) float, feed over programmed feed
     label : (n,) text
     cutting : (n,) bool, by the label
     """
@@ -80,6 +85,8 @@ class Log:
     speed: Floats | None = None
     torque: Floats | None = None
     feed: Floats | None = None
+    line: Floats | None = None
+    override: Floats | None = None
     label: NDArray[np.str_] | None = None
     cutting: NDArray[np.bool_] | None = None
 

@@ -1,0 +1,419 @@
+"""Force coefficients of a material learned from logs of the spindle while programs ran.
+
+Notation: C, E [N mm] mean torque of a step with the cutting and the edge coefficients of the prior material, w spindle
+speed [rad/s], x_c = Ktc / Ktc prior, x_e = Kte / Kte prior, g gain of the signal, d wear of the edge a second of
+cutting. A block of a log has the mean signal
+
+    y = idle_0 + idle_1 w + g (1 + u) w (x_c C + x_e (1 + d s) E)
+
+for power, and without w for current and torque; s [s] is the time for which the tool has cut. Unknown are x_c, x_e,
+d of each tool, idle_0 of each log, idle_1 where the speed changes, g within the error of the spindle's data, and u, the
+error of the simulated torque, common to a log. All have Gaussian priors; those of x_c and x_e are the material's. The
+greatest posterior is found by least squares, and its covariance is that of the linear model there. The noise is what
+the blocks scatter, more where a block and the next scatter together.
+
+Power and current tell the tangential coefficients alone: the radial and axial ones stay as they were.
+
+Reference: [Altintas2012] ch. 2 for the torque.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from chipload.control.log_alignment import AlignedLog, PredictedTorque
+from chipload.cutting.material import Material
+from chipload.errors import Finding, InputError, Severity
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: tangential coefficients among the six
+TANGENTIAL = [0, 3]
+#: error of a simulated mean torque, common to a log, as a standard deviation (docs/accuracy.md: within 0.5 % of brute
+#: force for steady cuts; engagement and entry add to it)
+TORQUE_ERROR = 0.02
+#: prior of the wear of an edge: its coefficient may double in so many seconds of cutting, as a standard deviation
+WEAR_SCALE_S = 600.0
+#: blocks of a log at most, samples of one at least, and how often the time constant of the sensor it is long at least
+MOST_BLOCKS, LEAST_SAMPLES, BLOCK_LAGS = 240, 3, 4.0
+#: a block further than so many standard deviations from the posterior is left out; of those that scatter normally,
+#: 1 of 15,000 is
+OUTLIER = 4.0
+#: share of blocks that may be left out of a log before it contradicts the others
+MOST_OUTLIERS = 0.2
+
+
+@dataclass(frozen=True)
+class Signal:
+    """What a log measures of the spindle.
+
+    Parameters
+    ----------
+    kind : ``power``, ``current`` or ``torque``
+    gain : of the signal over the power [N mm/s] or the torque [N mm] of the cut: 1 / efficiency, 1 / torque constant
+        [A/(N mm)], 1
+    gain_error : its relative standard deviation
+    """
+
+    kind: str
+    gain: float
+    gain_error: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.gain < math.inf:
+            raise InputError(f"signal.gain = {self.gain:g}: must be above 0")
+        if not 0.0 <= self.gain_error < 1.0:
+            raise InputError(f"signal.gain_error = {self.gain_error:g}: must be from 0 to below 1")
+
+
+@dataclass(frozen=True, eq=False)
+class LogBlocks:
+    """Means over blocks of an aligned log, (k,) each.
+
+    Parameters
+    ----------
+    name : of the log
+    time : [s] of its middle, in the log
+    signal, speed, cutting, edge : means over the block; the torques in N mm, 0 in the air
+    edge_time : mean of edge torque times the time for which the tool has cut [N mm s]
+    misfit : half of what the signal may change if the alignment is off by a sample, in its unit, for a gain of 1
+    line, tool : of its middle
+    """
+
+    name: str
+    time: Floats
+    signal: Floats
+    speed: Floats
+    cutting: Floats
+    edge: Floats
+    edge_time: Floats
+    misfit: Floats
+    line: Ints
+    tool: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedMaterial:
+    """A material after logs were read.
+
+    Parameters
+    ----------
+    material, prior : after and before
+    wear : tool number -> growth of Kte an hour of cutting, relative, and its standard deviation
+    fit_error : log -> mean of signal over prediction in the cut, less 1, of the logs alone that were left out
+    used, left_out : blocks
+    findings : what contradicts the model, by line
+    """
+
+    material: Material
+    prior: Material
+    wear: dict[int, tuple[float, float]]
+    fit_error: dict[str, float]
+    used: int
+    left_out: int
+    findings: tuple[Finding, ...]
+
+    @property
+    def deviations(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Relative standard deviations of Ktc and Kte: (before, before), (after, after)."""
+        before, after = (
+            np.sqrt(np.diagonal(m.variances))[TANGENTIAL] / np.array(m.coefficients)[TANGENTIAL]
+            for m in (self.prior, self.material)
+        )
+        return (float(before[0]), float(before[1])), (float(after[0]), float(after[1]))
+
+
+def blocks_of(
+    aligned: AlignedLog, predicted: PredictedTorque, before: float = 0.0, sensor_lag: float = 0.0
+) -> LogBlocks:
+    """Return the means of a log over blocks of equal time, long against the sensor.
+
+    Parameters
+    ----------
+    before : seconds for which each tool has cut before this log [s]
+    """
+    time, inside = aligned.time, aligned.row >= 0
+    row = np.maximum(aligned.row, 0)
+    start = np.concatenate([[0.0], predicted.time[:-1]])
+    load = predicted.cutting + predicted.edge
+    cut = np.zeros(len(load))
+    for number in np.unique(predicted.tool):
+        own = predicted.tool == number
+        cut[own] = np.cumsum(np.where(load > 0.0, predicted.time - start, 0.0)[own])
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    length = max((time[-1] - time[0]) / MOST_BLOCKS, LEAST_SAMPLES * step, BLOCK_LAGS * sensor_lag)
+    place = ((time - time[0]) / length).astype(np.int64)
+    kept, n = np.ones(len(time), dtype=np.bool_), int(place[-1]) + 1
+    # speeds up to the cut and the time before the program runs tell the idle spindle only where the speed is known
+    speed = np.where(inside, predicted.speed[row], np.nan)
+    kept &= np.isfinite(speed) & (speed > 0.0)
+    torque = np.where(inside, load[row], 0.0)
+    columns = {
+        "signal": aligned.signal, "speed": speed, "cutting": np.where(inside, predicted.cutting[row], 0.0),
+        "edge": np.where(inside, predicted.edge[row], 0.0), "time": time,
+        "edge_time": np.where(inside, predicted.edge[row] * (before + cut[row]), 0.0),
+    }  # fmt: skip
+    count = np.bincount(place[kept], minlength=n)
+    means = {
+        key: np.bincount(place[kept], values[kept], minlength=n) / np.maximum(count, 1)
+        for key, values in columns.items()
+    }
+    jumps = np.zeros(n)
+    change = np.abs(np.diff(torque, prepend=torque[:1]))
+    np.add.at(jumps, place[kept], change[kept])
+    lagging = max(sensor_lag / length, 1.0 / max(length / step, 1.0))
+    middle = np.array([int(np.median(np.flatnonzero(place == k))) if c else 0 for k, c in enumerate(count)])
+    full = (count >= max(LEAST_SAMPLES, int(0.5 * length / step))) & (count > 0)
+    whole = {key: values[full] for key, values in means.items()}
+    at = row[middle[full]]
+    return LogBlocks(
+        aligned.name, whole["time"], whole["signal"], whole["speed"], whole["cutting"], whole["edge"],
+        whole["edge_time"], (jumps * lagging)[full], predicted.line[at], predicted.tool[at],
+    )  # fmt: skip
+
+
+class _SpindleModel:
+    """Parameters of several logs in one vector, with their priors, and the prediction of every block."""
+
+    def __init__(self, logs: Sequence[LogBlocks], signal: Signal, prior: Material) -> None:
+        self.logs, self.signal = logs, signal
+        self.tools = sorted({int(t) for log in logs for t in np.unique(log.tool[log.edge > 0.0])})
+        speeds = np.concatenate([log.speed for log in logs])
+        self.slope = bool(np.ptp(speeds) > 0.02 * speeds.max())
+        n = len(logs)
+        # x_c, x_e, gain, wear of tools, error of logs, idle of logs, idle with speed
+        self.wear = slice(3, 3 + len(self.tools))
+        self.error = slice(self.wear.stop, self.wear.stop + n)
+        self.idle = slice(self.error.stop, self.error.stop + n)
+        self.size = self.idle.stop + int(self.slope)
+        values = np.array(prior.coefficients)[TANGENTIAL]
+        share = prior.variances[np.ix_(TANGENTIAL, TANGENTIAL)] / np.outer(values, values)
+        typical = max(float(np.abs(np.concatenate([log.signal for log in logs])).max()), np.finfo(np.float64).tiny)
+        self.mean = np.zeros(self.size)
+        self.mean[:3] = 1.0
+        deviation = np.full(self.size, 10.0 * typical)
+        deviation[2] = max(signal.gain_error, 1e-6)
+        deviation[self.wear], deviation[self.error] = 1.0 / WEAR_SCALE_S, TORQUE_ERROR
+        if self.slope:
+            deviation[-1] = 10.0 * typical / speeds.max()
+        covariance = np.diag(deviation**2)
+        covariance[:2, :2] = share
+        self.root = np.linalg.inv(np.linalg.cholesky(covariance))
+
+    def predict(self, x: Floats, k: int) -> Floats:
+        """Return the signal of the blocks of log k."""
+        log = self.logs[k]
+        wear = np.zeros(len(log.time))
+        for tool, d in zip(self.tools, x[self.wear], strict=True):
+            wear[log.tool == tool] = d
+        torque = x[0] * log.cutting + x[1] * (log.edge + wear * log.edge_time)
+        out = x[self.idle][k] + self.signal.gain * x[2] * (1.0 + x[self.error][k]) * torque * self.per_torque(k)
+        return np.asarray(out + x[-1] * log.speed if self.slope else out)
+
+    def per_torque(self, k: int) -> Floats:
+        """Return what a gain of 1 makes of a torque, in the blocks of log k."""
+        return self.logs[k].speed if self.signal.kind == "power" else np.ones(len(self.logs[k].time))
+
+    def start(self) -> Floats:
+        """Return the prior, with the idle signal of each log where nothing is cut."""
+        x = self.mean.copy()
+        for k, log in enumerate(self.logs):
+            air = log.cutting + log.edge == 0.0
+            x[self.idle.start + k] = np.median(log.signal[air]) if air.any() else log.signal.min()
+        return x
+
+
+def learn_material(
+    logs: Sequence[LogBlocks], signal: Signal, prior: Material, name: str = "", evidence: str = ""
+) -> LearnedMaterial:
+    """Return the material after logs of programs that it was cut with.
+
+    Parameters
+    ----------
+    logs : of one machine, one material and cutters of one kind
+    signal : what they measure
+    prior : with a spread or a covariance
+    name : of the new material; empty: that of the prior with ``-learned``
+    evidence : which logs, for the source of the material
+
+    Raises
+    ------
+    InputError
+        The prior states no spread, no block is in the cut, the unit of the signal is wrong, or logs contradict one
+        another.
+    """
+    logs = [log for log in logs if len(log.time)]
+    if not any((log.cutting > 0.0).any() for log in logs):
+        raise InputError("no log has a block in the cut: at least three samples in a row are needed")
+    if prior.Kte <= 0.0:
+        raise InputError(
+            f"material {prior.name}: kte_n_mm = 0: the edge force must be stated, if only with a wide spread"
+        )
+    for log in logs:
+        _check_unit(log, signal)
+    model = _SpindleModel(logs, signal, prior)
+    kept = [np.ones(len(log.time), dtype=np.bool_) for log in logs]
+    noise = [_noise(log, signal) for log in logs]
+    for _ in range(5):
+        x, covariance, residuals = _greatest(model, kept, noise)
+        fresh = [np.abs(r) <= OUTLIER for r in residuals]
+        if all((a == b).all() for a, b in zip(fresh, kept, strict=True)):
+            break
+        kept = fresh
+    off = x[model.error]
+    if len(logs) > 1 and np.abs(off).max() > OUTLIER * TORQUE_ERROR:
+        worst = int(np.argmax(np.abs(off)))
+        raise InputError(
+            f"{logs[worst].name}: its cut takes {100.0 * off[worst]:+.0f} % of what the other logs agree on, at most "
+            f"{100.0 * OUTLIER * TORQUE_ERROR:.0f} % is believed: another tool or material, or worn out; leave it out"
+        )
+    findings = [f for k in range(len(logs)) for f in _findings_of(model, x, k, kept[k], noise[k])]
+    for log, own in zip(logs, kept, strict=True):
+        out = 1.0 - own.mean()
+        if out > MOST_OUTLIERS:
+            raise InputError(
+                f"{log.name}: {100.0 * out:.0f} % of its blocks contradict the program and the other logs, at most "
+                f"{100.0 * MOST_OUTLIERS:.0f} % may: another tool, another material, or worn out; leave it out"
+            )
+    wear = {
+        tool: (
+            3600.0 * float(x[model.wear][j]),
+            3600.0 * math.sqrt(covariance[model.wear.start + j, model.wear.start + j]),
+        )
+        for j, tool in enumerate(model.tools)
+    }
+    for tool, (mean, sd) in wear.items():
+        if mean > 2.0 * sd:
+            text = (
+                f"tool {tool}: Kte grows by {100.0 * mean:.3g} +- {200.0 * sd:.2g} % an hour of cutting: the edge wears"
+            )
+            findings.append(Finding("log-wear", 0, text, Severity.NOTE))
+    used = sum(int(own.sum()) for own in kept)
+    return LearnedMaterial(
+        _material_after(prior, x[:2], covariance[:2, :2], name, evidence), prior, wear,
+        {log.name: _fit_error(model, x, k, kept[k]) for k, log in enumerate(logs)},
+        used, sum(len(log.time) for log in logs) - used, tuple(findings),
+    )  # fmt: skip
+
+
+def _check_unit(log: LogBlocks, signal: Signal) -> None:
+    """Refuse a signal whose size is 10 or 1000 times off: the unit."""
+    load = (log.cutting + log.edge) * (log.speed if signal.kind == "power" else 1.0)
+    if not (load > 0.0).any():
+        return
+    centred = load - load.mean()
+    ratio = float(centred @ (log.signal - log.signal.mean()) / max(float(centred @ centred), 1e-300)) / signal.gain
+    if ratio > 0.0 and not 0.25 < ratio < 4.0:
+        tens = 10.0 ** round(math.log10(ratio))
+        raise InputError(
+            f"{log.name}: {signal.kind} is {ratio:.3g} times what the program predicts: check its unit (a factor of "
+            f"{tens:g}) and the data of the spindle"
+        )
+
+
+def _greatest(
+    model: _SpindleModel, kept: Sequence[NDArray[np.bool_]], noise: Sequence[Floats]
+) -> tuple[Floats, Floats, list[Floats]]:
+    """Return the greatest posterior, its covariance, and the residuals of all blocks over their noise."""
+
+    def residuals(x: Floats) -> list[Floats]:
+        return [(log.signal - model.predict(x, k)) / noise[k] for k, log in enumerate(model.logs)]
+
+    def misfit(x: Floats) -> Floats:
+        parts = [r[own] for r, own in zip(residuals(x), kept, strict=True)]
+        return np.concatenate([*parts, model.root @ (x - model.mean)])
+
+    found = least_squares(misfit, model.start(), x_scale="jac")
+    return found.x, np.linalg.inv(found.jac.T @ found.jac), residuals(found.x)
+
+
+def _noise(log: LogBlocks, signal: Signal) -> Floats:
+    """Return the standard deviation of the blocks of a log: how they scatter about the line that fits the log alone,
+    and what a shift of a sample changes.
+
+    Residuals of neighbours that are alike (correlation r) count as fewer: variance times (1 + r) / (1 - r).
+    """
+    factor = log.speed if signal.kind == "power" else np.ones(len(log.speed))
+    design = np.column_stack(
+        [np.ones(len(log.time)), *(factor * part for part in (log.cutting, log.edge, log.edge_time))]
+    )
+    scale = np.abs(design).max(axis=0)
+    design = design[:, scale > 0.0] / scale[scale > 0.0]
+    own = np.zeros(len(log.time))
+    weight = np.ones(len(log.time))
+    least = max(1e-3 * float(np.ptp(log.signal)), np.finfo(np.float64).tiny)
+    for _ in range(10):
+        line, *_ = np.linalg.lstsq(design * weight[:, None], log.signal * weight, rcond=None)
+        own = log.signal - design @ line
+        # the scatter by the median, which outliers do not move
+        size = max(1.4826 * float(np.median(np.abs(own))), least)
+        weight = np.sqrt(1.0 / (1.0 + (own / (2.0 * size)) ** 2))
+    inside = own[np.abs(own) <= OUTLIER * size]
+    below = float(inside @ inside)
+    r = min(max(float(inside[1:] @ inside[:-1]) / below, 0.0), 0.9) if below > 0.0 and len(inside) > 8 else 0.0
+    return np.asarray(np.sqrt(size**2 * (1.0 + r) / (1.0 - r) + (signal.gain * factor * log.misfit) ** 2))
+
+
+def _findings_of(model: _SpindleModel, x: Floats, k: int, kept: NDArray[np.bool_], noise: Floats) -> list[Finding]:
+    """Return what is wrong with blocks that were left out: air where metal should be, metal where none should be."""
+    log = model.logs[k]
+    expected = model.predict(x, k)
+    idle = x[model.idle][k] + (x[-1] * log.speed if model.slope else 0.0)
+    cut = expected - idle
+    share = np.divide(log.signal - idle, cut, out=np.full(len(cut), np.nan), where=cut > 5.0 * noise)
+    out = []
+    kinds = {
+        "log-air": ((share < 0.2), "cuts air where the program cuts material: missing stock, or a broken tool"),
+        "log-more": ((share > 1.3), "is above what the program predicts: more stock, another tool, or a worn edge"),
+        "log-metal": ((cut <= 0.0) & (log.signal - idle > 5.0 * noise), "shows a cut where the program cuts air"),
+    }
+    for code, (wrong, text) in kinds.items():
+        wrong = wrong & ~kept
+        if wrong.any():
+            first = int(np.flatnonzero(wrong)[0])
+            lines = sorted({int(v) for v in log.line[wrong]})
+            at = f"lines {lines[0]} to {lines[-1]}" if len(lines) > 1 else f"line {lines[0]}"
+            message = (
+                f"{log.name}: {at}, at {log.time[first]:.4g} s: {model.signal.kind} {text} ({int(wrong.sum())} blocks)"
+            )
+            out.append(Finding(code, lines[0], message, Severity.UNPROVEN))
+    return out
+
+
+def _fit_error(model: _SpindleModel, x: Floats, k: int, kept: NDArray[np.bool_]) -> float:
+    """Return the mean cut of a log over its prediction, less 1."""
+    log = model.logs[k]
+    idle = x[model.idle][k] + (x[-1] * log.speed if model.slope else 0.0)
+    own = kept & (log.cutting > 0.0)
+    predicted = float((model.predict(x, k) - idle)[own].sum()) / (1.0 + float(x[model.error][k]))
+    return float((log.signal - idle)[own].sum()) / predicted - 1.0 if predicted > 0.0 else math.nan
+
+
+def _material_after(prior: Material, ratio: Floats, share: Floats, name: str, evidence: str) -> Material:
+    """Return the prior with other tangential coefficients; the others and their covariance stay.
+
+    Cov(others, tangential) = Cov0(others, tangential) Cov0(tangential)^-1 Cov(tangential), which keeps the matrix
+    without negative variances.
+    """
+    values = np.array(prior.coefficients)
+    before = prior.variances
+    after = before.copy()
+    t, o = TANGENTIAL, [1, 2, 4, 5]
+    tangential = share * np.outer(values[t], values[t])
+    after[np.ix_(t, t)] = tangential
+    across = before[np.ix_(o, t)] @ np.linalg.solve(before[np.ix_(t, t)], tangential)
+    after[np.ix_(o, t)], after[np.ix_(t, o)] = across, across.T
+    source = f"{prior.source}; tangential coefficients learned from {evidence or 'logs of the spindle'}"
+    numbers: dict[str, Any] = {"Ktc": float(values[0] * ratio[0]), "Kte": float(values[3] * ratio[1])}
+    covariance: Any = tuple(map(tuple, (0.5 * (after + after.T)).tolist()))
+    return replace(
+        prior, name=name or f"{prior.name}-learned", source=source, spread=None, covariance=covariance, **numbers
+    )  # fmt: skip

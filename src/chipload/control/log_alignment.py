@@ -1,0 +1,231 @@
+"""Alignment of a log of the spindle with the simulated history of the program that ran.
+
+A log has its own clock: it starts before the program, and the machine needs longer or less than was calculated. A time
+t of the log is the time (t - lag) / rate of the history. Where the log has the line of the program, the first samples
+of the lines are matched instead, and between them time runs evenly; where it has the feed override, a sample of the
+log advances the program by its override.
+
+Notation: t time [s], w spindle speed [rad/s].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.signal import correlate
+
+from chipload.control.logs import Log
+from chipload.control.spindle import first_order
+from chipload.errors import Finding, InputError, Severity
+
+Floats = NDArray[np.float64]
+
+#: least correlation of signal and prediction of a log that is taken to be one of the program
+LEAST_CORRELATION = 0.8
+#: how much longer than calculated a program may take on the machine, and how much shorter
+RATES = (0.8, 1.5)
+#: samples of the search for lag and rate, and rates that are tried
+SAMPLES, TRIED = 4096, 71
+#: a step of time over the usual one, and in seconds, that is a gap
+GAP_STEPS, GAP_S = 10.0, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class PredictedTorque:
+    """Mean torque of a simulated program, by the parts that the coefficients are proportional to.
+
+    Parameters
+    ----------
+    time : (n,) float [s], rising, at the end of each step
+    speed : (n,) float [rad/s], of the spindle
+    cutting, edge : (n,) float [N mm], with the cutting and the edge coefficients of the prior material
+    line : (n,) int, of the program
+    tool : (n,) int
+    """
+
+    time: Floats
+    speed: Floats
+    cutting: Floats
+    edge: Floats
+    line: NDArray[np.int64]
+    tool: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        n = len(self.time)
+        if n < 2:
+            raise InputError("the history has less than two steps: simulate the program that ran")
+        for name in ("speed", "cutting", "edge", "line", "tool"):
+            column = getattr(self, name)
+            if column.shape != (n,) or not np.isfinite(column).all():
+                raise InputError(f"history.{name}: must be a column of {n} finite numbers like time")
+        if not (np.diff(self.time) >= 0.0).all():
+            raise InputError("history.time: must rise")
+
+    @property
+    def cut_seconds(self) -> float:
+        """Time in the cut [s]."""
+        return float(np.diff(self.time, prepend=0.0)[self.cutting + self.edge > 0.0].sum())
+
+
+@dataclass(frozen=True, eq=False)
+class AlignedLog:
+    """The place in the program of each sample of a log.
+
+    Parameters
+    ----------
+    name : of the log
+    time : (m,) float [s], of the log
+    signal : (m,) float, what the log measures of the spindle
+    row : (m,) int, of the history; -1: the program does not run
+    lag, rate : the time of the history is (t - lag) / rate
+    correlation : of signal and prediction
+    findings : gaps of the clock
+    """
+
+    name: str
+    time: Floats
+    signal: Floats
+    row: NDArray[np.int64]
+    lag: float
+    rate: float
+    correlation: float
+    findings: tuple[Finding, ...] = ()
+
+
+def align_log(name: str, log: Log, signal: Floats, predicted: PredictedTorque, sensor_lag: float = 0.0) -> AlignedLog:
+    """Return the row of the history at which each sample of a log was taken.
+
+    Parameters
+    ----------
+    name : of the log, for messages
+    log : with ``line`` or ``override`` if it has them
+    signal : (m,) float, current, power or torque of its samples
+    predicted : of the program
+    sensor_lag : time constant of the sensor [s]
+
+    Raises
+    ------
+    InputError
+        The signal does not follow the program: another program, or no cut.
+    """
+    start = np.concatenate([[0.0], predicted.time[:-1]])
+    load = predicted.cutting + predicted.edge
+    if not (load > 0.0).any():
+        raise InputError(f"{name}: the program cuts nothing, so that its log tells nothing of the material")
+    clock = log.time - log.time[0]
+    if log.override is not None:
+        clock = np.concatenate([[0.0], np.cumsum(np.diff(log.time) * log.override[1:])])
+    lag, rate = 0.0, 1.0
+    place = None if log.line is None else _time_by_line(log.line, clock, predicted, start)
+    if place is None:
+        lag, rate = _lag_and_rate(clock, signal, predicted.time, start, load, sensor_lag)
+        place = (clock - lag) / rate
+    row = np.searchsorted(predicted.time, place, side="left")
+    running = (place >= 0.0) & (row < len(predicted.time))
+    row = np.where(running, row, -1)
+    expected = first_order(np.where(running, load[row], 0.0), log.time, sensor_lag)
+    correlation = _correlation(signal, expected)
+    if not correlation >= LEAST_CORRELATION:
+        raise InputError(
+            f"{name}: its signal follows the program with a correlation of {correlation:.2f}, at least "
+            f"{LEAST_CORRELATION:g} is needed: it is the log of another program, or the spindle does not feel the cut"
+        )
+    return AlignedLog(name, log.time, signal, row, lag, rate, correlation, tuple(_gaps(name, log.time)))
+
+
+def _correlation(a: Floats, b: Floats) -> float:
+    """Return the correlation of two series; 0 where one does not vary."""
+    a, b = a - a.mean(), b - b.mean()
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / size if size > 0.0 else 0.0
+
+
+def _gaps(name: str, time: Floats) -> list[Finding]:
+    step = np.diff(time)
+    far = np.flatnonzero(step > max(GAP_STEPS * float(np.median(step)), GAP_S)) if len(step) else np.empty(0, np.int64)
+    if not len(far):
+        return []
+    text = f"{name}: {len(far)} gaps in time, the first of {step[far[0]]:.3g} s at {time[far[0]]:.4g} s"
+    return [Finding("log-gap", 0, text, Severity.NOTE)]
+
+
+def _time_by_line(line: Floats, clock: Floats, predicted: PredictedTorque, start: Floats) -> Floats | None:
+    """Return the time of the history of each sample, by the first sample of each line; None: no two lines are shared.
+
+    Lines that run again, as in a loop, count where they run first.
+    """
+    logged, first = np.unique(np.asarray(line, dtype=np.int64), return_index=True)
+    lines, row = np.unique(predicted.line, return_index=True)
+    _, a, b = np.intersect1d(logged, lines, assume_unique=True, return_indices=True)
+    at, then = clock[first[a]], start[row[b]]
+    order = np.argsort(then, kind="stable")
+    at, then = at[order], then[order]
+    rises = np.concatenate([[True], np.diff(np.maximum.accumulate(at)) > 0.0])
+    at, then = at[rises], then[rises]
+    if len(at) < 2:
+        return None
+    out = np.interp(clock, at, then, left=-1.0)
+    # the last line ends when the history does, at the pace of the lines before it
+    pace = (then[-1] - then[0]) / max(at[-1] - at[0], np.finfo(np.float64).tiny)
+    after = clock > at[-1]
+    out[after] = then[-1] + (clock[after] - at[-1]) * pace
+    return np.asarray(out)
+
+
+def _lag_and_rate(
+    clock: Floats, signal: Floats, end: Floats, start: Floats, load: Floats, sensor_lag: float
+) -> tuple[float, float]:
+    """Return the lag [s] and the rate at which prediction and signal correlate best.
+
+    Every rate: all lags at once, by a correlation of the series at SAMPLES equal steps, O(S log S); then both together.
+    """
+    step = max(float(clock[-1]), float(end[-1]) * RATES[1]) / SAMPLES
+    grid = np.arange(0.0, float(clock[-1]) + step, step)
+    seen = _means_on_grid(grid, step, clock, signal)
+    seen = seen - seen.mean()
+    size = float(np.sqrt(seen @ seen))
+    if size == 0.0:
+        return 0.0, 1.0
+    work = np.concatenate([[0.0], np.cumsum(load * (end - start))])
+    times = np.concatenate([[0.0], end])
+    best = (-np.inf, 0.0, 1.0)
+    ones = np.ones(len(seen))
+    for rate in np.linspace(*RATES, TRIED):
+        own = np.arange(0.0, rate * float(end[-1]) + step, step)
+        wanted = np.diff(np.interp(own / rate, times, work)) / step * rate
+        if sensor_lag > 0.0:
+            wanted = first_order(wanted, own[1:], sensor_lag)
+        product = correlate(seen, wanted, "full", "fft")
+        # the prediction is 0 outside of the program, so that its mean over the log is that of what lies within
+        total = correlate(ones, wanted, "full", "fft")
+        square = correlate(ones, wanted * wanted, "full", "fft")
+        variance = square - total * total / len(seen)
+        enough = square > 0.5 * float(wanted @ wanted)
+        value = np.where(enough & (variance > 0.0), product / np.sqrt(np.maximum(variance, 1e-300)), -np.inf) / size
+        k = int(np.argmax(value))
+        if value[k] > best[0]:
+            best = (float(value[k]), (k - (len(wanted) - 1)) * step, float(rate))
+
+    def misfit(x: Floats) -> float:
+        place = (clock - x[0]) / x[1]
+        row = np.searchsorted(end, place, side="left")
+        inside = (place >= 0.0) & (row < len(end))
+        expected = np.where(inside, load[np.minimum(row, len(end) - 1)], 0.0)
+        return -_correlation(signal, first_order(expected, clock, sensor_lag))
+
+    _, lag, rate = best
+    simplex = np.array([[lag, rate], [lag + 3.0 * step, rate], [lag, rate * 1.01]])
+    found = minimize(misfit, simplex[0], method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-4})
+    return float(found.x[0]), float(found.x[1])
+
+
+def _means_on_grid(grid: Floats, step: float, clock: Floats, signal: Floats) -> Floats:
+    """Return the signal at equal steps: means of the samples of a step, or between samples that are further apart."""
+    place = np.clip(np.rint(clock / step).astype(np.int64), 0, len(grid) - 1)
+    count = np.bincount(place, minlength=len(grid))
+    total = np.bincount(place, signal, minlength=len(grid))
+    between = np.interp(grid, clock, signal)
+    return np.asarray(np.where(count > 0, total / np.maximum(count, 1), between))

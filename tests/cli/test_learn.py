@@ -1,0 +1,108 @@
+"""``chipload learn``: logs whose power is that of the same program simulated with other coefficients."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from chipload import jobs
+from command import call
+
+JOB = """
+[program]
+file = "part.nc"
+[machine]
+name = "vmc-fanuc"
+[stock]
+low_mm = [0.0, 0.0, -20.0]
+high_mm = [120.0, 80.0, 0.0]
+[material]
+{material}
+[[cutter]]
+number = 1
+diameter_mm = 10.0
+flutes = 4
+helix_deg = 30.0
+flute_length_mm = 22.0
+overhang_mm = 35.0
+modulus_gpa = 580.0
+runout_mm = 0.0
+[[operation]]
+kind = "simulate"
+step_mm = 1.0
+[limits]
+force_n = 5000.0
+"""
+#: passes of unlike width, depth and feed, with air between them
+PASSES = [(2.0, 6.0, 900), (1.0, 3.0, 1500), (6.0, 4.0, 700), (9.0, 2.0, 500), (0.5, 8.0, 2000), (4.0, 5.0, 1000)]
+TRUE = {"ktc_mpa": 950.0, "kte_n_mm": 22.0}
+
+
+def program_text() -> str:
+    """Return passes along the edge of a block, each from the side that the pass before left."""
+    lines, y = ["%", "O0001 (PART)", "G21 G90 G54 G94", "T1 M6", "S8000 M3", "G43 H1 Z20."], 0.0
+    for width, depth, feed in PASSES:
+        y += width
+        lines += [f"G0 X-10. Y{y - 5.0:.3f}", f"Z-{depth:.3f}", f"G1 X130. F{feed}", "G0 Z20."]
+    return "\n".join([*lines, "M5", "M30", "%", ""])
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cell")
+    (folder / "part.nc").write_text(program_text())
+    (folder / "job.toml").write_text(JOB.format(material='name = "al7075-t6"'))
+    true = "\n".join(f"{key} = {value}" for key, value in TRUE.items())
+    rest = "krc_mpa = 168.8\nkac_mpa = 222.0\nkre_n_mm = 26.6\nkae_n_mm = 0.7\nspread = 0.1\n"
+    (folder / "true.toml").write_text(f'name = "true"\nsource = "drawn for this test"\n{true}\n{rest}')
+    (folder / "true_job.toml").write_text(JOB.format(material='file = "true.toml"'))
+    history = jobs.run_job(jobs.load_job(folder / "true_job.toml")).result.in_use[0].columns
+    end = history["t_s"]
+    rng = np.random.default_rng(1)
+    for k in range(2):
+        t = np.arange(0.0, 1.1 * end[-1] + 8.0, 0.05)
+        place = (t - 3.0) / 1.1
+        row = np.minimum(np.searchsorted(end, place), len(end) - 1)
+        power = np.where((place >= 0.0) & (place < end[-1]), history["power_w"][row], 0.0) / 0.85
+        rows = zip(t, power + 310.0 + 5.0 * rng.standard_normal(len(t)), strict=True)
+        (folder / f"log{k}.csv").write_text("time_s,power_w\n" + "".join(f"{a:.3f},{p:.3f}\n" for a, p in rows))
+    return folder
+
+
+def test_coefficients_are_found(cell):
+    """Both within two standard deviations, each known to 5 %; the material is one that a job takes."""
+    code, out, err = call(
+        "learn", cell / "log0.csv", cell / "log1.csv", "--job", cell / "job.toml", "--out", cell / "learned.toml",
+        "--efficiency", "0.85",
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    found = tomllib.loads((cell / "learned.toml").read_text())
+    for k, (key, value) in enumerate(TRUE.items()):
+        deviation = found["covariance"][3 * k][3 * k] ** 0.5
+        assert deviation < 0.05 * value
+        assert abs(found[key] - value) < 2.0 * deviation
+    assert found["krc_mpa"] == 168.8
+    assert "log0.csv (sha256" in found["source"]
+    assert "power and current tell the tangential force alone" in out
+    (cell / "next.toml").write_text(JOB.format(material='file = "learned.toml"'))
+    assert jobs.check_job(jobs.load_job(cell / "next.toml"))[1]
+
+
+def test_refusals(cell, tmp_path):
+    job, out = cell / "job.toml", tmp_path / "m.toml"
+    (tmp_path / "current.csv").write_text("time_s,current_a\n0,1\n1,2\n2,1\n")
+    code, _, err = call("learn", tmp_path / "current.csv", "--job", job, "--out", out)
+    assert code == 2
+    assert "no column of power or torque that all logs have; of current, state --spindle" in err
+    code, _, err = call("learn", cell / "log0.csv", "--job", job, "--out", out, "--efficiency", "1.5")
+    assert code == 2
+    assert "--efficiency = 1.5: must be above 0 and at most 1" in err
+    noise = np.random.default_rng(0).normal(500.0, 50.0, 400)
+    text = "".join(f"{0.1 * k:.1f},{p:.2f}\n" for k, p in enumerate(noise))
+    (tmp_path / "noise.csv").write_text("time_s,power_w\n" + text)
+    code, _, err = call("learn", tmp_path / "noise.csv", "--job", job, "--out", out)
+    assert code == 2
+    assert "it is the log of another program" in err
+    assert not out.exists()

@@ -1,0 +1,144 @@
+"""Coefficients learned from logs of the spindle, on cells in closed form whose coefficients are drawn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chipload.control.learning import Signal, blocks_of, learn_material
+from chipload.control.log_alignment import align_log
+from chipload.control.logs import Log
+from chipload.errors import InputError
+from synthetic_cell import EFFICIENCY, PRIOR, Truth, cell, closed_form_program, power_log
+
+SIGNAL = Signal("power", 1.0 / EFFICIENCY, 0.02)
+IDLE = (2e5, 100.0)
+TRUTH = Truth(1.2, 0.85, 1.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def program():
+    return closed_form_program(np.random.default_rng(3))
+
+
+@pytest.fixture(scope="module")
+def log(program):
+    return power_log(np.random.default_rng(4), TRUTH, program, 0.0, IDLE)
+
+
+def blocks(log, program, name="log", before=0.0):
+    return blocks_of(align_log(name, log, log.power, program), program, before)
+
+
+def test_coverage():
+    """Of 30 cells the 95 % intervals hold Ktc, Kte and the wear in 25 or more (99.7 % likely if they are right), and
+    three logs leave a fourth of the prior's spread. benchmarks/learning.py does 500.
+    """
+    inside = np.zeros(3, dtype=int)
+    for seed in range(30):
+        logs, signal, truth = cell(seed)
+        found = learn_material(logs, signal, PRIOR)
+        sd = np.sqrt(np.diagonal(found.material.variances))
+        rate, error = found.wear[1]
+        inside += [
+            abs(found.material.Ktc - truth.cutting * PRIOR.Ktc) < 1.96 * sd[0],
+            abs(found.material.Kte - truth.edge * PRIOR.Kte) < 1.96 * sd[3],
+            abs(rate - 3600.0 * truth.wear) < 1.96 * error,
+        ]
+        assert max(found.deviations[1]) < 0.3 * 0.25
+    assert (inside >= 25).all()
+
+
+def test_what_power_does_not_tell_stays(log, program):
+    found = learn_material([blocks(log, program)], SIGNAL, PRIOR).material
+    for name in ("Krc", "Kac", "Kre", "Kae"):
+        assert getattr(found, name) == getattr(PRIOR, name)
+    own = [1, 2, 4, 5]
+    assert np.allclose(found.variances[np.ix_(own, own)], PRIOR.variances[np.ix_(own, own)], rtol=1e-12)
+    assert np.linalg.eigvalsh(found.variances).min() > 0.0
+
+
+def test_clock_and_override(program):
+    """The clock of a log is found, and an override that the log states is taken out of it."""
+    log = power_log(np.random.default_rng(7), TRUTH, program, 0.0, IDLE)
+    rng = np.random.default_rng(7)
+    rng.standard_normal()
+    lag, rate = rng.uniform(2.0, 20.0), rng.uniform(0.95, 1.2)
+    found = align_log("log", log, log.power, program)
+    assert found.lag == pytest.approx(lag, abs=0.1)
+    assert found.rate == pytest.approx(rate, rel=1e-3)
+    # half of the log at half of the feed: each sample lasts twice as long
+    half = np.arange(len(log.time)) > len(log.time) // 2
+    time = np.cumsum(np.where(half, 0.2, 0.1)) - 0.1
+    slow = Log(time, power=log.power, override=np.where(half, 0.5, 1.0))
+    assert align_log("log", slow, slow.power, program).rate == pytest.approx(rate, rel=1e-3)
+    with pytest.raises(InputError, match="correlation"):
+        align_log("log", replace(slow, override=None), slow.power, program)
+
+
+def test_lines_align_what_a_lag_cannot(program):
+    """The machine stood for 40 s in the middle: the lines of the log say where it was."""
+    place = np.arange(0.0, program.time[-1], 0.1)
+    row = np.searchsorted(program.time, place)
+    middle = len(row) // 2
+    row = np.concatenate([row[:middle], np.full(400, row[middle]), row[middle:]])
+    torque = 1.2 * program.cutting + 0.85 * program.edge
+    power = 2e5 + torque[row] * program.speed[row] / EFFICIENCY
+    log = Log(0.1 * np.arange(len(row)), power=power, line=program.line[row].astype(float))
+    aligned = align_log("log", log, log.power, program)
+    assert aligned.correlation > 0.95
+    found = learn_material([blocks_of(aligned, program)], Signal("power", 1.0 / EFFICIENCY, 0.0), PRIOR).material
+    assert found.Ktc == pytest.approx(1.2 * PRIOR.Ktc, rel=0.06)
+
+
+def test_missing_stock_is_named(log, program):
+    """Air in five lines where the program cuts: the lines are named and do not enter the coefficients."""
+    aligned = align_log("log", log, log.power, program)
+    cut = np.unique(program.line[program.cutting > 0.0])[10:15]
+    missing = (aligned.row >= 0) & np.isin(program.line[aligned.row], cut)
+    power = np.where(missing, np.quantile(log.power, 0.05), log.power)
+    found = learn_material([blocks(replace(log, power=power), program)], SIGNAL, PRIOR)
+    air = [f for f in found.findings if f.code == "log-air"]
+    assert len(air) == 1
+    assert air[0].severity.name == "UNPROVEN"
+    assert f"lines {cut[0]} to {cut[-1]}" in air[0].text
+    assert found.material.Ktc == pytest.approx(1.2 * PRIOR.Ktc, rel=3.0 * found.deviations[1][0])
+
+
+@pytest.mark.parametrize("factor", [1e-3, 10.0, 1e3])
+def test_unit_of_the_power(log, program, factor):
+    with pytest.raises(InputError, match=r"check its unit \(a factor of"):
+        learn_material([blocks(replace(log, power=factor * log.power), program)], SIGNAL, PRIOR)
+
+
+def test_another_program(log):
+    other = closed_form_program(np.random.default_rng(99))
+    with pytest.raises(InputError, match="it is the log of another program"):
+        align_log("log", log, log.power, other)
+
+
+def test_a_worn_tool(program):
+    """An edge force that doubles over 10 minutes of cutting is seen as wear, within its interval."""
+    worn = Truth(1.0, 1.0, 1.0, 1.0 / 600.0)
+    logs, before = [], 0.0
+    for k in range(4):
+        log = power_log(np.random.default_rng(20 + k), worn, program, before, IDLE)
+        logs.append(blocks(log, program, f"log {k}", before))
+        before += program.cut_seconds
+    found = learn_material(logs, SIGNAL, PRIOR)
+    rate, error = found.wear[1]
+    assert rate == pytest.approx(6.0, abs=2.0 * error)
+    assert error < 1.0
+    assert [f.code for f in found.findings] == ["log-wear"]
+
+
+def test_contradicting_logs(program):
+    """A log with twice the force, beside two that agree, is refused by name."""
+    logs = []
+    for k, factor in enumerate((1.0, 1.0, 2.0)):
+        truth = Truth(factor, factor, 1.0, 0.0)
+        logs.append(blocks(power_log(np.random.default_rng(30 + k), truth, program, 0.0, IDLE), program, f"log {k}"))
+    with pytest.raises(InputError, match=r"log 2: its cut takes \+\d+ % of what the other logs agree on"):
+        learn_material(logs, SIGNAL, PRIOR)
