@@ -52,6 +52,47 @@ def _rapids(head: str) -> str:
     return _text(head, *(f"G0 X{37 * k % 90} Y{53 * k % 70} Z{11 * k % 30}" for k in range(1, 25)))
 
 
+def _arches(head: str, radius: float, rise: float) -> str:
+    """Lines that meet half circles at corners, which bend outwards and inwards in turn."""
+    rows, x = [f"G1 X{3 * radius:g} Y0 F2400"], 3.0 * radius
+    for k in range(8):
+        y = rise * (k % 2)
+        rows += [f"G{2 + k // 2 % 2} X{x + 2 * radius:g} Y{y:g} I{radius:g} J0"]
+        rows += [f"G1 X{x + 5 * radius:g} Y{rise - y:g}"]
+        x += 5.0 * radius
+    return _text(head, *rows)
+
+
+def _corners(head: str, seed: int, straight: float) -> str:
+    """Lines and arcs of any radius and angle, one after another; ``straight``: share of lines."""
+    rng, x, y, rows = np.random.default_rng(seed), 0.0, 0.0, ["G1 F2400"]
+    for k in range(24):
+        turn = rng.uniform(0.0, math.tau)
+        if (k % 2 == 0) if straight == 0.5 else rng.random() < straight:
+            length = 10.0 ** rng.uniform(-0.2, 1.2)
+            x, y = round(x + length * math.cos(turn), 6), round(y + length * math.sin(turn), 6)
+            rows.append(f"G1 X{x:.6f} Y{y:.6f}")
+            continue
+        r, sweep = 10.0 ** rng.uniform(-0.3, 1.0), rng.uniform(0.3, 5.5) * rng.choice([-1, 1])
+        i, j = -r * math.cos(turn), -r * math.sin(turn)
+        x, y = (
+            round(c + r * f(turn + sweep), 6) for c, f in ((x + i, math.cos), (y + j, math.sin))
+        )  # fmt: skip
+        rows.append(f"G{3 if sweep > 0 else 2} X{x:.6f} Y{y:.6f} I{i:.6f} J{j:.6f}")
+    return _text(head, *rows)
+
+
+def _spiral_pocket(head: str) -> str:
+    """A pocket of 40 x 30 mm with rounded corners, by rings from inside, after a helix down."""
+    rows = ["G0 X2 Y0 Z1", "G3 X2 Y0 Z-1 I-2 J0 F900", "G3 I-2 J0"]
+    for k in range(1, 6):
+        w, h, r = 4.0 * k, 3.0 * k, 1.0 + 0.4 * k
+        rows += [f"G1 X{w:g} Y0 F3000", f"Y{h - r:g}", f"G3 X{w - r:g} Y{h:g} I{-r:g} J0", f"G1 X{r - w:g}"]
+        rows += [f"G3 X{-w:g} Y{h - r:g} I0 J{-r:g}", f"G1 Y{r - h:g}", f"G3 X{r - w:g} Y{-h:g} I{r:g} J0"]
+        rows += [f"G1 X{w - r:g}", f"G3 X{w:g} Y{r - h:g} I0 J{r:g}", "G1 Y0"]
+    return _text(head, *rows, "G0 Z5")
+
+
 def _five(head: str) -> str:
     rows = [
         f"G1 X{30 * math.sin(k / 15):.3f} Y{20 * math.cos(k / 11) - 20:.3f} Z{3 * math.sin(k / 7):.3f} "
@@ -72,6 +113,9 @@ def own_programs() -> dict[str, tuple[str, str]]:
     waves = [f"G{2 if k % 2 else 3} X{8 * k} Y0 I4 J0 F5000" for k in range(1, 10)]
     corners = [f"G1 X{20 * k + 10} Y0 F3000\nG2 X{20 * k + 20} Y0 I5 J0" for k in range(6)]
     stops = [f"G1 X{0.2 * k:.2f} Y{0.2 * (k % 2):.2f} F1200" for k in range(1, 100)]
+    stairs = [f"G1 X{1.5 * ((k + 1) // 2):g} Y{1.5 * (k // 2):g} F6000" for k in range(1, 80)]
+    holes = [f"G81 X{12 * (k % 4)} Y{9 * (k // 4)} Z-4 R2 F300" for k in range(8)]
+    deep = [f"G83 X{15 * k} Y{7 * (k % 2)} Z-9 R2 Q3 F400" for k in range(3)]
     mixed = [
         f"G0 Z5\nG0 A{10 * k} C{30 * k}\nG1 Z0 F600\nX20 F2400\nG2 X20 Y-10 J-5\nG1 X0\nG2 X0 Y0 J5"
         for k in range(1, 5)
@@ -100,6 +144,21 @@ def own_programs() -> dict[str, tuple[str, str]]:
         "arcs at corners, G64 P": _text("G64 P0.05", *corners),
         "two circles, G64": _text("G64", "G2 I10 F6000\nG2 I10"),
         "99 short stops, G61.1": _text("G61.1", *stops),
+        "half circles at corners, G64": _arches("G64", 2.0, 4.0),
+        "large half circles at corners, G64": _arches("G64", 6.0, 9.0),
+        "small half circles at corners, G64 P": _arches("G64 P0.1", 0.8, 2.0),
+        "lines and arcs anywhere, G64": _corners("G64", 1, 0.5),
+        "other lines and arcs anywhere, G64": _corners("G64", 6, 0.5),
+        "lines and arcs anywhere, G64 P": _corners("G64 P0.05", 2, 0.5),
+        "lines and arcs anywhere, G61": _corners("G61", 3, 0.5),
+        "arcs anywhere, G64": _corners("G64", 103, 0.3),
+        "staircase of rows of 1.5 mm, G64": _text("G64", *stairs),
+        "staircase of rows of 1.5 mm, G64 P": _text("G64 P0.01", *stairs),
+        "staircase of rows of 1.5 mm, G61": _text("G61", *stairs),
+        "pocket from a helix, G64 P": _spiral_pocket("G64 P0.02"),
+        "pocket from a helix, G61": _spiral_pocket("G61"),
+        "holes by G81, G64": _text("G64", "G0 Z10", "G98", *holes, "G80"),
+        "holes by G83, G64 P": _text("G64 P0.01", "G0 Z10", "G99", *deep, "G80"),
     }
     five = {
         "five axes, G64": _five("G64"),

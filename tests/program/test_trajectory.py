@@ -23,7 +23,7 @@ from cycle_counts.programs import digest, own_programs, recorded
 PROGRAMS, COUNTS = own_programs(), recorded()
 MILL = machine_of("XYZ")
 #: of the time, and at least two servo cycles
-CLOSE = 0.03
+CLOSE = 0.015
 
 
 @pytest.mark.parametrize("name", list(PROGRAMS))

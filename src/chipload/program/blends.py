@@ -9,8 +9,7 @@ every axis. Else the planner compares three speeds and takes the best: that at w
 a blend arc with R = d tan(theta) within the tolerance, v = sqrt(a_n R), and half that of a parabolic blend (the next
 segment starts while this one slows down, both with half the acceleration).
 
-Reference: LinuxCNC 2.9, `tp.c`, `blendmath.c`. Differs from source: two arcs that are not tangent blend like their
-tangents.
+Reference: LinuxCNC 2.9, `tp.c`, `blendmath.c`.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 
 from chipload.machine.machine import Machine
 from chipload.machine.trajectory import TrajectoryPlanner
+from chipload.program.corner_arcs import CornerSide, corner_arcs
 from chipload.program.path_mode import PathControl
 from chipload.program.segments import Segments
 
@@ -40,6 +40,12 @@ LEAST_CYCLES = 1.02
 REVERSAL = math.radians(2.0)
 #: of the length of a segment: what a blend may leave the corner by where no tolerance is stated
 FREE_TOLERANCE = 0.25
+#: half angles of corners of two arcs below which there is no blend arc [rad]
+LEAST_BETWEEN_ARCS = math.pi / 12.0
+#: times that blend arcs are found, each with what the one before takes of a segment
+PASSES = 4
+#: share of the acceleration for the angle between a blend arc and what remains of an arc
+TANGENT_SHARE = 0.25
 _LEAST_ANGLE, _LEAST_ARC = 1e-6, 1e-6
 
 
@@ -90,7 +96,14 @@ def joints_of(s: Segments, machine: Machine, planner: TrajectoryPlanner) -> Join
     chosen = np.flatnonzero(considered & ~smooth & (s.control[a] == PathControl.CONTINUOUS))
     if len(chosen) == 0:
         return out
-    return _best(out, s, chosen, u1[chosen], u2[chosen], planner, (rate, most))
+    taken = np.zeros(len(s))
+    for _ in range(PASSES if s.arc.any() else 1):
+        best = _best(out, s, chosen, u1[chosen], u2[chosen], planner, (rate, most), taken)
+        now = np.concatenate([[0.0], best.trim2])
+        if np.array_equal(now, taken):
+            break
+        taken = now
+    return best
 
 
 def _bounds(machine: Machine) -> tuple[Floats, Floats]:
@@ -122,12 +135,12 @@ def _inscribed(normal: Floats, bound: Floats) -> Floats:
 
 def _best(
     joints: Joints, s: Segments, k: Ints, u1: Floats, u2: Floats, planner: TrajectoryPlanner,
-    bounds: tuple[Floats, Floats],
+    bounds: tuple[Floats, Floats], taken: Floats,
 ) -> Joints:  # fmt: skip
     """Corners: the fastest of a slow kink, a blend arc and a parabolic blend."""
     a, b = k, k + 1
     theta = 0.5 * np.arccos(np.clip(-(u1 * u2).sum(axis=1), -1.0, 1.0))
-    arc = _blend_arcs(s, a, b, u1, u2, theta, planner, bounds)
+    arc = _blend_arcs(s, a, b, u1, u2, theta, planner, bounds, taken[a])
     half = 0.5 * (1.0 - joints.reduction[k])
     parabolic = 0.5 * _parabolic_net(s, a, b, theta, half, planner)
     speeds = np.column_stack([parabolic, joints.speed[k], arc.speed])
@@ -145,22 +158,26 @@ def _best(
 
 def _blend_arcs(
     s: Segments, a: Ints, b: Ints, u1: Floats, u2: Floats, theta: Floats, planner: TrajectoryPlanner,
-    bounds: tuple[Floats, Floats],
+    bounds: tuple[Floats, Floats], taken: Floats,
 ) -> Joints:  # fmt: skip
-    """Blend arcs of corners; speed 0 where there can be none."""
+    """Blend arcs of corners; speed 0 where there can be none. ``taken`` [mm]: of the start of the first segments."""
     binormal = np.cross(u1, u2)
     size = np.linalg.norm(binormal, axis=1)
     binormal /= np.where(size > 0.0, size, 1.0)[:, None]
     fits = (0.5 * math.pi - theta >= _LEAST_ANGLE) & (theta >= _LEAST_ANGLE)
     for segments in (a, b):
         fits &= ~s.arc[segments] | (np.abs((binormal * s.normal[segments]).sum(axis=1)) > 1.0 - 1e-12)
-    inner1, used1, w1 = _arc_share(s, a, u2, theta, -1.0)
-    inner2, used2, w2 = _arc_share(s, b, u1, theta, 1.0)
-    angle = theta - np.where(inner1, 0.25 * used1, 0.0) - np.where(inner2, 0.25 * used2, 0.0)
-    fits &= angle > _LEAST_ANGLE
+    inner1, used1, w1 = _arc_share(s, a, u2, theta, -1.0, taken)
+    inner2, used2, w2 = _arc_share(s, b, u1, theta, 1.0, np.zeros(len(a)))
+    angle = theta - 0.25 * np.maximum(np.where(inner1, used1, 0.0), np.where(inner2, used2, 0.0))
+    fits &= angle > np.where(s.arc[a] & s.arc[b], LEAST_BETWEEN_ARCS, _LEAST_ANGLE)
     angle = np.where(fits, angle, 0.25 * math.pi)
     phi = math.pi - 2.0 * angle
-    share1 = np.where(s.arc[a], np.where(inner1, np.sin(0.25 * used1) * w1, used1 * w1), 0.5 * s.length[a])
+    share1 = np.where(
+        s.arc[a],
+        np.where(inner1, np.sin(0.25 * used1) * w1, used1 * w1),
+        np.minimum(0.5 * s.length[a], s.length[a] - taken),
+    )
     share2 = np.where(s.arc[b], np.where(inner2, np.sin(0.25 * used2) * w2, used2 * w2), 0.5 * s.length[b])
     tolerance = np.minimum(FREE_TOLERANCE * s.length[a], FREE_TOLERANCE * s.length[b])
     for segments in (a, b):
@@ -176,28 +193,38 @@ def _blend_arcs(
     slow = 0.5 * most_there
     time = np.minimum(np.sqrt(2.0 * slow * d), speed) / slow
     plan = np.maximum(speed**2 / (NORMAL * most_there), np.minimum(time * speed / phi, radius))
-    length = plan * phi
-    fits &= length >= _LEAST_ARC
-    trim = plan / np.tan(angle)
+    fits &= plan * phi >= _LEAST_ARC
+    kink = NORMAL * TANGENT_SHARE * most_there * planner.cycle / np.where(speed > 0.0, speed, 1.0)
+    side = np.cross(binormal, u1)
+    sides = []
+    for k, inner, used, w, corner in ((a, inner1, used1, w1, s.point[a]), (b, inner2, used2, w2, s.point[b - 1])):
+        out = s.centre[k] - corner
+        centre = (out * u1).sum(axis=1) + 1j * (out * side).sum(axis=1)
+        sides.append(CornerSide(s.arc[k], inner, np.where(s.arc[k], centre, 0j), w, used, s.length[k]))
+    leaving = (u1 * u2).sum(axis=1) + 1j * (side * u2).sum(axis=1)
+    found = corner_arcs(*sides, leaving, plan, tolerance, kink)
+    fits &= found.possible
     zero = np.zeros(len(a))
     return Joints(
         kind=np.full(len(a), ARC),
         speed=np.where(fits, speed, 0.0),
         reduction=zero,
-        trim1=np.minimum(trim, s.length[a]),
-        trim2=np.minimum(trim, s.length[b]),
-        length=length,
+        trim1=found.trim1,
+        trim2=found.trim2,
+        length=found.length,
         acceleration=most_there,
     )
 
 
-def _arc_share(s: Segments, k: Ints, other: Floats, theta: Floats, sign: float) -> tuple[Bools, Floats, Floats]:
+def _arc_share(
+    s: Segments, k: Ints, other: Floats, theta: Floats, sign: float, taken: Floats
+) -> tuple[Bools, Floats, Floats]:
     """Of segments that are arcs: whether the other segment lies inside, the angle a blend may take, the radius."""
     arc = s.arc[k]
     corner = s.point[k] if sign < 0.0 else s.point[k - 1]
     out = ((corner - s.centre[k]) * other).sum(axis=1)
     inner = arc & (out * sign >= 0.0)
-    most = s.sweep[k] * (1.0 / 3.0 if sign > 0.0 else 2.0 / 3.0)
+    most = (s.sweep[k] - taken / s.radius[k]) * (1.0 / 3.0 if sign > 0.0 else 2.0 / 3.0)
     used = np.where(arc, np.minimum(most, np.where(inner, theta, 0.5 * math.pi)), 0.0)
     return inner, used, np.where(arc, s.radius[k], 0.0)
 

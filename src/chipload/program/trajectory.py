@@ -106,6 +106,9 @@ def _segment_times(s: Segments, joints: Joints, planner: TrajectoryPlanner) -> F
     limit[at[~blended & ~smooth]] = 0.0
     slow = np.flatnonzero(smooth)
     limit[at[slow]] = np.minimum(limit[at[slow]], joints.speed[slow])
+    # the last segment before a pause is entered while its end may still be cut: no faster than it stops in its half
+    last = np.flatnonzero(s.ends & ~(blended | smooth))
+    limit[place[last]] = np.minimum(limit[place[last]], np.sqrt(most[place[last]] * lengths[place[last]]))
     there = np.ones(count, dtype=bool)
     there[place[absorbed]] = False
     limit = _stopping_speeds(limit, lengths, most, there, planner.lookahead)

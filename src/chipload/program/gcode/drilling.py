@@ -8,6 +8,7 @@ Reference: LinuxCNC 2.9, "Canned Cycles"; the way between holes is that which it
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from chipload.errors import InputError, Severity
@@ -19,10 +20,13 @@ from chipload.program.gcode.modal import shown
 from chipload.program.gcode.state import put
 from chipload.program.gcode.targets import axes, polar, rate
 from chipload.program.gcode.words import Block
+from chipload.program.path_mode import PathControl, PathMode
 
 #: heights that differ by less are one [units of the text]
 SAME = 1e-9
 MOST_REPEATS = 100_000
+#: a cycle positions exactly, whatever the program asks for at joints
+EXACT: PathMode = (float(PathControl.EXACT_PATH), 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -114,7 +118,22 @@ class Drilling:
         if level < r:
             go(RAPID, state.at[first], state.at[second], r)
             height = r
-        height = max(height, clear)
+        asked, state.path_mode = state.path_mode, EXACT
+        c.changed()
+        try:
+            self._drill(block, code, hole, given, max(height, clear), repeats, go)
+        finally:
+            state.path_mode = asked
+            c.changed()
+
+    def _drill(
+        self, block: Block, code: int, hole: cycles.Hole, given: dict[int, float], height: float, repeats: int,
+        go: Callable[[int, float, float, float], None],
+    ) -> None:  # fmt: skip
+        """Drill the holes of a block from ``height``; ``go``: a motion to a place and a height [units of the text]."""
+        c, state, words = self.c, self.c.state, block.words
+        first, second, _ = PLANE_AXES[PLANES[state.plane]]
+        back = code == cycles.FANUC_BACK_BORING
         a, b = state.at[first], state.at[second]
         pole = "@" in words or "^" in words
         for count in range(repeats):
@@ -130,8 +149,8 @@ class Drilling:
             else:
                 a, b = a + given.get(first, 0.0), b + given.get(second, 0.0)
             go(RAPID, a, b, height)
-            if abs(height - r) > SAME and not back:
-                go(RAPID, a, b, r)
+            if abs(height - hole.r) > SAME and not back:
+                go(RAPID, a, b, hole.r)
             for kind, p, q, h, value in cycles.cycle_steps(code, a, b, hole):
                 if kind in (RAPID, LINE):
                     go(kind, p, q, h)
@@ -142,7 +161,7 @@ class Drilling:
                     c.changed()
                 else:
                     c.note("nc-stop", f"{shown(code)}: the program waits for its operator, who retracts by hand")
-            height = clear
+            height = hole.clear
             c.track.spill()
 
     def _sticky(self, block: Block, code: int, old: Series | None, normal: str, here: float) -> Series:
