@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -65,7 +65,7 @@ def _rows(whole: Rows, lines: Lines, others: Sequence[Lines], rapid: int) -> Row
     if whole.motion[first] != rapid and first > 0:
         first -= 1
     columns = [f.name for f in fields(whole) if f.name not in ("labels", "frames")]
-    some = {name: np.array(getattr(whole, name)[first : last + 1]) for name in columns}
+    some: dict[str, Any] = {name: np.array(getattr(whole, name)[first : last + 1]) for name in columns}
     some["motion"][0] = rapid
     some["feed"][0] = 0.0
     some["turns"][0] = 0

@@ -23,12 +23,13 @@ from chipload.program.gcode.state import AXES, LINEAR, NO_MOTION, ZERO, Datum, N
 from chipload.program.gcode.tilted_plane import machine_of, position_of
 from chipload.program.gcode.tool_rows import ToolRows
 from chipload.program.gcode.tools import Tool, ToolTable
-from chipload.program.gcode.track import Context, Findings, MotionRows
+from chipload.program.gcode.track import Context, Findings, MotionRows, Row
 from chipload.program.path_mode import PathControl
 from chipload.units import MM_PER
 
 if TYPE_CHECKING:
     from chipload.program.gcode.frames import ProgramFrame
+    from chipload.program.gcode.interpolation import Interpolation
     from chipload.program.gcode.words import MacroCall
     from chipload.program.swivel import Swivel
 
@@ -105,6 +106,8 @@ class Controller:
         self.polar_before = (0.0, 0.0)
         #: factors along X Y Z and the point [mm] that stays (G51, G51.1); None: none
         self.scaled: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+        #: plane in which a rotary axis takes the place of a linear one (G12.1, G7.1); None: none
+        self.interpolation: Interpolation | None = None
         #: macro that is called after each motion (G66), and the level of calls at which it was stated
         self.modal_macro: tuple[MacroCall, int] | None = None
         self.label = 0
@@ -160,7 +163,8 @@ class Controller:
         if not self.increments or letter not in numbers.increment_letters:
             return 1.0
         inch = numbers.increment_inch if self.state.scale != 1.0 else numbers.increment_mm
-        return numbers.increment_deg if letter in "abc" else inch
+        flat = self.interpolation is not None and self.interpolation.radius is None
+        return numbers.increment_deg if letter in "abc" and not flat else inch
 
     def stated_tool_offset(self, kind: str, number: int) -> None:
         """An offset that the program sets counts from the next G43 or G41 of its number on."""
@@ -384,15 +388,38 @@ class Controller:
             moves = beside.skip(end)
         self._emit(moves)
 
+    def _row(self, row: Row) -> None:
+        """A row that is no arc, of the axes of the machine."""
+        self.track.rows.extend((row,) if self.interpolation is None else self.interpolation.rows(self.track, row))
+
+    def _arc_row(self, row: Row, first: float, second: float, turns: int) -> None:
+        """A row that is an arc, or the rows of the axes that make one."""
+        if self.interpolation is None:
+            self.track.arc(row, first, second, turns)
+        else:
+            self.track.rows.extend(self.interpolation.rows(self.track, row, (first, second), turns))
+
+    def interpolate(self, interpolation: Interpolation | None) -> None:
+        """Begin or end polar or cylindrical interpolation."""
+        self.end_corner()
+        before = self.interpolation
+        if before is not None:
+            self.state.at = before.stands
+            self.state.plane = before.plane
+        self.interpolation = interpolation
+        if interpolation is not None:
+            self.state.at = interpolation.last
+        self.changed()
+
     def _emit(self, moves: list[CentreMove]) -> None:
         """Rows of motions beside the contour."""
         for move in moves:
             context, line = cast(tuple[int, int], move.payload)
             row = (move.motion, *nine(list(move.end)), context, line)
             if move.motion == ARC:
-                self.track.arc(row, *move.centre, move.turns)
+                self._arc_row(row, *move.centre, move.turns)
             else:
-                self.track.rows.append(row)
+                self._row(row)
 
     # -- corners ---------------------------------------------------------------------------------------------------
 
@@ -459,9 +486,9 @@ class Controller:
         elif self._beside is not None:
             self._compensated(self._beside, lambda b: b.line(piece.motion, end, (context, line)), end)
         elif piece.motion == ARC:
-            self.track.arc((ARC, *end, context, line), *piece.centre, piece.turns)
+            self._arc_row((ARC, *end, context, line), *piece.centre, piece.turns)
         else:
-            self.track.rows.append((piece.motion, *end, context, line))
+            self._row((piece.motion, *end, context, line))
 
     # -- rows ------------------------------------------------------------------------------------------------------
 
@@ -564,7 +591,7 @@ class Controller:
         elif self._beside is not None:
             self._compensated(self._beside, lambda b: b.line(motion, end, (context, self.line)), end)
         else:
-            self.track.rows.append((motion, *end, context, self.line))
+            self._row((motion, *end, context, self.line))
         self.state.at = end
 
     def check(self, end: Nine) -> None:
@@ -591,7 +618,7 @@ class Controller:
         elif self._beside is not None:
             self._compensated(self._beside, lambda b: b.arc(end, centre, turns, (context, self.line)), end)
         else:
-            self.track.arc((ARC, *end, context, self.line), *centre, turns)
+            self._arc_row((ARC, *end, context, self.line), *centre, turns)
         self.state.at = end
 
     def dwell(self, seconds: float) -> None:
@@ -601,4 +628,4 @@ class Controller:
         if self._beside is not None:
             self._emit(self._beside.pause((context, self.line)))
         else:
-            self.track.rows.append((DWELL, *self.state.at, context, self.line))
+            self._row((DWELL, *self.state.at, context, self.line))

@@ -10,10 +10,11 @@ of a Haas of :mod:`~chipload.program.gcode.haas_cycles`. G68 turns about Z. A ti
 G268) has an origin and Euler angles; G53.1 (G253) turns the tool along its normal
 (:mod:`~chipload.program.gcode.tilted_plane`).
 
-Left out, so that the result is unproven: motions in cylindrical and polar interpolation (G7.1, G12.1) and in planes
-that are tilted otherwise (G68.2 P, G68.3, G68 about another axis than Z) until they end, tool vectors (G43.5),
-involutes and splines. Noted and left out: smoothing and look-ahead (G5.1, G8), retractions to where only the machine
-knows.
+Polar and cylindrical interpolation (G12.1, G7.1) are those of :mod:`~chipload.program.gcode.interpolation_codes`.
+
+Left out, so that the result is unproven: motions in planes that are tilted otherwise (G68.2 P, G68.3, G68 about another
+axis than Z) until they end, tool vectors (G43.5), involutes and splines. Noted and left out: smoothing and look-ahead
+(G5.1, G8), retractions to where only the machine knows.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from chipload.program.gcode.dialect import UNREAD, Dialect, NotReadError, go_on,
 from chipload.program.gcode.expression import integer_of, read_value
 from chipload.program.gcode.frames import remove, turn_about
 from chipload.program.gcode.haas_cycles import circular_pocket, hole_pattern
+from chipload.program.gcode.interpolation_codes import change_plane, refuse_within
 from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, read_macro_call, system_variables, with_brackets
 from chipload.program.gcode.modal import GROUP_OF, shown
 from chipload.program.gcode.numbers import count_increments, decide_increments, seconds_of
@@ -52,12 +54,9 @@ _CORNER = re.compile(r",([rc])([-+]?[0-9.]+|#[0-9]+|\[[^\]]*\])")
 CHANGED = {
     683: "a tilted plane",
     684: "a tilted plane",
-    71: "cylindrical interpolation",
-    121: "polar interpolation",
-    1120: "polar interpolation",
 }
 #: and those codes
-ENDS = {150: (160,), 690: (682, 683, 684), 130: (), 131: (121,), 1130: (1120,)}
+ENDS = {150: (160,), 690: (682, 683, 684), 131: (121,), 1130: (1120,), 71: (71,), 1070: (1070,)}
 #: blocks that are left out
 NOT_READ = {
     401: "normal direction control",
@@ -73,7 +72,7 @@ TILTED, ALIGN = (682, 2680), (531, 2530)
 HAAS_UNTILTED, EULER = 2690, 313.0
 #: G53.1 P: the angle of the last rotary axis from the workpiece is positive, or negative
 SIGNS = {0.0: 0, 1.0: 1, 2.0: -1}
-TURNED, UNTURNED, SKIP, ENDS_CYLINDER = 680, 690, 310, 71
+TURNED, UNTURNED, SKIP = 680, 690, 310
 #: blocks that are left out if they have such words: what they do with them
 NOT_READ_WITH = {
     270: ("xyzabc", "a motion to a position of the machine"),
@@ -143,7 +142,9 @@ class Fanuc(Dialect):
         if any(key == ALARM for key, _ in block.sets):
             c.leave_out("nc-alarm", f"#{ALARM}: an alarm ends the program here")
             block.sets, block.m = [], [30]
+        refuse_within(block, c)
         self._coordinates(block, c)
+        change_plane(block, c)
         change_coordinates(block, c)
         if 198 in block.m:
             raise NotReadError("M198: calls a program of another device")
@@ -163,14 +164,8 @@ class Fanuc(Dialect):
         if HAAS_UNTILTED in g:
             g[g.index(HAAS_UNTILTED)] = UNTURNED
         for code in g:
-            if c.left_out and code in ENDS and c.left_out.split(":")[0] in map(shown, ENDS[code] or (ENDS_CYLINDER,)):
+            if c.left_out and code in ENDS and c.left_out.split(":")[0] in map(shown, ENDS[code]):
                 go_on(c)
-            if code == ENDS_CYLINDER and c.left_out.startswith(f"{shown(code)}:"):
-                # G7.1 C0 ends what G7.1 C50 began
-                go_on(c)
-                g.remove(code)
-                words.clear()
-                return
         for code in [code for code in g if code in CHANGED]:
             leave_out(c, f"{shown(code)}: {CHANGED[code]}")
             g.remove(code)

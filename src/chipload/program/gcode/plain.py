@@ -115,6 +115,7 @@ def _ready(c: Controller, motion: ControllerMotion) -> bool:
         and not c.unread
         and not c.left_out
         and c.polar is None
+        and c.interpolation is None
         and c.scaled is None
         and c.modal_macro is None
         and c.modal_hole is None

@@ -14,6 +14,7 @@ import math
 from chipload.errors import InputError, Severity
 from chipload.program.commands import PLANE_AXES
 from chipload.program.gcode.controller import PLANES, Controller
+from chipload.program.gcode.interpolation import Interpolation
 from chipload.program.gcode.state import AXES, LINEAR, Nine, put
 from chipload.program.gcode.words import Block
 
@@ -25,12 +26,26 @@ def axes(c: Controller, block: Block) -> dict[int, float]:
     for k, axis in enumerate(AXES):
         if axis in words:
             out[k] = words[axis] * (state.scale if k in LINEAR else 1.0)
+    if c.interpolation is not None:
+        out = flat_axes(c.interpolation, words, out, state.scale)
     if c.polar is not None:
         out |= from_polar(c, words)
     if c.scaled is not None:
         out |= scaled(c, out)
     if state.diameter and 0 in out:
         out[0] *= 0.5
+    return out
+
+
+def flat_axes(plane: Interpolation, words: dict[str, float], given: dict[int, float], scale: float) -> dict[int, float]:
+    """Axes of a block in polar or cylindrical interpolation: the rotary one gives the flat coordinate [mm]."""
+    out = {k: value for k, value in given.items() if k != plane.rotary}
+    letter = AXES[plane.rotary]
+    if letter in words:
+        turned = words[letter]
+        out[plane.flat] = turned * scale if plane.radius is None else math.radians(turned) * plane.radius
+    elif plane.radius is not None and plane.flat in given:
+        raise InputError(f"{AXES[plane.flat].upper()}: not in {plane.name}, in which {letter.upper()} takes its place")
     return out
 
 

@@ -81,12 +81,27 @@ class MotionRows:
         self._pieces: list[NDArray[np.float64]] = []
         self._arcs: list[tuple[int, float, float, int]] = []
         self._contexts: dict[Context, int] = {}
+        self._by_number: list[Context] = []
         self._frames: dict[Datum, int] = {}
         self._labels: dict[str, int] = {"": 0}
 
     def context(self, context: Context) -> int:
         """Number of a context."""
         return self._contexts.setdefault(context, len(self._contexts))
+
+    def feed_of(self, number: int) -> float:
+        """Feed of a context."""
+        return self._list()[number][0]
+
+    def with_feed(self, number: int, feed: float) -> int:
+        """Number of a context that differs by its feed."""
+        return self.context((feed, *self._list()[number][1:]))
+
+    def _list(self) -> list[Context]:
+        """Contexts by number."""
+        if len(self._by_number) < len(self._contexts):
+            self._by_number += list(self._contexts)[len(self._by_number) :]
+        return self._by_number
 
     def frame(self, datum: Datum) -> int:
         """Number of the frame of a datum."""
