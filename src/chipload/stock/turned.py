@@ -64,7 +64,7 @@ def stock_bounds(stock: LayeredStock, R: Floats) -> tuple[Floats, Floats]:
     for i in range(stock.layers):
         xy = shapely.get_coordinates(stock.section(i))
         if len(xy):
-            x0, y0, x1, y1 = *xy.min(axis=0), *xy.max(axis=0)
+            (x0, y0), (x1, y1) = xy.min(axis=0).tolist(), xy.max(axis=0).tolist()
             flat = xy if abs(R[2, 2]) > 0.5 else np.array([[x0, y0], [x1, y0], [x0, y1], [x1, y1]])
             points += [np.column_stack([flat, np.full(len(flat), z)]) for z in stock.bounds[i : i + 2]]
     if not points:
