@@ -16,6 +16,7 @@ FIELDS = 12
 #: keys that users write or read: to divide the record would move the keys, or write each of them twice
 KEYS = {
     "checking/settings.CheckSettings": "[checks]",
+    "checking/settings.Limits": "[limits]",
     "control/hal.HalJob": "hal.toml",
     "control/override.Override": "[torque_control.override] and hal.toml",
     "control/_override.Rules": "the same, as plain numbers for the compiled controller",

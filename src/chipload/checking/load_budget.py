@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.drilling import THRUST, is_drilling
 from chipload.cutter.cutter import Cutter
+from chipload.cutting.drilling import MODEL_SPREAD
 from chipload.cutting.load_parts import CHIP, MEANS, SCATTER, LoadParts, bounded_parts, bounded_rise
 from chipload.cutting.material import Material
 from chipload.result.budget import ErrorBudget, ErrorPart, factor_at
@@ -25,12 +27,19 @@ WITH_FORCE = (
 #: columns that have a budget, and the load whose parts theirs are
 BUDGETED = {
     **dict.fromkeys(WITH_FORCE, "force_n"), "torque_nm": "torque_nm", "torque_mean_nm": "torque_mean_nm",
-    "power_w": "power_w", CHIP: CHIP,
+    "power_w": "power_w", CHIP: CHIP, THRUST: "torque_mean_nm",
 }  # fmt: skip
 
 
 def budget_parts(
-    own: LoadParts, load: str, cutter: Cutter, material: Material, error: float, peaks: float, deflection_mm: float
+    own: LoadParts,
+    load: str,
+    cutter: Cutter,
+    material: Material,
+    error: float,
+    peaks: float,
+    deflection_mm: float,
+    drilling: bool = False,
 ) -> tuple[ErrorPart, ...]:
     """Return the parts of the error of a load.
 
@@ -41,6 +50,7 @@ def budget_parts(
     error : relative, by the resolution of the calculation and the chip
     peaks : how far measured peaks were above predicted ones, relative
     deflection_mm : between cutter and workpiece
+    drilling : whether the load is one of a drill along its axis
     """
     mean = BUDGETED[load] in MEANS
     geometric = load == CHIP
@@ -60,6 +70,7 @@ def budget_parts(
             remedy=state if own.assumed_runout else "state runout_deg, the direction of the runout",
         ),
         ErrorPart(spread, deviation=0.0 if geometric else own.coefficients, remedy=fit if textbook else ""),
+        ErrorPart("drill model", deviation=MODEL_SPREAD if drilling and not geometric else 0.0),
         ErrorPart("thin chips", deviation=0.0 if geometric else own.thin_chips),
         ErrorPart("turns", deviation=0.0 if mean or geometric else TURNS),
     )
@@ -146,7 +157,8 @@ def budget_of(
     if own is None:
         own = bounded_parts(cutter, material, _at(columns, CHIP, row))
     deflection = 1e-3 * _at(columns, "deflection_um", row)
-    return ErrorBudget(confidence, budget_parts(own, load, cutter, material, check.error, peaks, deflection))
+    drills = is_drilling(columns, row)
+    return ErrorBudget(confidence, budget_parts(own, load, cutter, material, check.error, peaks, deflection, drills))
 
 
 def _at(columns: Columns, name: str, row: int | None) -> float:

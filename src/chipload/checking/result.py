@@ -128,6 +128,8 @@ def unchecked(program: ProgramResult) -> tuple[str, ...]:
     always: tuple[str, ...] = () if simulation.stability is None else ("stability_margin",)
     if simulation.left is not None and "gouge" not in simulation.checks.off:
         always += ("gouge_mm",)
+    if "thrust_n" not in simulation.removal.columns:
+        always += ("thrust_n",)
     missing = [name for name in simulation.stated_limits.unstated if name not in always]
     out = [*unchecked_checks(simulation.checks), *(f"limit {name}: not stated" for name in missing)]
     out += program.reading.unchecked

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.checking.default_checks import PROGRAM_COLUMNS, with_checks
+from chipload.checking.drilling import with_drilling
 from chipload.checking.form_error import forming
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.leaning_stock import check_leaning_stock
@@ -26,6 +27,7 @@ from chipload.checking.workpiece_compliance import (
     workpiece_compliance,
 )
 from chipload.cutter.cutter import Cutter
+from chipload.cutting.drilling import is_pointed
 from chipload.errors import Finding
 from chipload.program.motions import lengths
 from chipload.program.program import Program
@@ -151,6 +153,8 @@ def simulate_program(
             ),
         )  # fmt: skip
     removal = with_columns(removal, (*watched(gives, formed=made is not None), *PROGRAM_COLUMNS))
+    if inputs.limits.thrust_n is not None or any(is_pointed(c) for c in cutters.values()):
+        removal = with_drilling(removal, cutters, material)
     if leans(program).any():
         found, unchecked = check_leaning_stock(inputs, program, before, stock)
         stock_check = replace(

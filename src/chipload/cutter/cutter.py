@@ -78,6 +78,7 @@ class Cutter:
     max_speed : greatest spindle speed [rad/s], > 0; None: not known
     thread_pitch : of the thread that a tap cuts [mm], > 0; None: not known, or no tap
     hole_depth : greatest depth [mm] that it drills without a retraction, > 0; None: not known
+    web : thickness [mm] of the web of a drill at its point, > 0; None: of standard design
 
     Raises
     ------
@@ -116,6 +117,7 @@ class Cutter:
     thread_pitch: float | None = None
     hole_depth: float | None = None
     runout_size: float | None = None
+    web: float | None = None
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: float, limit: str) -> None:
@@ -198,6 +200,8 @@ class Cutter:
             ("hole_depth_mm", self.hole_depth, 1.0),
         ):
             need(value is None or 0.0 < value < math.inf, key, unit * (value or 0.0), "must be above 0")
+        limit = f"must be above 0 and at most 0.35 diameter_mm = {0.35 * self.diameter:g}"
+        need(self.web is None or 0.0 < self.web <= 0.35 * self.diameter + 1e-9, "web_mm", self.web or 0.0, limit)
         need(self.number >= 0, "number", self.number, "must be at least 0")
 
     def _check_corner(self) -> None:

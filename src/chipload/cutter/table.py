@@ -81,6 +81,11 @@ class CutterTable(BaseModel):
     hole_depth_mm: float | None = Field(
         None, description="greatest depth that it drills without a retraction; default: not known above 5 diameters"
     )
+    web_mm: float | None = Field(
+        None,
+        description="of a drill: thickness of its web at the point, after thinning, for thrust and torque; default: "
+        "0.155 diameters, a standard point; a split point has about 0.025",
+    )
     flute_length_mm: float | None = Field(None, description="length of the cutting edges along the axis")
     overhang_mm: float | None = Field(None, description=f"length from the holder to the tip, at most {LONGEST:g}")
     modulus_gpa: float | None = Field(None, description="Young's modulus of the cutter: carbide 580, steel 210")
@@ -193,6 +198,7 @@ class CutterTable(BaseModel):
             max_speed=rad_s_from_rpm(values["max_rpm"]) if "max_rpm" in values else None,
             thread_pitch=values.get("thread_pitch_mm"),
             hole_depth=values.get("hole_depth_mm"),
+            web=values.get("web_mm"),
         )
 
     def _from_file(self, folder: Path) -> dict[str, Any]:

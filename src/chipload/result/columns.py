@@ -150,6 +150,7 @@ _ROWS = (
     ("torque_mean_sd_nm", "N m", "standard deviation of mean torque", "from the spread of the coefficients",
      MEAN_TORQUE),
     ("power_sd_w", "W", "standard deviation of power", "of the mean power, from the spread of the coefficients", POWER),
+    ("thrust_n", "N", "drill thrust", "thrust of a drill along its axis; 0 in other steps", MEAN_TORQUE),
     ("force_normal_n", "N", "normal force", "greatest force normal to the surface that the step leaves", FORCE),
     ("force_normal_planned_n", "N", "planned normal force", "normal force that the plan expects", FORCE),
     ("force_allowable_n", "N", "allowable normal force", "normal force that the workpiece allows at the place", STATED),

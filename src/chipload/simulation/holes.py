@@ -37,7 +37,7 @@ def deep_holes(columns: Mapping[str, NDArray[Any]], cutters: Mapping[int, Cutter
     tool, s_mm = np.asarray(columns["tool"]), np.asarray(columns["s_mm"])
     solid = (np.asarray(columns["ramp_deg"]) >= AXIAL_DEG) & (np.asarray(columns["chip_volume_mm3"]) > 0.0)
     # runs of steps that go down the axis with one tool; by layers some of them meet nothing
-    down = _down_axis(columns)
+    down = down_axis(columns)
     run = np.cumsum(down & ~(np.append(False, down[:-1]) & np.append(False, tool[1:] == tool[:-1])))
     solid &= down
     out = []
@@ -71,8 +71,8 @@ def deep_holes(columns: Mapping[str, NDArray[Any]], cutters: Mapping[int, Cutter
     return tuple(out)
 
 
-def _down_axis(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
-    """Which steps feed down the axis of the tool, (n,)."""
+def down_axis(columns: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
+    """Return which steps feed down the axis of the tool, (n,)."""
     p, axis = (np.column_stack([columns[name] for name in names]) for names in (PLACE, AXIS))
     d = np.diff(p, axis=0, prepend=p[:1])
     size = np.linalg.norm(d, axis=1)

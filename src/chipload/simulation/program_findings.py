@@ -18,6 +18,7 @@ from chipload.program.motions import bounds
 from chipload.program.program import DWELL, Program
 from chipload.program.tapping import tapping_findings
 from chipload.simulation.approach import approach_findings
+from chipload.simulation.drill_depth import drill_depths
 from chipload.simulation.holes import deep_holes
 from chipload.simulation.steps import StepBlocks
 from chipload.simulation.stops import stop_findings
@@ -86,6 +87,7 @@ def program_findings(
         ),
         *(tapping_findings(program, cutters) if around.text is None else ()),
         *deep_holes(columns, cutters),
+        *drill_depths(columns, cutters, float(around.low[2])),
         *speed_findings(program, cutters),
         *(() if around.bodies_below else below_stock(program, cutters, *box)),
     )

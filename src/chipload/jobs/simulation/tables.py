@@ -245,6 +245,7 @@ class ProgramLimitsTable(LimitsTable):
 
     force_n: Number | None = _limit("force_n", "greatest force on the cutter")
     torque_nm: Number | None = _limit("torque_nm", "greatest torque on the cutter")
+    thrust_n: Number | None = _limit("thrust_n", "greatest thrust of a drill along its axis")
     power_w: Number | None = _limit("power_w", "greatest mean power over a revolution")
     chip_max_mm: Number | None = _limit("chip_max_mm", "greatest undeformed chip thickness")
     deflection_um: Number | None = _limit(
