@@ -67,3 +67,17 @@ def test_a_positioned_spindle_stands_still(block: str) -> None:
     commands, findings = read_gcode(text, control=control_named("sinumerik"), lenient=True)
     assert (commands.spindle > 0.0).tolist() == [True, False]
     assert findings == ()
+
+
+@pytest.mark.parametrize("block", ["SPOS[2]=0", "SPOSA[3]=DC(90)"])
+def test_a_second_spindle_leaves_the_first_turning(block: str) -> None:
+    text = f"S1000 M3\nG1 X1 F100\n{block}\nG1 X2\nM30\n"
+    commands, findings = read_gcode(text, control=control_named("sinumerik"), lenient=True)
+    assert (commands.spindle > 0.0).all()
+    assert [(f.code, f.line, f.severity) for f in findings] == [("nc-other-spindle", 3, Severity.NOTE)]
+
+
+def test_a_spindle_that_is_not_named_by_a_number_is_unproven() -> None:
+    text = "R1=2\nS1000 M3\nG1 X1 F100\nSPOS[R1]=0\nG1 X2\nM30\n"
+    _, findings = read_gcode(text, control=control_named("sinumerik"), lenient=True)
+    assert [(f.code, f.severity) for f in findings] == [("nc-other-spindle", Severity.UNPROVEN)]

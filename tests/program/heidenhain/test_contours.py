@@ -133,6 +133,17 @@ def test_round_approaches_and_departures(side):
     np.testing.assert_allclose(np.degrees(arc_sweeps(c)[[2, 4]]), [90 * s, 90 * s])
 
 
+@pytest.mark.parametrize("side", ["RL", "RR"])
+def test_a_negative_radius_turns_to_the_other_side(side):
+    """The manual's table: RL with a negative R turns clockwise. The path of the centre has R10 + 4 about (+-10, 0)."""
+    s = 1 if side == "RL" else -1
+    c, findings = read(*TOOL, f"APPR CT X+0 Y+0 CCA90 R-10 {side} F300", "L X+0 Y+30", "DEP CT CCA90 R-10")
+    assert not findings
+    expected = [[-20, -20], [10 * s, -14], [-4 * s, 0], [-4 * s, 30], [10 * s, 44]]
+    np.testing.assert_allclose(xy(c), expected, atol=1e-9)
+    np.testing.assert_allclose(np.degrees(arc_sweeps(c)[[2, 4]]), [-90 * s, -90 * s])
+
+
 def test_lines_touch_the_arcs_of_lct():
     """The lines to and from the arcs are square to their radii, and go on in the sense of the arcs."""
     c, findings = read(*TOOL, "APPR LCT X+0 Y+0 R10 RL F300", "L X+0 Y+30", "DEP LCT X-40 Y+20 R7", "L Z+9 FMAX")

@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 LARGEST_CORNER = 1e6
 _TOKEN = re.compile(
     r"""\s*(?:
-      (?P<name>[A-Z_$][A-Z0-9_$]*?)\s*(?:\[[^\]]*\])?\s*=\s*(?P<value>"[^"]*"|(?:[^\s=()"]|\([^()]*(?:\([^()]*\)[^()]*)*\))+)
+      (?P<name>[A-Z_$][A-Z0-9_$]*?)\s*(?:\[(?P<index>[^\]]*)\])?\s*=\s*(?P<value>"[^"]*"|(?:[^\s=()"]|\([^()]*(?:\([^()]*\)[^()]*)*\))+)
      |(?P<call>[A-Z_][A-Z0-9_]+)\s*\((?P<arguments>(?:"[^"]*"|[^()"]|\([^()]*\))*)\)
      |(?P<letter>[A-Z])\s*(?P<number>[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?![A-Z_])
      |(?P<word>[A-Z_][A-Z0-9_]*)(?P<colon>:?)
@@ -115,6 +115,8 @@ class Sinumerik(Dialect):
             at = found.end()
             if found["letter"]:
                 _letter(block, c, found["letter"], float(found["number"]), values)
+            elif found["name"] in ("SPOS", "SPOSA"):
+                _position_spindle(block, c, found["index"])
             elif found["name"]:
                 _named(block, c, found["name"], found["value"], values)
             elif found["call"]:
@@ -259,6 +261,19 @@ def _code(block: Block, c: Controller, code: int) -> None:
         block.g.append(9990 - code % 100 if code > 998 else 10 * code + 9)
 
 
+def _position_spindle(block: Block, c: Controller, index: str | None) -> None:
+    """SPOS: the spindle stops at an angle; that of another number than 1 is not the one that cuts."""
+    if index is None or not index.strip() or index.strip() == "1":
+        block.m.append(19)
+    elif index.strip().isdigit():
+        c.once("nc-other-spindle", f"SPOS[{index.strip()}]: positions another spindle: the one that cuts goes on")
+    else:
+        block.m.append(19)
+        c.leave_out(
+            "nc-other-spindle", f"SPOS[{index.strip()[:20]}]: which spindle is not known: taken as the one that cuts"
+        )
+
+
 def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple[str, str, float]]) -> None:
     if name in ("A3", "B3", "C3", "A2", "B2", "C2", "A4", "B4", "C4", "A5", "B5", "C5", "LEAD", "TILT"):
         raise NotReadError(
@@ -279,10 +294,6 @@ def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple
         c.leave_out("nc-unknown-word", left_out)
         if leaves_out(name) and NOTED not in block.g:
             block.g.append(NOTED)
-        return
-    if name in ("SPOS", "SPOSA"):
-        # the spindle stops at an angle
-        block.m.append(19)
         return
     if text.startswith('"') or name.startswith("$") or name in IDLE or name in ("OVR", "OVRRAP"):
         c.once("nc-ignored", f"{name}: does not affect the path; it is ignored")

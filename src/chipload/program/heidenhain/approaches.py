@@ -3,13 +3,15 @@
 Notation: complex numbers in the plane; ``u`` the direction of the contour at its first point PA or its last point PE,
 ``n`` = +-i u its normal on the tool's side, r the radius of the tool. PS is where the tool stands, PH the point
 between, PN the end of a departure. The arc of CT and LCT touches the contour on the tool's side, is compensated like
-the contour and turns to the left where the tool is left of it (RL).
+the contour and turns to the left where the tool is left of it (RL); with a negative R of CT to the right, on the other
+side of the contour.
 
 An approach is carried out with the first motion behind it, which gives u. The tool goes to PH in the plane with the
 feed that was before, at rapid if the block before was at FMAX, then to the Z of the block, then to PA.
 
 Reference: Heidenhain, TNC 407 User's Manual, "Contour Approach and Departure"; iTNC 530 User's Manual HEIDENHAIN
-Conversational, "Contour Approach and Departure".
+Conversational, "Contour Approach and Departure"; TNC7 User's Manual, "Approach function APPR CT", "Departure function
+DEP CT" (direction of rotation by compensation and sign of R).
 """
 
 from __future__ import annotations
@@ -35,11 +37,15 @@ LEAST_MM = 1e-9
 
 
 class Form(NamedTuple):
-    """Words of an approach or a departure: ``size`` is LEN or R [mm], ``span`` CCA [rad]."""
+    """Words of an approach or a departure: ``size`` is LEN or R [mm], ``span`` CCA [rad].
+
+    ``turn`` is -1 for a negative R of CT, with which the arc turns the other way and lies on the other side.
+    """
 
     kind: str
     size: float
     span: float
+    turn: int = 1
 
 
 def form_of(s: ConversationalState, kind: str, text: str) -> tuple[Form, str]:
@@ -61,9 +67,11 @@ def form_of(s: ConversationalState, kind: str, text: str) -> tuple[Form, str]:
         if angle is None:
             raise InputError("CT: CCA is missing: the angle of the arc")
         span = math.radians(s.amount(angle[1]))
+    turn = -1 if kind == "CT" and size < 0.0 else 1
+    size *= turn
     if not (size > 0.0 and 0.0 < span <= math.tau):
         raise InputError(f"{kind}: {name} must be above 0, CCA above 0 and at most 360 deg")
-    return Form(kind, size * s.scale * abs(s.size_factor()), span), words.rest_of(text, pattern, _ANGLE)
+    return Form(kind, size * s.scale * abs(s.size_factor()), span, turn), words.rest_of(text, pattern, _ANGLE)
 
 
 class Approach:
@@ -123,15 +131,16 @@ class Approach:
             self._to(pa - form.size * u, motion, feed)
             self._piece(LINE, self.end, self.feed)
             return
-        centre = pa + n * form.size
+        sense = side * form.turn
+        centre = pa + form.turn * n * form.size
         if form.kind == "CT":
-            ph = centre + (pa - centre) * cmath.rect(1.0, -side * form.span)
+            ph = centre + (pa - centre) * cmath.rect(1.0, -sense * form.span)
         else:
             # the line from PS touches the path of the tool's centre, an arc of the radius R - r
             ph = centre + form.size * touching(ps - centre, form.size - radius, -side)
         self._to(ph, motion, feed)
         at, end = list(s.at), self.end
-        s.carry(Piece(ARC, at, end, (centre.real, centre.imag), side, self.feed, self.tail))
+        s.carry(Piece(ARC, at, end, (centre.real, centre.imag), sense, self.feed, self.tail))
         s.at = end
 
     def _to(self, ph: complex, motion: int, feed: float) -> None:
@@ -186,13 +195,14 @@ def depart(s: ConversationalState, form: Form, end: list[float], named: set[int]
         pn = pe + n * (form.size + radius)
         s.straight(motion, [pn.real, pn.imag, *s.at[2:]])
     else:
-        centre = pe + n * form.size
+        sense = side * form.turn
+        centre = pe + form.turn * n * form.size
         if form.kind == "CT":
-            ph = centre + (pe - centre) * cmath.rect(1.0, side * form.span)
+            ph = centre + (pe - centre) * cmath.rect(1.0, sense * form.span)
         else:
             pn = complex(*end[:2])
             ph = centre + form.size * touching(pn - centre, form.size - radius, side)
-        s.arc([ph.real, ph.imag, *s.at[2:]], (centre.real, centre.imag), side)
+        s.arc([ph.real, ph.imag, *s.at[2:]], (centre.real, centre.imag), sense)
         s.end_contour()
         if form.kind == "LCT":
             s.lag = [0.0, 0.0]
