@@ -1,4 +1,4 @@
-"""Write the pages of docs/ that are made from the source: summary.schema.json, columns.md, jobs.md and materials.md.
+"""Write the pages of docs/ that are made from the source: schema, columns, jobs, materials and controls.
 
 Run it after a change of the schema, of the table of columns or of the tables of a job: ``make reference``. With
 ``--check`` nothing is written; the exit code is 1 if a page is not current.
@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 
+from chipload.jobs.control_reference import control_page, control_pages
 from chipload.jobs.reference import reference
 from chipload.jobs.shipped import materials
 from chipload.result import COLUMNS, SCHEMA_VERSION, Summary
@@ -77,6 +79,7 @@ PAGES = {
     "columns.md": columns_text,
     "jobs.md": reference,
     "materials.md": materials_text,
+    **{name: partial(control_page, Path(name).stem) for name in control_pages()},
 }
 
 
@@ -87,6 +90,7 @@ def main(check: bool) -> int:
         if check:
             print(f"docs/{name}: is not current: run make reference")
         else:
+            (DOCS / name).parent.mkdir(exist_ok=True)
             (DOCS / name).write_text(PAGES[name](), encoding="utf-8")
             print(f"written: docs/{name}")
     return 1 if check and stale else 0

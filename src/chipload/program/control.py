@@ -368,5 +368,6 @@ def _record(name: str, table: str, kind: Any, values: dict[str, Any]) -> Any:
         if isinstance(value, list):
             given[key] = tuple(value)
         elif isinstance(value, dict):
-            given[key] = MappingProxyType({int(k) if k.isdigit() else k: v for k, v in value.items()})
+            # an empty value takes away what was inherited
+            given[key] = MappingProxyType({int(k) if k.isdigit() else k: v for k, v in value.items() if v != ""})
     return kind(**given)
