@@ -70,7 +70,7 @@ GUESS = "must be given, a machine's limits are never guessed"
         ),
         (
             "decimals = 6",
-            "decimals = 6\njerk_mm_s3 = 4e4\njerk_low_mm_s3 = 2e4",
+            "decimals = 6\njerk_mm_s3 = 4e4",
             "machine.jerk_low_mm_s3 = 20000: must be left out where jerk_mm_s3 is stated",
         ),
     ],

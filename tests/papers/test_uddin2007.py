@@ -172,7 +172,7 @@ def slow_machine(folder):
     text = (resources.files("chipload") / "data" / "machines" / "vmc.toml").read_text()
     text = text.replace("acceleration_mm_s2 = 3000.0", "acceleration_mm_s2 = 20.0")
     path = folder / "slow.toml"
-    path.write_text(text.replace('dialect = "linuxcnc"', 'dialect = "linuxcnc"\njerk_mm_s3 = 40.0'))
+    path.write_text(text.replace("jerk_low_mm_s3 = 20000.0", "jerk_mm_s3 = 40.0"))
     return read_machine(path)
 
 
