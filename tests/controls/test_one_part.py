@@ -86,6 +86,25 @@ PARTS = {
         "fanuc": "G0 Z2.\nG51.1 X0.\nG1 X20. F200.\nG3 X30. Y10. I0. J10.\nG50.1 X0.\nG0 Z20.",
         "haas": "G0 Z2.\nG101 X0.\nG1 X20. F200.\nG3 X30. Y10. I0. J10.\nG100 X0.\nG0 Z20.",
         "sinumerik": "G0 Z2\nMIRROR X0\nG1 X20 F200\nG3 X30 Y10 CR=10\nMIRROR\nG0 Z20",
+        "heidenhain": "L Z+2 FMAX\nCYCL DEF 8.0 MIRROR IMAGE\nCYCL DEF 8.1 X\nL X+20 F200\nCR X+30 Y+10 R+10 DR+\n"
+        "CYCL DEF 8.0 MIRROR IMAGE\nCYCL DEF 8.1\nL Z+20 FMAX",
+    },
+    "scaled coordinates": {
+        "fanuc": "G0 Z2.\nG51 X0. Y0. Z0. P1.5\nG1 Z-1. F200.\nX20.\nG3 X30. Y10. R10.\nG50\nG0 Z20.",
+        "sinumerik": "G0 Z2\nSCALE X1.5 Y1.5 Z1.5\nG1 Z-1 F200\nX20\nG3 X30 Y10 CR=10\nSCALE\nG0 Z20",
+        "heidenhain": "L Z+2 FMAX\nCYCL DEF 11.0 SCALING\nCYCL DEF 11.1 SCL 1.5\nL Z-1 F200\nL X+20\n"
+        "CR X+30 Y+10 R+10 DR+\nCYCL DEF 11.0 SCALING\nCYCL DEF 11.1 SCL 1\nL Z+20 FMAX",
+    },
+    "rounded and chamfered corners": {
+        "fanuc": "G0 Z2.\nG1 Z-1. F100.\nX30. F400. ,R5.\nY20. ,C4.\nX0.\nG0 Z20.",
+        "sinumerik": "G0 Z2\nG1 Z-1 F100\nX30 F400 RND=5\nY20 CHR=4\nX0\nG0 Z20",
+        "heidenhain": "L Z+2 FMAX\nL Z-1 F100\nL X+30 F400\nRND R5\nL Y+20\nCHF 4\nL X+0\nL Z+20 FMAX",
+    },
+    "shifted zero": {
+        "fanuc": "G0 Z2.\nG52 X10. Y5.\nG1 X0. Y0. Z-1. F200.\nX20.\nG52 X0. Y0.\nG0 Z20.",
+        "sinumerik": "G0 Z2\nTRANS X10 Y5\nG1 X0 Y0 Z-1 F200\nX20\nTRANS\nG0 Z20",
+        "heidenhain": "L Z+2 FMAX\nCYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+10\nCYCL DEF 7.2 Y+5\n"
+        "L X+0 Y+0 Z-1 F200\nL X+20\nCYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+0\nCYCL DEF 7.2 Y+0\nL Z+20 FMAX",
     },
 }  # fmt: skip
 
@@ -117,16 +136,45 @@ def cuts(reading):
     return found[np.linalg.norm(found[:, 3:6] - found[:, :3], axis=1) + np.abs(found[:, 6:8]).sum(axis=1) > 0.0]
 
 
+def removed(program):
+    """Volume [mm3] that a flat cutter of 6 mm takes below Z0: brute force on a grid, rapids too."""
+    ground = np.zeros((280, 280))
+    x = y = 0.5 * (np.arange(280) - 100.5)
+    for k, start in enumerate(program.p_work[:-1], 1):
+        for p in _places(program, k, start):
+            if p[2] < 0.0:
+                under = (x[:, None] - p[0]) ** 2 + (y[None, :] - p[1]) ** 2 <= 9.0
+                ground[under] = np.minimum(ground[under], p[2])
+    return -0.25 * float(ground.sum())
+
+
+def _places(program, k, start):
+    """Points along row k of a program, 0.5 mm apart."""
+    end, centre = program.p_work[k], program.centre[k]
+    if program.motion[k] not in (ARC_CW, ARC_CCW):
+        t = np.linspace(0.0, 1.0, max(int(np.linalg.norm(end - start) / 0.5), 1) + 1)
+        return start + t[:, None] * (end - start)
+    sense = 1.0 if program.motion[k] == ARC_CCW else -1.0
+    a, b = (np.arctan2(*(p - centre)[1::-1]) for p in (start, end))
+    sweep = sense * ((sense * (b - a) - 1e-9) % (2.0 * np.pi) + 1e-9 + 2.0 * np.pi * program.turns[k])
+    r = np.hypot(*(start - centre)[:2])
+    t = np.linspace(0.0, 1.0, int(r * abs(sweep) / 0.5) + 2)
+    angle = a + t * sweep
+    z = start[2] + t * (end[2] - start[2])
+    return np.column_stack([centre[0] + r * np.cos(angle), centre[1] + r * np.sin(angle), z])
+
+
 @pytest.mark.parametrize("part", PARTS)
 def test_one_part(tmp_path: Path, part):
-    # cycle 8 of a Heidenhain is not read
-    controls = ("fanuc", "haas", "sinumerik", "heidenhain")[: 3 if part == "mirrored coordinates" else 4]
-    readings = {control: read(tmp_path, part, control) for control in controls}
+    readings = {control: read(tmp_path, part, control) for control in ("fanuc", "haas", "sinumerik", "heidenhain")}
     for control, reading in readings.items():
         left_out = [f for f in reading.findings if f.severity >= Severity.UNPROVEN]
         assert left_out == [], control
     expected = cuts(readings["fanuc"])
+    volume = removed(readings["fanuc"].program)
+    assert volume > 0.0 or part in ("turned coordinates", "mirrored coordinates", "repeated by a subprogram")
     times = {control: line_times(reading, VMC)[1].sum() for control, reading in readings.items()}
     for control, reading in readings.items():
         np.testing.assert_allclose(cuts(reading), expected, atol=1e-6, err_msg=control)
         assert times[control] == pytest.approx(times["fanuc"], rel=0.01), control
+        assert removed(reading.program) == pytest.approx(volume, rel=1e-3), control

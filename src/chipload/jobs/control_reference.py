@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 
 from chipload.program.control import CONTROLS, Control, control_named
@@ -253,7 +253,7 @@ def _table(head: tuple[str, str], rows: Iterable[tuple[str, str]]) -> list[str]:
     return [f"| {head[0]} | {head[1]} |", "|---|---|", *(f"| {a} | {b} |" for a, b in rows)]
 
 
-_READERS = {
+_READERS: dict[str, Callable[[Control], list[str]]] = {
     "linuxcnc": _blocks,
     "fanuc": partial(_blocks, family=True),
     "sinumerik": _sinumerik,
