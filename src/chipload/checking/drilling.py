@@ -44,9 +44,9 @@ def with_drilling(removal: Removal, cutters: Mapping[int, Cutter], material: Mat
     out: dict[str, NDArray[Any]] = {}
     down = down_axis(columns) & (np.asarray(columns["torque_mean_nm"]) > 0.0) if len(thrust) else thrust > 0.0
     for number, cutter in cutters.items():
-        rows = np.flatnonzero(down & (np.asarray(columns["tool"]) == number)) if is_pointed(cutter) else ()
+        rows = np.flatnonzero(down & (np.asarray(columns["tool"]) == number) & is_pointed(cutter))
         if len(rows):
-            _put_in(columns, out, thrust, rows, cutter, material)
+            _put_in(columns, out, thrust, rows.astype(np.int64), cutter, material)
     return replace(removal, columns={**columns, **out, THRUST: thrust})
 
 
@@ -55,7 +55,7 @@ def _put_in(
     material: Material,
 ) -> None:  # fmt: skip
     """Put the loads of one drill into copies of the columns."""
-    feed = np.asarray(columns["feed_mm_min"])[rows] / rpm_from_rad_s(spindle_speed(columns)[rows])
+    feed = np.asarray(columns["feed_mm_min"])[rows] / (rpm_from_rad_s(1.0) * spindle_speed(columns)[rows])
     lips = np.asarray(columns["torque_mean_nm"])[rows] * 1e3
     under = np.asarray(columns["ramp_deg"])[rows] >= AXIAL_DEG
     loads = drill_loads(cutter, material, feed, lips, under)

@@ -20,6 +20,7 @@ from chipload.checking.preparation import Bodies, bodies_of, resolution_of, time
 from chipload.checking.stability import stability_of, watch_of
 from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.checking.stock_check import check_stock
+from chipload.checking.tap_torque import tap_torques
 from chipload.checking.workpiece import insides, stock_box
 from chipload.checking.workpiece_compliance import (
     WorkpieceCompliance,
@@ -162,7 +163,11 @@ def simulate_program(
         )
     errors = with_compliance_error(removal.resolution_error, removal.columns, compliance)
     around = program_surroundings(inputs, reading, before, stock_box(stock))
-    findings = (*removal.findings, *_findings_of(program, steps, removal.columns, cutters, around, compliance))
+    findings = (
+        *removal.findings,
+        *_findings_of(program, steps, removal.columns, cutters, around, compliance),
+        *tap_torques(reading.program, cutters, material, machine),
+    )
     removal = replace(removal, resolution_error=errors, samples=recorder.samples(), findings=findings)
     if stability_watch is not None:
         removal = with_columns(removal, stability_watch.columns)

@@ -40,7 +40,7 @@ _RANGES = {"chip": ("chip_min_mm", "chip_max_mm"), "speed": ("speed_min_m_min", 
 _SPREADS = ("spread_radial", "spread_axial")
 _KEYS = (
     *_TEXTS, *_NUMBERS, *_EXPONENTS, *_RANGES["chip"], *_RANGES["speed"], "spread", *_SPREADS, "covariance",
-    "peak_excess",
+    "peak_excess", "tap_kc_mpa",
 )  # fmt: skip
 
 #: correlation of the errors of two coefficients whose material states a spread: between independent errors and one
@@ -74,6 +74,7 @@ class Material:
         be proved, directions and sizes of forces, deflections and stability cannot
     spread_directions : relative standard deviations of the radial and of the axial coefficients, where they are less
         sure than the tangential ones, whose ``spread`` then is; None: as ``spread``
+    tap_kc : specific cutting force of tapping [MPa], > 0; None: not known
     covariance : (6, 6), of (Ktc, Krc, Kac, Kte, Kre, Kae) in products of MPa and N/mm, from a fit; instead of
         ``spread``; None: not known
 
@@ -102,6 +103,7 @@ class Material:
     tangential: bool = False
     peak_excess: float = 0.0
     spread_directions: tuple[float, float] | None = None
+    tap_kc: float | None = None
 
     def __post_init__(self) -> None:
         for key, (name, low, high) in _NUMBERS.items():
@@ -135,6 +137,8 @@ class Material:
             )
         if not 0.0 <= self.peak_excess <= 10.0:
             raise InputError(f"material.peak_excess = {self.peak_excess:g}: must be from 0 to 10 (0.4 is 40 %)")
+        if self.tap_kc is not None and not 10.0 <= self.tap_kc <= 2e4:
+            raise InputError(f"material.tap_kc_mpa = {self.tap_kc:g}: must be from 10 to 20000 MPa")
         if self.covariance is not None:
             self._check_covariance()
         if self.tangential and any((self.Krc, self.Kac, self.Kre, self.Kae)):
@@ -240,6 +244,7 @@ def _from_table(label: str, table: dict[str, Any]) -> Material:
     if (speed := ranges["speed"]) is not None:
         ranges["speed"] = (mm_s_from_mm_min(1000.0 * speed[0]), mm_s_from_mm_min(1000.0 * speed[1]))
     spread = _number(label, "spread", table["spread"]) if "spread" in table else None
+    numbers["tap_kc"] = _number(label, "tap_kc_mpa", table["tap_kc_mpa"]) if "tap_kc_mpa" in table else None
     ranges["spread_directions"] = _range(label, table, *_SPREADS)
     if ranges["spread_directions"] is not None and spread is None:
         raise InputError(f"{label}: spread is missing: spread_radial and spread_axial state what differs from it")
@@ -259,7 +264,7 @@ def read_material(path: str | Path) -> Material:
     depth), ``source``; without all four radial and axial ones only the tangential force is known; optional
     ``workpiece``, ``conditions``, ``cutter``, ``chip_min_mm`` with ``chip_max_mm``, ``speed_min_m_min`` with
     ``speed_max_m_min``, ``exponent_t``, ``exponent_r``, ``exponent_a``, ``spread`` (with ``spread_radial`` and
-    ``spread_axial`` where these differ) or ``covariance`` (6 rows of 6), and ``peak_excess``.
+    ``spread_axial`` where these differ) or ``covariance`` (6 rows of 6), ``peak_excess``, and ``tap_kc_mpa``.
 
     Raises
     ------
@@ -282,6 +287,8 @@ def material_text(material: Material) -> str:
             values |= dict(zip(_RANGES[name], limits, strict=True))
     if material.peak_excess:
         values["peak_excess"] = material.peak_excess
+    if material.tap_kc is not None:
+        values["tap_kc_mpa"] = material.tap_kc
     if material.spread is not None:
         values["spread"] = material.spread
         values |= dict(zip(_SPREADS, material.spread_directions or (), strict=False))
