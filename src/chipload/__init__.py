@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from chipload.api.mechanics.coefficients import fit, measured_cut
     from chipload.api.mechanics.cut import CutEngagement, engagement_of_cut
     from chipload.api.mechanics.forces import TurnForces, tooth_forces
+    from chipload.api.mechanics.learning import learn, spindle_log
     from chipload.api.mechanics.stability import (
         LocationErrors,
         SpeedMargins,
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from chipload.checking.settings import CheckSettings, Limits, SimulationSettings
     from chipload.checking.stiffness import MachineStiffness
     from chipload.checking.workpiece import FinishedPart, Fixture, Stock
+    from chipload.control.learning import LearnedMaterial
+    from chipload.control.logs import Log
     from chipload.cutter.table import CutterTable as Cutter
     from chipload.cutting.fit import Fit
     from chipload.cutting.material import Material
@@ -69,9 +72,11 @@ __all__ = [
     "FlatStock",
     "History",
     "InputError",
+    "LearnedMaterial",
     "LimitCheck",
     "Limits",
     "LocationErrors",
+    "Log",
     "Machine",
     "MachineStiffness",
     "Material",
@@ -100,6 +105,7 @@ __all__ = [
     "fit",
     "fit_coefficients",
     "hold_torque",
+    "learn",
     "load_result",
     "measured_cut",
     "modes",
@@ -114,6 +120,7 @@ __all__ = [
     "read_program",
     "run_job",
     "simulate",
+    "spindle_log",
     "stability_chart",
     "stability_margin",
     "surface_location_error",
@@ -139,9 +146,11 @@ _PLACES = {
     "FlatStock": ("chipload.api.contours", "FlatStock"),
     "History": ("chipload.checking.history", "History"),
     "InputError": ("chipload.errors", "InputError"),
+    "LearnedMaterial": ("chipload.control.learning", "LearnedMaterial"),
     "LimitCheck": ("chipload.result.limits", "LimitCheck"),
     "Limits": ("chipload.checking.settings", "Limits"),
     "LocationErrors": ("chipload.api.mechanics.stability", "LocationErrors"),
+    "Log": ("chipload.control.logs", "Log"),
     "Machine": ("chipload.machine.machine", "Machine"),
     "MachineStiffness": ("chipload.checking.stiffness", "MachineStiffness"),
     "Material": ("chipload.cutting.material", "Material"),
@@ -180,6 +189,7 @@ _FUNCTIONS = {
         "mechanics.cut": "engagement_of_cut",
         "mechanics.coefficients": "fit measured_cut",
         "mechanics.forces": "tooth_forces",
+        "mechanics.learning": "learn spindle_log",
         "mechanics.stability": "stability_chart stability_margin surface_location_error",
         "planning": "plan_impeller plan_thin_wall",
         "reading": "read_machine read_material read_program",

@@ -59,8 +59,7 @@ def learn(
     """
 
     def work() -> int:
-        from chipload.control.learning import blocks_of, learn_material
-        from chipload.control.log_alignment import align_log
+        from chipload.control.learning import learn_from_logs
         from chipload.control.logs import read_log
         from chipload.cutting.material import material_text
         from chipload.files import write_whole
@@ -79,21 +78,11 @@ def learn(
         signal, lag, told = _signal(stated, predicted, list(read.values()))
         if told:
             show(told)
-        blocks, before = [], 0.0
-        for key, log in read.items():
-            values = getattr(log, signal.kind)
-            if values is None:
-                raise InputError(f"{key}: no column of {signal.kind}, which the other logs have: learn from them apart")
-            aligned = align_log(key, log, values, predicted, lag)
-            for f in aligned.findings:
-                show(str(f))
-            show(
-                f"{key}: correlation {aligned.correlation:.3f}"
-                + ("" if log.line is not None else f", starts at {aligned.lag:.4g} s, {aligned.rate:.4g} times as long")
-            )
-            blocks.append(blocks_of(aligned, predicted, before, lag))
-            before += predicted.cut_seconds
-        found = learn_material(blocks, signal, prior, name, ", ".join(hashes))
+        found, aligned = learn_from_logs(read, predicted, signal, prior, lag, name, ", ".join(hashes))
+        for one in aligned:
+            stated_line = read[one.name].line is not None
+            clock = "" if stated_line else f", starts at {one.lag:.4g} s, {one.rate:.4g} times as long"
+            show(f"{one.name}: correlation {one.correlation:.3f}{clock}")
         write_whole(out, material_text(found.material).encode("utf-8"))
         for line in lines_of(found):
             show(line)
@@ -105,10 +94,8 @@ def learn(
 
 def _prediction(job: Path, sets: Any) -> tuple[PredictedTorque, Material]:
     """Return the torque of the program of a job, simulated now, and the material of the job."""
-    import numpy as np
-
     from chipload import jobs
-    from chipload.control.log_alignment import PredictedTorque
+    from chipload.control.log_alignment import predicted_torque
     from chipload.jobs.simulation.job import ProgramJob
     from chipload.jobs.simulation.run import material_of
 
@@ -116,26 +103,8 @@ def _prediction(job: Path, sets: Any) -> tuple[PredictedTorque, Material]:
     if not isinstance(loaded.job, ProgramJob):
         raise InputError(f"{job}: a job of {loaded.capability.name}: state one that simulates the program that ran")
     material = material_of(loaded.job)
-    result = jobs.run_job(loaded, guesses=Severity.UNPROVEN).result
-    columns = result.in_use[0].columns if result.in_use else {}
-    missing = [key for key in ("t_s", "torque_mean_nm", "cutting_work_j", "power_w") if key not in columns]
-    if missing:
-        raise InputError(f"{job}: its history has no {', '.join(missing)}: state stock, material and cutters")
-    torque, tool = 1e3 * columns["torque_mean_nm"], np.asarray(columns["tool"], dtype=np.int64)
-    speed = np.divide(1e3 * columns["power_w"], torque, out=np.full(len(torque), np.nan), where=torque > 0.0)
-    for number in np.unique(tool):
-        # in the air the spindle turns as in the cut before
-        own = tool == number
-        cut = np.flatnonzero(own & np.isfinite(speed))
-        if len(cut):
-            at = np.clip(np.searchsorted(cut, np.flatnonzero(own), side="right") - 1, 0, None)
-            speed[own] = speed[cut[at]]
-    swept = speed * columns["cutting_s"]
-    cutting = np.divide(1e3 * columns["cutting_work_j"], swept, out=np.zeros(len(swept)), where=swept > 0.0)
-    return PredictedTorque(
-        np.asarray(columns["t_s"]), np.nan_to_num(speed), cutting, np.maximum(torque - cutting, 0.0),
-        np.asarray(columns["line"], dtype=np.int64), tool,
-    ), material  # fmt: skip
+    result = jobs.run_job(loaded, accept=True).result
+    return predicted_torque(result.in_use[0].columns if result.in_use else {}, str(job)), material
 
 
 def _signal(

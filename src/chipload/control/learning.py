@@ -20,7 +20,7 @@ Reference: [Altintas2012] ch. 2 for the torque.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,7 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from chipload.control.log_alignment import AlignedLog, PredictedTorque
+from chipload.control.log_alignment import AlignedLog, PredictedTorque, align_log
+from chipload.control.logs import Log
 from chipload.cutting.material import Material
 from chipload.errors import Finding, InputError, Severity
 
@@ -304,6 +305,42 @@ def learn_material(
     )  # fmt: skip
 
 
+def learn_from_logs(
+    logs: Mapping[str, Log],
+    predicted: PredictedTorque,
+    signal: Signal,
+    prior: Material,
+    sensor_lag: float = 0.0,
+    name: str = "",
+    evidence: str = "",
+) -> tuple[LearnedMaterial, list[AlignedLog]]:
+    """Align logs of one program with its simulation and learn from them.
+
+    Parameters
+    ----------
+    logs : by name, in the order in which they ran with the same tools
+    predicted : of the program, with the prior material
+    signal, prior, name, evidence : as :func:`learn_material`
+    sensor_lag : time constant of the sensor [s]
+
+    Raises
+    ------
+    InputError
+        As :func:`chipload.control.log_alignment.align_log` and :func:`learn_material`; a log lacks the signal.
+    """
+    aligned, blocks, before = [], [], 0.0
+    for key, log in logs.items():
+        values = {"power": log.power, "current": log.current, "torque": log.torque}[signal.kind]
+        if values is None:
+            raise InputError(f"{key}: no column of {signal.kind}, which the other logs have: learn from them apart")
+        aligned.append(align_log(key, log, values, predicted, sensor_lag))
+        blocks.append(blocks_of(aligned[-1], predicted, before, sensor_lag))
+        before += predicted.cut_seconds
+    found = learn_material(blocks, signal, prior, name, evidence)
+    gaps = tuple(f for one in aligned for f in one.findings)
+    return replace(found, findings=(*gaps, *found.findings)), aligned
+
+
 def _check_unit(log: LogBlocks, signal: Signal) -> None:
     """Refuse a signal whose size is 10 or 1000 times off: the unit."""
     load = (log.cutting + log.edge) * (log.speed if signal.kind == "power" else 1.0)
@@ -311,7 +348,7 @@ def _check_unit(log: LogBlocks, signal: Signal) -> None:
         return
     centred = load - load.mean()
     ratio = float(centred @ (log.signal - log.signal.mean()) / max(float(centred @ centred), 1e-300)) / signal.gain
-    if ratio > 0.0 and not 0.25 < ratio < 4.0:
+    if ratio > 0.0 and not 0.2 < ratio < 5.0:
         tens = 10.0 ** round(math.log10(ratio))
         raise InputError(
             f"{log.name}: {signal.kind} is {ratio:.3g} times what the program predicts: check its unit (a factor of "

@@ -10,7 +10,9 @@ Notation: t time [s], w spindle speed [rad/s].
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +95,41 @@ class AlignedLog:
     rate: float
     correlation: float
     findings: tuple[Finding, ...] = ()
+
+
+def predicted_torque(columns: Mapping[str, NDArray[Any]], name: str) -> PredictedTorque:
+    """Return the torque of a simulated program of the columns of its history.
+
+    The cutting work of a step over the angle by which the spindle turns is the torque with the cutting coefficients;
+    the rest of the mean torque is that with the edge coefficients. In the air the spindle turns as in the cut before.
+
+    Parameters
+    ----------
+    columns : of :attr:`chipload.result.track.Track.columns`
+    name : of the job or result, for messages
+
+    Raises
+    ------
+    InputError
+        The history has no loads.
+    """
+    missing = [key for key in ("t_s", "torque_mean_nm", "cutting_work_j", "power_w", "cutting_s") if key not in columns]
+    if missing:
+        raise InputError(f"{name}: its history has no {', '.join(missing)}: state stock, material and cutters")
+    torque, tool = 1e3 * columns["torque_mean_nm"], np.asarray(columns["tool"], dtype=np.int64)
+    speed = np.divide(1e3 * columns["power_w"], torque, out=np.full(len(torque), np.nan), where=torque > 0.0)
+    for number in np.unique(tool):
+        own = tool == number
+        cut = np.flatnonzero(own & np.isfinite(speed))
+        if len(cut):
+            at = np.clip(np.searchsorted(cut, np.flatnonzero(own), side="right") - 1, 0, None)
+            speed[own] = speed[cut[at]]
+    swept = speed * columns["cutting_s"]
+    cutting = np.divide(1e3 * columns["cutting_work_j"], swept, out=np.zeros(len(swept)), where=swept > 0.0)
+    return PredictedTorque(
+        np.asarray(columns["t_s"]), np.nan_to_num(speed), cutting, np.maximum(torque - cutting, 0.0),
+        np.asarray(columns["line"], dtype=np.int64), tool,
+    )  # fmt: skip
 
 
 def align_log(name: str, log: Log, signal: Floats, predicted: PredictedTorque, sensor_lag: float = 0.0) -> AlignedLog:

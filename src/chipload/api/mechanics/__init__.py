@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from chipload.api.mechanics.coefficients import fit, measured_cut
     from chipload.api.mechanics.cut import CutEngagement, engagement_of_cut
     from chipload.api.mechanics.forces import TurnForces, tooth_forces
+    from chipload.api.mechanics.learning import learn, spindle_log
     from chipload.api.mechanics.stability import (
         LocationErrors,
         SpeedMargins,
@@ -40,8 +41,10 @@ __all__ = [
     "compliance",
     "engagement_of_cut",
     "fit",
+    "learn",
     "measured_cut",
     "modes",
+    "spindle_log",
     "stability_chart",
     "stability_margin",
     "surface_location_error",
@@ -58,6 +61,7 @@ __getattr__, __dir__ = attach(
         "coefficients": "fit measured_cut",
         "cut": "CutEngagement engagement_of_cut",
         "forces": "TurnForces tooth_forces",
+        "learning": "learn spindle_log",
         "stability": "LocationErrors SpeedMargins StabilityLobes stability_chart stability_margin "
         "surface_location_error",
         "wall": "WallErrors wall_form_error",

@@ -1,0 +1,104 @@
+"""Force coefficients learned from logs of the spindle, as values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chipload.control.learning import LearnedMaterial, Signal, learn_from_logs
+from chipload.control.log_alignment import predicted_torque
+from chipload.control.logs import Log
+from chipload.cutting.material import Material
+from chipload.errors import InputError
+
+if TYPE_CHECKING:
+    from chipload.result import Result
+
+
+def spindle_log(
+    time_s: ArrayLike,
+    *,
+    power_w: ArrayLike | None = None,
+    torque_nm: ArrayLike | None = None,
+    line: ArrayLike | None = None,
+    override: ArrayLike | None = None,
+) -> Log:
+    """Return a log of the spindle while a program ran.
+
+    Parameters
+    ----------
+    time_s : (n,) float, rising
+    power_w, torque_nm : (n,) float; one of them
+    line : (n,) line of the program, if it was logged
+    override : (n,) feed over programmed feed, if it was logged
+
+    Raises
+    ------
+    InputError
+        Neither or both of power and torque, a column of another length, a number that is not finite, time that falls.
+
+    Examples
+    --------
+    >>> spindle_log([0.0, 0.1], power_w=[300.0, 310.0]).power.tolist()
+    [300000.0, 310000.0]
+    """
+    if (power_w is None) == (torque_nm is None):
+        raise InputError("power_w, torque_nm: state one of them")
+    time = np.asarray(time_s, dtype=np.float64)
+    given = {"power": (power_w, 1e3), "torque": (torque_nm, 1e3), "line": (line, 1.0), "override": (override, 1.0)}
+    columns = {}
+    for name, (values, factor) in given.items():
+        if values is not None:
+            columns[name] = np.asarray(values, dtype=np.float64) * factor
+            if columns[name].shape != time.shape or not np.isfinite(columns[name]).all():
+                raise InputError(f"{name}: must be {time.shape[0] if time.ndim else 1} finite numbers, like time_s")
+    if time.ndim != 1 or len(time) < 2 or not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():
+        raise InputError("time_s: must be two or more finite numbers that rise")
+    return Log(time, **columns)
+
+
+def learn(
+    logs: Mapping[str, Log],
+    result: Result,
+    material: Material,
+    *,
+    efficiency: float = 1.0,
+    efficiency_error: float = 0.0,
+    name: str = "",
+) -> LearnedMaterial:
+    """Learn the tangential coefficients of a material from logs of a program that was simulated.
+
+    A Gaussian posterior of Ktc, Kte, the wear of each tool, the idle power of each log, the efficiency and the error of
+    the simulated torque; ``material`` with its spread is the prior (docs/how-to/learn.md).
+
+    Parameters
+    ----------
+    logs : of :func:`spindle_log` by name, in the order in which they ran with the same tools; all of power or of torque
+    result : of :func:`chipload.simulate` for the program that ran, with ``material``
+    efficiency : power of the cut over the logged power, above 0 to 1
+    efficiency_error : its relative standard deviation, from 0 to below 1
+    name : of the new material; empty: that of the old one with ``-learned``
+
+    Returns
+    -------
+    LearnedMaterial
+
+    Raises
+    ------
+    InputError
+        No log, or one is not of this program; the unit is wrong; logs contradict one another; the material states no
+        spread.
+    """
+    if not logs:
+        raise InputError("logs: none is given")
+    if not result.in_use:
+        raise InputError("result: it has no simulated program")
+    if not 0.0 < efficiency <= 1.0:
+        raise InputError(f"efficiency = {efficiency:g}: must be above 0 and at most 1")
+    kind = "power" if all(log.power is not None for log in logs.values()) else "torque"
+    signal = Signal(kind, 1.0 / efficiency if kind == "power" else 1.0, efficiency_error)
+    predicted = predicted_torque(result.in_use[0].columns, "result")
+    return learn_from_logs(logs, predicted, signal, material, 0.0, name, ", ".join(logs))[0]
