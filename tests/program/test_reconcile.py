@@ -14,8 +14,9 @@ from chipload.program.apt.cutters import read_cutters
 from chipload.program.gcode.reader import read_gcode
 from chipload.program.gcode.tools import read_tool_table
 from chipload.program.read import read_program
-from chipload.program.reconcile import agree, tool_comments
+from chipload.program.reconcile import agree
 from chipload.program.setup import Setup
+from chipload.program.tool_comments import stated_diameters
 
 MILL = Cutter(10.0, 4, math.radians(30.0), 20.0, 30.0, 5.8e5, number=1)
 
@@ -44,10 +45,13 @@ MILL = Cutter(10.0, 4, math.radians(30.0), 20.0, 30.0, 5.8e5, number=1)
         ("(T10 D10 MM)", {10: 10.0}),
         ("(T3 | 1/0 FLAT ENDMILL)", {}),
         ("(D=10 without a tool)", {}),
+        ("(T2: D 8 MM, 3 FLUTES, OVERHANG 22 MM)", {2: 8.0}),
+        ("(T4 DRILL 5 HOLES)", {}),
+        ("(T6 TOOL FOR 3 SLOTS, END MILL)", {}),
     ],
 )
 def test_comments(text, stated):
-    assert {k: v.diameter for k, v in tool_comments(text).items()} == pytest.approx(stated)
+    assert {k: v.diameter for k, v in stated_diameters(text).items()} == pytest.approx(stated)
 
 
 def test_a_real_comment_with_the_cutter_that_it_states(tmp_path: Path):

@@ -20,9 +20,10 @@ from chipload.program.control_findings import (
 from chipload.program.gcode.reader import read_gcode
 from chipload.program.gcode.tools import ToolTable
 from chipload.program.recognise import Recognition
-from chipload.program.reconcile import StatedDiameter, tool_comments
+from chipload.program.reconcile import StatedDiameter
 from chipload.program.setup import Setup
 from chipload.program.swivel import Swivel
+from chipload.program.tool_comments import stated_diameters
 from chipload.progress import Progress, silent
 
 #: texts longer than this are read for one control only [characters]
@@ -62,7 +63,7 @@ class NcText:
 
     def __post_init__(self) -> None:
         """Take the tool table in its own unit."""
-        diameters = tool_comments(self.text)
+        diameters = stated_diameters(self.text)
         table = self.tools
         said: tuple[Finding, ...] = ()
         if table is not None:

@@ -4,16 +4,15 @@ Notation: a statement is a diameter [mm] with the place that makes it. The job's
 the tool table is what the controller compensates for; CUTTER of CL data and the comments of NC text are what the path
 was made for. Tools without a ``[[cutter]]`` are not compared: the table may hold tools that a text uses as allowances.
 
-Comments that are read: a tool number with a diameter, as ``T1 D=10. CR=0.``, ``TOOL 2 - DIA 6.0``, ``T3 = 8.0 MM END
-MILL``, ``TOOL: T1 = 10.0 dia.``, ``T1 | 1/4 FLAT ENDMILL | H1 | D1``; a number without a unit is in the unit that the
-text selects first, a fraction in inches. ``D1`` beside ``H1``, or with the number of the tool, is an offset.
+Comments are read by :mod:`~chipload.program.tool_comments`. A number without a unit is in the unit that the text
+selects first, a fraction in inches. ``D1`` beside ``H1``, or with the number of the tool, is an offset.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from chipload.cutter.cutter import Cutter
@@ -32,11 +31,6 @@ SAME_ANGLE = math.radians(0.5)
 #: a comment of NC text, and the number of a tool in it
 COMMENT = re.compile(r"\(([^()\n]*)\)|;([^\n]*)")
 TOOL = r"\bT(?:OOL)?\s*(?:NO\.?|NUMBER)?\s*[-:#=]?\s*T?(?P<tool>[0-9]{1,8})\b"
-_VALUE = r"(?P<value>[0-9]+/[0-9]+|[0-9]+\.?[0-9]*|\.[0-9]+)(?![0-9./])\s*(?P<unit>MM|INCH(?:ES)?\b|IN\b|\")?"
-_STATED = (
-    re.compile(rf"{TOOL}[^()\n]{{0,80}}?\b(?:D\s*[=:]?|(?:DIAMETER|DIAM|DIA)\.?\s*[-=:]?)\s*{_VALUE}"),
-    re.compile(rf"{TOOL}\s*[-=:|,]\s*{_VALUE}\s*(?:DIA|FLAT|BALL|BULL|END|MILL|ROUND|SLOT|DRILL|SPOT|CENTER)"),
-)
 #: D and the number of an offset: no point, no sign between them, no unit
 _OFFSET = re.compile(r"\bD([0-9]{1,8})\b(?![./]|\s*(?:MM|INCH|IN\b|\"))")
 _LENGTH_OFFSET = re.compile(r"\bH\s*[0-9]+\b")
@@ -52,20 +46,6 @@ class StatedDiameter(NamedTuple):
     line: int
 
 
-def tool_comments(text: str) -> dict[int, StatedDiameter]:
-    r"""What the comments of an NC text state about the diameter of each tool, the first of each tool.
-
-    >>> tool_comments("(T1 D=10. CR=0. - ZMIN=-5. - flat end mill)")[1].diameter
-    10.0
-    >>> tool_comments("G20\n(TOOL: T2 = 0.5 dia. ENDMILL)")[2].diameter
-    12.7
-    """
-    out: dict[int, StatedDiameter] = {}
-    for tool, statement in _comments(text, unit_mm(text)):
-        out.setdefault(tool, statement)
-    return out
-
-
 def unit_mm(text: str) -> float:
     """The unit [mm] that an NC text selects first, or that of a Heidenhain program; mm where it selects none.
 
@@ -76,19 +56,6 @@ def unit_mm(text: str) -> float:
         return MM_PER["inch"]
     found = _UNITS.search(COMMENT.sub(" ", text).upper())
     return MM_PER["inch"] if found is not None and found[1] in ("20", "70", "700") else 1.0
-
-
-def _comments(text: str, own: float) -> Iterator[tuple[int, StatedDiameter]]:
-    for number, line in enumerate(text.split("\n"), start=1):
-        if "(" not in line and ";" not in line:
-            continue
-        for comment in COMMENT.finditer(line):
-            comment_text = (comment[1] if comment[1] is not None else comment[2]).upper()
-            hits = (pattern.search(without_offsets(comment_text)) for pattern in _STATED)
-            hit = next((hit for hit in hits if hit is not None), None)
-            if hit is not None and (value := length_of(hit["value"], hit["unit"], own)) > 0.0:
-                shown = " ".join(comment_text.split())[:60]
-                yield int(hit["tool"]), StatedDiameter(value, f"the comment ({shown})", number)
 
 
 def without_offsets(comment: str) -> str:

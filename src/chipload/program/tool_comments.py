@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from chipload.program.reconcile import tool_comments, without_offsets
+from chipload.program.reconcile import StatedDiameter, unit_mm, without_offsets
 from chipload.program.setup import FIRST_NAMED
 from chipload.program.tool_words import Stated, describe_tool, kind_of, names_diameter
 
@@ -40,6 +40,8 @@ _OFFSETS = re.compile(
 _OWN_LINE = re.compile(
     r"^\s*(?:TOOL\s*(?:NAME|DESCRIPTION|DESC|DIAMETER|DIA|TYPE)?|TC|WERKZEUG|OUTIL)\b\.?\s*[-:=]", re.IGNORECASE
 )
+#: a size with which the words about a tool begin
+_SIZE_FIRST = re.compile(r"\s*(?:[0-9]+/[0-9]+|[0-9]+\.?[0-9]*|\.[0-9]+)(?![0-9./])")
 #: lines above a change of tools whose comments may describe the tool
 ABOVE = 6
 
@@ -56,8 +58,6 @@ def stated_tools(text: str, mm: float) -> dict[int, Stated]:
         own = out.setdefault(number, {})
         for key, stated in _statement(words, mm, comment).items():
             own.setdefault(key, stated)
-    for number, statement in tool_comments(text).items():
-        out.setdefault(number, {}).setdefault("diameter_mm", (statement.diameter, statement.where))
     for k, name in enumerate(dict.fromkeys(_NAMED.findall(re.sub(r";[^\n]*", "", text)))):
         own = out.setdefault(FIRST_NAMED + k, {})
         described = describe_tool(name, mm, f"the name of the tool ({name[:50]})")
@@ -68,17 +68,46 @@ def stated_tools(text: str, mm: float) -> dict[int, Stated]:
     return out
 
 
+def stated_diameters(text: str) -> dict[int, StatedDiameter]:
+    r"""The diameter of each tool that a comment with its number states, the first of each tool.
+
+    Read are numbers that the comment calls a diameter, and those that stand between the tool's number and its kind.
+
+    >>> stated_diameters("(T1 D=10. CR=0. - ZMIN=-5. - flat end mill)")[1].diameter
+    10.0
+    >>> stated_diameters("G20\n(TOOL: T2 = 0.5 dia. ENDMILL)")[2].diameter
+    12.7
+    """
+    out: dict[int, StatedDiameter] = {}
+    mm = unit_mm(text)
+    for line, row in enumerate(text.split("\n"), start=1):
+        for comment in _comments_of(row) if "(" in row or ";" in row else ():
+            found = next(_numbered(comment), None)
+            if found is None or found[0] in out:
+                continue
+            number, words = found
+            value = describe_tool(words, mm).get("diameter_mm")
+            if value is not None and (names_diameter(words) or (_SIZE_FIRST.match(words) and kind_of(words))):
+                where = f"the comment ({' '.join(comment.upper().split())[:60]})"
+                out[number] = StatedDiameter(float(value[0]), where, line)
+    return out
+
+
+def _numbered(comment: str) -> Iterator[tuple[int, str]]:
+    """The number of the tool that begins a comment, and the words about it."""
+    if (found := _OFFSETS.match(comment)) is not None:
+        yield int(found[1]), found[2]
+    elif (found := _NUMBERED.match(comment)) is not None and _describes(found["rest"], sure=True):
+        shorter = _NUMBERED.match(without_offsets(comment.upper()))
+        yield int(found["tool"] or found["post"]), (found if shorter is None else shorter)["rest"]
+
+
 def _described(text: str) -> Iterator[tuple[int, str, str]]:
     """Number of a tool, words about it, and the comment that they stand in, the surest first."""
     for line in text.splitlines():
         for comment in _comments_of(line):
-            if (found := _OFFSETS.match(comment)) is not None:
-                yield int(found[1]), found[2], comment
-            elif (found := _NUMBERED.match(comment)) is not None and _describes(found["rest"], sure=True):
-                rest = without_offsets(comment.upper())
-                shorter = _NUMBERED.match(rest)
-                words = found["rest"] if shorter is None else shorter["rest"]
-                yield int(found["tool"] or found["post"]), words, comment
+            for number, words in _numbered(comment):
+                yield number, words, comment
     for number, comment in _at_changes(text):
         yield number, comment, comment
     for hit in _TOOL_DEF.finditer(text):

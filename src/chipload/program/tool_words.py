@@ -101,7 +101,7 @@ _OTHER = re.compile(
     r"|\bTOOL\s*#?\s*[0-9]+\b"
 )
 _DIAMETER = re.compile(
-    rf"(?:\bDM|\bD(?=\s*[=:])|\bD(?=[0-9.])|Ø|\b(?:DIAMETER|DIAM|DIA)\.?)\s*[-=:]?\s*({_SIZE})\s*({_UNIT})?"
+    rf"(?:\bDM|\bD(?=\s*[=:])|\bD(?=[0-9.])|\bD(?=\s+{_SIZE}\s*{_UNIT})|Ø|\b(?:DIAMETER|DIAM|DIA)\.?)\s*[-=:]?\s*({_SIZE})\s*({_UNIT})?"
     rf"|{_FREE}({_SIZE})\s*({_UNIT})?\s*-?\s*(?:DIA|DIAM|DIAMETER)\b"
 )
 #: name of a tool with its diameter behind it: ``EM12R1``
