@@ -13,20 +13,23 @@ import chipload
 from chipload.checking.workpiece import Surroundings
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import Severity
+from chipload.jobs.impeller import programs, read_program
 from chipload.jobs.impeller.machine_check import (
     around_part,
     every_channel,
     every_channel_findings,
     text_check,
 )
-from chipload.jobs.impeller.programs import table_text
+from chipload.jobs.impeller.programs import program_files, table_text
 from chipload.jobs.impeller.result import result_of
 from chipload.machine.machine import machine_named
 from chipload.machine.table import MachineTable
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.program import LINE, RAPID
+from chipload.program.read import times_of, times_on
+from chipload.program.read_back import read_back
 from chipload.program.release import NOT_SIMULATED
-from chipload.result import release_of
+from chipload.result import Verdict, release_of
 from impeller_job import impeller_job
 
 MACHINE = machine_named("horizontal-b")
@@ -136,6 +139,82 @@ def test_a_text_that_is_not_the_plan_is_not_released(milled, written) -> None:
         assert old in every
         (f,) = every_channel_findings(one, every.replace(old, new, 1), FILE, MACHINE, TOOL, repeat)
         assert f.code == "text-differs"
+
+
+def without_a_pass(text: str) -> str:
+    """The longest feed motion is left out: the one that goes farthest in Y."""
+    lines = text.splitlines()
+    feeds = [k for k, line in enumerate(lines) if re.match(r"(G1 )?X[^Z]* Y", line) and not line.startswith("G0")]
+    return "\n".join(lines[: feeds[2]] + lines[feeds[2] + 1 :]) + "\n"
+
+
+def deeper(text: str) -> str:
+    """Every height of the text 0.5 mm lower, from the first approach on."""
+    return re.sub(r"Z(-?[\d.]+)", lambda m: f"Z{float(m[1]) - 0.5:.6f}", text)
+
+
+CHANGES = {
+    "feed doubled": lambda text: re.sub(r"F([\d.]+)", lambda m: f"F{2.0 * float(m[1]):.6g}", text),
+    "spindle reversed": lambda text: text.replace(" M3", " M4"),
+    "line deleted": without_a_pass,
+    "wrong tool": lambda text: re.sub(r"T(\d+) M6", "T9 M6", text),
+    "lower": deeper,
+    "no end": lambda text: text.replace("\nM2\n", "\n"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_changed_text_exceeds_and_is_not_released(milled, written, change, monkeypatch) -> None:
+    """By the reader where the writer is wrong, and by its blocks where it is changed after it was simulated."""
+    checked, one, _ = written
+    p, around = checked.setting.program, plate(milled, -90.0)
+    changed = CHANGES[change](one)
+    assert changed != one
+    assert text_check(changed, FILE, MACHINE, TOOL, p, around).fails
+    held = result_of(milled)
+    name = next(
+        file for track in held.in_use for file in track.programs if file.endswith(".ngc") and "-all" not in file
+    )
+    assert program_files(milled, held)[name].startswith(b"(chipload: verified")
+    own = programs.write_gcode
+    monkeypatch.setattr(programs, "write_gcode", lambda *a, **k: CHANGES[change](own(*a, **k)))
+    assert program_files(milled, held)[name].startswith(b"(NOT VERIFIED: its text is not the one")
+
+
+def test_what_is_simulated_is_what_was_read(milled, written, tmp_path, monkeypatch) -> None:
+    """A writer that goes 0.5 mm too low gouges by as much; the job of such texts exceeds, and none is released."""
+    own = read_program.write_gcode
+    for module in (read_program, programs):
+        monkeypatch.setattr(module, "write_gcode", lambda *a, **k: deeper(own(*a, **k)))
+    found = chipload.run_job(impeller_job(tmp_path))
+    assert found.result.verdict is Verdict.EXCEEDS
+    assert max(p.gouge.found for p in found.outcome.programs) > max(p.gouge.found for p in milled.programs) + 0.1
+    assert not any(
+        text.startswith(b"(chipload: verified") for file, text in program_files(found.outcome, found.result).items()
+        if file.endswith((".ngc", ".apt"))
+    )  # fmt: skip
+
+
+def test_the_history_is_that_of_the_text(milled, written) -> None:
+    """Lines, places and time of each row, by the file as it is read from its first line to its end."""
+    checked, one, _ = written
+    track = next(t for t in result_of(milled).tracks if t.time_s == checked.seconds)
+    reading = read_back(one, FILE, MACHINE, {2: TOOL.assembled(2, 100.0)})
+    seconds = times_of(reading, MACHINE)
+    columns = track.columns
+    assert columns["t_s"][-1] == pytest.approx(seconds.sum(), rel=1e-12)
+    assert track.time_s == pytest.approx(seconds.sum(), rel=1e-12)
+    assert columns["line"][-1] == reading.program.line[-1]
+    assert one.splitlines()[columns["line"][-1] - 1].startswith(("G0", "Z", "X", "Y"))
+    n = len(columns["line"])
+    np.testing.assert_array_equal(columns["line"], reading.program.line[-n:])
+    for k, x in enumerate("xyz"):
+        np.testing.assert_allclose(columns[f"{x}_mm"], reading.program.p_work[-n:, k], atol=1e-9)
+    assert {"finish", "link"} <= set(columns["pass"].tolist())
+    # what is in tracks takes as long as it does in the plan
+    plan = times_on(checked.setting.program, MACHINE)
+    cut = np.array([x == "finish" for x in checked.setting.program.labels])[checked.setting.program.label]
+    assert checked.cutting == pytest.approx(plan[cut].sum(), rel=2e-3)
 
 
 def test_a_row_that_only_begins_a_feed_is_no_difference(milled, written) -> None:

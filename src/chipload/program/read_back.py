@@ -151,14 +151,14 @@ def text_differences(planned: Program, reading: ProgramReading) -> tuple[Finding
     return compared_rows(planned, reading)[0]
 
 
-def lines_of_source(planned: Program, reading: ProgramReading) -> NDArray[np.int64]:
-    """Line of the planned program (m,) that each row of a text comes from; behind a difference the last that agrees."""
+def rows_of_source(planned: Program, reading: ProgramReading) -> NDArray[np.int64]:
+    """Row of the planned program (m,) that each row of a text comes from; behind a difference the last that agrees."""
     ends = compared_rows(planned, reading)[1]
     known = np.flatnonzero(ends >= 0)
     if not len(known):
-        return np.asarray(reading.program.line)
+        return np.zeros(len(reading.program), dtype=np.int64)
     at = np.searchsorted(ends[known], np.arange(len(reading.program)))
-    return np.asarray(planned.line[known[np.minimum(at, len(known) - 1)]])
+    return np.asarray(known[np.minimum(at, len(known) - 1)])
 
 
 def compared_rows(planned: Program, reading: ProgramReading) -> tuple[tuple[Finding, ...], NDArray[np.int64]]:

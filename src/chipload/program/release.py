@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-#: a comment of RS-274
-COMMENT = re.compile(r"\([^)]*\)")
+#: a comment of RS-274, and the number of a program
+COMMENT, NUMBER = re.compile(r"\([^)]*\)"), re.compile(r"O\d+$")
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,14 @@ def released(text: str, simulated: str, release: Release) -> Release:
     >>> released("(a)\nG0 X2\nM2", "(b)\nG0 X1\nM2", Release("")).text
     'NOT VERIFIED: its text is not the one that was simulated'
     """
-    if _blocks(text) == _blocks(simulated):
-        return release
-    return Release("its text is not the one that was simulated")
+    return release if same_blocks(text, simulated) else Release("its text is not the one that was simulated")
+
+
+def same_blocks(text: str, other: str) -> bool:
+    """Return whether two texts have the same blocks, comments and program numbers aside."""
+    return _blocks(text) == _blocks(other)
 
 
 def _blocks(text: str) -> list[str]:
-    """The lines of a text without comments."""
-    return [block for line in text.splitlines() if (block := COMMENT.sub("", line).strip())]
+    blocks = (COMMENT.sub("", line).strip() for line in text.splitlines())
+    return [block for block in blocks if block and not NUMBER.match(block)]

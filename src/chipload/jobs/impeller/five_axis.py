@@ -20,6 +20,7 @@ from chipload.jobs.impeller.five_axis_outcome import AllChannels
 from chipload.jobs.impeller.machine_check import MachineCheck, axes_check
 from chipload.jobs.impeller.paths import EDGE, gouge_by, left_by, walls_of
 from chipload.jobs.impeller.ray_depth import ray_depth
+from chipload.jobs.impeller.read_program import ReadProgram, read_program_of
 from chipload.jobs.impeller.tables import PathsTable, SurfaceTable
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import Machine, machine_named, read_machine
@@ -29,7 +30,6 @@ from chipload.planning.impeller.surfaces import BODIES
 from chipload.program.check import check_program
 from chipload.program.gcode.writer import Repeat
 from chipload.program.program import Program
-from chipload.program.read import times_on
 from chipload.program.to_axes import to_axes
 from chipload.simulation.channel.channel import Remainder, SurfacePoints, wall
 from chipload.simulation.channel.gouges import Gouge
@@ -65,12 +65,12 @@ def five_axis_machine(source: str | Path | None, key: str) -> Machine:
 
 @dataclass(frozen=True, eq=False)
 class ProgramCheck:
-    """Result of the check of a program: gouge, excess, what it does on the machine, time [s]."""
+    """Result of the check of a program as its text was read: gouge, excess, what it does on the machine."""
 
     gouge: Gouge
     left: Remainder
     machine_check: MachineCheck
-    seconds: float
+    read: ReadProgram
 
 
 def program_check(
@@ -80,10 +80,11 @@ def program_check(
     """Check of a program of a surface; ``points`` of the surface, None: evenly over it."""
     at = surface_points(how, side) if points is None else points
     depth = ray_depth(how.impeller, EDGE, paths.gouge_mm)
-    left = left_by(how, [at], program, cutter, depth, keep)[0]
-    gouge = gouge_by(how, walls_of(how.impeller, how.ahead), program, cutter, depth, paths.gouge_mm, keep)
+    read = read_program_of(program, machine, cutter)
+    left = left_by(how, [at], read.program, cutter, depth, keep)[0]
+    gouge = gouge_by(how, walls_of(how.impeller, how.ahead), read.program, cutter, depth, paths.gouge_mm, keep)
     _, beyond = to_axes(program, machine)
-    return ProgramCheck(gouge, left, axes_check(*beyond), float(times_on(program, machine).sum()))
+    return ProgramCheck(gouge, left, axes_check(*beyond), read)
 
 
 def surface_points(how: FinishSettings, side: SurfaceTable, apart: float = _SPACING) -> SurfacePoints:

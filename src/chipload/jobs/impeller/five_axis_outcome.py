@@ -8,6 +8,7 @@ from typing import Any
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.jobs.impeller.machine_check import MachineCheck, verdict_of
+from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.flank import FlankPass
 from chipload.planning.impeller.point_milling import PointPath
@@ -43,7 +44,7 @@ class FiveAxisProgram:
     gouge, left : as of every program
     allowed, most : gouge, and what may be left [mm]
     machine_check : what it does on the machine, and what its text shows
-    seconds : of one channel
+    read : the program as its text was read, which was checked
     channels : how many there are
     every : of all channels; a text why there is none
     """
@@ -57,12 +58,17 @@ class FiveAxisProgram:
     allowed: float
     most: float
     machine_check: MachineCheck
-    seconds: float
+    read: ReadProgram
     channels: int
     every: AllChannels | str
 
     #: key of the limit on what is left
     limit = "excess_mm"
+
+    @property
+    def seconds(self) -> float:
+        """Time of one channel [s]."""
+        return self.read.seconds
 
     @property
     def excess(self) -> float:

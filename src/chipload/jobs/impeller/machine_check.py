@@ -29,7 +29,7 @@ from chipload.program.gcode.writer import Repeat
 from chipload.program.path_mode import PathControl
 from chipload.program.program import RAPID, Program
 from chipload.program.read import ProgramReading
-from chipload.program.read_back import UNITS, commands_back, read_back, reading_findings, unread
+from chipload.program.read_back import UNITS, commands_back, no_end, read_back, reading_findings, unread
 from chipload.program.to_axes import LIMITS
 from chipload.program.to_work import axes_of, home
 from chipload.result import Verdict
@@ -145,7 +145,7 @@ def text_check(
     lengths, beyond = _travel(reading, cutter)
     program = _placed(reading.program)
     found = [
-        *_text_findings(reading, tool, planned), *beyond, *speed_findings(program, tool),
+        *_text_findings(reading, tool, planned), *no_end(text), *beyond, *speed_findings(program, tool),
         *_touched(program, tool, around), *_below(program, tool, around),
     ]  # fmt: skip
     return MachineCheck(tuple(found), lengths)

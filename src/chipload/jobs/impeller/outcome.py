@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints, NoFiveAxisPath
 from chipload.jobs.impeller.machine_check import MachineCheck
+from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.answer import Answer, Unreachable
@@ -164,8 +165,7 @@ class Checked:
     allowed : what of it is allowed [mm]
     scallops : of each patch
     machine_check : what it does on the machine, and what its text shows
-    seconds : time of one channel, as the text takes it on the machine [s]
-    cutting : of that in tracks; the rest is leads, links and rapids [s]
+    read : the program as its text was read, which was checked
     between : from the end of one channel to the beginning of the next [s]
     repeat : how the text goes through all channels; None: it is of one channel
     """
@@ -175,10 +175,19 @@ class Checked:
     allowed: float
     scallops: tuple[Scallop, ...]
     machine_check: MachineCheck
-    seconds: float
-    cutting: float
+    read: ReadProgram
     between: float
     repeat: Repeat | None
+
+    @property
+    def seconds(self) -> float:
+        """Time of one channel, as the text takes it on the machine [s]."""
+        return self.read.seconds
+
+    @property
+    def cutting(self) -> float:
+        """Of that in tracks; the rest is leads, links and rapids [s]."""
+        return float(self.read.times[self.read.in_cut()].sum())
 
     @property
     def verified(self) -> bool:

@@ -15,6 +15,7 @@ from chipload.jobs.impeller.channels import between_channels, channel_repeat
 from chipload.jobs.impeller.machine_check import axes_check
 from chipload.jobs.impeller.outcome import Checked, Covered, Scallop
 from chipload.jobs.impeller.ray_depth import ray_depth
+from chipload.jobs.impeller.read_program import read_program_of
 from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.coverage import between_lines
@@ -26,13 +27,12 @@ from chipload.planning.impeller.kept import Keep, PlanTask, anew
 from chipload.planning.impeller.lines import LineMotion
 from chipload.planning.impeller.links import Link
 from chipload.planning.impeller.paths import PatchFinish
-from chipload.planning.impeller.planned_settings import PlannedSettings
+from chipload.planning.impeller.planned_settings import PlannedSettings, loads_at_feeds
 from chipload.planning.impeller.programs import pallet_rate, too_fast
 from chipload.planning.impeller.settings import FinishSettings, Milling, channel_scene
 from chipload.planning.impeller.surfaces import BODIES, ContactSampling
 from chipload.planning.impeller.tables import IndexTable
 from chipload.program.program import Program
-from chipload.program.read import times_on
 from chipload.program.to_axes import to_axes
 from chipload.simulation.channel.channel import Remainder, SurfacePoints, left_on, scallop_numbers, wall
 from chipload.simulation.channel.gouges import Gouge, deepest_gouge
@@ -85,7 +85,7 @@ def finish_settings(
 def checked_programs(
     job: FinishSettings, machine: Machine, plan: PlannedSettings, paths: PathsTable, keep: Keep = anew
 ) -> tuple[tuple[Checked, ...], tuple[Covered, ...]]:
-    """A program for each setting with the result of its check; the excess of all of them on each surface."""
+    """A program for each setting with the check of what its text says; the excess of all of them on each surface."""
     impeller, scallop, settings = job.impeller, job.how.scallop, plan.settings
     millings = [m for s in settings for m in s.millings]
     faces = list(dict.fromkeys((m.patch.body, m.patch.side) for m in millings))
@@ -95,25 +95,26 @@ def checked_programs(
     walls = [*dense, *whole]
     depth = ray_depth(impeller, EDGE, paths.gouge_mm)
     # the longest program first, so that no process waits for it at the end
-    long_first = sorted(settings, key=lambda s: -len(s.program))
-    gouges = [_gouge_task(coarse, s.program, s.cutter, depth, paths.gouge_mm) for s in long_first]
-    keep.ahead([*gouges, *(_left_task(walls, s.program, s.cutter, depth) for s in long_first)])
-    found = [left_by(job, walls, s.program, s.cutter, depth, keep) for s in settings]
+    reads = [read_program_of(s.program, machine, s.cutter) for s in settings]
+    settings = loads_at_feeds(job, settings, [r.as_planned(s.program) for s, r in zip(settings, reads, strict=True)])
+    both = [(r.program, s.cutter) for s, r in zip(settings, reads, strict=True)]
+    long_first = sorted(both, key=lambda one: -len(one[0]))
+    gouges = [_gouge_task(coarse, program, cutter, depth, paths.gouge_mm) for program, cutter in long_first]
+    keep.ahead([*gouges, *(_left_task(walls, program, cutter, depth) for program, cutter in long_first)])
+    found = [left_by(job, walls, program, cutter, depth, keep) for program, cutter in both]
     # what is left is what no program takes
     rest = [replace(same[0], rest=np.min([x.rest for x in same], axis=0)) for same in zip(*found, strict=True)]
     others = iter(rest)
     out = []
-    for setting in settings:
+    for setting, read in zip(settings, reads, strict=True):
         program = setting.program
         scallops = tuple(_scallop(m, next(others), scallop) for m in setting.millings)
         _, findings = to_axes(program, machine)
         on_machine = axes_check(*findings, *too_fast(program, machine))
-        gouge = gouge_by(job, coarse, program, setting.cutter, depth, paths.gouge_mm, keep)
-        rows = times_on(program, machine)
-        seconds, cutting = float(rows.sum()), float(rows[in_cut(program)].sum())
+        gouge = gouge_by(job, coarse, read.program, setting.cutter, depth, paths.gouge_mm, keep)
         between = between_channels(program, machine, impeller.blades)
         repeat = channel_repeat(program, machine, job.table, impeller.blades)
-        out.append(Checked(setting, gouge, paths.gouge_mm, scallops, on_machine, seconds, cutting, between, repeat))
+        out.append(Checked(setting, gouge, paths.gouge_mm, scallops, on_machine, read, between, repeat))
     covered = tuple(
         Covered(face[0], face[1], left, scallop, _SPACING, plan.unreached[face])
         for face, left in zip(faces, rest[len(dense) :], strict=True)
@@ -170,11 +171,6 @@ def _deepest(
     allowed: float,
 ) -> Gouge:  # fmt: skip
     return deepest_gouge(walls, program, cutter, depth, _RESOLUTION * allowed, allowed, workers=job.workers)
-
-
-def in_cut(program: Program) -> NDArray[np.bool_]:
-    """Rows of tracks, (n,) bool: neither leads nor links."""
-    return np.array([name == "finish" for name in program.labels])[program.label]
 
 
 def _whole(job: FinishSettings, body: int, side: str, millings: Sequence[Milling]) -> SurfacePoints:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -11,11 +12,12 @@ from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints
 from chipload.jobs.impeller.names import ALL, finish_names, flank_names, points_names, rough_names
 from chipload.jobs.impeller.outcome import Checked, ImpellerResult
 from chipload.jobs.impeller.proof import contact_points_bytes, proof_bytes
+from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.program.apt.writer import write_apt
 from chipload.program.gcode.writer import Repeat, write_gcode
 from chipload.program.program import Program
-from chipload.program.release import Release
+from chipload.program.release import Release, released
 from chipload.report.programs import ENDINGS
 from chipload.result import Result, release_of
 
@@ -28,19 +30,31 @@ def program_files(milled: ImpellerResult, result: Result) -> dict[str, bytes]:
         for name, repeat in ((stem, None), (f"{stem}{ALL}", checked.repeat)):
             if name == stem or repeat is not None:
                 file = f"{name}.{ENDINGS[milled.machine.dialect]}"
-                out[file] = table_text(milled, checked, repeat, release_of(result, file)).encode("ascii")
+                out[file] = _released(
+                    partial(table_text, milled, checked, repeat), release_of(result, file),
+                    checked.read if repeat is None else None,
+                )  # fmt: skip
         cl = write_apt(program, None, title=_title(milled, checked), release=release_of(result, f"{stem}.apt"))
         out[f"{stem}.apt"] = cl.encode("ascii")
     for stem, p in five_axis_programs(milled):
         ending = ENDINGS[p.machine.dialect]
         for more in ("", *(() if isinstance(p.every, str) else (ALL,))):
             file = f"{stem}{more}.{ending}"
-            out[file] = five_axis_text(milled, p, bool(more), release_of(result, file)).encode("ascii")
+            out[file] = _released(
+                partial(five_axis_text, milled, p, bool(more)), release_of(result, file), None if more else p.read
+            )
         release = release_of(result, f"{stem}.apt")
         out[f"{stem}.apt"] = write_apt(p.program, None, title=_five_axis_title(milled, p), release=release).encode(
             "ascii"
         )
     return out
+
+
+def _released(text_of: Callable[[Release], str], release: Release, read: ReadProgram | None) -> bytes:
+    """The text of a program, which is not released if its blocks are not those that were read and simulated."""
+    text = text_of(release)
+    given = release if read is None else released(text, read.text, release)
+    return (text if given is release else text_of(given)).encode("ascii")
 
 
 def table_text(milled: ImpellerResult, checked: Checked | CheckedRough, repeat: Repeat | None, release: Release) -> str:

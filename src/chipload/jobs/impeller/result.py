@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
@@ -27,13 +27,13 @@ from chipload.jobs.impeller.outcome import (
     unreached_text,
 )
 from chipload.jobs.impeller.paths import walls_of
+from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.jobs.impeller.tool_clearance import clearance_blocks
-from chipload.program.program import Program
 from chipload.report.bodies import MACHINE_TABLE
 from chipload.report.programs import ENDINGS
-from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, state_of
-from chipload.result.motions import motion_blocks
+from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, in_memory, state_of
+from chipload.result.motions import motion_columns
 from chipload.simulation.channel.channel import SurfacePoints
 
 #: name of the track of the search, which has no program
@@ -104,8 +104,7 @@ def _roughing(milled: ImpellerResult, walls: Walls) -> list[Track]:
         _track(
             milled,
             name,
-            r.rough.program,
-            r.seconds,
+            r.read,
             (_gouge(name, r),),
             _rough_findings(r),
             not r.rough.machined,
@@ -127,8 +126,7 @@ def _finishing(milled: ImpellerResult, walls: Walls) -> list[Track]:
             _track(
                 milled,
                 name,
-                p.setting.program,
-                p.seconds,
+                p.read,
                 limits,
                 findings,
                 not p.setting.machined,
@@ -152,7 +150,7 @@ def _five_axis(milled: ImpellerResult) -> list[Track]:
         ending = ENDINGS[p.machine.dialect]
         every = () if isinstance(p.every, str) else (f"{name}{ALL}.{ending}",)
         files = (f"{name}.{ending}", f"{name}.apt", *every)
-        blocks = partial(motion_blocks, p.program, p.machine)
+        blocks = in_memory(motion_columns(p.read.program, p.read.times))
         out.append(Track(name, TrackKind.PROGRAM, False, p.seconds, limits, findings, files, blocks=blocks))
     return out
 
@@ -160,8 +158,7 @@ def _five_axis(milled: ImpellerResult) -> list[Track]:
 def _track(
     milled: ImpellerResult,
     name: str,
-    program: Program,
-    time_s: float,
+    read: ReadProgram,
     limits: tuple[LimitCheck, ...],
     findings: tuple[Finding, ...],
     empty: bool,
@@ -172,8 +169,8 @@ def _track(
 ) -> Track:
     ending = ENDINGS[milled.machine.dialect]
     files = () if empty else (f"{name}.{ending}", f"{name}.apt", *((f"{name}{ALL}.{ending}",) if repeats else ()))
-    blocks = clearance_blocks(program, milled.machine, cutter, walls)
-    return Track(name, TrackKind.PROGRAM, in_use, time_s, limits, findings, files, blocks=blocks)
+    blocks = clearance_blocks(read.program, read.times, cutter, walls)
+    return Track(name, TrackKind.PROGRAM, in_use, read.seconds, limits, findings, files, blocks=blocks)
 
 
 def _gouge(track: str, checked: Checked | CheckedRough | FiveAxisProgram) -> LimitCheck:

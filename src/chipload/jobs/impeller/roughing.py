@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.jobs.impeller.channels import between_channels, channel_repeat
 from chipload.jobs.impeller.machine_check import axes_check
+from chipload.jobs.impeller.read_program import read_program_of
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable, RoughTable
 from chipload.machine.machine import Machine
@@ -27,7 +28,6 @@ from chipload.planning.impeller.rough_settings import RoughingSetting, roughed
 from chipload.planning.impeller.roughing import RoughingSettings, uncut
 from chipload.planning.impeller.surfaces import hub_range
 from chipload.planning.impeller.tables import IndexTable
-from chipload.program.read import times_on
 from chipload.program.to_axes import to_axes
 from chipload.progress import Progress
 from chipload.simulation.channel.channel import SurfacePoints, left_on
@@ -81,7 +81,7 @@ def checked_roughing(
         if plan.index not in stock:
             blanks[plan.index] = blank_of(impeller, plan.index, how, ahead)
             stock[plan.index] = TriDexel.of_mesh(blanks[plan.index], rough.grid_mm)
-        safe, removal, left = without_touch(plan, stock[plan.index], rough.grid_mm, rough.touch_mm3)
+        safe, removal, left = without_touch(plan, stock[plan.index], rough.grid_mm, rough.touch_mm3, machine)
         first = not any(r.rough.index == plan.index for r in out)
         # a further table angle that takes nothing that is left is no program
         if first or removal.before - removal.after > _LEAST * removal.before:
@@ -98,7 +98,7 @@ def checked_roughing(
 
 
 def without_touch(
-    plan: RoughingSetting, stock: TriDexel, grid: float, touch: float
+    plan: RoughingSetting, stock: TriDexel, grid: float, touch: float, machine: Machine
 ) -> tuple[RoughingSetting, ChannelRemoval, TriDexel]:
     """The plan without the rows on which a part above the cutting part removes some of the blank; what is removed, and
     what is left.
@@ -108,8 +108,9 @@ def without_touch(
     """
     for turn in itertools.count():
         left = copy.deepcopy(stock)
-        removal = taken_from(left, plan.program, plan.cutter, grid)
-        bad = np.unique(plan.linked.track[removal.above > touch])
+        read = read_program_of(plan.program, machine, plan.cutter)
+        removal = taken_from(left, read.program, plan.cutter, grid)
+        bad = np.unique(plan.linked.track[read.source[removal.above > touch]])
         if not len(bad) or bad[0] < 0 or turn == _ROUNDS:
             break
         plan = plan.without(bad.tolist())
@@ -121,8 +122,8 @@ def _checked(
     Sequence[SurfacePoints],
     workers: int, table: IndexTable, blades: int, blank: trimesh.Trimesh, keep: Keep,
 ) -> CheckedRough:  # fmt: skip
-    program = plan.program
-    allowed = paths.gouge_mm
+    read = read_program_of(plan.program, machine, plan.cutter)
+    program, allowed = read.program, paths.gouge_mm
 
     def checked() -> tuple[Gouge, list[float]]:
         found = left_on(walls, program, plan.cutter, _HEIGHT, _DEPTH, step=_STEP, workers=workers)
@@ -136,13 +137,12 @@ def _checked(
     for hub in (False, True):
         least = min(r for w, r in zip(walls, rest, strict=True) if w.name.startswith("floor") == hub)
         stands.append(least if least < _HEIGHT else None)
-    _, findings = to_axes(program, machine)
-    on_machine = axes_check(*findings, *too_fast(program, machine))
-    seconds = float(times_on(program, machine).sum())
+    _, findings = to_axes(plan.program, machine)
+    on_machine = axes_check(*findings, *too_fast(plan.program, machine))
     return CheckedRough(
         plan, gouge, allowed, (stands[0], stands[1]), removal, touch,
-        on_machine, seconds, between_channels(program, machine, blades),
-        channel_repeat(program, machine, table, blades), blank,
+        on_machine, read, between_channels(plan.program, machine, blades),
+        channel_repeat(plan.program, machine, table, blades), blank,
     )  # fmt: skip
 
 

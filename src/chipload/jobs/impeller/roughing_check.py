@@ -11,6 +11,7 @@ import numpy as np
 import trimesh
 
 from chipload.jobs.impeller.machine_check import MachineCheck, check_cell
+from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.planning.impeller.rough_settings import RoughingSetting
 from chipload.program.gcode.writer import Repeat
 from chipload.report.sheet import table
@@ -32,7 +33,7 @@ class CheckedRough:
     taken : from the blank as the programs before it leave it, row by row
     touch : [mm3] that a rapid, and what is above the cutting part, may take in one row
     machine_check : what it does on the machine, and what its text shows
-    seconds : time of one channel [s]
+    read : the program as its text was read, which was checked
     between : from the end of one channel to the beginning of the next [s]
     repeat : how the text goes through all channels; None: it is of one channel
     blank : what its channel begins with, before any program
@@ -45,7 +46,7 @@ class CheckedRough:
     taken: ChannelRemoval
     touch: float
     machine_check: MachineCheck
-    seconds: float
+    read: ReadProgram
     between: float
     repeat: Repeat | None
     blank: trimesh.Trimesh
@@ -56,6 +57,11 @@ class CheckedRough:
         c = self.rough.cutter
         of = " beside the splitter" if self.rough.index else ""
         return f"roughing{of}: {c.label} mm at {np.degrees(self.rough.table):.6g} deg"
+
+    @property
+    def seconds(self) -> float:
+        """Time of one channel [s]."""
+        return self.read.seconds
 
     @property
     def verified(self) -> bool:

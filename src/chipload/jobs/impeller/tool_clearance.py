@@ -15,11 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.machine.machine import Machine
 from chipload.planning.impeller.clearance import nearest
 from chipload.planning.impeller.tree import tree_of
 from chipload.program.program import Program
-from chipload.program.read import times_on
 from chipload.result.limits import Columns
 from chipload.result.motions import motion_columns
 from chipload.simulation.channel.channel import SurfacePoints
@@ -33,13 +31,13 @@ CUT = ("finish", "lead")
 
 
 def clearance_blocks(
-    program: Program, machine: Machine, cutter: CatalogueCutter, walls: Callable[[], Sequence[SurfacePoints]]
+    program: Program, times: Floats, cutter: CatalogueCutter, walls: Callable[[], Sequence[SurfacePoints]]
 ) -> Callable[[], Iterator[Columns]]:
     """History of a program with its clearance, calculated once, at its first use."""
 
     @cache
     def columns() -> Columns:
-        motions = motion_columns(program, times_on(program, machine))
+        motions = motion_columns(program, times)
         axis = np.column_stack([motions[f"axis_{x}"] for x in "xyz"]).astype(np.float64)
         tip = np.column_stack([motions[f"{x}_mm"] for x in "xyz"]).astype(np.float64)
         cuts = np.isin(np.asarray(motions["pass"]).astype(str), CUT)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from chipload.checking.workpiece import Surroundings
+from chipload.errors import Finding, Severity
 from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints
 from chipload.jobs.impeller.machine_check import (
     AroundPart,
@@ -16,9 +17,10 @@ from chipload.jobs.impeller.machine_check import (
 )
 from chipload.jobs.impeller.outcome import Checked, CheckedPartition, ImpellerResult
 from chipload.jobs.impeller.programs import cutter_of, five_axis_text, program_of, table_text
+from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.machine.machine import Machine
-from chipload.program.release import NOT_SIMULATED
+from chipload.program.release import NOT_SIMULATED, same_blocks
 from chipload.report.programs import ENDINGS
 
 OfTable = TypeVar("OfTable", Checked, CheckedRough)
@@ -83,6 +85,7 @@ class _Check:
             return checked
         text = self._texts[id(program)] = table_text(self.milled, checked, None, NOT_SIMULATED)
         found = text_check(text, _file(machine), machine, cutter_of(checked), program, self.around(machine))
+        found = found.joined(_simulated(text, checked.read))
         return replace(checked, machine_check=checked.machine_check.joined(found))
 
     def with_every_channel(self, checked: OfTable) -> OfTable:
@@ -99,7 +102,16 @@ class _Check:
         """A program on five axes with what its text of one channel shows."""
         text = five_axis_text(self.milled, p, False, NOT_SIMULATED)
         found = text_check(text, _file(p.machine), p.machine, p.cutter, p.program, self.around(p.machine))
+        found = found.joined(_simulated(text, p.read))
         return replace(p, machine_check=p.machine_check.joined(found))
+
+
+def _simulated(text: str, read: ReadProgram) -> MachineCheck:
+    """What is wrong if the blocks of a text are not those of the program that was simulated."""
+    if not read.text or same_blocks(text, read.text):
+        return MachineCheck()
+    found = Finding("text-differs", 0, "the written text is not the one that was simulated", Severity.EXCEEDS)
+    return MachineCheck((found,))
 
 
 def _file(machine: Machine) -> str:

@@ -17,7 +17,7 @@ from chipload.program.control import control_named
 from chipload.program.gcode.writer import write_commands
 from chipload.program.program import RAPID, Program
 from chipload.program.read import times_of, times_on
-from chipload.program.read_back import lines_of_source, no_end, read_back, reading_findings, unread
+from chipload.program.read_back import no_end, read_back, reading_findings, rows_of_source, unread
 from chipload.program.release import NOT_SIMULATED, Release
 from chipload.program.to_axes import to_axes
 from chipload.report.programs import ENDINGS
@@ -86,7 +86,7 @@ def written_program(job: TorqueJob, machine: Machine) -> WrittenProgram:
     stops, retractions = reading.stops, reading.retractions
     if job.program_file is not None:
         file = read_file(job, job.program_file, machine)
-        whole = replace(whole, line=lines_of_source(planned, reading))
+        whole = replace(whole, line=planned.line[rows_of_source(planned, reading)])
         stops, retractions = file.stops, file.retractions
     program = with_tool(whole, job.cutters)
     first = len(whole) - len(program)

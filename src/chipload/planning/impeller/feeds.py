@@ -255,7 +255,10 @@ class PassRows:
 
 
 def pass_feeds(
-    settings: Sequence[tuple[CatalogueCutter, Sequence[PassRows]]], terms: ForceTerms, feed: float
+    settings: Sequence[tuple[CatalogueCutter, Sequence[PassRows]]],
+    terms: ForceTerms,
+    feed: float,
+    given: Sequence[Sequence[float]] | None = None,
 ) -> list[tuple[list[float], PassLoads]]:
     """For each setting in its order the feed [mm/s] of each of its passes, and the loads.
 
@@ -263,6 +266,7 @@ def pass_feeds(
     ----------
     settings : cutter and passes, both in the order in which they are milled
     feed : greatest of all [mm/s]
+    given : feed of each pass [mm/s]; None: the greatest that is allowed
     """
     earlier, counts = EarlierPoses.none(), []
     total = 0
@@ -278,7 +282,7 @@ def pass_feeds(
     if parts:
         earlier = EarlierPoses(*(np.vstack([getattr(x, k) for x in parts]) for k in ("tip", "axis", "shape")))
     out = []
-    for (size, passes), own in zip(settings, counts, strict=True):
+    for number, ((size, passes), own) in enumerate(zip(settings, counts, strict=True)):
         cutter = terms.cutter(size)
         found = [(k, p) for k, one in enumerate(passes) if (p := one.places()) is not None]
         feeds = np.full(len(passes), feed)
@@ -287,7 +291,10 @@ def pass_feeds(
         engagement = engagement_at(
             whole, cutter, per_tooth(feed, terms), terms.allowance, earlier, np.array(own, dtype=np.int64)[owner]
         )
-        np.minimum.at(feeds, owner, feed * allowed_factor(engagement, whole, cutter, terms))
+        if given is None:
+            np.minimum.at(feeds, owner, feed * allowed_factor(engagement, whole, cutter, terms))
+        else:
+            feeds = np.asarray(given[number], dtype=np.float64)
         loads = loads_of(engagement, whole, cutter, terms.material, feeds[owner] / feed)
         out.append(
             (

@@ -38,7 +38,7 @@ from chipload.planning.impeller.settings import (
     surface_number,
 )
 from chipload.planning.impeller.track import ToolTrack
-from chipload.program.program import LINE
+from chipload.program.program import LINE, Program
 from chipload.progress import Progress, part_of, silent
 
 #: rest passes remove excess above this share of the scallop: above the scallop between two lines, and below the
@@ -212,6 +212,20 @@ def settings_with_feeds(job: FinishSettings, settings: tuple[CutterSetting, ...]
         feed = np.where(in_cut, np.minimum(program.feed, own), program.feed)
         out.append(replace(s, program=replace(program, feed=feed), loads=loads))
     return tuple(out)
+
+
+def loads_at_feeds(
+    job: FinishSettings, settings: tuple[CutterSetting, ...], programs: Sequence[Program]
+) -> tuple[CutterSetting, ...]:
+    """The settings, in the order in which they are milled, with the loads of other programs of the same rows."""
+    if job.forces is None:
+        return settings
+    other = [replace(s, program=program) for s, program in zip(settings, programs, strict=True)]
+    passes = [_pass_rows(job, s) for s in other]
+    feeds = [[float(s.program.feed[p.rows].max()) for _, p in rows] for s, rows in zip(other, passes, strict=True)]
+    given = [(s.cutter, [p for _, p in rows]) for s, rows in zip(other, passes, strict=True)]
+    found = pass_feeds(given, job.forces, job.how.motion.feed, feeds)
+    return tuple(replace(s, loads=loads) for s, (_, loads) in zip(settings, found, strict=True))
 
 
 def _pass_rows(job: FinishSettings, s: CutterSetting) -> list[tuple[int, PassRows]]:
