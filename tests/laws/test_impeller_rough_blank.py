@@ -43,7 +43,7 @@ def test_nothing_above_the_cutting_part_touches_the_uncut_blank(impeller):
     volume = blank.volume()
     # as laid out beside the walls the holder meets what earlier rows left: such rows are left out
     assert taken_from(copy.deepcopy(blank), plan.program, SHORT, 2.5).above.max() > 20.0
-    safe, taken, left = without_touch(plan, blank, 2.5, 1.0)
+    safe, taken, left = without_touch(plan, blank, 2.5, 1.0, machine_named("horizontal-b"))
     assert blank.volume() == volume
     assert len(safe.stopped) + len(safe.tracks.tracks) == len(plan.tracks.tracks)
     assert len(safe.machined) > 4
@@ -51,7 +51,8 @@ def test_nothing_above_the_cutting_part_touches_the_uncut_blank(impeller):
     again = taken_from(blank_of(impeller, 0, HOW, 0.0), safe.program, SHORT, 2.5)
     assert again.above.max() <= 1.0
     assert again.rapid.max() == 0.0
-    assert again.after == pytest.approx(left.volume())
+    # but for the pieces in which the text turns an axis
+    assert again.after == pytest.approx(left.volume(), rel=1e-4)
     # what is taken: no more than the channel between hub and top of the blank, which is one of 2.6 pitches
     assert 0.1 * volume / 2.6 < taken.before - taken.after < volume / 2.6
 
