@@ -6,6 +6,7 @@ chisel edge adds to torque and power are put in, see :mod:`chipload.cutting.dril
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -17,7 +18,9 @@ from chipload.checking.rubbing import spindle_speed
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.drilling import drill_loads, is_pointed
 from chipload.cutting.material import Material
-from chipload.simulation.holes import AXIAL_DEG, AXIS, down_axis
+from chipload.simulation.holes import AXIAL, AXIAL_DEG, AXIS, down_axis
+from chipload.simulation.loads import Cuts
+from chipload.simulation.ramp import ramp_angle
 from chipload.simulation.removal import Removal
 from chipload.units import rpm_from_rad_s
 
@@ -80,6 +83,32 @@ def _put_in(
     if "force_sd_n" in columns:
         sd = np.asarray(columns["torque_mean_sd_nm"])[rows] * 1e3 / lips * whole
         out.setdefault("force_sd_n", np.array(columns["force_sd_n"], dtype=np.float64))[rows] = sd
+
+
+def with_drill_loads(loads: Mapping[str, Floats], cuts: Cuts, material: Material) -> dict[str, Floats]:
+    """Return greatest loads (c,) of cuts with those of a drill where it goes down its axis.
+
+    Parameters
+    ----------
+    loads : as of :func:`chipload.simulation.loads.greatest_loads`
+    """
+    cutter, axis = cuts.cutter, cuts.plain.frames[:, 2]
+    d = cuts.ends[:, 3:6] - cuts.ends[:, 0:3]
+    down = -(d * axis).sum(axis=1) >= AXIAL * np.linalg.norm(d, axis=1)
+    rows = np.flatnonzero(down & (loads["torque_mean_nm"] > 0.0) & is_pointed(cutter))
+    out = dict(loads)
+    if not len(rows):
+        return out
+    feed = cuts.plain.chip_max()[rows] * cutter.flutes / math.cos(cutter.bottom)
+    own = drill_loads(cutter, material, feed, 1e3 * loads["torque_mean_nm"][rows], ramp_angle(cuts)[rows] >= AXIAL_DEG)
+    more = 1e-3 * own.chisel_torque
+    turns = np.abs(cuts.spindle[rows])
+    for name, values in (("torque_nm", more), ("torque_mean_nm", more), ("power_w", more * turns)):
+        out[name] = np.array(loads[name])
+        out[name][rows] += values
+    out["force_n"] = np.array(loads["force_n"])
+    out["force_n"][rows] = own.thrust
+    return out
 
 
 def is_drilling(columns: Columns, row: int | None) -> bool:

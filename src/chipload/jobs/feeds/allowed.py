@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.checking.default_checks import DefaultChecks, peak_excess
+from chipload.checking.drilling import with_drill_loads
 from chipload.checking.load_budget import BUDGETED, factors_of_steps
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
@@ -147,7 +148,7 @@ def watching(
 
     def watch(cuts: Cuts) -> dict[str, Floats]:
         low, high = least[cuts.step], most[cuts.step]
-        there = greatest_loads(cuts, material, request.rotation)
+        there = with_drill_loads(greatest_loads(cuts, material, request.rotation), cuts, material)
         beyond = {
             name: np.maximum(np.divide(before[name][cuts.step], x, out=np.ones(len(x)), where=x > 0.0), 1.0)
             for name, x in there.items()
@@ -165,7 +166,9 @@ def watching(
         def ratios(factor: Floats, parts: Mapping[str, Sequence[LoadParts]]) -> Floats:
             thickest = chip_at(factor)
             moved = at_feeds(cuts, factor)
-            loads: dict[str, Floats] = greatest_loads(moved, material, request.rotation)
+            loads: dict[str, Floats] = with_drill_loads(
+                greatest_loads(moved, material, request.rotation), moved, material
+            )
             if request.more is not None:
                 loads |= request.more(moved)
             if STRESS in request.feed_limits and STRESS not in loads:

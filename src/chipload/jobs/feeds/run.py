@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from chipload.checking.default_checks import PROGRAM_COLUMNS, default_checks, with_checks
+from chipload.checking.drilling import with_drilling
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.limits import spindle_limits
 from chipload.checking.preparation import resolution_of, timed
@@ -14,6 +15,7 @@ from chipload.checking.program_text import read_as
 from chipload.checking.run import compliance_of_workpiece, simulate_program
 from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
 from chipload.checking.workpiece_compliance import WorkpieceCompliance, with_compliance_error
+from chipload.cutting.drilling import is_pointed
 from chipload.jobs.feeds.allowed import FeedRequest, watching, with_new_feeds
 from chipload.jobs.feeds.job import FeedsJob
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
@@ -106,6 +108,8 @@ def _new_feeds(
         engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.0, 0.5),
     )  # fmt: skip
     before = with_columns(before, (*watched(gives), *PROGRAM_COLUMNS))
+    if any(is_pointed(c) for c in cutters.values()):
+        before = with_drilling(before, cutters, material)
     more = bends if limits.keys() & {"deflection_um", "deflection_workpiece_um"} else None
     errors = {name: SPARE * error for name, error in before.resolution_error.items()}
     errors = with_compliance_error(errors, before.columns, compliance)  # the compliance does not change with the feed
