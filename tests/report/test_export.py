@@ -107,7 +107,7 @@ def test_another_reader_reads_the_same(exported: Path) -> None:
 def test_the_sheet_shows_verdict_program_and_limits(exported: Path) -> None:
     text = (exported / "setup.html").read_text()
     assert "<script" not in text
-    for part in ("Holds: ", "torque [N m]", "0-program.apt", "vmc", "X -8 to 28", "size: A4"):
+    for part in ("Holds at 95 %: ", "torque [N m]", "0-program.apt", "vmc", "X -8 to 28", "size: A4"):
         assert part in text
 
 
@@ -177,7 +177,7 @@ def read_pdf(data: bytes) -> str:
 
 def test_the_sheet_in_pdf(exported: Path) -> None:
     data = (exported / "setup.pdf").read_bytes()
-    for part in ("HOLDS", "Holds: ", "torque [N m]", "0-program.apt", "vmc", "X -8 to 28"):
+    for part in ("HOLDS", "Holds at 95 %: ", "torque [N m]", "0-program.apt", "vmc", "X -8 to 28"):
         assert part in read_pdf(data)
 
 

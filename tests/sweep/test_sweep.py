@@ -39,7 +39,7 @@ def job(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("job") / "contour"
     shutil.copytree(EXAMPLES / "contour", folder)
     text = (folder / "job.toml").read_text()
-    (folder / "job.toml").write_text(text.replace("step_mm = 0.05", "step_mm = 0.2"))
+    (folder / "job.toml").write_text(text.replace("step_mm = 0.05", "step_mm = 0.2") + "[checks]\nconfidence = 0.5\n")
     return folder / "job.toml"
 
 
@@ -174,7 +174,12 @@ def test_a_refused_case_is_a_row(job, tmp_path):
 def test_the_probability_is_that_of_the_normal_distribution(tmp_path):
     """The torque is linear in the coefficients: the share below a limit follows from its mean and deviation."""
     limit = 0.38
-    done = run_sweep(slot_job(tmp_path / "job"), (f"limits.torque_nm={limit}",), tmp_path, samples=Samples(32))
+    done = run_sweep(
+        slot_job(tmp_path / "job"),
+        (f"limits.torque_nm={limit}", "checks.confidence=0.5"),
+        tmp_path,
+        samples=Samples(32),
+    )
     torque = np.array([record["limits"]["torque_nm"]["worst"] for record in done.records])
     (combination,) = done.combinations
     low, high = combination.interval
