@@ -50,7 +50,10 @@ def result_of_setups(program: SetupsProgram) -> Result:
         sure = sure and result.verdict is Verdict.HOLDS
         maps += [replace(one, name=f"{name}, {one.name}", track=name) for one in result.maps]
         findings += [replace(f, text=f"{name}: {f.text}") for f in result.findings]
-        unchecked += [text for text in result.unchecked if text not in unchecked]
+        for text in result.unchecked:
+            # what no setup checks needs no name
+            own_text = text if all(text in one.unchecked for one in own) else f"{name}: {text}"
+            unchecked += [own_text] if own_text not in unchecked else []
         for what, of in result.provenance.inputs.items():
             if files.setdefault(what, of) != of:
                 files[f"{name}, {what}"] = of
