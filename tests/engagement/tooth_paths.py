@@ -81,7 +81,12 @@ def loads(slices, pitch, c, e, lam, low, high, K, turns, F, T, H):
 
 @dataclass(frozen=True)
 class Cut:
-    """A steady cut by a flat or a ball end mill, straight along the feed."""
+    """A steady cut, straight along the feed, by a flat, ball, bull-nose, tapered or barrel mill.
+
+    ``corner`` radius of the corner circle, which touches the bottom and the flank; ``taper`` [deg] of the flank, which
+    has the diameter D at the height of the tip; ``barrel`` radius of an arc between corner and flank, which touches
+    both; its corner circle has its centre ``hub`` from the axis. [mm]
+    """
 
     D: float
     N: int
@@ -94,6 +99,34 @@ class Cut:
     lam: float = 0.0
     pitch: tuple[float, ...] = ()
     ball: bool = False
+    corner: float = 0.0
+    taper: float = 0.0
+    barrel: float = 0.0
+    hub: float = 0.0
+
+    @property
+    def arcs(self):
+        """Arcs of the profile from the bottom up (centre, radius, angles from and to), and where the flank begins."""
+        R, r, a = self.D / 2.0, self.D / 2.0 if self.ball else self.corner, math.radians(self.taper)
+        last = math.pi / 2.0 - a
+        if not self.barrel:
+            e = R + r * math.tan(a) - r / math.cos(a)
+            return [(e, r, r, 0.0, last)] if r else [], (e + r * math.cos(a), r - r * math.sin(a))
+        # the centre (E, F): barrel from the flank, E = R + F tan(a) - barrel / cos(a), and barrel - r from the corner
+        B, b, t = self.barrel, R - self.barrel / math.cos(a) - self.hub, math.tan(a)
+        p, q, w = 1.0 + t * t, b * t - r, b * b + r * r - (B - r) ** 2
+        F = (-q + math.sqrt(q * q - p * w)) / p
+        E = R + F * t - B / math.cos(a)
+        first = math.atan2(self.hub - E, F - r)
+        return [(self.hub, r, r, 0.0, first), (E, F, B, first, last)], (E + B * math.cos(a), F - B * math.sin(a))
+
+    def radius_at(self, z):
+        """Radius [mm] of the profile at a height above the tip."""
+        arcs, (rho, high) = self.arcs
+        for e, f, r, _, last in arcs:
+            if z <= f - r * math.cos(last):
+                return e + math.sqrt(max(r * r - (f - z) ** 2, 0.0))
+        return rho + (z - high) * math.tan(math.radians(self.taper))
 
     @property
     def pitches(self):
@@ -106,18 +139,23 @@ class Cut:
         return (0.0, w) if self.up else (math.pi - w, math.pi)
 
     def slices(self, count):
-        R, lead = self.D / 2.0, math.tan(math.radians(self.helix)) / (self.D / 2.0)
-        if self.ball:
-            top = math.acos(1.0 - self.ap / R)
-            kappa = (np.arange(count) + 0.5) * top / count
-            z = R * (1.0 - np.cos(kappa))
-            return np.column_stack(
-                [R * np.sin(kappa), np.sin(kappa), np.cos(kappa), lead * z, np.full(count, R * top / count)]
-            )
-        z = (np.arange(count) + 0.5) * self.ap / count
-        return np.column_stack(
-            [np.full(count, R), np.ones(count), np.zeros(count), lead * z, np.full(count, self.ap / count)]
-        )
+        """Rows (k, 5) of :func:`loads`, about ``count`` of them."""
+        lead, out = math.tan(math.radians(self.helix)) / (self.D / 2.0), []
+        arcs, (rho, high) = self.arcs
+        for e, f, r, first, last in arcs:
+            top = min(last, math.acos(max(min((f - self.ap) / r, 1.0), -1.0)))
+            if top > first:
+                n = count if len(arcs) == 1 and self.ap <= high else max(count // 3, 1)
+                k = first + (np.arange(n) + 0.5) * (top - first) / n
+                width = np.full(n, r * (top - first) / n)
+                out.append([e + r * np.sin(k), np.sin(k), np.cos(k), lead * (f - r * np.cos(k)), width])
+        if self.ap > high:
+            a = math.radians(self.taper)
+            z = high + (np.arange(count) + 0.5) * (self.ap - high) / count
+            ones = np.ones(count)
+            width = ones * (self.ap - high) / count / math.cos(a)
+            out.append([rho + (z - high) * math.tan(a), ones * math.cos(a), ones * math.sin(a), lead * z, width])
+        return np.concatenate(out, axis=1).T.copy()
 
 
 def true_loads(cut: Cut, K, rotations=360, slices=None):

@@ -128,15 +128,14 @@ def test_layers_find_the_same_loads() -> None:
 
 
 def test_accuracy_of_a_run_with_a_turning_axis() -> None:
-    """Runout adds what the chips of a ball leave out: 0.03 + 0.5 e / f, and half of the share of divided edges."""
+    """Runout adds what the chips of a ball leave out: 0.01 + 0.7 e / ae, and half of the share of divided edges."""
     removal, plain = (run_of_ball(replace(BALL, runout=runout)) for runout in (BALL.runout, (0.0, 0.0)))
     for one in (removal, plain):
         assert abs(one.energy_balance[2]) < 1e-6
     error = plain.resolution_error["force_n"]
     assert LEANING_MOVES_FLOOR["force_n"] <= error < 0.2
-    feed = 20.0 * math.tau / (2 * 300.0)
     more = removal.resolution_error["force_n"] - error
-    assert more == pytest.approx(TIP + BEYOND * 0.01 / feed + 0.5 * SHARE, abs=0.01)
+    assert more == pytest.approx(TIP + BEYOND * 0.01 / BALL.diameter + 0.5 * SHARE, abs=0.01)
 
 
 def run_of_ball(ball: Cutter) -> Removal:

@@ -42,9 +42,9 @@ Ints = NDArray[np.int64]
 SHARE = 0.01
 #: parts of :func:`chip_error`: at any cut, of the square of feed over radius, of the runout over the radial depth
 LEAST, SECOND, RUNOUT = 0.003, 0.75, 0.04
-#: the same where the surface leans, as that of a ball nose: at any cut, with runout, and of the runout over the feed.
-#: With it a tooth also cuts beyond the front, on parts of the edge that no circle reaches, and its tip is off the axis
-LEANS, TIP, BEYOND = 0.01, 0.03, 0.5
+#: the same where the surface leans, as that of a ball nose or a cone: at any cut, with runout, and of the runout over
+#: the greatest radial depth of the step: a longer tooth also cuts on parts of the edge that no circle reaches
+LEANS, TIP, BEYOND = 0.01, 0.01, 0.7
 
 
 def tooth_radii(cutter: Cutter, lag: ArrayLike = 0.0) -> Floats:
@@ -154,10 +154,11 @@ def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
     leave out: 0.003 + 0.75 (f / R)^2 / phi_w + 0.04 e / max(ae, e), phi_w the engaged arc, ae its radial depth.
 
     With runout half of :data:`SHARE` is added. Where a range moves along the axis and leans, its chip is of first order
-    in that motion: f / R is added. A surface that leans has 0.01 at least, and with runout 0.03 + 0.5 e / f more.
+    in that motion: f / R is added. A surface that leans has 0.01 at least, and with runout 0.01 + 0.7 e / ae more, ae
+    the greatest radial depth of the step.
     Ranges count by their share of the chip. 0 where nothing is cut.
 
-    The constants are those within which random cuts by flat and ball end mills lie (benchmarks/truth.py).
+    The constants are those within which random cuts by all kinds of mills lie (benchmarks/truth.py).
 
     Examples
     --------
@@ -167,6 +168,7 @@ def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
     [0.006, 0.00325]
     """
     low, high, s0, s1, along, offset, across = front.rows.T
+    step = np.repeat(np.arange(len(front)), np.diff(front.start))
     rho, sine, cosine = front.slices[front.slice][:, [1, 3, 4]].T
     swing = np.hypot(along, across)
     first = low + np.arctan2(across, along)
@@ -181,8 +183,9 @@ def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
     each += np.where(np.abs(offset) > _tooth_chips.LEVEL * swing, share, 0.0)
     if e > 0.0:
         each += 0.5 * SHARE + RUNOUT * e / np.maximum(depth, e)
-        each += np.where(leans, TIP + BEYOND * np.minimum(e / np.maximum(feed, e), 1.0), 0.0)
+        widest = np.zeros(len(front))
+        np.maximum.at(widest, step, depth)
+        each += np.where(leans, TIP + BEYOND * e / np.maximum(widest[step], e), 0.0)
     weight = (swing + np.abs(offset)) * np.maximum(high - low, 1e-12) * (s1 - s0)
-    step = np.repeat(np.arange(len(front)), np.diff(front.start))
     whole = np.bincount(step, weight, len(front))
     return np.divide(np.bincount(step, weight * each, len(front)), whole, out=np.zeros(len(front)), where=whole > 0.0)

@@ -25,7 +25,7 @@ A small load matters to a limit only if the finer one exceeds the worst.
   order, and the finer ones are at most half as large, which gives 2. If the axis leans, slices do not end where contact
   ends and the instants of the peak are uneven: 3.
 * FLOOR, 1 % (2 % if an axis leans), is the error that both runs share: the sampled rotations, and edges of the stock
-  within the tolerance.
+  within the tolerance. Of barrel cutters, which meet a wall at a small angle, it is at least :data:`MOVES_FLOOR`.
 
 The computed steps are: a worst one of each column; those that remove most; others at even distances among those in cut;
 some that remove nothing, at the height of a section, although the cutter is in the stock; and MISSED of those that
@@ -266,6 +266,7 @@ def resolution_error(
     straight = all(
         c.corner_radius == c.taper == c.bottom == 0.0 and c.barrel_radius is None for c in _used(windows, setting)
     )
+    barrels = any(c.barrel_radius is not None for c in _used(windows, setting))
     if "chip_max_mm" in chip and not all(c.teeth_alike for c in _used(windows, setting)):
         chip["chip_max_mm"] += 2.0 * PARTS_OF_EDGE
     films, least = _films(columns), FLOOR if all(w.upright for w in windows.values()) else LEANING_FLOOR
@@ -274,8 +275,8 @@ def resolution_error(
             floor = least
             if setting.moves is not None and not setting.moves.upright:
                 floor = LEANING_MOVES_FLOOR[name]
-            elif setting.moves is not None and not straight:
-                floor = MOVES_FLOOR[name]
+            elif not straight and (setting.moves is not None or barrels):
+                floor = max(MOVES_FLOOR.get(name, 0.035), least)
             found[name] = excess[name] / worst[name] + floor + films / (1.0 - films) + chip[name]
         elif excess[name] > 0.0 or films > 0.0:
             found[name] = math.inf

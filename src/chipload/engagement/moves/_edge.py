@@ -16,6 +16,9 @@ PI = math.pi
 SAME = 1e-6
 #: number of slices of the part of a corner whose circles cut all round in a downward motion, where there is material
 ROUND = 4
+#: by how many more slices a flank has than a corner where it is a cone, or goes down beside a floor that does: on a
+#: helix of flat mills the greatest torque was 2 to 4.5 % too high, that of cones in thin layers up to 30 %
+DOWN = 4
 
 
 @njit(cache=True, nogil=True)
@@ -196,13 +199,16 @@ def sliced(c, near, count, u, parts, flank, levels, out):
                 out, k, c, alpha, a + (b - a) * parts[i, 0], a + (b - a) * parts[i, 1], a + (b - a) * parts[i, 2]
             )
     if outer >= c[RHO2] and top > c[Z2]:
-        k = flanked(c, near, count, top, pieces, flank, levels, out, k)
+        many = pieces * (DOWN if u[2] < 0.0 or c[TB] > 0.0 else 1)
+        k = flanked(c, near, count, top, many, flank, levels, out, k)
     return k
 
 
 @njit(cache=True, nogil=True)
 def flanked(c, near, count, top, pieces, flank, levels, out, k):
-    """Slices of the flank: between the heights of the stock beside it, none longer than ``flank``."""
+    """Slices of the flank: between the heights of the stock beside it, none longer than ``flank``; where these are too
+    many, ``pieces`` equal ones.
+    """
     n = 2
     levels[0] = c[Z2]
     levels[1] = top
@@ -225,6 +231,8 @@ def flanked(c, near, count, top, pieces, flank, levels, out, k):
     if many:
         # no level floors around: a surface that rises and falls
         n = 2
+    if many or c[TB] > 0.0:
+        # beside an upright wall the contact of a cone changes all along it
         flank = min(flank, (top - c[Z2]) / pieces)
     levels[:n].sort()
     beta = math.atan(c[TB])

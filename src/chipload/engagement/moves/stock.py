@@ -93,7 +93,9 @@ def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tupl
     for c, longest in zip(cutters, flank, strict=True):
         cells = max(cells, (int(2.0 * c[_sweep.WIDE] / grid[2]) + 3) * (int(2.0 * c[_sweep.WIDE] / grid[3]) + 3))
         sk = math.cos(math.atan(c[_sweep.TB]))
-        most = max(most, 3 * pieces + front.LEVELS + edge.ROUND + int(c[_sweep.FLUTE] / sk / longest) + 4)
+        most = max(
+            most, (3 + 2 * edge.DOWN) * pieces + 2 * front.LEVELS + edge.ROUND + int(c[_sweep.FLUTE] / sk / longest) + 4
+        )
         samples = max(
             samples, int(math.tau / min(min(grid[2], grid[3]) / c[_sweep.WIDE], front.APART)) + 4 + front.FEWEST
         )
