@@ -11,7 +11,10 @@ from chipload.number_text import number_text
 
 SOURCE = Path(__file__).parents[1] / "src" / "chipload"
 #: units of quantities that are often above 1000
-LARGE = r"(?:mm/min|rpm|points|steps|mm2|mm3|columns|cells|motions|rows|s|min|µm)(?![\w/])"
+LARGE = (
+    r"(?:mm/min|rpm|points|steps|mm2|mm3|columns|cells|motions|rows|s|min|µm|N m|N/mm|N|MPa/N|MPa|%|Hz|m/min|times)"
+    r"(?![\w/])"
+)
 FORMAT = re.compile(r"\{[^{}]*:\.[1-4]g\} " + LARGE)
 
 

@@ -19,7 +19,7 @@ from chipload.cutting.rigid import OF_DEPTH, OF_FEED, deflection_share
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.errors import Finding, Severity
 from chipload.machine.machine import Machine
-from chipload.number_text import percent_text
+from chipload.number_text import number_text, percent_text
 from chipload.result import CoveredRows, LimitCheck, Verdict, check_limit, error_of
 from chipload.result.limits import Columns, hold_at_confidence
 from chipload.simulation.chip_space import flute_fill
@@ -179,7 +179,8 @@ def _speed_findings(checks: DefaultChecks, columns: Columns) -> list[Finding]:
         if k < 0 or not (0.0 < speed[k] < low * (1.0 - 1e-6) if side == "below" else speed[k] > high * (1.0 + 1e-6)):
             continue
         text = (
-            f"the cutting speed is {speed[k]:.4g} m/min: the coefficients of {material.name} hold from {low:g} to "
+            f"the cutting speed is {number_text(speed[k])} m/min: the coefficients of {material.name} hold "
+            f"from {low:g} to "
             f"{high:g} m/min, the loads {side} that are not known"
         )
         out.append(_at_step(f"speed-{side}-coefficients", columns, k, text))

@@ -16,6 +16,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from chipload.checking import part_numbers
+from chipload.number_text import number_text
 from chipload.report.scene import legend
 from chipload.report.sheet import table
 from chipload.simulation.surface import Collision, Difference
@@ -76,7 +77,8 @@ def section(
             "<h2>Gouge and excess on the part</h2>",
             table(["", "mm", "line", "at x, y, z [mm]"], rows, numbers=(1, 2)),
             f"<p>Of {what['part_under_stock']} points of the part that had stock over them "
-            f"{100.0 * what['part_reached_share']:.3g} % lie within {left.search_range:g} mm of the tool path; over "
+            f"{number_text(100.0 * what['part_reached_share'], 3)} % lie within {left.search_range:g} mm "
+            "of the tool path; over "
             "the others there is more.</p>",
             '<p class="note">On the part in the view above, red is cut too deep, blue stands over the part, in full '
             f"colour by {span:.3g} mm; pale: beyond the search range.</p>",

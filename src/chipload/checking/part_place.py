@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
+from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
 
@@ -40,6 +41,6 @@ def find_misplaced_part(bounds: Floats, volume: float, low: Floats, high: Floats
     share = abs(volume) / float(np.prod(high - low))
     if share < LEAST_SHARE:
         size = " x ".join(f"{v:.3g}" for v in np.ptp(bounds, axis=0).tolist())
-        text = f"the part, {size} mm, fills {100.0 * share:.2g} % of its stock: check part.units"
+        text = f"the part, {size} mm, fills {number_text(100.0 * share, 2)} % of its stock: check part.units"
         return (Finding("part-misplaced", 0, text, Severity.UNPROVEN),)
     return ()

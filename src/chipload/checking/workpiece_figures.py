@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 
 from chipload.checking.bent_workpiece import BentWorkpiece
 from chipload.checking.outcome import SimulationResult
+from chipload.number_text import number_text
 from chipload.report.sheet import figure, table
 from chipload.result.style import FONT, GRID, LIMIT, SCALE
 from chipload.structure.cells.followed import FollowedModes
@@ -29,8 +30,9 @@ def workpiece_section(simulation: SimulationResult, figures: dict[str, go.Figure
     body = [
         "<h2>Deflection of the workpiece</h2>",
         f"<p>{len(own.steps.states)} states of removal in cells of {own.cell:.3g} mm, {own.unknowns} unknowns; the "
-        f"thinnest wall left is {own.wall:.3g} mm. The greatest deflection is known to {100.0 * own.error:.2g} %, of "
-        f"which {100.0 * own.state_change:.2g} % is the change between states.</p>",
+        f"thinnest wall left is {own.wall:.3g} mm. The greatest deflection is known to "
+        f"{number_text(100.0 * own.error, 2)} %, of "
+        f"which {number_text(100.0 * own.state_change, 2)} % is the change between states.</p>",
         "<h3>Lines with the greatest deflection</h3>",
         table(["line", "deflection [\u00b5m]"], rows, numbers=(0, 1)),
     ]
@@ -47,8 +49,8 @@ def bent_section(bent: BentWorkpiece, where: str, figures: dict[str, go.Figure])
     x, y, z = bent.place
     return [
         "<h3>Greatest deflection</h3>",
-        f'<p class="note">{where}, under {np.linalg.norm(bent.force):.4g} N; displacement drawn '
-        f"{_scale(bent):.3g} times.</p>",
+        f'<p class="note">{where}, under {number_text(np.linalg.norm(bent.force))} N; displacement drawn '
+        f"{number_text(_scale(bent), 3)} times.</p>",
         figure("bent", bent_figure(bent), figures),
         f"<p>A support of 10 N/\u00b5m at ({x:.4g}, {y:.4g}, {z:.4g}) lowers the deflection there from "
         f"{1e3 * bent.before:.3g} to {1e3 * bent.after:.3g} \u00b5m.</p>",
@@ -62,7 +64,7 @@ def _frequencies(modes: FollowedModes, figures: dict[str, go.Figure]) -> list[st
     head = ["mode", "before [Hz]", "greatest [Hz]", "after [Hz]"]
     return [
         "<h3>Natural frequencies as material is removed</h3>",
-        f'<p class="note">In {len(modes.states)} states, known to {100.0 * modes.error:.2g} %.</p>',
+        f'<p class="note">In {len(modes.states)} states, known to {number_text(100.0 * modes.error, 2)} %.</p>',
         table(head, rows, numbers=(0, 1, 2, 3)),
         figure("frequencies", frequency_figure(modes), figures),
     ]

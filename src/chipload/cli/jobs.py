@@ -11,6 +11,7 @@ import typer
 from chipload.cli.app import Accept, Debug, JobFile, Sets, app
 from chipload.cli.inputs import show_verdict
 from chipload.errors import Cancelled, InputError
+from chipload.number_text import number_text
 from chipload.terminal import bar, guarded, show, write_line
 
 #: [s] between two states of a simulation
@@ -164,8 +165,9 @@ def cuts(
         for f in found.findings:
             show(str(f))
         show(
-            f"{len(found.site)} cuts at {len(found.sites)} places: error of interpolation {100.0 * found.bias:.2g} %, "
-            f"error by scatter {100.0 * found.noise:.2g} % (root mean square over the wall)"
+            f"{len(found.site)} cuts at {len(found.sites)} places: error of interpolation "
+            f"{number_text(100.0 * found.bias, 2)} %, "
+            f"error by scatter {number_text(100.0 * found.noise, 2)} % (root mean square over the wall)"
         )
         show(f'fill in the table and name it in the job: [threshold] file = "{out.name}"')
         return 0

@@ -81,7 +81,9 @@ def learn(
         found, aligned = learn_from_logs(read, predicted, signal, prior, lag, name, ", ".join(hashes))
         for one in aligned:
             stated_line = read[one.name].line is not None
-            clock = "" if stated_line else f", starts at {one.lag:.4g} s, {one.rate:.4g} times as long"
+            clock = (
+                "" if stated_line else f", starts at {number_text(one.lag)} s, {number_text(one.rate)} times as long"
+            )
             show(f"{one.name}: correlation {one.correlation:.3f}{clock}")
         write_whole(out, material_text(found.material).encode("utf-8"))
         for line in lines_of(found):
@@ -152,8 +154,8 @@ def lines_of(found: LearnedMaterial) -> list[str]:
     for k, (key, unit) in enumerate((("Ktc", "MPa"), ("Kte", "N/mm"))):
         old, new = getattr(found.prior, key), getattr(found.material, key)
         out.append(
-            f"{key}: {number_text(new)} {unit} +- {200.0 * after[k]:.2g} %; before {number_text(old)} +- "
-            f"{200.0 * before[k]:.2g} % (two standard deviations)"
+            f"{key}: {number_text(new)} {unit} +- {number_text(200.0 * after[k], 2)} %; before {number_text(old)} +- "
+            f"{number_text(200.0 * before[k], 2)} % (two standard deviations)"
         )
     out.append("Krc, Kac, Kre, Kae: as before: power and current tell the tangential force alone")
     for key, error in found.fit_error.items():

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from chipload.cli.app import Debug, app
+from chipload.number_text import number_text
 from chipload.terminal import guarded, show
 
 
@@ -40,8 +41,8 @@ def tap(
         write_whole(out, modes_text(found, tool).encode("utf-8"))
         for one in found:
             for f, z, k in zip(one.fit.frequency, one.fit.damping, one.fit.stiffness, strict=True):
-                show(f"{one.name} {one.direction}: {f:.5g} Hz, damping {z:.3g}, {1e-3 * k:.4g} N/um")
-            show(f"{one.name} {one.direction}: the fit leaves {100.0 * one.fit.left:.2g} % of the peak")
+                show(f"{one.name} {one.direction}: {f:.5g} Hz, damping {z:.3g}, {number_text(1e-3 * k)} N/um")
+            show(f"{one.name} {one.direction}: the fit leaves {number_text(100.0 * one.fit.left, 2)} % of the peak")
         show(f'written: {out}; name it in the job: [dynamics] file = "{out.name}"')
         return 0
 

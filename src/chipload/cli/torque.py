@@ -108,8 +108,9 @@ def hal(
         if out is not None:
             write_whole(out, table_of(record).encode("ascii"))
         show(
-            f"{len(record.rows)} steps, ended: {record.ended}; greatest torque {1e-3 * record.torque_max:.4g} N m, "
-            f"set point {1e-3 * job.override.torque_ref:.4g} N m"
+            f"{len(record.rows)} steps, ended: {record.ended}; greatest torque "
+            f"{number_text(1e-3 * record.torque_max)} N m, "
+            f"set point {number_text(1e-3 * job.override.torque_ref)} N m"
         )
         return 0 if record.ended == "path" else EXCEEDED
 
@@ -214,8 +215,9 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
     power = found.source == "power"
     unit, scale = ("N m", 1e-3) if power else ("A", 1.0)
     name = "efficiency" if power else "torque constant"
-    constant = f"{f.torque_constant:.4g}" if power else f"{1e-3 * f.torque_constant:.4g} N m/A"
-    how = {True: "stated", False: f"+- {100.0 * found.constant_error:.2g} % at {level}", None: ""}[found.constant_known]
+    constant = f"{f.torque_constant:.4g}" if power else f"{number_text(1e-3 * f.torque_constant)} N m/A"
+    wrong = number_text(100.0 * found.constant_error, 2)
+    how = {True: "stated", False: f"+- {wrong} % at {level}", None: ""}[found.constant_known]
     low, high = (x * rpm_from_rad_s(1.0) for x in f.speeds)
     out = [
         f"{name}: {constant} ({how})"
@@ -237,10 +239,12 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
     if found.constant_known is not None:
         least, most = (1e-3 * x for x in found.torque)
         out.append(
-            f"valid for torques from {least:.3g} to {most:.4g} N m, {low:.5g} to {number_text(high, 5)} rpm, below "
-            f"{sensor.bandwidth:.3g} Hz"
+            f"valid for torques from {least:.3g} to {number_text(most)} N m, {low:.5g} to "
+            f"{number_text(high, 5)} rpm, below "
+            f"{number_text(sensor.bandwidth, 3)} Hz"
             if most < math.inf
-            else f"valid for torques above {least:.3g} N m, below {sensor.bandwidth:.3g} Hz; no log has a cut above "
+            else f"valid for torques above {number_text(least, 3)} N m, below {number_text(sensor.bandwidth, 3)} Hz; "
+            "no log has a cut above "
             "that torque"
         )
     torque = "N m" if found.constant_known is not None else unit
@@ -248,19 +252,22 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
     for answer in found.predictions:
         text = f"prediction of {answer.name}: error {per * answer.rms:.3g} {torque} rms, {per * answer.mean:+.3g} mean"
         if answer.greatest > 0.0:
-            text += f", of {per * answer.greatest:.4g} at most ({100.0 * answer.rms / answer.greatest:.2g} %)"
-        text += f", {100.0 * answer.covered:.3g} % within the interval"
+            text += (
+                f", of {per * answer.greatest:.4g} at most ({number_text(100.0 * answer.rms / answer.greatest, 2)} %)"
+            )
+        text += f", {number_text(100.0 * answer.covered, 3)} % within the interval"
         if math.isfinite(answer.apart):
             resolved = "distinguished from air" if answer.apart >= TOLD_APART else "not distinguished from air"
-            text += f"; cuts {resolved}: {100.0 * answer.apart:.3g} % of pairs in order (50 %: chance)"
+            text += f"; cuts {resolved}: {number_text(100.0 * answer.apart, 3)} % of pairs in order (50 %: chance)"
         out.append(text)
     if flutes is not None:
         passing = flutes * found.cut_speed / math.tau
         seen = aliased(passing, 1.0 / sensor.period)
         inside = seen < sensor.bandwidth
         out.append(
-            f"tooth passing frequency {passing:.4g} Hz: sampling at {1.0 / sensor.period:.4g} Hz shifts it to "
-            f"{seen:.3g} Hz, "
+            f"tooth passing frequency {number_text(passing)} Hz: sampling at "
+            f"{number_text(1.0 / sensor.period)} Hz shifts it to "
+            f"{number_text(seen, 3)} Hz, "
             + ("inside the bandwidth, where it looks like torque" if inside else "above the bandwidth")
         )
     return out

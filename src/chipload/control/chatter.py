@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
+from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
 
@@ -228,7 +229,7 @@ class ChatterGuard:
         self._loud = 0
         self._bad.append(float(np.mean(np.asarray(speed, dtype=np.float64))))
         found = self._quiet() if self._changes < self.rules.changes else None
-        message = f"chatter at {window.hertz:.4g} Hz, level {window.level:.3g} outside the harmonics"
+        message = f"chatter at {number_text(window.hertz)} Hz, level {window.level:.3g} outside the harmonics"
         if found is None:
             why = "no quiet speed within the override" if self._changes < self.rules.changes else "after all changes"
             self.override = 0.0

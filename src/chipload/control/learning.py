@@ -32,6 +32,7 @@ from chipload.control.log_alignment import AlignedLog, PredictedTorque, align_lo
 from chipload.control.logs import Log
 from chipload.cutting.material import Material
 from chipload.errors import Finding, InputError, Severity
+from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -294,7 +295,8 @@ def learn_material(
     for tool, (mean, sd) in wear.items():
         if mean > 2.0 * sd:
             text = (
-                f"tool {tool}: Kte grows by {100.0 * mean:.3g} +- {200.0 * sd:.2g} % an hour of cutting: the edge wears"
+                f"tool {tool}: Kte grows by {100.0 * mean:.3g} +- {number_text(200.0 * sd, 2)} % an hour "
+                "of cutting: the edge wears"
             )
             findings.append(Finding("log-wear", 0, text, Severity.NOTE))
     used = sum(int(own.sum()) for own in kept)
@@ -351,7 +353,8 @@ def _check_unit(log: LogBlocks, signal: Signal) -> None:
     if ratio > 0.0 and not 0.2 < ratio < 5.0:
         tens = 10.0 ** round(math.log10(ratio))
         raise InputError(
-            f"{log.name}: {signal.kind} is {ratio:.3g} times what the program predicts: check its unit (a factor of "
+            f"{log.name}: {signal.kind} is {number_text(ratio, 3)} times what the program predicts: check "
+            "its unit (a factor of "
             f"{tens:g}) and the data of the spindle"
         )
 
@@ -419,7 +422,8 @@ def _findings_of(model: _SpindleModel, x: Floats, k: int, kept: NDArray[np.bool_
             lines = sorted({int(v) for v in log.line[wrong]})
             at = f"lines {lines[0]} to {lines[-1]}" if len(lines) > 1 else f"line {lines[0]}"
             message = (
-                f"{log.name}: {at}, at {log.time[first]:.4g} s: {model.signal.kind} {text} ({int(wrong.sum())} blocks)"
+                f"{log.name}: {at}, at {number_text(log.time[first])} s: {model.signal.kind} {text} "
+                f"({int(wrong.sum())} blocks)"
             )
             out.append(Finding(code, lines[0], message, Severity.UNPROVEN))
     return out

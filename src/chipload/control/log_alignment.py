@@ -22,6 +22,7 @@ from scipy.signal import correlate
 from chipload.control.logs import Log
 from chipload.control.spindle import first_order
 from chipload.errors import Finding, InputError, Severity
+from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
 
@@ -185,7 +186,8 @@ def _gaps(name: str, time: Floats) -> list[Finding]:
     far = np.flatnonzero(step > max(GAP_STEPS * float(np.median(step)), GAP_S)) if len(step) else np.empty(0, np.int64)
     if not len(far):
         return []
-    text = f"{name}: {len(far)} gaps in time, the first of {step[far[0]]:.3g} s at {time[far[0]]:.4g} s"
+    text = f"{name}: {len(far)} gaps in time, the first of {number_text(step[far[0]], 3)} s"
+    text += f" at {number_text(time[far[0]])} s"
     return [Finding("log-gap", 0, text, Severity.NOTE)]
 
 

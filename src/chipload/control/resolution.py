@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 from chipload.control.spindle_model import Spindle
 from chipload.errors import InputError
+from chipload.number_text import number_text
 
 #: standard deviations of the noise that an estimate is granted
 DEVIATIONS = 2.0
@@ -38,7 +39,8 @@ class TorqueResolution:
 
     def __str__(self) -> str:
         return (
-            f"{1e-3 * self.total:.3g} N m (noise {1e-3 * self.noise:.2g}, quantisation {1e-3 * self.quantisation:.2g}, "
+            f"{number_text(1e-3 * self.total, 3)} N m (noise {1e-3 * self.noise:.2g}, quantisation "
+            f"{1e-3 * self.quantisation:.2g}, "
             f"idle map {1e-3 * self.idle:.2g})"
         )
 
@@ -78,7 +80,7 @@ def check_light(spindle: Spindle, period: float, light: float) -> None:
     if light < found.total:
         raise InputError(
             f"override.light = {1e-3 * light:g} N m: below the resolution of the spindle, {found}: air cannot be "
-            f"distinguished from a cut: {_remedy(found)}, or light at least {1e-3 * found.total:.3g} N m"
+            f"distinguished from a cut: {_remedy(found)}, or light at least {number_text(1e-3 * found.total, 3)} N m"
         )
 
 
@@ -101,18 +103,20 @@ def check_limit(spindle: Spindle, period: float, limit: float, hold: float, exce
     granted = 1.0 + excess - wrong * hold
     if granted <= 0.0:
         raise InputError(
-            f"spindle: its torque constant may be wrong by {100.0 * (wrong - 1.0):.3g} %: a share of {hold:g} of the "
+            f"spindle: its torque constant may be wrong by {number_text(100.0 * (wrong - 1.0), 3)} %: a "
+            f"share of {hold:g} of the "
             f"limit cannot be held: log more cuts of known torque, or hold at most {(1.0 + excess) / wrong:.3g}"
         )
     if found.total > granted * limit:
         lower = (1.0 + excess - found.total / limit) / wrong
         alternative = f", or hold at most {lower:.2g}" if lower > 0.5 else ""
-        error = f", torque constant {100.0 * (wrong - 1.0):.2g} % wrong," if wrong > 1.0 else ""
+        error = f", torque constant {number_text(100.0 * (wrong - 1.0), 2)} % wrong," if wrong > 1.0 else ""
         raise InputError(
-            f"spindle: it resolves {found}, the limit is {1e-3 * limit:.4g} N m: must be at most "
-            f"{1e-3 * granted * limit:.3g} N m, the share of the limit that is neither held{error} nor "
+            f"spindle: it resolves {found}, the limit is {number_text(1e-3 * limit)} N m: must be at most "
+            f"{number_text(1e-3 * granted * limit, 3)} N m, the share of the limit that is neither held{error} nor "
             "allowed in excess: "
-            f"{_remedy(found)}{alternative}; this spindle holds limits from {1e-3 * found.total / granted:.3g} N m"
+            f"{_remedy(found)}{alternative}; this spindle holds limits from "
+            f"{number_text(1e-3 * found.total / granted, 3)} N m"
         )
 
 

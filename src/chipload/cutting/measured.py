@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
 from chipload.files import open_regular
+from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
 
@@ -311,5 +312,7 @@ def _findings(measured: Measured, window: tuple[float, float] | None, end: float
         largest = float(np.abs(f).max())
         if abs(slope) > DRIFT * largest:
             yield Finding(
-                "force-drift", 0, f"{name} drifts by {slope:.3g} N over the window, of {largest:.4g} N at most"
+                "force-drift",
+                0,
+                f"{name} drifts by {number_text(slope, 3)} N over the window, of {number_text(largest)} N at most",
             )

@@ -13,6 +13,7 @@ import numpy as np
 
 from chipload.files import read_regular
 from chipload.jobs import CAPABILITIES, check_job, load_job
+from chipload.number_text import number_text
 from chipload.tables import LARGEST_FILE, parsed
 
 #: lines about a file, and whether what it holds can be used as it is
@@ -87,7 +88,8 @@ def _hal(path: Path) -> list[str]:
     from chipload.control.hal_file import load_hal
 
     job = load_hal(path)
-    return [f"{path.name}: a controller for chipload hal, torque held {1e-3 * job.override.torque_ref:.4g} N m"]
+    held = number_text(1e-3 * job.override.torque_ref)
+    return [f"{path.name}: a controller for chipload hal, torque held {held} N m"]
 
 
 def _fuzzy(path: Path) -> list[str]:

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from chipload.control.spindle_file import read_spindle
 from chipload.errors import InputError
+from chipload.number_text import number_text
 from chipload.result import Result, Track
 from chipload.units import rpm_from_rad_s
 
@@ -151,7 +152,7 @@ def _percent(tool: int, own: Sequence[LoadSection]) -> tuple[float, float]:
             raise InputError(f"{at}: the spread of the coefficients is not known: state spread in the material")
         load, high = max(load, 100.0 * s.motor.most / s.rated), max(high, 100.0 * s.motor.high / s.rated)
     if load > 100.0:
-        raise InputError(f"{at}: takes {load:.4g} % of the rated power: must be at most 100: cut less")
+        raise InputError(f"{at}: takes {number_text(load)} % of the rated power: must be at most 100: cut less")
     up = math.ceil(10.0 * load - 1e-9) / 10.0
     return up, max(0.1, math.ceil(10.0 * (high - up) - 1e-9) / 10.0)
 

@@ -79,7 +79,8 @@ def jump_findings(
     out = []
     for k, ratio in zip(*(x.tolist() for x in jumps(place, f, d, compliance, reach)), strict=True):
         text = (
-            f"the workpiece bends by {number_text(d[k])} µm under {f[k]:.4g} N, {ratio:.3g} times as much per "
+            f"the workpiece bends by {number_text(d[k])} µm under {number_text(f[k])} N, "
+            f"{number_text(ratio, 3)} times as much per "
             "newton as in the "
             "steps next to it: its deflection is not known; state a smaller step_mm"
         )

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from chipload.errors import InputError
+from chipload.number_text import number_text
 from chipload.structure.hexa import Array
 from chipload.structure.receptance import Receptance
 
@@ -96,7 +97,7 @@ def fit_modes(measured: Receptance, band: tuple[float, float], coherence: Array 
             break
     if not left <= LEFT:
         raise InputError(
-            f"receptance: {len(best) // 2} modes leave {100.0 * left:.3g} % of the peak: must be at most "
+            f"receptance: {len(best) // 2} modes leave {number_text(100.0 * left, 3)} % of the peak: must be at most "
             f"{100.0 * LEFT:g} %: take another band (--from-hz, --to-hz), or measure again"
         )
     c = _model(f, H, best)[1]
@@ -139,7 +140,7 @@ def _check(frequency: Array, damping: Array, modal: Array, band: tuple[float, fl
             )
         if not STIFFNESS[0] <= 1.0 / c <= STIFFNESS[1]:
             raise InputError(
-                f"receptance: the mode at {f:.5g} Hz has the stiffness {1e-3 / c:.3g} N/um: must be from "
+                f"receptance: the mode at {f:.5g} Hz has the stiffness {number_text(1e-3 / c, 3)} N/um: must be from "
                 f"{1e-3 * STIFFNESS[0]:g} to {1e-3 * STIFFNESS[1]:g} N/um: check the unit"
             )
 

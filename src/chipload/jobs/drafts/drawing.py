@@ -357,7 +357,7 @@ def _rest(
     radial = round(RADIAL * d, 4)
     key = "file" if named is not None and named.lower().endswith(".toml") else "name"
     own = Entry(key, named) if named is not None else Entry("name", "vmc", "chipload machines lists all", True)
-    cut = f"{math.pi * d * speed / 1000.0:.3g} m/min"
+    cut = f"{number_text(math.pi * d * speed / 1000.0, 3)} m/min"
     cut += ", carbide in aluminium" if least <= wanted <= most else f", as far as the spindle of {machine.name} turns"
     entries = [
         Entry("kind", kind),

@@ -15,6 +15,7 @@ from chipload.checking.result import changed_name
 from chipload.jobs.feeds.numbers import COMPARED, exceeding, feed_numbers
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
 from chipload.jobs.feeds.result import division_notes, result_of
+from chipload.number_text import number_text
 from chipload.report.presentation import Presentation
 from chipload.report.sheet import figure, table
 from chipload.result import COLUMNS, LimitCheck
@@ -68,7 +69,7 @@ def feed_sections(
     body = [
         "<h2>Feeds</h2>",
         f"<p>{what['lines_changed']} of {what['lines']} lines with a feed have a new one: {what['lines_slower']} are "
-        f"slower, {what['lines_faster']} faster. The program takes {abs(gain):.3g} % "
+        f"slower, {what['lines_faster']} faster. The program takes {number_text(abs(gain), 3)} % "
         f"{'less' if gain >= 0.0 else 'more'} time. {escape(' '.join((*division_notes(feeds), '')))}"
         f"<b>{escape(program)}</b> is its text; it was read again and simulated from fresh stock.</p>",
         table(["", "before", "after", "limit"], rows, numbers=(1, 2, 3)),

@@ -68,7 +68,7 @@ def sections(done: FitResult, figures: dict[str, go.Figure]) -> list[str]:
         known["harmonics of the spindle speed that are used"] = str(fit.search.harmonics)
         known["runout"] = f"{number_text(fit.cutter.runout[0] * 1000.0, 3)} µm"
         for key, (w0, zeta) in zip(CHANNELS, fit.channels.resonance, strict=True):
-            rings = f"{w0 / math.tau:.4g} Hz, damping {zeta:.3g}" if math.isfinite(w0) else "taken as rigid"
+            rings = f"{number_text(w0 / math.tau)} Hz, damping {zeta:.3g}" if math.isfinite(w0) else "taken as rigid"
             known[f"dynamometer, {key}"] = rings
     for key, left, r2 in zip(CHANNELS, fit.channels.residual, fit.channels.r2, strict=True):
         known[f"residual, {key}"] = f"{_text_of(left)} N, R2 {_text_of(r2)}"

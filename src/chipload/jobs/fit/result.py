@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from chipload.cutting.fit import NAMES, TURN, predicted
 from chipload.jobs.fit.job import CHANNELS
 from chipload.jobs.fit.outcome import Comparison, FitResult
+from chipload.number_text import number_text
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, in_memory, state_of
 from chipload.result.limits import Columns
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
@@ -39,7 +40,7 @@ def result_of(done: FitResult) -> Result:
         findings=done.findings,
         unchecked=tuple(f"limit {name}: not stated" for name in done.job.unchecked),
         provenance=done.provenance,
-        note=f"Ktc {ktc:.4g} MPa, Krc {krc:.4g} MPa." if np.isfinite([ktc, krc]).all() else "",
+        note=f"Ktc {number_text(ktc)} MPa, Krc {number_text(krc)} MPa." if np.isfinite([ktc, krc]).all() else "",
     )
 
 

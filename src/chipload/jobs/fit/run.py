@@ -17,6 +17,7 @@ from chipload.cutting.turns import MeasuredCut, turns_of
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs.fit.job import CHANNELS, FitJob
 from chipload.jobs.fit.outcome import Comparison, FitResult, MeasuredForces
+from chipload.number_text import number_text
 from chipload.progress import Progress, silent
 from chipload.result import Provenance
 from chipload.result.provenance import hashes, title_of, versions
@@ -188,7 +189,8 @@ def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple
         found = (Finding("fit-covariance", 0, text),)
     excess = peak_excess(comparisons)
     if excess is not None:
-        text = f"90 % of the peaks of each run are at most {100.0 * excess:.3g} % above the prediction: limits on peaks"
+        above = number_text(100.0 * excess, 3)
+        text = f"90 % of the peaks of each run are at most {above} % above the prediction: limits on peaks"
         found = (*found, Finding("fit-peaks", 0, f"{text} allow for that"))
     if all(one.use == "fit" for one in comparisons):
         text = 'no run has use = "predict": the error of the prediction of other cuts is unknown'

@@ -17,6 +17,7 @@ from chipload.jobs.impeller.machine_check import MachineCheck
 from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.machine.machine import Machine
+from chipload.number_text import number_text
 from chipload.planning.impeller.answer import Answer, Unreachable
 from chipload.planning.impeller.compare import Partition
 from chipload.planning.impeller.impeller import Impeller
@@ -275,7 +276,8 @@ class Covered:
         least = f"{most:.3f} mm" if most < self.left.height else f"{most:g} mm or more"
         note = f", no cutter was found for {self.unreached:.1f} mm2 of it" if self.unreached > 0.0 else ""
         return (
-            f"{self.name}: on {over:.1f} mm2, {100.0 * (1.0 - self.share):.2g} % of what is milled, more than "
+            f"{self.name}: on {over:.1f} mm2, {number_text(100.0 * (1.0 - self.share), 2)} % of what is "
+            "milled, more than "
             f"{self.limit:g} mm is left: {least} at ({x:.2f}, {y:.2f}, {z:.2f}){note}",
         )
 

@@ -30,6 +30,7 @@ from chipload.jobs.impeller.paths import walls_of
 from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.jobs.impeller.tool_clearance import clearance_blocks
+from chipload.number_text import number_text
 from chipload.report.bodies import MACHINE_TABLE
 from chipload.report.programs import ENDINGS
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict, in_memory, state_of
@@ -87,7 +88,8 @@ def _surface_findings(op: Searched) -> tuple[Finding, ...]:
     if missed:
         share = op.surface.area[[u.point for u in missed]].sum() / op.surface.area.sum()
         text = (
-            f"{op.surface.name}: {len(missed)} of {len(op.place)} contact points, {100.0 * share:.3g} % of the area, "
+            f"{op.surface.name}: {len(missed)} of {len(op.place)} contact points, "
+            f"{number_text(100.0 * share, 3)} % of the area, "
             f"are not reached; {unreached_text(op, missed[0])}"
         )
         x, y, z = (float(v) for v in op.place[missed[0].point])

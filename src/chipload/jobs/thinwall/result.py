@@ -161,7 +161,7 @@ def findings_of(walled: ThinWallResult, one: Variant) -> tuple[Finding, ...]:
         worst = min(one.plan.infeasible, key=lambda h: h.force_allowable_n)
         text = (
             f"{len(one.plan.infeasible)} places do not allow even the smallest depth of cut: allowable force "
-            f"{worst.force_allowable_n:.4g} N, needed {worst.force_n:.4g} N: {remedy_text(worst)}"
+            f"{number_text(worst.force_allowable_n)} N, needed {number_text(worst.force_n)} N: {remedy_text(worst)}"
         )
         out.append(Finding("thinwall-infeasible", 0, text, Severity.EXCEEDS, worst.at))
     missed = sum(int((~f.made).sum()) for f in one.finish)

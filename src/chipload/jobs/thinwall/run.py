@@ -31,6 +31,7 @@ from chipload.jobs.thinwall.proof import resolution_of
 from chipload.jobs.thinwall.tries import Tried, compared_variants, constant_within, unlimited_plan, variable_within
 from chipload.jobs.thinwall.wall_operation import WallOperation
 from chipload.jobs.thinwall.wall_program import linked, on_machine
+from chipload.number_text import number_text
 from chipload.planning.thinwall.blank import SIDES
 from chipload.planning.thinwall.experiments import Proposal, propose_cuts
 from chipload.planning.thinwall.plane_stock import CutterPose
@@ -180,15 +181,17 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
         f"{job.path.name}: {inputs.body.shape.name}: {length:.4g} mm long, {height:.4g} mm high, at least "
         f"{thickness:.4g} mm thick; {solved}",
         f"threshold of the finished side {_first_side(inputs)}, {bearing.source}: "
-        f"{bearing.force.min():.4g} to {bearing.force.max():.4g} N; normal force {law.forces[0]:.4g} N at "
-        f"{law.depths[0]:g} mm, {law.forces[-1]:.4g} N at {law.depths[-1]:g} mm",
+        f"{bearing.force.min():.4g} to {number_text(bearing.force.max())} N; normal force "
+        f"{number_text(law.forces[0])} N at "
+        f"{law.depths[0]:g} mm, {number_text(law.forces[-1])} N at {law.depths[-1]:g} mm",
         f"{VARIANTS} variants or more; the unconstrained one: {estimate(count, 0)}",
     ]
     weak = bearing.force < law.forces[0]
     if weak.any():
         lines.append(
             f"the limit cannot be kept at {int(weak.sum())} of {weak.size} places of the finished side: the normal "
-            f"force at the smallest depth, {law.forces[0]:.4g} N at {law.depths[0]:g} mm, is above their threshold"
+            f"force at the smallest depth, {number_text(law.forces[0])} N at {law.depths[0]:g} mm, is "
+            "above their threshold"
         )
     return lines, not weak.any()
 

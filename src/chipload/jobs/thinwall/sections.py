@@ -155,7 +155,7 @@ def _agreement(one: Variant) -> str:
             (c["force_normal_n"] / np.where(known, c["force_normal_planned_n"], 1.0))[known], [5, 50, 95]
         )
     )
-    return f"{low:.3g} to {high:.3g} % (5 to 95 % of the contact points, median {middle:.3g} %)"
+    return f"{low:.3g} to {number_text(high, 3)} % (5 to 95 % of the contact points, median {number_text(middle, 3)} %)"
 
 
 def _thresholds(one: Variant) -> go.Figure:

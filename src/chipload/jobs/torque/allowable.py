@@ -183,9 +183,10 @@ def limit_text(planned: CutSteps, limit: PathLimit, where: str) -> str:
     feed, programmed = feed_at(planned, limit, limit.step), mm_min_from_mm_s(float(planned.feed[limit.step]))
     own = f"{number_text(programmed)} mm/min are programmed"
     return (
-        f"a coarse simulation gives a torque limit of about {1e-3 * limit.torque:.2g} N m, {where}; the feed there "
+        f"a coarse simulation gives a torque limit of about {number_text(1e-3 * limit.torque, 2)} N m, "
+        f"{where}; the feed there "
         f"must be at most {number_text(feed)} mm/min, {own}"
         if feed < programmed * (1.0 - 1e-3)
-        else f"a coarse simulation gives a torque limit of about {1e-3 * limit.torque:.2g} N m, {where}; {own} there, "
-        "which is within it"
+        else f"a coarse simulation gives a torque limit of about {number_text(1e-3 * limit.torque, 2)} N m, {where}; "
+        f"{own} there, which is within it"
     )

@@ -87,23 +87,33 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     body = ["<h2>Allowable torque</h2>"]
     if outcome.attainable and isinstance(outcome.wall, ClampedWorkpiece):
         line = (
-            f"<p>The torque limit is <b>{what['torque_limit_nm']:.4g} N m</b>, mean over a revolution. It comes from "
-            f"{why}, at ({place}) mm, where the workpiece allows a force of {where['force_n']:.4g} N. The compliance "
-            f"there is known to {100.0 * outcome.wall.planned.error:.2g} %; the limit includes that error. Elsewhere "
-            f"the workpiece allows up to {where['relief_max']:.3g} times as much torque. The set point of the "
+            f"<p>The torque limit is <b>{number_text(what['torque_limit_nm'])} N m</b>, mean over a "
+            "revolution. It comes from "
+            f"{why}, at ({place}) mm, where the workpiece allows a force of "
+            f"{number_text(where['force_n'])} N. The compliance "
+            f"there is known to {number_text(100.0 * outcome.wall.planned.error, 2)} %; the limit includes "
+            "that error. Elsewhere "
+            f"the workpiece allows up to {number_text(where['relief_max'], 3)} times as much torque. The "
+            "set point of the "
             "controller is the same share of the allowable torque everywhere, "
-            f"{where['held_nm']:.4g} N m here. The real workpiece would allow {where['true_wall_nm']:.4g} N m.</p>"
+            f"{number_text(where['held_nm'])} N m here. The real workpiece would allow "
+            f"{number_text(where['true_wall_nm'])} N m.</p>"
         )
         body.append(line)
     if outcome.attainable and isinstance(outcome.wall, ShellWall):
         body.append(
-            f"<p>The torque limit is <b>{what['torque_limit_nm']:.4g} N m</b>, mean over a revolution. It comes from "
+            f"<p>The torque limit is <b>{number_text(what['torque_limit_nm'])} N m</b>, mean over a "
+            "revolution. It comes from "
             f"{why}, at ({place}) mm, where the wall of {outcome.wall.thinnest:.4g} mm (the least that the tolerance "
-            f"allows) and the cutter allow {where['force_n']:.4g} N along the normal. Elsewhere the wall allows up to "
-            f"{where['relief_max']:.3g} times as much torque. The set point of the controller is the same share of the "
-            f"allowable torque everywhere, {where['held_nm']:.4g} N m here. The real wall of {outcome.wall.real:.4g} "
-            f"mm would allow {where['true_wall_nm']:.4g} N m. The closed formula for one tooth, which neglects the "
-            f"engagement, gives {where['one_tooth_formula_nm']:.3g} N m.</p>"
+            f"allows) and the cutter allow {number_text(where['force_n'])} N along the normal. Elsewhere "
+            "the wall allows up to "
+            f"{number_text(where['relief_max'], 3)} times as much torque. The set point of the controller "
+            "is the same share of the "
+            f"allowable torque everywhere, {number_text(where['held_nm'])} N m here. The real wall of "
+            f"{outcome.wall.real:.4g} "
+            f"mm would allow {number_text(where['true_wall_nm'])} N m. The closed formula for one tooth, "
+            "which neglects the "
+            f"engagement, gives {number_text(where['one_tooth_formula_nm'], 3)} N m.</p>"
         )
     off = what.get("surface_off_um")
     if off is not None:
@@ -146,9 +156,11 @@ def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[s
         body += [
             f"<h3>{title}</h3>",
             _table(outcome, case),
-            f"<p>{drawn.NAMES[HELD]}: {by['shorter_percent']:.3g} % shorter than the greatest constant feed that keeps "
-            f"the limit, {by['shorter_than_model_percent']:.3g} % shorter than the model's derated schedule, "
-            f"{by['of_possible_percent']:.3g} % of the physically possible gain; form error "
+            f"<p>{drawn.NAMES[HELD]}: {number_text(by['shorter_percent'], 3)} % shorter than the greatest "
+            "constant feed that keeps "
+            f"the limit, {number_text(by['shorter_than_model_percent'], 3)} % shorter than the model's "
+            "derated schedule, "
+            f"{number_text(by['of_possible_percent'], 3)} % of the physically possible gain; form error "
             f"{by['form_error_change_percent']:+.3g} % compared with the constant feed.</p>",
         ]
     plain, late = outcome.control.cases
@@ -156,7 +168,8 @@ def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[s
     body += [
         f"<p>Latency and override steps cost {number_text(time_cost, 3)} s with the model, and change its "
         "greatest torque from "
-        f"{1e-3 * plain.runs[HELD].outcome.load_max:.4g} to {1e-3 * late.runs[HELD].outcome.load_max:.4g} N m.</p>",
+        f"{number_text(1e-3 * plain.runs[HELD].outcome.load_max)} to "
+        f"{number_text(1e-3 * late.runs[HELD].outcome.load_max)} N m.</p>",
         '<p class="note">The constant feed and the derated schedule are the fastest that keep the limit everywhere '
         "with all deviations, which are unknown beforehand. The last row is the shortest time that is physically "
         "possible: the torque is at its limit at every instant.</p>",
@@ -194,7 +207,7 @@ def _table(outcome: TorqueResult, case: ControllerCase) -> str:
         "override", "ended",
     )  # fmt: skip
     units = (
-        f'<p class="note">Limits: torque {100.0 * most / torque_nm:.4g} % of the allowable torque; form '
+        f'<p class="note">Limits: torque {number_text(100.0 * most / torque_nm)} % of the allowable torque; form '
         "error in µm, at most "
         f"{outcome.job.limits['form_error_um']:g}; stress in MPa, at most "
         f"{outcome.job.limits['strength_share'] * outcome.wall.strength:g}.</p>"
@@ -209,8 +222,9 @@ def _workpiece(wall: ClampedWorkpiece, figures: dict[str, go.Figure]) -> list[st
     body = [
         "<h2>Deflection of the workpiece</h2>",
         f"<p>{len(own.steps.states)} states of removal in cells of {own.cell:.3g} mm, {own.unknowns} unknowns; the "
-        f"thinnest wall left is {own.wall:.3g} mm. The deflection is known to {100.0 * own.error:.2g} %. The greatest "
-        f"stress is {wall.strained[1]:.3g} MPa per newton; its yield stress {wall.strength:g} MPa.</p>",
+        f"thinnest wall left is {own.wall:.3g} mm. The deflection is known to "
+        f"{number_text(100.0 * own.error, 2)} %. The greatest "
+        f"stress is {number_text(wall.strained[1], 3)} MPa per newton; its yield stress {wall.strength:g} MPa.</p>",
     ]
     return body if own.bent is None else [*body, *bent_section(own.bent, "In the worst step", figures)]
 
@@ -227,7 +241,8 @@ def _wall(wall: ShellWall, outcome: TorqueResult, figures: dict[str, go.Figure])
         f"A beam with shear gives {number_text(1e3 * wall.oval.beam, 3)} µm, {whole / wall.oval.beam:.3g} "
         "times too little."
         if wall.oval.beam is not None
-        else f"There is no beam model of a cone; its first harmonic, the bending of a beam, is {share:.3g} % of it."
+        else f"There is no beam model of a cone; its first harmonic, the bending of a beam, is "
+        f"{number_text(share, 3)} % of it."
     )
     return [
         "<h2>Compliance of the wall</h2>",
@@ -254,14 +269,17 @@ def _estimate(e: SpindleEstimate, outcome: TorqueResult, figures: dict[str, go.F
         ["resolution: noise, quantisation, idle map [N m]", f"{1e-3 * e.resolution:.3g}"],
         ["uncertainty of the torque constant [%]", f"{100.0 * e.constant_error:.3g}"],
         ["valid for torques from, to [N m]", f"{1e-3 * e.range[0]:.3g}, {1e-3 * e.range[1]:.3g}"],
-        [f"tooth passing frequency {e.aliased[0]:.4g} Hz, as the readings show it [Hz]", f"{e.aliased[1]:.3g}"],
+        [
+            f"tooth passing frequency {number_text(e.aliased[0])} Hz, as the readings show it [Hz]",
+            number_text(e.aliased[1], 3),
+        ],
         ["torque below which the estimate is not trusted and the feed does not rise [N m]", f"{1e-3 * e.light:.3g}"],
         ["share of the cutting time below that torque [%]", f"{100.0 * e.light_share:.3g}"],
     ]
     return [
         "<h2>Torque estimate from the spindle</h2>",
         table(("", ""), rows, numbers=(1,)),
-        f"<p>Do not trust torques below {1e-3 * e.light:.3g} N m"
+        f"<p>Do not trust torques below {number_text(1e-3 * e.light, 3)} N m"
         f"; changes within {3e3 * e.lag:.3g} ms; speeds other than the programmed one, for which the idle current is "
         "not stated.</p>",
         figure("measured", drawn.measured(outcome), figures),

@@ -251,7 +251,7 @@ def _findings(outcome: TorqueResult) -> tuple[Finding, ...]:
         limit, what = outcome.allowable.limit, "wall" if isinstance(outcome.wall, ShellWall) else "workpiece"
         text = (
             f"no torque is allowable: at step {limit.step} the edge force alone exceeds the "
-            f"{limit.force:.4g} N that the {what} allows by its {limit.by}: {outcome.allowable.remedy}"
+            f"{number_text(limit.force)} N that the {what} allows by its {limit.by}: {outcome.allowable.remedy}"
         )
         out.append(Finding("no-allowable-torque", 0, text, Severity.EXCEEDS))
     elif isinstance(outcome.wall, ClampedWorkpiece):
@@ -270,6 +270,7 @@ def _note(outcome: TorqueResult) -> str:
     case = outcome.control.cases[-1]
     by = outcome.compared(case)
     return (
-        f"With {1e3 * case.loop.latency:g} ms latency {by['shorter_percent']:.3g} % shorter than the constant feed "
+        f"With {1e3 * case.loop.latency:g} ms latency {number_text(by['shorter_percent'], 3)} % shorter "
+        "than the constant feed "
         "that keeps the limit everywhere."
     )

@@ -223,7 +223,7 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
         f"{job.path.name}: {what}; "
         f"{len(program)} motions on machine {machine.name}, stock of {number_text(stock.volume(), 5)} mm3, material "
         f"{material.name}, controller {table.name}, {number} surprise{'' if number == 1 else 's'}",
-        f"the controller can hold torque limits from {1e-3 * least:.3g} N m up",
+        f"the controller can hold torque limits from {number_text(1e-3 * least, 3)} N m up",
         text,
         estimate(4 * count, len(program)),
     ], attainable

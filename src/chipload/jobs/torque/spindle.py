@@ -14,6 +14,7 @@ from chipload.control.spindle_model import Spindle, SpindleDeviation
 from chipload.errors import InputError
 from chipload.jobs.messages import Errors
 from chipload.jobs.torque.job import TorqueJob
+from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
 
@@ -80,13 +81,14 @@ def require_resolved(job: TorqueJob, spindle: Spindle, torque: float) -> None:
         raise wrong_side("light_nm", light, override.hold * torque)
     if override.hold * torque < least:
         raise InputError(
-            f"spindle: the estimate is valid from {1e-3 * least:.4g} N m up, the torque that is held is "
-            f"{1e-3 * override.hold * torque:.4g} N m: log lighter cuts of known torque, each over several seconds"
+            f"spindle: the estimate is valid from {number_text(1e-3 * least)} N m up, the torque that is held is "
+            f"{number_text(1e-3 * override.hold * torque)} N m: log lighter cuts of known torque, each "
+            "over several seconds"
         )
     if override.hold * torque > most:
         raise InputError(
-            f"spindle: the estimate is valid up to {1e-3 * most:.4g} N m, the torque that is held is "
-            f"{1e-3 * override.hold * torque:.4g} N m: "
+            f"spindle: the estimate is valid up to {number_text(1e-3 * most)} N m, the torque that is held is "
+            f"{number_text(1e-3 * override.hold * torque)} N m: "
             + (
                 "log heavier cuts of known torque"
                 if job.spindle_file is not None
@@ -100,5 +102,5 @@ def wrong_side(key: str, value: float, set_point: float) -> InputError:
     side = "below" if key == "light_nm" else "above"
     return InputError(
         f"torque_control.override.{key} = {1e-3 * value:g}: must be {side} the torque that is held, "
-        f"{1e-3 * set_point:.4g} N m"
+        f"{number_text(1e-3 * set_point)} N m"
     )

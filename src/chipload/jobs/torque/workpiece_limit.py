@@ -28,6 +28,7 @@ from chipload.jobs.torque.workpiece_cut import (
     workpiece_cut,
 )
 from chipload.machine.machine import Machine
+from chipload.number_text import number_text
 from chipload.program.program import Program
 from chipload.simulation.chips import counted
 
@@ -100,8 +101,8 @@ def remedies_on_workpiece(job: TorqueJob, planned: WorkpieceCut, limit: PathLimi
             x, y, z = bent.place
             out.append(f"a support near ({x:.3g}, {y:.3g}, {z:.3g}) mm")
         out.append(
-            f"clamps or walls with which the workpiece is {stiffer:.2g} times as stiff there (a wall "
-            f"{stiffer ** (1.0 / 3.0):.2g} times as thick)"
+            f"clamps or walls with which the workpiece is {number_text(stiffer, 2)} times as stiff there (a wall "
+            f"{number_text(stiffer ** (1.0 / 3.0), 2)} times as thick)"
         )
     if work < allowed:
         cutter = job.cutters[int(planned.removal.columns["tool"][planned.rows][k])]

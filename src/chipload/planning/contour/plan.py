@@ -24,6 +24,7 @@ from chipload.geometry.contour import Contour, Region
 from chipload.geometry.distance import distance
 from chipload.geometry.offset import offset
 from chipload.machine.machine import Machine
+from chipload.number_text import number_text
 from chipload.planning.contour.backward import concave_kinks, leading_curve
 from chipload.planning.contour.blend import eased
 from chipload.planning.contour.compare import FinishPasses, compared, programmed_feeds
@@ -478,8 +479,9 @@ def _force_above(job: _Job, history: Columns, on_wall: NDArray[np.bool_]) -> lis
     if force[k] <= 1.005 * straight:
         return []
     text = (
-        f"no feed down to {LEAST_SHARE:.0%} of feed_mm_min holds the force of a straight wall, {straight:.4g} N: "
-        f"{force[k]:.4g} N here, mostly edge force, which does not depend on the feed"
+        f"no feed down to {LEAST_SHARE:.0%} of feed_mm_min holds the force of a straight wall, "
+        f"{number_text(straight)} N: "
+        f"{number_text(force[k])} N here, mostly edge force, which does not depend on the feed"
     )
     return [Event("feed-least", float(history["x_mm"][k]), float(history["y_mm"][k]), text)]
 

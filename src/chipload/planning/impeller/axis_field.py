@@ -28,6 +28,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch
 from chipload.machine.kinematics import inverse
 from chipload.machine.machine import Machine
+from chipload.number_text import number_text
 from chipload.planning.impeller.clearance import clearance
 from chipload.planning.impeller.profile import contact_band
 from chipload.planning.impeller.scene import Floats, Scene
@@ -161,7 +162,7 @@ def clear_field(
     for count in _COUNTS:
         field = axis_field(surface, box, count, scene, cutter, reachable, limits)
         if isinstance(field, float):
-            return f"it reaches {100.0 * field:.3g} % of the surface"
+            return f"it reaches {number_text(100.0 * field, 3)} % of the surface"
         U, V = (
             x.ravel()
             for x in np.meshgrid(

@@ -32,6 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, Delaunay, QhullError, cKDTree
 
 from chipload.errors import Finding, InputError
+from chipload.number_text import number_text
 from chipload.planning.thinwall.force_table import ForceTable
 from chipload.progress import Progress, silent
 
@@ -260,8 +261,8 @@ def propose_cuts(
         if not len(depth):
             raise InputError(
                 f"experiments: site {i + 1} (u {x[at, 0]:g}, v {x[at, 1]:g}): the smallest depth "
-                f"{law.limits.smallest:g} mm needs {float(law.forces[0]):.4g} N, the greatest force to try is "
-                f"{wanted[-1]:.4g} N: allow a smaller depth or feed, or leave the place out of the candidates"
+                f"{law.limits.smallest:g} mm needs {number_text(float(law.forces[0]))} N, the greatest force to try is "
+                f"{number_text(wanted[-1])} N: allow a smaller depth or feed, or leave the place out of the candidates"
             )
         force = np.asarray(law.force(depth))
         if force[0] > F[at] or force[-1] < F[at]:
@@ -270,8 +271,8 @@ def propose_cuts(
                 Finding(
                     "site-not-bracketed",
                     0,
-                    f"site {i + 1}: forces from {force[0]:.4g} to {force[-1]:.4g} N: none {side} the modelled "
-                    f"threshold of {F[at]:.4g} N within the depths {law.limits.smallest:g} to "
+                    f"site {i + 1}: forces from {force[0]:.4g} to {number_text(force[-1])} N: none {side} the modelled "
+                    f"threshold of {number_text(F[at])} N within the depths {law.limits.smallest:g} to "
                     f"{law.limits.greatest:g} mm",
                 )
             )

@@ -22,6 +22,7 @@ import numpy as np
 
 from chipload.errors import Finding, InputError
 from chipload.files import read_regular, write_whole
+from chipload.number_text import number_text
 from chipload.planning.thinwall.experiments import Proposal
 from chipload.planning.thinwall.threshold import Experiments
 from chipload.tables import LARGEST_FILE
@@ -123,14 +124,15 @@ def _allowable_force(cuts: list[_Row], label: str, findings: list[Finding]) -> f
     line, (u, v, _) = cuts[0].line, cuts[0].series
     if not below:
         raise InputError(
-            f"{label}: line {line}: u = {u:g}, v = {v:g}: the least force {least:.4g} N was too much already: cut "
+            f"{label}: line {line}: u = {u:g}, v = {v:g}: the least force {number_text(least)} N was too "
+            "much already: cut "
             "shallower there"
         )
     if not failed:
-        text = f"u = {u:g}, v = {v:g}: no cut was too much: {max(below):.4g} N is taken; it may allow more"
+        text = f"u = {u:g}, v = {v:g}: no cut was too much: {number_text(max(below))} N is taken; it may allow more"
         findings.append(Finding("series-never-too-much", line, text))
     if any(not c.too_much and c.force >= least for c in cuts):
-        text = f"u = {u:g}, v = {v:g}: {least:.4g} N was too much, and a greater force was not"
+        text = f"u = {u:g}, v = {v:g}: {number_text(least)} N was too much, and a greater force was not"
         findings.append(Finding("series-overlaps", line, text))
     return max(below)
 

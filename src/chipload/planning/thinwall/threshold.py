@@ -29,6 +29,7 @@ from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay, QhullError
 
 from chipload.errors import InputError
+from chipload.number_text import number_text
 from chipload.structure.removal import StructureRemoval
 from chipload.structure.unit_loads import UnitLoads, compliance
 
@@ -241,7 +242,8 @@ def calibrated(experiments: Experiments, places: ArrayLike, deviations: float) -
     factor = math.exp(-deviations * s)
     force = factor * np.exp(np.where(outside, y.min(), value))
     text = (
-        f"calibrated: {len(experiments.force)} experiments at {len(place)} places, scatter {100.0 * s:.3g} % ({how}), "
+        f"calibrated: {len(experiments.force)} experiments at {len(place)} places, scatter "
+        f"{number_text(100.0 * s, 3)} % ({how}), "
         f"safety factor {factor:.3g}"
     )
     return Threshold(force, "calibrated", factor, outside, None, text)

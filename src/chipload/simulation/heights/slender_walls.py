@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
+from chipload.number_text import number_text
 from chipload.simulation.heights.height_map import HeightMap
 
 Floats = NDArray[np.float64]
@@ -61,7 +62,8 @@ def slender_wall_findings(walls: Sequence[SlenderWall], slenderness: float) -> l
         more = f" (the most slender of {len(walls)})" if wall is walls[0] and len(walls) > 1 else ""
         text = (
             f"leaves a wall {wall.height_mm:.3g} mm high and {wall.thickness_mm:.2g} mm thick{more}, "
-            f"{wall.slenderness:.2g} times as high as thick: its deflection is not checked: state [workpiece], or a "
+            f"{number_text(wall.slenderness, 2)} times as high as thick: its deflection is not checked: "
+            "state [workpiece], or a "
             f"greater checks.wall_slenderness than {slenderness:g}"
         )
         out.append(Finding("slender-wall", 0, text, Severity.UNPROVEN, wall.place))

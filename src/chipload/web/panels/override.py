@@ -8,6 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
+from chipload.number_text import number_text
 from chipload.web.result import PageResult, PageTrack, TextColumn
 
 #: columns that are shown where a track has the first of them
@@ -54,9 +55,16 @@ def gauge(values: Mapping[str, float | str]) -> str:
     lines = [_bar("override", f"{100.0 * override:.0f} %", override, False)]
     if TORQUE in values and ALLOWED in values and float(values[ALLOWED]) > 0.0:
         torque, allowed = float(values[TORQUE]), float(values[ALLOWED])
-        lines.append(_bar("torque", f"{torque:.3g} of {allowed:.3g} N m", torque / allowed, torque > allowed))
+        lines.append(
+            _bar(
+                "torque",
+                f"{number_text(torque, 3)} of {number_text(allowed, 3)} N m",
+                torque / allowed,
+                torque > allowed,
+            )
+        )
     if PLANNED in values:
-        lines.append(f"<div>planned {float(values[PLANNED]):.3g} N m</div>")
+        lines.append(f"<div>planned {number_text(float(values[PLANNED]), 3)} N m</div>")
     if STATE in values:
         lines.append(f"<div>{escape(str(values[STATE]))}</div>")
     return "".join(lines)
