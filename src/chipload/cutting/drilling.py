@@ -38,8 +38,8 @@ FACTORS = np.array([
 ])  # fmt: skip
 #: w / D of a drill of standard design; of one with a split point 0.025. Reference: [Machinery2020] table 7
 STANDARD_WEB = 0.155
-#: standard deviation of thrust and torque of a drill besides that of the coefficients: four published formulas and
-#: values are 0.64 to 1.6 of these, docs/design/drilling.md
+#: standard deviation of thrust and torque of a drill besides that of the coefficients: three published formulas and
+#: values are 0.64 to 1.7 of these, docs/design/drilling.md
 MODEL_SPREAD = 0.2
 #: a tool with a flatter point is no drill [rad]
 LEAST_POINT = math.radians(5.0)
