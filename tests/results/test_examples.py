@@ -122,13 +122,18 @@ def test_numbers_of_the_message_are_those_of_the_limits(example, name):
     named = {c: (c.column.label, number_text(c.worst), number_text(c.limit, 6)) for c in known}
     labels = "|".join(sorted({re.escape(label) for label, *_ in named.values()}, key=len, reverse=True))
     said = re.findall(
-        rf"(?:^|[:;,] )({labels}) ([\d.e+-]+)(?: \S+| N m)? (?:of at least|of|exceeds|is below) ([\d.e+-]*\d)",
+        rf"(?:^|[:;,] )({labels}) ([\d.e+-]+)(?: [+-] [\d.e]+)?"
+        r"(?: \S+| N m)? (?:of at least|of|exceeds|is below) ([\d.e+-]*\d)",
         result.message,
     )
     assert set(said) <= set(named.values())
     if result.verdict is Verdict.HOLDS:
-        # the first line names the critical limit alone: the one whose worst value is nearest to it
-        ratios = {c: (abs(c.worst) if c.column.signed else c.worst) / c.limit for c in known if c.limit}
+        # the first line names the critical limit alone: the one whose value at its confidence is nearest to it
+        ratios = {
+            c: (c.value_at_confidence if c.by_confidence else abs(c.worst) if c.column.signed else c.worst) / c.limit
+            for c in known
+            if c.limit
+        }
         margins = {c: ratio - 1.0 if c.column.least else 1.0 - ratio for c, ratio in ratios.items()}
         assert set(said) == {named[min(margins, key=margins.__getitem__)]}
 
