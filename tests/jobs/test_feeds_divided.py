@@ -135,3 +135,26 @@ def test_division_can_be_switched_off(tmp_path: Path) -> None:
     assert read.outcome.feeds.segments == {}
     assert "ivided" not in read.result.note
     assert len(read.outcome.feeds.text.split("\n")) == len(SLOT.split("\n"))
+
+
+PLUNGE = HEAD + "G0 X20 Y0 Z5\nG1 Z-5 F900 (plunge)\nG1 X34 (slot)\nG0 Z5\nM2\n"
+
+
+def test_a_plunge_is_as_fast_as_its_axial_force_allows(tmp_path: Path) -> None:
+    """Bottom edges to the axis: the teeth push up with (Krc f_z + Kre) R each, and nothing across.
+
+    Ahead of the material and in it the line has segments of their own.
+    """
+    job = SLOT_JOB.replace("force_n = 300.0", "force_n = 400.0").replace(
+        "overhang_mm = 30.0", "overhang_mm = 30.0\ncentre_cutting = true"
+    )
+    read = done(tmp_path, PLUNGE, job)
+    feeds = read.outcome.feeds
+    assert 5 in feeds.segments
+    error = feeds.before.resolution_error["force_n"]
+    most = 400.0 / (1.0 + 2.0 * error)
+    krc, kre = COEFFICIENTS[1], COEFFICIENTS[4]
+    wanted = (most / (2.0 * 5.0) - kre) / krc * 2.0 * 3000.0
+    column = read.outcome.simulated.removal.columns
+    plunge = (column["ramp_deg"] > 89.0) & (column["force_n"] > 0.0)
+    assert column["feed_mm_min"][plunge].max() == pytest.approx(wanted, rel=0.02)

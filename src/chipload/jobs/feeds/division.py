@@ -321,24 +321,24 @@ def _divided(
 ) -> DividedProgram:
     """Return the entries of a divided program."""
     of = np.arange(int(steps.line.max(initial=0)) + 1)
-    for line, new in first.items():
-        if line < len(of):
-            of[line] = new
+    for old, new in first.items():
+        if old < len(of):
+            of[old] = new
     inside = np.isin(steps.line, list(cuts))
     whole = np.flatnonzero(~steps.rapid & ~inside)
-    step, line, segments = [whole], [of[steps.line[whole]]], dict[int, range]()
+    entries: list[tuple[Ints, Ints]] = [(whole, of[steps.line[whole]])]
+    segments: dict[int, range] = {}
     for number, cut in cuts.items():
         bounds = [0, *cut.ends.tolist(), len(cut.steps) - 1]
         segments[number] = range(first[number], first[number] + len(bounds) - 1)
         for segment, a, b in zip(segments[number], bounds[:-1], bounds[1:], strict=True):
-            step.append(cut.steps[a : b + 1])
-            line.append(np.full(b + 1 - a, segment))
+            entries.append((cut.steps[a : b + 1], np.full(b + 1 - a, segment)))
     uncut = inside & (allowed.touch != StepContact.CUT)
     return DividedProgram(
         text,
         reading,
-        np.concatenate(step),
-        np.concatenate(line),
+        np.concatenate([step for step, _ in entries]),
+        np.concatenate([line for _, line in entries]),
         Allowed(
             np.where(inside, StepContact.CUT, allowed.touch),
             np.minimum(allowed.least, np.where(inside, passed, np.inf)),

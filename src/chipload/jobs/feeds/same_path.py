@@ -79,4 +79,4 @@ def _distance(p: Floats, old: Program, of: Ints) -> Floats:
     rise, height = (way[of] * normal).sum(axis=1), (v * normal).sum(axis=1)
     out = np.maximum(np.minimum(near, far) - radius, radius - np.maximum(near, far))
     out = np.maximum(out, np.maximum(np.minimum(rise, 0.0) - height, height - np.maximum(rise, 0.0)))
-    return np.where(is_arc(old)[of], out, straight)
+    return np.asarray(np.where(is_arc(old)[of], out, straight))

@@ -123,7 +123,7 @@ def line_forms(text: str) -> dict[int, LineForm]:
 
 def _words(open_text: str) -> tuple[tuple[str, str, int, int], ...] | None:
     """Return the words of a line, None where something else stands in it."""
-    at, out = 0, []
+    at, out = 0, list[tuple[str, str, int, int]]()
     while at < len(open_text):
         found = _WORD.match(open_text, at)
         if found is None:
