@@ -19,6 +19,8 @@ from chipload.checking.workpiece import stock_box
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, Severity
 from chipload.program.block_delete import with_block_delete
+from chipload.program.read import line_times
+from chipload.program.time import slow_machine
 from chipload.result import LimitCheck, Result, SurfaceMap, Track, TrackKind, Verdict, in_memory
 from chipload.result.limits import Columns
 from chipload.simulation.placement import nothing_cut, stock_placement
@@ -63,6 +65,14 @@ def checked_result(program: ProgramResult) -> Result:
     return program_result("program", program, (_unchanged_track(program),), {})
 
 
+def _time_high(program: ProgramResult) -> float | None:
+    """Return the time of the program at the least jerk that its machine may have [s]; None: its time is known."""
+    slow = slow_machine(program.machine)
+    if slow is None:
+        return None
+    return max(float(line_times(program.reading, slow)[1].sum()), float(program.seconds.sum()))
+
+
 def _unchanged_track(program: ProgramResult) -> Track:
     """Return the track of the unchanged program."""
     time_s, simulation = float(program.seconds.sum()), program.simulated
@@ -70,12 +80,16 @@ def _unchanged_track(program: ProgramResult) -> Track:
         unproven = Finding("not-simulated", 0, "the program was not simulated in its stock", Severity.UNPROVEN)
         findings = (*(exceeding(f) for f in program.reading.violations), unproven)
         blocks = in_memory(motion_rows(program))
-        return Track(PROGRAM, TrackKind.PROGRAM, True, time_s, (), findings, (APT,), blocks=blocks)
+        return Track(
+            PROGRAM, TrackKind.PROGRAM, True, time_s, (), findings, (APT,),
+            blocks=blocks, time_high_s=_time_high(program),
+        )  # fmt: skip
     limits = program_limits(simulation, simulation.removal.columns, PROGRAM)
     found = (*misplaced(simulation, limits), *findings_of(program, simulation))
     return Track(
         PROGRAM, TrackKind.PROGRAM, True, time_s, limits, found, (APT,),
         energy_balance=simulation.removal.energy_balance, blocks=lambda: step_rows(simulation),
+        time_high_s=_time_high(program),
     )  # fmt: skip
 
 
@@ -103,7 +117,7 @@ def changed_tracks(
         OPTIMISED, TrackKind.PROGRAM, True, float(program.seconds.sum()),
         program_limits(simulation, simulation.removal.columns, OPTIMISED), (*findings_of(program, simulation), *found),
         (name, APT), energy_balance=simulation.removal.energy_balance,
-        blocks=blocks or (lambda: step_rows(simulation)),
+        blocks=blocks or (lambda: step_rows(simulation)), time_high_s=_time_high(program),
     )  # fmt: skip
     limits = program_limits(simulation, changed.before.columns, ORIGINAL, stability)
     before = Track(

@@ -81,6 +81,17 @@ def show_verdict(result: Result, *, worst: bool = False) -> None:
         show_limits(result)
     for line in more:
         show(line)
+    show_time(result)
+
+
+def show_time(result: Result) -> None:
+    """Show the time of each program in use that is an interval; a time that is known stands in the result."""
+    from chipload.result.times import JERK_NOTE, time_text
+
+    tracks = [t for t in result.in_use if t.time_high_s is not None]
+    texts = [f"{f'{t.name} ' if len(tracks) > 1 else ''}{time_text(t.time_s, t.time_high_s, '.4g')} s" for t in tracks]
+    if any(" to " in text for text in texts):
+        show(f"time: {', '.join(texts)}. {JERK_NOTE}")
 
 
 def show_limits(result: Result) -> None:

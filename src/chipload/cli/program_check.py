@@ -43,6 +43,8 @@ def check_program(
     """Read a program, show its findings and a summary, and return the exit code."""
     from chipload.program.motions import bounds, lengths
     from chipload.program.read import line_times, read_program, read_tools
+    from chipload.program.time import slow_machine
+    from chipload.result.times import JERK_NOTE
 
     table, feed = read_tools(tools) if tools is not None else None, feed_of(feed_mm_min)
     refused: list[InputError] = []
@@ -70,11 +72,15 @@ def check_program(
     lows, highs = bounds(reading.program)
     low, high = lows.min(axis=0), highs.max(axis=0)
     box = ", ".join(f"{x} {a:g} to {b:g}" for x, a, b in zip("XYZ", low, high, strict=True))
-    _, seconds = line_times(reading, on)
+    slow = slow_machine(on)
+    minutes = [line_times(reading, one)[1].sum() / 60.0 for one in (on, *(() if slow is None else (slow,)))]
+    time = " to ".join(dict.fromkeys(number_text(m) for m in sorted(minutes)))
     show(
         f"{path.name}: {len(reading.commands)} motions on machine {on.name}, {lengths(reading.program).sum():.6g} mm, "
-        f"{number_text(seconds.sum() / 60.0)} min; {box} mm"
+        f"{time} min; {box} mm"
     )
+    if " to " in time:
+        show(f"time: {JERK_NOTE}")
     count = len(reading.violations)
     state = f"unproven: {gaps[0]}" if gaps else f"the program stays within the limits of machine {on.name}"
     show(f"{count} {'finding exceeds' if count == 1 else 'findings exceed'} the limits" if count else state)

@@ -110,6 +110,12 @@ def program_time(program: Program, machine: Machine) -> Floats:
     return np.where(unplaced, 0.0, out)
 
 
+def time_high(program: Program, machine: Machine, time: float) -> float | None:
+    """Time [s] of a program at the least jerk that the machine may have, at least ``time``; None: ``time`` is known."""
+    slow = slow_machine(machine)
+    return None if slow is None else max(float(program_time(program, slow).sum()), time)
+
+
 def row_times(
     program: Program, machine: Machine, commands: Commands | None = None, axes: Floats | None = None
 ) -> Floats:

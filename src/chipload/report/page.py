@@ -21,6 +21,7 @@ from chipload.report.view import viewer_script
 from chipload.report.view_section import DATA, VIEW
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
 from chipload.result.budget import SHOWN, level_text
+from chipload.result.times import JERK_NOTE, time_text
 
 #: findings and limits that the report lists
 LISTED = 300
@@ -136,7 +137,7 @@ def tracks_table(tracks: tuple[Track, ...]) -> list[str]:
                 ", ".join(f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in track.parameters.items())
             ),
             state_cell(track.verdict),
-            "" if track.time_s is None else f"{track.time_s:.5g}",
+            time_text(track.time_s, track.time_high_s),
             *_times_cells(track),
             ", ".join(f"<code>{escape(name)}</code>" for name in track.programs),
         ]
@@ -145,7 +146,10 @@ def tracks_table(tracks: tuple[Track, ...]) -> list[str]:
     kind = tracks[0].kind
     head = [kind.value, "parameters", "verdict", "time [s]", *TIMES, "programs"]
     used = [t.in_use for t in tracks]
-    note = '<p class="note">Other: tool change, start-up and the approach to the first point. The parts add up.</p>'
+    note = '<p class="note">Other: tool change, start-up and the approach to the first point. The parts add up.'
+    if any(track.time_high_s is not None for track in tracks):
+        note += f" {JERK_NOTE}"
+    note += "</p>"
     return [f"<h2>{HEADINGS[kind]}</h2>", table(head, rows, numbers=tuple(range(3, 9)), used=used), note]
 
 

@@ -14,6 +14,7 @@ from chipload.report.page import BANNERS, limits_table
 from chipload.report.pdf import Block, SheetLine, SheetTable, one_page
 from chipload.report.sheet import definitions, heading, items, style, table
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
+from chipload.result.times import time_text
 
 #: guesses, things not checked and limits that a page has room for
 ROOM = 12
@@ -30,7 +31,7 @@ def setup_sheet(result: Result) -> bytes:
         [
             escape(t.name),
             ", ".join(f"<code>{escape(name)}</code>" for name in t.programs),
-            "" if t.time_s is None else f"{t.time_s / 60.0:.2f}",
+            time_text(t.time_s, t.time_high_s, ".2f", 60.0),
             t.verdict.value,
         ]
         for t in tracks
@@ -75,7 +76,7 @@ def _blocks(result: Result, limits: int, room: int) -> list[Block]:
     """Return the contents of the page, the worst limits first."""
     tracks = _tracks(result)
     programs = [
-        (t.name, ", ".join(t.programs), "" if t.time_s is None else f"{t.time_s / 60.0:.2f}", t.verdict.value)
+        (t.name, ", ".join(t.programs), time_text(t.time_s, t.time_high_s, ".2f", 60.0), t.verdict.value)
         for t in tracks[:room]
     ]
     order = list(Verdict)

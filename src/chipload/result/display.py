@@ -7,6 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from chipload.number_text import number_text
+from chipload.result.times import time_text
 from chipload.result.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -48,7 +49,12 @@ def result_html(result: Result) -> str:
     tracks = table_html(
         (result.tracks[0].kind.value if result.tracks else "track", "in use", "time [s]", "verdict"),
         (
-            (track.name, "yes" if track.in_use else "no", _number(track.time_s), track.verdict.value)
+            (
+                track.name,
+                "yes" if track.in_use else "no",
+                time_text(track.time_s, track.time_high_s, ".4g"),
+                track.verdict.value,
+            )
             for track in result.tracks
         ),
     )

@@ -108,6 +108,7 @@ def _track(folder: Path, model: TrackModel, first: int) -> Track:
         kind=model.kind,
         in_use=model.in_use,
         time_s=model.time_s,
+        time_high_s=model.time_high_s,
         limits=tuple(map(limit_from, model.limits)),
         findings=tuple(map(finding_from, model.findings)),
         programs=model.programs,

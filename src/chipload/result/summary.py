@@ -118,6 +118,10 @@ class TrackModel(_SummaryPart):
     in_use: bool = Field(description="whether its program is the one that is released")
     verdict: Verdict = Field(description="verdict of this track")
     time_s: float | None = Field(description="cycle time of the program; null: not calculated")
+    time_high_s: float | None = Field(
+        default=None,
+        description="what the program takes at most, where the jerk of the machine is not stated; null: time_s",
+    )
     times: TimesModel | None = Field(description="parts of time_s; null: the track has no history")
     parameters: dict[str, float | str] = Field(description="parameters that distinguish the track from the others")
     programs: tuple[str, ...] = Field(description="files in the result folder")
@@ -289,6 +293,7 @@ def _track(track: Track, rows: int) -> TrackModel:
         in_use=track.in_use,
         verdict=track.verdict,
         time_s=track.time_s,
+        time_high_s=track.time_high_s,
         times=_times(track),
         parameters=dict(track.parameters),
         programs=track.programs,

@@ -9,6 +9,9 @@ import numpy as np
 
 from chipload.result.coverage import CUTTING, Columns, durations
 
+#: why the time of a program is an interval
+JERK_NOTE = "An interval: the jerk of the machine is not known (jerk_mm_s3 in its file settles it)."
+
 
 @dataclass(frozen=True)
 class Times:
@@ -33,6 +36,18 @@ class Times:
     def whole(self) -> float:
         """The time of the program."""
         return self.cut + self.air + self.rapid + self.dwell + self.other
+
+
+def time_text(low: float | None, high: float | None, form: str = ".5g", unit: float = 1.0) -> str:
+    """A time of a program in units of ``unit`` [s], as an interval where it is one; empty: it was not run.
+
+    >>> time_text(90.0, None), time_text(90.0, 99.0, ".2f", 60.0), time_text(90.0, 90.0001), time_text(None, None)
+    ('90', '1.50 to 1.65', '90', '')
+    """
+    if low is None:
+        return ""
+    ends = [format(t / unit, form) for t in (low, low if high is None else high)]
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 def times_of(blocks: Iterable[Columns], time_s: float | None) -> Times | None:

@@ -51,6 +51,7 @@ class Track:
     kind : what the tracks of this result compare
     in_use : whether the verdict stands on it and its program is released
     time_s : of the program on the machine [s]; None: it was not run
+    time_high_s : what the program takes at most [s] where the jerk of the machine is not stated; None: ``time_s``
     limits : each limit of the job against this track
     findings : what was found in this track
     programs : names of its program files
@@ -72,11 +73,15 @@ class Track:
     parameters: Mapping[str, float | str] = field(default_factory=dict)
     blocks: Blocks = field(default=lambda: iter(()))
     energy_balance: Mapping[int, float] = field(default_factory=dict)
+    time_high_s: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse a time that is not a number."""
         if self.time_s is not None and not (math.isfinite(self.time_s) and self.time_s >= 0.0):
             raise ValueError(f"track {self.name}: time_s = {self.time_s}: must be a finite number from 0")
+        high = self.time_high_s
+        if high is not None and not (math.isfinite(high) and high >= (self.time_s or 0.0) * (1.0 - 1e-9)):
+            raise ValueError(f"track {self.name}: time_high_s = {high}: must be a finite number from time_s")
         if all(finding.code != UNBALANCED for finding in self.findings):
             object.__setattr__(self, "findings", (*self.findings, *self._unbalanced()))
 

@@ -19,6 +19,7 @@ from chipload.errors import Finding, Severity
 from chipload.jobs.contour.outcome import ContourResult, Operation, PlanVerification
 from chipload.machine.machine import Machine
 from chipload.planning.result import Event, StrategyResult
+from chipload.program.time import time_high
 from chipload.report.programs import ENDINGS, program_name
 from chipload.result import (
     CoveredRows,
@@ -139,6 +140,7 @@ def _track(outcome: ContourResult, k: int, op: Operation, name: str) -> Track:
         kind=TrackKind.STRATEGY,
         in_use=name == op.result.use,
         time_s=float(strategy.summary["time_s"]),
+        time_high_s=time_high(strategy.program, outcome.machine, float(strategy.summary["time_s"])),
         limits=limits_of(outcome.machine, op, strategy, track),
         findings=findings_of(op, name),
         programs=(f"{stem}.{ENDINGS[outcome.machine.dialect]}", f"{stem}.apt", *_inserted(k, op, name)),

@@ -14,6 +14,7 @@ from chipload.jobs.thinwall.chatter import FIRST_STATE, chatter_limits, chatter_
 from chipload.jobs.thinwall.outcome import OVER, USED, Finish, ThinWallResult, Variant, remedy_text
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.number_text import number_text
+from chipload.program.time import time_high
 from chipload.report.programs import ENDINGS, program_name
 from chipload.result import (
     CoveredRows,
@@ -207,6 +208,7 @@ def _track(walled: ThinWallResult, one: Variant) -> Track:
         kind=TrackKind.VARIANT,
         in_use=one.name == USED,
         time_s=one.seconds,
+        time_high_s=time_high(one.program, walled.planning.machine, one.seconds),
         limits=limits_of(walled, one),
         findings=findings_of(walled, one),
         programs=(f"{stem}.{ENDINGS[walled.planning.machine.dialect]}", f"{stem}.apt"),
