@@ -237,7 +237,7 @@ def minutes_of(done, program):
     """Time of a program as ``chipload check`` states it."""
     words = ["check", str(done.folder / program), "--machine", str(done.loaded.job.machine)]
     words += ["--tools", str(done.folder.parent / f"{done.name}.tbl")] if done.name in WITH_LENGTHS else []
-    return float(re.search(r" mm, ([0-9.e+-]+) min; ", CliRunner().invoke(app, words).output)[1])
+    return float(re.search(r" mm, ([0-9.e+-]+)(?: to [0-9.e+-]+)? min; ", CliRunner().invoke(app, words).output)[1])
 
 
 #: the override changes the time of these programs while they run
