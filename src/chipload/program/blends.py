@@ -202,7 +202,7 @@ def _blend_arcs(
         centre = (out * u1).sum(axis=1) + 1j * (out * side).sum(axis=1)
         sides.append(CornerSide(s.arc[k], inner, np.where(s.arc[k], centre, 0j), w, used, s.length[k]))
     leaving = (u1 * u2).sum(axis=1) + 1j * (side * u2).sum(axis=1)
-    found = corner_arcs(*sides, leaving, plan, tolerance, kink)
+    found = corner_arcs(sides[0], sides[1], leaving, plan, tolerance, kink)
     fits &= found.possible
     zero = np.zeros(len(a))
     return Joints(
