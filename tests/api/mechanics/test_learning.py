@@ -53,7 +53,7 @@ def test_refusals(histories):
     prior, result, _ = histories
     with pytest.raises(InputError, match="state one of them"):
         chipload.spindle_log([0.0, 1.0])
-    with pytest.raises(InputError, match="power: must be 2 finite numbers, like time_s"):
+    with pytest.raises(InputError, match="power_w: must be 2 finite numbers, like time_s"):
         chipload.spindle_log([0.0, 1.0], power_w=[1.0, np.nan])
     with pytest.raises(InputError, match="finite numbers that rise"):
         chipload.spindle_log([0.0, 0.0], power_w=[1.0, 2.0])

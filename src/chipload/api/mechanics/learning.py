@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from chipload.control.learning import LearnedMaterial, Signal, learn_from_logs
 from chipload.control.log_alignment import predicted_torque
@@ -48,16 +48,25 @@ def spindle_log(
     if (power_w is None) == (torque_nm is None):
         raise InputError("power_w, torque_nm: state one of them")
     time = np.asarray(time_s, dtype=np.float64)
-    given = {"power": (power_w, 1e3), "torque": (torque_nm, 1e3), "line": (line, 1.0), "override": (override, 1.0)}
-    columns = {}
-    for name, (values, factor) in given.items():
-        if values is not None:
-            columns[name] = np.asarray(values, dtype=np.float64) * factor
-            if columns[name].shape != time.shape or not np.isfinite(columns[name]).all():
-                raise InputError(f"{name}: must be {time.shape[0] if time.ndim else 1} finite numbers, like time_s")
     if time.ndim != 1 or len(time) < 2 or not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():
         raise InputError("time_s: must be two or more finite numbers that rise")
-    return Log(time, **columns)
+    return Log(
+        time,
+        power=_column("power_w", power_w, 1e3, len(time)),
+        torque=_column("torque_nm", torque_nm, 1e3, len(time)),
+        line=_column("line", line, 1.0, len(time)),
+        override=_column("override", override, 1.0, len(time)),
+    )
+
+
+def _column(name: str, values: ArrayLike | None, factor: float, n: int) -> NDArray[np.float64] | None:
+    """Return a column of n numbers in the unit inside; None: it was not logged."""
+    if values is None:
+        return None
+    out = np.asarray(values, dtype=np.float64) * factor
+    if out.shape != (n,) or not np.isfinite(out).all():
+        raise InputError(f"{name}: must be {n} finite numbers, like time_s")
+    return out
 
 
 def learn(
