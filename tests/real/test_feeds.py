@@ -49,6 +49,7 @@ tolerance_mm = 0.005
 slowest_percent = 20.0
 fastest_percent = 300.0
 air_mm_min = 3000.0
+divide = false
 [limits]
 force_n = {force}
 chip_max_mm = 0.12
