@@ -66,16 +66,16 @@ def one(moves: int, memory: bool) -> dict[str, float]:
     """Run one length."""
     material = material_named("al7075-t6")
     small = finishing(40)
-    remove(small, block(small), {1: BALL}, material, RESOLUTION)
+    remove(small, block(small), {1: BALL}, material, RESOLUTION, engine="layers")
     program = finishing(moves)
     stock = block(program)
     before = peak()
     wall, own = time.perf_counter(), time.process_time()
     with tempfile.TemporaryDirectory() as folder, Checkpoint(Path(folder) / "unfinished") as kept:
         if memory:
-            removal = remove(program, stock, {1: BALL}, material, RESOLUTION)
+            removal = remove(program, stock, {1: BALL}, material, RESOLUTION, engine="layers")
         else:
-            removal = remove_in_chunks(program, stock, {1: BALL}, material, RESOLUTION, kept)
+            removal = remove_in_chunks(program, stock, {1: BALL}, material, RESOLUTION, kept, engine="layers")
         wall, own = time.perf_counter() - wall, time.process_time() - own
         after = peak()
         force = float(removal.columns["force_n"].max())

@@ -104,6 +104,7 @@ def layers(places: Floats, low: Floats, high: Floats, ball: Cutter, layer: float
     done = remove(
         program_of(places), stock, {1: ball}, material_named("al7075-t6"),
         Resolution(1000.0, 0.01, 12, 0.5 * ball.radius),
+        engine="layers",
     )  # fmt: skip
     return time.process_time() - begun, done.volume_before - done.volume_after
 

@@ -40,7 +40,7 @@ def shared(lines: int, processes: int) -> tuple[float, float, bool]:
         # the first compiles
         stock = LayeredStock.block((0.0, 0.0, -6.0), (120.0, 2.0 * some, 0.0), 0.3, 15.0)
         begun = time.perf_counter()
-        remove(wave(some), stock, {1: BALL}, metal, FINE, processes=each, accuracy=False)
+        remove(wave(some), stock, {1: BALL}, metal, FINE, processes=each, accuracy=False, engine="layers")
         times.append(time.perf_counter() - begun)
         left.append(stock.volume())
     return times[1], times[2], left[1] == left[2]

@@ -107,10 +107,6 @@ def test_variable_is_held_to_the_limit(finished, done, operation):
     assert done.variants["unconstrained"].deflection >= variable.deflection
 
 
-@pytest.mark.xfail(
-    reason="the error of the loads by chips between true paths holds the constant plan of this coarse job lower",
-    strict=False,
-)
 def test_less_error_in_the_time_of_the_constant_depth(done):
     least, constant = done.variants["least_error"], done.variants["constant"]
     assert least.seconds <= constant.seconds * 1.001
@@ -118,9 +114,6 @@ def test_less_error_in_the_time_of_the_constant_depth(done):
     assert least.error_rms <= constant.error_rms * (1.0 + 1e-9)
 
 
-@pytest.mark.xfail(
-    reason="with chips between true paths the moved plan of this coarse job takes 11 % longer", strict=False
-)
 def test_a_path_that_is_moved_leaves_a_fraction_of_the_error(done, operation):
     """The stock is cut lower by what the wall gives way: of a rigid wall the moved path would be a gouge as deep."""
     moved, plain = done.variants["compensated"], done.variants["variable"]
@@ -133,10 +126,6 @@ def test_a_path_that_is_moved_leaves_a_fraction_of_the_error(done, operation):
     assert moved.seconds == pytest.approx(plain.seconds, rel=0.05)
 
 
-@pytest.mark.xfail(
-    reason="the bound by the slope takes chips between circles",
-    strict=False,
-)
 def test_deflection_is_force_over_threshold_times_the_limit(done):
     """The threshold is limit / C_nn and the deflection F_n C_nn: their quotients are the same; F_n along the normal of
     a plate is that along y."""
@@ -221,8 +210,8 @@ def test_a_limit_within_the_error_is_unproven(done, name):
 
 
 def test_the_error_of_the_loads_covers_a_finer_simulation(finished, done, tmp_path):
-    """The same plan in layers of a fifth and steps of a half: its greatest loads are within the stated error."""
-    sets = (*SMALL, "operation.0.layer_mm=0.05", "operation.0.step_mm=1.5", "operation.0.corner_slices=120")
+    """The same plan in twice the slices and steps of a half: its greatest loads are within the stated error."""
+    sets = (*SMALL, "operation.0.step_mm=1.5", "operation.0.corner_slices=120")
     inputs = read_wall(load_job(copy_example("plate", tmp_path / "plate") / "job.toml", sets).job)
     tried = Tried(places_of(inputs), lambda part, what: None)
     fine, coarse = tried.prove(unlimited_plan(tried.places), 0.5), done.variants["unconstrained"]
@@ -230,7 +219,7 @@ def test_the_error_of_the_loads_covers_a_finer_simulation(finished, done, tmp_pa
         if name == "force_normal_n":  # along the normal of the wall, not of the surface that a step leaves
             continue
         assert fine.columns[name].max() <= coarse.columns[name].max() * (1.0 + error)
-        assert fine.load_error[name] < error
+        assert fine.load_error[name] <= error
     assert fine.force <= coarse.force * (1.0 + coarse.load_error["force_normal_n"])
 
 

@@ -87,7 +87,7 @@ def test_the_sum_of_chips_is_what_the_stock_has_lost(
     program = five_axis(*(v.tolist() for v in walk(seed)))
     with monkeypatch.context() as patched:
         kept = Kept(stock, patched)
-        removal = remove(program, stock, {1: cutter}, NO_EDGE, resolution)
+        removal = remove(program, stock, {1: cutter}, NO_EDGE, resolution, engine="layers")
     whole = 30.0 * 24.0
     left = np.array([stock.area(i) for i in range(stock.layers)])
     assert (kept.lost > 10.0).sum() >= 8
@@ -97,7 +97,9 @@ def test_the_sum_of_chips_is_what_the_stock_has_lost(
         assert left[i] == pytest.approx(at_once, rel=1e-9)
     assert removal.columns["chip_volume_mm3"].sum() == pytest.approx(0.5 * kept.lost.sum(), rel=1e-9)
     # with edges made simpler on the way, what that takes and gives is in the books too
-    tidied = remove(program, LayeredStock.block(LOW, HIGH, 0.5, 15.0), {1: cutter}, NO_EDGE, resolution)
+    tidied = remove(
+        program, LayeredStock.block(LOW, HIGH, 0.5, 15.0), {1: cutter}, NO_EDGE, resolution, engine="layers"
+    )
     lost = tidied.volume_before - tidied.volume_after
     assert tidied.columns["chip_volume_mm3"].sum() == pytest.approx(lost, rel=1e-9)
     assert lost == pytest.approx(0.5 * kept.lost.sum(), rel=2e-3)
@@ -254,7 +256,7 @@ def slot(
     tip = np.array([0.0, 0.0, arm - depth]) - arm * axis
     stock = LayeredStock.block((-15.0, -12.0, -5.0), (15.0, 12.0, 0.0), layer, 30.0)
     program = five_axis([[tip[0] + x, tip[1], tip[2]] for x in (-10.0, 0.0, 0.5)], [axis.tolist()] * 3, feed=feed)
-    c = remove(program, stock, {1: cutter}, edge_with_feed(feed), resolution).columns
+    c = remove(program, stock, {1: cutter}, edge_with_feed(feed), resolution, engine="layers").columns
     return np.array([c[name][-1] for name in (*FORCES, "torque_mean_nm")]), -float(tip[2])
 
 
@@ -347,7 +349,7 @@ def test_exact_arcs_and_chips_tell_the_same_force_of_a_finish_pass() -> None:
     x0, y0, x1, y1 = before.bounds
     stock = LayeredStock.block((x0, y0, -5.0), (x1, y1, 0.0), 5.0, 20.0)
     stock.remove(0, shapely.box(x0, y0, x1, y1).difference(before))
-    removal = remove(plan.program, stock, {1: FLAT}, al, Resolution(0.5, 1e-4, 1, 5.0))
+    removal = remove(plan.program, stock, {1: FLAT}, al, Resolution(0.5, 1e-4, 1, 5.0), engine="layers")
     c, told = removal.columns, plan.history
     ours, theirs = c["label"] == removal.labels.index("finish"), told["pass"] == "finish"
     s = (c["s_mm"] - 0.5 * np.diff(c["s_mm"], prepend=0.0))[ours]

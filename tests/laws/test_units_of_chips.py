@@ -28,7 +28,7 @@ def run(tips: Floats, axes: Floats, cutter: Cutter, stock: LayeredStock, k: floa
     material = replace(material_named("al7075-t6"), source="scaled")
     material = replace(material, Kte=k * material.Kte, Kre=k * material.Kre, Kae=k * material.Kae)
     program = five_axis((k * tips).tolist(), axes.tolist(), feed=20.0 * k)
-    return remove(program, stock, {1: cutter}, material, Resolution(3.0 * k, 2e-3 * k, 8, 1.0 * k))
+    return remove(program, stock, {1: cutter}, material, Resolution(3.0 * k, 2e-3 * k, 8, 1.0 * k), engine="layers")
 
 
 @pytest.mark.parametrize(("cutter", "seed"), [(FLAT, 11), (BALL, 12)], ids=["flat", "ball"])

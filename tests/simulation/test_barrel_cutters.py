@@ -66,7 +66,7 @@ def test_the_profile_is_tangent_and_its_arc_has_the_radius(name: str) -> None:
 @pytest.mark.parametrize("name", BARRELS)
 def test_a_wall_takes_the_volume_under_the_profile(name: str) -> None:
     cutter, stock = BARRELS[name], wall()
-    removal = remove(along(cutter), stock, {1: cutter}, PLAIN, FINE, accuracy=False)
+    removal = remove(along(cutter), stock, {1: cutter}, PLAIN, FINE, accuracy=False, engine="layers")
     z = (np.arange(40_000) + 0.5) * (DEEP / 40_000)
     area = np.maximum(cutter.radius_at(z) - REST, 0.0).mean() * DEEP
     assert area > 0.2
@@ -83,7 +83,7 @@ def test_forces_are_those_of_a_fine_stack_of_discs(name: str) -> None:
     The feed is so small that the teeth run on circles: chips between their true paths begin f / (2 rho) later.
     """
     cutter, feed = BARRELS[name], 1.0
-    found = remove(along(cutter, feed=feed), wall(), {1: cutter}, PLAIN, FINE, accuracy=False).columns
+    found = remove(along(cutter, feed=feed), wall(), {1: cutter}, PLAIN, FINE, accuracy=False, engine="layers").columns
     k = int(np.flatnonzero(np.abs(found["x_mm"] - 15.0) < 1.1)[0])
     f = math.tau * feed / (cutter.flutes * 300.0)
     rho, kappa, ds = discs(cutter)
@@ -116,7 +116,7 @@ def test_forces_are_those_of_a_fine_stack_of_discs(name: str) -> None:
 
 
 def test_the_torque_does_the_work_that_the_volume_asks_for() -> None:
-    found = remove(along(OVAL), wall(), {1: OVAL}, ENERGY, FINE, accuracy=True)
+    found = remove(along(OVAL), wall(), {1: OVAL}, ENERGY, FINE, accuracy=True, engine="layers")
     work = found.columns["cutting_work_j"].sum()
     assert work == pytest.approx(ENERGY.Ktc * found.columns["chip_volume_mm3"].sum() / 1000.0, rel=0.02)
 
@@ -126,7 +126,7 @@ def test_a_leaning_barrel_takes_what_dexels_lose(name: str) -> None:
     cutter = BARRELS[name]
     tips, axes = [[-6.0, 2.0, -4.0], [36.0, 1.0, -5.0]], [[0.1, 0.45, 1.0], [-0.2, 0.3, 1.0]]
     stock = LayeredStock.block((0.0, -20.0, -12.0), (30.0, 10.0, 0.0), 0.15, 30.0)
-    found = remove(five_axis(tips, axes), stock, {1: cutter}, PLAIN, FINE, accuracy=False)
+    found = remove(five_axis(tips, axes), stock, {1: cutter}, PLAIN, FINE, accuracy=False, engine="layers")
     dexels = TriDexel.block((0.0, -20.0, -12.0), (30.0, 10.0, 0.0), 0.2)
     a0, a1 = (np.array(a) / np.linalg.norm(a) for a in axes)
     dexels.remove_move(tips[0], a0, tips[1], a1, cutter.outline, error_mm=2e-3)

@@ -28,7 +28,15 @@ def fill(cutter: Cutter, width: float, depth: float) -> tuple[float, float]:
     stock = LayeredStock.block((0.0, -20.0, -8.0), (40.0, width - 5.0, 0.0), 0.25, 20.0)
     path = [rapid([-10.0, 0.0, -depth], SPEED, 1, "link"), plunge([30.0, 0.0, -depth], FEED, SPEED, 1, "cut")]
     fine = Resolution(2.0, 1e-4, 60, 0.5)
-    done = remove(Program.join(path), stock, {1: cutter}, AL, fine, watch=lambda cuts: {"flute_fill": flute_fill(cuts)})
+    done = remove(
+        Program.join(path),
+        stock,
+        {1: cutter},
+        AL,
+        fine,
+        watch=lambda cuts: {"flute_fill": flute_fill(cuts)},
+        engine="layers",
+    )
     x, share = done.columns["x_mm"], done.columns["flute_fill"]
     return float(share.max()), float(share[np.argmin(np.abs(x - 15.0))])
 
@@ -61,6 +69,8 @@ def test_a_plunge_of_a_flat_end_is_not_judged() -> None:
     stock = LayeredStock.block((-10.0, -10.0, -5.0), (10.0, 10.0, 0.0), 0.5, 20.0)
     path = [rapid([0.0, 0.0, 1.0], SPEED, 1, "link"), plunge([0.0, 0.0, -0.4], 2.0, SPEED, 1, "cut")]
     fine = Resolution(2.0, 1e-4, 4, 0.5)
-    done = remove(Program.join(path), stock, {1: MILL}, AL, fine, watch=lambda c: {"flute_fill": flute_fill(c)})
+    done = remove(
+        Program.join(path), stock, {1: MILL}, AL, fine, watch=lambda c: {"flute_fill": flute_fill(c)}, engine="layers"
+    )
     assert done.columns["chip_volume_mm3"].sum() > 0.0
     assert not done.columns["flute_fill"].any()

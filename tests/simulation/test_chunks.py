@@ -65,7 +65,7 @@ def run(folder: Path, program: Program | None = None, every_s: float = 0.0, **mo
     stock = block()
     with Checkpoint(folder, every_s, fresh=more.pop("fresh", False), notice=more.pop("notice", print)) as kept:
         program = program or some_rows()
-        removal = remove_in_chunks(program, stock, CUTTERS, MATERIAL, ROUGH, kept, **more)
+        removal = remove_in_chunks(program, stock, CUTTERS, MATERIAL, ROUGH, kept, engine="layers", **more)
         out = bytes_of(removal, stock)
         kept.discard()
     return removal, out
@@ -92,7 +92,7 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> None:
 def whole() -> list[bytes]:
     """What a run in memory gives."""
     stock = block()
-    return bytes_of(remove(some_rows(), stock, CUTTERS, MATERIAL, ROUGH), stock)
+    return bytes_of(remove(some_rows(), stock, CUTTERS, MATERIAL, ROUGH, engine="layers"), stock)
 
 
 @pytest.mark.parametrize("size", [1, 7, 1000])
@@ -189,10 +189,12 @@ def test_a_watched_column_that_comes_late_is_0_before(tmp_path: Path) -> None:
     def watch(cuts: Any) -> dict[str, np.ndarray]:
         return {f"tool_{cuts.tool}": cuts.step + 1.0}
 
-    one = remove(some_rows(), block(), CUTTERS, MATERIAL, ROUGH, watch=watch).columns
+    one = remove(some_rows(), block(), CUTTERS, MATERIAL, ROUGH, watch=watch, engine="layers").columns
     stopped(tmp_path / "u", 0.3)
     with Checkpoint(tmp_path / "u", 0.0) as kept:
-        two = remove_in_chunks(some_rows(), block(), CUTTERS, MATERIAL, ROUGH, kept, watch=watch).columns
+        two = remove_in_chunks(
+            some_rows(), block(), CUTTERS, MATERIAL, ROUGH, kept, watch=watch, engine="layers"
+        ).columns
         assert list(one) == list(two)
         at = np.flatnonzero(two["tool_2"])
         assert np.array_equal(two["tool_2"][at], at + 1.0)
@@ -240,11 +242,11 @@ def test_refused_input_leaves_nothing(tmp_path: Path) -> None:
 
 def test_a_run_that_was_killed_before_its_result_was_written_simulates_nothing(tmp_path: Path) -> None:
     with Checkpoint(tmp_path / "u", 0.0) as kept:
-        first = remove_in_chunks(some_rows(), block(), CUTTERS, MATERIAL, ROUGH, kept)
+        first = remove_in_chunks(some_rows(), block(), CUTTERS, MATERIAL, ROUGH, kept, engine="layers")
         force = first.columns["force_n"]
     stock, said = block(), list[str]()
     with Checkpoint(tmp_path / "u", notice=said.append) as kept:
-        again = remove_in_chunks(some_rows(), stock, CUTTERS, MATERIAL, ROUGH, kept)
+        again = remove_in_chunks(some_rows(), stock, CUTTERS, MATERIAL, ROUGH, kept, engine="layers")
         assert np.array_equal(again.columns["force_n"], force)
     assert (again.volume_after, stock.volume()) == (first.volume_after, first.volume_after)
     assert said[0].startswith(f"continues after step {len(force)} of {len(force)}")

@@ -38,7 +38,7 @@ def test_other_feeds_cost_what_the_simulation_at_them_says(material, runout, rad
 
     def run(feed, watch=None):
         stock = LayeredStock.block((0.0, -6.0, -5.0), (30.0, 24.0, 0.0), 1.0, 20.0)
-        return remove(path(feed), stock, {1: cutter}, material, FINE, watch=watch).columns
+        return remove(path(feed), stock, {1: cutter}, material, FINE, watch=watch, engine="layers").columns
 
     factors = (0.3, 1.0, 2.5)
     names = ("force_n", "torque_nm", "power_w", "chip_max_mm")
@@ -62,7 +62,9 @@ def test_each_step_has_its_own_factor_and_cuts_join() -> None:
     cutter = Cutter(10.0, 2, 0.0, 20.0, 30.0, 6e5, runout=(0.004, 0.2))
     blocks: list[Cuts] = []
     stock = LayeredStock.block((0.0, -6.0, -5.0), (30.0, 24.0, 0.0), 1.0, 20.0)
-    removal = remove(path(10.0), stock, {1: cutter}, PLAIN, FINE, keep=True, watch=lambda c: blocks.append(c) or {})
+    removal = remove(
+        path(10.0), stock, {1: cutter}, PLAIN, FINE, keep=True, watch=lambda c: blocks.append(c) or {}, engine="layers"
+    )
     (whole,) = removal.cuts
     assert len(whole) == sum(len(b) for b in blocks)
     factor = np.linspace(0.5, 1.5, len(whole))

@@ -56,7 +56,7 @@ def across() -> Program:
 
 def one(program: Program) -> tuple[Removal, list[bytes]]:
     stock = block()
-    found = remove(program, stock, CUTTERS, MATERIAL, ROUGH)
+    found = remove(program, stock, CUTTERS, MATERIAL, ROUGH, engine="layers")
     return found, bytes_of(found, stock)
 
 
@@ -85,7 +85,7 @@ def test_every_process_count_gives_the_same_bytes(tmp_path: Path, monkeypatch: p
     begin = Strips.__init__
     monkeypatch.setattr(Strips, "__init__", lambda self, s, *more: (used.append(len(s)), begin(self, s, *more))[1])
     stock = block()
-    found = remove(program, stock, CUTTERS, MATERIAL, ROUGH, processes=2)
+    found = remove(program, stock, CUTTERS, MATERIAL, ROUGH, processes=2, engine="layers")
     assert used == [2]
     assert bytes_of(found, stock) == whole
     assert found.energy_balance == known.energy_balance
@@ -99,10 +99,12 @@ def test_every_process_count_gives_the_same_bytes(tmp_path: Path, monkeypatch: p
     for first, then in ((2, 1), (1, 2)):
         folder = tmp_path / f"{first}"
         with pytest.raises(Cancelled), Checkpoint(folder, 0.0, notice=lambda _: None) as kept:
-            remove_in_chunks(program, block(), CUTTERS, MATERIAL, ROUGH, kept, processes=first, progress=stop)
+            remove_in_chunks(
+                program, block(), CUTTERS, MATERIAL, ROUGH, kept, processes=first, progress=stop, engine="layers"
+            )
         said, stock = list[str](), block()
         with Checkpoint(folder, 0.0, notice=said.append) as kept:
-            found = remove_in_chunks(program, stock, CUTTERS, MATERIAL, ROUGH, kept, processes=then)
+            found = remove_in_chunks(program, stock, CUTTERS, MATERIAL, ROUGH, kept, processes=then, engine="layers")
             assert bytes_of(found, stock) == whole
         assert "continues after step" in said[0]
 
@@ -114,7 +116,7 @@ def test_an_error_of_a_strip_is_that_of_one_process(monkeypatch: pytest.MonkeyPa
     told = []
     for processes in (1, 2):
         with pytest.raises(InputError, match=r"the axis has A_z = 0\.001") as found:
-            remove(program, block(), CUTTERS, MATERIAL, ROUGH, processes=processes)
+            remove(program, block(), CUTTERS, MATERIAL, ROUGH, processes=processes, engine="layers")
         told.append(str(found.value))
     assert told[0] == told[1]
 
@@ -136,7 +138,7 @@ def test_a_process_that_is_killed_loses_nothing(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(Strips, "next", broken)
     stock = block()
-    assert bytes_of(remove(program, stock, CUTTERS, MATERIAL, ROUGH, processes=2), stock) == whole
+    assert bytes_of(remove(program, stock, CUTTERS, MATERIAL, ROUGH, processes=2, engine="layers"), stock) == whole
     assert killed
 
 
@@ -172,6 +174,6 @@ def test_areas_that_are_found_early_or_late_remove_the_same(monkeypatch: pytest.
     for when in (_Late, _Early):
         monkeypatch.setattr(swept_area, "ThreadPoolExecutor", when)
         stock = LayeredStock.block((0.0, 0.0, -6.0), (40.0, 30.0, 0.0), 0.5, 12.0)
-        removal = remove(some_rows(), stock, {1: WIDE, 2: ROUND}, MATERIAL, COARSE, accuracy=False)
+        removal = remove(some_rows(), stock, {1: WIDE, 2: ROUND}, MATERIAL, COARSE, accuracy=False, engine="layers")
         found.append(bytes_of(removal, stock))
     assert found[0] == found[1]

@@ -38,7 +38,7 @@ def test_layers_without_material_are_left_out_and_no_others(turn: float, monkeyp
 
     def run() -> list[bytes]:
         stock = LayeredStock.block((0.0, 0.0, -16.0), (30.0, 30.0, 0.0), 1.0, 15.0)
-        columns = remove(leaning(turn), stock, CUTTERS, material_named("al7075-t6"), ROUGH).columns
+        columns = remove(leaning(turn), stock, CUTTERS, material_named("al7075-t6"), ROUGH, engine="layers").columns
         return [stock.to_bytes(), *(np.ascontiguousarray(v).tobytes() for v in columns.values())]
 
     def watched(*words):

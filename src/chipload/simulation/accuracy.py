@@ -101,7 +101,7 @@ COMPARED = ("force_n", "torque_nm", "torque_mean_nm", "power_w", "chip_max_mm")
 WITH_FORCE = ("deflection_um", "form_error_um")
 #: columns that can be compared
 COMPARABLE = (*COMPARED, "force_normal_n")
-#: greatest size of the force along z: by layers it is compared too where a run asks for it, with a column of that name
+#: greatest size of the force along z: it is compared too where a run asks for it, with a column of that name
 AXIAL = "force_axial_n"
 #: earlier steps that are removed a second time: at most this share of those of the run, or this number in a short run
 SHARE, LEAST = 0.05, 60
@@ -116,12 +116,12 @@ FLOOR, LEANING_FLOOR = 0.01, 0.02
 #: by moves: error of a column that a few steps do not show
 MOVES_FLOOR = {
     "force_n": 0.035, "torque_nm": 0.035, "torque_mean_nm": 0.01, "power_w": 0.01, "chip_max_mm": 0.035,
-    "force_normal_n": 0.035,
+    "force_normal_n": 0.035, AXIAL: 0.035,
 }  # fmt: skip
 #: the same if an axis leans, for any cutter
 LEANING_MOVES_FLOOR = {
     "force_n": 0.05, "torque_nm": 0.05, "torque_mean_nm": 0.02, "power_w": 0.02, "chip_max_mm": 0.05,
-    "force_normal_n": 0.05,
+    "force_normal_n": 0.05, AXIAL: 0.05,
 }  # fmt: skip
 #: by moves: number of slices of the finer run over that of the run
 MORE = 4
@@ -220,7 +220,7 @@ def resolution_error(
     columns : of the removal
     setting : of the run
     again : :func:`layers_again` or :func:`moves_again`
-    names : columns that are compared, of :data:`COMPARABLE` and, by layers, :data:`AXIAL`; the force among them
+    names : columns that are compared, of :data:`COMPARABLE` and :data:`AXIAL`; the force among them
 
     Returns
     -------
@@ -415,13 +415,14 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
     ) -> tuple[Mapping[str, float], float, list[Cuts]]:
         stock = run.stock.cropped(window.low, window.high)
         if stock is None:
-            return dict.fromkeys((*COMPARABLE, CHIP), 0.0), 0.0, []
+            return dict.fromkeys((*COMPARABLE, AXIAL, CHIP), 0.0), 0.0, []
         stock.more = stock.more if more is None else more
         finer = replace(run, stock=stock, corner_slices=MORE * run.corner_slices, flank_mm=flank)
         for some in window.earlier:
             finer.make(some, len(some))
         found = moved(own, finer, 0, setting.cutters, setting.material, rotation)
-        worst = {name: float(found.loads[:, LOADS.index(name)].max()) for name in COMPARABLE}
+        loads = dict(zip(LOADS, found.loads.T, strict=True))
+        worst = {name: float(loads[name].max()) for name in COMPARABLE} | {AXIAL: float(axial_force(loads).max())}
         worst[CHIP] = max((float(chip_error(c.plain, c.cutter).max(initial=0.0)) for c in found.cuts), default=0.0)
         return worst, float(found.removed[:, 0].sum()), found.cuts
 
@@ -441,7 +442,7 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
     cutter = setting.cutters[tool]
     stock = before.cropped(window.low[:2], window.high[:2])
     if stock is None:
-        return dict.fromkeys((*COMPARABLE, CHIP), 0.0)
+        return dict.fromkeys((*COMPARABLE, AXIAL, CHIP), 0.0)
     low, high = float(window.low[2]), float(window.high[2])
     thickest = 0.5 * float(np.median(before.thickness[slice(*_span(before, low, high))]))
     heights, z, thin = [low], low, LOWEST * cutter.diameter

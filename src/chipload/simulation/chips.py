@@ -91,7 +91,7 @@ def remove(
     accuracy: bool = True,
     workers: int = 2,
     processes: int | Workers = 1,
-    engine: Engine = "layers",
+    engine: Engine = "auto",
     progress: Progress = silent,
 ) -> Removal:
     """Remove the cuts of a program from ``stock``, which changes, and calculate the loads of every step.

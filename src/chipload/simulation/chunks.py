@@ -86,7 +86,7 @@ def remove_in_chunks(
     also: Any = (),
     workers: int = 2,
     processes: int | Workers = 1,
-    engine: Engine = "layers",
+    engine: Engine = "auto",
     progress: Progress = silent,
 ) -> Removal:
     """Do what :func:`chipload.simulation.chips.remove` does, with columns in files; continue a stopped run.

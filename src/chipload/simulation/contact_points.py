@@ -45,7 +45,7 @@ def touched(
     step = np.sort(np.concatenate([c.step for c in removal.cuts])) if removal.cuts else np.zeros(0, dtype=np.int64)
     line = np.asarray(removal.columns["line"])
     row = line[step] - first_line
-    share = _shares(line, within)[step]
+    share = _shares(line, np.asarray(removal.columns["s_mm"]), within)[step]
     before = np.maximum(row - 1, 0)
     before = np.where(contact[before], before, row)
     t = share[:, None]
@@ -59,9 +59,17 @@ def touched(
     )
 
 
-def _shares(line: Ints, within: float) -> Floats:
-    """Return the share of its row at which the place ``within`` each step lies; the steps of a row are equal."""
+def _shares(line: Ints, s: Floats, within: float) -> Floats:
+    """Return the share of its row at which the place ``within`` each step lies, by the path ``s`` (n,) [mm] at its
+    end; the steps of a row that does not move are equal, as is the first of all.
+    """
     start = np.flatnonzero(np.r_[True, line[1:] != line[:-1]])
     count = np.diff(np.append(start, len(line)))
-    k = np.arange(len(line)) - np.repeat(start, count)
-    return np.asarray((k + within) / np.repeat(count, count))
+    length = np.diff(s, prepend=s[:1])
+    row = np.repeat(np.arange(len(start)), count)
+    whole = np.add.reduceat(length, start)[row] if len(start) else length
+    before = np.cumsum(length) - length
+    before = before - before[start][row]
+    k = np.arange(len(line)) - start[row]
+    moved = np.divide(before + within * length, whole, out=np.zeros(len(line)), where=whole > 0.0)
+    return np.asarray(np.where(whole > 0.0, moved, (k + within) / count[row]))

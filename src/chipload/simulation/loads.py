@@ -104,6 +104,17 @@ def joined(cuts: list[Cuts]) -> Cuts:
     return Cuts(cuts[0].tool, cuts[0].cutter, step, ends, engagement, plain, spindle)
 
 
+def part_of_cuts(cuts: Cuts, first: int, end: int) -> Cuts:
+    """Return the tooth engagement of the steps ``first`` to before ``end`` of those that cut."""
+    kept = np.arange(first, end)
+    plain = cuts.plain.part(kept)
+    engagement = plain if cuts.engagement is cuts.plain else cuts.engagement.part(kept)
+    return replace(
+        cuts, step=cuts.step[first:end], ends=cuts.ends[first:end], engagement=engagement, plain=plain,
+        spindle=cuts.spindle[first:end],
+    )  # fmt: skip
+
+
 def _joined(parts: list[ToothEngagement]) -> ToothEngagement:
     start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(b.start) for b in parts]))])
     rows, tooth = (np.concatenate([getattr(b, name) for b in parts]) for name in ("rows", "tooth"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from chipload.cutting.material import Material
 from chipload.engagement.chips.move import Move
 from chipload.errors import Finding
 from chipload.simulation.engagement_samples import EngagementSamples
-from chipload.simulation.loads import Cuts, StepEngagement
+from chipload.simulation.loads import Cuts, StepEngagement, part_of_cuts
 from chipload.simulation.moves import MoveRun
 from chipload.simulation.swept_area import Interpolation
 from chipload.workers import Workers
@@ -143,6 +143,11 @@ class Removal:
     samples: EngagementSamples | None = None
 
     @property
+    def handed_over(self) -> bool:
+        """Whether the run was handed over from moves to layers."""
+        return any(f.code == "handed-over" for f in self.findings)
+
+    @property
     def band_error(self) -> dict[str, float]:
         """Standard deviation over the value, by column, at the greatest value of the column: what the spread of the
         coefficients makes of it. Empty where the material does not state their uncertainty.
@@ -157,6 +162,20 @@ class Removal:
                 if base[k] > 0.0:
                     out[name] = float(self.columns[band][k] / base[k])
         return out
+
+
+def removal_between(whole: Removal, first: int, end: int) -> Removal:
+    """Return the columns and tooth engagement of the steps from ``first`` to before ``end`` of a removal, numbered from
+    0; its volumes, accuracy and findings are those of the whole.
+    """
+    cuts = tuple(
+        part_of_cuts(each, a, b)
+        for each in whole.cuts
+        for a, b in [np.searchsorted(each.step, [first, end]).tolist()]
+        if b > a
+    )
+    cuts = tuple(replace(each, step=each.step - first) for each in cuts)
+    return replace(whole, columns={name: values[first:end] for name, values in whole.columns.items()}, cuts=cuts)
 
 
 @dataclass(frozen=True, eq=False)

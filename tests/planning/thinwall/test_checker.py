@@ -31,7 +31,7 @@ def simulated(posture: CutterPose, d: float, layers: int, feed: float, spindle: 
     )
     bounds = np.concatenate([[-1.0], np.linspace(-0.008, 0.0, 3)[:-1], np.linspace(0.0, d, layers + 1)])
     stock = LayeredStock.block((-10.0, -12.0, -1.0), (20.0, 12.0, d), bounds, 16.0)
-    c = remove(program, stock, {1: posture.cutter}, STEEL, Resolution(1.0, 0.002, 96, 0.5)).columns
+    c = remove(program, stock, {1: posture.cutter}, STEEL, Resolution(1.0, 0.002, 96, 0.5), engine="layers").columns
     k = int(np.flatnonzero(~c["rapid"] & (np.abs(c["x_mm"] - 5.5) < 2.0) & (c["chip_volume_mm3"] > 0.0))[-1])
     return abs(float(c["force_z_mean_n"][k])), float(max(c["force_z_max_n"][k], -c["force_z_min_n"][k]))
 

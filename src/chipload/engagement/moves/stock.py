@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,12 @@ def cutter_row(cutter: Cutter) -> Floats:
     return np.array(row)
 
 
+@lru_cache(64)
+def _gauss_nodes(count: int) -> tuple[Floats, Floats]:
+    """Nodes and weights of Gauss and Legendre, which take longer to find than some steps."""
+    return np.polynomial.legendre.leggauss(count)
+
+
 def corner_parts(count: int) -> Floats:
     """(count, 3) parts of 0..1 into which the engaged part of a corner is cut: from, to, and where each is evaluated.
 
@@ -76,7 +83,7 @@ def corner_parts(count: int) -> Floats:
     >>> corner_parts(2).round(6).tolist()
     [[0.0, 0.5, 0.211325], [0.5, 1.0, 0.788675]]
     """
-    node, weight = np.polynomial.legendre.leggauss(count)
+    node, weight = _gauss_nodes(count)
     end = np.cumsum(0.5 * weight)
     return np.column_stack([end - 0.5 * weight, end, 0.5 + 0.5 * node])
 

@@ -3,7 +3,8 @@
 The variable plan takes less time at one deflection. The least-error plan takes the time of the constant plan and has
 less form error, which is that of the last pass of each side: that pass keeps ever smaller shares of the limit, until
 the time is used. Places where even the smallest depth exceeds such a share get the smallest depth, where the edge force
-governs.
+governs. The constant plan takes that time as well: where it has less error than all of these, as in a few passes with
+coarse rows, it is the plan of least error.
 
 Compensation moves the last pass of each side by its predicted form error to the other side (mirrored), by at most the
 stated distance. The moved pass is simulated, and moved again by the error found. The remaining error is the form error
@@ -37,7 +38,7 @@ MOVES = 2
 def least_error(
     places: Places,
     operations: Sequence[DepthOperation],
-    seconds: float,
+    constant: Variant,
     time_of: Callable[[PlannedVariant], float],
     prove: Callable[[PlannedVariant], Variant],
 ) -> Variant:
@@ -46,7 +47,7 @@ def least_error(
     Parameters
     ----------
     operations : with the thresholds of the other passes
-    seconds : that it may take
+    constant : the plan of constant depth, whose time it may take
     time_of : time of a plan [s]
     prove : writes and simulates one
     """
@@ -66,10 +67,11 @@ def least_error(
     best = planned(SHARES[0])
     for share in SHARES[1:]:
         one = planned(share)
-        if time_of(one) > seconds:
+        if time_of(one) > constant.seconds:
             break
         best = one
-    return prove(replace(best, plan=replace(best.plan, name="least_error")))
+    found = prove(replace(best, plan=replace(best.plan, name="least_error")))
+    return found if found.error_rms <= constant.error_rms else replace(constant, name="least_error")
 
 
 def compensated(

@@ -176,7 +176,7 @@ class Variant:
 
     @cached_property
     def load_error(self) -> Mapping[str, float]:
-        """Relative error of the greatest load by column, of layers and steps; inf: not known."""
+        """Relative error of the greatest load by column, of slices and steps; inf: not known."""
         return self.find_load_error()
 
     @property
@@ -303,6 +303,7 @@ class ThinWallResult:
     settings : JSON values
     checks : checks in addition to the stated limits
     provenance : where the numbers come from
+    texts : of the programs of the variants, as they were read back
     """
 
     title: str
@@ -315,6 +316,7 @@ class ThinWallResult:
     settings: Mapping[str, Any]
     checks: DefaultChecks
     provenance: Provenance
+    texts: Mapping[str, str] = field(default_factory=dict)
 
 
 def remedy_text(place: Help) -> str:

@@ -1,13 +1,20 @@
-"""The texts of the programs of a thin wall, and what keeps them from being released: each is read back."""
+"""The texts of the programs of a thin wall, and what keeps them from being released.
+
+Each text is read back and compared with its plan; the one that is released is simulated as it was read.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from chipload.jobs.thinwall.outcome import ThinWallResult, Variant
+from chipload.checking.preparation import timed
+from chipload.errors import Finding, InputError, Severity
+from chipload.jobs.thinwall.outcome import USED, ThinWallResult, Variant
 from chipload.jobs.thinwall.part_shape import PartShape
+from chipload.jobs.thinwall.tries import Tried
 from chipload.program.gcode.writer import write_commands
-from chipload.program.read_back import text_findings
+from chipload.program.read import ProgramReading
+from chipload.program.read_back import lines_of_source, no_end, read_back, reading_findings, unread
 from chipload.program.release import NOT_SIMULATED, Release
 from chipload.report.programs import ENDINGS, program_name
 
@@ -41,18 +48,36 @@ def program_file(walled: ThinWallResult, one: Variant) -> str:
     return f"{program_name(0, one.name)}.{ENDINGS[walled.planning.machine.dialect]}"
 
 
-def with_texts_read_back(walled: ThinWallResult) -> ThinWallResult:
-    """A result whose variants have the findings of their texts, read back with the machine and compared with the
-    simulated program.
+def with_texts_read_back(walled: ThinWallResult, tried: Tried) -> ThinWallResult:
+    """A result whose variants have the findings of their texts, read back with the machine and compared with their
+    plans. The text of the variant in use is simulated as it was read: its history and its checks are those of the text.
     """
-    planning, made = walled.planning, {}
+    made, texts = dict[str, Variant](), dict[str, str]()
     for name, one in walled.variants.items():
         text = program_text(walled, one, NOT_SIMULATED)
-        found = text_findings(
-            text, program_file(walled, one), planning.machine, planning.cutters, one.program, lengths=True
-        )
-        made[name] = replace(one, beyond=(*one.beyond, *(f for f in found if f not in one.beyond)))
-    return replace(walled, variants=made)
+        reading, found = _read(walled, one, text)
+        findings = (*one.beyond, *(f for f in found if f not in one.beyond))
+        if name == USED and reading is not None and not any(f.severity is Severity.EXCEEDS for f in found):
+            one = _simulated_text(walled, one, reading, tried)
+        made[name], texts[name] = replace(one, beyond=findings), text
+    return replace(walled, variants=made, texts=texts)
+
+
+def _read(walled: ThinWallResult, one: Variant, text: str) -> tuple[ProgramReading | None, tuple[Finding, ...]]:
+    """The text of a variant as it is read, None if it cannot be; and the findings that keep it from being released."""
+    planning = walled.planning
+    try:
+        reading = read_back(text, program_file(walled, one), planning.machine, planning.cutters, lengths=True)
+    except InputError as err:
+        return None, (unread(err),)
+    return reading, (*reading_findings(reading, planning.cutters, one.program), *no_end(text))
+
+
+def _simulated_text(walled: ThinWallResult, one: Variant, reading: ProgramReading, tried: Tried) -> Variant:
+    """A variant as the simulation of its text finds it, which names the lines of its program."""
+    program, times = timed(reading, walled.planning.cutters, walled.planning.machine)
+    lines = lines_of_source(one.program, reading)[len(reading.program) - len(program) :]
+    return tried.prove_text(one, replace(program, line=lines), times)
 
 
 def _frame(walled: ThinWallResult) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
 
@@ -23,7 +23,7 @@ from chipload.jobs.tables import value_of
 from chipload.jobs.thinwall.floor_loads import FloorLoads, floor_finish, floor_loads
 from chipload.jobs.thinwall.floor_shape import floor_shape
 from chipload.jobs.thinwall.inputs import WallInputs
-from chipload.jobs.thinwall.load_error import SimulatedPass, load_error
+from chipload.jobs.thinwall.load_error import load_error
 from chipload.jobs.thinwall.mesh_error import error_at
 from chipload.jobs.thinwall.neighbours import part_collisions, wall_collisions
 from chipload.jobs.thinwall.outcome import Finish, Shape
@@ -37,7 +37,8 @@ from chipload.progress import Progress
 from chipload.simulation.chips import remove, stacked
 from chipload.simulation.contact_points import touched
 from chipload.simulation.deflection import Contacts, form_error, step_deflections
-from chipload.simulation.removal import Removal, Resolution
+from chipload.simulation.moves import Engine
+from chipload.simulation.removal import Removal, Resolution, removal_between
 from chipload.simulation.section_deviation import nearest, section_deviation
 from chipload.stock.layers import LayeredStock
 from chipload.structure.places import normals_of, on_cut, on_side, weights
@@ -57,6 +58,8 @@ FLANK_TURN = math.radians(0.25)
 EVEN = ("constant", "unconstrained")
 #: points of a finished side, along and up
 POINTS = (33, 25)
+#: the highest points lie so much of v below the free edge, at which the contact of a row ends
+EDGE = 0.002
 #: spacing [mm] of the points of the finished wall with which the path is compared
 CLOUD = 0.2
 
@@ -82,56 +85,64 @@ class Proof:
     find_load_error: Callable[[], Mapping[str, float]]
 
 
-def resolution_of(inputs: WallInputs, pass_programs: Sequence[PassProgram], operation: int = -1) -> Resolution:
-    """Resolution of the simulation of an operation: one row of the passes is one step."""
-    own = inputs.operations[operation]
-    op = own.table
-    longest = max(
-        float(np.linalg.norm(np.diff(pass_program.program.p_work, axis=0), axis=1).max())
-        for pass_program in pass_programs
+def resolution_of(inputs: WallInputs, program: Program) -> Resolution:
+    """Resolution of the simulation of the whole program: the finest of the operations; one row is one step."""
+    tables = [o.table for o in inputs.operations]
+    longest = float(np.linalg.norm(np.diff(program.p_work, axis=0), axis=1).max())
+    return Resolution(
+        max(longest, *(op.step_mm for op in tables)),
+        min(op.tolerance_mm for op in tables),
+        max(op.corner_slices for op in tables),
+        0.5 * min(o.cut.cutter.radius for o in inputs.operations),
     )
-    return Resolution(max(longest, op.step_mm), op.tolerance_mm, op.corner_slices, 0.5 * own.cut.cutter.radius)
 
 
-def prove(places: Places, plan: Plan, pass_programs: Sequence[PassProgram], times: Floats, progress: Progress) -> Proof:
-    """Simulate the passes of a plan at these places in the stock.
+def engine_of(inputs: WallInputs) -> Engine:
+    """The engine of the simulation: moves where corners cut.
+
+    A flank meets the floors of the rows above it within one cell of the index of moves, beside the wall, where they are
+    not known: its slices of half a radius then reach too high by up to 50 %. Floors are cut with the same upright
+    cutters. Both are simulated by layers.
+    """
+    return "auto" if all(o.table.contact == "corner" for o in inputs.operations) else "layers"
+
+
+def prove(
+    places: Places,
+    plan: Plan,
+    pass_programs: Sequence[PassProgram],
+    times: Floats,
+    progress: Progress,
+    read: Program | None = None,
+) -> Proof:
+    """Simulate the program of all passes of a plan from the uncut stock.
 
     Parameters
     ----------
-    times : (n,) float [s], time of each row of all passes, one after another, on the machine
+    times : (n,) float [s], time of each row of the program on the machine
+    read : the program as its text is read back, with the lines of ``pass_programs``; None: it is simulated as planned
     """
     inputs = places.inputs
-    stock = places.uncut.copied()
-    fine = [resolution_of(inputs, pass_programs, k) for k in range(len(inputs.operations))]
-    bars = {o.cut.cutter.number: tool_bars(o.cut.cutter) for o in inputs.operations}
+    stock, program = places.uncut.copied(), read or Program.join([one.program for one in pass_programs])
+    fine, cutters = resolution_of(inputs, program), {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
+    whole = remove(
+        program, stock, cutters, inputs.cut.material, fine, keep=True, accuracy=False, times=times,
+        engine=engine_of(inputs), progress=progress,
+    )  # fmt: skip
+    bars = {number: tool_bars(cutter) for number, cutter in cutters.items()}
     left = [np.full(places.shape, inputs.body.allowance[s]) for s in inputs.body.side_numbers]
     parts: list[dict[str, NDArray[Any]]] = []
-    simulated: list[SimulatedPass] = []
     thresholds: list[Floats] = []
     finish: dict[int, Finish] = {}
-    time = path = stress = 0.0
+    stress = 0.0
     last = {p.side: k for k, p in enumerate(plan.passes)}
-    ends, count = np.cumsum([len(one.program) for one in pass_programs]), len(pass_programs)
-    for k, (p, pass_program, own) in enumerate(
-        zip(plan.passes, pass_programs, np.split(times, ends[:-1]), strict=True)
+    for k, (p, pass_program, removal) in enumerate(
+        zip(plan.passes, pass_programs, removals_of_passes(whole, pass_programs), strict=True)
     ):
-        before, own_operation = stock.copied(), inputs.operations[p.operation]
-        cutter, rules = own_operation.cut.cutter, own_operation.depths
-        removal = remove(
-            pass_program.program,
-            stock,
-            {cutter.number: cutter},
-            inputs.cut.material,
-            fine[p.operation],
-            keep=True,
-            accuracy=False,
-            times=own,
-            progress=lambda part, what, k=k: progress((k + part) / count, f"pass {k + 1} of {count}"),  # type: ignore[misc]
-        )
+        rules = inputs.operations[p.operation].depths
         left[p.side] = p.low
         number = inputs.body.side_numbers[p.side]
         floor = inputs.floor(number) is not None
-        simulated.append(SimulatedPass(pass_program.program, before, removal.columns, cutter, fine[p.operation], floor))
         C = places.compliance(left, p.side)
         F_th = places.threshold(inputs.depths.deflection, 1.0, spare=False)(left, p.side).force.reshape(places.shape)
         thresholds.append(F_th)
@@ -142,9 +153,6 @@ def prove(places: Places, plan: Plan, pass_programs: Sequence[PassProgram], time
         share = RegularGridInterpolator(places.grid, p.correction)(np.column_stack([u, v]))
         law = rules.even_law if plan.name in EVEN else rules.law
         columns["force_normal_planned_n"] = share * law.force(columns["depth_mm"])
-        columns["t_s"] = columns["t_s"] + time
-        columns["s_mm"] = columns["s_mm"] + path
-        time, path = float(columns["t_s"][-1]), float(columns["s_mm"][-1])
         if places.chatter is not None:
             columns |= places.chatter.columns(places, removal, p, left, columns)
         columns["pass"] = np.full(len(columns["t_s"]), pass_program.program.labels[0], dtype=object)
@@ -156,9 +164,25 @@ def prove(places: Places, plan: Plan, pass_programs: Sequence[PassProgram], time
                 if floor
                 else _finish(inputs, removal, number, places.compliance(left, p.side, of_surface=True), error, bars)
             )
-    whole = stacked(parts)  # a pass that cuts films alone has no bands
-    find = partial(load_error, simulated, inputs.cut.material)
-    return Proof(whole, tuple(thresholds), tuple(finish.values()), _shape(places, stock, pass_programs), stress, find)
+    floors = any(inputs.floor(number) is not None for number in inputs.body.side_numbers)
+    by_layers = engine_of(inputs) == "layers" or whole.handed_over
+    find = partial(
+        load_error, program, places.uncut, whole, cutters, inputs.cut.material, fine, floors=floors, layers=by_layers
+    )
+    return Proof(
+        stacked(parts),
+        tuple(thresholds),
+        tuple(finish.values()),
+        _shape(places, stock, pass_programs, program),
+        stress,
+        find,
+    )
+
+
+def removals_of_passes(whole: Removal, pass_programs: Sequence[PassProgram]) -> list[Removal]:
+    """The removal of each pass from that of the whole program, by the lines of its rows."""
+    ends = np.searchsorted(whole.columns["line"], [int(one.program.line[-1]) for one in pass_programs], side="right")
+    return [removal_between(whole, int(a), int(b)) for a, b in zip([0, *ends[:-1]], ends, strict=True)]
 
 
 def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Mapping[str, NDArray[Any]]) -> float:
@@ -213,8 +237,8 @@ def _columns(
 
     The force of a step acts anywhere in it: threshold and compliance are the worst of its beginning, middle and end, so
     that edges and corners of the wall are among them. `contact_*_mm` is the place of that threshold, the upper end of a
-    contact line; `u`, `v` and
-    `depth_mm` are those of the middle. `compliance_error` is the greatest error of the compliance by its mesh there.
+    contact line; `u` and `v` are those of the middle. `depth_mm` is the greatest planned depth of the three, as the
+    force is the greatest in the step. `compliance_error` is the greatest error of the compliance by its mesh there.
     """
     inputs = places.inputs
     columns = dict(removal.columns)
@@ -240,7 +264,7 @@ def _columns(
     else:
         allowable = np.stack([between(places.grid, F_th, u, v) for u, v in uv])
     unsure = np.stack([error_at(inputs.body.places, error, u, v) for u, v in uv]).max(axis=0)
-    place, values = spots[MIDDLE]
+    place, deepest = spots[MIDDLE][0], np.stack([values[:, 2] for _, values in spots]).max(axis=0)
     u, v = uv[MIDDLE]
     if loads is not None:
         gives, unsure = loads.normal[None], loads.error
@@ -269,7 +293,7 @@ def _columns(
     for name, given in (
         ("u", u),
         ("v", v),
-        ("depth_mm", values[:, 2]),
+        ("depth_mm", deepest),
         ("force_allowable_n", threshold),
         ("compliance_error", unsure),
         *((f"contact_{x}_mm", judged[:, k]) for k, x in enumerate("xyz")),
@@ -312,7 +336,7 @@ def _finish(
     inputs: WallInputs, removal: Removal, number: int, C: Floats, error: Floats, bars: Mapping[int, Any]
 ) -> Finish:
     """Form error of a side by its last pass."""
-    parameters = np.linspace(0.02, 0.98, POINTS[0]), np.linspace(inputs.body.foot, 1.0, POINTS[1] + 1)[1:]
+    parameters = np.linspace(0.02, 0.98, POINTS[0]), np.linspace(inputs.body.foot, 1.0 - EDGE, POINTS[1] + 1)[1:]
     u, v = np.meshgrid(*parameters, indexing="ij")
     points, normals = inputs.body.shape.sides(u, v)[number], inputs.body.shape.normals(u, v)[number]
     unsure = error_at(inputs.body.places, error, u.ravel(), v.ravel()).reshape(u.shape)
@@ -340,7 +364,7 @@ def _finish(
     )
 
 
-def _shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProgram]) -> Shape:
+def _shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProgram], program: Program) -> Shape:
     """Path and stock against the finished wall, the tool against its neighbours or the part."""
     inputs = places.inputs
     if isinstance(inputs.body.shape, PartShape) and inputs.body.shape.floors:
@@ -353,12 +377,8 @@ def _shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProg
     )
     cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.body.shape.sides(u, v)])
     gaps = [
-        nearest(
-            Program.join([one.program for one in pass_programs if one.operation == k]),
-            o.cut.cutter,
-            cloud,
-        )
-        for k, o in enumerate(inputs.operations)
+        nearest(_rows_of_tool(program, number), cutter, cloud)
+        for number, cutter in {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}.items()
     ]
     gap = min(gaps, key=lambda one: one.distance)
     found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.below)
@@ -369,3 +389,9 @@ def _shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProg
         else part_collisions(inputs, places.uncut, pass_programs)
     )
     return Shape(found.gouge, found.left, at, found.points, gap.distance, touched)
+
+
+def _rows_of_tool(program: Program, number: int) -> Program:
+    """The rows of a program that have a tool."""
+    own = program.tool == number
+    return replace(program, **{f.name: getattr(program, f.name)[own] for f in fields(program) if f.name != "labels"})

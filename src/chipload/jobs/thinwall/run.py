@@ -73,7 +73,6 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
     variable = variable_within(tried, corrections, constant)
     made = {"variable": variable, "constant": constant, "unconstrained": free}
     made |= compared_variants(tried, variable, constant)
-    progress(1.0, "proved")
     body, finished = inputs.stock_mesh(), inputs.finished_mesh()
     text = inputs.finished_threshold()
     settings: dict[str, Any] = {k: v for k, v in job.operation.model_dump().items() if v is not None}
@@ -121,7 +120,9 @@ def run(job: ThinWallJob, progress: Progress = silent, checkpoint: Checkpoint | 
         checks=default_checks(value_of(CheckSettings, job.table.checks), cutters, inputs.cut.material),
         provenance=provenance,
     )
-    return with_texts_read_back(walled)
+    found = with_texts_read_back(walled, tried)
+    progress(1.0, "proved")
+    return found
 
 
 def _planned_operation(one: WallOperation) -> PlannedOperation:
@@ -164,10 +165,8 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
     program = Program.join([one.program for one in pass_programs])
     on_machine(inputs, program)
     wall_stock(inputs)
-    count = 0
-    for k, o in enumerate(inputs.operations):
-        own = Program.join([one.program for one in pass_programs if one.operation == k])
-        count += counted(own, {o.cut.cutter.number: o.cut.cutter}, resolution_of(inputs, pass_programs, k))
+    cutters = {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
+    count = counted(program, cutters, resolution_of(inputs, program))
     length, height, thickness = inputs.body.shape.size()
     part = inputs.body.part
     if part is None:

@@ -266,7 +266,9 @@ class WallOperationTable(Table):
         description="true: plan and simulate again until a plan uses 95 % of the limit; false: take the first plan "
         "that holds",
     )
-    layer_mm: Positive = Field(le=1.0, description="thickness of the layers of the simulation")
+    layer_mm: Positive = Field(
+        le=1.0, description="thickness of the layers in which the remaining stock is compared with the wall"
+    )
     tolerance_mm: Positive = Field(
         0.001, ge=1e-6, le=0.05, description="greatest deviation of chords from the edges of chips"
     )

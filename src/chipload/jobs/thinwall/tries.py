@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from chipload.jobs.thinwall.wall_operation import DepthRules
 from chipload.jobs.thinwall.wall_program import OnMachine, linked, on_machine
 from chipload.planning.thinwall.correction import greatest_ratios
 from chipload.planning.thinwall.depth import largest_depths, normal_force
+from chipload.planning.thinwall.pass_program import PassProgram
 from chipload.planning.thinwall.passes import Plan, ThresholdOf, WallPass
 from chipload.planning.thinwall.variants import DepthOperation, even, limited_to, unlimited
 from chipload.planning.thinwall.variants import PlannedVariant as Planned
@@ -55,6 +57,7 @@ class Tried:
         self.done = PLANNING
         self.variable = 0
         self.planned: dict[str, Planned] = {}
+        self.proved: list[tuple[Program, Planned, tuple[PassProgram, ...]]] = []
         self.corrections: Corrections = ()
         self.share = 1.0
 
@@ -78,7 +81,33 @@ class Tried:
             ),
         )
         self.done = low + width
+        self.proved.append((program, planned, pass_programs))
         return _variant(self.places, planned, program, run, proof)
+
+    def prove_text(self, one: Variant, read: Program, times: Floats) -> Variant:
+        """Return a variant as the simulation of its written text finds it.
+
+        Parameters
+        ----------
+        one : as it was planned and simulated
+        read : its text as it was read back, with the lines of its program
+        times : (n,) float [s], time of each row of it on the machine
+        """
+        planned, pass_programs = next((p, own) for program, p, own in self.proved if program is one.program)
+        proof = kept_proof(
+            self.keep,
+            replace(planned.plan, name=f"text of {one.name}"),
+            lambda: prove(
+                self.places,
+                planned.plan,
+                pass_programs,
+                times,
+                lambda p, w: self.progress(self.done + (1.0 - self.done) * p, f"text of {one.name}: {w}"),
+                read,
+            ),
+        )
+        run = OnMachine(one.commands, times, one.beyond)
+        return _variant(self.places, planned, one.program, run, proof)
 
 
 def unlimited_plan(places: Places) -> Planned:
@@ -214,7 +243,7 @@ def compared_variants(tried: Tried, variable: Variant, constant: Variant) -> dic
     places, op, out = tried.places, tried.places.inputs.job.operation, {}
     if op.least_error:
         out["least_error"] = least_error(
-            places, _depth_operations(places, tried.share, tried.corrections, False), constant.seconds,
+            places, _depth_operations(places, tried.share, tried.corrections, False), constant,
             lambda planned: program_seconds(places, planned), lambda planned: tried.prove(planned, 0.4),
         )  # fmt: skip
     if op.compensate_um > 0.0:
