@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from chipload.cli import app
 from chipload.machine.machine import machine_named
 from chipload.program._jerk_limited import jerk_limited
 from chipload.program.build import plunge, rapid
@@ -145,3 +148,15 @@ def test_feeds_in_small_steps_that_keep_the_jerk_hardly_take_longer():
     free = program_time(rows, VMC).sum()
     time = program_time(rows, replace(VMC, jerk=j)).sum()
     assert free < time < 1.1 * free
+
+
+def test_a_program_on_a_machine_of_unknown_jerk_has_two_times(tmp_path):
+    """The terminal states both: stops at 21 places, without a limit of the jerk and at 20 m/s^3."""
+    stairs = "".join(f"G1 X{1.5 * ((k + 1) // 2)} Y{1.5 * (k // 2)} F6000\n" for k in range(1, 21))
+    text = tmp_path / "stairs.nc"
+    text.write_text(f"G21 G90 G17 G61\nG0 X0 Y0 Z0\n{stairs}M2\n")
+    shown = CliRunner().invoke(app, ["check", str(text), "--machine", "vmc"]).output
+    low, high = (20.0 * rest_to_rest(1.5, 100.0, 3000.0, j) / 60.0 for j in (1e15, 2e4))
+    found = re.search(r" mm, ([0-9.]+) to ([0-9.]+) min; ", shown)
+    assert [float(x) for x in found.groups()] == pytest.approx([low, high], rel=5e-3)
+    assert "time: An interval: the jerk of the machine is not known" in shown
