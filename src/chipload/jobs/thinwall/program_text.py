@@ -14,7 +14,7 @@ from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.tries import Tried
 from chipload.program.gcode.writer import write_commands
 from chipload.program.read import ProgramReading
-from chipload.program.read_back import lines_of_source, no_end, read_back, reading_findings, unread
+from chipload.program.read_back import no_end, read_back, reading_findings, rows_of_source, unread
 from chipload.program.release import NOT_SIMULATED, Release
 from chipload.report.programs import ENDINGS, program_name
 
@@ -76,7 +76,7 @@ def _read(walled: ThinWallResult, one: Variant, text: str) -> tuple[ProgramReadi
 def _simulated_text(walled: ThinWallResult, one: Variant, reading: ProgramReading, tried: Tried) -> Variant:
     """A variant as the simulation of its text finds it, which names the lines of its program."""
     program, times = timed(reading, walled.planning.cutters, walled.planning.machine)
-    lines = lines_of_source(one.program, reading)[len(reading.program) - len(program) :]
+    lines = one.program.line[rows_of_source(one.program, reading)][len(reading.program) - len(program) :]
     return tried.prove_text(one, replace(program, line=lines), times)
 
 
