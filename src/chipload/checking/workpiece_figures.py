@@ -49,7 +49,7 @@ def bent_section(bent: BentWorkpiece, where: str, figures: dict[str, go.Figure])
     x, y, z = bent.place
     return [
         "<h3>Greatest deflection</h3>",
-        f'<p class="note">{where}, under {number_text(np.linalg.norm(bent.force))} N; displacement drawn '
+        f'<p class="note">{where}, under {number_text(float(np.linalg.norm(bent.force)))} N; displacement drawn '
         f"{number_text(_scale(bent), 3)} times.</p>",
         figure("bent", bent_figure(bent), figures),
         f"<p>A support of 10 N/\u00b5m at ({x:.4g}, {y:.4g}, {z:.4g}) lowers the deflection there from "

@@ -28,7 +28,7 @@ def _change_time(dv: float, a: float, j: float) -> float:
 @njit(cache=True, error_model="numpy")
 def _change_length(v0: float, v1: float, a: float, j: float) -> float:
     """Way [mm] of a change of speed."""
-    return 0.5 * (v0 + v1) * _change_time(abs(v1 - v0), a, j)
+    return float(0.5 * (v0 + v1) * _change_time(abs(v1 - v0), a, j))
 
 
 @njit(cache=True, error_model="numpy")
@@ -52,7 +52,7 @@ def _reached(v0: float, length: float, a: float, j: float) -> float:
         u -= step
         if abs(step) <= 1e-15 * u:
             break
-    return v0 + u * u
+    return float(v0 + u * u)
 
 
 @njit(cache=True, error_model="numpy")
