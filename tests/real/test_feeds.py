@@ -53,6 +53,8 @@ divide = false
 [limits]
 force_n = {force}
 chip_max_mm = 0.12
+[checks]
+confidence = 0.5
 """
 #: the program, its job, its time [s] and greatest force [N] before and after
 PROGRAMS = {

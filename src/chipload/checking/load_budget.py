@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chipload.checking.drilling import THRUST, is_drilling
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.drilling import MODEL_SPREAD
-from chipload.cutting.load_parts import CHIP, MEANS, SCATTER, LoadParts, bounded_parts, bounded_rise
+from chipload.cutting.load_parts import CHIP, MEANS, LoadParts, bounded_parts, bounded_rise, deviation_of_rise
 from chipload.cutting.material import Material
 from chipload.result.budget import ErrorBudget, ErrorPart, factor_at
 from chipload.result.limits import Columns, LimitCheck
@@ -102,7 +102,7 @@ def factors_of_steps(
     size, rise, spread, thin, depth = (
         np.array([(x.load, x.rise, x.coefficients, x.thin_chips, x.radial_depth) for x in parts]).reshape(n, 5).T
     )
-    scatter = np.array([x.rise_deviation / x.rise if x.rise > 0.0 else 0.0 for x in parts])
+    assumed = np.array([x.assumed_runout for x in parts])
     mean, geometric = kind in MEANS, load == CHIP
     # of a load that is another one of the force, as a deflection, the force itself is the measure
     share = np.divide(size, nominal, out=np.ones(n), where=nominal > 0.0)
@@ -112,7 +112,7 @@ def factors_of_steps(
         random = random + TURNS**2
     bends = np.divide(deflection_mm, depth, out=np.zeros(n), where=depth > 0.0)
     bounds = error + (0.0 if mean or geometric else peaks) + bends
-    return factor_at(confidence, bounds, rise, np.sqrt(random + (scatter * rise) ** 2))
+    return factor_at(confidence, bounds, rise, np.sqrt(random + np.where(assumed, deviation_of_rise(rise), 0.0) ** 2))
 
 
 def bounded_factors(columns: Columns, cutters: Mapping[int, Cutter], material: Material, confidence: float) -> Floats:
@@ -124,8 +124,8 @@ def bounded_factors(columns: Columns, cutters: Mapping[int, Cutter], material: M
     for number in np.unique(tool).tolist() if confidence > 0.5 else ():
         own, cutter = tool == number, cutters.get(int(number), cutters[min(cutters)])
         rise, worst = bounded_rise(cutter, material, chip[own]), bounded_parts(cutter, material, 0.0)
-        scatter = SCATTER if worst.assumed_runout else 0.0
-        deviation = np.sqrt(worst.coefficients**2 + TURNS**2 + (scatter * rise) ** 2)
+        scatter = deviation_of_rise(rise) if worst.assumed_runout else 0.0
+        deviation = np.sqrt(worst.coefficients**2 + TURNS**2 + scatter**2)
         out[own] = factor_at(confidence, 0.0, rise, deviation)
     return out
 

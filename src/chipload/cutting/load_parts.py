@@ -5,8 +5,9 @@ size of a runout whose direction is not known; K, C coefficients and their covar
 :mod:`chipload.cutting.band`. All parts are relative to L.
 
 * Runout raises the peaks: rise = L(e) / L - 1. Of an assumed e it is the mean over :data:`DIRECTIONS` directions, and
-  its standard deviation is :data:`SCATTER` of it: e is taken as even between 0.5 and 1.5 of its value. Of a stated e
-  it is the greatest over the directions. Means over a revolution do not rise.
+  its standard deviation is :data:`SCATTER` of it: e is taken as even between 0.5 and 1.5 of its value. Relative to the
+  risen load L (1 + rise) that is SCATTER rise / (1 + rise). Of a stated e it is the greatest over the directions. Means
+  over a revolution do not rise.
 * Coefficients: sqrt(g C g) / L, g = dL / dK at the rotation of the peak.
 * Chips below the measured range: half the share that the edge forces have in L, by the part of the engaged edge on
   which the chip is thinner.
@@ -19,7 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.band import deviations, peak_band
@@ -84,8 +85,8 @@ class LoadParts:
 
     @property
     def rise_deviation(self) -> float:
-        """Standard deviation of the rise."""
-        return SCATTER * self.rise if self.assumed_runout else 0.0
+        """Standard deviation of the rise, relative to the risen load."""
+        return float(deviation_of_rise(self.rise)) if self.assumed_runout else 0.0
 
     def relative_to(self, load: float) -> LoadParts:
         """Return the parts relative to another load that is at least as great; what this one lacks counts as rise.
@@ -136,6 +137,16 @@ def bounded_parts(cutter: Cutter, material: Material, chip: float) -> LoadParts:
     spread = float(np.max(np.divide(values, sizes, out=np.zeros(6), where=sizes > 0.05 * sizes[[0, 0, 0, 3, 3, 3]])))
     rise = float(bounded_rise(cutter, material, np.array([chip]))[0])
     return LoadParts(1.0, rise, spread, 0.0, runout_of(cutter)[1], not material.has_band)
+
+
+def deviation_of_rise(rise: ArrayLike) -> Floats:
+    """Return the standard deviation of a rise by an assumed runout, relative to the risen load: below SCATTER.
+
+    >>> deviation_of_rise([0.0, 0.25, 1e6]).round(4).tolist()
+    [0.0, 0.0577, 0.2887]
+    """
+    r = np.asarray(rise, dtype=np.float64)
+    return np.asarray(SCATTER * r / (1.0 + r))
 
 
 def bounded_rise(cutter: Cutter, material: Material, chip: Floats) -> Floats:
