@@ -23,6 +23,7 @@ from slot_programs import (
     COEFFICIENTS,
     JOB,
     LIMIT_N,
+    MACHINE,
     allowed_feeds,
     forces,
     lines_in,
@@ -39,6 +40,7 @@ def new_text(text: str, divide: bool) -> tuple[str, dict[int, range], str]:
         folder = Path(name)
         (folder / "a.ngc").write_text(text)
         (folder / "m.toml").write_text(made_up_material(*COEFFICIENTS))
+        (folder / "machine.toml").write_text(MACHINE)
         (folder / "job.toml").write_text(JOB)
         done = run_job(load_job(folder / "job.toml", [f"operation.0.feeds.divide={str(divide).lower()}"]))
     feeds = done.outcome.feeds

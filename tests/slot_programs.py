@@ -1,6 +1,6 @@
 """Programs of slots and passes of varied step-over, and what feed each place of them allows: an oracle in NumPy.
 
-Nothing of the package is used. The block is cut by a flat end mill whose every edge point is followed: a point of the
+No code of the package is used. The block is cut by a flat end mill whose every edge point is followed: a point of the
 rim is in material where it lies in the block and outside all that the path swept before. The chip is f_z sin(phi).
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
@@ -203,10 +204,17 @@ def written_feeds(text: str, places: Places, first: list[range]) -> Floats:
     return out
 
 
+#: the shipped machine without a limit of the jerk, as the times here have none
+MACHINE = (
+    (files("chipload") / "data" / "machines" / "vmc.toml")
+    .read_text(encoding="utf-8")
+    .replace("jerk_low_mm_s3 = 20000.0", "jerk_mm_s3 = 1e9")
+)
+
 JOB = f"""[program]
 file = "a.ngc"
 [machine]
-name = "vmc"
+file = "machine.toml"
 [stock]
 low_mm = [{LOW[0]}, {LOW[1]}, {LOW[2]}]
 high_mm = [{HIGH[0]}, {HIGH[1]}, {HIGH[2]}]

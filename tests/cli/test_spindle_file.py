@@ -47,7 +47,7 @@ def test_the_values_are_those_of_the_file(job):
 def test_a_check_goes_through(job):
     code, out, err = call("check", job, "--set", "torque_control.override.light_nm=0.06")
     assert (code, err) == (0, "")
-    assert "torque limit of about 0.22 N m" in out
+    assert "torque limit of about 0.19 N m" in out
 
 
 def test_more_than_was_identified_is_refused(job):

@@ -14,6 +14,7 @@ from slot_programs import (
     COEFFICIENTS,
     JOB,
     LIMIT_N,
+    MACHINE,
     allowed_feeds,
     forces,
     lines_in,
@@ -29,6 +30,7 @@ TEXT, LINES = program(0, 2)
 
 def done(folder: Path, text: str, job: str, changes: tuple[str, ...] = ()) -> FinishedJob:
     (folder / "m.toml").write_text(made_up_material(*COEFFICIENTS))
+    (folder / "machine.toml").write_text(MACHINE)
     (folder / "a.ngc").write_bytes(text.encode())
     (folder / "job.toml").write_text(job)
     return run_job(load_job(folder / "job.toml", list(changes)))

@@ -84,6 +84,7 @@ EXAMPLES = {
     "body_mm": "[[0.0, 0.0], [8.0, 6.0], [8.0, 20.0]]", "at_mm": "[40.0, 0.0, 8.0]",
     "high_mm": "[60.0, 40.0, 0.0]", "holder_mm": "[[20.0, 25.0], [30.0, 40.0]]",
     "pitch_deg": "[88.0, 92.0, 88.0, 92.0]", "layers": '["WALL"]',
+    "setup.lines": "[1, 40]", "setup.zero": '["x0", "y0", "z+"]', "setup.zero_mm": "[40.0, 0.0, 8.0]",
     "strategies": '["plain", "backward"]', "allowance_mm": "0.2", "wall.allowance_mm": "[0.3, 0.3]", "wall.face": "3",
     "opposite": "[10.0, 2.0, 15.0]", "places": "[8, 6]",
     "elements": "[8, 8]", "files": '["section_1.txt", "section_2.txt"]', "columns": '"X Y Z"', "span": "[0.1, 1.0]",

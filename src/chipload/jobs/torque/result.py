@@ -143,7 +143,7 @@ def _track(outcome: TorqueResult, case: ControllerCase, name: str) -> Track:
         in_use=used,
         time_s=outcome.time_of(run),
         limits=limits_of(outcome, columns, track),
-        findings=(*_run_findings(case, run), *range_findings(outcome.job.checks, columns)),
+        findings=(*_run_findings(outcome, case, run), *range_findings(outcome.job.checks, columns)),
         programs=_programs(outcome, case, name),
         parameters={"latency_s": case.loop.latency, "override_step": case.quantum},
         energy_balance=outcome.energy_balance["real"],
@@ -224,21 +224,18 @@ def _controlled(outcome: TorqueResult, run: ControllerRun) -> Columns:
     }
 
 
-def _run_findings(case: ControllerCase, run: ControllerRun) -> tuple[Finding, ...]:
+def _run_findings(outcome: TorqueResult, case: ControllerCase, run: ControllerRun) -> tuple[Finding, ...]:
     """Findings of a run in addition to its limits."""
-    out, o, plain = [], run.outcome, case.runs[PLAIN].outcome
+    out, o, plain = [], run.outcome, case.runs[PLAIN]
     if not o.finished:
         text = f"the controller stopped at {o.s[-1]:.4g} mm of the path: {o.ended}"
         out.append(Finding("controller-stopped", 0, text, Severity.EXCEEDS))
     if float(o.override.max()) > run.config.cap:
         text = f"override {float(o.override.max()):.4g} exceeds {run.config.cap:.4g}"
         out.append(Finding("override-above-cap", 0, text, Severity.EXCEEDS))
-    if o.finished and plain.finished and o.time > plain.time:
-        text = (
-            f"takes {number_text(o.time)} s, longer than the {number_text(plain.time)} s of the constant feed "
-            "that keeps the limit "
-            "everywhere"
-        )
+    if o.finished and plain.outcome.finished and o.time > plain.outcome.time:
+        times = [number_text(outcome.time_of(one)) for one in (run, plain)]
+        text = f"takes {times[0]} s, longer than the {times[1]} s of the constant feed that keeps the limit everywhere"
         out.append(Finding("slower-than-constant", 0, text, Severity.EXCEEDS))
     return tuple(out)
 
