@@ -47,6 +47,8 @@ step_mm = 10.0
 [limits]
 force_n = 1e5
 torque_nm = 1e3
+[checks]
+confidence = 0.5
 """
 
 

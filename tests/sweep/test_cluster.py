@@ -73,6 +73,7 @@ def test_a_worker_that_is_killed_in_the_middle_loses_nothing(cluster, tmp_path):
     """The bytes are those of one process, and the worker that is left did the rest."""
     address, workers = cluster
     job = slot_job(tmp_path / "job")
+    job.write_text(job.read_text() + "[checks]\nconfidence = 0.5\n")
     ended: list[int] = []
 
     def progress(done: float, _: str) -> None:

@@ -48,7 +48,7 @@ def turn_matrix(axis: str, degrees: float) -> Floats:
     first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
     out = np.eye(3)
     out[first, first] = out[second, second] = c
-    out[first, second], out[second, first] = -s, s
+    out[first, second], out[second, first] = 0.0 - s, s
     return out
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -153,6 +154,7 @@ def _five_axis(milled: ImpellerResult) -> list[Track]:
         every = () if isinstance(p.every, str) else (f"{name}{ALL}.{ending}",)
         files = (f"{name}.{ending}", f"{name}.apt", *every)
         blocks = in_memory(motion_columns(p.read.program, p.read.times))
+        limits = _with_lines(limits, p.read)
         out.append(Track(name, TrackKind.PROGRAM, False, p.seconds, limits, findings, files, blocks=blocks))
     return out
 
@@ -172,7 +174,14 @@ def _track(
     ending = ENDINGS[milled.machine.dialect]
     files = () if empty else (f"{name}.{ending}", f"{name}.apt", *((f"{name}{ALL}.{ending}",) if repeats else ()))
     blocks = clearance_blocks(read.program, read.times, cutter, walls)
+    limits = _with_lines(limits, read)
     return Track(name, TrackKind.PROGRAM, in_use, read.seconds, limits, findings, files, blocks=blocks)
+
+
+def _with_lines(limits: Sequence[LimitCheck], read: ReadProgram) -> tuple[LimitCheck, ...]:
+    """Return limits with the line of the text that their row was read from."""
+    lines = read.program.line
+    return tuple(check if check.row is None else replace(check, line=int(lines[check.row])) for check in limits)
 
 
 def _gouge(track: str, checked: Checked | CheckedRough | FiveAxisProgram) -> LimitCheck:
