@@ -138,3 +138,17 @@ def test_refused(change, text):
     with pytest.raises(InputError) as err:
         Commands(**{**columns, **change}, frames=(Frame(),), labels=("x",))
     assert str(err.value) == text
+
+
+def test_a_turn_beside_a_way_of_nearly_nothing_takes_its_time():
+    """0.2 rad in 0.4 s beside 0.02 µm: LinuxCNC takes at least 0.1 mm/min along X and would turn 33 times too fast."""
+    rows = [
+        (RAPID, nine(1.0, 2, 3), 0, (0, 0), 0, 0, 10.0, 1, False, 0, 1, 0),
+        (LINE, nine(1.00002, 2, 3, 0.2), 0, (0, 0), 0, 2e-5 / 0.4, 10.0, 1, False, 0, 2, 0),
+        (LINE, nine(2.0, 2, 3, 0.4), 0, (0, 0), 0, 1.0 / 0.4, 10.0, 1, False, 0, 3, 0),
+    ]
+    c = commands_from_rows(rows, (Frame(),), ("x",))
+    text = write_commands(c, machine_named("xyzac-trunnion"), title="t", release=NOT_SIMULATED)
+    assert "G93 A11.459156 F150\n" in text
+    read, _ = read_gcode(text)
+    assert read.feed[-2:].tolist() == pytest.approx([0.5, 2.5], rel=1e-4)

@@ -19,6 +19,7 @@ from chipload.machine.machine import Machine
 from chipload.program.commands import ARC, DWELL, LETTERS, LINE, PLANE_AXES, RAPID, XY, Commands, arc_sweeps, extents
 from chipload.program.commands import starts as starts_of
 from chipload.program.control import control_named
+from chipload.program.gcode.controller import LEAST_INVERSE
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
 
 Floats = NDArray[np.float64]
@@ -26,6 +27,8 @@ Floats = NDArray[np.float64]
 #: comments that LinuxCNC would act upon
 _ACTIVE = re.compile(r"^\s*(abort|axis|debug|log|logappend|logclose|logopen|msg|print|probeclose|probeopen|py)\b", re.I)
 _LONGEST_COMMENT = 120
+#: way of linear axes beside a turn that is left out where it would spoil the time of the turn [mm]
+HELD_MM = 1e-3
 
 
 def comment(text: str, fanuc: bool) -> str:
@@ -197,6 +200,7 @@ class Blocks:
             words = self._arc(k)
         else:
             turn = "G0" if c.motion[k] == RAPID else "G1"
+            to = self._held(k, to)
             words = [f"{LETTERS[x]}{to[x]}" for x in self.columns if to[x] != self.at[x]]
             if not words:
                 return []
@@ -214,6 +218,21 @@ class Blocks:
                 words.append(f"F{feed}")
                 self.feed = feed
         return words
+
+    def _held(self, k: int, to: list[str]) -> list[str]:
+        """Return the end of a motion by inverse time, with linear axes that hardly move where they are.
+
+        LinuxCNC counts the time along the linear axes and takes a feed of at least LEAST_INVERSE: a turn beside a way
+        of nearly 0 would be far too fast. Where only the rotary axes move the time is theirs.
+        """
+        if self.minutes[k] <= 0.0 or self.commands.motion[k] == RAPID or not all(self.at[x] for x in self.columns):
+            return to
+        linear = [x for x in self.columns if LETTERS[x] not in "ABC"]
+        way = math.hypot(*(float(to[x]) - float(self.at[x]) for x in linear))
+        turns = any(to[x] != self.at[x] for x in self.columns if x not in linear)
+        if not turns or not 0.0 < way <= HELD_MM or way > LEAST_INVERSE * self.minutes[k]:
+            return to
+        return [self.at[x] if x in linear else text for x, text in enumerate(to)]
 
     def _arc(self, k: int) -> list[str]:
         """End and centre of an arc, and its plane where that is another."""
