@@ -154,8 +154,8 @@ def _five_axis(milled: ImpellerResult) -> list[Track]:
         every = () if isinstance(p.every, str) else (f"{name}{ALL}.{ending}",)
         files = (f"{name}.{ending}", f"{name}.apt", *every)
         blocks = in_memory(motion_columns(p.read.program, p.read.times))
-        limits = _with_lines(limits, p.read)
-        out.append(Track(name, TrackKind.PROGRAM, False, p.seconds, limits, findings, files, blocks=blocks))
+        lined = _with_lines(limits, p.read)
+        out.append(Track(name, TrackKind.PROGRAM, False, p.seconds, lined, findings, files, blocks=blocks))
     return out
 
 
