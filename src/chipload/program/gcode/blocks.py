@@ -200,7 +200,7 @@ class Blocks:
             words = self._arc(k)
         else:
             turn = "G0" if c.motion[k] == RAPID else "G1"
-            to = self._held(k, to)
+            to = self._turn_end(k, to)
             words = [f"{LETTERS[x]}{to[x]}" for x in self.columns if to[x] != self.at[x]]
             if not words:
                 return []
@@ -219,7 +219,7 @@ class Blocks:
                 self.feed = feed
         return words
 
-    def _held(self, k: int, to: list[str]) -> list[str]:
+    def _turn_end(self, k: int, to: list[str]) -> list[str]:
         """Return the end of a motion by inverse time, with linear axes that hardly move where they are.
 
         LinuxCNC counts the time along the linear axes and takes a feed of at least LEAST_INVERSE: a turn beside a way
