@@ -59,7 +59,7 @@ def main() -> int:
         guess = (ratio[0] * program.cutting + ratio[1] * program.edge)[is_cut].mean()
         error.append(abs(guess / real - 1.0))
         share = np.array([program.cutting[is_cut].mean(), program.edge[is_cut].mean()])
-        before, after = (np.sqrt(share @ m @ share) for m in map(tangential_shares, (PRIOR, found.material)))
+        before, after = (np.sqrt(share @ m @ share) for m in map(shares_of_prior, (PRIOR, found.material)))
         left.append(after / guess / (before / share.sum()))
     u = np.array(ranks)
     print(
@@ -78,7 +78,7 @@ def main() -> int:
     return int(bad)
 
 
-def tangential_shares(material):
+def shares_of_prior(material):
     """Return the covariance (2, 2) of Ktc and Kte over those of the prior."""
     values = np.array([PRIOR.Ktc, PRIOR.Kte])
     return material.variances[np.ix_([0, 3], [0, 3])] / np.outer(values, values)

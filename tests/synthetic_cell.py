@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chipload.control.learning import TORQUE_ERROR, WEAR_SCALE_S, LogBlocks, Signal, blocks_of
+from chipload.control.learning import TORQUE_ERROR, WEAR_SCALE_S, LogBlocks, Signal, SignalKind, blocks_of
 from chipload.control.log_alignment import PredictedTorque, align_log
-from chipload.control.logs import Log
+from chipload.control.logs import SpindleLog
 from chipload.cutting.material import material_named
 
 PRIOR = material_named("al7075-t6")
@@ -53,7 +53,7 @@ def draw_truth(rng: np.random.Generator) -> Truth:
 
 def power_log(
     rng: np.random.Generator, truth: Truth, program: PredictedTorque, before: float, idle: tuple[float, float]
-) -> Log:
+) -> SpindleLog:
     """Return a log of the power [N mm/s] every 0.1 s, with its own clock, an idle power of the day and noise."""
     error = TORQUE_ERROR * rng.standard_normal()
     lag, rate = rng.uniform(2.0, 20.0), rng.uniform(0.95, 1.2)
@@ -66,7 +66,7 @@ def power_log(
     gain = truth.gain * (1.0 + error) / EFFICIENCY
     power = idle[0] * (1.0 + 0.02 * rng.standard_normal()) + idle[1] * program.speed[0]
     power = power + np.where(running, gain * program.speed[row] * torque[row], 0.0)
-    return Log(t, power=power + rng.standard_normal(len(t)) * rng.uniform(0.01, 0.05) * power.max())
+    return SpindleLog(t, power=power + rng.standard_normal(len(t)) * rng.uniform(0.01, 0.05) * power.max())
 
 
 def cell(seed: int, logs: int = 3) -> tuple[list[LogBlocks], Signal, Truth]:
@@ -81,4 +81,4 @@ def cell(seed: int, logs: int = 3) -> tuple[list[LogBlocks], Signal, Truth]:
         assert log.power is not None
         out.append(blocks_of(align_log(f"log {k}", log, log.power, program), program, before))
         before += program.cut_seconds
-    return out, Signal("power", 1.0 / EFFICIENCY, GAIN_ERROR), truth
+    return out, Signal(SignalKind.POWER, 1.0 / EFFICIENCY, GAIN_ERROR), truth

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from chipload.checking.stiffness import MachineStiffness
     from chipload.checking.workpiece import FinishedPart, Fixture, Stock
     from chipload.control.learning import LearnedMaterial
-    from chipload.control.logs import Log
+    from chipload.control.logs import SpindleLog
     from chipload.cutter.table import CutterTable as Cutter
     from chipload.cutting.fit import Fit
     from chipload.cutting.material import Material
@@ -76,7 +76,6 @@ __all__ = [
     "LimitCheck",
     "Limits",
     "LocationErrors",
-    "Log",
     "Machine",
     "MachineStiffness",
     "Material",
@@ -89,6 +88,7 @@ __all__ = [
     "Result",
     "SimulationSettings",
     "SpeedMargins",
+    "SpindleLog",
     "StabilityLobes",
     "Stock",
     "Track",
@@ -150,7 +150,7 @@ _PLACES = {
     "LimitCheck": ("chipload.result.limits", "LimitCheck"),
     "Limits": ("chipload.checking.settings", "Limits"),
     "LocationErrors": ("chipload.api.mechanics.stability", "LocationErrors"),
-    "Log": ("chipload.control.logs", "Log"),
+    "SpindleLog": ("chipload.control.logs", "SpindleLog"),
     "Machine": ("chipload.machine.machine", "Machine"),
     "MachineStiffness": ("chipload.checking.stiffness", "MachineStiffness"),
     "Material": ("chipload.cutting.material", "Material"),

@@ -9,6 +9,7 @@ import pytest
 
 from chipload import jobs
 from command import call
+from spindle_logs import IDLE, KT, spindle_log
 
 JOB = """
 [program]
@@ -38,6 +39,8 @@ force_n = 5000.0
 #: passes of unlike width, depth and feed, with air between them
 PASSES = [(2.0, 6.0, 900), (1.0, 3.0, 1500), (6.0, 4.0, 700), (9.0, 2.0, 500), (0.5, 8.0, 2000), (4.0, 5.0, 1000)]
 TRUE = {"ktc_mpa": 950.0, "kte_n_mm": 22.0}
+#: of the spindle [rad/s], 8000 rpm
+SPEED = 837.76
 
 
 def program_text() -> str:
@@ -61,6 +64,10 @@ def cell(tmp_path_factory):
     history = jobs.run_job(jobs.load_job(folder / "true_job.toml")).result.in_use[0].columns
     end = history["t_s"]
     rng = np.random.default_rng(1)
+    t = np.arange(0.0, end[-1], 0.05)
+    current = IDLE[0] + IDLE[1] * SPEED + history["torque_mean_nm"][np.searchsorted(end, t)] / KT
+    rows = zip(t + 5.0, current + 0.02 * rng.standard_normal(len(t)), strict=True)
+    (folder / "current.csv").write_text("time_s,current_a\n" + "".join(f"{a:.3f},{i:.4f}\n" for a, i in rows))
     for k in range(2):
         t = np.arange(0.0, 1.1 * end[-1] + 8.0, 0.05)
         place = (t - 3.0) / 1.1
@@ -90,15 +97,32 @@ def test_coefficients_are_found(cell):
     assert jobs.check_job(jobs.load_job(cell / "next.toml"))[1]
 
 
+def test_current_of_an_identified_spindle(cell, tmp_path):
+    """The torque constant is the one that the spindle was identified with, on logs of its own."""
+    logs = [spindle_log(tmp_path / f"{k}.csv", k, torques, speeds=(600.0, SPEED)) for k, torques in
+            enumerate(((0.5, 1.0, 2.0), (0.8, 1.5)))]  # fmt: skip
+    assert call("spindle", *logs, "--out", tmp_path / "spindle.toml")[0] == 0
+    code, _, err = call(
+        "learn", cell / "current.csv", "--job", cell / "job.toml", "--out", tmp_path / "m.toml", "--spindle",
+        tmp_path / "spindle.toml",
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    found = tomllib.loads((tmp_path / "m.toml").read_text())
+    for k, (key, value) in enumerate(TRUE.items()):
+        deviation = found["covariance"][3 * k][3 * k] ** 0.5
+        assert deviation < 0.06 * value
+        assert abs(found[key] - value) < 2.5 * deviation
+
+
 def test_refusals(cell, tmp_path):
     job, out = cell / "job.toml", tmp_path / "m.toml"
     (tmp_path / "current.csv").write_text("time_s,current_a\n0,1\n1,2\n2,1\n")
     code, _, err = call("learn", tmp_path / "current.csv", "--job", job, "--out", out)
     assert code == 2
-    assert "no column of power or torque that all logs have; of current, state --spindle" in err
+    assert "no column of power or torque that all logs have; of current, state the spindle" in err
     code, _, err = call("learn", cell / "log0.csv", "--job", job, "--out", out, "--efficiency", "1.5")
     assert code == 2
-    assert "--efficiency = 1.5: must be above 0 and at most 1" in err
+    assert "efficiency = 1.5: must be above 0 and at most 1" in err
     noise = np.random.default_rng(0).normal(500.0, 50.0, 400)
     text = "".join(f"{0.1 * k:.1f},{p:.2f}\n" for k, p in enumerate(noise))
     (tmp_path / "noise.csv").write_text("time_s,power_w\n" + text)

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chipload.control.learning import Signal, blocks_of, learn_material
+from chipload.control.learning import Signal, SignalKind, blocks_of, learn_material, signal_of_logs
 from chipload.control.log_alignment import align_log
-from chipload.control.logs import Log
+from chipload.control.logs import SpindleLog
 from chipload.errors import InputError
 from synthetic_cell import EFFICIENCY, PRIOR, Truth, cell, closed_form_program, power_log
 
-SIGNAL = Signal("power", 1.0 / EFFICIENCY, 0.02)
+SIGNAL = Signal(SignalKind.POWER, 1.0 / EFFICIENCY, 0.02)
 IDLE = (2e5, 100.0)
 TRUTH = Truth(1.2, 0.85, 1.0, 0.0)
 
@@ -72,7 +72,7 @@ def test_clock_and_override(program):
     # half of the log at half of the feed: each sample lasts twice as long
     half = np.arange(len(log.time)) > len(log.time) // 2
     time = np.cumsum(np.where(half, 0.2, 0.1)) - 0.1
-    slow = Log(time, power=log.power, override=np.where(half, 0.5, 1.0))
+    slow = SpindleLog(time, power=log.power, override=np.where(half, 0.5, 1.0))
     assert align_log("log", slow, slow.power, program).rate == pytest.approx(rate, rel=1e-3)
     with pytest.raises(InputError, match="correlation"):
         align_log("log", replace(slow, override=None), slow.power, program)
@@ -86,10 +86,12 @@ def test_lines_align_what_a_lag_cannot(program):
     row = np.concatenate([row[:middle], np.full(400, row[middle]), row[middle:]])
     torque = 1.2 * program.cutting + 0.85 * program.edge
     power = 2e5 + torque[row] * program.speed[row] / EFFICIENCY
-    log = Log(0.1 * np.arange(len(row)), power=power, line=program.line[row].astype(float))
+    log = SpindleLog(0.1 * np.arange(len(row)), power=power, line=program.line[row].astype(float))
     aligned = align_log("log", log, log.power, program)
     assert aligned.correlation > 0.95
-    found = learn_material([blocks_of(aligned, program)], Signal("power", 1.0 / EFFICIENCY, 0.0), PRIOR).material
+    found = learn_material(
+        [blocks_of(aligned, program)], Signal(SignalKind.POWER, 1.0 / EFFICIENCY, 0.0), PRIOR
+    ).material
     assert found.Ktc == pytest.approx(1.2 * PRIOR.Ktc, rel=0.06)
 
 
@@ -140,5 +142,43 @@ def test_contradicting_logs(program):
     for k, factor in enumerate((1.0, 1.0, 2.0)):
         truth = Truth(factor, factor, 1.0, 0.0)
         logs.append(blocks(power_log(np.random.default_rng(30 + k), truth, program, 0.0, IDLE), program, f"log {k}"))
-    with pytest.raises(InputError, match=r"log 2: its cut takes \+\d+ % of what the other logs agree on"):
+    with pytest.raises(InputError, match=r"log 2: its cut takes \d+ % more than that of the other logs"):
         learn_material(logs, SIGNAL, PRIOR)
+
+
+def test_another_material_is_named(program):
+    """Forces of 2.2 times the prior, 4.8 of its standard deviations: they are learned, and not believed in silence."""
+    log = power_log(np.random.default_rng(40), Truth(2.2, 2.2, 1.0, 0.0), program, 0.0, IDLE)
+    found = learn_material([blocks(log, program)], SIGNAL, PRIOR)
+    text = [f.text for f in found.findings if f.code == "log-material"]
+    assert [t.split()[0] for t in text] == ["Ktc", "Kte"]
+    assert "another material or tool, or a wrong efficiency" in text[0]
+    assert found.material.Ktc == pytest.approx(2.2 * PRIOR.Ktc, rel=0.1)
+
+
+def test_a_size_effect_without_edge_force(program):
+    """Ktc of a material whose Kte is 0 and whose directions have spreads of their own."""
+    prior = replace(
+        PRIOR, Kte=0.0, Kre=0.0, Kae=0.0, exponents=(0.25, 0.25, 0.25), spread=0.3, spread_directions=(0.4, 0.5)
+    )
+    plain = replace(program, edge=np.zeros(len(program.edge)))
+    log = power_log(np.random.default_rng(41), Truth(1.2, 1.0, 1.0, 0.0), plain, 0.0, IDLE)
+    found = learn_material([blocks(log, plain)], SIGNAL, prior).material
+    assert found.Kte == 0.0
+    assert abs(found.Ktc - 1.2 * prior.Ktc) < 2.5 * np.sqrt(found.variances[0, 0]) < 0.15 * prior.Ktc
+    assert np.allclose(np.sqrt(np.diagonal(found.variances))[1:3], [0.4 * prior.Krc, 0.5 * prior.Kac])
+
+
+def test_override_in_percent(log, program):
+    percent = replace(log, override=np.full(len(log.time), 100.0))
+    with pytest.raises(InputError, match="override = 100: must be from 0 to 3, a share of the programmed feed"):
+        align_log("log", percent, percent.power, program)
+
+
+def test_an_efficiency_is_not_ignored(log):
+    torque = replace(log, torque=log.power)
+    assert signal_of_logs([torque]).kind is SignalKind.TORQUE
+    with pytest.raises(InputError, match="efficiency: not used: the logs state the torque"):
+        signal_of_logs([torque], 0.9)
+    assert signal_of_logs([log], 0.9).gain_error == 0.05
+    assert signal_of_logs([log]) == Signal(SignalKind.POWER, 1.25, 0.1)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from chipload.errors import InputError
-from chipload.planning.line_division import PRICE, change_time, line_ends, segment_feeds
+from chipload.planning.line_division import PRICE, line_ends, segment_feeds
+from chipload.program.time import change_time
 
 
 def cost(s: np.ndarray, v: np.ndarray, length: float, a: float, block: float, ends: tuple[int, ...]) -> float:

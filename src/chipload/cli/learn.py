@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,16 +11,12 @@ import typer
 from chipload.cli.app import Debug, Sets, app
 from chipload.errors import InputError, Severity
 from chipload.number_text import number_text
-from chipload.terminal import EXCEEDED, guarded, show
+from chipload.terminal import EXCEEDED, bar, guarded, show
 
 if TYPE_CHECKING:
     from chipload.control.learning import LearnedMaterial, Signal
     from chipload.control.log_alignment import PredictedTorque
     from chipload.cutting.material import Material
-
-#: efficiency of a spindle drive that is not stated, and its standard deviation: 0.9 with a belt, 0.7 to 0.8 with gears
-#: [MachinerysHandbook, machine tool efficiency factors]
-EFFICIENCY, EFFICIENCY_ERROR = 0.8, 0.08
 
 
 @app.command()
@@ -42,7 +37,7 @@ def learn(
         float | None, typer.Option("--efficiency", help="power of the cut over the logged power, from 0 to 1")
     ] = None,
     efficiency_error: Annotated[
-        float | None, typer.Option("--efficiency-error", help="its relative standard deviation, e.g. 0.05")
+        float | None, typer.Option("--efficiency-error", help="its relative standard deviation; default 0.05")
     ] = None,
     columns: Annotated[
         Path | None,
@@ -59,7 +54,7 @@ def learn(
     """
 
     def work() -> int:
-        from chipload.control.learning import learn_from_logs
+        from chipload.control.learning import SignalKind, learn_from_logs, signal_of_logs
         from chipload.control.logs import read_log
         from chipload.cutting.material import material_text
         from chipload.files import write_whole
@@ -74,10 +69,14 @@ def learn(
         if len(read) < len(logs):
             raise InputError("LOG: two logs have one name: name each once, and rename one of two")
         predicted, prior = _prediction(job, sets or ())
-        stated = (spindle, efficiency, efficiency_error)
-        signal, lag, told = _signal(stated, predicted, list(read.values()))
-        if told:
-            show(told)
+        if spindle is None:
+            signal, lag = signal_of_logs(read.values(), efficiency, efficiency_error), 0.0
+        elif efficiency is None and efficiency_error is None:
+            signal, lag = _signal_of_spindle(spindle, predicted)
+        else:
+            raise InputError("--spindle, --efficiency: state only one of them")
+        if signal.kind is SignalKind.POWER:
+            show(f"efficiency of the spindle: {number_text(1.0 / signal.gain)} +- {100.0 * signal.gain_error:.2g} %")
         found, aligned = learn_from_logs(read, predicted, signal, prior, lag, name, ", ".join(hashes))
         for one in aligned:
             stated_line = read[one.name].line is not None
@@ -97,7 +96,7 @@ def learn(
 def _prediction(job: Path, sets: Any) -> tuple[PredictedTorque, Material]:
     """Return the torque of the program of a job, simulated now, and the material of the job."""
     from chipload import jobs
-    from chipload.control.log_alignment import predicted_torque
+    from chipload.api.mechanics.learning import torque_of_result
     from chipload.jobs.simulation.job import ProgramJob
     from chipload.jobs.simulation.run import material_of
 
@@ -105,50 +104,31 @@ def _prediction(job: Path, sets: Any) -> tuple[PredictedTorque, Material]:
     if not isinstance(loaded.job, ProgramJob):
         raise InputError(f"{job}: a job of {loaded.capability.name}: state one that simulates the program that ran")
     material = material_of(loaded.job)
-    result = jobs.run_job(loaded, accept=True).result
-    return predicted_torque(result.in_use[0].columns if result.in_use else {}, str(job)), material
+    with bar() as progress:
+        result = jobs.run_job(loaded, progress, accept=True).result
+    return torque_of_result(result, str(job)), material
 
 
-def _signal(
-    stated: tuple[Path | None, float | None, float | None], predicted: PredictedTorque, logs: list[Any]
-) -> tuple[Signal, float, str]:
-    """Return what the logs measure, the time constant of the sensor, and what was taken for it."""
-    from chipload.control.learning import Signal
+def _signal_of_spindle(file: Path, predicted: PredictedTorque) -> tuple[Signal, float]:
+    """Return the signal that a spindle was identified from, and the time constant of its sensor [s]."""
+    from chipload.control.learning import Signal, SignalKind
     from chipload.control.spindle_file import read_spindle
 
-    spindle, efficiency, error = stated
-    if spindle is not None:
-        if efficiency is not None or error is not None:
-            raise InputError("--spindle, --efficiency: state only one of them")
-        data = read_spindle(spindle, float(predicted.speed.max()))
-        constant = data.values.get("torque_constant_nm_a")
-        if constant is None:
-            raise InputError(
-                f"{spindle}: no torque constant or efficiency: log a cut of known torque for chipload spindle"
-            )
-        share = float(data.values.get("torque_constant_error_share", 0.0)) / 1.96
-        gain = 1.0 / float(constant) if data.source == "power" else 1e-3 / float(constant)
-        return Signal(data.source, gain, share), float(data.values.get("sensor_lag_s", 0.0)), ""
-    kinds = [kind for kind in ("torque", "power") if all(getattr(log, kind) is not None for log in logs)]
-    if not kinds:
-        raise InputError("LOG: no column of power or torque that all logs have; of current, state --spindle")
-    if kinds[0] == "torque":
-        return Signal("torque", 1.0, error or 0.0), 0.0, ""
-    for option, value in (("--efficiency", efficiency), ("--efficiency-error", error)):
-        if value is not None and not (0.0 < value <= 1.0 and math.isfinite(value)):
-            raise InputError(f"{option} = {value:g}: must be above 0 and at most 1")
-    told = ""
-    if efficiency is None:
-        told = (
-            f"efficiency of the spindle: {EFFICIENCY:g} +- {EFFICIENCY_ERROR:g} taken; state --spindle or --efficiency"
-        )
-    own = EFFICIENCY if efficiency is None else efficiency
-    spread = error if error is not None else EFFICIENCY_ERROR / EFFICIENCY if efficiency is None else 0.0
-    return Signal("power", 1.0 / own, spread), 0.0, told
+    data = read_spindle(file, float(predicted.speed.max()))
+    constant = data.values.get("torque_constant_nm_a")
+    if constant is None:
+        raise InputError(f"{file}: no torque constant or efficiency: log a cut of known torque for chipload spindle")
+    # the file states half of the interval at 95 %
+    error = float(data.values.get("torque_constant_error_share", 0.0)) / 1.96
+    kind = SignalKind(data.source)
+    gain = 1.0 / float(constant) if kind is SignalKind.POWER else 1e-3 / float(constant)
+    return Signal(kind, gain, error), float(data.values.get("sensor_lag_s", 0.0))
 
 
 def lines_of(found: LearnedMaterial) -> list[str]:
     """Return what was learned, a line each."""
+    from chipload.control.learning import share_text
+
     before, after = found.deviations
     out = []
     for k, (key, unit) in enumerate((("Ktc", "MPa"), ("Kte", "N/mm"))):
@@ -159,6 +139,6 @@ def lines_of(found: LearnedMaterial) -> list[str]:
         )
     out.append("Krc, Kac, Kre, Kae: as before: power and current tell the tangential force alone")
     for key, error in found.fit_error.items():
-        out.append(f"{key}: the cut takes {100.0 * error:+.2g} % of what is predicted now")
+        out.append(f"{key}: its cut takes {share_text(error)} than the new coefficients predict")
     out.append(f"{found.used} blocks used, {found.left_out} left out")
     return [*out, *map(str, found.findings)]

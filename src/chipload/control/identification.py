@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaincinv
 
-from chipload.control.logs import Log
+from chipload.control.logs import SpindleLog
 from chipload.control.spindle import Run, SpindleMap, estimate, first_order, identify_runs, known_rows
 from chipload.errors import InputError
 
@@ -128,7 +128,7 @@ class IdentifiedSpindle:
         return float(self.found.half_width[0]) / self.found.torque_constant
 
 
-def run_of(log: Log, label: str, source: str, air: bool = False) -> Run:
+def run_of(log: SpindleLog, label: str, source: str, air: bool = False) -> Run:
     """Return the rows of a log in which the spindle turns.
 
     Parameters

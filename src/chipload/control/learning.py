@@ -19,8 +19,9 @@ Reference: [Altintas2012] ch. 2 for the torque.
 
 from __future__ import annotations
 
+import enum
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,7 +30,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from chipload.control.log_alignment import AlignedLog, PredictedTorque, align_log
-from chipload.control.logs import Log
+from chipload.control.logs import SpindleLog
 from chipload.cutting.material import Material
 from chipload.errors import Finding, InputError, Severity
 from chipload.number_text import number_text
@@ -49,23 +50,36 @@ MOST_BLOCKS, LEAST_SAMPLES, BLOCK_LAGS = 240, 3, 4.0
 #: a block further than so many standard deviations from the posterior is left out; of those that scatter normally,
 #: 1 of 15,000 is
 OUTLIER = 4.0
+#: efficiency of a spindle drive that is not stated, and its relative standard deviation: 0.9 with a belt, 0.7 to 0.8
+#: with gears [Machinery2020, efficiency of machine tools]; that of one which is stated without its error
+EFFICIENCY, EFFICIENCY_ERROR, STATED_ERROR = 0.8, 0.1, 0.05
+#: coefficients further from the prior than so many of its standard deviations are another material's
+BELIEVED = 3.0
 #: share of blocks that may be left out of a log before it contradicts the others
 MOST_OUTLIERS = 0.2
 
 
+class SignalKind(enum.StrEnum):
+    """What a log measures of the spindle: the name of its column."""
+
+    POWER = "power"
+    CURRENT = "current"
+    TORQUE = "torque"
+
+
 @dataclass(frozen=True)
 class Signal:
-    """What a log measures of the spindle.
+    """What logs measure of the spindle, and how it follows from the cut.
 
     Parameters
     ----------
-    kind : ``power``, ``current`` or ``torque``
+    kind : of the signal
     gain : of the signal over the power [N mm/s] or the torque [N mm] of the cut: 1 / efficiency, 1 / torque constant
         [A/(N mm)], 1
     gain_error : its relative standard deviation
     """
 
-    kind: str
+    kind: SignalKind
     gain: float
     gain_error: float
 
@@ -74,6 +88,44 @@ class Signal:
             raise InputError(f"signal.gain = {self.gain:g}: must be above 0")
         if not 0.0 <= self.gain_error < 1.0:
             raise InputError(f"signal.gain_error = {self.gain_error:g}: must be from 0 to below 1")
+
+    def of_torque(self, speed: Floats) -> Floats:
+        """Return what a gain of 1 makes of a torque of 1 at speeds (n,) [rad/s]."""
+        return speed if self.kind is SignalKind.POWER else np.ones(len(speed))
+
+
+def signal_of_logs(
+    logs: Iterable[SpindleLog], efficiency: float | None = None, efficiency_error: float | None = None
+) -> Signal:
+    """Return the signal of logs that all have torque, or all have power.
+
+    Parameters
+    ----------
+    efficiency : power of the cut over the logged power, above 0 to 1; None: EFFICIENCY
+    efficiency_error : its relative standard deviation, from 0 to below 1; None: that of EFFICIENCY, or STATED_ERROR
+
+    Raises
+    ------
+    InputError
+        Neither is in all logs, a number is out of range, or an efficiency is stated for logs of torque.
+    """
+    read = list(logs)
+    stated = efficiency is not None or efficiency_error is not None
+    if all(log.torque is not None for log in read):
+        if stated:
+            raise InputError("efficiency: not used: the logs state the torque: leave it out")
+        return Signal(SignalKind.TORQUE, 1.0, 0.0)
+    if not all(log.power is not None for log in read):
+        raise InputError("no column of power or torque that all logs have; of current, state the spindle")
+    own = EFFICIENCY if efficiency is None else efficiency
+    error = efficiency_error
+    if error is None:
+        error = EFFICIENCY_ERROR if efficiency is None else STATED_ERROR
+    if not 0.0 < own <= 1.0:
+        raise InputError(f"efficiency = {own:g}: must be above 0 and at most 1")
+    if not 0.0 <= error < 1.0:
+        raise InputError(f"efficiency_error = {error:g}: must be from 0 to below 1")
+    return Signal(SignalKind.POWER, 1.0 / own, error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +138,8 @@ class LogBlocks:
     time : [s] of its middle, in the log
     signal, speed, cutting, edge : means over the block; the torques in N mm, 0 in the air
     edge_time : mean of edge torque times the time for which the tool has cut [N mm s]
-    misfit : half of what the signal may change if the alignment is off by a sample, in its unit, for a gain of 1
+    misfit : what the torque of the block would change if the alignment were off by a sample, or by the lag of the
+        sensor [N mm]
     line, tool : of its middle
     """
 
@@ -110,7 +163,7 @@ class LearnedMaterial:
     ----------
     material, prior : after and before
     wear : tool number -> growth of Kte an hour of cutting, relative, and its standard deviation
-    fit_error : log -> mean of signal over prediction in the cut, less 1, of the logs alone that were left out
+    fit_error : log -> signal of its cut over what the new coefficients predict, less 1
     used, left_out : blocks
     findings : what contradicts the model, by line
     """
@@ -126,10 +179,7 @@ class LearnedMaterial:
     @property
     def deviations(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Relative standard deviations of Ktc and Kte: (before, before), (after, after)."""
-        before, after = (
-            np.sqrt(np.diagonal(m.variances))[TANGENTIAL] / np.array(m.coefficients)[TANGENTIAL]
-            for m in (self.prior, self.material)
-        )
+        before, after = (np.sqrt(np.diagonal(tangential_shares(m))) for m in (self.prior, self.material))
         return (float(before[0]), float(before[1])), (float(after[0]), float(after[1]))
 
 
@@ -153,10 +203,10 @@ def blocks_of(
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
     length = max((time[-1] - time[0]) / MOST_BLOCKS, LEAST_SAMPLES * step, BLOCK_LAGS * sensor_lag)
     place = ((time - time[0]) / length).astype(np.int64)
-    kept, n = np.ones(len(time), dtype=np.bool_), int(place[-1]) + 1
-    # speeds up to the cut and the time before the program runs tell the idle spindle only where the speed is known
-    speed = np.where(inside, predicted.speed[row], np.nan)
-    kept &= np.isfinite(speed) & (speed > 0.0)
+    n = int(place[-1]) + 1
+    # before and after the program the speed of the spindle is not known
+    speed = np.where(inside, predicted.speed[row], 0.0)
+    kept = speed > 0.0
     torque = np.where(inside, load[row], 0.0)
     columns = {
         "signal": aligned.signal, "speed": speed, "cutting": np.where(inside, predicted.cutting[row], 0.0),
@@ -171,14 +221,14 @@ def blocks_of(
     jumps = np.zeros(n)
     change = np.abs(np.diff(torque, prepend=torque[:1]))
     np.add.at(jumps, place[kept], change[kept])
-    lagging = max(sensor_lag / length, 1.0 / max(length / step, 1.0))
+    late = max(sensor_lag, step) / length
     middle = np.array([int(np.median(np.flatnonzero(place == k))) if c else 0 for k, c in enumerate(count)])
     full = (count >= max(LEAST_SAMPLES, int(0.5 * length / step))) & (count > 0)
     whole = {key: values[full] for key, values in means.items()}
     at = row[middle[full]]
     return LogBlocks(
         aligned.name, whole["time"], whole["signal"], whole["speed"], whole["cutting"], whole["edge"],
-        whole["edge_time"], (jumps * lagging)[full], predicted.line[at], predicted.tool[at],
+        whole["edge_time"], (jumps * late)[full], predicted.line[at], predicted.tool[at],
     )  # fmt: skip
 
 
@@ -196,8 +246,7 @@ class _SpindleModel:
         self.error = slice(self.wear.stop, self.wear.stop + n)
         self.idle = slice(self.error.stop, self.error.stop + n)
         self.size = self.idle.stop + int(self.slope)
-        values = np.array(prior.coefficients)[TANGENTIAL]
-        share = prior.variances[np.ix_(TANGENTIAL, TANGENTIAL)] / np.outer(values, values)
+        share = tangential_shares(prior)
         typical = max(float(np.abs(np.concatenate([log.signal for log in logs])).max()), np.finfo(np.float64).tiny)
         self.mean = np.zeros(self.size)
         self.mean[:3] = 1.0
@@ -207,7 +256,8 @@ class _SpindleModel:
         if self.slope:
             deviation[-1] = 10.0 * typical / speeds.max()
         covariance = np.diag(deviation**2)
-        covariance[:2, :2] = share
+        # a coefficient of 0, as Kte with a size effect, stays
+        covariance[:2, :2] = share + np.diag(np.where(np.diagonal(share) > 0.0, 0.0, 1e-12))
         self.root = np.linalg.inv(np.linalg.cholesky(covariance))
 
     def predict(self, x: Floats, k: int) -> Floats:
@@ -217,12 +267,10 @@ class _SpindleModel:
         for tool, d in zip(self.tools, x[self.wear], strict=True):
             wear[log.tool == tool] = d
         torque = x[0] * log.cutting + x[1] * (log.edge + wear * log.edge_time)
-        out = x[self.idle][k] + self.signal.gain * x[2] * (1.0 + x[self.error][k]) * torque * self.per_torque(k)
+        out = x[self.idle][k] + self.signal.gain * x[2] * (1.0 + x[self.error][k]) * torque * self.signal.of_torque(
+            log.speed
+        )
         return np.asarray(out + x[-1] * log.speed if self.slope else out)
-
-    def per_torque(self, k: int) -> Floats:
-        """Return what a gain of 1 makes of a torque, in the blocks of log k."""
-        return self.logs[k].speed if self.signal.kind == "power" else np.ones(len(self.logs[k].time))
 
     def start(self) -> Floats:
         """Return the prior, with the idle signal of each log where nothing is cut."""
@@ -255,10 +303,6 @@ def learn_material(
     logs = [log for log in logs if len(log.time)]
     if not any((log.cutting > 0.0).any() for log in logs):
         raise InputError("no log has a block in the cut: at least three samples in a row are needed")
-    if prior.Kte <= 0.0:
-        raise InputError(
-            f"material {prior.name}: kte_n_mm = 0: the edge force must be stated, if only with a wide spread"
-        )
     for log in logs:
         _check_unit(log, signal)
     model = _SpindleModel(logs, signal, prior)
@@ -274,10 +318,12 @@ def learn_material(
     if len(logs) > 1 and np.abs(off).max() > OUTLIER * TORQUE_ERROR:
         worst = int(np.argmax(np.abs(off)))
         raise InputError(
-            f"{logs[worst].name}: its cut takes {100.0 * off[worst]:+.0f} % of what the other logs agree on, at most "
-            f"{100.0 * OUTLIER * TORQUE_ERROR:.0f} % is believed: another tool or material, or worn out; leave it out"
+            f"{logs[worst].name}: its cut takes {share_text(off[worst])} than that of the other logs, at most "
+            f"{100.0 * OUTLIER * TORQUE_ERROR:.0f} % is believed: one of them has another tool or material, or a worn "
+            "edge; leave it out"
         )
-    findings = [f for k in range(len(logs)) for f in _findings_of(model, x, k, kept[k], noise[k])]
+    findings = _far_from_prior(prior, x)
+    findings += [f for k in range(len(logs)) for f in _findings_of(model, x, k, kept[k], noise[k])]
     for log, own in zip(logs, kept, strict=True):
         out = 1.0 - own.mean()
         if out > MOST_OUTLIERS:
@@ -307,8 +353,43 @@ def learn_material(
     )  # fmt: skip
 
 
+def share_text(share: float) -> str:
+    """Return a difference in words.
+
+    >>> share_text(0.046), share_text(-0.2)
+    ('4.6 % more', '20 % less')
+    """
+    return f"{number_text(100.0 * abs(share), 2)} % {'more' if share >= 0.0 else 'less'}"
+
+
+def tangential_shares(material: Material) -> Floats:
+    """Return the covariance (2, 2) of Ktc and Kte relative to them; 0 for a coefficient of 0.
+
+    >>> plain = Material("plain", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="made up for this example", spread=0.1)
+    >>> tangential_shares(plain).round(9).tolist()
+    [[0.01, 0.0], [0.0, 0.0]]
+    """
+    values = np.array(material.coefficients)[TANGENTIAL]
+    size = np.outer(values, values)
+    own = material.variances[np.ix_(TANGENTIAL, TANGENTIAL)]
+    return np.divide(own, size, out=np.zeros((2, 2)), where=size > 0.0)
+
+
+def _far_from_prior(prior: Material, x: Floats) -> list[Finding]:
+    """Return a finding on each coefficient that the spread of the prior does not explain."""
+    out = []
+    for name, ratio, sd in zip(("Ktc", "Kte"), x[:2], np.sqrt(np.diagonal(tangential_shares(prior))), strict=True):
+        if sd > 0.0 and abs(ratio - 1.0) > BELIEVED * sd:
+            text = (
+                f"{name} is {number_text(float(ratio), 3)} times that of {prior.name}, {abs(ratio - 1.0) / sd:.1f} "
+                "of its standard deviations away: another material or tool, or a wrong efficiency"
+            )
+            out.append(Finding("log-material", 0, text, Severity.UNPROVEN))
+    return out
+
+
 def learn_from_logs(
-    logs: Mapping[str, Log],
+    logs: Mapping[str, SpindleLog],
     predicted: PredictedTorque,
     signal: Signal,
     prior: Material,
@@ -332,7 +413,8 @@ def learn_from_logs(
     """
     aligned, blocks, before = [], [], 0.0
     for key, log in logs.items():
-        values = {"power": log.power, "current": log.current, "torque": log.torque}[signal.kind]
+        columns = {SignalKind.POWER: log.power, SignalKind.CURRENT: log.current, SignalKind.TORQUE: log.torque}
+        values = columns[signal.kind]
         if values is None:
             raise InputError(f"{key}: no column of {signal.kind}, which the other logs have: learn from them apart")
         aligned.append(align_log(key, log, values, predicted, sensor_lag))
@@ -345,7 +427,7 @@ def learn_from_logs(
 
 def _check_unit(log: LogBlocks, signal: Signal) -> None:
     """Refuse a signal whose size is 10 or 1000 times off: the unit."""
-    load = (log.cutting + log.edge) * (log.speed if signal.kind == "power" else 1.0)
+    load = (log.cutting + log.edge) * signal.of_torque(log.speed)
     if not (load > 0.0).any():
         return
     centred = load - load.mean()
@@ -381,7 +463,7 @@ def _noise(log: LogBlocks, signal: Signal) -> Floats:
 
     Residuals of neighbours that are alike (correlation r) count as fewer: variance times (1 + r) / (1 - r).
     """
-    factor = log.speed if signal.kind == "power" else np.ones(len(log.speed))
+    factor = signal.of_torque(log.speed)
     design = np.column_stack(
         [np.ones(len(log.time)), *(factor * part for part in (log.cutting, log.edge, log.edge_time))]
     )
@@ -450,11 +532,12 @@ def _material_after(prior: Material, ratio: Floats, share: Floats, name: str, ev
     t, o = TANGENTIAL, [1, 2, 4, 5]
     tangential = share * np.outer(values[t], values[t])
     after[np.ix_(t, t)] = tangential
-    across = before[np.ix_(o, t)] @ np.linalg.solve(before[np.ix_(t, t)], tangential)
+    across = before[np.ix_(o, t)] @ np.linalg.pinv(before[np.ix_(t, t)], hermitian=True) @ tangential
     after[np.ix_(o, t)], after[np.ix_(t, o)] = across, across.T
     source = f"{prior.source}; tangential coefficients learned from {evidence or 'logs of the spindle'}"
     numbers: dict[str, Any] = {"Ktc": float(values[0] * ratio[0]), "Kte": float(values[3] * ratio[1])}
     covariance: Any = tuple(map(tuple, (0.5 * (after + after.T)).tolist()))
     return replace(
-        prior, name=name or f"{prior.name}-learned", source=source, spread=None, covariance=covariance, **numbers
+        prior, name=name or f"{prior.name}-learned", source=source, spread=None, spread_directions=None,
+        covariance=covariance, **numbers,
     )  # fmt: skip

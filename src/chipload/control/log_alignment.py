@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.signal import correlate
 
-from chipload.control.logs import Log
+from chipload.control.logs import SpindleLog
 from chipload.control.spindle import first_order
 from chipload.errors import Finding, InputError, Severity
 from chipload.number_text import number_text
@@ -30,6 +30,8 @@ Floats = NDArray[np.float64]
 LEAST_CORRELATION = 0.8
 #: how much longer than calculated a program may take on the machine, and how much shorter
 RATES = (0.8, 1.5)
+#: greatest feed override of a control
+MOST_OVERRIDE = 3.0
 #: samples of the search for lag and rate, and rates that are tried
 SAMPLES, TRIED = 4096, 71
 #: a step of time over the usual one, and in seconds, that is a gap
@@ -133,7 +135,9 @@ def predicted_torque(columns: Mapping[str, NDArray[Any]], name: str) -> Predicte
     )  # fmt: skip
 
 
-def align_log(name: str, log: Log, signal: Floats, predicted: PredictedTorque, sensor_lag: float = 0.0) -> AlignedLog:
+def align_log(
+    name: str, log: SpindleLog, signal: Floats, predicted: PredictedTorque, sensor_lag: float = 0.0
+) -> AlignedLog:
     """Return the row of the history at which each sample of a log was taken.
 
     Parameters
@@ -155,6 +159,12 @@ def align_log(name: str, log: Log, signal: Floats, predicted: PredictedTorque, s
         raise InputError(f"{name}: the program cuts nothing, so that its log tells nothing of the material")
     clock = log.time - log.time[0]
     if log.override is not None:
+        worst = log.override[np.argmax(np.abs(log.override))]
+        if not (log.override >= 0.0).all() or worst > MOST_OVERRIDE:
+            raise InputError(
+                f"{name}: override = {worst:g}: must be from 0 to {MOST_OVERRIDE:g}, a share of the programmed feed; "
+                "in percent, name the column override_percent"
+            )
         clock = np.concatenate([[0.0], np.cumsum(np.diff(log.time) * log.override[1:])])
     lag, rate = 0.0, 1.0
     place = None if log.line is None else _time_by_line(log.line, clock, predicted, start)

@@ -62,7 +62,7 @@ KNOWN = {
 
 
 @dataclass(frozen=True, eq=False)
-class Log:
+class SpindleLog:
     """Columns of a log; a column that it lacks is None.
 
     Parameters
@@ -101,7 +101,7 @@ class _Columns:
     head: bool
 
 
-def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = None) -> tuple[Log, list[Finding]]:
+def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = None) -> tuple[SpindleLog, list[Finding]]:
     """Read a log from a CSV file.
 
     Parameters
@@ -156,7 +156,7 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = Non
             Finding("log-time", number[first] + 2, f"{int((~rising).sum())} rows are left out: time does not rise")
         )
         made = {key: column[rising] for key, column in made.items()}
-    return Log(**made), findings
+    return SpindleLog(**made), findings
 
 
 def _table(text: str, head: bool) -> tuple[list[str], Any]:

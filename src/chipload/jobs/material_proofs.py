@@ -13,14 +13,13 @@ from statistics import NormalDist
 
 import numpy as np
 
+from chipload.checking.settings import CheckSettings
 from chipload.cutting.load_parts import with_spread
 from chipload.cutting.material import Material
 from chipload.units import mm_min_from_mm_s
 
 #: chip [mm] at which the spread of a load is stated; the middle of the range where it is outside
 CHIP_MM = 0.1
-#: as the verdict's default
-CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ def load_deviations(material: Material, chip: float) -> tuple[float, float]:
     return math.sqrt(covariance[0, 0]) / float(force[0]), math.sqrt(float(along @ covariance @ along)) / size
 
 
-def proved_shares(material: Material, confidence: float = CONFIDENCE) -> tuple[float, float]:
+def proved_shares(material: Material, confidence: float = CheckSettings.confidence) -> tuple[float, float]:
     """Return the shares of a limit of torque and of force up to which it is proved, by the coefficients alone.
 
     >>> plain = Material("plain", 1000.0, 0.0, 0.0, 0.0, 0.0, 0.0, source="made up for this example", spread=0.25)
@@ -74,7 +73,7 @@ def proved_shares(material: Material, confidence: float = CONFIDENCE) -> tuple[f
     return torque, force
 
 
-def material_proofs(material: Material, confidence: float = CONFIDENCE) -> tuple[CheckProof, ...]:
+def material_proofs(material: Material, confidence: float = CheckSettings.confidence) -> tuple[CheckProof, ...]:
     """Return what each check of a program can prove with a material."""
     torque, force = proved_shares(material, confidence)
     lacks = "unproven: the radial and axial coefficients are not known"
@@ -93,7 +92,7 @@ def material_proofs(material: Material, confidence: float = CONFIDENCE) -> tuple
     )  # fmt: skip
 
 
-def proofs_text(material: Material, confidence: float = CONFIDENCE) -> str:
+def proofs_text(material: Material, confidence: float = CheckSettings.confidence) -> str:
     """Return the lines of what a material states and proves."""
     m, known = material, with_spread(material)
     names = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")

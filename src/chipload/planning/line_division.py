@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
+from chipload.program.time import change_time
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -31,19 +32,6 @@ Ints = NDArray[np.int64]
 PRICE = 2e-3
 #: stations beside a change of the allowed feed that may be ends too, and ends that a segment may pass over at most
 BESIDE, PASSED = 2, 400
-
-
-def change_time(dv: ArrayLike, acceleration: float, jerk: float | None) -> Floats:
-    """Time (n,) [s] of changes of speed by ``dv`` (n,) [mm/s], without acceleration at both ends.
-
-    >>> change_time([100.0, 1.0], 1000.0, 1e4).round(6).tolist()
-    [0.2, 0.02]
-    """
-    d = np.abs(np.asarray(dv, dtype=np.float64))
-    if jerk is None:
-        return d / acceleration
-    short = 2.0 * np.sqrt(d / jerk)
-    return np.where(d >= acceleration**2 / jerk, d / acceleration + acceleration / jerk, short)
 
 
 def line_ends(

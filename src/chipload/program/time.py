@@ -30,7 +30,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipload.machine.feed import corner_speed, limited_speed, move_time, row_time_limited
 from chipload.machine.machine import Machine
@@ -108,6 +108,19 @@ def program_time(program: Program, machine: Machine) -> Floats:
         else:
             out[row] = jerk_limited(length, most, a, joints, v, machine.jerk)[0]
     return np.where(unplaced, 0.0, out)
+
+
+def change_time(dv: ArrayLike, acceleration: float, jerk: float | None) -> Floats:
+    """Time (n,) [s] of changes of speed by ``dv`` (n,) [mm/s], without acceleration at both ends.
+
+    >>> change_time([100.0, 1.0], 1000.0, 1e4).round(6).tolist()
+    [0.2, 0.02]
+    """
+    d = np.abs(np.asarray(dv, dtype=np.float64))
+    if jerk is None:
+        return d / acceleration
+    short = 2.0 * np.sqrt(d / jerk)
+    return np.where(d >= acceleration**2 / jerk, d / acceleration + acceleration / jerk, short)
 
 
 def time_high(program: Program, machine: Machine, time: float) -> float | None:

@@ -22,8 +22,6 @@ from chipload.number_text import number_text
 
 #: confidence of the value that is shown beside the nominal one where limits are held at the nominal one
 SHOWN = 0.95
-#: begins a remedy where one part alone takes the value beyond its limit
-ALONE = "only by "
 
 
 @dataclass(frozen=True)
@@ -117,15 +115,16 @@ class ErrorBudget:
         ]
         return ", ".join(f"{name} {number_text(x, 2)}" for name, x in shown)
 
-    def remedy(self, nominal: float, limit: float, *, least: bool = False) -> str:
-        """Return the one statement that brings the value within its limit, or does most for it; empty: none does.
-
-        Where one part alone takes the value beyond the limit, the text says so.
+    def remedy(self, nominal: float, limit: float, *, least: bool = False) -> tuple[ErrorPart | None, str]:
+        """Return the part that alone takes the value beyond its limit, and the one statement that brings the value
+        within it, or does most for it; None: more than one part does, or nothing can be stated for it; empty: no
+        statement does.
 
         >>> fit = ErrorPart("coefficients", deviation=0.1, remedy="fit them")
         >>> own = ErrorBudget(0.95, (fit, ErrorPart("turns", deviation=0.015)))
-        >>> own.remedy(180.0, 190.0)
-        'only by coefficients: fit them'
+        >>> part, text = own.remedy(180.0, 190.0)
+        >>> part.name, text
+        ('coefficients', 'fit them')
         """
         settling = []
         for part in self.parts:
@@ -135,9 +134,9 @@ class ErrorBudget:
                 settling.append(part)
         stated = [part for part in settling if part.remedy] or [part for part in self.parts if part.remedy]
         if not stated:
-            return ""
+            return None, ""
         text = max(stated, key=lambda part: part.alone(self.confidence)).remedy
-        return f"{ALONE}{settling[0].name}: {text}" if len(settling) == 1 and settling[0].remedy else text
+        return (settling[0] if len(settling) == 1 and settling[0].remedy else None), text
 
 
 def _factor(parts: tuple[ErrorPart, ...], confidence: float) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.number_text import number_text, percent_text
-from chipload.result.budget import ALONE, ErrorBudget, level_text
+from chipload.result.budget import ErrorBudget, level_text
 from chipload.result.columns import Column, column_of, error_of
 from chipload.result.coverage import FAR_BEYOND, WHOLE, Coverage, CoveredRows, coverage_of
 from chipload.result.verdict import Verdict
@@ -259,11 +259,11 @@ def hold_at_confidence(check: LimitCheck, budget: ErrorBudget) -> LimitCheck:
     if value >= check.limit if least else value <= check.limit:
         return out
     unit = f" {check.column.unit}" if check.column.unit else ""
-    remedy = budget.remedy(abs(check.worst), check.limit, least=least)
+    alone, remedy = budget.remedy(abs(check.worst), check.limit, least=least)
     parts = budget.parts_text(check.worst)
     reason = f"at {level_text(budget.confidence)} it may be {number_text(value, 3)}{unit} ({parts})"
-    joint = ", " if remedy.startswith(ALONE) else ": "
-    return replace(out, state=Verdict.UNPROVEN, reason=f"{reason}{joint}{remedy}" if remedy else reason)
+    reason += f", only by {alone.name}" if alone is not None else ""
+    return replace(out, state=Verdict.UNPROVEN, reason=f"{reason}: {remedy}" if remedy else reason)
 
 
 def state_of(

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipload.control.learning import LearnedMaterial, Signal, learn_from_logs
-from chipload.control.log_alignment import predicted_torque
-from chipload.control.logs import Log
+from chipload.control.learning import LearnedMaterial, learn_from_logs, signal_of_logs
+from chipload.control.log_alignment import PredictedTorque, predicted_torque
+from chipload.control.logs import SpindleLog
 from chipload.cutting.material import Material
 from chipload.errors import InputError
 
@@ -25,7 +25,7 @@ def spindle_log(
     torque_nm: ArrayLike | None = None,
     line: ArrayLike | None = None,
     override: ArrayLike | None = None,
-) -> Log:
+) -> SpindleLog:
     """Return a log of the spindle while a program ran.
 
     Parameters
@@ -50,7 +50,7 @@ def spindle_log(
     time = np.asarray(time_s, dtype=np.float64)
     if time.ndim != 1 or len(time) < 2 or not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():
         raise InputError("time_s: must be two or more finite numbers that rise")
-    return Log(
+    return SpindleLog(
         time,
         power=_column("power_w", power_w, 1e3, len(time)),
         torque=_column("torque_nm", torque_nm, 1e3, len(time)),
@@ -70,12 +70,12 @@ def _column(name: str, values: ArrayLike | None, factor: float, n: int) -> NDArr
 
 
 def learn(
-    logs: Mapping[str, Log],
+    logs: Mapping[str, SpindleLog],
     result: Result,
     material: Material,
     *,
-    efficiency: float = 1.0,
-    efficiency_error: float = 0.0,
+    efficiency: float | None = None,
+    efficiency_error: float | None = None,
     name: str = "",
 ) -> LearnedMaterial:
     """Learn the tangential coefficients of a material from logs of a program that was simulated.
@@ -87,8 +87,8 @@ def learn(
     ----------
     logs : of :func:`spindle_log` by name, in the order in which they ran with the same tools; all of power or of torque
     result : of :func:`chipload.simulate` for the program that ran, with ``material``
-    efficiency : power of the cut over the logged power, above 0 to 1
-    efficiency_error : its relative standard deviation, from 0 to below 1
+    efficiency : power of the cut over the logged power, above 0 to 1; None: 0.8
+    efficiency_error : its relative standard deviation, from 0 to below 1; None: 0.1, or 0.05 of a stated efficiency
     name : of the new material; empty: that of the old one with ``-learned``
 
     Returns
@@ -103,11 +103,20 @@ def learn(
     """
     if not logs:
         raise InputError("logs: none is given")
-    if not result.in_use:
-        raise InputError("result: it has no simulated program")
-    if not 0.0 < efficiency <= 1.0:
-        raise InputError(f"efficiency = {efficiency:g}: must be above 0 and at most 1")
-    kind = "power" if all(log.power is not None for log in logs.values()) else "torque"
-    signal = Signal(kind, 1.0 / efficiency if kind == "power" else 1.0, efficiency_error)
-    predicted = predicted_torque(result.in_use[0].columns, "result")
-    return learn_from_logs(logs, predicted, signal, material, 0.0, name, ", ".join(logs))[0]
+    signal = signal_of_logs(logs.values(), efficiency, efficiency_error)
+    return learn_from_logs(logs, torque_of_result(result, "result"), signal, material, 0.0, name, ", ".join(logs))[0]
+
+
+def torque_of_result(result: Result, name: str) -> PredictedTorque:
+    """Return the torque of the program of a result; ``name`` is of the result, for messages.
+
+    Raises
+    ------
+    InputError
+        It has no simulated program, or several.
+    """
+    if len(result.in_use) != 1:
+        raise InputError(
+            f"{name}: {len(result.in_use)} programs are in use, one is needed: learn from each setup apart"
+        )
+    return predicted_torque(result.in_use[0].columns, name)
