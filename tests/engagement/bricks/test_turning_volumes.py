@@ -35,7 +35,7 @@ def test_upright_programs_remove_what_the_upright_engine_removes(kind: str) -> N
     tool = np.ones(len(points) - 1, dtype=int)
     known = upright_volumes(cutter, points)
     found = volumes(take(BrickStock(LOW, HIGH, {1: cutter}), points, UP, 24, 0.5), len(tool))
-    # the upright engine takes four times the slices where a flank comes down beside a floor: 0.2 % here
+    # of a height field of 0.03 mm under the path of the bull nose the upright engine is 0.03 % over, this one 0.23 %
     assert found.sum() == pytest.approx(known.sum(), rel=3e-3)
     # a bottom that comes down on a level floor is known to one part of a step
     fall = math.pi * cutter.apt[2] ** 2 * np.abs(np.diff(points[:, 2])) / MORE[1]
