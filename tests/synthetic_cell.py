@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chipload.control.learning import TORQUE_ERROR, WEAR_SCALE_S, LogBlocks, Signal, SignalKind, blocks_of
+from chipload.control.learning import TORQUE_ERROR, WEAR_SCALE_S, Signal, SignalKind
 from chipload.control.log_alignment import PredictedTorque, align_log
+from chipload.control.log_blocks import LogBlocks, blocks_of
 from chipload.control.logs import SpindleLog
 from chipload.cutting.material import material_named
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chipload.control.learning import Signal, SignalKind, blocks_of, learn_material, signal_of_logs
+from chipload.control.learning import Signal, SignalKind, learn_material, signal_of_logs
 from chipload.control.log_alignment import align_log
+from chipload.control.log_blocks import blocks_of
 from chipload.control.logs import SpindleLog
 from chipload.errors import InputError
 from synthetic_cell import EFFICIENCY, PRIOR, Truth, cell, closed_form_program, power_log

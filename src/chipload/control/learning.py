@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from chipload.control.log_alignment import AlignedLog, PredictedTorque, align_log
+from chipload.control.log_blocks import LogBlocks, blocks_of
 from chipload.control.logs import SpindleLog
 from chipload.cutting.material import Material
 from chipload.errors import Finding, InputError, Severity
@@ -45,8 +46,6 @@ TANGENTIAL = [0, 3]
 TORQUE_ERROR = 0.02
 #: prior of the wear of an edge: its coefficient may double in so many seconds of cutting, as a standard deviation
 WEAR_SCALE_S = 600.0
-#: blocks of a log at most, samples of one at least, and how often the time constant of the sensor it is long at least
-MOST_BLOCKS, LEAST_SAMPLES, BLOCK_LAGS = 240, 3, 4.0
 #: a block further than so many standard deviations from the posterior is left out; of those that scatter normally,
 #: 1 of 15,000 is
 OUTLIER = 4.0
@@ -129,33 +128,6 @@ def signal_of_logs(
 
 
 @dataclass(frozen=True, eq=False)
-class LogBlocks:
-    """Means over blocks of an aligned log, (k,) each.
-
-    Parameters
-    ----------
-    name : of the log
-    time : [s] of its middle, in the log
-    signal, speed, cutting, edge : means over the block; the torques in N mm, 0 in the air
-    edge_time : mean of edge torque times the time for which the tool has cut [N mm s]
-    misfit : what the torque of the block would change if the alignment were off by a sample, or by the lag of the
-        sensor [N mm]
-    line, tool : of its middle
-    """
-
-    name: str
-    time: Floats
-    signal: Floats
-    speed: Floats
-    cutting: Floats
-    edge: Floats
-    edge_time: Floats
-    misfit: Floats
-    line: Ints
-    tool: Ints
-
-
-@dataclass(frozen=True, eq=False)
 class LearnedMaterial:
     """A material after logs were read.
 
@@ -181,55 +153,6 @@ class LearnedMaterial:
         """Relative standard deviations of Ktc and Kte: (before, before), (after, after)."""
         before, after = (np.sqrt(np.diagonal(tangential_shares(m))) for m in (self.prior, self.material))
         return (float(before[0]), float(before[1])), (float(after[0]), float(after[1]))
-
-
-def blocks_of(
-    aligned: AlignedLog, predicted: PredictedTorque, before: float = 0.0, sensor_lag: float = 0.0
-) -> LogBlocks:
-    """Return the means of a log over blocks of equal time, long against the sensor.
-
-    Parameters
-    ----------
-    before : seconds for which each tool has cut before this log [s]
-    """
-    time, inside = aligned.time, aligned.row >= 0
-    row = np.maximum(aligned.row, 0)
-    start = np.concatenate([[0.0], predicted.time[:-1]])
-    load = predicted.cutting + predicted.edge
-    cut = np.zeros(len(load))
-    for number in np.unique(predicted.tool):
-        own = predicted.tool == number
-        cut[own] = np.cumsum(np.where(load > 0.0, predicted.time - start, 0.0)[own])
-    step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
-    length = max((time[-1] - time[0]) / MOST_BLOCKS, LEAST_SAMPLES * step, BLOCK_LAGS * sensor_lag)
-    place = ((time - time[0]) / length).astype(np.int64)
-    n = int(place[-1]) + 1
-    # before and after the program the speed of the spindle is not known
-    speed = np.where(inside, predicted.speed[row], 0.0)
-    kept = speed > 0.0
-    torque = np.where(inside, load[row], 0.0)
-    columns = {
-        "signal": aligned.signal, "speed": speed, "cutting": np.where(inside, predicted.cutting[row], 0.0),
-        "edge": np.where(inside, predicted.edge[row], 0.0), "time": time,
-        "edge_time": np.where(inside, predicted.edge[row] * (before + cut[row]), 0.0),
-    }  # fmt: skip
-    count = np.bincount(place[kept], minlength=n)
-    means = {
-        key: np.bincount(place[kept], values[kept], minlength=n) / np.maximum(count, 1)
-        for key, values in columns.items()
-    }
-    jumps = np.zeros(n)
-    change = np.abs(np.diff(torque, prepend=torque[:1]))
-    np.add.at(jumps, place[kept], change[kept])
-    late = max(sensor_lag, step) / length
-    middle = np.array([int(np.median(np.flatnonzero(place == k))) if c else 0 for k, c in enumerate(count)])
-    full = (count >= max(LEAST_SAMPLES, int(0.5 * length / step))) & (count > 0)
-    whole = {key: values[full] for key, values in means.items()}
-    at = row[middle[full]]
-    return LogBlocks(
-        aligned.name, whole["time"], whole["signal"], whole["speed"], whole["cutting"], whole["edge"],
-        whole["edge_time"], (jumps * late)[full], predicted.line[at], predicted.tool[at],
-    )  # fmt: skip
 
 
 class _SpindleModel:

@@ -1,0 +1,92 @@
+"""Means of an aligned log over blocks of equal time, and what a simulation predicts of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.control.log_alignment import AlignedLog, PredictedTorque
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: blocks of a log at most, samples of one at least, and how often the time constant of the sensor it is long at least
+MOST_BLOCKS, LEAST_SAMPLES, BLOCK_LAGS = 240, 3, 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class LogBlocks:
+    """Means over blocks of an aligned log, (k,) each.
+
+    Parameters
+    ----------
+    name : of the log
+    time : [s] of its middle, in the log
+    signal, speed, cutting, edge : means over the block; the torques in N mm, 0 in the air
+    edge_time : mean of edge torque times the time for which the tool has cut [N mm s]
+    misfit : what the torque of the block would change if the alignment were off by a sample, or by the lag of the
+        sensor [N mm]
+    line, tool : of its middle
+    """
+
+    name: str
+    time: Floats
+    signal: Floats
+    speed: Floats
+    cutting: Floats
+    edge: Floats
+    edge_time: Floats
+    misfit: Floats
+    line: Ints
+    tool: Ints
+
+
+def blocks_of(
+    aligned: AlignedLog, predicted: PredictedTorque, before: float = 0.0, sensor_lag: float = 0.0
+) -> LogBlocks:
+    """Return the means of a log over blocks of equal time, long against the sensor.
+
+    Parameters
+    ----------
+    before : seconds for which each tool has cut before this log [s]
+    """
+    time, inside = aligned.time, aligned.row >= 0
+    row = np.maximum(aligned.row, 0)
+    start = np.concatenate([[0.0], predicted.time[:-1]])
+    load = predicted.cutting + predicted.edge
+    cut = np.zeros(len(load))
+    for number in np.unique(predicted.tool):
+        own = predicted.tool == number
+        cut[own] = np.cumsum(np.where(load > 0.0, predicted.time - start, 0.0)[own])
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    length = max((time[-1] - time[0]) / MOST_BLOCKS, LEAST_SAMPLES * step, BLOCK_LAGS * sensor_lag)
+    place = ((time - time[0]) / length).astype(np.int64)
+    n = int(place[-1]) + 1
+    # before and after the program the speed of the spindle is not known
+    speed = np.where(inside, predicted.speed[row], 0.0)
+    kept = speed > 0.0
+    torque = np.where(inside, load[row], 0.0)
+    columns = {
+        "signal": aligned.signal, "speed": speed, "cutting": np.where(inside, predicted.cutting[row], 0.0),
+        "edge": np.where(inside, predicted.edge[row], 0.0), "time": time,
+        "edge_time": np.where(inside, predicted.edge[row] * (before + cut[row]), 0.0),
+    }  # fmt: skip
+    count = np.bincount(place[kept], minlength=n)
+    means = {
+        key: np.bincount(place[kept], values[kept], minlength=n) / np.maximum(count, 1)
+        for key, values in columns.items()
+    }
+    jumps = np.zeros(n)
+    change = np.abs(np.diff(torque, prepend=torque[:1]))
+    np.add.at(jumps, place[kept], change[kept])
+    late = max(sensor_lag, step) / length
+    middle = np.array([int(np.median(np.flatnonzero(place == k))) if c else 0 for k, c in enumerate(count)])
+    full = (count >= max(LEAST_SAMPLES, int(0.5 * length / step))) & (count > 0)
+    whole = {key: values[full] for key, values in means.items()}
+    at = row[middle[full]]
+    return LogBlocks(
+        aligned.name, whole["time"], whole["signal"], whole["speed"], whole["cutting"], whole["edge"],
+        whole["edge_time"], (jumps * late)[full], predicted.line[at], predicted.tool[at],
+    )  # fmt: skip
