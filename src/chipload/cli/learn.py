@@ -76,7 +76,8 @@ def learn(
         else:
             raise InputError("--spindle, --efficiency: state only one of them")
         if signal.kind is SignalKind.POWER:
-            show(f"efficiency of the spindle: {number_text(1.0 / signal.gain)} +- {100.0 * signal.gain_error:.2g} %")
+            spread = number_text(100.0 * signal.gain_error, 2)
+            show(f"efficiency of the spindle: {number_text(1.0 / signal.gain)} +- {spread} %")
         found, aligned = learn_from_logs(read, predicted, signal, prior, lag, name, ", ".join(hashes))
         for one in aligned:
             stated_line = read[one.name].line is not None
