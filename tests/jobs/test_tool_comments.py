@@ -67,6 +67,19 @@ POSTS = [
     ("(T3 8.5 DRILL 135DEG)", 1.0, "drill", {"d": 8.5, "bottom": 22.5}),
     ("(T3 M6 TAP DRILL 5.0)", 1.0, "drill", {"d": 5.0}),
     ('T="DRILL_8.5"', 1.0, "drill", {"guess": 8.5}),
+    ("(T2 - #4 CTR DRILL)", IN, "spot drill", {"d": 7.9375}),
+    ("(TOOL -2- DRILL DIA 8.5 DEG 118. )", 1.0, "drill", {"d": 8.5, "bottom": 31.0}),
+    # above a retraction and the change; CAMWorks names its operations below it
+    ("(3/8 EM CRB 4FL)\nG91 G28 X0 Y0 Z0\nT14 M06\n( Contour Mill1 )", IN, "end mill", {"d": 9.525, "flutes": 4}),
+    # PowerMill, hyperMILL: on the line of TOOL CALL, above and below it
+    ("; TOOL : 10mm Ballnosed, D=10.0 R=5.0\nTOOL CALL 3 Z S800\n; FINISH", 1.0, "ball nose", {"d": 10.0, "r": 5.0}),
+    ("TOOL CALL 12 Z S4500 F900 ; SCHAFTFRAESER D12 R0.5 Z4", 1.0, "end mill", {"d": 12.0, "r": 0.5, "flutes": 4}),
+    # a text that never changes its tool: Vectric, Estlcam, by hand on GRBL
+    ('T1\nG21\n(Tool: V-Bit {90 deg 0.5"})\nG0X25.', 1.0, "chamfer mill", {"d": 12.7, "bottom": 45.0}),
+    ("(Required tools:)\n(End mill 3mm)\nG21", 1.0, "end mill", {"d": 3.0}),
+    ('; 1/8" flat end mill\nG21 ; mm', 1.0, "end mill", {"d": 3.175}),
+    # Brother
+    ("(T3 D=6 CR=0 - RIGHT HAND TAP)\nG100 T3 X10. Y10. G43 Z30. H3", 1.0, "tap", {"d": 6.0}),
 ]  # fmt: skip
 KEYS = {
     "d": "diameter_mm", "r": "corner_radius_mm", "bottom": "bottom_deg", "flutes": "flutes", "flute": "flute_length_mm",

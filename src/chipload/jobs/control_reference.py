@@ -169,7 +169,11 @@ def _blocks(control: Control, family: bool = False) -> list[str]:
     rows.append(("M codes", " ".join(f"M{m}" for m in sorted(m for codes in M_GROUPS.values() for m in codes))))
     out = ["## Codes that are read", "", *_table(("what", "codes"), [row for row in rows if row[1]])]
     if changed:
-        names = {"idle": "without effect", "unread": "not read"}
+        names = {
+            "idle": "without effect", "unread": "not read", "change": "change of the tool and approach",
+            "tap": "G84 by the pitch I or J", "tap left": "G74 by the pitch I or J", "offset": "work offset by H",
+            "level": "level to which cycles with M53 go back",
+        }  # fmt: skip
         taken = [(shown(code), names.get(to) or shown(int(to))) for code, to in sorted(changed.items())]
         out += ["", "## Codes with another meaning", "", *_table(("code", "taken as"), taken)]
     if family:

@@ -59,17 +59,21 @@ class NcText:
     values: Mapping[int | str, float]
     table: ToolTable | None = field(init=False)
     stated: Mapping[int, StatedDiameter] = field(init=False)
+    unit: str = field(init=False)
     noted: tuple[Finding, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         """Take the tool table in its own unit."""
-        diameters = stated_diameters(self.text)
+        control = self.found.control.with_settings(self.setup.control.settings)
+        unit, _ = unit_of(self.text, control, self.setup.control)
+        diameters = stated_diameters(self.text, unit)
         table = self.tools
         said: tuple[Finding, ...] = ()
         if table is not None:
             table, said = table_in_its_unit(
                 table, self.text, self.setup.control, self.setup.diameters(), diameters if self.comments else {}
             )
+        object.__setattr__(self, "unit", unit)
         object.__setattr__(self, "table", table)
         object.__setattr__(self, "noted", said)
         object.__setattr__(self, "stated", diameters if self.setup.cutters and self.comments else {})

@@ -47,12 +47,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Dialect = Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"]
 
+#: endings of NC texts whose control is told from what they hold
+OF_TEXT = (
+    ".ngc", ".nc", ".gcode", ".gc", ".g", ".gco", ".gcd", ".tap", ".cnc", ".txt", ".iso", ".eia", ".ptp", ".din",
+    ".min", ".ssb", ".anc", ".ncc", ".ncf", ".prg", ".pgm", ".pim", ".dnc", ".mcd", ".sub",
+)  # fmt: skip
 #: dialect by the ending of a file; None: that of the machine
 ENDINGS: dict[str, Dialect | None] = {
-    **dict.fromkeys(
-        (".ngc", ".nc", ".gcode", ".gc", ".g", ".gco", ".gcd", ".tap", ".cnc", ".txt", ".iso", ".eia", ".ptp", ".din"),
-        None,
-    ),
+    **dict.fromkeys(OF_TEXT, None),
     **dict.fromkeys((".fnc", ".fan"), "fanuc"),
     **dict.fromkeys((".mpf", ".spf"), "sinumerik"),
     **dict.fromkeys((".h", ".hnc"), "heidenhain"),
@@ -167,6 +169,7 @@ def read_program(
     values, origins, placed = setup.values(kind), setup.origins(kind), setup.placed(kind)
     swivel = Swivel(machine, placed)
     said: tuple[Finding, ...] = ()
+    unit = "mm"
     if recognition is None:
         lengths = tools.lengths() if tools is not None else {}
         text = apt_text(path) if text is None else text
@@ -192,11 +195,12 @@ def read_program(
         else:
             text = gcode_text(path) if text is None else text
             nc = NcText(path, text, recognition, setup, tools, comments, origins, values)
+            unit = nc.unit
             agreed = agree(path.name, setup.cutters, tools=nc.table, comments=nc.stated)
             rate = None if feed is None else mm_min_from_mm_s(feed)
             commands, findings, said = read_nc(nc, rate, strict, swivel, progress)
         if setup.cutters and comments:
-            agreed += compare_kinds(setup.cutters, stated_tools(text, unit_mm(text)))
+            agreed += compare_kinds(setup.cutters, stated_tools(text, unit_mm(text, unit)))
         if len(commands) == 0:
             left_out = next((f": {f}" for f in findings if f.severity >= Severity.UNPROVEN), "")
             raise InputError(f"{path.name}: no motion: nothing to check{left_out}")

@@ -12,6 +12,7 @@ import re
 from dataclasses import dataclass
 
 from chipload.program.control import CONTROLS, Control, control_named
+from chipload.program.reconcile import UNITS
 
 #: a difference of scores below this is none
 MARGIN = 3
@@ -24,8 +25,6 @@ SEARCHED = 200_000
 NAMED = 2
 _COMMENT = re.compile(r"\(([^()\n]*)\)|;([^\n]*)")
 _FLAGS = re.IGNORECASE | re.MULTILINE
-#: unit words outside comments; G700 and G710 of a Sinumerik
-_UNIT = re.compile(r"(?<![A-Z])G0*(20|21|70|71|700|710)(?![0-9.])", re.IGNORECASE)
 _DISTANCE = re.compile(r"(?<![A-Z])G9[01](?![0-9.])", re.IGNORECASE)
 _COORDINATE = re.compile(r"[XYZ][ \t]*[-+]?([0-9]*)\.([0-9]*)", re.IGNORECASE)
 _FEED = re.compile(r"(?<![A-Z])F[ \t]*([0-9]+\.?[0-9]*|\.[0-9]+)", re.IGNORECASE)
@@ -115,7 +114,7 @@ def states_unit(text: str) -> bool:
     >>> states_unit("G21 G0 X1"), states_unit("(G21) G0 X1")
     (True, False)
     """
-    return _UNIT.search(_COMMENT.sub(" ", text)) is not None
+    return UNITS.search(_COMMENT.sub(" ", text)) is not None
 
 
 def states_distance(text: str) -> bool:

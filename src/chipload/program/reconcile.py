@@ -35,7 +35,8 @@ TOOL = r"\bT(?:OOL)?\s*(?:NO\.?|NUMBER)?\s*[-:#=]?\s*T?(?P<tool>[0-9]{1,8})\b"
 _OFFSET = re.compile(r"\bD([0-9]{1,8})\b(?![./]|\s*(?:MM|INCH|IN\b|\"))")
 _LENGTH_OFFSET = re.compile(r"\bH\s*[0-9]+\b")
 _INCH_PROGRAM = re.compile(r"BEGIN PGM[^\n]*\bINCH\b", re.IGNORECASE)
-_UNITS = re.compile(r"\bG\s*(20|21|70|71|700|710)\b(?!\.)")
+#: unit words, also without blanks between words; G70 and G71 with other words are cycles and levels
+UNITS = re.compile(r"(?<![A-Z])G\s*0*(20|21|700|710|7[01](?!\s*[IJKLPQZ]))(?![0-9.])", re.IGNORECASE)
 
 
 class StatedDiameter(NamedTuple):
@@ -46,16 +47,18 @@ class StatedDiameter(NamedTuple):
     line: int
 
 
-def unit_mm(text: str) -> float:
-    """The unit [mm] that an NC text selects first, or that of a Heidenhain program; mm where it selects none.
+def unit_mm(text: str, unit: str = "mm") -> float:
+    """The unit [mm] that an NC text selects first, or that of a Heidenhain program; ``unit`` where it selects none.
 
-    >>> unit_mm("(G20) G21 G0 X1"), unit_mm("G20 G0 X1")
-    (1.0, 25.4)
+    >>> unit_mm("(G20) G21 G0 X1"), unit_mm("N10G0G20X1"), unit_mm("X1", "inch")
+    (1.0, 25.4, 25.4)
     """
     if _INCH_PROGRAM.search(text[:1000]) is not None:
         return MM_PER["inch"]
-    found = _UNITS.search(COMMENT.sub(" ", text).upper())
-    return MM_PER["inch"] if found is not None and found[1] in ("20", "70", "700") else 1.0
+    found = UNITS.search(COMMENT.sub(" ", text))
+    if found is None:
+        return MM_PER[unit]
+    return MM_PER["inch" if found[1] in ("20", "70", "700") else "mm"]
 
 
 def without_offsets(comment: str) -> str:

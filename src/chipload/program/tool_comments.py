@@ -26,10 +26,13 @@ _NUMBERED = re.compile(
 _TOOL_DEF = re.compile(r";([^\n]*)\n[^\n]*\bTOOL\s+(?:DEF|CALL)\s+(\d{1,8})\b", re.IGNORECASE)
 #: a tool called by its name: Sinumerik, Heidenhain
 _NAMED = re.compile(r'(?:\bT\d*\s*=\s*|\bTOOL\s+CALL\s+)"([^"\n]+)"', re.IGNORECASE)
-#: a change of tools by number, and a motion
-_CHANGE = re.compile(r"(?<![A-Z_<\[#])M0?6(?![0-9.])", re.IGNORECASE)
-_TOOL_WORD = re.compile(r"(?<![A-Z_<\[#])T\s*([0-9]{1,8})(?![0-9.=])", re.IGNORECASE)
+#: a change of tools by number (G100 of a Brother, TOOL CALL of a Heidenhain), and a motion that is no retraction
+_CHANGE = re.compile(r"(?<![A-Z_<\[#])(?:M0?6(?![0-9.])|G100(?![0-9.]))|\bTOOL\s+CALL\s+[0-9]", re.IGNORECASE)
+_TOOL_WORD = re.compile(r"(?:(?<![A-Z_<\[#])T\s*|\bTOOL\s+CALL\s+)([0-9]{1,8})(?![0-9.=])", re.IGNORECASE)
 _MOTION = re.compile(r"(?<![A-Z_<\[#])[XYZ]\s*[-+.0-9\[#]", re.IGNORECASE)
+_RETRACTION = re.compile(r"(?<![A-Z])(?:G(?:28|30|53)(?![0-9.])|M91\b)|\b(?:SUPA|BLK\s+FORM)\b", re.IGNORECASE)
+#: a text that names a tool
+_NAMES_TOOLS = re.compile(r"\bTOOL\s+(?:DEF|CALL)\b|(?<![A-Z_])T\d*\s*=", re.IGNORECASE)
 #: CutViewer, Carbide Create: kind of the tool and its numbers
 _CUT_VIEWER = re.compile(r"^\s*TOOL/(MILL|DRILL)\s*,([^()\n]*)$", re.IGNORECASE)
 #: Mastercam's first form: the number, offsets and the diameter
@@ -42,6 +45,10 @@ _OWN_LINE = re.compile(
 )
 #: a size with which the words about a tool begin
 _SIZE_FIRST = re.compile(r"\s*(?:[0-9]+/[0-9]+|[0-9]+\.?[0-9]*|\.[0-9]+)(?![0-9./])")
+#: name of an operation with its number, which is no size: ``Contour Mill14``, ``Drill1``
+_OPERATION = re.compile(
+    r"^\s*(?:[A-Z]+[ -][A-Z -]*(?:MILL|DRILL|BORE|TAP|REAM|CHAMFER)[0-9]{1,2}|[A-Z]+[12])\s*$", re.IGNORECASE
+)
 #: lines above a change of tools whose comments may describe the tool
 ABOVE = 6
 
@@ -68,8 +75,10 @@ def stated_tools(text: str, mm: float) -> dict[int, Stated]:
     return out
 
 
-def stated_diameters(text: str) -> dict[int, StatedDiameter]:
+def stated_diameters(text: str, unit: str = "mm") -> dict[int, StatedDiameter]:
     r"""The diameter of each tool that a comment with its number states, the first of each tool.
+
+    ``unit`` is that of a text that selects none.
 
     Read are numbers that the comment calls a diameter, and those that stand between the tool's number and its kind.
 
@@ -79,7 +88,7 @@ def stated_diameters(text: str) -> dict[int, StatedDiameter]:
     12.7
     """
     out: dict[int, StatedDiameter] = {}
-    mm = unit_mm(text)
+    mm = unit_mm(text, unit)
     for line, row in enumerate(text.split("\n"), start=1):
         for comment in _comments_of(row) if "(" in row or ";" in row else ():
             found = next(_numbered(comment), None)
@@ -113,6 +122,7 @@ def _described(text: str) -> Iterator[tuple[int, str, str]]:
     for hit in _TOOL_DEF.finditer(text):
         if _describes(hit[1]):
             yield int(hit[2]), hit[1], hit[1]
+    yield from _only_tool(text)
 
 
 def _comments_of(line: str) -> list[str]:
@@ -136,7 +146,7 @@ def _at_changes(text: str) -> Iterator[tuple[int, str]]:
                 if k == 0 or _OWN_LINE.match(comment):
                     yield chosen, comment.strip()
             above, waiting = [], 0 if near else chosen
-        elif _MOTION.search(words):
+        elif _MOTION.search(words) and not _RETRACTION.search(words):
             above, waiting = [], 0
         else:
             below = [c for c in comments if waiting and _describes(c)]
@@ -144,6 +154,18 @@ def _at_changes(text: str) -> Iterator[tuple[int, str]]:
                 yield waiting, below[0].strip()
                 waiting = 0
             above = [*above, *(_comments_of(line) or [""])][-ABOVE:]
+
+
+def _only_tool(text: str) -> Iterator[tuple[int, str, str]]:
+    """The comment on the tool of a text that never changes it, number 0, where one describes a tool."""
+    code = COMMENT.sub(" ", text)
+    if _CHANGE.search(code) or _NAMES_TOOLS.search(code):
+        return
+    spoken = [c for line in text.splitlines() for c in _comments_of(line)]
+    comments = dict.fromkeys(c.strip() for c in spoken if _describes(c))
+    if len(comments) == 1 and not any(True for c in spoken for _ in _numbered(c)):
+        comment = next(iter(comments))
+        yield 0, comment, comment
 
 
 def _names_another(comment: str, number: int) -> bool:
@@ -157,6 +179,8 @@ def _describes(comment: str, sure: bool = False) -> bool:
     if _CUT_VIEWER.match(comment):
         return True
     kind = kind_of(comment) is not None
+    if not sure and _OPERATION.match(comment):
+        return False
     if sure or _OWN_LINE.match(comment):
         return kind or names_diameter(comment)
     return kind and "diameter_mm" in describe_tool(comment, 1.0)

@@ -23,6 +23,12 @@ _LETTERS = (
     234, 238, 242, 246, 250, 257, 261, 266, 272, 277, 281, 290, 295, 302, 316, 323, 332, 339, 348, 358, 368, 377, 386,
     397, 404, 413,
 )  # fmt: skip
+#: diameters of the bodies of centre drills 00 to 8 (ASME B94.11M) [1/64 in]
+_CENTRE = {"00": 5, "0": 8, "1": 8, "2": 12, "3": 16, "4": 20, "5": 28, "6": 32, "7": 40, "8": 48}
+_CENTRE_DRILL = re.compile(
+    r"(?:#\s*|\bNO\.?\s*|\bNUMBER\s*)(?P<before>00|[0-8])(?![0-9./]).*?C(?:EN)?T(?:ER|RE|R)?\.?\s*-?\s*DR"
+    r"|C(?:EN)?T(?:ER|RE|R)?\.?\s*-?\s*DR(?:IL)?L?\s*(?:#\s*|\bNO\.?\s*)(?P<after>00|[0-8])(?![0-9./])"
+)
 _DRILL = re.compile(
     r"(?:#|\bNO\.?\s*|\bNUMBER\s*|\bNUM\.?\s*)(?P<number>[0-9]{1,2})(?![0-9./])"
     r"|(?:\bLTR\.?\s*|\bLETTER\s*)(?P<letter>[A-Z])\b|(?<![A-Z0-9.])(?P<own>[A-Z])\s*-?\s*(?:SIZE\s*)?DRILL"
@@ -36,11 +42,15 @@ _INCH = re.compile(
 
 
 def drill_size(words: str) -> float | None:
-    """Diameter [mm] of a drill by its number or letter; None: there is neither.
+    """Diameter [mm] of a drill by its number or letter, of a centre drill that of its body; None: there is neither.
 
+    >>> round(drill_size("#4 CENTER DRILL"), 4), round(drill_size("NO. 3 CTR DRILL"), 4)
+    (7.9375, 6.35)
     >>> round(drill_size("#7 DRILL"), 4), round(drill_size("LTR. F DRILL"), 4), drill_size("6.8 DRILL")
     (5.1054, 6.5278, None)
     """
+    if (centre := _CENTRE_DRILL.search(words)) is not None:
+        return _CENTRE[centre["before"] or centre["after"]] * MM_PER["inch"] / 64.0
     found = _DRILL.search(words)
     if found is None:
         return None

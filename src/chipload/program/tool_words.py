@@ -53,7 +53,7 @@ _KINDS = (
     (ToolKind.TAP, r"\bTAP(?:PED|PING|S|RH|LH)?\b|GEWINDEBOHR|GEWINDEFORM|TARAUD"),
     (ToolKind.REAMER, r"\bREAM|REIBAHLE|ALESOIR"),
     (ToolKind.BORING, r"\bBOR(?:E|ING)\s*-?\s*(?:BAR|HEAD|TOOL)|AUSDREH"),
-    (ToolKind.SPOT, r"SPOT|CENT(?:ER|RE)\s*-?\s*DR|\bNC.?DRILL|ZENTRIER|ANBOHR|POINTER"),
+    (ToolKind.SPOT, r"SPOT|C(?:EN)?T(?:ER|RE|R)\.?\s*-?\s*DR|\bNC.?DRILL|ZENTRIER|ANBOHR|POINTER"),
     (ToolKind.END_MILL, r"SLOT\s*-?\s*DRILL"),
     (ToolKind.COUNTERSINK, r"C(?:OUNTER|\.|')?\s*-?\s*SINK|\bCSK\b|SENKER"),
     (ToolKind.CHAMFER, r"CHAM(?:FER)?\b|CHAMFER|\bCHMF|\bV.?BIT|\bV.?CARV|ENGRAV|GRAVI|FASE[NR]?|DEBURR|\bDRILL.?MILL"),
@@ -81,10 +81,12 @@ _CORNER = re.compile(
     rf"(?:\bCR\s*[=:]?|\bCORNER\s*-?RAD(?:IUS)?\.?\s*[-=:]?|(?<![A-Z])R\s*[=:]?)\s*({_SIZE})\s*({_UNIT})?"
     rf"|{_FREE}({_SIZE})\s*({_UNIT})?\s*(?:CR|R|RAD|RADIUS|CORNER\s*-?RAD(?:IUS)?)\b(?!\s*[=:]?\s*[.0-9])"
 )
-_ANGLE = re.compile(rf"(?P<key>\bTAPER\s*[=:]\s*)?(?<![.0-9])({_N})\s*-?\s*(?:DEG(?:REES?)?\b|°)")
+_ANGLE = re.compile(
+    rf"(?P<key>\bTAPER\s*[=:]\s*)?(?<![.0-9])({_N})\s*-?\s*(?:DEG(?:REES?)?\b|°)|\b(?:DEG|ANGLE|ANG)\.?\s*[-=:]?\s*({_N})"
+)
 _FLUTES = re.compile(
     rf"{_FREE}([0-9]{{1,2}})\s*-?\s*(?:FL(?:T|UTES?|UTED)?S?|F)\b|\bFLUTES?\s*[=:]\s*([0-9]{{1,2}})\b"
-    r"|\bZ\s*=\s*([0-9]{1,2})(?![0-9.])"
+    r"|\bZ\s*=?\s*([0-9]{1,2})(?![0-9.])"
 )
 _FLUTE_LENGTH = re.compile(
     rf"{_FREE}({_SIZE})\s*({_UNIT})?\s*LOC\b|\b(?:LOC|FLUTE\s+LEN(?:GTH)?|LCF)\s*[-=:]?\s*({_SIZE})\s*({_UNIT})?"
@@ -204,7 +206,7 @@ def _measures(words: str, mm: float) -> tuple[str, dict[str, float | int]]:
     out: dict[str, float | int] = {}
     angle = _ANGLE.search(words)
     if angle is not None:
-        out["angle"] = float(angle[2])
+        out["angle"] = float(angle[2] or angle[3])
         words = f"{words[: angle.start()]} {words[angle.end() :]}"
     flutes = _FLUTES.search(words)
     if flutes is not None:

@@ -71,7 +71,7 @@ def cutter_table(
         if key in stated:
             entries.append(Entry(key, stated[key][0], stated[key][1]))
         elif key in guessed:
-            entries.append(Entry(key, *guessed[key], True))
+            entries.append(Entry(key, *guessed[key], not (key == "body_mm" and "diameter_mm" in stated)))
     entries += [
         Entry("holder_mm", *stated["holder_mm"])
         if "holder_mm" in stated

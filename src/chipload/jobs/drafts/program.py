@@ -26,6 +26,7 @@ from chipload.program.lines_of import reading_of_lines
 from chipload.program.motions import bounds, lengths
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import ENDINGS, ProgramReading, read_program, read_tools
+from chipload.program.recognise import recognise
 from chipload.program.reconcile import unit_mm
 from chipload.program.setup import Setup
 from chipload.program.tapping import tapping_motions
@@ -35,6 +36,8 @@ from chipload.units import mm_s_from_mm_min, rpm_from_rad_s
 
 #: machines that a program is read for where none is stated: the first that has its axes
 MACHINES = ("vmc", "xyzbc-trunnion", "xyzac-trunnion", "xyzbc-head-table")
+#: language of programs that show nothing
+MACHINES_LANGUAGE = "linuxcnc"
 #: NC texts longer than this are read in one dialect only [bytes]
 LONG = 3_000_000
 #: feed of cuts that the draft takes where the text states none [mm/min]
@@ -108,7 +111,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     kind = chosen.dialect or ENDINGS.get(path.suffix.lower())
     apt = kind is not None and is_cl_data(kind)
     text = known.text if known.text is not None else _text(path, apt)
-    header = read_header(text, apt, unit_mm(text))
+    header = read_header(text, apt, unit_mm(text, _unit(chosen.reading)))
     if any(f.code == "nc-diameter-unknown" for f in chosen.reading.findings):
         chosen = _read(path, known, _cutters(chosen.reading.program, known, header))
     program = chosen.reading.program
@@ -148,6 +151,11 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
         tuple(tables),
         tuple(notes),
     )
+
+
+def _unit(reading: ProgramReading) -> str:
+    """The unit that a text which states none is read in."""
+    return next(("inch" if "read as inch" in f.text else "mm" for f in reading.findings if f.code == "nc-unit"), "mm")
 
 
 def _stated(number: int, known: Known, header: Header) -> list[Stated]:
@@ -202,7 +210,9 @@ def _read(path: Path, known: Known, cutters: Mapping[int, Cutter] | None = None)
         # CL data and conversational programs are named .txt too
         groups = ((None,), ("heidenhain", "apt"))
     elif ending not in ENDINGS:
-        groups = (("linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"),)
+        text = known.text if known.text is not None else _text(path, apt=False)
+        named = recognise(text, MACHINES_LANGUAGE).control.name
+        groups = (tuple(dict.fromkeys((named, "linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"))),)
     setup = Setup(cutters=cutters or {})
     refused: list[tuple[Machine, InputError]] = []
     without: _Chosen | None = None
@@ -371,7 +381,7 @@ def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known, smal
 def _guesses(reading: ProgramReading) -> list[Entry]:
     """What the reader guessed about unit, tool table and compensation: the keys that confirm it."""
     guesses: dict[str, tuple[str, Callable[[str], str], str]] = {
-        "nc-unit": ("unit", lambda text: "inch" if "read as inch" in text else "mm", "the program states none"),
+        "nc-unit": ("unit", lambda _: _unit(reading), "the program states none"),
         "nc-tools-unit": ("tools_unit", lambda _: "inch", "its diameters agree with the program as inches"),
         "nc-compensation-wear": ("compensation", lambda _: "wear", "the cutter does not fit beside the contour"),
         "nc-compensation-unstated": ("compensation", lambda _: "control", "the offset of D holds the cutter's radius"),

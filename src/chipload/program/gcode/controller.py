@@ -116,6 +116,9 @@ class Controller:
         self.unread = ""
         #: Fanuc: the cycle that lasts is fine boring (G76)
         self.fine = False
+        #: level of G71 of an Okuma [units of the text], and whether its cycles go back to it
+        self.return_level: float | None = None
+        self.returns_to_level = False
         #: Sinumerik: the drilling cycle behind each block (MCALL), its name and its arguments
         self.modal_hole: tuple[str, list[float | None]] | None = None
         #: Sinumerik: whether the spindle of the tapping block that is read turns against K; None: no such block

@@ -106,7 +106,10 @@ class Drilling:
         back = code == cycles.FANUC_BACK_BORING
         if r < bottom and not back:
             raise InputError(f"R{r:g}: lies below the bottom of the hole, {bottom:g}: raise R")
-        clear = max(level, r) if state.old_level or back else r
+        if self.c.returns_to_level and self.c.return_level is not None:
+            clear = max(self.c.return_level, r)
+        else:
+            clear = max(level, r) if state.old_level or back else r
         hole = self._hole(series, code, along, first, second, r, bottom, clear)
         self.series = series
         given = axes(self.c, block)

@@ -20,7 +20,6 @@ axis than Z) until they end, tool vectors (G43.5), involutes and splines. Noted 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -38,7 +37,8 @@ from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, read_macro
 from chipload.program.gcode.modal import GROUP_OF, shown
 from chipload.program.gcode.numbers import count_increments, decide_increments, seconds_of
 from chipload.program.gcode.offsets import choose, probed
-from chipload.program.gcode.tilted_plane import align, level, tilted
+from chipload.program.gcode.other_codes import replace_codes, without_next_tool
+from chipload.program.gcode.tilted_plane import align, at_angles, level, tilted
 from chipload.program.gcode.words import Block, bare, read_block
 from chipload.program.tilt import tilt_of, turned
 
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from chipload.program.gcode.flow import Flow
 
 _COLON = re.compile(r"^([ \t]*):(?=[0-9])", re.MULTILINE)
+_FILE = re.compile(r"^\$[^\n%]*%[ \t]*$", re.MULTILINE)
 _SKIP = re.compile(r"^/[1-9]")
 #: rounding or chamfer of the corner behind a motion, and an angle or what else stands behind a comma
 _CORNER = re.compile(r",([rc])([-+]?[0-9.]+|#[0-9]+|\[[^\]]*\])")
@@ -68,6 +69,8 @@ NOT_READ = {
 }
 #: tilted planes by Euler angles and the code that turns the tool along their normal, of a Fanuc and of a Haas
 TILTED, ALIGN = (682, 2680), (531, 2530)
+#: G254 and G255 of a Haas: the origin follows the turned table, X, Y and Z stay those of the machine
+DYNAMIC, STATIC = 2540, 2550
 #: what a Haas calls G69, and what names its Euler angles (Q)
 HAAS_UNTILTED, EULER = 2690, 313.0
 #: G53.1 P: the angle of the last rotary axis from the workpiece is positive, or negative
@@ -105,8 +108,8 @@ class Fanuc(Dialect):
     """See above."""
 
     def prepare(self, text: str) -> str:
-        """A program number may begin with : instead of O."""
-        return _COLON.sub(r"\1O", text)
+        """A program number may begin with : instead of O; the name of a file may stand in the first line ($A.MIN%)."""
+        return _FILE.sub("%", _COLON.sub(r"\1O", text))
 
     def begin(self, c: Controller, text: str) -> None:
         """System variables, and numbers without a decimal point."""
@@ -123,9 +126,10 @@ class Fanuc(Dialect):
         call = read_macro_call(text, comments, c)
         if call is not None:
             return lenient(call, c, UNREAD | LEFT_OUT)
+        text = without_next_tool(text, c)
         block = read_block(with_brackets(_corners(text, c)), comments, c.parameters)
         rules = c.control.text
-        _other_codes(block, rules.codes)
+        replace_codes(block, rules.codes, c)
         if 670 in block.g:
             c.modal_macro = None
         count_increments(block, c)
@@ -171,6 +175,14 @@ class Fanuc(Dialect):
             g.remove(code)
             words.clear()
         self._tilted(block, c)
+        if DYNAMIC in g:
+            g.remove(DYNAMIC)
+            remove(c)
+            if not tilted(c, tilt_of(at_angles(c, {})[1], (0.0, 0.0, 0.0))):
+                leave_out(c, "G254: the origin follows the table, and no machine with rotary axes")
+        elif STATIC in g:
+            g.remove(STATIC)
+            level(c)
         g = block.g
         if TURNED in g:
             g.remove(TURNED)
@@ -273,7 +285,12 @@ class Fanuc(Dialect):
         if motion in CYCLES:
             self._shorter_pecks(words, g, motion, c)
             repeat = c.control.cycles.repeat_letter
-            if repeat in words and repeat != "l":
+            if repeat == "q" and motion in NEED_Q:
+                # an Okuma repeats by Q, but for the pecks of G83 and G73, whose depth may also be I
+                if "i" in words and "q" not in words:
+                    words["q"] = words.pop("i")
+                    words.pop("j", None)
+            elif repeat in words and repeat != "l":
                 words["l"] = words.pop(repeat)
             if "p" in words and 40 not in g and 98 not in block.m:
                 seconds = seconds_of(block, c, "p")
@@ -353,17 +370,6 @@ class Fanuc(Dialect):
             times, p = divmod(int(p), 10_000)
             words = {"p": float(p), "l": float(times)}
         return super().call(words, c)
-
-
-def _other_codes(block: Block, codes: Mapping[int, str]) -> None:
-    """Codes that mean something else on this control, as the profile has them."""
-    for code in [code for code in block.g if code in codes]:
-        if codes[code] == "idle":
-            block.g.remove(code)
-        elif codes[code] != "unread":
-            block.g[block.g.index(code)] = int(codes[code])
-        else:
-            raise NotReadError(f"{shown(code)}: is not read")
 
 
 def _corners(text: str, c: Controller) -> str:

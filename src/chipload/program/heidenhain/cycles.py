@@ -20,7 +20,7 @@ from collections.abc import Iterator
 
 from chipload.errors import InputError
 from chipload.program.commands import DWELL, LINE, RAPID
-from chipload.program.heidenhain import bore_cycles, q_cycles, words
+from chipload.program.heidenhain import bore_cycles, patterns, q_cycles, words
 from chipload.program.heidenhain.formula import NotKnownError, q_number
 from chipload.program.heidenhain.state import ConversationalState
 from chipload.program.heidenhain.switches import datum_shift, leave_out
@@ -62,6 +62,7 @@ class Cycles:
         self.number: int | None = None
         self.values: dict[int, float] = {}
         self.modal = False
+        self.places: list[patterns.Place] = []
         self.preset: float | None = None
         #: turn of the coordinates about Z [deg]
         self.turned = 0.0
@@ -279,14 +280,47 @@ class Cycles:
         holes = self._circle() if number == 220 else self._rows()
         level = away
         for x, y in holes:
-            if 2 in s.unknown or s.at[2] < level:
-                s.plunge(RAPID, level, 0.0)
-            s.unknown.clear()
-            x, y = s.factor[0] * x + s.origin[0], s.factor[1] * y + s.origin[1]
-            s.straight(RAPID, [x, y, *s.at[2:]])
-            self.call()
+            self._at_hole(x, y, level, RAPID)
             level = between
         s.plunge(RAPID, away, 0.0)
+
+    def _at_hole(self, x: float, y: float, level: float, motion: int) -> None:
+        """The cycle at a place [mm], over which the tool goes at a height or above it."""
+        s = self.s
+        if 2 in s.unknown or s.at[2] < level:
+            s.plunge(RAPID, level, 0.0)
+        s.unknown.clear()
+        x, y = s.factor[0] * x + s.origin[0], s.factor[1] * y + s.origin[1]
+        s.straight(motion, [x, y, *s.at[2:]])
+        self.call()
+
+    def define_pattern(self, text: str) -> None:
+        """PATTERN DEF: the places at which CYCL CALL PAT calls a cycle."""
+        self.places = []
+        self.places = patterns.pattern_places(text, self.s.signed)
+
+    def call_pattern(self, text: str) -> None:
+        """CYCL CALL PAT: the cycle at each place; between them the tool stays at the height of the call or above."""
+        s = self.s
+        if not self.places:
+            raise NotKnownError("CYCL CALL PAT: no pattern is defined that is read: what it cuts here is left out")
+        if self.number is None or self.number not in q_cycles.CYCLES:
+            self.call()
+            return
+        if s.factor[2] != 1.0:
+            raise NotKnownError("a pattern is called in scaled coordinates: what it cuts here is left out")
+        s.feed_of(text)
+        motion = RAPID if "MAX" in text or s.feed is None else LINE
+        surface = self._q(203, None)
+        lowest = -math.inf if 2 in s.unknown else s.at[2]
+        try:
+            for x, y, z in self.places:
+                s.q.set(203, surface + z)
+                away = s.scale * (surface + z + max(abs(self._q(200, None)), self._q(204, 0.0)))
+                self._at_hole(s.scale * x, s.scale * y, max(away, lowest), motion)
+        finally:
+            s.q.set(203, surface)
+        s.plunge(RAPID, max(away, lowest), 0.0)
 
     def _count(self, key: int) -> int:
         value = self._q(key, None)

@@ -7,7 +7,7 @@ Notation: a block is a line; X Y Z [mm], A B C [rad].
 | motions (:mod:`~chipload.program.heidenhain.motions`) | L, LP, CC, C, CR, CT, CP, RND, CHF, RL, RR |
 | approach (:mod:`~chipload.program.heidenhain.approaches`) | APPR and DEP with LT, LN, CT, LCT |
 | planes (:mod:`~chipload.program.heidenhain.tilted_plane`) | PLANE SPATIAL, EULER, VECTOR, RELATIV, RESET; cycle 19 |
-| cycles (:mod:`~chipload.program.heidenhain.cycles`) | 1, 7, 9, 200 to 203, 205 to 209, 220, 221, 240, 262 |
+| cycles (:mod:`~chipload.program.heidenhain.cycles`) | 1, 7, 9, 200 to 209, 220, 221, 240, 262; PATTERN DEF |
 | switches (:mod:`~chipload.program.heidenhain.switches`) | TOOL DEF, TOOL CALL, M functions, FUNCTION TCPM |
 | order (:mod:`~chipload.program.heidenhain.flow`) | labels, REP, FN, Q parameters, CALL PGM of a file beside it |
 
@@ -215,6 +215,8 @@ class _Blocks:
             self.tools.read(s, block)
         elif re.match(r"CYCLE? DEF\b", block):
             self.cycles.define(block)
+        elif block.startswith("PATTERN DEF"):
+            self.cycles.define_pattern(block)
         elif block.startswith("CYCL CALL"):
             self._call_cycle(block[9:].strip())
         elif word in _MOTIONS:
@@ -267,7 +269,7 @@ class _Blocks:
     def _call_cycle(self, text: str) -> None:
         s = self.s
         if text.startswith("PAT"):
-            s.unproven("heidenhain-cycle", f"CYCL CALL {text[:40]}: patterns are not read: left out")
+            self.cycles.call_pattern(text[3:])
             return
         if text.startswith("POS"):
             s.feed_of(text)

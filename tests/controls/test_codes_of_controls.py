@@ -1,0 +1,100 @@
+"""Codes that only one control has: Brother, Okuma, Mazak, Haas, NX on a Fanuc. Oracle: points and heights by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from chipload.machine.machine import machine_named
+from chipload.program.recognise import recognise
+from chipload.program.reconcile import unit_mm
+from chipload.program.swivel import Swivel
+from control_texts import ends, read
+
+OKUMA = "G21 G17 G90 G94 G15 H1\nT1 M6\nS1000 M3\nG56 H1\nG0 X0. Y0. Z10.\n"
+
+
+def test_change_and_approach_in_one_block_of_a_brother():
+    """G100: the tool, then X Y with the offset and the spindle, then Z, at rapid though a cut came before."""
+    commands, findings = read(
+        "G43 H1 Z10.\nG1 X5. F100.\nG100 T2 X30. Y10. G54 G43 Z7. H2 S500 M3\nG1 Z-1. F100.", "brother"
+    )
+    assert findings == []
+    assert ends(commands)[-3:].tolist() == [[30, 10, 10], [30, 10, 7], [30, 10, -1]]
+    assert [(f == 0.0) for f in commands.feed[-3:]] == [True, True, False]
+    assert commands.tool[-3:].tolist() == [2, 2, 2]
+    assert commands.spindle[-1] == pytest.approx(500 * 2 * np.pi / 60)
+
+
+@pytest.mark.parametrize(("words", "pitch"), [("I1.25", 1.25), ("J20", 25.4 / 20)])
+def test_tapping_by_the_pitch_of_a_brother(words, pitch):
+    commands, findings = read(f"G77 X1. Y2. Z-8. R3. {words} S400\nG80", "brother")
+    assert findings == []
+    down = (commands.feed > 0.0) & (commands.position[:, 2] == -8.0)
+    assert commands.feed[down].tolist() == pytest.approx([pitch * 400 / 60])
+    assert commands.position[-1].tolist()[:2] == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(("back", "height"), [("M53", 40.0), ("M54", 3.0)])
+def test_the_level_of_cycles_of_an_okuma(back, height):
+    """G71 moves nothing; with M53 each hole ends at its level, with M54 at R; Q is the peck of G83."""
+    commands, findings = read(f"G71 Z40.\nG83 X5. Y5. Z-7. R3. Q5. F100. {back}\nX9.\nG80", "okuma", head=OKUMA)
+    assert findings == []
+    at = ends(commands)
+    assert at[at[:, 2] == -7.0].tolist() == [[5, 5, -7], [9, 5, -7]]
+    assert at[at[:, 2] == -2.0][:, :2].tolist() == [[5, 5], [9, 5]]
+    assert at[-1].tolist() == [9, 5, height]
+
+
+def test_work_offset_and_length_of_an_okuma():
+    origins = {1: ((100.0, *[0.0] * 8), 0.0), 2: ((300.0, *[0.0] * 8), 0.0)}
+    commands, _ = read("G15 H2\nG0 X1. Y0.", "okuma", origins=origins)
+    frame = commands.frames[commands.frame[-1]]
+    assert (frame.number, frame.offset[0]) == (2, 300.0)
+
+
+def test_the_next_tool_of_a_mazak():
+    commands, findings = read("T3 T7 M6\nG1 X5. F100.", "mazak")
+    assert (findings, int(commands.tool[-1])) == ([], 3)
+    assert recognise("T01 T02 M06\nG0 X1.", "linuxcnc").control.name == "mazak"
+    assert recognise("%\nO1\nG05 P10000\nG1 X1.\nG05 P0", "linuxcnc").control.name != "mazak"
+
+
+@pytest.mark.parametrize(("code", "x"), [("G70", 25.4), ("G71", 1.0)])
+def test_units_of_nx_on_a_fanuc(code, x):
+    commands, findings = read(f"{code}\nG0 X1.")
+    assert (findings, ends(commands)[-1][0]) == ([], pytest.approx(x))
+
+
+def test_a_unit_without_blanks():
+    assert unit_mm("N10G00G17G20G40\nX1.") == 25.4
+    assert unit_mm("G70 I25. J15. L4") == 1.0
+
+
+def test_a_program_number_alone_is_not_linuxcnc():
+    assert recognise("O0026\nN1 G80 Z1. M09", "linuxcnc").control.name != "linuxcnc"
+
+
+@pytest.mark.parametrize("angles", [(-30.0, 90.0), (20.0, 0.0)])
+def test_dynamic_work_offset_of_a_haas(angles):
+    """G254: the text's X Y Z are those of the machine about the zero that the table has carried along.
+
+    Oracle: the point that the machine's axes reach is Ry(B) or Rz(C) of the tip on the part, written out here.
+    """
+    b, c = angles
+    machine = machine_named("xyzbc-trunnion")
+    body = f"G0 Z0.\nG0 B{b} C{c}\nG254\nG0 X3. Y4. Z50.\nG255\nG0 X1. Y1. Z60."
+    commands, findings = read(body, "haas", swivel=Swivel(machine))
+    assert findings == []
+    tilted = commands.frames[commands.frame[-2]].tilt
+    assert commands.frames[commands.frame[-1]].tilt is None
+    swivel = Swivel(machine)
+    axes = np.zeros(9)
+    axes[4:6] = np.radians([b, c])
+    np.testing.assert_allclose(tilted.matrix, swivel.directions(axes), atol=1e-12)
+    b, c = np.radians([b, c])
+    turn_b = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
+    turn_c = np.array([[np.cos(c), -np.sin(c), 0], [np.sin(c), np.cos(c), 0], [0, 0, 1]])
+    # a table turns the part the other way round: either sign is one of the machine, but both turns must be there
+    signs = [(turn_b if s > 0 else turn_b.T) @ (turn_c if t > 0 else turn_c.T) for s in (1, -1) for t in (1, -1)]
+    assert any(np.allclose(tilted.matrix, M.T, atol=1e-12) for M in signs)
