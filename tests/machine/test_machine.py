@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from importlib import resources
 
+import numpy as np
 import pytest
 
 from chipload.errors import InputError
@@ -24,6 +25,26 @@ def test_units_are_converted(tmp_path):
     assert mine.spindle_max == pytest.approx(500.0 * math.pi)
     assert (mine.power_w, mine.torque) == (11000.0, 70000.0)
     assert replace(mine, name="vmc") == machine_named("vmc")
+
+
+@pytest.mark.parametrize(
+    ("name", "rpm", "hp", "rates_in_s", "travel_in"),
+    [
+        ("tormach-1100", 1100, 1.5, (1.833, 1.833, 1.5), (18, 9.5, 16.25)),
+        ("tormach-1100m-plus", 7500, 0.4, (5, 5, 3.8333), (18, 11, 16.25)),
+        ("tormach-770", 3000, 1.0, (2.25, 2.25, 1.833), (14, 7.5, 13.25)),
+        ("tormach-440", 10000, 0.68, (2.25, 2.25, 1.833), (10, 6.25, 10)),
+    ],
+)
+def test_machines_by_their_makers_configuration(name, rpm, hp, rates_in_s, travel_in):
+    """Oracle: numbers of the maker's files in inches, one horsepower being 745.7 W."""
+    machine = machine_named(name)
+    speed = rpm * 2 * np.pi / 60
+    torque = np.interp(speed, *np.array(machine.torque_curve).T) / 1e3
+    assert torque * speed == pytest.approx(hp * 745.7, rel=2e-3)
+    axes = machine.chain.axes
+    assert [a.rate / 25.4 for a in axes] == pytest.approx(list(rates_in_s), rel=1e-4)
+    assert [(a.high - a.low) / 25.4 for a in axes] == pytest.approx(list(travel_in))
 
 
 def test_shipped_ones_are_read():

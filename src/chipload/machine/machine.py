@@ -279,7 +279,7 @@ def read_machine(path: str | Path) -> Machine:
 def machine_names() -> tuple[str, ...]:
     """Names of the machines that come with chipload, sorted.
 
-    >>> machine_names()[3:5]
+    >>> machine_names()[7:9]
     ('vmc', 'vmc-fanuc')
     """
     return shipped_names("machine")
