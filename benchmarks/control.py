@@ -34,9 +34,9 @@ from chipload.control.spindle_model import Spindle, SpindleDeviation
 from chipload.control.wall import Loads
 from chipload.jobs import load_job
 from chipload.jobs.torque.allowable import allowable
-from chipload.jobs.torque.controllers import compared, controller_of, player, shortest
+from chipload.jobs.torque.controllers import compare_controllers, controller_of, player, shortest
 from chipload.jobs.torque.outcome import HELD, MODEL, PLAIN
-from chipload.jobs.torque.run import opened
+from chipload.jobs.torque.run import open_inputs
 from chipload.jobs.torque.spindle import deviation_of
 from chipload.jobs.torque.tables import RoundTable
 
@@ -106,7 +106,7 @@ def changes(job, spindle, torque):
 
 def robustness(name: str) -> None:
     job = load_job(Path(chipload.examples.__file__).parent / name / "job.toml").job
-    machine, material, table, written, spindle = opened(job)
+    machine, material, table, written, spindle = open_inputs(job)
     program = written.program
     found = allowable(job, program, material, machine)
     config, acceleration = controller_of(job, found.torque), min(machine.acceleration[:2])
@@ -126,7 +126,7 @@ def robustness(name: str) -> None:
         rules = replace(config, quantum=row["quantum"], floor=max(config.floor, row["quantum"]),
                         torque_ref=row["hold"] * found.torque)  # fmt: skip
         if not fixed:
-            runs = compared(changed.path, rules, play, found.torque)
+            runs = compare_controllers(changed.path, rules, play, found.torque)
             fixed = {x: (runs[x].config, runs[x].modelled) for x in (PLAIN, MODEL)}
         runs = [play(*fixed[PLAIN]), play(*fixed[MODEL]), play(rules, True)]
         cells = [f"{r.outcome.time:.1f}{'' if r.outcome.finished else ' ' + r.outcome.ended} | "
@@ -144,7 +144,7 @@ def depths(name: str, pitches: list[float]) -> None:
     for pitch in pitches:
         made = found.table.round.model_copy(update={"pitch_mm": pitch})
         job = replace(found, table=found.table.model_copy(update={"round": made}))
-        machine, material, table, written, spindle = opened(job)
+        machine, material, table, written, spindle = open_inputs(job)
         program = written.program
         a = allowable(job, program, material, machine)
         if a.torque <= 0.0:
@@ -155,8 +155,8 @@ def depths(name: str, pitches: list[float]) -> None:
         acceleration = ask.acceleration_mm_s2 or min(machine.acceleration[:2])
         period = 1e-3 * ask.period_ms
         loop = Loop(acceleration, period, 1e-3 * ask.latency_ms, min(1e-3, period), seed=ask.seed)
-        runs = compared(a.path, rules, player(a.path, table, spindle, deviation_of(job), loop, a.torque, a.walls),
-                        a.torque)  # fmt: skip
+        runs = compare_controllers(a.path, rules, player(a.path, table, spindle, deviation_of(job), loop, a.torque,
+                                                          a.walls), a.torque)  # fmt: skip
         plain, model, held = (runs[x] for x in (PLAIN, MODEL, HELD))
         print(f"| {pitch:g} | {1e-3 * a.torque:.3f} | {plain.outcome.time:.1f} | {1e3 * plain.error.max():.1f} | "
               f"{model.outcome.time:.1f} | {held.outcome.time:.1f} | {held.outcome.load_max / a.torque:.2f} | "

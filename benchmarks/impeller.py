@@ -33,7 +33,7 @@ from plotly.subplots import make_subplots
 from chipload import examples
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named
 from chipload.geometry.revolve import Revolved
-from chipload.geometry.sections import checked, loft, read_meridian, read_sections
+from chipload.geometry.sections import check_sections, loft, read_meridian, read_sections
 from chipload.jobs import load_job
 from chipload.jobs.impeller import run as impeller_run
 from chipload.jobs.impeller import surface_search
@@ -206,7 +206,7 @@ def plot(rows) -> str:
 
 def hecc():
     kinds = [sorted(HECC.glob(f"*impeller_{kind}_blade_section_*.txt")) for kind in ("main", "splitter")]
-    blades = [loft(checked(read_sections(k, "inch", True, "X R*THETA R"), 431.5)) for k in kinds]
+    blades = [loft(check_sections(read_sections(k, "inch", True, "X R*THETA R"), 431.5)) for k in kinds]
     hub, shroud = (
         read_meridian(HECC / f"HECCvanedCoordinates_flowpathCoordinates_{n}.txt", "inch", over=True)
         for n in ("hub", "shroud")

@@ -16,7 +16,7 @@ from chipload.geometry.bspline import BSplinePatch, basis
 from chipload.planning.impeller import _scallop
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.scallop_height import distance, shares
-from chipload.planning.impeller.track import posed
+from chipload.planning.impeller.track import pose_cutter
 
 CUTTER, TABLE, WIDE = CatalogueCutter(12.0, 2.0), math.radians(55.0), 8
 
@@ -79,7 +79,7 @@ def main() -> None:
     x = np.linspace(0.3, 0.5, n)
     step = 1.2 / float(np.linalg.norm(patch.at(0.4, 0.6, 0, 1)))
     lines = (np.full(n, 0.6), np.full(n, 0.6 + step))
-    poses = [posed(patch.at(x, q), patch.normal(x, q), TABLE, np.full(n, 0.4), CUTTER) for q in lines]
+    poses = [pose_cutter(patch.at(x, q), patch.normal(x, q), TABLE, np.full(n, 0.4), CUTTER) for q in lines]
     tips, axes = (np.stack([p[k] for p in poses]) for k in (0, 1))
     at = np.repeat(x, len(share)), (lines[0][:, None] + share * step).ravel()
     points, normals = (f(*at).reshape(n, len(share), 3) for f in (patch.at, patch.normal))

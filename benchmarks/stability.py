@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "stability"))
 from stability_oracles import HALF, ONE, TAU, TWO, cut_of, down, semi_discretisation
 
 from chipload.stability.chart import stability_chart
-from chipload.stability.cuts import joined
+from chipload.stability.cuts import join_dynamic_cuts
 from chipload.stability.margin import PER_WAVE, largest_multipliers, stability_margins
 from chipload.stability.modes import Modes
 
@@ -41,7 +41,7 @@ def program(modes):
     s = np.arange(STEPS) / STEPS
     ae = np.clip(0.1 + 0.175 * (1 + np.sin(40 * s)) + 0.5 * (np.sin(200 * s) > 0.95), 0.02, 1.0)
     depth, rpm = 1.0 + 0.8 * np.sin(13 * s), np.where(s < 0.5, 9000.0, 12500.0)
-    return joined([cut_of(modes, r, d, down(a), helix=30.0) for r, d, a in zip(rpm, depth, ae, strict=True)])
+    return join_dynamic_cuts([cut_of(modes, r, d, down(a), helix=30.0) for r, d, a in zip(rpm, depth, ae, strict=True)])
 
 
 def main() -> None:

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from chipload.geometry import isolated
-from chipload.geometry.isolated import Isolated, packed, unpacked
+from chipload.geometry.isolated import Isolated, pack_value, unpack_message
 
 #: first parts of the paths below tests/ whose tests are about the process of the CAD kernel
 OF_CAD = ("bad", "geometry", "test_cad_kernel.py", "test_extras.py", "test_workers.py")
@@ -101,11 +101,11 @@ class CadAnswers:
         """As :meth:`Isolated.call`; each answer is read from its message again, so that nothing is shared."""
         if not self.used:
             return self.ask(of, function, *values)
-        asked = packed([of.reader, of.file.name, of.key, function, *values])
+        asked = pack_value([of.reader, of.file.name, of.key, function, *values])
         key = hashlib.sha256(of.file.read_bytes() + asked).digest()
         if key not in self.known:
-            self.known[key] = packed(self.ask(of, function, *values))
-        return unpacked(io.BytesIO(self.known[key]))
+            self.known[key] = pack_value(self.ask(of, function, *values))
+        return unpack_message(io.BytesIO(self.known[key]))
 
     def started(self) -> Any:
         """A process of the kernel."""

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from chipload.errors import Finding, InputError, Severity, grouped, worst_severity
+from chipload.errors import Finding, InputError, Severity, group_findings, worst_severity
 
 
 def test_a_finding_is_a_note_without_place_and_row_unless_stated():
@@ -36,12 +36,12 @@ def test_a_wrong_place_or_row_is_refused(place, row, message):
 def test_what_is_found_in_many_lines_is_told_once_with_its_lines():
     coolant = [Finding("nc-coolant", n, "M8: left out") for n in (9, 30, 41, 52, 52, 63)]
     other = [Finding("nc-coolant", 10, "M9: left out"), Finding("nc-coolant", 9, "M8: left out", Severity.UNPROVEN)]
-    found = grouped([*coolant, *other])
+    found = group_findings([*coolant, *other])
     assert [text for _, text in found] == [
         "lines 9, 30, 41 and 2 more: M8: left out (nc-coolant)",
         "line 10: M9: left out (nc-coolant)",
         "line 9: M8: left out (nc-coolant)",
     ]
     assert [first for first, _ in found] == [coolant[0], *other]
-    assert grouped([Finding("a", 1, "x"), Finding("a", 2, "x")])[0][1] == "lines 1, 2: x (a)"
-    assert grouped([Finding("a", 0, "x"), Finding("a", 0, "x")])[0][1] == "x (a)"
+    assert group_findings([Finding("a", 1, "x"), Finding("a", 2, "x")])[0][1] == "lines 1, 2: x (a)"
+    assert group_findings([Finding("a", 0, "x"), Finding("a", 0, "x")])[0][1] == "x (a)"

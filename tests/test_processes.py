@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from chipload import processes
-from chipload.files import exchanged, fresh_folder, sweep, write_whole
+from chipload.files import exchange_names, fresh_folder, sweep, write_whole
 
 #: it starts another process, and prints the number of that
 PARENT = (
@@ -83,7 +83,7 @@ def test_files_are_written_whole_without_the_calls_of_linux(windows, tmp_path):
     write_whole(tmp_path / "a.txt", b"one\n")
     write_whole(tmp_path / "a.txt", b"two\n")
     assert (tmp_path / "a.txt").read_bytes() == b"two\n"
-    assert exchanged(tmp_path / "a", tmp_path / "b") is False
+    assert exchange_names(tmp_path / "a", tmp_path / "b") is False
     sweep(tmp_path)
     with fresh_folder(tmp_path) as folder:
         assert folder.is_dir()

@@ -179,12 +179,12 @@ def _drawing(path: Path) -> int:
 
 
 def _sections(path: Path) -> int:
-    from chipload.geometry.sections import checked, loft, read_sections
+    from chipload.geometry.sections import check_sections, loft, read_sections
 
     one = read_sections([path], "mm", columns=None)
     finite(*one)
     some = [p + np.array([0.0, 0.0, 0.0]) for p in one] + [1.1 * one[-1]]
-    finite(loft(checked(tuple(some))).plus.control)
+    finite(loft(check_sections(tuple(some))).plus.control)
     return 0
 
 
@@ -493,9 +493,9 @@ def _devices() -> list[bytes]:
 
 
 def _device(path: Path) -> int:
-    from chipload.machine.mtconnect import described, document, machine_text
+    from chipload.machine.mtconnect import describe_device, document, machine_text
 
-    found = described(document(str(path)))
+    found = describe_device(document(str(path)))
     finite([x for pair in found.travel.values() for x in pair if x is not None])
     machine_text(found)
     return 0

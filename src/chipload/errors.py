@@ -94,10 +94,10 @@ class Finding:
 LINES_NAMED = 3
 
 
-def grouped(findings: Iterable[Finding]) -> list[tuple[Finding, str]]:
+def group_findings(findings: Iterable[Finding]) -> list[tuple[Finding, str]]:
     """Findings with the same code, text and severity as one: the first of them, and the text with the lines of all.
 
-    >>> [text for _, text in grouped([Finding("a", n, "one") for n in (2, 5, 7, 8)] + [Finding("b", 4, "two")])]
+    >>> [text for _, text in group_findings([Finding("a", n, "one") for n in (2, 5, 7, 8)] + [Finding("b", 4, "two")])]
     ['lines 2, 5, 7 and 1 more: one (a)', 'line 4: two (b)']
     """
     groups: dict[tuple[str, str, Severity], list[Finding]] = {}

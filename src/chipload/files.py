@@ -236,7 +236,7 @@ def sweep(above: Path) -> None:
                     os.close(handle)
 
 
-def exchanged(a: Path, b: Path) -> bool:
+def exchange_names(a: Path, b: Path) -> bool:
     """Exchange the names of two folders atomically; False where the system cannot."""
     if not sys.platform.startswith("linux"):
         return False

@@ -33,12 +33,12 @@ def read_table(kind: str, path: str | Path) -> Labelled:
         The file cannot be read or is not TOML.
     """
     label = f"{kind} {path}"
-    return label, parsed(label, read_regular(path, label, LARGEST_FILE, "not a table of chipload"))
+    return label, parse_toml(label, read_regular(path, label, LARGEST_FILE, "not a table of chipload"))
 
 
 def shipped_names(kind: str) -> tuple[str, ...]:
     """Names of the tables of a kind that come with chipload, sorted."""
-    return tuple(sorted(_shipped(kind)))
+    return tuple(sorted(_shipped_files(kind)))
 
 
 def shipped_table(kind: str, name: str) -> Labelled:
@@ -49,7 +49,7 @@ def shipped_table(kind: str, name: str) -> Labelled:
     InputError
         There is none; the message lists similar names and all known ones.
     """
-    shipped = _shipped(kind)
+    shipped = _shipped_files(kind)
     if name not in shipped:
         names = sorted(shipped)
         alike = [x for x in names if name.lower() in x.split("-")]
@@ -57,7 +57,7 @@ def shipped_table(kind: str, name: str) -> Labelled:
         hint = f"the nearest {'are' if len(near) > 1 else 'is'} {', '.join(near)}" if near else "none is like it"
         raise InputError(f"{kind} {name}: not known: {hint} (known: {', '.join(names)}), or give a file")
     label = f"{kind} {name}"
-    return label, parsed(label, shipped[name].read_bytes())
+    return label, parse_toml(label, shipped[name].read_bytes())
 
 
 def nearest(name: str, known: list[str]) -> str:
@@ -69,12 +69,12 @@ def nearest(name: str, known: list[str]) -> str:
     return difflib.get_close_matches(name, known, 1, 0.0)[0]
 
 
-def _shipped(kind: str) -> dict[str, Traversable]:
+def _shipped_files(kind: str) -> dict[str, Traversable]:
     folder = resources.files("chipload") / "data" / f"{kind}s"
     return {x.name.removesuffix(".toml"): x for x in folder.iterdir() if x.name.endswith(".toml")}
 
 
-def parsed(label: str, data: bytes) -> dict[str, Any]:
+def parse_toml(label: str, data: bytes) -> dict[str, Any]:
     """The table of a TOML text in UTF-8; ``label`` is its name in messages.
 
     Raises

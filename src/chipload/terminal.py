@@ -21,7 +21,7 @@ LOG_S = 60.0
 FAULT, WRONG, EXCEEDED, UNWRITTEN, STOPPED = 1, 2, 3, 4, 130
 
 
-def guarded(work: Callable[[], int], debug: bool) -> NoReturn:
+def run_guarded(work: Callable[[], int], debug: bool) -> NoReturn:
     """Run a command and end with its exit code; write one line for each error."""
     try:
         raise typer.Exit(work())
@@ -55,7 +55,7 @@ def guarded(work: Callable[[], int], debug: bool) -> NoReturn:
         write_line(f"stopped: {str(err) or 'nothing was written'}")
         code = STOPPED
     except typer.Exit as end:
-        code = end.exit_code if _flushed() else UNWRITTEN
+        code = end.exit_code if _flush_output() else UNWRITTEN
     except Exception as err:
         _fault(err, debug)
         code = FAULT
@@ -138,7 +138,7 @@ def _code(c: str) -> str:
     return f"\\x{ord(c):02x}" if ord(c) < 256 else f"\\u{ord(c):04x}"
 
 
-def _flushed() -> bool:
+def _flush_output() -> bool:
     """Whether all output has left the process."""
     try:
         if sys.stdout is not None:

@@ -71,8 +71,8 @@ class Workers:
         return self.processes == 1 and self.dask is None
 
     def completed(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
-        """As :func:`completed`."""
-        return completed(function, tasks, self.processes, self.dask)
+        """As :func:`run_tasks`."""
+        return run_tasks(function, tasks, self.processes, self.dask)
 
     @contextmanager
     def team(self) -> Iterator[Team]:
@@ -108,10 +108,10 @@ class Team(Protocol):
         """Send the workers the first argument of the functions of :meth:`completed_shared` from now on."""
 
     def completed(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
-        """As :func:`completed`."""
+        """As :func:`run_tasks`."""
 
     def completed_shared(self, function: Callable[..., Any], tasks: Sequence[Task]) -> Iterator[tuple[int, Any]]:
-        """As :func:`completed`, with the value that is shared before the arguments of each task."""
+        """As :func:`run_tasks`, with the value that is shared before the arguments of each task."""
 
 
 class WorkerDied(ChiploadError):
@@ -122,7 +122,7 @@ class _Lost(WorkerDied):
     """No worker of the cluster has the shared value of a task."""
 
 
-def completed(
+def run_tasks(
     function: Callable[..., Any], tasks: Sequence[Task], workers: int = 1, dask: str | None = None
 ) -> Iterator[tuple[int, Any]]:
     """Numbers and results of the tasks, in the order in which they end.
@@ -200,7 +200,7 @@ class _Pool(_Alone):
         while waiting:
             running: dict[Future[Any], int] = {}
             try:
-                for k, value in self._through(function, tasks, list(waiting), running):
+                for k, value in self._run_numbers(function, tasks, list(waiting), running):
                     del waiting[k]
                     yield k, value
             except BrokenProcessPool:
@@ -216,7 +216,7 @@ class _Pool(_Alone):
                 for future in running:
                     future.cancel()
 
-    def _through(
+    def _run_numbers(
         self,
         function: Callable[..., Any],
         tasks: Sequence[Task],

@@ -14,7 +14,7 @@ import pytest
 from chipload import examples
 from chipload.errors import InputError
 from chipload.examples import copy_example
-from chipload.geometry.bspline import BSplinePatch, through
+from chipload.geometry.bspline import BSplinePatch, patch_through
 from chipload.geometry.revolve import Revolved
 from chipload.jobs import check_job, load_job
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
@@ -184,7 +184,7 @@ def test_a_face_with_three_sides(job):
 def test_a_part_of_a_side(job):
     """Half of a side does not reach from hub to shroud."""
     blade = IMPELLER.blade
-    lower = through(blade.plus.at(U, 0.5 * V).reshape(15, 9, 3), U[::9], V[:9])
+    lower = patch_through(blade.plus.at(U, 0.5 * V).reshape(15, 9, 3), U[::9], V[:9])
     written(job.parent / "impeller.step", face(lower), face(lower), *FACES[1:])
     text = refused(
         job, "plus = 1\nminus = 2\nhub = [3]\nshroud = [4]", "plus = [1, 2]\nminus = 3\nhub = [4]\nshroud = [5]"

@@ -30,7 +30,7 @@ from chipload.geometry import isolated
 from chipload.geometry.dxf import read_dxf
 from chipload.geometry.isolated import Isolated
 from chipload.geometry.mesh import read_mesh
-from chipload.geometry.sections import checked, read_meridian
+from chipload.geometry.sections import check_sections, read_meridian
 from chipload.geometry.step import read_step_face
 from chipload.geometry.step_faces import read_faces
 from chipload.jobs import check_job, load_job
@@ -39,7 +39,7 @@ from chipload.planning.thinwall.table import read_cuts
 from chipload.program.gcode.reader import read_gcode, read_gcode_file
 from chipload.program.heidenhain.reader import read_heidenhain_file
 from chipload.stock.layers import LayeredStock
-from chipload.tables import parsed
+from chipload.tables import parse_toml
 from chipload.web.result import open_result
 from square import make_result
 
@@ -118,7 +118,7 @@ def test_forces_with_cr_are_those_with_lf(tmp_path: Path) -> None:
 )
 def test_tables(text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        parsed("t", text.encode("latin-1"))
+        parse_toml("t", text.encode("latin-1"))
 
 
 @pytest.mark.parametrize("diameter", ["9" * 400 + " mm", "9" * 5000 + " mm", "1/" + "9" * 400 + " in"])
@@ -264,7 +264,7 @@ def test_a_child_executes_nothing_that_is_sent() -> None:
         isolated._function("os.system")
     forged = np.array([{"a": 1}], dtype=object)
     with pytest.raises(ValueError, match="allow_pickle=False"):
-        isolated.packed(forged)
+        isolated.pack_value(forged)
 
 
 # -- item 22: archives that hold more than they show ------------------------------------------------------------
@@ -346,9 +346,9 @@ def test_the_order_of_sections_does_not_depend_on_their_points() -> None:
         return np.stack([40.0 + 20.0 * np.cos(a), 4.0 * np.sin(a), z + 0.0 * a], axis=-1)
 
     rings = tuple(ring(dense if k == 2 else angle, 2.0 * k) for k in range(5))
-    assert checked(rings) == rings
+    assert check_sections(rings) == rings
     with pytest.raises(InputError, match="section 2: is not between sections 1 and 3"):
-        checked((rings[0], rings[3], rings[1]))
+        check_sections((rings[0], rings[3], rings[1]))
 
 
 # -- item 21: check opens every file ----------------------------------------------------------------------------

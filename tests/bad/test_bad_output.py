@@ -126,7 +126,7 @@ def test_a_fault_in_the_exchange_puts_the_older_result_back(
             raise fault
         return rename(self, target)
 
-    monkeypatch.setattr(folder, "exchanged", lambda a, b: False)
+    monkeypatch.setattr(folder, "exchange_names", lambda a, b: False)
     monkeypatch.setattr(Path, "rename", once)
     with pytest.raises((OutputError, KeyboardInterrupt)):
         written(outcome("backward"), out)

@@ -17,7 +17,7 @@ from chipload.examples import copy_example
 from chipload.jobs import check_job, load_job
 from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, Program
-from chipload.simulation.chips import counted
+from chipload.simulation.chips import count_steps
 from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 
@@ -84,9 +84,11 @@ def straight(length: float) -> Program:
 
 def test_steps_of_a_simulation() -> None:
     tip = Resolution(step_mm=1e-7, tolerance=0.01, corner_slices=4, flank_mm=2.0, rotation=math.radians(10.0))
-    refused(lambda: counted(straight(100.0), {1: cutter()}, tip), r"step_mm = 1e-07: 1e9 steps: must be at most 5000")
+    refused(
+        lambda: count_steps(straight(100.0), {1: cutter()}, tip), r"step_mm = 1e-07: 1e9 steps: must be at most 5000"
+    )
     coarse = Resolution(step_mm=0.5, tolerance=0.01, corner_slices=4, flank_mm=2.0, rotation=math.radians(10.0))
-    assert counted(straight(100.0), {1: cutter()}, coarse) == 200
+    assert count_steps(straight(100.0), {1: cutter()}, coarse) == 200
     assert np.isfinite(coarse.step_mm)
 
 

@@ -17,7 +17,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.jobs import load_job
 from chipload.jobs.torque.cut import cut, off_centre, shell_stock
 from chipload.jobs.torque.result import over_allowable
-from chipload.jobs.torque.run import opened
+from chipload.jobs.torque.run import open_inputs
 from chipload.machine.machine import machine_named
 from chipload.program.motions import lengths
 from chipload.program.program import RAPID
@@ -107,7 +107,7 @@ def test_the_errors_cover_layers_and_steps_of_a_quarter(job):
     for share in (1.0, 0.25):
         sets = (f"simulation.step_mm={2.0 * share}", f"simulation.layer_mm={0.5 * share}")
         real = load_job(job, sets).job
-        machine, material, _, written, _ = opened(real)
+        machine, material, _, written, _ = open_inputs(real)
         program = written.program
         stock = shell_stock(real, program, off_centre(real.shell.stock_mm, real.table.surprise))
         found.append(cut(real, program, stock, material, machine.rapid, silent, accuracy=True))

@@ -9,7 +9,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from chipload.control.fuzzy import FuzzyTable, additive, mamdani, product_sum, read_fuzzy, sampled, standard, surface
+from chipload.control.fuzzy import (
+    FuzzyTable,
+    additive,
+    mamdani,
+    product_sum,
+    read_fuzzy,
+    sample_output,
+    standard,
+    surface,
+)
 from chipload.errors import InputError
 
 TABLE = standard()
@@ -40,7 +49,7 @@ def test_against_sampling(whole, seed):
     rules = np.sort(np.sort(rng.integers(0, r, (p, q)), axis=0), axis=1)
     table = FuzzyTable(e, d, o, rules, whole)
     for x, y in rng.uniform(-1.1, 1.1, (12, 2)):
-        assert float(mamdani(table, x, y)) == pytest.approx(sampled(table, x, y, 200_001), abs=1e-8)
+        assert float(mamdani(table, x, y)) == pytest.approx(sample_output(table, x, y, 200_001), abs=1e-8)
 
 
 def test_by_hand():

@@ -7,7 +7,7 @@ import tomllib
 
 import pytest
 
-from chipload.control.identification import aliased, bandwidth
+from chipload.control.identification import alias_frequency, bandwidth
 from chipload.control.spindle_file import read_spindle
 from chipload.errors import InputError
 from command import call
@@ -158,7 +158,7 @@ def test_a_speed_that_was_not_identified(identified):
 def test_bandwidth_and_alias():
     """Two equal lags: (1 + x^2)^2 = 2; 300 Hz read 130 times a second shows as 40 Hz."""
     assert math.tau * bandwidth(0.1, 0.1) * 0.1 == pytest.approx(math.sqrt(math.sqrt(2.0) - 1.0))
-    assert aliased(300.0, 130.0) == pytest.approx(40.0)
+    assert alias_frequency(300.0, 130.0) == pytest.approx(40.0)
 
 
 def test_a_range_that_is_not_finite_is_refused(identified, tmp_path):

@@ -21,7 +21,7 @@ from chipload.control.hal_file import write_hal
 from chipload.control.linuxcnc import hal_client
 from chipload.control.linuxcnc.hal_client import PinValues
 from chipload.control.linuxcnc.path import tool_path, write_path
-from chipload.control.override import STATUS, STOPS, Override, Reading, Status, begin, step, stopped
+from chipload.control.override import STATUS, STOPS, Override, Reading, Status, begin, step, stop_state
 from chipload.control.plant import Fault, Loop, TorqueProfile, comparison, run
 from chipload.control.spindle_model import Spindle
 from chipload.errors import InputError
@@ -267,14 +267,14 @@ def test_a_dead_sensor_in_short_cuts_is_seen():
 
 
 def test_a_stop_is_final():
-    state = stopped(begin(RULES), Status.OFF_PATH)
+    state = stop_state(begin(RULES), Status.OFF_PATH)
     for _ in range(10):
         sent, status, state = step(RULES, standard(), state, Reading(500.0, 0.01))
         assert (sent, status) == (0.0, "off-path")
     with pytest.raises(
         InputError, match="reason = run: must be one of low-reading, machine-data, no-reading, off-path"
     ):
-        stopped(state, Status.RUN)
+        stop_state(state, Status.RUN)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.fit import NAMES, aligned, fit_average, predict, predicted
+from chipload.cutting.fit import NAMES, align_turn, fit_average, predict, predict_forces
 from chipload.cutting.fit_turns import fit_instantaneous
 from chipload.cutting.turns import MeasuredCut, turns_of
 from chipload.errors import InputError
@@ -209,7 +209,7 @@ def test_prediction_of_a_third_feed():
     # the phase of a cut that was not fitted
     turns = turns_of(third, 14)
     t = np.arange(len(third.force)) / third.rate
-    model = predicted(fit, third, np.mod(aligned(fit, third, turns) + turns.speed * t, math.tau))
+    model = predict_forces(fit, third, np.mod(align_turn(fit, third, turns) + turns.speed * t, math.tau))
     assert np.sqrt(np.mean((model - third.force) ** 2)) < 0.03 * scale.max()
 
 

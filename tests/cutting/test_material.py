@@ -9,7 +9,14 @@ import pytest
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.force import forces_over_turn
-from chipload.cutting.material import Material, beyond, material_named, material_names, material_text, read_material
+from chipload.cutting.material import (
+    Material,
+    material_named,
+    material_names,
+    material_text,
+    read_material,
+    texts_beyond_range,
+)
 from chipload.engagement.tooth_engagement import engagement_of_arcs
 from chipload.errors import InputError
 
@@ -129,8 +136,8 @@ def test_reads_a_size_effect_a_cutter_and_ranges(tmp_path):
     assert material.law == (700.0, 200.0, -5.0, 0.0, 0.0, 0.0, 0.25, 0.4, 0.0)
     assert material.cutter == "d 10, 4 teeth, 30 deg"
     assert material.speed == (1000.0, 5000.0)
-    assert beyond(material, 9.0, 1000.0) == ()
-    assert beyond(material, 9.0, 6000.0) == (
+    assert texts_beyond_range(material, 9.0, 1000.0) == ()
+    assert texts_beyond_range(material, 9.0, 6000.0) == (
         "material mine: a speed of 360 m/min: its coefficients were measured from 60 to 300 m/min",
     )
 

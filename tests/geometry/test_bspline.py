@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import NdBSpline
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 
 U, V = np.sort(np.r_[0.0, np.random.default_rng(1).uniform(size=11), 1.0]), np.linspace(0.0, 1.0, 9) ** 1.3
 
@@ -17,7 +17,7 @@ def wavy():
 
 @pytest.mark.parametrize("degrees", [(3, 3), (5, 2), (1, 3)])
 def test_against_scipy(degrees):
-    patch = through(wavy(), U, V, degrees)
+    patch = patch_through(wavy(), U, V, degrees)
     other = NdBSpline((patch.knots_u, patch.knots_v), patch.control, patch.degrees)
     rng = np.random.default_rng(2)
     u, v = np.r_[0, 1, 0, 1, rng.uniform(size=200)], np.r_[0, 0, 1, 1, rng.uniform(size=200)]
@@ -29,7 +29,7 @@ def test_against_scipy(degrees):
 
 def test_goes_through_its_points():
     u, v = np.meshgrid(U, V, indexing="ij")
-    at = through(wavy(), U, V).at(u.ravel(), v.ravel())
+    at = patch_through(wavy(), U, V).at(u.ravel(), v.ravel())
     np.testing.assert_allclose(at, wavy().reshape(-1, 3), atol=1e-11)
 
 
@@ -42,7 +42,7 @@ def torus(a, b):
 def test_normal_and_curvature_of_a_torus():
     x = np.linspace(0.0, 1.0, 60)
     a, b = np.meshgrid(1.0 * x, 1.0 * x, indexing="ij")
-    patch = through(torus(a, b), x, x, (5, 5))
+    patch = patch_through(torus(a, b), x, x, (5, 5))
     u, v = (c.ravel() for c in np.meshgrid(np.linspace(0.1, 0.9, 7), np.linspace(0.1, 0.9, 7)))
     ring = np.stack([np.cos(u), np.sin(u), np.zeros_like(u)], axis=-1)
     normal = ring * np.cos(v)[:, None] + np.array([0, 0, 1.0]) * np.sin(v)[:, None]
@@ -59,7 +59,7 @@ def test_facing_is_point_and_normal_of_a_sphere():
     """R 20: the normal is the point over R; to the last bit as by themselves, with u or v the same in a row."""
     a, b = np.meshgrid(np.linspace(-1.0, 1.0, 21), np.linspace(-0.6, 0.6, 17), indexing="ij")
     grid = 20.0 * np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)], axis=-1)
-    patch = through(grid, np.linspace(0.0, 1.0, 21), np.linspace(0.0, 1.0, 17), (5, 5))
+    patch = patch_through(grid, np.linspace(0.0, 1.0, 21), np.linspace(0.0, 1.0, 17), (5, 5))
     u, v = np.repeat(np.linspace(0.05, 0.95, 7), 5), np.tile(np.linspace(0.1, 0.9, 5), 7)
     for at in ((u, v), (v, u)):
         points, normals = patch.facing(*at)
@@ -69,7 +69,7 @@ def test_facing_is_point_and_normal_of_a_sphere():
 
 
 def test_turned():
-    patch = through(wavy(), U, V)
+    patch = patch_through(wavy(), U, V)
     p, q = patch.at(0.3, 0.6)[0], patch.turned(0.7).at(0.3, 0.6)[0]
     assert np.hypot(*p[:2]) == pytest.approx(np.hypot(*q[:2]))
     assert np.arctan2(q[1], q[0]) - np.arctan2(p[1], p[0]) == pytest.approx(0.7)
@@ -77,11 +77,11 @@ def test_turned():
 
 def test_refused():
     with pytest.raises(InputError, match=r"patch.u: must ascend from 0 to 1, one for each of 13 points"):
-        through(wavy(), U * 2, V)
+        patch_through(wavy(), U * 2, V)
     with pytest.raises(InputError, match=r"patch: parameter out of 0\.\.1"):
-        through(wavy(), U, V).at(1.1, 0.0)
+        patch_through(wavy(), U, V).at(1.1, 0.0)
     flat = np.zeros((4, 4, 3))
     with pytest.raises(InputError, match="no normal where S_u and S_v are parallel"):
-        through(flat, np.linspace(0, 1, 4), np.linspace(0, 1, 4)).normal(0.5, 0.5)
+        patch_through(flat, np.linspace(0, 1, 4), np.linspace(0, 1, 4)).normal(0.5, 0.5)
     with pytest.raises(InputError, match="no normal where S_u and S_v are parallel"):
-        through(flat, np.linspace(0, 1, 4), np.linspace(0, 1, 4)).facing(0.5, 0.5)
+        patch_through(flat, np.linspace(0, 1, 4), np.linspace(0, 1, 4)).facing(0.5, 0.5)

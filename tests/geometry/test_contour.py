@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from chipload.errors import InputError
-from chipload.geometry.contour import Contour, Region, winding
+from chipload.geometry.contour import Contour, Region, winding_number
 
 # a stadium of 10 by 4 with one end bulging inwards: 10 x 4 + half disc - half disc of radius 2
 BULGED = Contour.from_bulges([[0, 0], [10, 0], [10, 4], [0, 4]], [0.0, 1.0, 0.0, -1.0], closed=True)
@@ -51,19 +51,24 @@ def test_winding_agrees_with_shapely_away_from_the_boundary():
     clear = shapely.distance(polygon.exterior, shapely.points(p)) > 1e-5
     inside = shapely.contains_xy(polygon, p[:, 0], p[:, 1])
     assert clear.sum() > 2900
-    assert np.array_equal(winding(c, p)[clear] != 0, inside[clear])
+    assert np.array_equal(winding_number(c, p)[clear] != 0, inside[clear])
 
 
 def test_winding_on_the_level_of_vertices_and_of_the_poles_of_a_circle():
     square = Contour.polyline([[0, 0], [2, 0], [2, 2], [0, 2]], closed=True)
-    assert winding(square, np.array([[1.0, 0.0 + 1e-12], [-1.0, 0.0], [-1.0, 2.0], [1.0, 1.0]])).tolist() == [
+    assert winding_number(square, np.array([[1.0, 0.0 + 1e-12], [-1.0, 0.0], [-1.0, 2.0], [1.0, 1.0]])).tolist() == [
         1,
         0,
         0,
         1,
     ]
     circle = Contour.circle((0.0, 0.0), 1.0, -1)
-    assert winding(circle, np.array([[-2.0, 1.0], [-2.0, -1.0], [-2.0, 0.0], [0.0, 0.0]])).tolist() == [0, 0, 0, -1]
+    assert winding_number(circle, np.array([[-2.0, 1.0], [-2.0, -1.0], [-2.0, 0.0], [0.0, 0.0]])).tolist() == [
+        0,
+        0,
+        0,
+        -1,
+    ]
 
 
 def test_parts_join_to_the_whole():

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import BSplinePatch, through
-from chipload.geometry.fillet import FIT, filleted, from_hub
+from chipload.geometry.bspline import BSplinePatch, patch_through
+from chipload.geometry.fillet import FIT, add_fillet, from_hub
 from chipload.geometry.revolve import Revolved
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 
@@ -22,7 +22,7 @@ def wall(lean: float) -> BSplinePatch:
     top = 30.0 * np.array([0.0, -math.sin(lean), math.cos(lean)])
     low = np.array([[20.0, 0.0, 0.0], [80.0, 0.0, 0.0]])
     grid = np.stack([low, low + top], axis=1)
-    return through(grid, [0.0, 1.0], [0.0, 1.0])
+    return patch_through(grid, [0.0, 1.0], [0.0, 1.0])
 
 
 @pytest.mark.parametrize("lean", [-0.5, 0.0, 0.4])
@@ -31,7 +31,7 @@ def test_planes(lean, radius):
     """A part of a cylinder: its axis a from both; the ball touches a / tan(half the corner) above the corner."""
     corner = 0.5 * math.pi - lean
     height = radius / math.tan(0.5 * corner)
-    found = filleted(wall(lean), PLANE, radius)
+    found = add_fillet(wall(lean), PLANE, radius)
     assert found.height == pytest.approx(height, rel=1e-9)
     p = found.fillet.at(U, V)
     middle = np.array([-height, radius])
@@ -54,14 +54,14 @@ def fin() -> BSplinePatch:
     z, r = np.linspace(0.0, 60.0, 5), np.linspace(30.0, 50.0, 9)
     x = np.sqrt(r**2 - 1.0)
     grid = np.stack(np.broadcast_arrays(x[None, :], 1.0, z[:, None]), axis=-1)
-    patch = through(grid, z / 60.0, (r - 30.0) / 20.0)
+    patch = patch_through(grid, z / 60.0, (r - 30.0) / 20.0)
     return patch if patch.normal(0.5, 0.5)[0][1] > 0.0 else patch.reversed(True, False)
 
 
 def test_a_fin_on_a_shaft():
     """Centre at y = 1 + a, 30 + a from the axis: a line; the ball touches the shaft under it."""
     a = 4.0
-    found = filleted(fin(), SHAFT, a)
+    found = add_fillet(fin(), SHAFT, a)
     x = math.sqrt((30.0 + a) ** 2 - (1.0 + a) ** 2)
     p = found.fillet.at(U, V)
     assert np.abs(np.hypot(p[:, 0] - x, p[:, 1] - 1.0 - a) - a).max() < FIT
@@ -102,7 +102,7 @@ def test_the_fillet_of_another_program():
             count += 1
     assert count == 1
     solid = maker.Shape()
-    found = filleted(fin(), SHAFT, 4.0)
+    found = add_fillet(fin(), SHAFT, 4.0)
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(0.1, 0.9, 4), np.linspace(0.05, 0.95, 7), indexing="ij"))
     shell = TopExp_Explorer(solid, TopExp_kind()).Current()
     for p in found.fillet.at(u, v).tolist():
@@ -121,7 +121,7 @@ def test_a_ball_on_a_twisted_blade(key):
     """Dense points of side and hub: the ball comes to both within a hair and goes into neither."""
     impeller, a = impeller_of(ImpellerShape(lean=0.15)), 3.0
     side = getattr(impeller.blade, key)
-    found = filleted(side, impeller.hub, a)
+    found = add_fillet(side, impeller.hub, a)
     u = np.linspace(0.02, 0.98, 25)
     high, low = found.fillet.at(u, 1.0), found.fillet.at(u, 0.0)
     C = high + a * found.fillet.normal(u, 1.0)
@@ -142,7 +142,7 @@ def test_a_ball_on_a_twisted_blade(key):
 
 def test_above_its_fillet_the_side_is_the_same():
     side = impeller_of(ImpellerShape()).blade.plus
-    found = filleted(side, impeller_of(ImpellerShape()).hub, 3.0)
+    found = add_fillet(side, impeller_of(ImpellerShape()).hub, 3.0)
     p, n = found.side.at(U, V), found.side.normal(U, V)
     x, y = np.linspace(0, 1, 801), np.linspace(0, 1, 401)
     grid = side.at(np.repeat(x, 401), np.tile(y, 801))
@@ -162,6 +162,6 @@ def test_distance_from_a_hub():
 
 def test_refused():
     with pytest.raises(InputError, match=r"^a fillet of 40 mm reaches above the side at u = 0$"):
-        filleted(wall(0.0), PLANE, 40.0)
+        add_fillet(wall(0.0), PLANE, 40.0)
     with pytest.raises(InputError, match=r"^no fillet of 1 mm fits between side and hub at u = 0: "):
-        filleted(through([[[20, 0, 1], [20, 0, 9]], [[80, 0, 1], [80, 0, 9]]], [0, 1], [0, 1]), PLANE, 1.0)
+        add_fillet(patch_through([[[20, 0, 1], [20, 0, 9]], [[80, 0, 1], [80, 0, 9]]], [0, 1], [0, 1]), PLANE, 1.0)

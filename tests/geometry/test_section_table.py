@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chipload.errors import InputError
-from chipload.geometry.sections import checked, loft, read_meridian, read_sections
+from chipload.geometry.sections import check_sections, loft, read_meridian, read_sections
 
 HALF = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 40))
 
@@ -54,7 +54,7 @@ def test_a_table_is_its_sections_and_their_surfaces_of_revolution(tmp_path, kind
         # first the side of the smaller th, from z towards y
         th = np.arctan2(p[:, 0], p[:, 1])
         assert (th[1:39] < th[:39:-1]).all()
-    assert loft(checked(sections, 120.0)).plus.at(0.5, 0.5)[0][0] > 0.0
+    assert loft(check_sections(sections, 120.0)).plus.at(0.5, 0.5)[0][0] > 0.0
     for shroud, radius in ((False, 40.0), (True, 30.0)):
         r, z = read_meridian(path, "m", shroud=shroud).T
         np.testing.assert_allclose(np.hypot(z, 60.0 - r), radius, atol=1e-5)

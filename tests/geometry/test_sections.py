@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chipload.errors import InputError
-from chipload.geometry.sections import checked, loft, read_meridian, read_sections
+from chipload.geometry.sections import check_sections, loft, read_meridian, read_sections
 
 
 def section(z, count=160, radius=50.0, length=40.0, thick=4.0):
@@ -87,17 +87,17 @@ def test_meridian(tmp_path):
 
 def test_refused_sections():
     good = blade()
-    assert checked(good) is good
+    assert check_sections(good) is good
     with pytest.raises(InputError, match="sections: 1: must be at least 2"):
-        checked(good[:1])
+        check_sections(good[:1])
     with pytest.raises(InputError, match="section 2: 8 points: must be at least 12"):
-        checked((good[0], good[1][::20]))
+        check_sections((good[0], good[1][::20]))
     with pytest.raises(InputError, match="section 2: is not between sections 1 and 3"):
-        checked((good[0], good[3], good[1], good[4]))
+        check_sections((good[0], good[3], good[1], good[4]))
     crossed = good[1].copy()
     crossed[20:60] = crossed[20:60][::-1]
     with pytest.raises(InputError, match="section 2: crosses itself"):
-        checked((good[0], crossed, good[2]))
+        check_sections((good[0], crossed, good[2]))
 
 
 def test_wrong_unit_is_found_by_the_outer_diameter():
@@ -106,8 +106,8 @@ def test_wrong_unit_is_found_by_the_outer_diameter():
     with pytest.raises(
         InputError, match=r"outer diameter .* must be .* as stated: smaller by 25.4, as inch read as mm"
     ):
-        checked(as_inch, outer)
-    checked(blade(), outer)
+        check_sections(as_inch, outer)
+    check_sections(blade(), outer)
 
 
 def test_refused_files(tmp_path):

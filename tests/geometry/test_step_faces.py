@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from chipload.geometry.bspline import BSplinePatch, through
+from chipload.geometry.bspline import BSplinePatch, patch_through
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.step_faces import read_faces
 from chipload.geometry.step_meridian import meridian_of
@@ -133,7 +133,7 @@ def test_uneven_parameters_are_put_over_lengths(tmp_path):
     grid = np.stack([20.0 * np.cos(angle), 20.0 * np.sin(angle), 0.0 * u], axis=-1)[:, None] + np.array(
         [[0.0, 0.0, 0.0], [0.0, 0.0, 8.0]]
     )
-    uneven = through(grid, u, [0.0, 1.0])
+    uneven = patch_through(grid, u, [0.0, 1.0])
     gap = np.linalg.norm(np.diff(uneven.at(np.linspace(0, 1, 41), 0.5), axis=0), axis=1)
     assert gap.max() > 10.0 * gap.min()
     model = read_faces(written(tmp_path / "uneven.step", face(uneven), face(BSplinePatch(uneven.knots_v, uneven.knots_u,

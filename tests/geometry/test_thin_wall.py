@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from chipload.errors import InputError
-from chipload.geometry.sections import checked, loft
+from chipload.geometry.sections import check_sections, loft
 from chipload.geometry.thin_wall import blade, plate, through_sections
 
 U, V = np.meshgrid(np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 5), indexing="ij")
@@ -62,7 +62,7 @@ def test_through_sections_stands_upright():
     """Ellipses of 30 x 3 mm around an axis far away, stacked along y: upright, along x, as thick as the ellipse."""
     t = np.linspace(0.0, math.tau, 81)
     sections = tuple(np.stack([1.5 * np.sin(t), 0.0 * t + 100.0 + 8.0 * k, 15.0 * np.cos(t)], axis=1) for k in range(4))
-    wall = through_sections(loft(checked(sections)), 0.2, (0.0, 1.0))
+    wall = through_sections(loft(check_sections(sections)), 0.2, (0.0, 1.0))
     minus, plus = wall.sides(U, V)
     assert minus[..., 2].min() == pytest.approx(0.0, abs=1e-6)
     assert minus[..., 2].max() == pytest.approx(24.0, abs=1e-6)

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from chipload import examples
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import Blade
 from chipload.geometry.step_faces import read_faces
@@ -170,7 +170,7 @@ def test_a_side_of_several_faces(tmp_path):
     for side in (blade.plus, blade.minus):
         for first, last in ((0.0, 0.45), (0.45, 1.0)):
             grid = side.at(first + a * (last - first), b).reshape(41, 13, 3)
-            halves.append(face(through(grid, u, v, side=side.side)))
+            halves.append(face(patch_through(grid, u, v, side=side.side)))
     written(path.parent / "impeller.step", *halves, turned(IMPELLER.hub), turned(IMPELLER.shroud))
     lines, holds = check_job(load_job(path))
     assert holds

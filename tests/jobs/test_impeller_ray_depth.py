@@ -3,7 +3,7 @@
 import pytest
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 from chipload.geometry.sections import Blade
 from chipload.jobs.impeller.ray_depth import MOST, ray_depth, thickness
 
@@ -14,7 +14,7 @@ class Wedge:
     def __init__(self, thin):
         def side(sign):
             grid = [[[x, sign * 0.5 * t, z] for z in (0.0, 30.0)] for x, t in ((0.0, 2.0), (60.0, thin))]
-            return through(grid, [0, 1], [0, 1])
+            return patch_through(grid, [0, 1], [0, 1])
 
         self.bodies = (Blade(side(1.0), side(-1.0)),)
 
@@ -30,7 +30,7 @@ def test_thickness_of_a_wedge(thin):
 def test_thickness_between_the_points_that_are_tried():
     """Two planes 0.2 mm apart, so high that points of a side are farther from each other than that."""
     wedge = Wedge(0.2)
-    wedge.bodies = (Blade(*(through([[[x, y, z] for z in (0.0, 400.0)] for x in (0.0, 30.0)], [0, 1], [0, 1])
+    wedge.bodies = (Blade(*(patch_through([[[x, y, z] for z in (0.0, 400.0)] for x in (0.0, 30.0)], [0, 1], [0, 1])
                             for y in (0.1, -0.1))),)  # fmt: skip
     assert thickness(wedge, 0, 0.013) == pytest.approx(0.2, rel=1e-6)
 

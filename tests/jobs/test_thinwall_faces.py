@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chipload.examples import copy_example
-from chipload.geometry.sections import checked, loft, read_sections
+from chipload.geometry.sections import check_sections, loft, read_sections
 from chipload.geometry.step_faces import read_faces
 from chipload.jobs import load_job
 from chipload.jobs.thinwall.inputs import WallInputs, read_wall
@@ -104,7 +104,7 @@ def test_a_blade_from_faces_is_that_through_sections(tmp_path, sections, flip):
     text = "".join("# section\n" + "".join(f"{x:.9f} {y:.9f} {z:.9f}\n" for x, y, z in s) for s in sections)
     (folder / "wall.curve").write_text(text)
     given = inputs(folder, SECTIONS)
-    made = loft(checked(read_sections([folder / "wall.curve"], "mm")))
+    made = loft(check_sections(read_sections([folder / "wall.curve"], "mm")))
     # of the section's frame: z up the span, x from the leading edge (greater z of the part), y = z x x
     up = made.plus.at(0.5, 1.0)[0] - made.plus.at(0.5, 0.0)[0]
     along = made.plus.at(1.0, 0.5)[0] - made.plus.at(0.0, 0.5)[0]

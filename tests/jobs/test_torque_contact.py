@@ -9,7 +9,7 @@ import numpy as np
 from chipload.examples import copy_example
 from chipload.jobs import load_job
 from chipload.jobs.torque.cut import cut, shell_stock
-from chipload.jobs.torque.run import opened
+from chipload.jobs.torque.run import open_inputs
 from chipload.progress import silent
 
 
@@ -20,7 +20,7 @@ def test_the_contact_of_a_helix_reaches_up_to_the_turn_before(tmp_path) -> None:
     folder = copy_example("tube", tmp_path / "tube")
     sets = ("simulation.step_mm=2.0", "simulation.tolerance_mm=0.01")
     job = load_job(folder / "job.toml", sets).job
-    machine, material, _, written, _ = opened(job)
+    machine, material, _, written, _ = open_inputs(job)
     program = written.program
     found = cut(job, program, shell_stock(job, program), material, machine.rapid, silent)
     p = found.points

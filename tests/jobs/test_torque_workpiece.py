@@ -17,7 +17,7 @@ from chipload.errors import InputError
 from chipload.jobs import load_job
 from chipload.jobs.torque.allowable import limit_of
 from chipload.jobs.torque.cut import cut, shell_stock
-from chipload.jobs.torque.run import opened
+from chipload.jobs.torque.run import open_inputs
 from chipload.jobs.torque.workpiece_cut import limit_on_workpiece, responses_of, workpiece_cut
 from chipload.structure import beam
 from command import call
@@ -128,7 +128,7 @@ def closed(x, tool):
 def test_the_torque_that_a_cantilever_allows(folder):
     """F_lim = d / (C_beam + C_tool); the torque at which that force is reached, in closed form, at every place."""
     job = load_job(folder / "job.toml").job
-    machine, material, _, written, _ = opened(job)
+    machine, material, _, written, _ = open_inputs(job)
     program = written.program
     made = workpiece_cut(job, job.table.stock, program, material, machine.rapid)
     assert made.compliance.error < 0.12
@@ -275,11 +275,11 @@ def test_a_tube_by_its_shell_and_as_a_workpiece(tmp_path):
     (tmp_path / "shell.toml").write_text(TUBE + SHELL)
     (tmp_path / "cells.toml").write_text(TUBE + WORKPIECE)
     shell, cells = (load_job(tmp_path / f"{x}.toml", ["checks.confidence=0.5"]).job for x in ("shell", "cells"))
-    machine, material, _, written, _ = opened(shell)
+    machine, material, _, written, _ = open_inputs(shell)
     program = written.program
     one = cut(shell, program, shell_stock(shell, program), material, machine.rapid, lambda *_: None)
     _, by_shell = limit_of(shell, one, material)
-    other = workpiece_cut(cells, cells.table.stock, opened(cells)[3].program, material, machine.rapid)
+    other = workpiece_cut(cells, cells.table.stock, open_inputs(cells)[3].program, material, machine.rapid)
     by_cells = limit_on_workpiece(other.loads, responses_of(cells, other))
     middle = 0.5 * (one.points[1:] + one.points[:-1])
     turn = np.degrees(np.arctan2(middle[:, 1], middle[:, 0]))

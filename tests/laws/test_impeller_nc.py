@@ -17,11 +17,11 @@ from chipload.jobs.impeller.channels import channel_repeat
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import machine_named
 from chipload.planning.impeller.lines import LineMotion
-from chipload.planning.impeller.links import Link, linked
+from chipload.planning.impeller.links import Link, link_tracks
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
-from chipload.planning.impeller.paths import PatchFinish, finishing
+from chipload.planning.impeller.paths import PatchFinish, finish_tracks
 from chipload.planning.impeller.programs import pallet_rate, program_of
-from chipload.planning.impeller.rough_settings import roughed
+from chipload.planning.impeller.rough_settings import rough_channels
 from chipload.planning.impeller.roughing import RoughingSettings
 from chipload.planning.impeller.tables import index_table
 from chipload.program.gcode.writer import write_gcode
@@ -43,19 +43,19 @@ def impeller():
 def finished(impeller):
     scene = impeller.scene(0, "plus", ([0.5], [0.5]), (90, 40), near=1.5, around=0, hub_points=(40, 12))
     table = math.radians(55.0)
-    tracks = finishing(
+    tracks = finish_tracks(
         impeller.blade.plus, "u", ((0.3, 0.45), (0.5, 0.6)), scene, 0, CUTTER, table,
         PatchFinish(0.1, LineMotion(0.005, 100.0 / 60.0, RATE, 0.5), 1.0), workers=2,
     )  # fmt: skip
     link = Link(lift=2.0, margin=0.5, touch=0.01, near=4.0, feed=20.0, above=5.0)
-    moves = linked(tracks.tracks, scene, CUTTER, table, 100.0 / 60.0, link, 0.5, rate=RATE).moves
+    moves = link_tracks(tracks.tracks, scene, CUTTER, table, 100.0 / 60.0, link, 0.5, rate=RATE).moves
     return program_of(moves, 90.0, 1)
 
 
 def rough(impeller):
     how = RoughingSettings(60.0, 25.0, 0.5, 0.5, LineMotion(0.1, 5.0, RATE, 0.5), spacing=4.0, around=0, over=1.0)
     table = index_table(MACHINE).at([math.radians(55.0)])
-    (plan,) = roughed(
+    (plan,) = rough_channels(
         impeller, Catalogue("own", (CUTTER,)), CUTTER, how, Link(2.0, 0.3, 0.1, 0.0, 20.0, 5.0), 90.0, table, 0.9
     )
     return plan.program

@@ -12,10 +12,10 @@ from chipload.machine.kinematics import forward
 from chipload.machine.machine import machine_named
 from chipload.planning.impeller.coverage import between_lines
 from chipload.planning.impeller.lines import LineMotion, stations
-from chipload.planning.impeller.links import Link, linked, safe_height
+from chipload.planning.impeller.links import Link, link_tracks, safe_height
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.passes import surface_joint
-from chipload.planning.impeller.paths import PatchFinish, finishing
+from chipload.planning.impeller.paths import PatchFinish, finish_tracks
 from chipload.planning.impeller.programs import pallet_rate, pallet_speed, program_of, table_stands, too_fast
 from chipload.planning.impeller.refinement import Refinement
 from chipload.program.gcode.writer import write_gcode
@@ -43,12 +43,12 @@ def scene(impeller):
 @pytest.fixture(scope="module", params=["u", "v"])
 def machined(request, impeller, scene):
     motion = LineMotion(CHORD, 100.0 / 60.0, pallet_rate(MACHINE), 0.5)
-    tracks = finishing(
+    tracks = finish_tracks(
         impeller.blade.plus, request.param, BOX, scene, 0, CUTTER, TABLE, PatchFinish(SCALLOP, motion), workers=2
     )
     link = Link(lift=2.0, margin=0.5, touch=0.01, near=6.0, feed=20.0, above=5.0)
     mender = Refinement(impeller.blade.plus, scene, 0, CUTTER, TABLE, CHORD, 0.5)
-    way = linked(
+    way = link_tracks(
         tracks.tracks, scene, CUTTER, TABLE, 100.0 / 60.0, link, 0.5, rate=pallet_rate(MACHINE),
         joint=surface_joint([mender] * len(tracks.tracks)),
     )  # fmt: skip
@@ -102,13 +102,13 @@ def lines_of_patch(impeller, scene, along, box, begin):
     """Lines of the cutter over a part of the plus side."""
     motion = LineMotion(CHORD, 100.0 / 60.0, pallet_rate(MACHINE), 0.5)
     finish = PatchFinish(SCALLOP, motion)
-    return finishing(impeller.blade.plus, along, box, scene, 0, CUTTER, TABLE, finish, workers=2, begin=begin)
+    return finish_tracks(impeller.blade.plus, along, box, scene, 0, CUTTER, TABLE, finish, workers=2, begin=begin)
 
 
 def leave_no_more_than_asked(impeller, scene, tracks, along, box):
     """The check finds no gouge, and nothing above the scallop between the lines."""
     link = Link(lift=2.0, margin=0.5, touch=0.01, near=6.0, feed=20.0, above=5.0)
-    way = linked(tracks.tracks, scene, CUTTER, TABLE, 100.0 / 60.0, link, 0.5, rate=pallet_rate(MACHINE))
+    way = link_tracks(tracks.tracks, scene, CUTTER, TABLE, 100.0 / 60.0, link, 0.5, rate=pallet_rate(MACHINE))
     assert not tracks.missed
     assert not way.refused
     share = [np.linspace(0.05, 0.95, 9), np.linspace(0.0, 1.0, 401)]
@@ -207,7 +207,7 @@ def test_a_rapid_keeps_off_what_roughing_leaves(impeller, scene, machined):
     _, tracks, _, _ = machined
     for allowance, rapid in ((0.0, True), (30.0, False)):
         link = Link(lift=2.0, margin=0.5, touch=0.01, near=6.0, feed=20.0, above=5.0, allowance=allowance)
-        way = linked(tracks.tracks[:1], scene, CUTTER, TABLE, 100.0 / 60.0, link, 0.5)
+        way = link_tracks(tracks.tracks[:1], scene, CUTTER, TABLE, 100.0 / 60.0, link, 0.5)
         height = np.einsum("ij,ij->i", way.moves.tip, way.moves.axis)
         low = height < safe_height(scene.check, TABLE)
         assert (np.array(way.moves.motion)[low] == RAPID).any() == rapid

@@ -13,7 +13,7 @@ from chipload.machine.machine import machine_named
 from chipload.planning.impeller.lines import LineMotion
 from chipload.planning.impeller.links import Link
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
-from chipload.planning.impeller.rough_settings import roughed
+from chipload.planning.impeller.rough_settings import rough_channels
 from chipload.planning.impeller.roughing import RoughingSettings, uncut
 from chipload.planning.impeller.tables import index_table
 from chipload.simulation.channel.stock import taken_from
@@ -32,7 +32,7 @@ def impeller():
 
 
 def plans(impeller, cutters, stated, tables=(55.0,), share=0.9):
-    return roughed(
+    return rough_channels(
         impeller, Catalogue("own", cutters), stated, HOW, LINK, 90.0, TABLE.at(np.radians(tables)), share, workers=2
     )
 

@@ -8,10 +8,10 @@ import pytest
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.planning.impeller.floor import layer_of, patch_of
 from chipload.planning.impeller.lines import LineMotion
-from chipload.planning.impeller.links import Link, linked
+from chipload.planning.impeller.links import Link, link_tracks
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.programs import program_of
-from chipload.planning.impeller.roughing import RoughingSettings, guarded, layers, roughing, thickened
+from chipload.planning.impeller.roughing import RoughingSettings, guard_walls, layers, roughing_tracks, thicken_walls
 from chipload.simulation.channel.channel import left_on, wall
 
 CUTTER = CatalogueCutter(12.0, 2.0, cutting_length=45.0, reach=60.0, holder_diameter=30.0)
@@ -26,8 +26,8 @@ def impeller():
 
 @pytest.fixture(scope="module")
 def rough(impeller):
-    tracks, scene = roughing(impeller, 0, CUTTER, TABLE, HOW, workers=2), thickened(impeller, 0, HOW)
-    way = linked(
+    tracks, scene = roughing_tracks(impeller, 0, CUTTER, TABLE, HOW, workers=2), thicken_walls(impeller, 0, HOW)
+    way = link_tracks(
         tracks.tracks, scene, CUTTER, TABLE, 2.0, Link(1.0, 0.3, 0.1, 0.0, 20.0, 5.0), 0.5, "rough", 2.0, one_way=True
     )
     return tracks, way, program_of(way.moves, 90.0, 2)
@@ -48,7 +48,7 @@ def test_floor_is_the_hub(impeller):
 def test_guarded_walls_stand_out_by_the_sag_and_the_milled_one_does_not(impeller):
     s = ImpellerShape()
     for milled in (0, 2):
-        scene = guarded(impeller, 0, milled, 2.0, 2.0, around=0)
+        scene = guard_walls(impeller, 0, milled, 2.0, 2.0, around=0)
         p = scene.check[scene.check_surface == 2]
         # distance from the ellipse of the hub, to first order of its equation
         x, y = s.outer_radius - np.hypot(p[:, 0], p[:, 1]), s.height - p[:, 2]

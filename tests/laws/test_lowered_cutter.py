@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chipload.planning.pocket.clearing_path import CUT, LIFT, ClearingPath
-from chipload.planning.pocket.motions import motions_of, programs_of, replayed, samples_of
+from chipload.planning.pocket.motions import motions_of, programs_of, replay_motions, samples_of
 from chipload.planning.pocket.request import Clearing
 from chipload.program.program import Program
 from chipload.simulation.verify import verify_contour
@@ -23,7 +23,7 @@ def test_any_engagement_up_to_that_ahead_agrees_where_the_cutter_is_lowered(end,
     )  # fmt: skip
     motions = motions_of(path, ASKED.heights, ASKED.feed, ASKED.link_feed)
     samples = samples_of(motions, 1.0)
-    met, _ = replayed(motions, samples, 5.0)
+    met, _ = replay_motions(motions, samples, 5.0)
     assert motions.kind[samples.motion[LOWERED]] == LIFT
     engagement = np.degrees(met.angle)
     assert engagement[LOWERED] == 0.0

@@ -8,7 +8,7 @@ import pytest
 
 from chipload.errors import InputError
 from chipload.machine.kinematics import forward
-from chipload.machine.linearise import linearise, traced
+from chipload.machine.linearise import linearise, trace_path
 from chipload.machine.machine import machine_named
 
 FIVE = ("cradle-ac", "dmu50", "xyzac-trunnion", "xyzbc-trunnion", "xyzbc-head-table", "xyzbcw-bridge")
@@ -103,7 +103,7 @@ def test_traced_leaves_the_true_path_by_the_tolerance():
     q = np.zeros((3, 9))
     q[:, 0] = 50.0, 80.0, -10.0
     q[1:, 5] = math.pi / 2, math.pi / 2 + 4.0 * math.pi
-    path = traced(machine, q, 0.01)
+    path = trace_path(machine, q, 0.01)
     worst = 0.0
     for k in range(1, len(path.row)):
         x, _ = densely(machine, path.axes, k, 0.0)
@@ -130,10 +130,10 @@ def test_traced_leaves_the_true_path_by_the_tolerance():
             lambda m: linearise(m, [[0, 0, 0], [50, 50, 0]], [[0, 0, 1.0], [0, 1.0, 1.0]], 1e-6, 1e-3, max_rows=10),
             "pieces are more than max_rows = 10: raise the tolerance or max_rows",
         ),
-        (lambda m: traced(m, np.zeros((1, 3)), 0.1), "traced: axes (1, 3): must be (n, 9) finite numbers, n >= 1"),
-        (lambda m: traced(m, np.zeros((1, 9)), -1.0), "traced: tolerance -1: must be above 0"),
+        (lambda m: trace_path(m, np.zeros((1, 3)), 0.1), "traced: axes (1, 3): must be (n, 9) finite numbers, n >= 1"),
+        (lambda m: trace_path(m, np.zeros((1, 9)), -1.0), "traced: tolerance -1: must be above 0"),
         (
-            lambda m: traced(m, [[0] * 9, [0, 0, 0, 0, 0, 1e12, 0, 0, 0]], 0.1),
+            lambda m: trace_path(m, [[0] * 9, [0, 0, 0, 0, 0, 1e12, 0, 0, 0]], 0.1),
             "traced: more than 1000000 pieces: raise the tolerance or max_rows",
         ),
     ],

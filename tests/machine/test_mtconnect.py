@@ -16,7 +16,7 @@ from chipload.cli import app
 from chipload.control.logs import read_log
 from chipload.errors import InputError
 from chipload.machine import read_machine
-from chipload.machine.mtconnect import described, document, samples
+from chipload.machine.mtconnect import describe_device, document, samples
 
 PROBE = """<?xml version="1.0" encoding="UTF-8"?>
 <MTConnectDevices xmlns="urn:mtconnect.org:MTConnectDevices:1.4"><Header/><Devices>
@@ -138,7 +138,7 @@ def test_a_machine_is_refused_until_its_comments_are_filled_in(agent: str, tmp_p
 
 def test_what_is_asked_for_must_be_there(agent: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no device lathe: there are mill 7"):
-        described(document(agent, "probe"), "lathe")
+        describe_device(document(agent, "probe"), "lathe")
     with pytest.raises(InputError, match="the agent reports: no such path"):
         document(agent, "assets")
     with pytest.raises(InputError, match="no answer"):
@@ -174,7 +174,7 @@ def test_numbers_and_depth_that_no_agent_sends_are_refused(tmp_path: Path) -> No
     deep = PROBE.replace('<Linear id="x"', "<Group>" * 20_000 + '<Linear id="x"', 1)
     deep = deep.replace("</Axes>", "</Axes>", 1).replace("</Linear>", "</Linear>" + "</Group>" * 20_000, 1)
     (tmp_path / "deep.xml").write_text(deep)
-    found = described(document(str(tmp_path / "deep.xml")))
+    found = describe_device(document(str(tmp_path / "deep.xml")))
     assert found.speed == (50.0, 12000.0)
 
 

@@ -17,7 +17,7 @@ from chipload.geometry.contour import Contour
 from chipload.geometry.offset import offset
 from chipload.machine.machine import machine_named, read_machine
 from chipload.planning.contour.backward import concave_kinks, leading_curve
-from chipload.planning.contour.blend import clothoid_length, eased
+from chipload.planning.contour.blend import clothoid_length, ease_arcs
 from chipload.planning.contour.forward import forward_pass
 from chipload.planning.contour.plan import Finishing, plan_contour
 from chipload.planning.contour.schedule import within_machine
@@ -143,7 +143,7 @@ def test_clothoid_length():
 
 def test_tight_tolerance_shortens_the_clothoid_and_says_so():
     path = offset([CORNER], R)[0]
-    e = eased(path, R, A, 0.005)
+    e = ease_arcs(path, R, A, 0.005)
     assert [x.code for x in e.events] == ["joint-short"]
     assert 0.0 < e.deviation_mm <= 0.005
 
@@ -153,7 +153,7 @@ def test_deviation_is_the_distance_of_the_walls():
     import shapely
 
     path = offset([CORNER], R)[0]
-    e = eased(path, R, A, 0.05)
+    e = ease_arcs(path, R, A, 0.05)
     drawn = shapely.linestrings(path.flatten(1e-6))
     points = shapely.points(e.path.at(np.linspace(0.0, e.path.length, 2000))[0])
     assert shapely.distance(drawn, points).max() == pytest.approx(e.deviation_mm, abs=1e-4)

@@ -8,7 +8,7 @@ import pytest
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour
 from chipload.program.build import follow, helix, plunge, rapid, rows
-from chipload.program.motions import bounds, directions, lengths, straightened, sweeps
+from chipload.program.motions import bounds, directions, lengths, straighten_arcs, sweeps
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, Program
 
 SLOT = Contour.from_bulges([[0, 0], [30, 0], [30, 20], [0, 20]], [0.0, 1.0, 0.0, 1.0], closed=True)
@@ -76,8 +76,8 @@ def test_helix_length():
 
 def test_chords_stay_near():
     whole = at_start(SLOT, follow(SLOT, 0.0, 10.0, 0.0, 1, "x"))
-    assert straightened(whole, np.full(len(whole), math.inf)) is whole
-    chords = straightened(whole, np.full(len(whole), 0.1))
+    assert straighten_arcs(whole, np.full(len(whole), math.inf)) is whole
+    chords = straighten_arcs(whole, np.full(len(whole), 0.1))
     assert (chords.motion[1:] == LINE).all()
     assert len(chords) == 1 + 2 + 2 * math.ceil(math.pi / 0.1)
     np.testing.assert_array_equal(chords.p_work[-1], whole.p_work[-1])

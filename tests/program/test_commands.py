@@ -14,7 +14,7 @@ from chipload.program.commands import (
     YZ,
     Commands,
     Frame,
-    chorded,
+    chord_arcs,
     commands_from_rows,
     extents,
     starts,
@@ -75,7 +75,7 @@ def test_chords_of_an_arc_in_another_plane():
         (RAPID, nine(0.0, 10, 0), 0, (0, 0), 0, 0, 1, 1, False, 0, 1, 0),
         (ARC, nine(2.0, 0, 10, 1.0), YZ, (0, 0), 1, 5, 1, 1, False, 0, 2, 0),
     ]
-    c = chorded(commands_from_rows(rows, (Frame(),), ("x",)), np.array([False, True]), 0.01)
+    c = chord_arcs(commands_from_rows(rows, (Frame(),), ("x",)), np.array([False, True]), 0.01)
     u = np.arange(1, len(c)) / (len(c) - 1)
     a = 0.5 * math.pi * u
     np.testing.assert_allclose(

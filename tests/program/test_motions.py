@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from chipload.errors import InputError
-from chipload.program.motions import bases, bounds, directions, lengths, straightened, sweeps
+from chipload.program.motions import bases, bounds, directions, lengths, straighten_arcs, sweeps
 from chipload.program.program import ARC_CCW, ARC_CW, RAPID, Program
 
 
@@ -62,7 +62,7 @@ def test_arc_against_samples(seed):
     step = np.diff(points, axis=0)
     np.testing.assert_allclose(first[1], step[0] / np.linalg.norm(step[0]), atol=1e-3)
     np.testing.assert_allclose(last[1], step[-1] / np.linalg.norm(step[-1]), atol=1e-3)
-    chords = straightened(program, np.array([np.inf, 0.1]))
+    chords = straighten_arcs(program, np.array([np.inf, 0.1]))
     n = len(chords) - 1
     np.testing.assert_allclose(chords.p_work[1:], at(np.arange(1, n + 1) / n), atol=1e-9)
 
@@ -87,5 +87,5 @@ def test_an_axis_that_turns_on_an_arc_turns_along_its_chords():
     program, _ = one_arc(5.0, 0.0, 180.0, 0.0)
     s, c = math.sin(0.2), math.cos(0.2)
     columns = {k: getattr(program, k) for k in program.__dataclass_fields__}
-    chords = straightened(Program(**{**columns, "axis": [[0, -s, c], [0, s, c]]}), np.array([np.inf, math.pi / 2]))
+    chords = straighten_arcs(Program(**{**columns, "axis": [[0, -s, c], [0, s, c]]}), np.array([np.inf, math.pi / 2]))
     np.testing.assert_allclose(chords.axis, [[0, -s, c], [0, 0, 1], [0, s, c]], atol=1e-12)

@@ -21,7 +21,7 @@ from chipload.program.gcode.reader import read_gcode
 from chipload.program.gcode.tools import Tool, ToolTable
 from chipload.program.heidenhain.reader import read_heidenhain
 from chipload.program.swivel import Swivel
-from chipload.program.tilt import Tilt, of_vectors, spatial, tilt_of, turned
+from chipload.program.tilt import Tilt, of_vectors, spatial, tilt_of, turn_matrix
 from chipload.program.to_work import axes_of, home, to_work
 
 #: machines with two rotary axes: both in the table, both in the head, one in each
@@ -289,7 +289,7 @@ def test_rotations():
     for a, b, c in rng.uniform(-180.0, 180.0, (50, 3)):
         for order in ("zxz", "xyz", "zyx", "yxz"):
             want = Rotation.from_euler(order.upper(), [a, b, c], degrees=True).as_matrix()
-            np.testing.assert_allclose(turned(order, (a, b, c)), want, atol=1e-12)
+            np.testing.assert_allclose(turn_matrix(order, (a, b, c)), want, atol=1e-12)
         np.testing.assert_allclose(
             spatial(a, b, c), Rotation.from_euler("xyz", [a, b, c], degrees=True).as_matrix(), atol=1e-12
         )
@@ -298,6 +298,6 @@ def test_rotations():
             Tilt(tuple(float(x) for x in bad))
     with pytest.raises(InputError, match="normal has no length"):
         of_vectors(np.array([1.0, 0.0, 0.0]), np.zeros(3))
-    tilt = tilt_of(turned("xyz", (10.0, 20.0, 30.0)), (1.0, 2.0, 3.0))
+    tilt = tilt_of(turn_matrix("xyz", (10.0, 20.0, 30.0)), (1.0, 2.0, 3.0))
     p = rng.normal(size=(4, 3))
     np.testing.assert_allclose(tilt.from_offset(tilt.to_offset(p)), p, atol=1e-12)

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.revolve import Revolved
-from chipload.geometry.sections import checked, loft, read_meridian, read_sections
+from chipload.geometry.sections import check_sections, loft, read_meridian, read_sections
 from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.impeller import Impeller
@@ -35,13 +35,13 @@ def impeller():
         read_meridian(FOLDER / f"HECCvanedCoordinates_flowpathCoordinates_{name}.txt", "inch", over=True)
         for name in ("hub", "shroud")
     )
-    blades = [loft(checked(sections(kind), OUTER)) for kind in ("main", "splitter")]
+    blades = [loft(check_sections(sections(kind), OUTER)) for kind in ("main", "splitter")]
     return Impeller(*blades, Revolved(hub, 1), Revolved(shroud, -1), 15)
 
 
 def test_a_wrong_unit_is_caught():
     with pytest.raises(InputError, match=r"smaller by 2.538, as inch read as cm"):
-        checked(sections("main", "cm"), OUTER)
+        check_sections(sections("main", "cm"), OUTER)
 
 
 def test_columns_that_a_file_does_not_name_are_not_guessed():

@@ -9,7 +9,7 @@ import pytest
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.geometry.revolve import Revolved
-from chipload.geometry.sections import checked, loft, read_meridian, read_sections
+from chipload.geometry.sections import check_sections, loft, read_meridian, read_sections
 from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.compare import cutter_choices, gouges
 from chipload.planning.impeller.costs import ChannelSide, Terms
@@ -32,7 +32,7 @@ def test_patches_of_blade_and_splitter():
         for name in ("hub", "shroud")
     )
     kinds = [sorted(FOLDER.glob(f"*impeller_{kind}_blade_section_*.txt")) for kind in ("main", "splitter")]
-    blades = [loft(checked(read_sections(k, "inch", True, "X R*THETA R"), OUTER)) for k in kinds]
+    blades = [loft(check_sections(read_sections(k, "inch", True, "X R*THETA R"), OUTER)) for k in kinds]
     impeller = Impeller(*blades, Revolved(hub, 1), Revolved(shroud, -1), 15)
     u, v = np.linspace(0.05, 0.95, 6), np.linspace(0.25, 0.95, 4)
     sides = []

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
 from chipload.examples import copy_example
-from chipload.geometry.sections import checked, loft
+from chipload.geometry.sections import check_sections, loft
 from chipload.geometry.thin_wall import through_sections
 from chipload.jobs import check_job, load_job, run_job
 from chipload.jobs.impeller.part import AGAINST_Z, read_part
@@ -142,7 +142,7 @@ def test_the_blade_as_a_wall(tmp_path):
     path.write_text(WALL + text[text.index("[workpiece]") :])
     found = wall_of_faces(load_job(path).job)
     rows = np.loadtxt(ROTOR / "blade3d.Case7-28-8.dat", skiprows=1).reshape(21, 241, 3)
-    given = through_sections(loft(checked(tuple(rows @ AGAINST_Z["+x"].T))), 0.15)
+    given = through_sections(loft(check_sections(tuple(rows @ AGAINST_Z["+x"].T))), 0.15)
     # the two have other parameters along the blade: what they share is the distance from one side to the other
     u, v = np.meshgrid(np.linspace(0.0, 1.0, 401), np.linspace(0.0, 1.0, 401), indexing="ij")
     greatest = []

@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from chipload.report.bodies import scene_bodies
-from chipload.report.gltf import GltfScene, node_names, selected
+from chipload.report.gltf import GltfScene, node_names, select_nodes
 
 COLOUR = (34, 120, 132, 255)
 RUNS = [(1, 4), (6, 9)]
@@ -59,7 +59,7 @@ def test_an_empty_scene_is_a_file_without_bodies() -> None:
 
 def test_of_a_selection_the_other_bodies_are_not_read() -> None:
     glb = _both()[0]
-    some = trimesh.load(io.BytesIO(selected(glb, frozenset({"part"}))), file_type="glb", force="scene")
+    some = trimesh.load(io.BytesIO(select_nodes(glb, frozenset({"part"}))), file_type="glb", force="scene")
     assert set(some.geometry) == {"part"}
     whole = trimesh.load(io.BytesIO(glb), file_type="glb", force="scene").geometry["part"]
     assert np.array_equal(some.geometry["part"].vertices, whole.vertices)

@@ -32,7 +32,7 @@ from chipload.result import Verdict
 from chipload.result.history import write_history
 from chipload.result.load import load_result
 from chipload.result.summary import summary_bytes
-from chipload.result.thinning import thinned
+from chipload.result.thinning import thin_rows
 
 Maker = Callable[..., ContourResult]
 
@@ -338,7 +338,7 @@ def test_thinning_keeps_the_extremes_of_every_stretch() -> None:
     rng = np.random.default_rng(1)
     values = rng.normal(size=50_000)
     values[31_234], values[17] = 40.0, -40.0
-    keep = thinned(values, 2000)
+    keep = thin_rows(values, 2000)
     assert len(keep) <= 2002
     assert {31_234, 17, 0, 49_999} <= set(keep.tolist())
     assert (np.diff(keep) > 0).all()

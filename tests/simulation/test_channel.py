@@ -7,12 +7,12 @@ import pytest
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
 from chipload.simulation.channel.channel import PARTS, left_on, scallop_numbers, tool_parts, wall
 
-FLAT = through([[[0, 0, 0], [0, 20, 0]], [[30, 0, 0], [30, 20, 0]]], [0, 1], [0, 1])
+FLAT = patch_through([[[0, 0, 0], [0, 20, 0]], [[30, 0, 0], [30, 20, 0]]], [0, 1], [0, 1])
 BALL = CatalogueCutter(8.0, 4.0, 12.0, neck_diameter=6.0, neck_length=25.0, reach=40.0, holder_diameter=30.0)
 
 
@@ -59,7 +59,7 @@ def test_each_part_of_the_tool_beside_a_wall(x, part, deep):
     """A wall x = 0 that the tool, standing along +Z at x < 0, goes by: which part meets which band of heights."""
     # the wall's normal looks to -x
     heights = {0: (4.0, 12.0), 1: (12.1, 24.9), 3: (40.1, 60.0)}[part]
-    side = through(
+    side = patch_through(
         [[[0, 0, heights[0]], [0, 0, heights[1]]], [[0, 20, heights[0]], [0, 20, heights[1]]]], [0, 1], [0, 1], side=-1
     )
     grid = wall("side", side, np.linspace(0.3, 0.7, 5), np.linspace(0.0, 1.0, 9))

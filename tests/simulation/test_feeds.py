@@ -13,7 +13,7 @@ from chipload.cutting.material import Material
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
 from chipload.simulation.chips import remove
-from chipload.simulation.loads import Cuts, at_feeds, greatest_loads, joined
+from chipload.simulation.loads import Cuts, at_feeds, greatest_loads, join_cuts
 from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 
@@ -79,7 +79,7 @@ def test_each_step_has_its_own_factor_and_cuts_join() -> None:
     thick, true = mixed.engagement.chip_max(), mixed.plain.chip_max()
     assert (thick - true <= 0.008 + (2.0 * true) ** 2 / 10.0).all()
     assert (thick[true > 1e-3] > true[true > 1e-3]).all()
-    again = joined([whole, whole])
+    again = join_cuts([whole, whole])
     np.testing.assert_array_equal(again.spindle, np.full(2 * len(whole), 300.0))
     assert len(again.plain.rows) == 2 * len(old)
     assert math.isclose(removal.columns["chip_max_mm"].max(), whole.engagement.chip_max().max())

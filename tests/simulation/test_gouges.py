@@ -9,7 +9,7 @@ from tests.simulation.test_channel import BALL, FLAT
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
 from chipload.simulation.channel.channel import left_on, wall
@@ -59,7 +59,7 @@ def test_on_a_curved_wall_no_dense_point_is_deeper_than_the_bound():
     u, v = np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9)
     U, V = np.meshgrid(u, v, indexing="ij")
     grid = np.stack([24.0 * U, 24.0 * V, 1.2 * np.sin(5.0 * U) * np.cos(4.0 * V)], axis=-1)
-    surface = through(grid, u, v)
+    surface = patch_through(grid, u, v)
     own = wall("wavy", surface, u, v)
     fine = wall("wavy", surface, np.linspace(0.0, 1.0, 171), np.linspace(0.0, 1.0, 167))
     seen = 0

@@ -8,7 +8,7 @@ import pytest
 from tests.simulation.test_channel import FLAT, over
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 from chipload.program.build import plunge, rapid
 from chipload.program.program import Program
 from chipload.simulation.channel import _ray_cuts
@@ -28,7 +28,7 @@ ALL = pytest.mark.parametrize("cutter", [TAPERED, OVAL, CONE], ids=["tapered", "
 def test_an_upright_wall_is_cut_as_deep_as_the_profile_is_wide(cutter):
     """A wall x = 0 that the tool, standing along z at x = -4, goes by."""
     low, high = 3.0, cutter.cutting_length - 0.1
-    side = through([[[0, 0, low], [0, 0, high]], [[0, 20, low], [0, 20, high]]], [0, 1], [0, 1], side=-1)
+    side = patch_through([[[0, 0, low], [0, 0, high]], [[0, 20, low], [0, 20, high]]], [0, 1], [0, 1], side=-1)
     grid = wall("side", side, np.linspace(0.3, 0.7, 3), np.linspace(0.0, 1.0, 40))
     x = -0.5 * cutter.top_diameter + 0.4
     path = [rapid([[x, -30.0, 0.0]], 100.0, 1, "link"), plunge([[x, 50.0, 0.0]], 10.0, 100.0, 1, "finish")]
@@ -72,7 +72,7 @@ def test_on_a_curved_wall_rays_end_where_the_profile_is(cutter):
     u = np.linspace(0.0, 1.0, 9)
     U, V = np.meshgrid(u, u, indexing="ij")
     grid = np.stack([24.0 * U, 24.0 * V, 1.2 * np.sin(5.0 * U) * np.cos(4.0 * V)], axis=-1)
-    surface = through(grid, u, u)
+    surface = patch_through(grid, u, u)
     own, fine = (wall("wavy", surface, x, x) for x in (u, np.linspace(0.0, 1.0, 61)))
     s = np.linspace(-1.5, 0.0, 3001)
     for _ in range(3):

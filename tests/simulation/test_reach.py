@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
-from chipload.simulation.reach import reached
+from chipload.simulation.reach import reached_layers
 from chipload.simulation.steps import Steps
 from chipload.stock.layers import LayeredStock
 
@@ -53,7 +53,7 @@ def test_no_layer_that_loses_anything_is_left_out(cutter) -> None:
         a0 = rng.normal(size=3) * 0.6 + [0.0, 0.0, 1.0]
         a0[2] = abs(a0[2]) + 0.2
         made = step(p0, a0, p1, a0 / np.linalg.norm(a0) + rng.normal(size=3) * 0.03)
-        found = set(reached(made, [0], [np.arange(stock.layers)], cutter, stock)[0].tolist())
+        found = set(reached_layers(made, [0], [np.arange(stock.layers)], cutter, stock)[0].tolist())
         for i, h in enumerate(stock.heights):
             if within(made, cutter, np.column_stack([x.ravel(), y.ravel(), np.full(x.size, h)])).any():
                 cut += 1
@@ -68,7 +68,7 @@ def test_a_link_beside_the_wall_reaches_nothing_and_a_row_only_its_own_layers() 
     for clearance in (0.001, -0.02, -0.2):
         tip = np.array([10.0, 3.0 + 4.0 + clearance, 9.0]) - 4.0 * lean
         made = step(tip, lean, [tip[0] + 2.0, *tip[1:]], lean)
-        layers = reached(made, [0], [np.arange(stock.layers)], BALL, stock)[0]
+        layers = reached_layers(made, [0], [np.arange(stock.layers)], BALL, stock)[0]
         near = np.flatnonzero(np.abs(stock.heights - 9.0) <= math.sqrt(max(16.0 - (4.0 + clearance) ** 2, 0.0)))
         assert bool(len(near)) == (clearance < 0.0)
         assert set(near) <= set(layers.tolist())
@@ -77,9 +77,9 @@ def test_a_link_beside_the_wall_reaches_nothing_and_a_row_only_its_own_layers() 
 
 def test_what_is_gone_is_not_reached() -> None:
     stock, made = wall(), step([10.0, 1.5, 8.0], [0.2, 0.1, 1.0], [12.0, 1.5, 8.0], [0.2, 0.1, 1.0])
-    before = reached(made, [0], [np.arange(stock.layers)], BALL, stock)[0]
+    before = reached_layers(made, [0], [np.arange(stock.layers)], BALL, stock)[0]
     assert len(before) > 3
     gone = int(before[2])
     stock.remove(gone, stock.section(gone))
-    after = reached(made, [0], [np.arange(stock.layers)], BALL, stock)[0]
+    after = reached_layers(made, [0], [np.arange(stock.layers)], BALL, stock)[0]
     assert sorted(set(before.tolist()) - set(after.tolist())) == [gone]

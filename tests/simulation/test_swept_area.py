@@ -34,7 +34,7 @@ def leaning(turn: float) -> Program:
 @pytest.mark.parametrize("turn", [0.0, 0.02, 0.2])
 def test_layers_without_material_are_left_out_and_no_others(turn: float, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[np.ndarray] = []
-    left = swept_area._left
+    left = swept_area._layers_left
 
     def run() -> list[bytes]:
         stock = LayeredStock.block((0.0, 0.0, -16.0), (30.0, 30.0, 0.0), 1.0, 15.0)
@@ -46,10 +46,10 @@ def test_layers_without_material_are_left_out_and_no_others(turn: float, monkeyp
         asked.extend(found.values())
         return found
 
-    monkeypatch.setattr(swept_area, "_left", watched)
+    monkeypatch.setattr(swept_area, "_layers_left", watched)
     some = run()
     monkeypatch.setattr(
-        swept_area, "_left", lambda *words: {k: np.ones(len(f), dtype=bool) for k, f in left(*words).items()}
+        swept_area, "_layers_left", lambda *words: {k: np.ones(len(f), dtype=bool) for k, f in left(*words).items()}
     )
     assert run() == some
     assert np.concatenate(asked).mean() < 0.97
@@ -67,7 +67,7 @@ def test_a_box_holds_all_that_its_layer_is_covered_by() -> None:
             tiny = shapely.box(x - 1e-6, y - 1e-6, x + 1e-6, y + 1e-6)
             stock.tiles[:] = shapely.Polygon()
             stock.tiles[i, 0, 0] = tiny
-            left = swept_area._left(steps, {k: range(i, i + 1)}, low, high, CUTTERS, stock)
+            left = swept_area._layers_left(steps, {k: range(i, i + 1)}, low, high, CUTTERS, stock)
             assert left[k].tolist() == [True]
             seen += 1
         stock.tiles[:] = shapely.box(-60.0, -60.0, 60.0, 60.0)

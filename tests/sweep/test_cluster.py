@@ -26,7 +26,7 @@ from chipload.jobs.impeller.checkpoint import part_bytes
 from chipload.result.summary import summary_bytes
 from chipload.simulation import strips
 from chipload.sweep.run import run_sweep
-from chipload.workers import WorkerDied, Workers, completed
+from chipload.workers import WorkerDied, Workers, run_tasks
 from conftest import EXAMPLES
 from impeller_job import impeller_job, impeller_outcome
 from slot_job import slot_job
@@ -97,7 +97,7 @@ def test_a_cluster_whose_workers_are_all_gone_is_said(cluster, monkeypatch):
     address, _ = cluster
     monkeypatch.setattr(workers_module, "PATIENCE_S", 1.0)
     with pytest.raises(WorkerDied, match="no worker is left: start workers; the same command continues"):
-        list(completed(always_killed, [(1,)], dask=address))
+        list(run_tasks(always_killed, [(1,)], dask=address))
 
 
 def test_a_cluster_shares_a_value_for_its_tasks(cluster):
@@ -114,7 +114,7 @@ def test_a_cluster_shares_a_value_for_its_tasks(cluster):
 def test_a_task_that_kills_as_many_workers_as_are_allowed_is_named(cluster):
     address, _ = cluster
     with pytest.raises(WorkerDied, match="task 1"):
-        list(completed(always_killed, [(1,)], dask=address))
+        list(run_tasks(always_killed, [(1,)], dask=address))
 
 
 #: a piece of each side of a blade

@@ -25,7 +25,7 @@ from chipload.jobs import load_job
 from chipload.sweep.cases import Samples, cases_of
 from chipload.sweep.run import Combination, SweepResult, run_sweep
 from chipload.sweep.table import job_text, pareto
-from chipload.workers import WorkerDied, completed
+from chipload.workers import WorkerDied, run_tasks
 from conftest import EXAMPLES
 from slot_job import slot_job
 from worker_tasks import always_killed, killed_once
@@ -191,12 +191,12 @@ def test_the_probability_is_that_of_the_normal_distribution(tmp_path):
 
 def test_a_killed_worker_loses_nothing(tmp_path):
     tasks = [(str(tmp_path / "flag"), k) for k in range(6)]
-    assert sorted(completed(killed_once, tasks, workers=2)) == [(k, k * k) for k in range(6)]
+    assert sorted(run_tasks(killed_once, tasks, workers=2)) == [(k, k * k) for k in range(6)]
 
 
 def test_a_task_that_always_kills_is_named():
     with pytest.raises(WorkerDied, match="its worker died 3 times"):
-        list(completed(always_killed, [(1,), (2,)], workers=2))
+        list(run_tasks(always_killed, [(1,), (2,)], workers=2))
 
 
 def test_a_stopped_sweep_goes_on(alone, job, tmp_path):

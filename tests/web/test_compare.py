@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chipload.web.comparison import COLOURS, KeyNumber, Side, along, common_span, key_numbers, knots, matching_row
+from chipload.web.comparison import COLOURS, KeyNumber, Side, common_span, key_numbers, knots, matching_row, rows_along
 from chipload.web.loads import line_loads, tool_uses
 from chipload.web.panels.comparison import comparison_table
 from chipload.web.result import open_result
@@ -48,8 +48,8 @@ def test_rows_belong_together_by_time_or_by_path(sides) -> None:
     assert matching_row(a, b, "time", 99) == 49
     assert matching_row(b, a, "time", 49) == 99
     assert matching_row(b, a, "time", ROWS - 1) == ROWS - 1
-    assert along(a, b, "path") == pytest.approx(a.track.s)
-    assert along(a, b, "time") == pytest.approx(2.0 * a.track.t)
+    assert rows_along(a, b, "path") == pytest.approx(a.track.s)
+    assert rows_along(a, b, "time") == pytest.approx(2.0 * a.track.t)
     here, there = knots(a, b, "path")
     assert (here.tolist(), there.tolist()) == ([0.0, pytest.approx(160.0)], [0.0, pytest.approx(160.0)])
     assert common_span(sides, "force_n") == (FORCE.min() / 2.0, FORCE.max())

@@ -32,7 +32,7 @@ from chipload.web.folder_access import find_by_hash, list_folder, open_path, res
 from chipload.web.page import target_in
 from chipload.web.panels.limits import finding_list, limit_table, time_line
 from chipload.web.result import TextColumn, open_result
-from chipload.web.source import followed, source_of
+from chipload.web.source import follow_lines, source_of
 from square import CL, FORCE, LINE, PROGRAM, ROWS, X, Y, make_result, square_result, two_variants, write_by_hand
 
 
@@ -72,7 +72,7 @@ def test_a_path_keeps_its_places_and_its_red(root: Path) -> None:
     # a box of 60 x 60 x 10, and the path within it
     assert (header["low"], header["high"]) == ([-10.0, -10.0, -12.0], [50.0, 50.0, -2.0])
     assert "does not change with the slider" in shown.notice
-    words = scene.colouring(r, r.tracks[0], "pass", None)
+    words = scene.colour_column(r, r.tracks[0], "pass", None)
     assert words.words == (("square", WORDS[0]),)
 
 
@@ -247,7 +247,7 @@ def test_an_arc_and_a_path_that_comes_back_are_followed() -> None:
             np.column_stack([straight, nothing, nothing]),
         ]
     )
-    assert followed(p, program).tolist() == [5] * 20 + [7] * 39 + [8] * 20 + [9] * 20 + [10] * 20
+    assert follow_lines(p, program).tolist() == [5] * 20 + [7] * 39 + [8] * 20 + [9] * 20 + [10] * 20
 
 
 def test_a_million_rows_keep_their_extremes(tmp_path: Path) -> None:

@@ -124,7 +124,7 @@ def _finish(kinds: tuple[str, ...], given: tuple[Any, ...], progress: Progress) 
         "material": {"name": metal.name}, "cutter": tuple(tools), "operation": tuple(several), "limits": limits,
         "checks": {} if checks is None else _stated_checks(checks, set(_checks_of(ContourJobTable))),
     }  # fmt: skip
-    job = load(Path(kinds[0]).absolute(), _validated(ContourJobTable, tables), ())
+    job = load(Path(kinds[0]).absolute(), _validate_tables(ContourJobTable, tables), ())
     own = [contours] if isinstance(contours, Contour) else list(contours)
     inputs = run.inputs_of_contours(job, own, flat.outline, on, metal)
     outcome = run.plan_inputs(job, inputs, provenance_of({}, (), on, (metal,)), progress)
@@ -144,7 +144,7 @@ def _stated_checks(checks: CheckSettings, known: set[str]) -> dict[str, Any]:
     return {name: value for name, value in asdict(checks).items() if name in known}
 
 
-def _validated(kind: Any, tables: dict[str, Any]) -> Any:
+def _validate_tables(kind: Any, tables: dict[str, Any]) -> Any:
     """Return the tables, with an :class:`InputError` for each value that they refuse."""
     from pydantic import ValidationError
 

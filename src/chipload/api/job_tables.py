@@ -33,7 +33,7 @@ def run_tables(
     """Run the job of these tables; a table that is None is left out. Operations must be of one of ``kinds``."""
     from chipload import jobs
 
-    tables = {key: _shaped(key, value) for key, value in given.items() if value is not None}
+    tables = {key: _tables_of_value(key, value) for key, value in given.items() if value is not None}
     for k, op in enumerate(tables["operation"] if kinds else ()):
         if op.get("kind") not in kinds:
             known = f"{'one of ' if len(kinds) > 1 else ''}{', '.join(map(repr, kinds))}"
@@ -41,7 +41,7 @@ def run_tables(
     return jobs.run_job(jobs.job_of(tables, folder, capability=capability), progress)
 
 
-def _shaped(key: str, given: Any) -> Any:
+def _tables_of_value(key: str, given: Any) -> Any:
     """Return the table or tables that a value stands for under this key."""
     if key in FILES:
         return _file(key, given)

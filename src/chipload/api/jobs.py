@@ -38,7 +38,7 @@ def run_job(
     """
     from chipload import jobs
 
-    return jobs.run_job(_loaded(job, overrides, folder), progress)
+    return jobs.run_job(_load_any_job(job, overrides, folder), progress)
 
 
 def check_job(
@@ -61,7 +61,7 @@ def check_job(
     """
     from chipload import jobs
 
-    return jobs.check_job(_loaded(job, overrides, folder))
+    return jobs.check_job(_load_any_job(job, overrides, folder))
 
 
 def write_result(job: FinishedJob, out: str | Path) -> Path:
@@ -99,7 +99,7 @@ def load_result(folder: str | Path) -> Result:
     return load.load_result(folder)
 
 
-def _loaded(job: str | Path | Values, overrides: Sequence[str], folder: str | Path) -> LoadedJob:
+def _load_any_job(job: str | Path | Values, overrides: Sequence[str], folder: str | Path) -> LoadedJob:
     from chipload import jobs
 
     if isinstance(job, Mapping):

@@ -16,7 +16,7 @@ from chipload.stock.layers import LayeredStock
 from chipload.stock.solid import prisms
 from chipload.stock.tile_grid import polygons
 from chipload.structure.cells.nearest import StockSections
-from chipload.structure.cells.support import supported
+from chipload.structure.cells.support import support_line
 from chipload.structure.cells.workpiece import CellWorkpiece, displacements
 
 Floats = NDArray[np.float64]
@@ -73,7 +73,7 @@ def bent_workpiece(
     moved = np.einsum("nij,j->ni", displacements(work, line, points), force)
     places, normals = _candidates(sections, stock, line.mean(axis=0), diameter)
     if len(places):
-        found = supported(work, line, force, places, normals, JACK)
+        found = support_line(work, line, force, places, normals, JACK)
         place, normal, before, after = places[found.best], normals[found.best], found.before, found.after[found.best]
     else:
         before = float(np.linalg.norm(np.einsum("ij,j->i", displacements(work, line, line[:1])[0], force)))

@@ -17,7 +17,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
-from chipload.simulation.chips import block_of, counted, remove_block, setting_of, with_engine
+from chipload.simulation.chips import block_of, count_steps, remove_block, setting_of, with_engine
 from chipload.simulation.loads import GRAZES, Cuts
 from chipload.simulation.moves import Engine, HandOver
 from chipload.simulation.removal import Resolution, RunningSums, RunSettings
@@ -67,7 +67,7 @@ def cut_ahead(
     engine : of the simulation that will use the lines: it must find its contacts where these are. A step that meets a
         wall at its end cuts by moves, and does not by layers, which look at its middle
     """
-    count = counted(program, cutters, resolution)
+    count = count_steps(program, cutters, resolution)
     setting = setting_of(cutters, material, resolution, interpolation, None, 2)
     found = _lines_by_moves(program, stock, with_engine(engine, setting, program, stock)[0])
     sums, own = RunningSums(stock.volume()), list[_Lines]()

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.checking.load_budget import budget_of
-from chipload.checking.rubbing import over_feed, rubbing, spindle_speed
+from chipload.checking.rubbing import over_feed, rubbing_text, spindle_speed
 from chipload.checking.settings import CheckSettings
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.load_parts import LoadParts
@@ -212,7 +212,7 @@ def _chip_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ..
         return ()
     out = []
     k = int(np.argmax(thick))
-    if _beyond(checks, columns):
+    if _chip_beyond_range(checks, columns):
         text = (
             f"chips are up to {thick[k]:.4g} mm thick: the coefficients of {material.name} hold up to {chip[1]:g} mm, "
             "the loads beyond that are not known"
@@ -264,7 +264,7 @@ def ramp_findings(checks: DefaultChecks, columns: Columns) -> tuple[Finding, ...
     return tuple(out)
 
 
-def _beyond(checks: DefaultChecks, columns: Columns) -> float:
+def _chip_beyond_range(checks: DefaultChecks, columns: Columns) -> float:
     """The thickest chip [mm] where it is above those that the coefficients were measured with; 0: none is."""
     chip = checks.material.chip
     if chip is None or "chip_range" in checks.off or "chip_max_mm" not in columns:
@@ -354,7 +354,7 @@ def _rigid(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> LimitC
     """A deflection beyond the rigid model makes loads unknown; it is no limit that is exceeded."""
     if check.state is not Verdict.EXCEEDS:
         return check
-    if (rubs := rubbing(check, checks.material, checks.of_feed, checks.cutters, columns)) is not None:
+    if (rubs := rubbing_text(check, checks.material, checks.of_feed, checks.cutters, columns)) is not None:
         return replace(check, state=Verdict.UNPROVEN, reason=rubs)
     reason = "the cutter bends further than the rigid model covers, so its loads are not known: shorten it or cut less"
     return replace(check, state=Verdict.UNPROVEN, reason=reason)
@@ -411,7 +411,7 @@ def with_peaks(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> Li
     if check.state is not Verdict.HOLDS or check.worst is None or check.column.name not in PEAKS:
         return check
     material = checks.material
-    if material.chip is not None and (thickest := _beyond(checks, columns)):
+    if material.chip is not None and (thickest := _chip_beyond_range(checks, columns)):
         reason = f"chips are up to {thickest:.4g} mm thick, {material.name} was measured up to {material.chip[1]:g} mm"
         return replace(check, state=Verdict.UNPROVEN, reason=reason)
     excess = peak_excess(material, check.column.name)

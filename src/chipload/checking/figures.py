@@ -32,7 +32,7 @@ from chipload.report.sheet import figure, table
 from chipload.result import Result, release_of
 from chipload.result.motions import chords_of
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SPACE_POINTS, STOCK
-from chipload.result.thinning import thinned
+from chipload.result.thinning import thin_rows
 from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.stock.solid import prisms
 from chipload.stock.tile_grid import polygons
@@ -165,7 +165,7 @@ def _load_sections(simulation: SimulationResult, time_s: float, figures: dict[st
         f"changes and start-up; {number_text(what['time_s'])} s in all.</p>",
         table(["", "mean", "greatest", "least"], rows, numbers=(1, 2, 3)),
         f'<p class="note">{SPREAD if torque["mean_sd"] is not None else NO_SPREAD}{escape(rigid)}</p>',
-        figure("loads", along(simulation), figures),
+        figure("loads", loads_along_time(simulation), figures),
     ]
     body += workpiece_section(simulation, figures)
     chip = simulation.removal.piece
@@ -190,7 +190,7 @@ def _mean(values: Mapping[str, Any]) -> str:
     return f"{values['mean']:.4g}" if sd is None else f"{values['mean']:.4g} \u00b1 {2.0 * sd:.2g}"
 
 
-def along(simulation: SimulationResult) -> go.Figure:
+def loads_along_time(simulation: SimulationResult) -> go.Figure:
     """Plot force, torque, power, chip thickness, deflection and removal against time."""
     columns = simulation.removal.columns
     seconds, of = columns["seconds"], columns["line"]
@@ -202,7 +202,7 @@ def along(simulation: SimulationResult) -> go.Figure:
                 y = np.where(seconds > 0.0, columns["chip_volume_mm3"] / np.where(seconds > 0.0, seconds, 1.0), 0.0)
             else:
                 y = np.asarray(columns[column], dtype=np.float64)
-            keep = thinned(y, LINE_POINTS)
+            keep = thin_rows(y, LINE_POINTS)
             out.add_trace(
                 go.Scatter(
                     x=t[keep].astype(np.float32),
@@ -260,7 +260,7 @@ def feed_figure(read: ProgramResult) -> go.Figure:
     return out
 
 
-def _drawn(program: Program) -> tuple[Floats, NDArray[np.bool_]]:
+def _path_points(program: Program) -> tuple[Floats, NDArray[np.bool_]]:
     """Return the points of the path with arcs as chords, and whether a rapid leads to each."""
     chords = chords_of(program)
     return np.asarray(chords.p_work), np.asarray(chords.motion == RAPID)
@@ -285,7 +285,7 @@ def _slowest(read: ProgramResult) -> str:
 
 def scene_bytes(read: ProgramResult) -> bytes:
     """Return scene.glb: rapids and cutting motions as lines, and the remaining stock; lengths in mm, Z up."""
-    points, rapid = _drawn(read.reading.program)
+    points, rapid = _path_points(read.reading.program)
     scene = GltfScene()
     for name, chosen, colour in (("rapids", rapid, (179, 38, 30, 255)), ("path", ~rapid, (34, 120, 132, 255))):
         scene.add_lines(name, points, _runs(chosen), colour)

@@ -42,7 +42,7 @@ NEARLY, ALIKE = 0.85, 0.005
 FINER, FURTHER = 8, 4
 
 
-def forming(left: Difference, stiffness: Stiffness, material: Material) -> Callable[[Cuts], dict[str, Floats]]:
+def form_error_watch(left: Difference, stiffness: Stiffness, material: Material) -> Callable[[Cuts], dict[str, Floats]]:
     """Return a watch with the columns ``form_error_um`` (of greatest size, signed) and ``form_points`` (points made).
 
     Parameters

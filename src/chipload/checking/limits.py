@@ -38,7 +38,7 @@ def program_limits(
     direction = simulation.checks.unknown_direction
     own = stability or simulation.stability
     return (
-        *(_stated(simulation, columns, track, name, limit) for name, limit in loads.items()),
+        *(_check_stated_limit(simulation, columns, track, name, limit) for name, limit in loads.items()),
         *_default_gouge(simulation, columns, track),
         *stability_limits(
             own, simulation.limits, columns, track, simulation.errors, direction, simulation.checks.confidence
@@ -89,7 +89,9 @@ def greatest_difference(left: Difference, name: str) -> tuple[float, int, tuple[
     return float(value[k]), int(step[k]), (x, y, z)
 
 
-def _stated(simulation: SimulationResult, columns: Columns, track: str, name: str, limit: float) -> LimitCheck:
+def _check_stated_limit(
+    simulation: SimulationResult, columns: Columns, track: str, name: str, limit: float
+) -> LimitCheck:
     reason = simulation.checks.unknown_direction if name in DIRECTED else ""
     if not reason and name in BY_STIFFNESS and simulation.rigid:
         reason = f"{', '.join(simulation.rigid)} {'is' if len(simulation.rigid) == 1 else 'are'} not stated"

@@ -155,13 +155,13 @@ def budget_of(
     cutter = cutters.get(tool, cutters[min(cutters)])
     own = known.get((tool, BUDGETED[load]))
     if own is None:
-        own = bounded_parts(cutter, material, _at(columns, CHIP, row))
-    deflection = 1e-3 * _at(columns, "deflection_um", row)
+        own = bounded_parts(cutter, material, _value_in_row(columns, CHIP, row))
+    deflection = 1e-3 * _value_in_row(columns, "deflection_um", row)
     drills = is_drilling(columns, row)
     return ErrorBudget(confidence, budget_parts(own, load, cutter, material, check.error, peaks, deflection, drills))
 
 
-def _at(columns: Columns, name: str, row: int | None) -> float:
+def _value_in_row(columns: Columns, name: str, row: int | None) -> float:
     """Size of a column in a row; its greatest where the row is not known, 0 where the column is not there."""
     if name not in columns:
         return 0.0

@@ -87,14 +87,17 @@ def operation_numbers(simulation: SimulationResult, time_s: float) -> dict[str, 
         **workpiece(simulation),
         "form_error_um": form_error(simulation),
         **part_numbers.numbers(simulation.left, c),
-        "collisions": part_numbers.listed(simulation.collisions.found, c),
+        "collisions": part_numbers.collision_rows(simulation.collisions.found, c),
         "compared_with": list(simulation.collisions.compared_with),
         "no_holder": list(simulation.collisions.no_holder),
         "energy_balance": {str(tool): value for tool, value in removal.energy_balance.items()},
         "resolution_error": {k: v if math.isfinite(v) else None for k, v in removal.resolution_error.items()},
         "checks_off": list(simulation.checks.off),
         "band_error": dict(removal.band_error),
-        "cutter_stress_mpa": {"max": float(c["cutter_stress_mpa"].max(initial=0.0)), "allowed": _allowed(simulation)},
+        "cutter_stress_mpa": {
+            "max": float(c["cutter_stress_mpa"].max(initial=0.0)),
+            "allowed": _allowed_stresses(simulation),
+        },
         "settings": dict(simulation.settings),
         **({} if simulation.stability is None else {"stability": stability_numbers(simulation.stability, c)}),
     }
@@ -112,7 +115,7 @@ def _times(c: Mapping[str, NDArray[Any]], cuts: NDArray[np.bool_], time_s: float
     }  # fmt: skip
 
 
-def _allowed(simulation: SimulationResult) -> dict[str, dict[str, Any]]:
+def _allowed_stresses(simulation: SimulationResult) -> dict[str, dict[str, Any]]:
     """Return the allowed stress of each cutter, and the source of its strength."""
     return {
         str(n): {

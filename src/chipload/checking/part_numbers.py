@@ -36,7 +36,7 @@ def numbers(left: Difference | None, columns: Mapping[str, NDArray[Any]]) -> dic
     }
 
 
-def listed(collisions: tuple[Collision, ...], columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
+def collision_rows(collisions: tuple[Collision, ...], columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
     """Return ``collisions`` of an operation in summary.json."""
     t, tool = columns["t_s"], columns["tool"]
     return [

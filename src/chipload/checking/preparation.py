@@ -19,7 +19,7 @@ from chipload.machine.machine import Machine
 from chipload.program.program import RAPID, Program
 from chipload.program.read import ProgramReading, times_of
 from chipload.program.travel import leading_rows
-from chipload.simulation.chips import counted, require_steps
+from chipload.simulation.chips import count_steps, require_steps
 from chipload.simulation.heights.height_map import require_columns
 from chipload.simulation.moves import leans
 from chipload.simulation.removal import Resolution
@@ -71,9 +71,9 @@ def bodies_of(inputs: CheckInputs, reading: ProgramReading, stock: LayeredStock)
     checks = default_checks(inputs.checks, cutters, inputs.material)
     stiffness = stiffness_of(inputs.elasticity.stiffness, cutters)
     require_clamped(inputs.elasticity.workpiece, stock)
-    program, times = timed(reading, cutters, machine)
+    program, times = time_rows(reading, cutters, machine)
     fine = resolution_of(op, cutters, program)
-    count = counted(program, cutters, fine)
+    count = count_steps(program, cutters, fine)
     if op.engine == "layers":
         require_upright(program, op.step_mm, op.tolerance_mm, stock, cutters, op.interpolation)
     points = _points_of_stock(inputs, program, stock)
@@ -114,7 +114,7 @@ def resolution_of(op: SimulationSettings, cutters: Mapping[int, Cutter], program
     )
 
 
-def timed(
+def time_rows(
     reading: ProgramReading, cutters: Mapping[int, Cutter], machine: Machine
 ) -> tuple[Program, NDArray[np.float64]]:
     """Return the program from its first tool on and the time of each row; omitted rows count with the first row."""

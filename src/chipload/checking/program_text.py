@@ -68,7 +68,7 @@ def straight(program: Program, words: str) -> None:
         )
 
 
-def differing(old: Program, new: Program, *names: str) -> NDArray[np.bool_]:
+def rows_that_differ(old: Program, new: Program, *names: str) -> NDArray[np.bool_]:
     """Return a mask (n,) of the rows of two programs of equal length in which a named column differs."""
     off = np.zeros(len(old), dtype=np.bool_)
     for name in names:

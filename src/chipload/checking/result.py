@@ -53,7 +53,7 @@ def program_result(
         tracks=tracks,
         operations=({**own, **numbers, "program": program_numbers(program)},),
         findings=program.reading.findings,
-        unchecked=unchecked(program),
+        unchecked=unchecked_texts(program),
         provenance=program.provenance,
         maps=maps_of(simulation),
         note=note,
@@ -78,14 +78,14 @@ def _unchanged_track(program: ProgramResult) -> Track:
     time_s, simulation = float(program.seconds.sum()), program.simulated
     if simulation is None:
         unproven = Finding("not-simulated", 0, "the program was not simulated in its stock", Severity.UNPROVEN)
-        findings = (*(exceeding(f) for f in program.reading.violations), unproven)
+        findings = (*(as_exceeding(f) for f in program.reading.violations), unproven)
         blocks = in_memory(motion_rows(program))
         return Track(
             PROGRAM, TrackKind.PROGRAM, True, time_s, (), findings, (APT,),
             blocks=blocks, time_high_s=_time_high(program),
         )  # fmt: skip
     limits = program_limits(simulation, simulation.removal.columns, PROGRAM)
-    found = (*misplaced(simulation, limits), *findings_of(program, simulation))
+    found = (*find_misplaced_stock(simulation, limits), *findings_of(program, simulation))
     return Track(
         PROGRAM, TrackKind.PROGRAM, True, time_s, limits, found, (APT,),
         energy_balance=simulation.removal.energy_balance, blocks=lambda: step_rows(simulation),
@@ -132,7 +132,7 @@ def changed_name(program: ProgramResult, what: str) -> str:
     return f"0-{what}{Path(program.name).suffix}"
 
 
-def unchecked(program: ProgramResult) -> tuple[str, ...]:
+def unchecked_texts(program: ProgramResult) -> tuple[str, ...]:
     """Return what was not checked: limits that are not stated, and bodies that were not compared."""
     simulation = program.simulated
     if simulation is None:
@@ -171,14 +171,14 @@ def findings_of(program: ProgramResult, simulation: SimulationResult) -> tuple[F
     empty = nothing_cut(simulation.removal.columns, stock_box(simulation.stock), simulation.checks.cutters)
     return (
         *([] if empty is None else [empty]),
-        *(exceeding(f) for f in program.reading.violations),
+        *(as_exceeding(f) for f in program.reading.violations),
         *simulation_findings(simulation),
     )
 
 
 def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
     """Return findings of the simulation: rapids in material, collisions, chips beyond the range of the coefficients."""
-    out = [exceeding(f) if f.code == "rapid-cuts" else f for f in simulation.removal.findings]
+    out = [as_exceeding(f) if f.code == "rapid-cuts" else f for f in simulation.removal.findings]
     out += collision_findings(simulation.collisions.found)
     known = {(f.code, f.line) for f in out}
     out += [f for f in simulation.collisions.stock.findings if f.code != "rapid-cuts" or (f.code, f.line) not in known]
@@ -236,13 +236,13 @@ def _bodies(simulation: SimulationResult) -> list[Finding]:
     return out
 
 
-def misplaced(simulation: SimulationResult, limits: tuple[LimitCheck, ...]) -> tuple[Finding, ...]:
+def find_misplaced_stock(simulation: SimulationResult, limits: tuple[LimitCheck, ...]) -> tuple[Finding, ...]:
     """Return the finding that the stock is probably misplaced, if a limit is exceeded."""
     if all(check.state is not Verdict.EXCEEDS for check in limits):
         return ()
     box = stock_box(simulation.stock)
     found = stock_placement(simulation.removal.columns, box, simulation.checks.cutters)
-    return () if found is None else (exceeding(found),)
+    return () if found is None else (as_exceeding(found),)
 
 
 def as_posted(limits: tuple[LimitCheck, ...], *of_part: str) -> tuple[LimitCheck, ...]:
@@ -254,7 +254,7 @@ def as_posted(limits: tuple[LimitCheck, ...], *of_part: str) -> tuple[LimitCheck
     )  # fmt: skip
 
 
-def exceeding(f: Finding) -> Finding:
+def as_exceeding(f: Finding) -> Finding:
     """Return a finding with the severity of an exceeded limit."""
     return Finding(f.code, f.line, f.text, Severity.EXCEEDS, f.place, f.row)
 
@@ -263,7 +263,7 @@ def maps_of(simulation: SimulationResult | None) -> tuple[SurfaceMap, ...]:
     """Return the surface maps: gouge (below 0) and excess (above 0) on the part, and the deformed workpiece."""
     if simulation is None:
         return ()
-    maps, left = _bent(simulation), simulation.left
+    maps, left = _bent_workpiece_map(simulation), simulation.left
     if left is None:
         return maps
     known = np.isfinite(left.distance) & (left.over | (left.distance < 0.0))
@@ -271,7 +271,7 @@ def maps_of(simulation: SimulationResult | None) -> tuple[SurfaceMap, ...]:
     return (SurfaceMap("part", "excess_mm", left.points, values, np.asarray(left.faces, dtype=np.int64)), *maps)
 
 
-def _bent(simulation: SimulationResult) -> tuple[SurfaceMap, ...]:
+def _bent_workpiece_map(simulation: SimulationResult) -> tuple[SurfaceMap, ...]:
     """Return the map of the displacement of the workpiece in its worst step."""
     bent = None if simulation.workpiece is None else simulation.workpiece.bent
     if bent is None:

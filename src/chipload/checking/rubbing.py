@@ -51,7 +51,7 @@ def over_feed(columns: Columns, tool: Ints, cutters: Mapping[int, Cutter]) -> Fl
     return out
 
 
-def rubbing(
+def rubbing_text(
     check: LimitCheck, material: Material, of_feed: float, cutters: Mapping[int, Cutter], columns: Columns
 ) -> str | None:
     """Why the deflection is above the range of the model where the feed per tooth is too small for the force of the

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from chipload.checking.default_checks import PROGRAM_COLUMNS, with_checks
 from chipload.checking.drilling import with_drilling
-from chipload.checking.form_error import forming
+from chipload.checking.form_error import form_error_watch
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.leaning_stock import check_leaning_stock
 from chipload.checking.limits import GOUGE
 from chipload.checking.outcome import CollisionCheck, SimulationResult, StockCheck
-from chipload.checking.preparation import Bodies, bodies_of, resolution_of, timed
+from chipload.checking.preparation import Bodies, bodies_of, resolution_of, time_rows
 from chipload.checking.stability import stability_of, watch_of
-from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.checking.stiffness import deflection_watch, stiffness_of, watched_columns, with_columns
 from chipload.checking.stock_check import check_stock
 from chipload.checking.tap_torque import tap_torques
 from chipload.checking.workpiece import insides, stock_box
@@ -118,18 +118,18 @@ def simulate_program(
     kept = KeptPasses(checkpoint, passes_key(inputs, bodies.program) if checkpoint is not None else "")
     steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
     stock_check = replace(check_stock(inputs, bodies.program, stock, steps, kept, progress), blank=blank)
-    watches = [with_checks(inputs.checks, material, deflecting(gives, material))]
+    watches = [with_checks(inputs.checks, material, deflection_watch(gives, material))]
 
-    def passing(share: float, what: str) -> Counted:
+    def pass_progress(share: float, what: str) -> Counted:
         return lambda done: progress(share + SHARE * done / bodies.steps, what)
 
     left, part_points = _difference_from_part(
-        inputs, program, steps, before, passing(0.0, "distances to the part"), kept
+        inputs, program, steps, before, pass_progress(0.0, "distances to the part"), kept
     )
     # form error costs as much as the chips, and means little without stiffness data
     made = left if stiffness is not None or compliance is not None or inputs.limits.form_error_um is not None else None
     if made is not None:
-        watches.append(forming(made, gives, material))
+        watches.append(form_error_watch(made, gives, material))
     stability_watch, recorder = watch_of(inputs, compliance), EngagementRecorder(material)
     watches += [recorder] if stability_watch is None else [stability_watch, recorder]
 
@@ -153,7 +153,7 @@ def simulate_program(
                 None if stability_watch is None else stability_watch.dynamics,
             ),
         )  # fmt: skip
-    removal = with_columns(removal, (*watched(gives, formed=made is not None), *PROGRAM_COLUMNS))
+    removal = with_columns(removal, (*watched_columns(gives, formed=made is not None), *PROGRAM_COLUMNS))
     if inputs.limits.thrust_n is not None or any(is_pointed(c) for c in cutters.values()):
         removal = with_drilling(removal, cutters, material)
     if leans(program).any():
@@ -172,7 +172,7 @@ def simulate_program(
     if stability_watch is not None:
         removal = with_columns(removal, stability_watch.columns)
     solids = {**bodies.fixtures, **part_points}
-    touched = _collision_check(inputs, bodies, steps, solids, stock_check, passing, kept)
+    touched = _collision_check(inputs, bodies, steps, solids, stock_check, pass_progress, kept)
     skipped = None
     if reading.skipped is not None and initial is not None:
         skipped = simulate_program(inputs, reading.skipped, initial, workers=workers)
@@ -268,7 +268,7 @@ def compliance_of_workpiece(
     workpiece, cutters, op = inputs.elasticity.workpiece, inputs.cutters, inputs.settings
     if workpiece is None:
         return None
-    program, _ = timed(reading, cutters, inputs.machine)
+    program, _ = time_rows(reading, cutters, inputs.machine)
     fine = resolution_of(op, cutters, program)
     return workpiece_compliance(
         workpiece, program, stock, cutters, inputs.material, fine, op.engine, op.interpolation, progress

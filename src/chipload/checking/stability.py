@@ -26,7 +26,7 @@ from chipload.machine.machine import Machine
 from chipload.result import CoveredRows, LimitCheck, check_limit, error_of
 from chipload.result.budget import ErrorBudget, ErrorPart
 from chipload.result.limits import Columns, hold_at_confidence
-from chipload.stability.cuts import joined
+from chipload.stability.cuts import join_dynamic_cuts
 from chipload.stability.margin import MOST_MARGIN, stability_margins
 from chipload.stability.probability import stable_probability, variance_shares
 from chipload.stability.speeds import QuietSpeeds, quiet_speeds, speed_windows
@@ -135,7 +135,7 @@ class StabilityResult:
         for tool, some in sorted(watch.cuts.items()):
             margin = np.array([x[0] for x in watch.known[tool].values()])
             first = np.argsort(margin, kind="stable")[:UNSURE]
-            cuts, count = joined(some).chosen(first), watch.workpiece.frequency.shape[1]
+            cuts, count = join_dynamic_cuts(some).chosen(first), watch.workpiece.frequency.shape[1]
             for sign in (-1.0, 1.0):
                 factor = np.ones(cuts.omega.shape[1])
                 factor[-count:] += sign * watch.workpiece.error

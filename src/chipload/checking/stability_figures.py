@@ -19,9 +19,9 @@ from chipload.checking.stability_watch import engaged_edge
 from chipload.report.sheet import figure, table
 from chipload.result.limits import Columns
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, STOCK
-from chipload.result.thinning import thinned
+from chipload.result.thinning import thin_rows
 from chipload.stability.chart import StabilityChart, stability_chart
-from chipload.stability.cuts import joined
+from chipload.stability.cuts import join_dynamic_cuts
 from chipload.stability.margin import MOST_MARGIN
 from chipload.units import rpm_from_rad_s
 
@@ -124,7 +124,7 @@ def worst_chart(stability: StabilityResult, tool: int) -> StabilityChart | None:
     low, high = stability.range_of(tool)
     if not some or not high > low:
         return None
-    cuts = joined(some)
+    cuts = join_dynamic_cuts(some)
     margin = np.array([x[0] for x in stability.watch.known[tool].values()])
     # of those with the same margin, the one with most edge in cut
     cut = cuts.chosen([int(np.lexsort((-engaged_edge(cuts), margin))[0])])
@@ -150,7 +150,7 @@ def chart_figure(
         some = own.watch.cuts.get(tool, [])
         if not some:
             continue
-        cuts, margin = joined(some), np.array([x[0] for x in own.watch.known[tool].values()])
+        cuts, margin = join_dynamic_cuts(some), np.array([x[0] for x in own.watch.known[tool].values()])
         single = np.diff(cuts.start) == 1
         depth = np.ones(len(cuts))
         if chart.is_depth:
@@ -186,7 +186,7 @@ def margin_figure(columns: Columns, before: Columns | None, stability: Stability
         s = np.asarray(c["s_mm"])
         for row, values in enumerate((filled_margins(c), np.asarray(c["sle_um"])), start=1):
             # troughs of the margin are what matters
-            keep = thinned(-values if row == 1 else values, LINE_POINTS)
+            keep = thin_rows(-values if row == 1 else values, LINE_POINTS)
             out.add_trace(
                 go.Scatter(
                     x=s[keep].astype(np.float32), y=values[keep].astype(np.float32), mode="lines", name=name,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
-from chipload.stability.cuts import DynamicCuts, joined
+from chipload.stability.cuts import DynamicCuts, join_dynamic_cuts
 from chipload.stock.shapes import read_shapes, shape_bytes
 
 KIND = "chipload different cuts of a simulation 3"
@@ -30,7 +30,7 @@ WIDTH = 13
 Known = dict[int, dict[bytes, tuple[float, ...]]]
 
 
-def _widened(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _widen_rows(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return rows (b, :data:`WIDTH`), with columns of 0 added to narrower ones."""
     return np.pad(rows, ((0, 0), (0, WIDTH - rows.shape[1])))
 
@@ -52,7 +52,7 @@ def known_cuts_bytes(
     columns : number of values of a cut
     first_margin : by step, with the modes that the workpiece has before its first cut
     """
-    whole = {tool: joined(some) for tool, some in cuts.items()}
+    whole = {tool: join_dynamic_cuts(some) for tool, some in cuts.items()}
     keys = [key for tool in whole for key in known[tool]]
     values = [row for tool in whole for row in known[tool].values()]
     none = np.zeros(0)
@@ -65,7 +65,7 @@ def known_cuts_bytes(
         "key_ends": np.cumsum([len(key) for key in keys], dtype=np.int64),
         "values": np.array(values).reshape(len(keys), columns),
         "sizes": np.concatenate([np.diff(c.start) for c in whole.values()]) if whole else none.astype(np.int64),
-        "rows": np.concatenate([_widened(c.rows) for c in whole.values()]) if whole else none.reshape(0, WIDTH),
+        "rows": np.concatenate([_widen_rows(c.rows) for c in whole.values()]) if whole else none.reshape(0, WIDTH),
         "directions": np.array([c.U.shape[1] for c in whole.values()], dtype=np.int64),
         "delay": np.concatenate([c.delay if len(c.delay) else np.zeros(len(c.rows)) for c in whole.values()])
         if whole

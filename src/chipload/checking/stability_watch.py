@@ -20,8 +20,8 @@ from chipload.checking.stability_state import known_cuts_bytes, read_known_cuts
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.simulation.loads import Cuts
-from chipload.stability.cuts import DynamicCuts, dynamic_cuts, joined
-from chipload.stability.grouping import grouped
+from chipload.stability.cuts import DynamicCuts, dynamic_cuts, join_dynamic_cuts
+from chipload.stability.grouping import group_steps
 from chipload.stability.margin import stability_margins
 from chipload.stability.modes import Modes
 from chipload.stability.probability import stable_probability
@@ -79,7 +79,7 @@ class StabilityWatch:
         if not upright:
             self.leaning.add(cuts.tool)
         if (modes is not None or self.follows) and upright and len(cuts):
-            groups = grouped(cuts.plain, cuts.spindle, any(self.material.exponents) or runs_out(cuts.cutter))
+            groups = group_steps(cuts.plain, cuts.spindle, any(self.material.exponents) or runs_out(cuts.cutter))
             key = groups.key
             if self.follows:  # each step has modes of its own
                 key = tuple(own + step.tobytes() for own, step in zip(key, np.asarray(cuts.step), strict=True))
@@ -189,7 +189,7 @@ class StabilityWatch:
         some = self.cuts.get(tool, [])
         if not some:
             return None
-        whole = joined(some)
+        whole = join_dynamic_cuts(some)
         margin = np.array([x[0] for x in self.known[tool].values()])
         near, large = (NEAREST, LARGEST) if not whole.uneven else UNEVEN
         first = np.argsort(margin, kind="stable")[:near]

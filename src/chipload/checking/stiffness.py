@@ -126,7 +126,7 @@ def _part(length: float, diameter: float, modulus: float | None) -> Bar:
     return tube(length, diameter, PER * modulus)
 
 
-def deflecting(stiffness: Stiffness, material: Material) -> Callable[[Cuts], dict[str, Floats]]:
+def deflection_watch(stiffness: Stiffness, material: Material) -> Callable[[Cuts], dict[str, Floats]]:
     """Return a watch with the columns of deflection of tool and work, and of flute fill if the chip space is stated."""
 
     def columns(cuts: Cuts) -> dict[str, Floats]:
@@ -137,7 +137,7 @@ def deflecting(stiffness: Stiffness, material: Material) -> Callable[[Cuts], dic
     return columns
 
 
-def watched(stiffness: Stiffness, *, formed: bool = False) -> tuple[str, ...]:
+def watched_columns(stiffness: Stiffness, *, formed: bool = False) -> tuple[str, ...]:
     """Return the names of the watched columns; with ``formed`` also those of the form error."""
     work = () if stiffness.work is None else ("deflection_workpiece_um",)
     room = ("flute_fill",) if stiffness.room else ()

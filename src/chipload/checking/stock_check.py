@@ -45,7 +45,7 @@ def check_stock(
     checks, op, part = inputs.checks, inputs.settings, inputs.surroundings.part
     placed = () if part is None else find_misplaced_part(part.mesh.bounds, part.mesh.volume, *stock_box(stock))
     if leans(program).any():
-        return replace(_leaning(inputs, stock), findings=placed)
+        return replace(_check_leaning_axis(inputs, stock), findings=placed)
     pitch = pitch_at(inputs.cutters, program, stock, op.stock_points_mm)
     what = "shank and holder in the stock"
     progress(0.0, what)
@@ -106,7 +106,7 @@ def _dips(cutter: Cutter, number: int, program: Program, high: Floats) -> bool:
     return any(2.0 * radius > cutter.diameter and (tip[:, 2] + z < high[2]).any() for _, radius, z in bands_of(cutter))
 
 
-def _leaning(inputs: CheckInputs, stock: LayeredStock) -> StockCheck:
+def _check_leaning_axis(inputs: CheckInputs, stock: LayeredStock) -> StockCheck:
     """What the check of a program whose axis leans cannot show."""
     checks, unchecked, hidden = inputs.checks, list[str](), 0.0
     if checks.shank_in_stock:

@@ -205,10 +205,10 @@ def workpiece_compliance(
             states, tolerance=FREQUENCY * share, most=max(workpiece.states, 2), error=0.5 * (error + FLOOR),
             progress=lambda done, what: progress(0.9 + 0.05 * done, what),
         )  # fmt: skip
-    bent = _bent(found, ahead, grid, build, cutters) if len(found.worst) else None
+    bent = _bend_workpiece(found, ahead, grid, build, cutters) if len(found.worst) else None
     strained = None
     if workpiece.yield_mpa is not None and len(found.step):
-        strained = _strained(found, ahead, grid, build, elastic, workpiece.yield_mpa)
+        strained = _stress_of_steps(found, ahead, grid, build, elastic, workpiece.yield_mpa)
     findings: tuple[Finding, ...] = ()
     if found.loose > 1e-6 * stock.volume():
         text = f"{number_text(found.loose, 3)} mm3 of the workpiece are connected to nothing and carry no force"
@@ -227,7 +227,7 @@ def workpiece_compliance(
     )
 
 
-def _strained(
+def _stress_of_steps(
     found: StepCompliances,
     ahead: CutAhead,
     grid: CellGrid,
@@ -260,7 +260,7 @@ def _force(ahead: CutAhead, row: int) -> Floats:
     return np.asarray(-mean * (float(ahead.lines.force[row]) / size if size > 0.0 else 0.0))
 
 
-def _bent(
+def _bend_workpiece(
     found: StepCompliances,
     ahead: CutAhead,
     grid: CellGrid,

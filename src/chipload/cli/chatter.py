@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from chipload.cli.app import Debug, app
-from chipload.terminal import guarded
+from chipload.terminal import run_guarded
 
 
 @app.command()
@@ -51,4 +51,4 @@ def chatter(
             stopped = kind is ChatterAnswer.STOP
         return 3 if stopped else 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)

@@ -10,7 +10,7 @@ import typer
 from chipload.cli.app import Debug, MachineName, Sets, Tools, app
 from chipload.cli.inputs import show_verdict
 from chipload.errors import InputError
-from chipload.terminal import bar, guarded, show
+from chipload.terminal import bar, run_guarded, show
 
 File = Annotated[
     Path,
@@ -78,7 +78,7 @@ def init(
         show(f"written: {written}: {len(draft.guesses)} guesses to confirm; then chipload run {written} --out result")
         return 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)
 
 
 def _templates(kinds: list[str], folder: Path) -> int:
@@ -146,4 +146,4 @@ def simulate(
             show(f"report: {target / 'report.html'}")
         return done.result.verdict.exit_code
 
-    guarded(work, debug)
+    run_guarded(work, debug)

@@ -12,7 +12,7 @@ from chipload.cli.app import Accept, Debug, JobFile, Sets, app
 from chipload.cli.inputs import show_verdict
 from chipload.errors import Cancelled, InputError
 from chipload.number_text import number_text
-from chipload.terminal import bar, guarded, show, write_line
+from chipload.terminal import bar, run_guarded, show, write_line
 
 #: [s] between two states of a simulation
 KEEP_S = 10.0
@@ -62,7 +62,7 @@ def run(
 
         loaded = load_job(job, sets or ())
         if coarse:
-            from chipload.jobs.coarse import coarser, marked
+            from chipload.jobs.coarse import coarser, mark_coarse
 
             loaded = load_job(job, (*(sets or ()), *coarser(loaded)))
         from chipload.report.folder import check_target, checkpoint_folder, write_finished
@@ -80,7 +80,7 @@ def run(
                         loaded, lambda part, what: progress(0.8 * part, what), kept,
                         accept=accept, workers=where,
                     )  # fmt: skip
-                    done = marked(done) if coarse else done
+                    done = mark_coarse(done) if coarse else done
                     target = write_finished(
                         done.result, done.presentation, out, lambda part, what: progress(0.8 + 0.2 * part, what)
                     )
@@ -96,7 +96,7 @@ def run(
         show(f"report: {target / 'report.html'}")
         return done.result.verdict.exit_code
 
-    guarded(work, debug)
+    run_guarded(work, debug)
 
 
 @app.command()
@@ -128,7 +128,7 @@ def fit(
         show(f"report: {target / 'report.html'}")
         return done.result.verdict.exit_code
 
-    guarded(work, debug)
+    run_guarded(work, debug)
 
 
 @app.command()
@@ -172,4 +172,4 @@ def cuts(
         show(f'fill in the table and name it in the job: [threshold] file = "{out.name}"')
         return 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)

@@ -11,7 +11,7 @@ import typer
 from chipload.cli.app import Debug, Sets, app
 from chipload.errors import InputError, Severity
 from chipload.number_text import number_text
-from chipload.terminal import EXCEEDED, bar, guarded, show
+from chipload.terminal import EXCEEDED, bar, run_guarded, show
 
 if TYPE_CHECKING:
     from chipload.control.learning import LearnedMaterial, Signal
@@ -91,7 +91,7 @@ def learn(
         show(f'written: {out}; name it in the job: [material] file = "{out.name}"')
         return EXCEEDED if any(f.severity is not Severity.NOTE for f in found.findings) else 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)
 
 
 def _prediction(job: Path, sets: Any) -> tuple[PredictedTorque, Material]:

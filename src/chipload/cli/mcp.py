@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from chipload.cli.app import Debug, app
-from chipload.terminal import guarded
+from chipload.terminal import run_guarded
 
 
 @app.command()
@@ -40,4 +40,4 @@ def mcp(
         server.run("stdio")
         return 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)

@@ -9,7 +9,7 @@ import typer
 
 from chipload.cli.app import Debug, app
 from chipload.errors import InputError
-from chipload.terminal import guarded, show
+from chipload.terminal import run_guarded, show
 
 
 @app.command()
@@ -34,13 +34,13 @@ def mtconnect(
 
     def work() -> int:
         from chipload.files import write_whole
-        from chipload.machine.mtconnect import described, document, machine_text, samples
+        from chipload.machine.mtconnect import describe_device, document, machine_text, samples
 
         ending = out.suffix.lower()
         if ending == ".toml":
             if component is not None:
                 raise InputError("--component: applies to a log: leave it out, or use --out spindle.csv")
-            found = described(document(source, "probe"), device)
+            found = describe_device(document(source, "probe"), device)
             write_whole(out, machine_text(found).encode("utf-8"))
             show(f"{found.name}: axes {', '.join(sorted(found.travel)) or 'none'}; fill in the comments of {out}")
         elif ending == ".csv":
@@ -53,4 +53,4 @@ def mtconnect(
             raise InputError(f"--out {out}: must end with .toml (the machine) or .csv (a log of its spindle)")
         return 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chipload.cli.inputs import feed_of, machine_of
-from chipload.errors import InputError, Severity, grouped
+from chipload.errors import InputError, Severity, group_findings
 from chipload.number_text import number_text
 from chipload.terminal import EXCEEDED, bar, show
 
@@ -26,8 +26,8 @@ def finding_lines(reading: ProgramReading) -> list[str]:
     violations = set(map(id, reading.violations))
     rest = sorted((*(f for f in reading.findings if f not in gaps), *reading.violations), key=lambda f: f.line)
     return [
-        *(f"{text} [unproven]" for _, text in grouped(gaps)),
-        *(f"{text}{' [exceeds]' if id(f) in violations else ''}" for f, text in grouped(rest)),
+        *(f"{text} [unproven]" for _, text in group_findings(gaps)),
+        *(f"{text}{' [exceeds]' if id(f) in violations else ''}" for f, text in group_findings(rest)),
     ]
 
 

@@ -11,7 +11,7 @@ import typer
 
 from chipload.cli.app import Debug, MachineName, Tools, app
 from chipload.errors import InputError, Severity
-from chipload.terminal import EXCEEDED, guarded, plain, write_bytes
+from chipload.terminal import EXCEEDED, plain, run_guarded, write_bytes
 
 #: variables of the environment: the file of the machine that LinuxCNC runs, and whether its screen shows progress
 INI, BAR = "INI_FILE_NAME", "AXIS_PROGRESS_BAR"
@@ -57,7 +57,7 @@ def filter_program(
         write_bytes(data)
         return 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)
 
 
 _WHY = {Severity.EXCEEDS: "a limit is exceeded", Severity.UNPROVEN: "something could not be checked"}

@@ -25,8 +25,8 @@ from chipload.cli.app import (
 )
 from chipload.cli.inputs import feed_of, machine_of, setup_of
 from chipload.cli.program_check import TOLERANCE_MM, check_program
-from chipload.errors import InputError, Severity, grouped, worst_severity
-from chipload.terminal import EXCEEDED, bar, guarded, show
+from chipload.errors import InputError, Severity, group_findings, worst_severity
+from chipload.terminal import EXCEEDED, bar, run_guarded, show
 
 #: findings of a machine that do not affect the exit code
 HARMLESS = ("machine-singular", "machine-rewind", "machine-offset")
@@ -88,7 +88,7 @@ def check(
             show(text)
         return 0 if holds else EXCEEDED
 
-    guarded(work, debug)
+    run_guarded(work, debug)
 
 
 @app.command()
@@ -129,10 +129,10 @@ def convert(
                 tool_lengths=lengths, tcp=tcp, tolerance=tolerance_mm,
             )  # fmt: skip
             write_whole(target, text.encode("ascii"))
-        for _, found in grouped((*reading.findings, *findings)):
+        for _, found in group_findings((*reading.findings, *findings)):
             show(found)
         show(f"written: {target}: {len(text.splitlines())} lines for machine {there.name}, not verified")
         exceeded = any(f.code.startswith("machine-") and f.code not in HARMLESS for f in findings)
         return EXCEEDED if exceeded or worst_severity(reading.findings) >= Severity.UNPROVEN else 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)

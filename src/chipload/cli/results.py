@@ -9,7 +9,7 @@ import typer
 
 from chipload.cli.app import Debug, app
 from chipload.errors import InputError
-from chipload.terminal import guarded, show
+from chipload.terminal import run_guarded, show
 
 #: examples that ``chipload demo`` runs
 DEMO = ("contour", "pocket", "chips")
@@ -35,7 +35,7 @@ def example(
         show(f"copied: chipload run {copy_example(name, folder) / 'job.toml'} --out result")
         return 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)
 
 
 @app.command()
@@ -65,7 +65,7 @@ def demo(
         show(f"the page: chipload view {out}")
         return 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)
 
 
 @app.command()
@@ -85,7 +85,7 @@ def view(
         serve(path, port, open_browser, show)
         return 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)
 
 
 @app.command()
@@ -129,4 +129,4 @@ def export(
             show(f"written: {out / name}")
         return 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)

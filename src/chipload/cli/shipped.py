@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chipload.cli.app import Debug, app
-from chipload.terminal import guarded, plain, show
+from chipload.terminal import plain, run_guarded, show
 
 if TYPE_CHECKING:
     from chipload.jobs.shipped import Listing
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 @app.command()
 def machines(debug: Debug = False) -> None:
     """List the machines that come with chipload: axes, travel, feed, spindle, source of the numbers."""
-    guarded(lambda: _shown("machines"), debug)
+    run_guarded(lambda: _show_entry("machines"), debug)
 
 
 @app.command()
@@ -27,19 +27,19 @@ def materials(
     debug: Debug = False,
 ) -> None:
     """List the materials that come with chipload: coefficients, range, spread, what they prove, source."""
-    guarded(lambda: _shown_material(name) if name else _shown("materials"), debug)
+    run_guarded(lambda: _shown_material(name) if name else _show_entry("materials"), debug)
 
 
 @app.command()
 def cutters(debug: Debug = False) -> None:
     """List the cutter catalogues that come with chipload; a job states its cutters or names a tool library."""
-    guarded(lambda: _shown("cutters"), debug)
+    run_guarded(lambda: _show_entry("cutters"), debug)
 
 
 @app.command()
 def examples(debug: Debug = False) -> None:
     """List the examples. `chipload example NAME DIR` copies one."""
-    guarded(lambda: _shown("examples"), debug)
+    run_guarded(lambda: _show_entry("examples"), debug)
 
 
 def _shown_material(name: str) -> int:
@@ -50,7 +50,7 @@ def _shown_material(name: str) -> int:
     return 0
 
 
-def _shown(name: str) -> int:
+def _show_entry(name: str) -> int:
     from chipload.jobs.shipped import LISTINGS
 
     listing = LISTINGS[name]()

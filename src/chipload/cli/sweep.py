@@ -9,7 +9,7 @@ import typer
 
 from chipload.cli.app import Debug, JobFile, app
 from chipload.errors import Cancelled
-from chipload.terminal import EXCEEDED, bar, guarded, show
+from chipload.terminal import EXCEEDED, bar, run_guarded, show
 
 
 @app.command()
@@ -61,4 +61,4 @@ def sweep(
         show(done.message)
         return 0 if done.best is not None else EXCEEDED
 
-    guarded(work, debug)
+    run_guarded(work, debug)

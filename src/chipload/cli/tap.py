@@ -9,7 +9,7 @@ import typer
 
 from chipload.cli.app import Debug, app
 from chipload.number_text import number_text
-from chipload.terminal import guarded, show
+from chipload.terminal import run_guarded, show
 
 
 @app.command()
@@ -46,4 +46,4 @@ def tap(
         show(f'written: {out}; name it in the job: [dynamics] file = "{out.name}"')
         return 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)

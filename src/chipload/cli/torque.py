@@ -14,7 +14,7 @@ import typer
 from chipload.cli.app import Debug, app
 from chipload.errors import InputError
 from chipload.number_text import number_text
-from chipload.terminal import EXCEEDED, guarded, show
+from chipload.terminal import EXCEEDED, run_guarded, show
 
 if TYPE_CHECKING:
     from chipload.control.hal import HalJob
@@ -114,7 +114,7 @@ def hal(
         )
         return 0 if record.ended == "path" else EXCEEDED
 
-    guarded(work, debug)
+    run_guarded(work, debug)
 
 
 def _write_panel(job: HalJob, file: Path, name: str, out: Path | None) -> int:
@@ -203,12 +203,12 @@ def spindle(
         show(f"written: {out}")
         return EXCEEDED if any(answer.apart < TOLD_APART for answer in found.predictions) else 0
 
-    guarded(work, debug)
+    run_guarded(work, debug)
 
 
 def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
     """The identified values, one line each."""
-    from chipload.control.identification import aliased
+    from chipload.control.identification import alias_frequency
     from chipload.units import rpm_from_rad_s
 
     f, level, sensor = found.found, f"{100.0 * found.found.level:g} %", found.sensor
@@ -262,7 +262,7 @@ def lines_of(found: IdentifiedSpindle, flutes: int | None) -> list[str]:
         out.append(text)
     if flutes is not None:
         passing = flutes * found.cut_speed / math.tau
-        seen = aliased(passing, 1.0 / sensor.period)
+        seen = alias_frequency(passing, 1.0 / sensor.period)
         inside = seen < sensor.bandwidth
         out.append(
             f"tooth passing frequency {number_text(passing)} Hz: sampling at "

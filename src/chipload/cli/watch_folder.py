@@ -10,7 +10,7 @@ import typer
 from chipload.cli.app import Debug, MachineName, Sets, Tools, app
 from chipload.errors import Cancelled
 from chipload.number_text import number_text
-from chipload.terminal import guarded, show
+from chipload.terminal import run_guarded, show
 
 
 @app.command("watch-folder")
@@ -56,4 +56,4 @@ def watch_folder(
             raise Cancelled(f"{len(codes)} programs have a new verdict; the same command continues") from None
         return worst_code(codes)
 
-    guarded(work, debug)
+    run_guarded(work, debug)

@@ -194,7 +194,7 @@ def mamdani(table: FuzzyTable, error: ArrayLike, change: ArrayLike) -> Floats:
     return out.reshape(e.shape)
 
 
-def sampled(table: FuzzyTable, error: float, change: float, points: int) -> float:
+def sample_output(table: FuzzyTable, error: float, change: float, points: int) -> float:
     """Return the Mamdani output by sampling at ``points`` places: the formula as written, slow, as a reference."""
     a, b = _memberships(table.error, error), _memberships(table.change, change)
     first, last = table.output[0], table.output[-1]

@@ -27,8 +27,15 @@ from numpy.typing import NDArray
 from chipload.control.fuzzy import FuzzyTable
 from chipload.control.linuxcnc.hal_client import ControlledMachine, PinValues
 from chipload.control.linuxcnc.path import ToolPath, locate
-from chipload.control.linuxcnc.simulated_spindle import Load, SpindleState, advance, at_speed, estimated, read_current
-from chipload.control.override import STATUS, STOPS, Override, Reading, Status, allowed, begin, step, stopped
+from chipload.control.linuxcnc.simulated_spindle import (
+    Load,
+    SpindleState,
+    advance,
+    at_speed,
+    estimate_state,
+    read_current,
+)
+from chipload.control.override import STATUS, STOPS, Override, Reading, Status, allowed, begin, step, stop_state
 from chipload.control.plant import Ended, TorqueProfile
 from chipload.control.resolution import check_light
 from chipload.control.spindle_model import AS_STATED, Spindle, SpindleDeviation
@@ -183,10 +190,10 @@ class _Cut:
                 return
             simulated = self.state
             turning = replace(simulated, speed=speed)
-            self.state = replace(estimated(self.believed, turning, self.current, seconds), speed=simulated.speed)
+            self.state = replace(estimate_state(self.believed, turning, self.current, seconds), speed=simulated.speed)
         else:
             self.current = read_current(real, self.state, noise)
-            self.state = estimated(self.believed, self.state, self.current, seconds)
+            self.state = estimate_state(self.believed, self.state, self.current, seconds)
 
     def torque(self, seen: PinValues) -> float:
         """Return the torque for the controller [N mm]; NaN if there is none."""
@@ -239,7 +246,7 @@ def control(
             break
         before = status
         if _implausible(seen, cut):
-            state = stopped(state, Status.MACHINE_DATA) if status not in STOPS else state
+            state = stop_state(state, Status.MACHINE_DATA) if status not in STOPS else state
             sent, status = 0.0, Status.MACHINE_DATA if status not in STOPS else status
             unknown = (math.nan, math.nan, float(STATUS.index(status)), math.nan, math.nan, math.nan, math.nan)
             rows.append((seen.time, s, seen.velocity, 0.0, seen.feed, *unknown))

@@ -186,7 +186,7 @@ def identify_spindle(
     cuts_known = any((np.nan_to_num(run.torque) > 0.0).any() for run in runs)
     constant = torque_constant if torque_constant is not None else None if cuts_known else 1.0
     lag, interval = (sensor_lag, (sensor_lag, sensor_lag)) if sensor_lag is not None else _lag(runs, constant, changes)
-    found = _identified(runs, lag, constant, changes, level)
+    found = _identify_map(runs, lag, constant, changes, level)
     step = _step(np.concatenate([run.current for run in runs]))
     drift, drift_width = _drift(runs, found)
     cutting = [np.isnan(run.torque) | (np.nan_to_num(run.torque) > 0.0) for run in runs]
@@ -238,10 +238,10 @@ def bandwidth(lag: float, smoothing: float) -> float:
     return math.sqrt(square) / math.tau
 
 
-def aliased(frequency: float, rate: float) -> float:
+def alias_frequency(frequency: float, rate: float) -> float:
     """Return the frequency [Hz] to which readings at a rate [Hz] fold another frequency.
 
-    >>> aliased(300.0, 100.0), aliased(130.0, 100.0), aliased(30.0, 100.0)
+    >>> alias_frequency(300.0, 100.0), alias_frequency(130.0, 100.0), alias_frequency(30.0, 100.0)
     (0.0, 30.0, 30.0)
     """
     return abs(frequency - rate * round(frequency / rate))
@@ -253,7 +253,7 @@ def _speed_changes(runs: Sequence[Run]) -> bool:
     return bool(high - low > ONE_SPEED * high)
 
 
-def _identified(
+def _identify_map(
     runs: Sequence[Run], lag: float, constant: float | None, changes: bool, level: float, settled: float | None = None
 ) -> SpindleMap:
     terms = 2 if changes else 1
@@ -268,7 +268,7 @@ def _lag(runs: Sequence[Run], constant: float | None, changes: bool) -> tuple[fl
 
     def misfit(lag: float) -> float:
         # all lags are judged by the rows that the longest leaves
-        found = _identified(runs, lag, constant, changes, 0.95, tried[-1])
+        found = _identify_map(runs, lag, constant, changes, 0.95, tried[-1])
         return math.log(found.residual**2 + 1e-300)
 
     found = [misfit(lag) for lag in tried]
@@ -354,10 +354,10 @@ def _predict_each(
         rest = [other for j, (_, other) in enumerate(parts) if j != k]
         try:
             own = stated if stated is not None else constant
-            found = _identified(rest, lag, own, _speed_changes(rest), level)
+            found = _identify_map(rest, lag, own, _speed_changes(rest), level)
         except InputError:
             continue
-        predicted = _predicted(name, run, found, smoothing)
+        predicted = _predict_log(name, run, found, smoothing)
         if predicted is not None:
             out.append(predicted)
     return tuple(out)
@@ -372,7 +372,7 @@ def _blocks(name: str, run: Run) -> list[tuple[str, Run]]:
     ]
 
 
-def _predicted(name: str, run: Run, found: SpindleMap, smoothing: float) -> LogPrediction | None:
+def _predict_log(name: str, run: Run, found: SpindleMap, smoothing: float) -> LogPrediction | None:
     """Return the torque error of a log by a map that was identified without it."""
     if len(run.time) < 3:
         return None

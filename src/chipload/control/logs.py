@@ -120,7 +120,7 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = Non
         A file cannot be read or is too large, a column is not there, a unit is not known, no row is left.
     """
     label = f"log {path}"
-    stated = _stated(columns) if columns is not None else None
+    stated = _check_columns(columns) if columns is not None else None
     data = read_regular(path, label, MOST_BYTES, "cut it into parts").decode("utf-8-sig", "replace")
     try:
         names, rows = _table(data, stated is None or stated.head)
@@ -131,7 +131,7 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = Non
                 near = f": the nearest is {nearest(name, names)}" if names else ": the file is empty"
                 raise InputError(f"{label}: no column {name} for {quantity}{near}")
             places[quantity] = names.index(name)
-        kept, bad, number = _kept(rows, places)
+        kept, bad, number = _complete_rows(rows, places)
     except csv.Error as err:
         raise InputError(f"{label}: not a CSV file: {err}") from None
     wanted, sample = layout.wanted, layout.sample
@@ -183,7 +183,7 @@ def _by_name(label: str, names: list[str]) -> _Columns:
     return _Columns(wanted, None, (), True)
 
 
-def _kept(rows: Any, places: dict[str, int]) -> tuple[list[list[float | str]], list[int], list[int]]:
+def _complete_rows(rows: Any, places: dict[str, int]) -> tuple[list[list[float | str]], list[int], list[int]]:
     """Return the values of complete rows, the lines of the others, and the number of each complete row."""
     kept: list[list[float | str]] = []
     bad, number = [], []
@@ -211,7 +211,7 @@ def _kept(rows: Any, places: dict[str, int]) -> tuple[list[list[float | str]], l
     return kept, bad, number
 
 
-def _stated(columns: dict[str, Any] | str | Path) -> _Columns:
+def _check_columns(columns: dict[str, Any] | str | Path) -> _Columns:
     """Return the table of columns after a check."""
     label, table = ("log columns", columns) if isinstance(columns, dict) else read_table("log columns", columns)
     out: dict[str, tuple[str, str]] = {}

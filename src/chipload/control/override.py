@@ -229,7 +229,7 @@ def begin(config: Override, modelled: bool = False) -> Floats:
     return state
 
 
-def stopped(state: Floats, reason: Status) -> Floats:
+def stop_state(state: Floats, reason: Status) -> Floats:
     """Return the state after a stop for a reason that is not in the readings.
 
     Raises

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from chipload.lazy import attach
 
 if TYPE_CHECKING:
-    from chipload.cutting.fit import Fit, fit_average, predict, predicted
+    from chipload.cutting.fit import Fit, fit_average, predict, predict_forces
     from chipload.cutting.fit_turns import fit_instantaneous
     from chipload.cutting.force import forces_along, forces_over_turn, mean_forces
     from chipload.cutting.material import Material, material_named, material_names, read_material
@@ -29,7 +29,7 @@ __all__ = [
     "material_names",
     "mean_forces",
     "predict",
-    "predicted",
+    "predict_forces",
     "read_forces",
     "read_material",
     "turns_of",
@@ -43,7 +43,7 @@ __getattr__, __dir__ = attach(
         "strength": "cutter_stress allowed_stress",
         "measured": "read_forces",
         "turns": "MeasuredCut turns_of",
-        "fit": "Fit fit_average predict predicted",
+        "fit": "Fit fit_average predict predict_forces",
         "fit_turns": "fit_instantaneous",
     },
 )

@@ -234,7 +234,7 @@ def fit_average(cuts: Sequence[MeasuredCut], cutter: Cutter) -> Fit:
             continue
         i, c = np.array(rows).T
         block, seen = a[i, c][:, which], y[i, c]
-        x, there, free = solved(block, seen)
+        x, there, free = solve_scaled(block, seen)
         left = seen - block @ x
         inverse = np.linalg.pinv(block, rcond=1e-9)
         count = len(rows) - int(np.linalg.matrix_rank(block, rtol=1e-9))
@@ -255,11 +255,11 @@ def fit_average(cuts: Sequence[MeasuredCut], cutter: Cutter) -> Fit:
         np.full(len(cuts), np.nan), np.zeros((len(cuts), 3)), np.full((3, 2), np.nan), residual, r2
     )
     found = np.concatenate([runout_of(cutter), linear])
-    search = FitSearch(found, padded(spread, 2), max(freedom, 0), 0, True)
-    return concluded("average", cuts, turns, cutter, linear, identified, seen_by, search, notes)
+    search = FitSearch(found, pad_covariance(spread, 2), max(freedom, 0), 0, True)
+    return conclude_fit("average", cuts, turns, cutter, linear, identified, seen_by, search, notes)
 
 
-def solved(a: Floats, y: Floats) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+def solve_scaled(a: Floats, y: Floats) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
     """Solve least squares with scaled columns; return also which columns are not zero and which are determined."""
     size = np.linalg.norm(a, axis=0)
     there = size > 0.0
@@ -284,14 +284,14 @@ def runout_of(cutter: Cutter) -> Floats:
     return size * np.array([math.cos(direction), math.sin(direction)])
 
 
-def padded(spread: Floats, more: int) -> Floats:
+def pad_covariance(spread: Floats, more: int) -> Floats:
     """Return a covariance preceded by ``more`` exact numbers, whose rows and columns are 0."""
     out = np.zeros((len(spread) + more, len(spread) + more))
     out[more:, more:] = spread
     return out
 
 
-def concluded(
+def conclude_fit(
     method: str,
     cuts: Sequence[MeasuredCut],
     turns: tuple[Turns, ...],
@@ -321,17 +321,19 @@ def _student(freedom: int) -> float:
     return float(stdtrit(freedom, 0.975)) if freedom > 0 else math.nan
 
 
-def predicted(fit: Fit, cut: MeasuredCut, theta: Floats, resonance: Floats | None = None) -> Floats:
+def predict_forces(fit: Fit, cut: MeasuredCut, theta: Floats, resonance: Floats | None = None) -> Floats:
     """Forces that the coefficients give over a turn of a cut, as the dynamometer shows them: (m, 3) float [N] on the
     cutter at the rotations theta (m,); ``resonance`` None: that of the fit.
     """
-    return _turned(
+    return _predict_turn(
         fit, cut, fit.search.parameters, theta, None, fit.channels.resonance if resonance is None else resonance
     )
 
 
-def _turned(fit: Fit, cut: MeasuredCut, p: Floats, theta: Floats, harmonics: int | None, resonance: Floats) -> Floats:
-    """Return :func:`predicted` for any runout and coefficients p, from the first harmonics or from all."""
+def _predict_turn(
+    fit: Fit, cut: MeasuredCut, p: Floats, theta: Floats, harmonics: int | None, resonance: Floats
+) -> Floats:
+    """Return :func:`predict_forces` for any runout and coefficients p, from the first harmonics or from all."""
     cutter = replace(fit.cutter, runout=(math.hypot(p[0], p[1]), math.atan2(p[1], p[0])))
     rings = np.isfinite(resonance[:, 0])
     force = np.full((len(theta), 3), np.nan)
@@ -348,7 +350,7 @@ def _turned(fit: Fit, cut: MeasuredCut, p: Floats, theta: Floats, harmonics: int
 
 def predicted_mean(fit: Fit, cut: MeasuredCut) -> tuple[Floats, Floats]:
     """Return the mean force over the turn and the half width of its band, (3,) [N] each, as :func:`predict`."""
-    return _banded(fit, lambda p: _mean(fit, cut, p))
+    return _band_of_numbers(fit, lambda p: _mean(fit, cut, p))
 
 
 def _mean(fit: Fit, cut: MeasuredCut, p: Floats) -> Floats:
@@ -356,7 +358,7 @@ def _mean(fit: Fit, cut: MeasuredCut, p: Floats) -> Floats:
     return np.asarray(np.where(fit.known, unit_means(cut, cutter) @ p[2:], np.nan))
 
 
-def _banded(fit: Fit, numbers: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
+def _band_of_numbers(fit: Fit, numbers: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
     """Return ``numbers`` at the fitted parameters, and the half width of its 95 % band by differences."""
     p = fit.search.parameters
     values = numbers(p)
@@ -375,18 +377,18 @@ def predict(fit: Fit, cut: MeasuredCut) -> Prediction:
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
 
     def numbers(p: Floats) -> Floats:
-        whole = _turned(fit, cut, p, theta, None, fit.channels.resonance)
-        band = _turned(fit, cut, p, theta, max(fit.search.harmonics, 1), fit.channels.resonance)
+        whole = _predict_turn(fit, cut, p, theta, None, fit.channels.resonance)
+        band = _predict_turn(fit, cut, p, theta, max(fit.search.harmonics, 1), fit.channels.resonance)
         return np.stack([_mean(fit, cut, p), whole.max(axis=0), whole.min(axis=0), band.max(axis=0), band.min(axis=0)])
 
-    values, half = _banded(fit, numbers)
-    whole = predicted(fit, cut, theta)
+    values, half = _band_of_numbers(fit, numbers)
+    whole = predict_forces(fit, cut, theta)
     return Prediction(
         values[0], values[1], values[2], values[3], values[4], half, float(np.hypot(whole[:, 0], whole[:, 1]).max())
     )
 
 
-def aligned(fit: Fit, cut: MeasuredCut, turns: Turns, parts: int = 720) -> float:
+def align_turn(fit: Fit, cut: MeasuredCut, turns: Turns, parts: int = 720) -> float:
     """Return theta_0 [rad] of a cut at which its harmonics are nearest to the predicted ones, of ``parts`` tried."""
     k = np.arange(len(turns.amplitude), dtype=np.float64)
     model = (unit_harmonics(cut, fit.cutter, len(k) - 1) @ fit.coefficients.linear) * dynamometer(

@@ -43,11 +43,11 @@ from chipload.cutting.fit import (
     FitSearch,
     FittedChannels,
     as_real,
-    concluded,
+    conclude_fit,
     dynamometer,
-    padded,
+    pad_covariance,
     runout_of,
-    solved,
+    solve_scaled,
     unit_harmonics,
 )
 from chipload.cutting.turns import MeasuredCut, Turns, turns_of
@@ -121,7 +121,7 @@ class _Problem:
     def left(self, q: Floats) -> Floats:
         """Return the residuals at the best linear coefficients."""
         a, y = self.rows(q)
-        return np.asarray(y - a @ solved(a, y)[0])
+        return np.asarray(y - a @ solve_scaled(a, y)[0])
 
     def start(self, runout: Floats) -> Floats:
         """Return theta_0 of each cut by search at one runout; the linear coefficients are free in each cut.
@@ -179,11 +179,11 @@ def fit_instantaneous(
         if w is not None:
             resonance[c] = w, 0.05
     problem = _Problem(tuple(cuts), turns, cutter, harmonics, runout, zero, resonance, {})
-    q, converged = _searched(problem)
+    q, converged = _search_starts(problem)
     if any(w is not None for w in ringing):
         for _ in range(ROUNDS):
             problem = replace(problem, resonance=_channel_modes(problem, q), kept={})
-            q, converged = _refined(problem, q)
+            q, converged = _refine_unknowns(problem, q)
     return _final_fit(problem, q, converged)
 
 
@@ -206,7 +206,7 @@ def turns_in_band(cuts: Sequence[MeasuredCut], band: float) -> tuple[int, tuple[
     return harmonics, tuple(turns_of(cut, h) for cut, h in zip(cuts, full, strict=True))
 
 
-def _searched(problem: _Problem) -> tuple[Floats, bool]:
+def _search_starts(problem: _Problem) -> tuple[Floats, bool]:
     """Return the best result of several starts."""
     f, m = len(problem.cuts), problem.unknowns
     flutes = problem.cutter.flutes
@@ -224,11 +224,11 @@ def _searched(problem: _Problem) -> tuple[Floats, bool]:
             q = min(turned, key=lambda x: float(np.sum(problem.left(x) ** 2)))
         ranked.append((float(np.sum(problem.left(q) ** 2)), len(ranked), q))
     ranked.sort()
-    found = [_refined(problem, q) for _, _, q in ranked[:3]]
+    found = [_refine_unknowns(problem, q) for _, _, q in ranked[:3]]
     return min(found, key=lambda x: float(np.sum(problem.left(x[0]) ** 2)))
 
 
-def _refined(problem: _Problem, q: Floats) -> tuple[Floats, bool]:
+def _refine_unknowns(problem: _Problem, q: Floats) -> tuple[Floats, bool]:
     """Refine the unknowns by least squares from one start."""
     least = min(cut.feed_per_tooth(problem.cutter.flutes) for cut in problem.cuts)
     scale = np.concatenate([np.full(len(problem.cuts), 0.1), np.full(problem.unknowns, 0.2 * least)])
@@ -240,7 +240,7 @@ def _channel_modes(problem: _Problem, q: Floats) -> Floats:
     """Return w0 and zeta of each channel that rings, from all harmonics, with the other unknowns fixed."""
     f = len(problem.cuts)
     a, y = problem.rows(q)
-    x = solved(a, y)[0][:6]
+    x = solve_scaled(a, y)[0][:6]
     out = problem.resonance.copy()
     cutter = problem.cutter_at(q[f:])
     for c in np.flatnonzero(np.isfinite(out[:, 0])):
@@ -270,7 +270,7 @@ def _final_fit(problem: _Problem, q: Floats, converged: bool) -> Fit:
     """Return values, covariance and quality at the end of the search."""
     f, m = len(problem.cuts), problem.unknowns
     a, y = problem.rows(q)
-    x, there, determined = solved(a, y)
+    x, there, determined = solve_scaled(a, y)
     left = y - a @ x
     # model rows against every unknown: those outside by differences, x and the zeros exactly
     steps = np.concatenate([np.full(f, 1e-5), np.full(m, 1e-7)])
@@ -299,12 +299,14 @@ def _final_fit(problem: _Problem, q: Floats, converged: bool) -> Fit:
     if m == 1:
         spread = np.insert(np.insert(spread, 1, 0.0, axis=0), 1, 0.0, axis=1)
     elif m == 0:
-        spread = padded(spread, 2)
+        spread = pad_covariance(spread, 2)
     zero = x[6:].reshape(f, 3) if problem.seek_zero else np.zeros((f, 3))
     channels = FittedChannels(np.mod(q[:f], math.tau), zero, problem.resonance, residual, r2)
     found = np.concatenate([runout_of(runout), linear])
     search = FitSearch(found, spread, len(y) - int(sure.sum()), problem.harmonics, converged)
-    return concluded("instantaneous", problem.cuts, problem.turns, runout, linear, identified, channels, search, notes)
+    return conclude_fit(
+        "instantaneous", problem.cuts, problem.turns, runout, linear, identified, channels, search, notes
+    )
 
 
 def _covariance(problem: _Problem, inverse: Floats, left: Floats) -> Floats:

@@ -297,7 +297,7 @@ def material_text(material: Material) -> str:
     return "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in values.items())
 
 
-def beyond(material: Material, chip_max_mm: float, speed_mm_s: float) -> tuple[str, ...]:
+def texts_beyond_range(material: Material, chip_max_mm: float, speed_mm_s: float) -> tuple[str, ...]:
     """Return a text for each measured range that a cut leaves; none if it leaves none or no range is known.
 
     Parameters
@@ -310,7 +310,7 @@ def beyond(material: Material, chip_max_mm: float, speed_mm_s: float) -> tuple[s
     Examples
     --------
     >>> steel = Material("steel", 1800.0, 600.0, 200.0, 30.0, 40.0, 2.0, source="made up", chip=(0.01, 0.1))
-    >>> beyond(steel, 0.15, 2000.0)
+    >>> texts_beyond_range(steel, 0.15, 2000.0)
     ('material steel: a chip of 0.15 mm: its coefficients were measured from 0.01 to 0.1 mm',)
     """
     out = []

@@ -139,7 +139,7 @@ def read_forces(path: str | Path, window: tuple[float, float] | None = None) -> 
         raise InputError(
             f"{label}: {len(t)} samples in the window {low:g} to {high:g} s: needs 3 or more: widen window_s"
         )
-    rate = stated if time is None and stated is not None else _spacing(t, stated, label)
+    rate = stated if time is None and stated is not None else _sampling_rate(t, stated, label)
     measured = Measured(tuple(names[k] for k, _ in columns), force, rate, float(t[0]), header)
     return measured, tuple(_findings(measured, window, float(t[-1])))
 
@@ -272,7 +272,7 @@ def _rate(header: Mapping[str, str], label: str) -> float | None:
     return None
 
 
-def _spacing(t: Floats, stated: float | None, label: str) -> float:
+def _sampling_rate(t: Floats, stated: float | None, label: str) -> float:
     """Return the sampling rate of the time stamps; refuse gaps, and a header with another rate."""
     step = float(np.median(np.diff(t)))
     if not step > 0.0:

@@ -173,7 +173,7 @@ def _speed(force: Floats, rate: float, nominal: float, search: float, top: int) 
     t = np.arange(n) / rate
     heard = force.astype(np.complex128)
 
-    def lost(w: float) -> float:
+    def negative_power(w: float) -> float:
         """Less the squares of the harmonics of w."""
         one = np.exp(-1j * w * t)
         total, turned = 0.0, one
@@ -183,6 +183,6 @@ def _speed(force: Floats, rate: float, nominal: float, search: float, top: int) 
         return -total
 
     found = minimize_scalar(
-        lost, bounds=(best - line, best + line), method="bounded", options={"xatol": 1e-8 * nominal}
+        negative_power, bounds=(best - line, best + line), method="bounded", options={"xatol": 1e-8 * nominal}
     )
     return float(found.x)

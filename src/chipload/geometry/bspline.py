@@ -80,8 +80,8 @@ class BSplinePatch:
         a, b = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64))
         p, q = self.degrees
         x, y = a.ravel(), b.ravel()
-        _within(self.knots_u, p, x)
-        _within(self.knots_v, q, y)
+        _require_within(self.knots_u, p, x)
+        _require_within(self.knots_v, q, y)
         out = np.empty((len(x), 3))
         _bspline.points_of(self.knots_u, self.knots_v, self.control, p, q, x, y, du, dv, out)
         return out
@@ -112,8 +112,8 @@ class BSplinePatch:
         a, b = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64))
         p, q = self.degrees
         x, y = a.ravel(), b.ravel()
-        _within(self.knots_u, p, x)
-        _within(self.knots_v, q, y)
+        _require_within(self.knots_u, p, x)
+        _require_within(self.knots_v, q, y)
         points, normals = np.empty((len(x), 3)), np.empty((len(x), 3))
         if not _bspline.facing_of(
             self.knots_u, self.knots_v, self.control, self.side, p, q, x, y, points, normals
@@ -159,7 +159,7 @@ class BSplinePatch:
     def reversed(self, u: bool, v: bool) -> BSplinePatch:
         """The same surface, with the same normal, with u, v or both reversed.
 
-        >>> flat = through([[[0, 0, 0], [0, 2, 0]], [[3, 0, 0], [3, 2, 0]]], [0, 1], [0, 1])
+        >>> flat = patch_through([[[0, 0, 0], [0, 2, 0]], [[3, 0, 0], [3, 2, 0]]], [0, 1], [0, 1])
         >>> flat.reversed(True, False).at(0.0, 1.0).tolist()
         [[3.0, 2.0, 0.0]]
         """
@@ -171,7 +171,7 @@ class BSplinePatch:
         )
 
 
-def _within(knots: Floats, degree: int, x: Floats) -> None:
+def _require_within(knots: Floats, degree: int, x: Floats) -> None:
     """Refuse parameters outside the range of the knots."""
     if (x < knots[degree]).any() or (x > knots[-degree - 1]).any():
         raise InputError(f"patch: parameter out of {knots[degree]:g}..{knots[-degree - 1]:g}")
@@ -184,7 +184,7 @@ def basis(knots: Floats, degree: int, x: Floats, derivative: int = 0) -> tuple[N
     >>> N.tolist()
     [[0.75, 0.25]]
     """
-    _within(knots, degree, x)
+    _require_within(knots, degree, x)
     count = len(knots) - degree - 1
     span = np.clip(np.searchsorted(knots, x, side="right") - 1, degree, count - 1)
     values = np.ones((len(x), 1))
@@ -203,7 +203,7 @@ def basis(knots: Floats, degree: int, x: Floats, derivative: int = 0) -> tuple[N
     return span - degree, values if derivative <= degree else np.zeros_like(values)
 
 
-def through(
+def patch_through(
     points: ArrayLike, u: ArrayLike, v: ArrayLike, degrees: tuple[int, int] = (3, 3), side: int = 1
 ) -> BSplinePatch:
     """The patch through a grid of points (n, m, 3) [mm] at the parameters u (n,), v (m,), each from 0 to 1.

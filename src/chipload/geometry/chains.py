@@ -38,7 +38,7 @@ class Drawing:
     findings: tuple[Finding, ...]
 
 
-def chained(
+def chain_parts(
     parts: Sequence[Floats], join_mm: float, where: str = ""
 ) -> tuple[tuple[Contour, ...], tuple[Finding, ...]]:
     """Closed and open contours from parts, in the order of the file. O(n log n).
@@ -62,7 +62,7 @@ def chained(
     Examples
     --------
     >>> rows = [np.array([[0, 0, 9, 0, 0, 0, 0.0]]), np.array([[9, 9, 9, 0.004, 0, 0, 0.0]])]
-    >>> (c,), (f,) = chained(rows, 0.01)
+    >>> (c,), (f,) = chain_parts(rows, 0.01)
     >>> c.end.tolist(), f.text
     ([9.0, 9.0], 'gap of 0.004 mm closed at (9, 0.002)')
     """
@@ -97,11 +97,11 @@ def chained(
                 end = int(mate[end ^ 1])
         for e in chain:
             used[e // 2] = True
-        out.append(Contour(np.vstack([rows[e // 2] if e % 2 else _turned(rows[e // 2]) for e in chain])))
+        out.append(Contour(np.vstack([rows[e // 2] if e % 2 else _reverse_part(rows[e // 2]) for e in chain])))
     return tuple(out), tuple(findings)
 
 
-def _turned(rows: Floats) -> Floats:
+def _reverse_part(rows: Floats) -> Floats:
     """A part in the opposite sense."""
     seg = rows[::-1]
     return np.column_stack([seg[:, 2:4], seg[:, 0:2], seg[:, 4:6], -seg[:, 6]])

@@ -284,7 +284,7 @@ class Region:
         out = []
         for i, c in enumerate(contours):
             p = c.at(np.array([0.381966 * c.length]))[0]
-            depth = sum(bool(winding(o, p)[0]) for j, o in enumerate(contours) if j != i)
+            depth = sum(bool(winding_number(o, p)[0]) for j, o in enumerate(contours) if j != i)
             out.append(c if (c.area > 0.0) == (depth % 2 == 0) else c.reversed())
         return Region(tuple(out))
 
@@ -309,7 +309,7 @@ class Region:
         p = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         total = np.zeros(len(p), dtype=np.int64)
         for c in self.contours:
-            total += winding(c, p)
+            total += winding_number(c, p)
         return total > 0
 
     def flatten(self, chord_mm: float) -> Any:
@@ -327,7 +327,7 @@ class Region:
         return out
 
 
-def winding(contour: Contour, points: Floats) -> NDArray[np.int64]:
+def winding_number(contour: Contour, points: Floats) -> NDArray[np.int64]:
     """(m,) winding number of a closed contour about ``points`` (m, 2), exact for arcs: crossings of the ray to +x.
 
     O(n m), vectorised over the points.

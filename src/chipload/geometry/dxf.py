@@ -20,7 +20,7 @@ import numpy as np
 from chipload.errors import Finding, InputError
 from chipload.files import is_file, open_regular
 from chipload.geometry.biarc import arcs_along
-from chipload.geometry.chains import Drawing, chained
+from chipload.geometry.chains import Drawing, chain_parts
 from chipload.geometry.contour import JOIN_MM, Contour, Floats
 from chipload.units import MM_PER
 
@@ -117,7 +117,7 @@ def read_dxf(
     contours: list[Contour] = []
     owner: list[str] = []
     for layer, rows_of in parts.items():
-        made, seen = chained(rows_of, join_mm, f"layer {layer!r}: ")
+        made, seen = chain_parts(rows_of, join_mm, f"layer {layer!r}: ")
         contours += made
         owner += [layer] * len(made)
         findings += seen
@@ -343,7 +343,7 @@ class _Reader:
 
     def _lwpolyline(self, entity: Any, what: str) -> Any:
         v = np.array(entity.get_points("xyb"), dtype=np.float64).reshape(-1, 3)
-        return self._bulged(v, bool(entity.closed), self._side(entity, what), what)
+        return self._rows_of_bulges(v, bool(entity.closed), self._side(entity, what), what)
 
     def _polyline(self, entity: Any, what: str) -> Any:
         # control points of a spline fit (flag 16) are not on the curve
@@ -352,9 +352,9 @@ class _Reader:
         flat = bool(entity.is_2d_polyline)
         b = [float(v.dxf.get("bulge", 0.0)) if flat else 0.0 for v in vertices]
         side = self._side(entity, what) if flat else 1.0
-        return self._bulged(np.column_stack([p, b]), bool(entity.is_closed), side, what)
+        return self._rows_of_bulges(np.column_stack([p, b]), bool(entity.is_closed), side, what)
 
-    def _bulged(self, v: Floats, closed: bool, side: float, what: str) -> Any:
+    def _rows_of_bulges(self, v: Floats, closed: bool, side: float, what: str) -> Any:
         if not np.isfinite(v).all():
             raise InputError(f"{what} has a coordinate that is not a finite number")
         p = v[:, :2] * (side * self.mm, self.mm)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.geometry.contour import Contour, Floats, Region, winding
+from chipload.geometry.contour import Contour, Floats, Region, winding_number
 from chipload.geometry.split import (
     LADDER,
     RawSegments,
@@ -64,7 +64,7 @@ def even_odd(contours: Sequence[Contour]) -> tuple[tuple[Contour, ...], Floats]:
             return given, found
         places = found
         pieces, _ = split_segments(raw, tol, snap)
-        bounding, rows = _bounding(given, raw, pieces)
+        bounding, rows = _bounding_segments(given, raw, pieces)
         made = chained_segments(RawSegments.plain(rows), bounding, 1.0, tol)
         if made and all(c.closed for c in made):
             return made, places
@@ -83,7 +83,9 @@ def _raw(contours: Sequence[Contour]) -> RawSegments:
     return RawSegments.plain(rows, np.concatenate(follow))
 
 
-def _bounding(contours: Sequence[Contour], raw: RawSegments, pieces: SplitSegments) -> tuple[SplitSegments, Floats]:
+def _bounding_segments(
+    contours: Sequence[Contour], raw: RawSegments, pieces: SplitSegments
+) -> tuple[SplitSegments, Floats]:
     """The pieces that bound the area, each once and with the area on its left, and their segments (m, 7)."""
     rows = rows_of(raw, pieces)
     middle, normal = _middles(rows)
@@ -123,6 +125,6 @@ def _odd(contours: Sequence[Contour], points: Floats) -> NDArray[np.bool_]:
     """(m,) whether the winding number about each point is odd."""
     total = np.zeros(len(points), dtype=np.int64)
     for c in contours:
-        total += winding(c, points)
+        total += winding_number(c, points)
     out: NDArray[np.bool_] = total % 2 == 1
     return out

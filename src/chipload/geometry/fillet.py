@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import BSplinePatch, through
+from chipload.geometry.bspline import BSplinePatch, patch_through
 from chipload.geometry.revolve import Revolved
 
 Floats = NDArray[np.float64]
@@ -55,7 +55,7 @@ class Filleted:
     off: float
 
 
-def filleted(side: BSplinePatch, hub: Revolved, radius: float) -> Filleted:
+def add_fillet(side: BSplinePatch, hub: Revolved, radius: float) -> Filleted:
     """A side with a fillet at the hub.
 
     Parameters
@@ -72,7 +72,7 @@ def filleted(side: BSplinePatch, hub: Revolved, radius: float) -> Filleted:
     ends = np.unique(side.knots_u)
     u, off = np.sort(np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])])), np.inf
     for _ in range(_ROUNDS):
-        made, away = _made(side, hub, radius, u)
+        made, away = _make_patches(side, hub, radius, u)
         off = made.off
         if off <= FIT:
             return made
@@ -82,12 +82,12 @@ def filleted(side: BSplinePatch, hub: Revolved, radius: float) -> Filleted:
     )
 
 
-def _made(side: BSplinePatch, hub: Revolved, radius: float, u: Floats) -> tuple[Filleted, Floats]:
+def _make_patches(side: BSplinePatch, hub: Revolved, radius: float, u: Floats) -> tuple[Filleted, Floats]:
     """The patches through exact points at u (n,), and their deviation midway between these places (n - 1,) [mm]."""
     middle = 0.5 * (u[1:] + u[:-1])
-    v, between = (_touched(side, hub, radius, x) for x in (u, middle))
+    v, between = (_touch_heights(side, hub, radius, x) for x in (u, middle))
     w = np.linspace(0.0, 1.0, _ARC)
-    made = through(_arcs(side, hub, radius, u, v, w), u, w, (3, 5))
+    made = patch_through(_arcs(side, hub, radius, u, v, w), u, w, (3, 5))
     k = len(u) // 2
     towards = _centre(side, radius, u[k : k + 1], v[k : k + 1])[0] - made.at(u[k], 0.5)[0]
     if made.normal(u[k], 0.5)[0] @ towards < 0.0:
@@ -95,21 +95,21 @@ def _made(side: BSplinePatch, hub: Revolved, radius: float, u: Floats) -> tuple[
     x = 0.5 * (w[1:] + w[:-1])
     exact = _arcs(side, hub, radius, middle, between, x)
     away = np.linalg.norm(_grid(made, middle, x) - exact, axis=2).max(axis=1)
-    above = _above(side, u, v)
+    above = _side_above(side, u, v)
     share = np.linspace(0.0, 1.0, 33)
-    error = _grid(above, middle, share) - _between(side, middle, between + share[:, None] * (1.0 - between))
+    error = _grid(above, middle, share) - _points_between(side, middle, between + share[:, None] * (1.0 - between))
     away = np.maximum(away, np.linalg.norm(error, axis=2).max(axis=1))
-    covered = _between(side, u, share[:, None] * v)
+    covered = _points_between(side, u, share[:, None] * v)
     height = float(np.linalg.norm(np.diff(covered, axis=1), axis=2).sum(axis=1).max())
     return Filleted(above, made, height, float(away.max())), away
 
 
 def _grid(patch: BSplinePatch, u: Floats, v: Floats) -> Floats:
     """Points (n, m, 3) [mm] of a patch at u (n,) and v (m,)."""
-    return _between(patch, u, np.repeat(v[:, None], len(u), axis=1))
+    return _points_between(patch, u, np.repeat(v[:, None], len(u), axis=1))
 
 
-def _between(patch: BSplinePatch, u: Floats, v: Floats) -> Floats:
+def _points_between(patch: BSplinePatch, u: Floats, v: Floats) -> Floats:
     """Points (n, m, 3) [mm] of a patch at u (n,), each with its own v (m, n)."""
     return patch.at(np.repeat(u, len(v)), v.T.ravel()).reshape(len(u), len(v), 3)
 
@@ -136,7 +136,7 @@ def _centre(side: BSplinePatch, radius: float, u: Floats, v: Floats) -> Floats:
     return out
 
 
-def _touched(side: BSplinePatch, hub: Revolved, radius: float, u: Floats | list[float]) -> Floats:
+def _touch_heights(side: BSplinePatch, hub: Revolved, radius: float, u: Floats | list[float]) -> Floats:
     """v* (n,): the least v at which a ball that touches the side touches the hub too."""
     at = np.asarray(u, dtype=np.float64)
 
@@ -183,13 +183,13 @@ def _arcs(side: BSplinePatch, hub: Revolved, radius: float, u: Floats, v: Floats
     return out
 
 
-def _above(side: BSplinePatch, u: Floats, v: Floats) -> BSplinePatch:
+def _side_above(side: BSplinePatch, u: Floats, v: Floats) -> BSplinePatch:
     """The side above v* at u, with the fewest points along v that keep the deviation within ``0.1 FIT``."""
     made = side
     for count in _UP:
         x = np.linspace(0.0, 1.0, count)
-        made = through(_between(side, u, v + x[:, None] * (1.0 - v)), u, x, side=side.side)
+        made = patch_through(_points_between(side, u, v + x[:, None] * (1.0 - v)), u, x, side=side.side)
         x = 0.5 * (x[1:] + x[:-1])
-        if np.abs(_grid(made, u, x) - _between(side, u, v + x[:, None] * (1.0 - v))).max() <= 0.1 * FIT:
+        if np.abs(_grid(made, u, x) - _points_between(side, u, v + x[:, None] * (1.0 - v))).max() <= 0.1 * FIT:
             break
     return made

@@ -97,9 +97,9 @@ class Isolated:
         try:
             if pipe_in is None or pipe_out is None:
                 raise EOFError
-            pipe_in.write(packed([self._seconds, values]))
+            pipe_in.write(pack_value([self._seconds, values]))
             pipe_in.flush()
-            kind, answer = unpacked(_Timed(pipe_out, time.monotonic() + PATIENCE * self._seconds))
+            kind, answer = unpack_message(_Timed(pipe_out, time.monotonic() + PATIENCE * self._seconds))
         except (OSError, EOFError):
             raise InputError(f"{self.key} = {self.file.name}: {self._why(process)}") from None
         if kind == "refused":
@@ -160,7 +160,7 @@ class _Timed:
         return bytes(out)
 
 
-def packed(value: Any) -> bytes:
+def pack_value(value: Any) -> bytes:
     """The message for a value: None, numbers, texts, arrays, and lists and mappings of them."""
     arrays: list[bytes] = []
 
@@ -181,7 +181,7 @@ def packed(value: Any) -> bytes:
     return b"".join([_END.pack(len(parts)), *(_END.pack(len(p)) + p for p in parts)])
 
 
-def unpacked(source: Any) -> Any:
+def unpack_message(source: Any) -> Any:
     """The value of the message that ``source.read(count)`` returns; tuples become lists.
 
     Raises
@@ -191,7 +191,7 @@ def unpacked(source: Any) -> Any:
     OSError
         The message is larger than ``LARGEST``.
 
-    >>> unpacked(io.BytesIO(packed([1, (2.5, "a"), {"x": np.arange(2)}, None])))
+    >>> unpack_message(io.BytesIO(pack_value([1, (2.5, "a"), {"x": np.arange(2)}, None])))
     [1, [2.5, 'a'], {'x': array([0, 1])}, None]
     """
 
@@ -289,7 +289,7 @@ def _serve() -> None:
     read: list[Any] = []
     while True:
         try:
-            seconds, (name, *values) = unpacked(source)
+            seconds, (name, *values) = unpack_message(source)
         except EOFError:
             return
         _allow(float(seconds))
@@ -297,13 +297,13 @@ def _serve() -> None:
             answer = _function(name)(*read, *values)
             if not read:
                 read, answer = [answer], None
-            data = packed(["done", answer])
+            data = pack_value(["done", answer])
         except InputError as err:
-            data = packed(["refused", str(err)])
+            data = pack_value(["refused", str(err)])
         except MemoryError:
-            data = packed(["memory", None])
+            data = pack_value(["memory", None])
         except Exception as err:
-            data = packed(["fault", " ".join(f"{type(err).__name__} {err}".split())[:120]])
+            data = pack_value(["fault", " ".join(f"{type(err).__name__} {err}".split())[:120]])
         target.write(data)
         target.flush()
 

@@ -116,7 +116,7 @@ def sections(mesh: trimesh.Trimesh, heights: Sequence[float] | Floats) -> list[M
     [12.0, 12.0, 0.0]
     """
     vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-    return [_filled(_rings(vertices, faces, float(h))) for h in heights]
+    return [_area_of_rings(_rings(vertices, faces, float(h))) for h in heights]
 
 
 def _rings(vertices: Floats, faces: Ints, h: float) -> list[Floats]:
@@ -150,7 +150,7 @@ def _rings(vertices: Floats, faces: Ints, h: float) -> list[Floats]:
     return rings
 
 
-def _filled(rings: list[Floats]) -> MultiPolygon:
+def _area_of_rings(rings: list[Floats]) -> MultiPolygon:
     """The area that rings enclose: from the largest to the smallest, solids are added and holes are subtracted."""
     areas = [0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) for x, y in (r.T for r in rings)]
     order = sorted((i for i, area in enumerate(areas) if area != 0.0), key=lambda i: -abs(areas[i]))

@@ -99,7 +99,7 @@ def _offset(contours: Sequence[Contour], d: float, both_sides: bool) -> tuple[Co
         return ()
     lost = np.zeros(2)
     for tol, snap in LADDER:
-        done, place = _trimmed(raw, given, d, tol, snap)
+        done, place = _trim_offsets(raw, given, d, tol, snap)
         if place is None:
             return done
         lost = place
@@ -239,7 +239,7 @@ def true_centres(seg: Floats) -> Floats:
 
 
 # -- trimming -----------------------------------------------------------------------------------------------------
-def _trimmed(
+def _trim_offsets(
     raw: RawSegments, given: Floats, d: float, tol: float, snap: float
 ) -> tuple[tuple[Contour, ...], Floats | None]:
     """The parallel contours, and a point of a valid piece that belongs to no contour (None: there is no such piece)."""
@@ -254,7 +254,7 @@ def _trimmed(
 
     pieces = pieces[~too_near(pieces, abs(d) - tol)]
     pieces = pieces[_single(raw, pieces, 10.0 * snap)]
-    alive = _rooted(pieces, loose)
+    alive = _without_dead_ends(pieces, loose)
     rest = pieces[~alive]
     pieces = pieces[alive]
     if len(rest.raw):
@@ -296,7 +296,7 @@ def _single(raw: RawSegments, pieces: SplitSegments, same: float) -> NDArray[np.
     return keep
 
 
-def _rooted(pieces: SplitSegments, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _without_dead_ends(pieces: SplitSegments, loose: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(m,) whether each piece remains when dead ends are removed until there are none."""
     alive = np.ones(len(pieces.raw), dtype=np.bool_)
     if not len(alive):

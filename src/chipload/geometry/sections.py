@@ -25,7 +25,7 @@ from scipy.optimize import minimize_scalar
 
 from chipload.errors import InputError
 from chipload.files import read_regular
-from chipload.geometry.bspline import BSplinePatch, through
+from chipload.geometry.bspline import BSplinePatch, patch_through
 from chipload.geometry.section_table import meridian_of_table, sections_of_table
 from chipload.units import MM_PER
 
@@ -107,7 +107,7 @@ def read_meridian(path: str | Path, unit: str, over: bool = False, shroud: bool 
     return np.stack([p[:, 1], -p[:, 0] if over else p[:, 0]], axis=-1)
 
 
-def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -> tuple[Floats, ...]:
+def check_sections(sections: tuple[Floats, ...], outer_diameter: float | None = None) -> tuple[Floats, ...]:
     """The sections, if a blade can be lofted through them.
 
     Parameters
@@ -127,7 +127,7 @@ def checked(sections: tuple[Floats, ...], outer_diameter: float | None = None) -
             raise InputError(f"section {k}: {len(p)} points: must be at least {_LEAST_POINTS}")
         if not np.isfinite(p).all():
             raise InputError(f"section {k}: a number is not finite")
-        if _crossing(p):
+        if _crosses_itself(p):
             raise InputError(f"section {k}: crosses itself: its points must go once round the profile")
     centre = np.array([_centre(p) for p in sections])
     step = np.diff(centre, axis=0)
@@ -181,10 +181,10 @@ def loft(sections: tuple[Floats, ...], count: int = 61) -> Blade:
 
 
 def _side(grid: Floats, u: Floats, v: Floats, sign: float) -> BSplinePatch:
-    return facing(through(np.swapaxes(grid, 0, 1), u, v), sign)
+    return face_patch(patch_through(np.swapaxes(grid, 0, 1), u, v), sign)
 
 
-def facing(patch: BSplinePatch, sign: float) -> BSplinePatch:
+def face_patch(patch: BSplinePatch, sign: float) -> BSplinePatch:
     """The patch with its normal towards increasing theta (sign 1) or decreasing theta (-1)."""
     at = patch.at(0.5, 0.5)[0]
     towards = sign * np.array([-at[1], at[0], 0.0])
@@ -228,7 +228,7 @@ def _read(half: _Half, u: Floats) -> Floats:
     return out
 
 
-def _crossing(p: Floats) -> bool:
+def _crosses_itself(p: Floats) -> bool:
     """Whether a profile crosses itself in each of three projections; a twisted profile may seem to in one of them."""
     ring = p[:-1] if np.array_equal(p[0], p[-1]) else p
     _, _, axes = np.linalg.svd(ring - ring.mean(axis=0), full_matrices=False)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.geometry.revolve import Revolved
-from chipload.geometry.sections import Blade, facing
+from chipload.geometry.sections import Blade, face_patch
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def blade_of(plus: BSplinePatch, minus: BSplinePatch, hub: Revolved, shroud: Rev
             "plus: must be less than half: exchange the sides: plus faces a growing angle about the axis"
         )
     minus = minus.turned(middle - between)
-    return Blade(facing(plus, 1.0), facing(minus, -1.0))
+    return Blade(face_patch(plus, 1.0), face_patch(minus, -1.0))
 
 
 def wall_of(front: BSplinePatch, back: BSplinePatch, clamp: Callable[[Floats], float]) -> Blade:

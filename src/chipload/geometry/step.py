@@ -72,7 +72,7 @@ def read_step_level(
     file = Path(path)
     if z_mm is not None and not np.isfinite(z_mm):
         raise InputError(f"part.z_mm = {z_mm:g}: must be a finite number")
-    with opened(file, "part.file") as part:
+    with open_step(file, "part.file") as part:
         found: list[float] = part.call("step.levels")
         if not found:
             raise InputError(f"part.file = {file.name}: no horizontal planar face in the part: turn it, or state a DXF")
@@ -83,12 +83,12 @@ def read_step_level(
     if not chosen:
         named = ", ".join(f"{z:g}" for z in heights)
         raise InputError(f"part.z_mm = {level:g}: no horizontal planar face at this height; faces are at {named} mm")
-    from chipload.geometry.chains import Drawing, chained
+    from chipload.geometry.chains import Drawing, chain_parts
 
     findings: list[Finding] = []
     contours: list[Contour] = []
     for edges in chosen:
-        made, seen = chained(edges, join_mm, f"face at z = {level:g}: ")
+        made, seen = chain_parts(edges, join_mm, f"face at z = {level:g}: ")
         contours += made
         findings += seen
     if z_mm is None and len(heights) > 1:
@@ -119,14 +119,14 @@ def step_triangles(
     InputError
         The file is missing or not a STEP file, or has no faces.
     """
-    with opened(Path(path), key) as part:
+    with open_step(Path(path), key) as part:
         points, corners = part.call("step.triangles", chord_mm, angle)
     if not len(corners):
         raise InputError(f"{key} = {Path(path).name}: no faces in this STEP file")
     return points, corners
 
 
-def opened(file: Path, key: str = "part.file") -> Isolated:
+def open_step(file: Path, key: str = "part.file") -> Isolated:
     """A STEP file in a separate process of the CAD kernel, which reads it at the first call.
 
     Raises
@@ -274,12 +274,12 @@ def _edges(face: Any, tolerance_mm: float) -> Iterator[Floats]:
         else:
             from chipload.geometry.biarc import arcs_along
 
-            def along(t: float, on: Any = curve) -> tuple[Floats, Floats]:
+            def place_along(t: float, on: Any = curve) -> tuple[Floats, Floats]:
                 point, slope = gp_Pnt(), gp_Vec()
                 on.D1(t, point, slope)
                 return np.array([point.X(), point.Y()]), np.array([slope.X(), slope.Y()])
 
-            made = arcs_along(along, np.linspace(a, b, 5), tolerance_mm)
+            made = arcs_along(place_along, np.linspace(a, b, 5), tolerance_mm)
             if made is None:
                 continue
             rows = np.array(made.segments)

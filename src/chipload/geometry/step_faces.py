@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.geometry.isolated import Isolated
-from chipload.geometry.step import LARGEST_FILE, Part, opened
+from chipload.geometry.step import LARGEST_FILE, Part, open_step
 from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
@@ -128,7 +128,7 @@ def read_faces(path: str | Path, key: str = "part.file") -> Model:
         The file is missing or not a STEP file, states no unit of length, or has no faces.
     """
     file = Path(path)
-    part = opened(file, key)
+    part = open_step(file, key)
     try:
         rows, solid = part.call("step_faces.listed")
     except BaseException:
@@ -162,7 +162,7 @@ def kernel_face(part: Part, number: int) -> KernelFace:
     return KernelFace(number, kind, len(_all(shape, TopAbs_WIRE)) - 1, shape)
 
 
-def listed(part: Part) -> tuple[list[list[Any]], bool]:
+def list_faces(part: Part) -> tuple[list[list[Any]], bool]:
     """Number, kind, area, corners of the box, holes and edges of each face; whether all faces bound solids."""
     from OCP.Bnd import Bnd_Box
     from OCP.BRepBndLib import BRepBndLib

@@ -54,7 +54,7 @@ def meridian_of(faces: Sequence[Face], R: Floats, key: str, tips: bool = False) 
 
 
 # -- in the process of the CAD kernel ---------------------------------------------------------------------------
-def joined(part: Part, numbers: Sequence[int], R: Floats, key: str, tips: bool) -> Floats:
+def join_meridians(part: Part, numbers: Sequence[int], R: Floats, key: str, tips: bool) -> Floats:
     """As :func:`meridian_of`, for the faces with these numbers."""
     rest = [kernel_face(part, number) for number in numbers]
     curves = [meridian_in(f, R, key, tips) for f in rest]
@@ -116,7 +116,7 @@ def meridian_in(face: KernelFace, R: Floats, key: str, tips: bool) -> Floats:
     if face.kind == "plane":
         if np.ptp(grid[..., 1]) > ROUND:
             raise InputError(f"{key}: face {face.number} is a plane along the axis: must be of revolution about it")
-        return _across(face, R)
+        return _meridian_across(face, R)
     round_u, round_v = (float(np.ptp(grid, axis=k).max()) for k in (0, 1))
     if min(round_u, round_v) > ROUND and tips:
         return _tip(face, R, key)
@@ -155,7 +155,7 @@ def _tip(face: KernelFace, R: Floats, key: str) -> Floats:
     return np.asarray(0.5 * (a + b), dtype=np.float64)
 
 
-def _across(face: KernelFace, R: Floats) -> Floats:
+def _meridian_across(face: KernelFace, R: Floats) -> Floats:
     """Meridian (n, 2) of a plane normal to the axis, from the least to the greatest radius of its edges."""
     p = np.concatenate(_edges(face, R))
     r = np.hypot(p[:, 0], p[:, 1])

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, make_interp_spline
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import BSplinePatch, basis, through
+from chipload.geometry.bspline import BSplinePatch, basis, patch_through
 from chipload.geometry.step import Part
 from chipload.geometry.step_faces import Face, KernelFace, kernel_face
 
@@ -116,7 +116,7 @@ def _patch_of(face: KernelFace, key: str, fit: float) -> ReadFace:
             off = max(rim, off_of(patch, lambda s, t: low + np.stack([s, t], axis=-1) * (high - low), surface, 17))
             if off <= fit:
                 return _even(ReadFace(patch, True, off), face, key, fit)
-    return _fitted(face, surface, loop, side, key, fit)
+    return _fit_face(face, surface, loop, side, key, fit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,15 +154,15 @@ def loop_of(face: KernelFace, surface: Any) -> list[_Piece]:
         ends = (curve.FirstParameter(), curve.LastParameter())
         t = np.linspace(*(ends[::-1] if turned else ends), _SAMPLES)
 
-        def at(x: float, on: Any = curve) -> tuple[float, float]:
+        def surface_point(x: float, on: Any = curve) -> tuple[float, float]:
             p = on.Value(x)
             return p.X(), p.Y()
 
-        uv = np.array([at(float(x)) for x in t])
+        uv = np.array([surface_point(float(x)) for x in t])
         points = points_of(surface, uv)
         length = np.concatenate([[0.0], np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum()])
         if length[-1] > 0.0:
-            out.append(_Piece(at, t, uv, points, length))
+            out.append(_Piece(surface_point, t, uv, points, length))
     return out
 
 
@@ -222,7 +222,7 @@ def off_of(patch: BSplinePatch, uv_of: Callable[[Floats, Floats], Floats], surfa
     return float(np.linalg.norm(patch.at(s.ravel(), t.ravel()).reshape(points.shape) - points, axis=2).max())
 
 
-def _fitted(face: KernelFace, surface: Any, loop: list[_Piece], side: int, key: str, fit: float) -> ReadFace:
+def _fit_face(face: KernelFace, surface: Any, loop: list[_Piece], side: int, key: str, fit: float) -> ReadFace:
     sides = [_side(pieces) for pieces in _four(face, loop, key)]
     corners = np.array([s(np.zeros(1))[0] for s in sides])
 
@@ -249,7 +249,7 @@ def _fitted(face: KernelFace, surface: Any, loop: list[_Piece], side: int, key: 
             raise InputError(
                 f"{key}: face {face.number} folds over between its four sides: split it in CAD, or state sections"
             )
-        patch = through(points_of(surface, uv), x, x, side=int(np.sign(sense[0, 0])) * side)
+        patch = patch_through(points_of(surface, uv), x, x, side=int(np.sign(sense[0, 0])) * side)
         middles = np.sort(np.concatenate([x, 0.5 * (x[1:] + x[:-1])]))
         s, t = np.meshgrid(middles, middles, indexing="ij")
         points = points_of(surface, uv_of(s, t))
@@ -351,7 +351,7 @@ def _side(pieces: list[_Piece]) -> Callable[[Floats], Floats]:
     ends = np.concatenate([[0.0], np.cumsum([p.length[-1] for p in pieces])])
     inverse = [CubicSpline(p.length, p.t) for p in pieces]
 
-    def at(shares: Floats) -> Floats:
+    def surface_point(shares: Floats) -> Floats:
         x = shares * ends[-1]
         number = np.clip(np.searchsorted(ends, x, side="right") - 1, 0, len(pieces) - 1)
         out = np.empty((len(x), 2))
@@ -361,4 +361,4 @@ def _side(pieces: list[_Piece]) -> Callable[[Floats], Floats]:
             out[k] = p.at(float(np.clip(inverse[n](here), *sorted((p.t[0], p.t[-1])))))
         return out
 
-    return at
+    return surface_point

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import BSplinePatch, through
+from chipload.geometry.bspline import BSplinePatch, patch_through
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.step import Part
 from chipload.geometry.step_faces import Face, kernel_face
@@ -99,22 +99,24 @@ def side_of(faces: Sequence[Face], key: str, fit: float, R: Floats, hub: Revolve
     parts, rest = [], 0.0
     for face in faces:
         ku, kv, control, side, off, loop = face.part.call("step_side.trimmed", face.number, key)
-        parts.append(_trimmed(BSplinePatch(ku, kv, control @ R.T, side), loop))
+        parts.append(_trim_patch(BSplinePatch(ku, kv, control @ R.T, side), loop))
         rest = max(rest, off)
     edges = _edges(_region(parts, hub, shroud, key, names), hub, shroud, key, names)
     best, looked = np.inf, 0
     for count in COUNTS:
         x = np.linspace(0.0, 1.0, count)
-        grid, sense, edge = _met(parts, _blended(edges, x), key, names)
-        patch = through(grid.reshape(count, count, 3), x, x)
+        grid, sense, edge = _points_on_faces(parts, _blend_edges(edges, x), key, names)
+        patch = patch_through(grid.reshape(count, count, 3), x, x)
         # orient the patch by a normal of the faces
         at = patch.normal(0.5, 0.5)[0]
         if at @ sense[len(sense) // 2] < 0.0:
-            patch = through(grid.reshape(count, count, 3), x, x, side=-1)
+            patch = patch_through(grid.reshape(count, count, 3), x, x, side=-1)
         middle = np.linspace(0.0, 1.0, 2 * count - 1)
         U, V = (q.ravel() for q in np.meshgrid(middle, middle, indexing="ij"))
         made = patch.at(U, V)
-        true, _, _ = _met(parts, np.stack([np.hypot(made[:, 0], made[:, 1]), made[:, 2]], axis=-1), key, names)
+        true, _, _ = _points_on_faces(
+            parts, np.stack([np.hypot(made[:, 0], made[:, 1]), made[:, 2]], axis=-1), key, names
+        )
         off = rest + float(np.linalg.norm(true - made, axis=1).max())
         looked = len(made)
         best = min(best, off)
@@ -126,7 +128,7 @@ def side_of(faces: Sequence[Face], key: str, fit: float, R: Floats, hub: Revolve
     )
 
 
-def _trimmed(patch: BSplinePatch, loop: Floats) -> _Trimmed:
+def _trim_patch(patch: BSplinePatch, loop: Floats) -> _Trimmed:
     import shapely
 
     outline = shapely.Polygon(loop).buffer(0.0)
@@ -181,7 +183,7 @@ def _edges(region: Any, hub: Revolved, shroud: Revolved, key: str, names: str) -
             on = shapely.intersection(ring, line.buffer(off))
             on = linemerge(on) if on.geom_type == "MultiLineString" else on
             pieces = [g for g in getattr(on, "geoms", [on]) if g.geom_type == "LineString" and g.length > 0.0]
-            ends = _joined(ring, pieces)
+            ends = _join_parts(ring, pieces)
             if ends is not None and (ends[1] - ends[0]) % ring.length > 0.05 * line.length:
                 break
         else:
@@ -207,7 +209,7 @@ def _edges(region: Any, hub: Revolved, shroud: Revolved, key: str, names: str) -
     return [low, right, high[::-1], left[::-1]]
 
 
-def _joined(ring: Any, pieces: list[Any]) -> tuple[float, float] | None:
+def _join_parts(ring: Any, pieces: list[Any]) -> tuple[float, float] | None:
     """Start and end [mm] along a ring of the longest of ``pieces``, joined with those within 1 mm of it."""
     import shapely
 
@@ -235,7 +237,7 @@ def _joined(ring: Any, pieces: list[Any]) -> tuple[float, float] | None:
     return first % ring.length, (first + size) % ring.length
 
 
-def _blended(edges: list[Floats], x: Floats) -> Floats:
+def _blend_edges(edges: list[Floats], x: Floats) -> Floats:
     """(n n, 2) r and z of the grid that blends the four edges, each parametrised by length."""
     low, right, high, left = (_by_length(e, x) for e in edges)
     a, b = (q[..., None] for q in np.meshgrid(x, x, indexing="ij"))
@@ -249,7 +251,7 @@ def _by_length(points: Floats, x: Floats) -> Floats:
     return np.stack([np.interp(x * length[-1], length, points[:, k]) for k in (0, 1)], axis=-1)
 
 
-def _met(parts: Sequence[_Trimmed], places: Floats, key: str, names: str) -> tuple[Floats, Floats, float]:
+def _points_on_faces(parts: Sequence[_Trimmed], places: Floats, key: str, names: str) -> tuple[Floats, Floats, float]:
     """Points (n, 3) of the faces at (r, z) (n, 2), their normals (n, 3), and the greatest distance of one [mm]."""
     import shapely
 
@@ -284,7 +286,7 @@ def _met(parts: Sequence[_Trimmed], places: Floats, key: str, names: str) -> tup
 
 
 # -- in the process of the CAD kernel ---------------------------------------------------------------------------
-def trimmed(part: Part, number: int, key: str) -> tuple[Floats, Floats, Floats, int, float, Floats]:
+def trim_face(part: Part, number: int, key: str) -> tuple[Floats, Floats, Floats, int, float, Floats]:
     """Knots, poles and side of the patch over the (u, v) box of a face, its deviation [mm], its outline (n, 2)."""
     from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_REVERSED
@@ -303,7 +305,7 @@ def trimmed(part: Part, number: int, key: str) -> tuple[Floats, Floats, Floats, 
     if patch is None:
         x = np.linspace(0.0, 1.0, 65)
         s, t = np.meshgrid(x, x, indexing="ij")
-        patch = through(points_of(surface, low + np.stack([s, t], axis=-1) * (high - low)), x, x, side=side)
+        patch = patch_through(points_of(surface, low + np.stack([s, t], axis=-1) * (high - low)), x, x, side=side)
         off = off_of(patch, lambda s, t: low + np.stack([s, t], axis=-1) * (high - low), surface, 65)
     outline = np.concatenate([p.uv[:-1] for p in loop])
     return patch.knots_u, patch.knots_v, patch.control, patch.side, off, (outline - low) / (high - low)

@@ -130,11 +130,11 @@ def plate(length: float, height: float, thickness: float) -> ThinWall:
         if not 0.0 < value < math.inf:
             raise InputError(f"wall.{key} = {value:g}: must be above 0")
 
-    def at(u: Floats, v: Floats) -> tuple[Floats, Floats]:
+    def surface_point(u: Floats, v: Floats) -> tuple[Floats, Floats]:
         x, z, t = (u - 0.5) * length, v * height, np.full(len(u), 0.5 * thickness)
         return np.stack([x, t, z], axis=1), np.stack([x, -t, z], axis=1)
 
-    return ThinWall(f"plate {length:g} x {height:g} x {thickness:g} mm", at)
+    return ThinWall(f"plate {length:g} x {height:g} x {thickness:g} mm", surface_point)
 
 
 def blade(
@@ -180,7 +180,7 @@ def blade(
     if not abs(camber) < 0.5 * math.pi:
         raise InputError(f"wall.camber_deg = {math.degrees(camber):g}: must be between -90 and 90")
 
-    def at(u: Floats, v: Floats) -> tuple[Floats, Floats]:
+    def surface_point(u: Floats, v: Floats) -> tuple[Floats, Floats]:
         c = chord[0] + v * (chord[1] - chord[0])
         t = thickness[0] + v * (thickness[1] - thickness[0])
         g = stagger[0] + v * (stagger[1] - stagger[0])
@@ -198,7 +198,7 @@ def blade(
             out.append(np.stack([px * np.cos(g) - py * np.sin(g), px * np.sin(g) + py * np.cos(g), v * height], axis=1))
         return out[0], out[1]
 
-    return ThinWall(f"blade, chord {chord[0]:g} to {chord[1]:g} mm, height {height:g} mm", at)
+    return ThinWall(f"blade, chord {chord[0]:g} to {chord[1]:g} mm, height {height:g} mm", surface_point)
 
 
 def through_sections(
@@ -241,11 +241,11 @@ def through_sections(
     low, high = raw(np.array([0.5]), np.array([0.5]))
     swap = float((turned @ (high - low)[0])[1]) > 0.0  # k+ faces -y
 
-    def at(u: Floats, v: Floats) -> tuple[Floats, Floats]:
+    def surface_point(u: Floats, v: Floats) -> tuple[Floats, Floats]:
         one, other = ((p - foot) @ turned.T for p in raw(u, v))
         return (other, one) if swap else (one, other)
 
-    return ThinWall(name, at)
+    return ThinWall(name, surface_point)
 
 
 def opposite(wall: ThinWall) -> ThinWall:

@@ -26,7 +26,7 @@ from chipload.jobs.messages import Errors, left_missing, renamed_tables, table_e
 from chipload.jobs.override import override
 from chipload.jobs.sources import cutter_errors, entries_of, source_errors
 from chipload.progress import Progress, silent
-from chipload.tables import LARGEST_FILE, parsed, require_sound
+from chipload.tables import LARGEST_FILE, parse_toml, require_sound
 from chipload.workers import Workers
 
 if TYPE_CHECKING:
@@ -133,8 +133,8 @@ def load_job(path: str | Path, overrides: Sequence[str] = ()) -> LoadedJob:
     path = Path(path).absolute()
     require_utf8(path)
     data = read_regular(path, str(path), LARGEST_FILE, "not a job")
-    raw = parsed(path.name, data)
-    return _loaded(capability_of(raw, overrides), path, raw, overrides, data)
+    raw = parse_toml(path.name, data)
+    return _load_tables(capability_of(raw, overrides), path, raw, overrides, data)
 
 
 def job_of(
@@ -156,7 +156,7 @@ def job_of(
     raw = plain(values)
     own = next((c for c in CAPABILITIES if c.name == capability), None) or capability_of(raw, overrides)
     data = json.dumps(raw, sort_keys=True).encode()
-    return _loaded(own, Path(folder).absolute() / own.name, raw, overrides, data)
+    return _load_tables(own, Path(folder).absolute() / own.name, raw, overrides, data)
 
 
 def capability_of(raw: Mapping[str, Any], overrides: Sequence[str] = ()) -> Capability:
@@ -188,7 +188,7 @@ def plain(value: Any) -> Any:
     )
 
 
-def _loaded(
+def _load_tables(
     capability: Capability, path: Path, raw: dict[str, Any], overrides: Sequence[str], data: bytes
 ) -> LoadedJob:
     """The job of a table that was read.
@@ -252,7 +252,7 @@ def run_job(
     """
     capability = loaded.capability
     if loaded.guesses and not accept:
-        raise InputErrors(*loaded.guesses, unconfirmed(loaded))
+        raise InputErrors(*loaded.guesses, unconfirmed_text(loaded))
     more: dict[str, Any] = {"checkpoint": checkpoint} if capability.resumes else {}
     if workers is not None and not workers.alone:
         if not capability.spreads:
@@ -284,7 +284,7 @@ def _article(name: str) -> str:
     return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
 
 
-def unconfirmed(loaded: LoadedJob) -> str:
+def unconfirmed_text(loaded: LoadedJob) -> str:
     """What is said of a job with guesses."""
     count = len(loaded.guesses)
     return (
@@ -303,5 +303,5 @@ def check_job(loaded: LoadedJob) -> tuple[list[str], bool]:
     """
     lines, holds = loaded.capability.module("run").check(loaded.job)
     if loaded.guesses:
-        lines, holds = [*(f"guess: {text}" for text in loaded.guesses), *lines, unconfirmed(loaded)], False
+        lines, holds = [*(f"guess: {text}" for text in loaded.guesses), *lines, unconfirmed_text(loaded)], False
     return lines, holds

@@ -76,7 +76,7 @@ def coarser(loaded: LoadedJob) -> tuple[str, ...]:
         entries = getattr(table, first, None)
         for number, entry in enumerate(entries) if isinstance(entries, tuple) else ((None, entries),):
             path = [first, *([] if number is None else [str(number)]), *rest]
-            value = _at(entry, rest)
+            value = _number_of_key(entry, rest)
             if value is not None:
                 scaled = value * factor
                 # a tolerance that is above what is coarse stays
@@ -101,7 +101,7 @@ def format_value(value: float | int) -> str:
     return str(value) if isinstance(value, int) else f"{value:.4g}"
 
 
-def _at(entry: Any, keys: Sequence[str]) -> float | int | None:
+def _number_of_key(entry: Any, keys: Sequence[str]) -> float | int | None:
     """A number in a table and its tables; None: not stated."""
     for key in keys:
         entry = getattr(entry, key, None)
@@ -126,7 +126,7 @@ def _of_program(loaded: LoadedJob) -> list[str]:
     return out
 
 
-def marked(done: FinishedJob) -> FinishedJob:
+def mark_coarse(done: FinishedJob) -> FinishedJob:
     """The result of a coarse run: nothing in it is proven, and its stock is shown with wider cells."""
     text = "--coarse gives a first result with larger steps and thicker layers; run the job without it for a proof"
     finding = Finding("job-coarse", 0, text, Severity.UNPROVEN)

@@ -8,7 +8,7 @@ from functools import partial
 from chipload.program.control import CONTROLS, Control, control_named
 from chipload.program.gcode import coordinates, fanuc, haas_cycles, interpolation_codes
 from chipload.program.gcode.dialect import UNREAD
-from chipload.program.gcode.modal import GROUPS, M_GROUPS, shown
+from chipload.program.gcode.modal import GROUPS, M_GROUPS, code_text
 from chipload.program.gcode.sinumerik import NO_MEANING, PLAIN, SAME, SYNCHRONISED
 from chipload.program.gcode.sinumerik_cycles import CYCLES as NAMED_CYCLES
 from chipload.program.gcode.sinumerik_flow import CLOSES
@@ -93,7 +93,7 @@ def _rules(control: Control) -> list[tuple[str, str]]:
     ]
     if control.lines.form == "blocks":
         rows += [
-            ("motion at power-on", shown(modal.motion_at_start) if modal.motion_at_start != 800 else "none"),
+            ("motion at power-on", code_text(modal.motion_at_start) if modal.motion_at_start != 800 else "none"),
             ("after G80", "G0 to G3 as before the cycle" if modal.cycle_group else "no motion is active"),
             ("cycles return to", "where they began (G98)" if modal.old_level_at_start else "R (G99)"),
             ("repeats of a cycle", cycles_of.repeat_letter.upper()),
@@ -174,7 +174,7 @@ def _blocks(control: Control, family: bool = False) -> list[str]:
             "tap": "G84 by the pitch I or J", "tap left": "G74 by the pitch I or J", "offset": "work offset by H",
             "level": "level to which cycles with M53 go back",
         }  # fmt: skip
-        taken = [(shown(code), names.get(to) or shown(int(to))) for code, to in sorted(changed.items())]
+        taken = [(code_text(code), names.get(to) or code_text(int(to))) for code, to in sorted(changed.items())]
         out += ["", "## Codes with another meaning", "", *_table(("code", "taken as"), taken)]
     if family:
         idle = fanuc.IDLE - left.keys() - {code for codes in _FANUC.values() for code in codes}
@@ -186,7 +186,7 @@ def _blocks(control: Control, family: bool = False) -> list[str]:
         _LEFT_OUT,
         "",
     ]
-    out += _table(("code", "what it does"), [(shown(code), what) for code, what in sorted(left.items())])
+    out += _table(("code", "what it does"), [(code_text(code), what) for code, what in sorted(left.items())])
     return out
 
 
@@ -235,7 +235,7 @@ def _heidenhain(control: Control) -> list[str]:
 
 
 def _codes(codes: Iterable[int]) -> str:
-    return " ".join(shown(code) for code in sorted(set(codes)))
+    return " ".join(code_text(code) for code in sorted(set(codes)))
 
 
 def _ranges(numbers: Iterable[int]) -> str:

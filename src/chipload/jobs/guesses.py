@@ -60,7 +60,7 @@ def _of_track(track: Track, tables: Collection[str], plan: bool) -> Track:
 
 def _of_limit(check: LimitCheck, tables: Collection[str], plan: bool) -> LimitCheck:
     """A check that rests on a guess is unproven."""
-    own = _guessed(tables if plan else (*LOAD, *LIMITS.get(check.name, ()), "limits"), tables)
+    own = _guessed_tables(tables if plan else (*LOAD, *LIMITS.get(check.name, ()), "limits"), tables)
     if check.state is Verdict.UNPROVEN or not own:
         return check
     would = "it would exceed the limit with the guessed" if check.state is Verdict.EXCEEDS else HELD_BY_GUESS
@@ -70,17 +70,17 @@ def _of_limit(check: LimitCheck, tables: Collection[str], plan: bool) -> LimitCh
 def _of_finding(f: Finding, tables: Collection[str], plan: bool) -> Finding:
     """A finding that exceeds by a guess is unproven."""
     every = tuple(t for t in tables if t not in ("limits", "operation"))
-    own = _guessed(tables if plan else FINDINGS.get(f.code, every), tables)
+    own = _guessed_tables(tables if plan else FINDINGS.get(f.code, every), tables)
     if f.severity is not Severity.EXCEEDS or not own:
         return f
     text = f"{RAPID} {own}" if f.code == "rapid-cuts" else f"{f.text}, with the guessed {own}"
     return replace(f, text=text, severity=Severity.UNPROVEN)
 
 
-def _guessed(tables: Collection[str], guessed: Collection[str]) -> str:
+def _guessed_tables(tables: Collection[str], guessed: Collection[str]) -> str:
     """The tables that are guessed, in words; empty: none.
 
-    >>> _guessed(("stock", "cutter", "part"), ("machine", "cutter", "stock"))
+    >>> _guessed_tables(("stock", "cutter", "part"), ("machine", "cutter", "stock"))
     'stock and cutter'
     """
     names = [name for name in dict.fromkeys(tables) if name in guessed]

@@ -14,7 +14,7 @@ import numpy as np
 from chipload.files import read_regular
 from chipload.jobs import CAPABILITIES, check_job, load_job
 from chipload.number_text import number_text
-from chipload.tables import LARGEST_FILE, parsed
+from chipload.tables import LARGEST_FILE, parse_toml
 
 #: lines about a file, and whether what it holds can be used as it is
 Inspected = tuple[list[str], bool]
@@ -42,7 +42,7 @@ def inspect_file(path: Path, overrides: Sequence[str] = ()) -> Inspected | None:
 
 def _toml_kind(path: Path) -> Callable[[Path], list[str]] | None:
     """How a TOML file is read that is no job; None: it is one."""
-    values = parsed(path.name, read_regular(path, str(path), LARGEST_FILE, "not a file of chipload"))
+    values = parse_toml(path.name, read_regular(path, str(path), LARGEST_FILE, "not a file of chipload"))
     if any(c.key in values for c in CAPABILITIES):
         return None
     return next((reader for keys, reader in BY_KEYS if keys <= set(values)), None)
@@ -116,7 +116,7 @@ def _mesh(path: Path) -> list[str]:
     ]
 
 
-def _drawing(path: Path) -> list[str]:
+def _drawing_lines(path: Path) -> list[str]:
     from chipload.geometry.dxf import read_dxf
 
     drawing = read_dxf(path, units_if_unstated="mm")
@@ -155,5 +155,6 @@ BY_KEYS: tuple[tuple[set[str], Callable[[Path], list[str]]], ...] = (
 )
 #: how files are read that are no TOML, by their ending
 BY_ENDING: dict[str, Callable[[Path], list[str]]] = {
-    ".step": _model, ".stp": _model, ".stl": _mesh, ".dxf": _drawing, ".ini": _ini, ".tbl": _tools, ".fctb": _tool_bit,
+    ".step": _model, ".stp": _model, ".stl": _mesh, ".dxf": _drawing_lines, ".ini": _ini,
+    ".tbl": _tools, ".fctb": _tool_bit,
 }  # fmt: skip

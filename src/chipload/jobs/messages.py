@@ -104,19 +104,19 @@ def _line(e: Any, root: type[BaseModel], foreign: Collection[str] = ()) -> str:
         known = keys_at(loc[:-1], root)
         return f"{key}: unknown key; did you mean {nearest_key(str(loc[-1]), known)}?"
     if kind == "missing":
-        return f"{key}: missing: state it{_meaning(loc, root)}"
+        return f"{key}: missing: state it{_key_meaning(loc, root)}"
     value = _short(e["input"])
     bounds = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "at least")}
     bounds |= {"less_than": ("lt", "below"), "less_than_equal": ("le", "at most")}
     if kind in bounds:
         name, word = bounds[kind]
-        return f"{key} = {value}: must be {word} {context[name]:g}{_meaning(loc, root)}"
+        return f"{key} = {value}: must be {word} {context[name]:g}{_key_meaning(loc, root)}"
     if kind == "finite_number":
-        return f"{key} = {value}: must be a finite number{_meaning(loc, root)}"
+        return f"{key} = {value}: must be a finite number{_key_meaning(loc, root)}"
     if kind == "literal_error":
         return f"{key} = {value}: must be one of {str(context['expected']).replace(' or ', ', ')}"
     if kind in ("value_error", "assertion_error"):
-        return f"{key} = {value}: {context['error']}{_meaning(loc, root)}"
+        return f"{key} = {value}: {context['error']}{_key_meaning(loc, root)}"
     if kind == "too_short":
         return f"{key}: has no entry: state at least one [[{key}]]"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
@@ -136,7 +136,7 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _meaning(loc: tuple[int | str, ...], root: type[BaseModel]) -> str:
+def _key_meaning(loc: tuple[int | str, ...], root: type[BaseModel]) -> str:
     """The description of a key in brackets, where it has one."""
     model = _model_at(loc[:-1], root)
     field = model.model_fields.get(str(loc[-1])) if model is not None else None

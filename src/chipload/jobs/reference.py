@@ -166,11 +166,11 @@ def _rows(table: type[BaseModel], name: str, prefix: str = "", tables: bool = Tr
             continue
         needed = field.is_required() or (table is CutterTable and key in NEEDED)
         need = "required" if needed else "name or file" if issubclass(table, SourceTable) else _default(field)
-        meaning = _meaning(table, key, field).replace("|", "/")
+        meaning = _key_meaning(table, key, field).replace("|", "/")
         yield f"| `{prefix}{key}` | {value_words(field)} | {need} | `{_example(name, key, field)}` | {meaning} |"
 
 
-def _meaning(table: type[BaseModel], key: str, field: FieldInfo) -> str:
+def _key_meaning(table: type[BaseModel], key: str, field: FieldInfo) -> str:
     if issubclass(table, SourceTable):
         return "a built-in name; or `file`" if key == "name" else "path of a file of your own; or `name`"
     return field.description or ""

@@ -86,10 +86,10 @@ Text = Annotated[str, Field(min_length=1)]
 Unit = Literal["um", "mm", "cm", "m", "inch", "foot"]
 
 
-def _within(value: Any, most: float) -> bool:
+def _is_within(value: Any, most: float) -> bool:
     """Whether a number, or each of a list of lists of them, is at most that large."""
     if isinstance(value, list | tuple):
-        return all(_within(x, most) for x in value)
+        return all(_is_within(x, most) for x in value)
     return not isinstance(value, int | float) or abs(value) <= most
 
 
@@ -102,12 +102,12 @@ class Table(BaseModel):
     @classmethod
     def _near(cls, value: Any, info: ValidationInfo) -> Any:
         """Refuse a length beyond any machine."""
-        if str(info.field_name).endswith("_mm") and not _within(value, FARTHEST_MM):
+        if str(info.field_name).endswith("_mm") and not _is_within(value, FARTHEST_MM):
             raise ValueError(f"must be within {FARTHEST_MM:g} mm")
         return value
 
 
-def setting(kind: type, name: str, description: str) -> Any:
+def setting_field(kind: type, name: str, description: str) -> Any:
     """The field of a table that has default and range of a field of a settings class.
 
     Parameters
@@ -129,7 +129,7 @@ def value_of(kind: type[Value], table: BaseModel, **other: Any) -> Value:
     return kind(**{**own, **other})
 
 
-def stated(value: Value | None, key: str) -> Value:
+def require_stated(value: Value | None, key: str) -> Value:
     """The value of a key that another key makes necessary.
 
     Raises
@@ -139,7 +139,7 @@ def stated(value: Value | None, key: str) -> Value:
 
     Examples
     --------
-    >>> stated(0.2, "wall.edge_share")
+    >>> require_stated(0.2, "wall.edge_share")
     0.2
     """
     if value is None:
@@ -175,7 +175,7 @@ def _switch(name: str, description: str) -> Any:
 class ChecksTable(Table):
     """Default checks. `false` switches a check off; the report lists the checks that are off."""
 
-    confidence: Number = setting(
+    confidence: Number = setting_field(
         CheckSettings,
         "confidence",
         "one-sided confidence at which limits of loads are held, with runout that is not known, coefficients, bending, "
@@ -189,12 +189,12 @@ class ChecksTable(Table):
     )
     spindle: bool = _switch("spindle", "check torque and power of the machine's spindle")
     rigid_model: bool = _switch("rigid_model", "check that the deflection is within the range of the rigid force model")
-    deflection_of_feed: Number = setting(
+    deflection_of_feed: Number = setting_field(
         CheckSettings,
         "deflection_of_feed",
         "range of the rigid model: greatest ratio of the deflection to the feed per tooth",
     )
-    deflection_of_depth: Number = setting(
+    deflection_of_depth: Number = setting_field(
         CheckSettings,
         "deflection_of_depth",
         "range of the rigid model: greatest ratio of the deflection to the radial depth",
@@ -222,7 +222,7 @@ class WallChecksTable(ProgramChecksTable):
         "slender_walls",
         "report walls that are left more slender than wall_slenderness, where no [workpiece] states how they deflect",
     )
-    wall_slenderness: Number = setting(
+    wall_slenderness: Number = setting_field(
         CheckSettings,
         "wall_slenderness",
         "height over thickness up to which a wall counts as rigid; 5 of aluminium 2 mm thick, clamped at its foot: "

@@ -24,9 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.errors import Finding, InputError
 from chipload.machine.axis import Axis
 from chipload.machine.kinematics import Solutions, inverse, with_tip
-from chipload.machine.limits import SLACK, beyond, limit_findings, text_of_rows, written
+from chipload.machine.limits import SLACK, distance_beyond, limit_findings, position_text, text_of_rows
 from chipload.machine.machine import Machine
-from chipload.machine.orientation import angle_between, wrapped
+from chipload.machine.orientation import angle_between, wrap_angles
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -162,34 +162,34 @@ def _shortest(
         middle = 0.5 * (one.low + one.high)
         some = math.floor((0.5 * (one.high - one.low) + math.pi) / math.tau + SLACK)
         turns = np.arange(-some, some + 1) * math.tau
-        near = middle + wrapped(states[..., i] - middle)
+        near = middle + wrap_angles(states[..., i] - middle)
         with_turns = np.repeat(states, len(turns), axis=2)
         with_turns[..., i] = (near[..., None] + turns).reshape(n, k, -1)
         states = with_turns
     turned_states = states.shape[2]
     states = states.reshape(n, k * turned_states, m)
-    penalty = _outside(machine, found, states, wide)
+    penalty = _cost_outside(machine, found, states, wide)
     loose, indexed = np.array(wide), np.array([one.indexed for one in found.free])
     stands = np.zeros(n) if stand is None else np.where(np.asarray(stand, dtype=np.bool_), _INDEXED_IN_CUT, 0.0)
     count = k * turned_states
 
-    def moved(a: Floats, b: Floats) -> Floats:
-        change = np.abs(np.where(loose, wrapped(b - a), b - a))
+    def axis_motion(a: Floats, b: Floats) -> Floats:
+        change = np.abs(np.where(loose, wrap_angles(b - a), b - a))
         return np.asarray(change.max(axis=-1) + _TIE * change.sum(axis=-1))
 
     def indexed_turn(a: Floats, b: Floats) -> Floats:
-        change = np.abs(wrapped(b - a))
+        change = np.abs(wrap_angles(b - a))
         return np.asarray((np.where(change > _STILL, change, 0.0) * indexed).sum(axis=-1))
 
     if begin is None:
-        cost = penalty[0] + _TIE * moved(np.zeros(m), states[0])
+        cost = penalty[0] + _TIE * axis_motion(np.zeros(m), states[0])
     else:
-        cost = penalty[0] + moved(begin[[one.column for one in found.free]], states[0])
+        cost = penalty[0] + axis_motion(begin[[one.column for one in found.free]], states[0])
     previous = np.zeros((n, count), dtype=np.int64)
     rows = max(1, _CHUNK // (count * count * m))
     for low in range(1, n, rows):
         high = min(low + rows, n)
-        steps = moved(states[low - 1 : high - 1, :, None], states[low:high, None, :])
+        steps = axis_motion(states[low - 1 : high - 1, :, None], states[low:high, None, :])
         if stands.any() and indexed.any():
             steps += stands[low:high, None, None] * indexed_turn(
                 states[low - 1 : high - 1, :, None], states[low:high, None, :]
@@ -206,24 +206,24 @@ def _shortest(
     return states[np.arange(n), chosen], chosen // turned_states
 
 
-def _outside(machine: Machine, found: Solutions, states: Floats, wide: list[bool]) -> Floats:
+def _cost_outside(machine: Machine, found: Solutions, states: Floats, wide: list[bool]) -> Floats:
     """Cost (n, states) [rad] of positions outside the limits."""
     turned, away = np.zeros(states.shape[:2]), np.zeros(states.shape[:2])
     for i, one in enumerate(found.free):
         if not wide[i]:
-            turned += beyond(one, states[..., i])
+            turned += distance_beyond(one, states[..., i])
     turned_states = states.shape[1] // found.axes.shape[1]
     for one in machine.chain.axes:
         if one not in found.free:
             out = turned if one.rotary else away
-            out += np.repeat(beyond(one, found.axes[:, :, one.column]), turned_states, axis=1)
+            out += np.repeat(distance_beyond(one, found.axes[:, :, one.column]), turned_states, axis=1)
     return np.where(turned > SLACK, _OUTSIDE_ROTARY + turned, 0.0) + np.where(away > SLACK, _OUTSIDE_LINEAR + away, 0.0)
 
 
 def _with_turns(axis: Axis, q: Floats, begin: float | None) -> Floats:
     """Angles (n,) of a wide axis with whole turns added: shortest from row to row, unwound where it reaches a limit."""
     first = 0.0 if begin is None else begin
-    path = first + np.cumsum(wrapped(np.diff(q, prepend=first)))
+    path = first + np.cumsum(wrap_angles(np.diff(q, prepend=first)))
     path = q + math.tau * np.round((path - q) / math.tau)  # rounding errors do not accumulate
     out = path.copy()
     i, turn = 0, 0
@@ -296,9 +296,9 @@ def _rewinds(free: tuple[Axis, ...], axes: Floats, lines: Ints) -> list[Finding]
     out = []
     for one in free:
         change = np.diff(axes[:, one.column])
-        turns = np.round((change - wrapped(change)) / math.tau).astype(np.int64)
+        turns = np.round((change - wrap_angles(change)) / math.tau).astype(np.int64)
         for row in (np.flatnonzero((turns != 0) & (np.abs(change) > math.pi + SLACK)) + 1).tolist():
-            a, b = (written(one, float(axes[row - k, one.column])) for k in (1, 0))
+            a, b = (position_text(one, float(axes[row - k, one.column])) for k in (1, 0))
             text = f"{one.letter} goes back from {a} to {b}: retract before it"
             text = text_of_rows(np.array([row]), row, text, lines)
             out.append(Finding("machine-rewind", int(lines[row]), text))

@@ -24,7 +24,7 @@ from chipload.errors import InputError
 from chipload.machine.axis import LETTERS, Axis
 from chipload.machine.chain import Chain
 from chipload.machine.machine import Machine
-from chipload.machine.orientation import angle_between, azimuth, rotated, two_turns, wrapped
+from chipload.machine.orientation import angle_between, azimuth, rotate_about, two_turns, wrap_angles
 
 Floats = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def forward(
     a = np.broadcast_to(np.array(chain.spindle), p.shape)
     for axis in reversed(chain.axes):
         if axis.rotary:
-            a = rotated(np.array(axis.direction), q[:, axis.column], a)
+            a = rotate_about(np.array(axis.direction), q[:, axis.column], a)
     R = chain.R_machine_work
     return (p - _zero(chain, work_zero)) @ R, a @ R
 
@@ -206,13 +206,13 @@ def _orientation(
         if axis in free:
             turns.insert(0, d)
         else:
-            w, *turns = (rotated(d, q[:, axis.column], v) for v in (w, *turns))
+            w, *turns = (rotate_about(d, q[:, axis.column], v) for v in (w, *turns))
     if len(free) == 0:
         return np.zeros((len(a), 1, 0)), angle_between(a, w), np.full(len(a), 0.5 * np.pi)
     u = turns[0]
     if len(free) == 1:
         chi, phi = angle_between(a, u), angle_between(w, u)
-        angle = wrapped(azimuth(u, w, a))[:, None]
+        angle = wrap_angles(azimuth(u, w, a))[:, None]
         miss = np.abs(chi - phi)
         pole = np.minimum(np.minimum(chi, np.pi - chi), np.minimum(phi, np.pi - phi))
         angles = angle[:, :, None]
@@ -246,8 +246,8 @@ def _tip_in_machine(chain: Chain, q: Floats, tool_length: ArrayLike, solved: str
         d, value = np.array(axis.direction), q[:, axis.column]
         if axis.rotary:
             c = np.array(axis.pivot)
-            p = c + rotated(d, value, p - c)
-            columns = {letter: rotated(d, value, v) for letter, v in columns.items()}
+            p = c + rotate_about(d, value, p - c)
+            columns = {letter: rotate_about(d, value, v) for letter, v in columns.items()}
         elif axis.letter in solved:
             columns[axis.letter] = np.broadcast_to(d, (n, 3))
         else:

@@ -20,10 +20,10 @@ Floats = NDArray[np.float64]
 SLACK = 1e-9
 
 
-def beyond(axis: Axis, q: Floats) -> Floats:
+def distance_beyond(axis: Axis, q: Floats) -> Floats:
     """Distance [mm or rad] of positions of an axis outside its limits; 0 inside.
 
-    >>> beyond(Axis("X", True, (1.0, 0.0, 0.0), low=-1.0, high=1.0), np.array([0.5, 3.0])).tolist()
+    >>> distance_beyond(Axis("X", True, (1.0, 0.0, 0.0), low=-1.0, high=1.0), np.array([0.5, 3.0])).tolist()
     [0.0, 2.0]
     """
     return np.asarray(np.maximum(np.maximum(axis.low - q, q - axis.high), 0.0))
@@ -47,10 +47,10 @@ def text_of_rows(rows: NDArray[np.int64], worst: int, text: str, line: NDArray[n
     return f"{text}{f' ({len(rows)} motions, the first in line {line[rows[0]]})' if len(rows) > 1 else ''}"
 
 
-def written(axis: Axis, q: float) -> str:
+def position_text(axis: Axis, q: float) -> str:
     """A position of an axis as text, in mm or deg.
 
-    >>> written(Axis("C", False, (0.0, 0.0, 1.0)), math.pi)
+    >>> position_text(Axis("C", False, (0.0, 0.0, 1.0)), math.pi)
     '180 deg'
     """
     return f"{math.degrees(q) + 0.0:g} deg" if axis.rotary else f"{q + 0.0:g} mm"
@@ -87,17 +87,17 @@ def limit_findings(
         checks = [
             (
                 "machine-offset" if fits else "machine-limit",
-                beyond(axis, values),
-                f"travels from {written(axis, axis.low)} to {written(axis, axis.high)}",
+                distance_beyond(axis, values),
+                f"travels from {position_text(axis, axis.low)} to {position_text(axis, axis.high)}",
             )
         ]
         if axis.step is not None:
             off = np.abs(values - axis.step * np.round(values / axis.step))
-            checks.append(("machine-index", off, f"stands at multiples of {written(axis, axis.step)}"))
+            checks.append(("machine-index", off, f"stands at multiples of {position_text(axis, axis.step)}"))
         for code, excess, text in checks:
             rows = np.flatnonzero(excess > SLACK)
             if len(rows):
                 worst = int(rows[np.argmax(excess[rows])])
-                what = f"{axis.letter} = {written(axis, float(values[worst]))}: machine {machine.name} {text}"
+                what = f"{axis.letter} = {position_text(axis, float(values[worst]))}: machine {machine.name} {text}"
                 found.append(Finding(code, int(lines[worst]), text_of_rows(rows, worst, what, lines)))
     return tuple(found)

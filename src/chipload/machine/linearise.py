@@ -128,7 +128,7 @@ def linearise(
     row: Ints = np.arange(len(p), dtype=np.int64)
     part: Floats = np.ones(len(p))
     for count in range(_ROUNDS):
-        x, d = _along(p, a, row, part)
+        x, d = _poses_along(p, a, row, part)
         axes, findings = follow(machine, x, d, start, tool_length, work_zero, free, pole_tolerance, None)
         e = np.zeros(len(row) - 1)
         for k in range(0, len(e), _CHUNK):
@@ -142,14 +142,14 @@ def linearise(
         parts = np.where(e > 1.0, parts, 1.0).astype(np.int64)
         if (parts == 1).all() or count == _ROUNDS - 1:
             break
-        row, part = _divided(row, part, parts, max_rows)
+        row, part = _divide_segments(row, part, parts, max_rows)
     jumps = sorted(set(row[1:][e > 1.0].tolist()))
     text = "row {}: the rotary axes jump: no piece is short enough for the tolerance: retract before it"
     found = tuple(Finding("machine-linear", 0, text.format(k)) for k in jumps)
     return AxisSegments(x, d, axes, row, part), (*findings, *found)
 
 
-def traced(
+def trace_path(
     machine: Machine,
     axes: ArrayLike,
     tolerance: float,
@@ -182,7 +182,7 @@ def traced(
     >>> from chipload.machine.machine import machine_named
     >>> axes = np.zeros((2, 9))
     >>> axes[:, 0], axes[1, 5] = 50.0, np.pi / 2
-    >>> path = traced(machine_named("cradle-ac"), axes, 0.01)
+    >>> path = trace_path(machine_named("cradle-ac"), axes, 0.01)
     >>> len(path.row) - 1, np.linalg.norm(path.tip[::11, :2], axis=1).round(9).tolist()
     (44, [50.0, 50.0, 50.0, 50.0, 50.0])
     """
@@ -198,13 +198,13 @@ def traced(
         raise InputError(f"traced: more than {max_rows} pieces: raise the tolerance or max_rows")
     parts = np.maximum(np.ceil(turns / _TURN), 1.0).astype(np.int64)
     while True:
-        row, part = _divided(row, part, parts, max_rows)
-        at = _interpolated(q, row, part)
+        row, part = _divide_segments(row, part, parts, max_rows)
+        at = _interpolate_rows(q, row, part)
         x, d = forward(machine, at, tool_length, work_zero)
         e = np.zeros(len(row) - 1)
         for k in range(0, len(e), _CHUNK):
             some = slice(k, k + _CHUNK + 1)
-            tips, _, share = _between(machine, at[some], tool_length, work_zero)
+            tips, _, share = _poses_between(machine, at[some], tool_length, work_zero)
             chord = x[some][:-1, None] + share[:, None] * np.diff(x[some], axis=0)[:, None]
             e[k : k + _CHUNK] = _MARGIN * np.linalg.norm(tips - chord, axis=2).max(axis=1) / tolerance
         parts = np.where(e > 1.0, np.minimum(np.ceil(np.sqrt(e) * _PARTS_FACTOR), _PARTS), 1.0).astype(np.int64)
@@ -212,13 +212,13 @@ def traced(
             return AxisSegments(x, d, at, row, part)
 
 
-def _interpolated(values: Floats, row: Ints, part: Floats) -> Floats:
+def _interpolate_rows(values: Floats, row: Ints, part: Floats) -> Floats:
     """Rows of ``values`` (n, c) interpolated linearly along their moves; exact at the rows themselves."""
     end, begin = values[row], values[np.maximum(row - 1, 0)]
     return np.asarray(np.where(part[:, None] == 1.0, end, begin + part[:, None] * (end - begin)))
 
 
-def _along(p: Floats, a: Floats, row: Ints, part: Floats) -> tuple[Floats, Floats]:
+def _poses_along(p: Floats, a: Floats, row: Ints, part: Floats) -> tuple[Floats, Floats]:
     """Tips along straight lines, axes along great circles."""
     end, begin = a[row], a[np.maximum(row - 1, 0)]
     turn = angle_between(begin, end)[:, None]
@@ -226,10 +226,10 @@ def _along(p: Floats, a: Floats, row: Ints, part: Floats) -> tuple[Floats, Float
     small = turn < 1e-12
     over = np.where(small, 1.0, np.sin(turn))
     d = np.where(small, end, (np.sin((1.0 - u) * turn) * begin + np.sin(u * turn) * end) / over)
-    return _interpolated(p, row, part), np.where(u == 1.0, end, d)
+    return _interpolate_rows(p, row, part), np.where(u == 1.0, end, d)
 
 
-def _between(
+def _poses_between(
     machine: Machine, axes: Floats, tool_length: float, work_zero: ArrayLike | None
 ) -> tuple[Floats, Floats, Floats]:
     """Tips and axes (k, PLACES, 3) at points inside k segments of linear axis motion, and their fractions."""
@@ -251,7 +251,7 @@ def _deviation(
     angle_tolerance: float,
 ) -> Floats:
     """Deviation (k,) of segments from line and great circle, in tolerances; inf where an axis turns over 90 degrees."""
-    tips, directions, _ = _between(machine, axes, tool_length, work_zero)
+    tips, directions, _ = _poses_between(machine, axes, tool_length, work_zero)
     chord = np.diff(x, axis=0)
     square = (chord**2).sum(axis=1)
     off = tips - x[:-1, None]
@@ -267,7 +267,7 @@ def _deviation(
     return np.asarray(np.where(half, math.inf, e))
 
 
-def _divided(row: Ints, part: Floats, parts: Ints, max_rows: int) -> tuple[Ints, Floats]:
+def _divide_segments(row: Ints, part: Floats, parts: Ints, max_rows: int) -> tuple[Ints, Floats]:
     """Every segment divided into its number of equal parts."""
     total = int(parts.sum()) + 1
     if total > max_rows:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
 from chipload.machine.chain import Chain
-from chipload.machine.schema import Row, chain_from_table, checked, vector
+from chipload.machine.schema import Row, chain_from_table, check_table, vector
 from chipload.machine.table import MachineTable
 from chipload.machine.trajectory import TrajectoryPlanner
 from chipload.tables import read_table, shipped_names, shipped_table
@@ -167,8 +167,8 @@ class Machine:
 
 def _from_table(label: str, table: Row) -> Machine:
     """A machine from the values of its file; ``label`` names it in messages."""
-    top = checked(label, table, "")
-    spindle = checked(label, top["spindle"], "spindle")
+    top = check_table(label, table, "")
+    spindle = check_table(label, top["spindle"], "spindle")
     try:
         rapid = mm_s_from_mm_min(top["rapid_mm_min"])
         return Machine(
@@ -207,7 +207,7 @@ def _planner(label: str, top: Row) -> TrajectoryPlanner | None:
     """The settings of `[trajectory_planner]`; a missing setting has the default of LinuxCNC."""
     if "trajectory_planner" not in top:
         return None
-    given = checked(label, top["trajectory_planner"], "trajectory_planner")
+    given = check_table(label, top["trajectory_planner"], "trajectory_planner")
     names = ("blend_arcs", "lookahead", "gap_cycles", "kink_ratio")
     values = {name: given[name] for name in names if name in given}
     if "ramp_frequency_hz" in given:
@@ -221,7 +221,7 @@ def _machine_table(label: str, top: Row) -> MachineTable | None:
     """The block of `[table]`."""
     if "table" not in top:
         return None
-    given = checked(label, top["table"], "table")
+    given = check_table(label, top["table"], "table")
     spacing = {"spacing": float(given["spacing_mm"])} if "spacing_mm" in given else {}
     return MachineTable(vector(given["low_mm"]), vector(given["high_mm"]), **spacing)
 

@@ -90,7 +90,7 @@ def document(source: str, path: str = "", query: str = "") -> Element:
         address = f"{source.rstrip('/')}/{path}{query}"
         try:
             with urllib.request.urlopen(address, timeout=WAIT_S) as answer:
-                data = _within(answer, time.monotonic() + WAIT_S)
+                data = _read_within(answer, time.monotonic() + WAIT_S)
         except (OSError, ValueError, urllib.error.URLError, http.client.HTTPException) as err:
             raise InputError(f"MTConnect {address}: no answer: {err}: start the agent or give a file") from None
         if len(data) > MOST_BYTES:
@@ -113,7 +113,7 @@ def document(source: str, path: str = "", query: str = "") -> Element:
     return root
 
 
-def _within(answer: http.client.HTTPResponse, until: float) -> bytes:
+def _read_within(answer: http.client.HTTPResponse, until: float) -> bytes:
     """Return the body of an answer, at most one byte over :data:`MOST_BYTES`.
 
     Raises
@@ -134,7 +134,7 @@ def _within(answer: http.client.HTTPResponse, until: float) -> bytes:
     return b"".join(parts)
 
 
-def described(root: Element, name: str | None = None) -> Described:
+def describe_device(root: Element, name: str | None = None) -> Described:
     """The device of a description.
 
     Parameters

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def rotated(d: Floats, q: Floats, v: Floats) -> Floats:
+def rotate_about(d: Floats, q: Floats, v: Floats) -> Floats:
     """Direction v turned right-handed by q about the unit d: v cos q + (d x v) sin q + d (d.v)(1 - cos q).
 
     Parameters
@@ -33,7 +33,7 @@ def rotated(d: Floats, q: Floats, v: Floats) -> Floats:
 
     Examples
     --------
-    >>> rotated(np.array([0.0, 0.0, 1.0]), np.array(np.pi / 2), np.array([1.0, 0.0, 0.0])).round(12).tolist()
+    >>> rotate_about(np.array([0.0, 0.0, 1.0]), np.array(np.pi / 2), np.array([1.0, 0.0, 0.0])).round(12).tolist()
     [0.0, 1.0, 0.0]
     """
     c, s = np.cos(q)[..., None], np.sin(q)[..., None]
@@ -56,7 +56,7 @@ def azimuth(d: Floats, start: Floats, end: Floats) -> Floats:
     return np.asarray(np.arctan2((across * end).sum(axis=-1), (along * end).sum(axis=-1)))
 
 
-def wrapped(q: Floats) -> Floats:
+def wrap_angles(q: Floats) -> Floats:
     """Angles [rad] without whole turns, in (-pi, pi]; unchanged if already in that range."""
     return np.asarray(q - 2.0 * np.pi * np.ceil((q - np.pi) / (2.0 * np.pi)))
 
@@ -93,9 +93,9 @@ def two_turns(u: Floats, v: Floats, w: Floats, a: Floats) -> tuple[Floats, Float
     over = np.maximum(np.sin(S - psi) * np.sin(S - phi), 0.0)
     under = np.maximum(np.sin(S) * np.sin(S - chi), 0.0)
     E = 2.0 * np.arctan2(np.sqrt(over), np.sqrt(under))
-    q2 = wrapped(azimuth(v, w, u)[:, None] + np.stack([-E, E], axis=1))
-    c = rotated(v[:, None], q2, w[:, None])
-    q1 = wrapped(azimuth(u[:, None], c, a[:, None]))
+    q2 = wrap_angles(azimuth(v, w, u)[:, None] + np.stack([-E, E], axis=1))
+    c = rotate_about(v[:, None], q2, w[:, None])
+    q1 = wrap_angles(azimuth(u[:, None], c, a[:, None]))
     pole = np.minimum(chi, np.pi - chi)
     q1[pole == 0.0] = 0.0
     return q1, q2, miss, pole

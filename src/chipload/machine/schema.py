@@ -97,7 +97,7 @@ def _is(kind: str, value: object) -> bool:
     return isinstance(value, int) if kind == _WHOLE else isinstance(value, (int, float))
 
 
-def checked(label: str, data: Row, where: str, letters: str = "XYZ") -> Row:
+def check_table(label: str, data: Row, where: str, letters: str = "XYZ") -> Row:
     """The table ``where`` of the file, with its keys checked: all known, none missing, each of the right type.
 
     Raises
@@ -180,10 +180,10 @@ def chain_from_table(label: str, top: Row, spindle: Row, rapid: float) -> Chain:
     for letter in letters:
         if letter not in LETTERS:
             raise InputError(f"{label}: chain = {letters!r}: {letter}: must be letters of {LETTERS}")
-    rows = checked(label, top["axis"], "axis", letters)
+    rows = check_table(label, top["axis"], "axis", letters)
     axes = []
     for letter in letters:
-        row = checked(label, rows[letter.lower()], f"axis.{letter.lower()}")
+        row = check_table(label, rows[letter.lower()], f"axis.{letter.lower()}")
         axes.append(_axis(letter, row, rapid))
     direction = vector(spindle.get("direction", [0.0, 0.0, 1.0]))
     nose = vector(spindle.get("nose_mm", [0.0, 0.0, 0.0]))
@@ -196,7 +196,7 @@ def chain_from_table(label: str, top: Row, spindle: Row, rapid: float) -> Chain:
             raise InputError(f"machine.spindle.gauge_mm = {gauge:g}: must be from 0 to 1e5")
         size = math.sqrt(sum(v * v for v in direction)) or 1.0
         nose = vector([c - gauge * s / size for c, s in zip(heads[-1].pivot, direction, strict=True)])
-    work = checked(label, top.get("work", {}), "work")
+    work = check_table(label, top.get("work", {}), "work")
     return Chain(
         axes=tuple(axes),
         spindle=direction,

@@ -13,7 +13,7 @@ from typing import Any
 
 from chipload.errors import InputError
 from chipload.files import read_regular
-from chipload.tables import LARGEST_FILE, parsed
+from chipload.tables import LARGEST_FILE, parse_toml
 
 #: endings of texts that name a machine or a material by its file
 FILES = (".toml", ".ini")
@@ -68,7 +68,7 @@ class NamedFolders:
             if path.exists() and self.contains(path):
                 return path.resolve()
         if any(path.exists() and not self.contains(path) for path in self._places(name)):
-            raise self._refused(name)
+            raise self._refusal(name)
         raise InputError(f"{name!r}: is not in the folders of this server: list_files shows what is")
 
     def new(self, name: str) -> Path:
@@ -81,7 +81,7 @@ class NamedFolders:
         """
         path = next(self._places(name))
         if not self.contains(path):
-            raise self._refused(name)
+            raise self._refusal(name)
         if path.resolve() in self.roots:
             raise InputError(f"{name!r}: is a folder of this server itself: name a folder in it")
         return path.resolve()
@@ -109,7 +109,7 @@ class NamedFolders:
         InputError
             A text of the job leads outside the folders as a path; the message names the key.
         """
-        raw = parsed(job.name, read_regular(job, job.name, LARGEST_FILE))
+        raw = parse_toml(job.name, read_regular(job, job.name, LARGEST_FILE))
         texts = [*_texts(raw), *((key, value.strip(" '\"")) for key, _, value in (o.partition("=") for o in overrides))]
         for key, text in texts:
             if "\n" in text or "\0" in text:
@@ -130,15 +130,15 @@ class NamedFolders:
         """
         path = Path(name)
         if not name.strip() or "\0" in name or ".." in path.parts or "\\" in name:
-            raise self._refused(name)
+            raise self._refusal(name)
         if path.is_absolute():
             if not self.contains(path):
-                raise self._refused(name)
+                raise self._refusal(name)
             yield path
         else:
             yield from (root / path for root in self.roots)
 
-    def _refused(self, name: str) -> InputError:
+    def _refusal(self, name: str) -> InputError:
         names = ", ".join(str(root) for root in self.roots)
         return InputError(f"{name!r}: lies outside the folders of this server: {names}")
 

@@ -34,7 +34,7 @@ def server_of(tools: ClientTools) -> MCPServer[Any]:
     )
     one_at_a_time = Lock()
 
-    def answered(call: Callable[[], Any]) -> Any:
+    def answer_call(call: Callable[[], Any]) -> Any:
         """Return what a call gives; what it refuses is the message of the tool's error."""
         try:
             with one_at_a_time:
@@ -47,17 +47,17 @@ def server_of(tools: ClientTools) -> MCPServer[Any]:
     @server.tool()
     def list_files() -> dict[str, Any]:
         """List the folders that this server may touch, with their jobs, results and other files."""
-        return dict(answered(tools.list_files))
+        return dict(answer_call(tools.list_files))
 
     @server.tool()
     def list_materials() -> dict[str, Any]:
         """List the materials that come with chipload: force coefficients, range, spread and source."""
-        return dict(answered(lambda: tools.listing("materials")))
+        return dict(answer_call(lambda: tools.listing("materials")))
 
     @server.tool()
     def list_machines() -> dict[str, Any]:
         """List the machines that come with chipload: axes, travel, feed, spindle and source of the numbers."""
-        return dict(answered(lambda: tools.listing("machines")))
+        return dict(answer_call(lambda: tools.listing("machines")))
 
     @server.tool()
     def draft_job(file: str, folder: str, machine: str | None = None, tool_table: str | None = None) -> dict[str, Any]:
@@ -65,7 +65,7 @@ def server_of(tools: ClientTools) -> MCPServer[Any]:
 
         machine: a shipped name or a file; tool_table: a LinuxCNC tool table or a tool library of Fusion.
         """
-        return dict(answered(lambda: tools.draft(file, folder, machine, tool_table)))
+        return dict(answer_call(lambda: tools.draft(file, folder, machine, tool_table)))
 
     @server.tool()
     def check_job(job: str, overrides: list[str] | None = None) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def server_of(tools: ClientTools) -> MCPServer[Any]:
 
         overrides: texts KEY.PATH=VALUE, such as limits.force_n=500.
         """
-        return dict(answered(lambda: tools.check(job, overrides or ())))
+        return dict(answer_call(lambda: tools.check(job, overrides or ())))
 
     @server.tool()
     def simulate_job(
@@ -90,7 +90,9 @@ def server_of(tools: ClientTools) -> MCPServer[Any]:
         overrides state their values, or a person deletes `confirm = true`.
         """
         return _with_picture(
-            *answered(lambda: tools.simulate(job, result, overrides or (), coarse=coarse, progress=_reported(ctx)))
+            *answer_call(
+                lambda: tools.simulate(job, result, overrides or (), coarse=coarse, progress=_report_progress(ctx))
+            )
         )
 
     @server.tool()
@@ -108,10 +110,10 @@ def server_of(tools: ClientTools) -> MCPServer[Any]:
         change. At least one limit of the job must limit a load.
         """
         return _with_picture(
-            *answered(
+            *answer_call(
                 lambda: tools.feeds(
                     job, result, slowest_percent, fastest_percent, overrides or (),
-                    progress=_reported(ctx),
+                    progress=_report_progress(ctx),
                 )
             )
         )  # fmt: skip
@@ -119,22 +121,22 @@ def server_of(tools: ClientTools) -> MCPServer[Any]:
     @server.tool()
     def read_result(result: str) -> dict[str, Any]:
         """Read a result folder: verdict and reason, limits with worst values and places, findings, programs, report."""
-        return dict(answered(lambda: tools.read_result(result)))
+        return dict(answer_call(lambda: tools.read_result(result)))
 
     @server.tool()
     def explain_limit(name: str, result: str | None = None) -> dict[str, Any]:
         """Explain a limit: meaning, unit, where its error comes from; with a result also worst value, place, reason."""
-        return dict(answered(lambda: tools.explain_limit(name, result)))
+        return dict(answer_call(lambda: tools.explain_limit(name, result)))
 
     @server.tool()
     def result_picture(result: str, columns: list[str] | None = None, track: str = "") -> CallToolResult:
         """Draw columns of a result over time with their limits, as PNG; by default the limited ones, then loads."""
-        return CallToolResult(content=[_png(answered(lambda: tools.picture(result, columns or (), track)))])
+        return CallToolResult(content=[_png(answer_call(lambda: tools.picture(result, columns or (), track)))])
 
     return server
 
 
-def _reported(ctx: Context[Any, Any]) -> Progress:
+def _report_progress(ctx: Context[Any, Any]) -> Progress:
     """Return a progress that is reported to the client; the calculation runs in a thread of its own."""
 
     def progress(part: float, what: str) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from chipload.errors import InputError
 from chipload.jobs import LoadedJob, check_job, load_job, run_job
-from chipload.jobs.coarse import coarser, marked
+from chipload.jobs.coarse import coarser, mark_coarse
 from chipload.jobs.drafts.draft import write_draft
 from chipload.jobs.drafts.make import draft_of
 from chipload.jobs.shipped import LISTINGS
@@ -75,7 +75,7 @@ class ClientTools:
 
     def check(self, job: str, overrides: Sequence[str] = ()) -> dict[str, Any]:
         """Return what a job names and whether it can run; nothing is simulated."""
-        lines, runs = check_job(self._loaded(job, overrides))
+        lines, runs = check_job(self._load_job(job, overrides))
         return {"runs": runs, "reason": "every file and value can be used" if runs else lines[-1], "lines": lines}
 
     def simulate(
@@ -88,12 +88,12 @@ class ClientTools:
         progress: Progress = silent,
     ) -> tuple[dict[str, Any], bytes | None]:
         """Run a job, write its result folder, and return its verdict and a picture of its loads."""
-        loaded, target = self._loaded(job, overrides), self.folders.new(result)
+        loaded, target = self._load_job(job, overrides), self.folders.new(result)
         if coarse:
-            loaded = self._loaded(job, (*overrides, *coarser(loaded)))
+            loaded = self._load_job(job, (*overrides, *coarser(loaded)))
         check_target(target)
         done = run_job(loaded, lambda part, what: progress(0.8 * part, what), accept=True)
-        done = marked(done) if coarse else done
+        done = mark_coarse(done) if coarse else done
         written = write_finished(
             done.result, done.presentation, target, lambda part, what: progress(0.8 + 0.2 * part, what)
         )
@@ -127,12 +127,12 @@ class ClientTools:
 
     def picture(self, result: str, columns: Sequence[str] = (), track: str = "") -> bytes:
         """Return the columns of a track over time with their limits, as PNG."""
-        drawn = self._drawn(load_result(self.folders.existing(result)), columns, track)
+        drawn = self._draw_result(load_result(self.folders.existing(result)), columns, track)
         if drawn is None:
             raise InputError(f"{result}: its result has no history to draw")
         return drawn
 
-    def _loaded(self, job: str, overrides: Sequence[str]) -> LoadedJob:
+    def _load_job(self, job: str, overrides: Sequence[str]) -> LoadedJob:
         """Return a job of the folders that names no file outside of them."""
         path = self.folders.existing(job)
         self.folders.require_job(path, overrides)
@@ -141,11 +141,11 @@ class ClientTools:
     def _loads(self, result: Result) -> bytes | None:
         """Return the picture of a result; None: it has no history, or nothing of it is drawn."""
         try:
-            return self._drawn(result, (), "")
+            return self._draw_result(result, (), "")
         except InputError:
             return None
 
-    def _drawn(self, result: Result, columns: Sequence[str], track: str) -> bytes | None:
+    def _draw_result(self, result: Result, columns: Sequence[str], track: str) -> bytes | None:
         names = [one.name for one in result.tracks]
         if track and track not in names:
             raise InputError(f"track {track!r}: is not in the result, which has {', '.join(names) or 'none'}")

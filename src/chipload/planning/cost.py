@@ -117,13 +117,13 @@ def cost(
         "heading_y": heading[:, 1],
         "feed_mm_min": mm_min_from_mm_s(1.0) * speed,
         **load,
-        **_bent(cut, phi_in, phi_out, f_z, count, load["force_xy_n"]),
+        **_bending_columns(cut, phi_in, phi_out, f_z, count, load["force_xy_n"]),
         "form_error_um": error,
         "form_error_signed_um": signed,
     }
 
 
-def _bent(
+def _bending_columns(
     cut: CutConditions, phi_in: Floats, phi_out: Floats, f_z: Floats, count: NDArray[np.int64], force: Floats
 ) -> Columns:
     """Stress of the cutter, its deflection as if the whole force acted at the tip (an upper bound), and that over the
@@ -143,7 +143,7 @@ def _bent(
     }
 
 
-def stacked(parts: Iterable[Columns]) -> Columns:
+def stack_histories(parts: Iterable[Columns]) -> Columns:
     """One history from those of passes that follow one another; lengths and times continue."""
     rows = list(parts)
     out: dict[str, NDArray[Any]] = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}

@@ -126,7 +126,7 @@ def _reach(s: Segments, k: Ints, planner: TrajectoryPlanner) -> Floats:
     return np.asarray(np.minimum(s.commanded[k] * planner.override, _top(s, k, planner)))
 
 
-def _inscribed(normal: Floats, bound: Floats) -> Floats:
+def _bounds_across(normal: Floats, bound: Floats) -> Floats:
     """(k,) what every direction in the planes across ``normal`` (k, 3) can have of axes' bounds (3,)."""
     shadow = np.sqrt(np.maximum(1.0 - normal**2, 0.0))
     with np.errstate(divide="ignore"):
@@ -184,9 +184,9 @@ def _blend_arcs(
         stated = s.tolerance[segments]
         tolerance = np.where(stated > 0.0, np.minimum(tolerance, stated), tolerance)
     rate, most = bounds
-    most_there = _inscribed(binormal, most)
+    most_there = _bounds_across(binormal, most)
     goal = np.maximum(_reach(s, a, planner), _reach(s, b, planner))
-    goal = np.minimum(goal, np.maximum(_altitude(s, a, b, u1, u2, phi, planner), _inscribed(binormal, rate)))
+    goal = np.minimum(goal, np.maximum(_altitude(s, a, b, u1, u2, phi, planner), _bounds_across(binormal, rate)))
     d = np.minimum(np.minimum(share1, share2), np.cos(angle) * tolerance / (1.0 - np.sin(angle)))
     radius = np.tan(angle) * d
     speed = np.minimum(np.sqrt(NORMAL * most_there * radius), goal)

@@ -228,7 +228,7 @@ def extents(commands: Commands) -> Floats:
     return np.asarray(np.where(sizes[0] > 0.0, sizes[0], np.where(sizes[1] > 0.0, sizes[1], sizes[2])))
 
 
-def chorded(commands: Commands, chosen: NDArray[np.bool_], tolerance: float) -> Commands:
+def chord_arcs(commands: Commands, chosen: NDArray[np.bool_], tolerance: float) -> Commands:
     """The commands with the ``chosen`` (n,) arcs as chords that leave them by at most ``tolerance`` [mm].
 
     Where the radii at both ends differ, that of the arc goes evenly from one to the other.

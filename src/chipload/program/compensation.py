@@ -214,7 +214,7 @@ class Compensation:
         round_ = new if new.turns else front
         limit = math.pi + (-SMOOTH if self._side * round_.turns < 0 else SMOOTH)
         if away < -SMOOTH or away > limit:
-            at = self._crossing(front, new, corner)
+            at = self._cross_offsets(front, new, corner)
             self._trim(at)
             return self._append(new, end, payload)
         if away <= SMOOTH:
@@ -222,7 +222,7 @@ class Compensation:
         if not new.turns:
             self._check()
         if self._sharp:
-            return self._outside(front, new, corner, away, end, payload)
+            return self._round_corner(front, new, corner, away, end, payload)
         # the other axes go round the corner with the new motion, the one along the tool waits
         around = self._with(end, new.m, along=self._centre[self._along])
         rapid = new.motion == RAPID
@@ -232,7 +232,7 @@ class Compensation:
         self._centre = around
         return [*done, *self._append(new, end, payload)]
 
-    def _outside(
+    def _round_corner(
         self, front: _Offset, new: _Offset, corner: complex, away: float, end: Sequence[float], payload: object
     ) -> list[CentreMove]:
         """Straight pieces round a corner that turns away from the tool by ``away``.
@@ -256,7 +256,7 @@ class Compensation:
             done.append(self._out(CentreMove(motion, self._centre, (0.0, 0.0), 0, payload)))
         return [*done, *self._append(new, end, payload)]
 
-    def _crossing(self, front: _Offset, new: _Offset, corner: complex) -> complex:
+    def _cross_offsets(self, front: _Offset, new: _Offset, corner: complex) -> complex:
         """Where two offsets cross beside a corner that turns towards the tool."""
         if not front.turns and not new.turns:
             return new.m + new.u * self._radius * math.tan(0.5 * abs(cmath.phase(new.u / front.u)))

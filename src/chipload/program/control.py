@@ -347,14 +347,14 @@ def _read(name: str) -> dict[str, Any]:
     """The tables of a file over those that it inherits."""
     own = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
     base = own.pop("inherits", None)
-    return own if base is None else _over(_read(base), own)
+    return own if base is None else _overlay(_read(base), own)
 
 
-def _over(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+def _overlay(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
     out = dict(base)
     for key, value in own.items():
         known = out.get(key)
-        out[key] = _over(known, value) if isinstance(known, dict) and isinstance(value, dict) else value
+        out[key] = _overlay(known, value) if isinstance(known, dict) and isinstance(value, dict) else value
     return out
 
 

@@ -35,10 +35,10 @@ _RECORDS = {
 }
 
 
-def carried(findings: tuple[Finding, ...]) -> tuple[tuple[int, str], ...]:
+def carry_findings(findings: tuple[Finding, ...]) -> tuple[tuple[int, str], ...]:
     """(line, block) of what the motions do not say: `M8`, `M0`, else a comment.
 
-    >>> carried((Finding("nc-coolant", 6, "M8: coolant"), Finding("nc-output", 9, "M62: an output")))
+    >>> carry_findings((Finding("nc-coolant", 6, "M8: coolant"), Finding("nc-output", 9, "M62: an output")))
     ((6, 'M8'), (9, '(line 9 has M62: an output)'))
     """
     out = []
@@ -86,5 +86,5 @@ def convert_program(
         known = " ".join((*NC_TEXT, *CL_DATA))
         raise InputError(f"the ending {ending or 'none'} cannot be written: must be one of {known}")
     commands, findings = to_axes(program, machine, tool_lengths=tool_lengths, tcp=tcp, tolerance=tolerance)
-    text = write_commands(commands, machine, title=title, release=NOT_SIMULATED, words=carried(noticed))
+    text = write_commands(commands, machine, title=title, release=NOT_SIMULATED, words=carry_findings(noticed))
     return text, findings

@@ -66,10 +66,10 @@ class CornerArc:
     sense: int
 
 
-def rounding(before: Element, after: Element, radius: float) -> CornerArc | None:
+def rounding_arc(before: Element, after: Element, radius: float) -> CornerArc | None:
     """The arc of a radius that touches both elements; None: no such arc ends on them.
 
-    >>> rounding(Element(0j, 10 + 0j), Element(10 + 0j, 10 + 10j), 2.0)
+    >>> rounding_arc(Element(0j, 10 + 0j), Element(10 + 0j, 10 + 10j), 2.0)
     CornerArc(start=(8+0j), end=(10+2j), centre=(8+2j), sense=1)
     """
     if min(abs(e.end - e.start) for e in (before, after)) <= SAME and not (before.sense and after.sense):
@@ -79,7 +79,7 @@ def rounding(before: Element, after: Element, radius: float) -> CornerArc | None
     if abs(across) < 1e-9:
         return None
     side = 1 if across > 0.0 else -1
-    centres = _intersections(_shifted(before, side * radius), _shifted(after, side * radius))
+    centres = _intersections(_shift_element(before, side * radius), _shift_element(after, side * radius))
     best: CornerArc | None = None
     for centre in sorted(centres, key=lambda c: abs(c - before.end)):
         a, b = _foot(before, centre), _foot(after, centre)
@@ -144,7 +144,7 @@ def turns(before: Piece, after: Piece) -> bool:
     return abs(cmath.phase(turned)) > 1e-6
 
 
-def joined(before: Piece, after: Piece, corner: Corner) -> tuple[Piece, Piece, Piece] | None:
+def join_corner(before: Piece, after: Piece, corner: Corner) -> tuple[Piece, Piece, Piece] | None:
     """Two trimmed pieces with the rounding or chamfer between them; None: it does not fit."""
     level = all(a[2:] == b[2:] for a, b in ((before.start, before.end), (after.start, after.end)))
     flat = any(e.sense == 0 and abs(e.end - e.start) <= SAME for e in (before.element, after.element))
@@ -152,7 +152,7 @@ def joined(before: Piece, after: Piece, corner: Corner) -> tuple[Piece, Piece, P
         return None
     feed = after.feed if corner.feed is None else corner.feed
     if corner.round:
-        arc = rounding(before.element, after.element, corner.size)
+        arc = rounding_arc(before.element, after.element, corner.size)
         if arc is None:
             return None
         ends, centre, turns, motion = (arc.start, arc.end), (arc.centre.real, arc.centre.imag), arc.sense, ARC
@@ -176,7 +176,7 @@ def joined(before: Piece, after: Piece, corner: Corner) -> tuple[Piece, Piece, P
 Shifted = tuple[complex, complex | None, float]
 
 
-def _shifted(element: Element, by: float) -> Shifted:
+def _shift_element(element: Element, by: float) -> Shifted:
     if element.sense == 0:
         tangent = element.along(element.start)
         return element.start + 1j * tangent * by, tangent, 0.0

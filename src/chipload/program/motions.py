@@ -151,7 +151,7 @@ def bounds(program: Program) -> tuple[Floats, Floats]:
     return low, high
 
 
-def straightened(program: Program, turn: Floats) -> Program:
+def straighten_arcs(program: Program, turn: Floats) -> Program:
     """The program with some arcs as chords between points on them.
 
     Parameters

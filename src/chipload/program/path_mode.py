@@ -103,7 +103,7 @@ def mode_column(name: str, values: object, n: int) -> Floats:
     return column
 
 
-def resolved(column: Floats, tolerance: float) -> Floats:
+def resolve_tolerance(column: Floats, tolerance: float) -> Floats:
     """(n, 3) the column with the machine's own corner ``tolerance`` [mm] where the program does not say.
 
     The same as a program that is written for the machine says: G61 for 0, else G64 P.

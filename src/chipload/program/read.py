@@ -208,12 +208,12 @@ def read_program(
         if machine.chain.rotary:
             findings = tuple(replace(f, severity=Severity.UNPROVEN) if f.code in OF_LENGTHS else f for f in findings)
     if speed is not None:
-        commands = replace(commands, spindle=_turning(commands.spindle, speed))
-        program = replace(program, spindle=_turning(program.spindle, speed))
+        commands = replace(commands, spindle=_turning_speeds(commands.spindle, speed))
+        program = replace(program, spindle=_turning_speeds(program.spindle, speed))
     taps = tapping_findings(program, setup.cutters, {} if is_cl_data(kind) else thread_comments(text))
     breaks = tuple(f for f in taps if f.severity is Severity.EXCEEDS)
     findings += tuple(f for f in taps if f.severity is not Severity.EXCEEDS)
-    reading = _checked(commands, program, machine, (*said, *agreed, *findings), more, placed)
+    reading = _check_program(commands, program, machine, (*said, *agreed, *findings), more, placed)
     reading = replace(reading, violations=(*reading.violations, *breaks), of_text=True, recognition=recognition)
     other = text if is_cl_data(kind) else without_deleted_blocks(text)
     if other == text:
@@ -242,7 +242,7 @@ def _others(findings: tuple[Finding, ...], known: tuple[Finding, ...]) -> Iterat
     return (with_block_delete(f) for f in findings if (f.code, f.line, f.text) not in without)
 
 
-def _turning(spindle: Floats, speed: float) -> Floats:
+def _turning_speeds(spindle: Floats, speed: float) -> Floats:
     """Speeds of the spindle [rad/s], with one for the rows before it first turns."""
     first = int(np.argmax(spindle != 0.0)) if spindle.any() else len(spindle)
     return np.concatenate([np.full(first, speed), spindle[first:]])
@@ -270,10 +270,10 @@ def reading_of(
     if len(program) == 0:
         raise InputError("program: no motion: nothing to check")
     commands, found = to_axes(program, machine, tool_lengths=tool_lengths, tolerance=tolerance)
-    return _checked(commands, program, machine, (), tuple(f for f in found if f.code not in LIMITS))
+    return _check_program(commands, program, machine, (), tuple(f for f in found if f.code not in LIMITS))
 
 
-def _checked(
+def _check_program(
     commands: Commands,
     program: Program,
     machine: Machine,
@@ -308,7 +308,7 @@ def command_times(commands: Commands, machine: Machine) -> Floats:
     blocks = replace(commands, line=np.arange(len(commands)))
     tips, _ = to_work(blocks, machine)
     seconds = row_times(tips, machine, blocks, axes_of(blocks, machine))
-    return _summed(tips.line, seconds, len(commands))
+    return _sum_by_row(tips.line, seconds, len(commands))
 
 
 def times_on(program: Program, machine: Machine, tool_lengths: Mapping[int, float] | None = None) -> Floats:
@@ -319,10 +319,10 @@ def times_on(program: Program, machine: Machine, tool_lengths: Mapping[int, floa
     tool_lengths : [mm] of each tool; one that is not named has 0
     """
     commands, _ = to_axes(replace(program, line=np.arange(len(program))), machine, tool_lengths=tool_lengths)
-    return _summed(commands.line, command_times(commands, machine), len(program))
+    return _sum_by_row(commands.line, command_times(commands, machine), len(program))
 
 
-def _summed(row: Ints, seconds: Floats, n: int) -> Floats:
+def _sum_by_row(row: Ints, seconds: Floats, n: int) -> Floats:
     """(n,) sums of times by row."""
     out = np.zeros(n)
     np.add.at(out, row, seconds)

@@ -180,7 +180,7 @@ def compared_rows(planned: Program, reading: ProgramReading) -> tuple[tuple[Find
         found = _next(read, last, planned, k, near)
         if found is None:
             line = int(read.line[min(last + 1, len(read) - 1)])
-            return (_finding(line, k, place, read, last),), ends
+            return (_difference_finding(line, k, place, read, last),), ends
         off = _away(read, last, found, planned, k) if row >= 0 else 0.0
         if off > near:
             text = f"the written text leaves the planned path by {off:.4g} mm"
@@ -250,7 +250,7 @@ def _away(read: Program, last: int, found: int, planned: Program, k: int) -> flo
     return float(np.linalg.norm(between - a - share[:, None] * along, axis=1).max())
 
 
-def _finding(line: int, k: int, place: Floats, read: Program, last: int) -> Finding:
+def _difference_finding(line: int, k: int, place: Floats, read: Program, last: int) -> Finding:
     at = ", ".join(f"{x:.6g}" for x in place)
     close = np.flatnonzero(np.linalg.norm(read.p_work[last + 1 : last + 1 + AHEAD] - place, axis=1) <= 0.05)
     what = (

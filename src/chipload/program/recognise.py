@@ -77,12 +77,12 @@ def scores(text: str) -> dict[str, tuple[int, tuple[str, ...]]]:
         for found in found_words:
             if found is not None:
                 score += DECISIVE
-                reasons.append(_shown(found[0]))
+                reasons.append(_kind_text(found[0]))
         for pattern in dict.fromkeys((*family.hints, *own.hints)):
             found = re.search(pattern, body, _FLAGS)
             if found is not None:
                 score += HINT
-                reasons.append(_shown(found[0]))
+                reasons.append(_kind_text(found[0]))
         if control.numbers.feed_increment and _WHOLE_FEED.search(plain) and not _FEED_POINT.search(plain):
             # its feeds would be thousandths of what they say
             score -= DECISIVE
@@ -90,7 +90,7 @@ def scores(text: str) -> dict[str, tuple[int, tuple[str, ...]]]:
     return out
 
 
-def _shown(found: str) -> str:
+def _kind_text(found: str) -> str:
     return repr(" ".join(found.split())[:24])
 
 

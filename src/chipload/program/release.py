@@ -46,12 +46,12 @@ class Release:
 NOT_SIMULATED = Release("no simulation has checked this program")
 
 
-def released(text: str, simulated: str, release: Release) -> Release:
+def release_of_text(text: str, simulated: str, release: Release) -> Release:
     r"""Return what a text may state: ``release`` if it has the blocks of the ``simulated`` text, comments aside.
 
-    >>> released("(a)\nG0 X1\nM2", "(b)\nG0 X1\nM2", Release("")).verified
+    >>> release_of_text("(a)\nG0 X1\nM2", "(b)\nG0 X1\nM2", Release("")).verified
     True
-    >>> released("(a)\nG0 X2\nM2", "(b)\nG0 X1\nM2", Release("")).text
+    >>> release_of_text("(a)\nG0 X2\nM2", "(b)\nG0 X1\nM2", Release("")).text
     'NOT VERIFIED: its text is not the one that was simulated'
     """
     return release if same_blocks(text, simulated) else Release("its text is not the one that was simulated")

@@ -81,7 +81,7 @@ def segments_of(program: Program, machine: Machine, others: Floats | None = None
     ----------
     others : (n, 6) float [rad, mm], A B C U V W at the end of each row; None: they stand
     """
-    program, others, row = _merged(program, np.zeros((len(program), 6)) if others is None else others)
+    program, others, row = _merge_short(program, np.zeros((len(program), 6)) if others is None else others)
     step = np.diff(others, axis=0, prepend=others[:1])
     length = lengths(program)
     turning = np.abs(step).max(axis=1) > 1e-12
@@ -142,7 +142,7 @@ def _axis_limits(program: Program, machine: Machine, step: Floats, length: Float
     return out[0], out[1]
 
 
-def _merged(program: Program, others: Floats) -> tuple[Program, Floats, Ints]:
+def _merge_short(program: Program, others: Floats) -> tuple[Program, Floats, Ints]:
     """The program with short lines that the naive CAM detector joins as one, and the last row of each.
 
     Lines of one feed are joined while the straight line to the last point passes every point between within the naive
@@ -165,7 +165,7 @@ def _merged(program: Program, others: Floats) -> tuple[Program, Floats, Ints]:
     for k in np.flatnonzero(joins).tolist():
         start = start if last == k - 1 else k - 2
         last = k
-        if k - 1 - start < LONGEST_CHAIN and _linked(p[start], p[k], p[start + 1 : k], mode[k, 2]):
+        if k - 1 - start < LONGEST_CHAIN and _lie_on_line(p[start], p[k], p[start + 1 : k], mode[k, 2]):
             keep[k - 1] = False
         else:
             start = k - 1
@@ -176,7 +176,7 @@ def _merged(program: Program, others: Floats) -> tuple[Program, Floats, Ints]:
     return Program(**columns, labels=program.labels), others[rows], rows
 
 
-def _linked(begin: Floats, end: Floats, points: Floats, tolerance: float) -> bool:
+def _lie_on_line(begin: Floats, end: Floats, points: Floats, tolerance: float) -> bool:
     """Whether points lie within the tolerance of the line from ``begin`` to ``end``."""
     d = end - begin
     square = float(d @ d)

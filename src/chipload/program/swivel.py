@@ -19,7 +19,7 @@ from chipload.errors import InputError
 from chipload.machine.axis import Axis
 from chipload.machine.kinematics import forward, inverse, with_tip
 from chipload.machine.machine import Machine
-from chipload.machine.orientation import rotated
+from chipload.machine.orientation import rotate_about
 from chipload.program.commands import Frame
 from chipload.program.to_work import tool_length, work_zero
 
@@ -81,7 +81,7 @@ class Swivel:
         out = np.eye(3)
         for axis in reversed(chain.axes):
             if axis.rotary:
-                out = rotated(np.array(axis.direction), np.full(3, axes[axis.column]), out)
+                out = rotate_about(np.array(axis.direction), np.full(3, axes[axis.column]), out)
         found: Floats = (out @ chain.R_machine_work).T @ chain.R_machine_work
         return found
 
@@ -117,8 +117,8 @@ class Swivel:
         found = inverse(self.machine, np.zeros((1, 3)), direction[None, :], held=now, free=tilting)
         if float(found.miss[0]) > REACH:
             raise InputError(
-                f"tilted plane: its normal {_shown(direction)} is {math.degrees(found.miss[0]):.3g} deg out of reach "
-                f"of the rotary axes {' and '.join(tilting)} of {self.machine.name}"
+                f"tilted plane: its normal {_direction_text(direction)} is {math.degrees(found.miss[0]):.3g} deg out "
+                f"of reach of the rotary axes {' and '.join(tilting)} of {self.machine.name}"
             )
         if self._stands(direction, now) and sign == 0:
             return np.array(now)
@@ -138,8 +138,8 @@ class Swivel:
                     best, least = q, travel
         if best is None:
             raise InputError(
-                f"tilted plane: its normal {_shown(direction)} is out of the limits of the rotary axes "
-                f"{' and '.join(tilting)} of {self.machine.name}{_signed(sign)}"
+                f"tilted plane: its normal {_direction_text(direction)} is out of the limits of the rotary axes "
+                f"{' and '.join(tilting)} of {self.machine.name}{_sign_text(sign)}"
             )
         return best
 
@@ -173,9 +173,9 @@ def _with_whole_turns(axis: Axis, angle: float, now: Floats) -> Iterator[float]:
             yield q
 
 
-def _shown(direction: Floats) -> str:
+def _direction_text(direction: Floats) -> str:
     return "(" + ", ".join(f"{x:.4g}" for x in direction) + ")"
 
 
-def _signed(sign: int) -> str:
+def _sign_text(sign: int) -> str:
     return f" with a {'positive' if sign > 0 else 'negative'} angle" if sign else ""

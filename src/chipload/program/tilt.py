@@ -50,7 +50,7 @@ class Tilt:
     --------
     A plane turned by 90 degrees about X: its Z stands along -Y.
 
-    >>> tilt = tilt_of(turned("x", (90.0,)), (0.0, 0.0, 5.0))
+    >>> tilt = tilt_of(turn_matrix("x", (90.0,)), (0.0, 0.0, 5.0))
     >>> (tilt.to_offset(np.array([[1.0, 2.0, 3.0]])).round(9) + 0.0).tolist()
     [[1.0, -3.0, 7.0]]
     """
@@ -98,7 +98,7 @@ def tilt_of(rotation: Floats, origin: tuple[float, ...]) -> Tilt:
     return Tilt(tuple(float(v) for v in rotation.ravel()), (x, y, z))
 
 
-def turned(axes: str, degrees: tuple[float, ...]) -> Floats:
+def turn_matrix(axes: str, degrees: tuple[float, ...]) -> Floats:
     """R (3, 3) of turns one after the other, each about an axis as it was turned by those before.
 
     Parameters
@@ -106,7 +106,7 @@ def turned(axes: str, degrees: tuple[float, ...]) -> Floats:
     axes : letters of x, y, z
     degrees : an angle for each
 
-    >>> (turned("zxz", (90.0, 90.0, 0.0)).round(9) + 0.0)[:, 2].tolist()
+    >>> (turn_matrix("zxz", (90.0, 90.0, 0.0)).round(9) + 0.0)[:, 2].tolist()
     [1.0, 0.0, 0.0]
     """
     R = np.eye(3)
@@ -123,7 +123,7 @@ def turned(axes: str, degrees: tuple[float, ...]) -> Floats:
 
 def spatial(a: float, b: float, c: float) -> Floats:
     """R (3, 3) of Heidenhain's spatial angles [deg]: about X, then about Y, then about Z of the work offset."""
-    return turned("zyx", (c, b, a))
+    return turn_matrix("zyx", (c, b, a))
 
 
 def of_vectors(x: Floats, z: Floats) -> Floats:

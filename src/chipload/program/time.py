@@ -38,7 +38,7 @@ from chipload.machine.trajectory import TrajectoryPlanner
 from chipload.program._jerk_limited import jerk_limited
 from chipload.program.commands import ARC, PLANE_AXES, Commands, spirals
 from chipload.program.motions import bases, directions, is_arc, lengths, radii, sweeps
-from chipload.program.path_mode import PathControl, resolved
+from chipload.program.path_mode import PathControl, resolve_tolerance
 from chipload.program.program import ARC_CCW, ARC_CW, ARC_SKEW_MM, DWELL, LINE, RAPID, Program
 from chipload.program.to_work import turning_times
 from chipload.program.trajectory import planned_times
@@ -97,7 +97,7 @@ def program_time(program: Program, machine: Machine) -> Floats:
     [0.0, 2.263333]
     """
     unplaced = program.path_mode[:, 0] == PathControl.UNPLACED
-    program = replace(program, path_mode=resolved(program.path_mode, machine.corner_tolerance))
+    program = replace(program, path_mode=resolve_tolerance(program.path_mode, machine.corner_tolerance))
     if machine.planner is not None:
         return np.where(unplaced, 0.0, planned_times(program, machine, machine.planner))
     out = np.where(program.motion == DWELL, program.feed, 0.0)
@@ -182,7 +182,7 @@ def _axis_path_times(commands: Commands, machine: Machine, planner: TrajectoryPl
         p_work=position[:, :3], axis=np.tile([0.0, 0.0, 1.0], (n, 1)), centre=centre, normal=normal,
         turns=np.where(arc, np.abs(commands.turns) - 1, 0), feed=commands.feed, spindle=commands.spindle,
         tool=commands.tool, line=commands.line, label=commands.label, labels=commands.labels,
-        path_mode=resolved(commands.path_mode, machine.corner_tolerance),
+        path_mode=resolve_tolerance(commands.path_mode, machine.corner_tolerance),
     )  # fmt: skip
     return planned_times(flat, machine, planner, position[:, 3:])
 
@@ -245,7 +245,7 @@ def _speeds(program: Program, machine: Machine) -> _Speeds:
     here, there = row[:-1], row[1:]
     cos = (last[here] * first[there]).sum(axis=1)
     sin = np.linalg.norm(np.cross(last[here], first[there]), axis=1)
-    mode = resolved(program.path_mode, machine.corner_tolerance)[here]
+    mode = resolve_tolerance(program.path_mode, machine.corner_tolerance)[here]
     stated = np.where(mode[:, 1] > 0.0, mode[:, 1], machine.corner_tolerance)
     tolerance = np.where(mode[:, 0] == PathControl.CONTINUOUS, stated, 0.0)
     theta, least = np.arctan2(sin, cos), np.minimum(a[here], a[there])

@@ -20,7 +20,7 @@ from chipload.machine.limits import limit_findings
 from chipload.machine.linearise import linearise
 from chipload.machine.machine import Machine
 from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, XY, YZ, ZX, Commands, Frame, extents
-from chipload.program.motions import is_arc, radii, spans, straightened, sweeps
+from chipload.program.motions import is_arc, radii, spans, straighten_arcs, sweeps
 from chipload.program.program import ARC_CCW, Program
 from chipload.program.program import RAPID as WORK_RAPID
 from chipload.program.to_work import TOLERANCE_MM, home
@@ -66,7 +66,7 @@ def to_axes(
         move in a cut.
     """
     small = (radii(program) < LEAST_RADIUS) & is_arc(program)
-    program = straightened(program, np.where(small, 0.25 * math.pi, math.inf))
+    program = straighten_arcs(program, np.where(small, 0.25 * math.pi, math.inf))
     program = _single_turns(program)
     if not machine.chain.rotary:
         tilted = np.flatnonzero((np.abs(program.axis[:, :2]).max(axis=1) > 1e-9) | (program.axis[:, 2] < 0.0))
@@ -84,7 +84,7 @@ def _single_turns(program: Program) -> Program:
         return program
     sweep = np.abs(sweeps(program))
     count = np.where(program.turns > 0, np.ceil(sweep / math.tau - 1e-9), 1.0).clip(1.0).astype(np.int64)
-    chords = straightened(program, np.where(program.turns > 0, sweep / count, math.inf))
+    chords = straighten_arcs(program, np.where(program.turns > 0, sweep / count, math.inf))
     row = np.repeat(np.arange(len(program)), count)
     back = {name: getattr(program, name)[row] for name in ("motion", "centre", "normal")}
     return replace(chords, **back, turns=np.zeros(len(row), dtype=np.int64))
@@ -95,7 +95,7 @@ def _plane_arcs(program: Program, normal: Floats, tolerance: float) -> Program:
     odd = is_arc(program) & (np.abs(normal).max(axis=1) < 1.0 - 1e-9)
     r = radii(program)
     turn = 2.0 * np.arccos(1.0 - np.minimum(tolerance / np.where(r > 0.0, r, math.inf), 1.0))
-    return straightened(program, np.where(odd, turn, math.inf))
+    return straighten_arcs(program, np.where(odd, turn, math.inf))
 
 
 def _commands(
@@ -183,7 +183,7 @@ def _piece(
     program: Program, machine: Machine, length: float, free: str, tcp: bool, start: Floats | None, tolerance: float
 ) -> tuple[Program, Floats, tuple[Finding, ...]]:
     """Rows of one tool and their axes: arcs that the machine sees askew as chords, turning rows in pieces."""
-    q, findings = _followed(program, machine, start, length, free)
+    q, findings = _follow_axes(program, machine, start, length, free)
     missed = next((f for f in findings if f.code == "machine-reach"), None)
     if missed is not None:
         raise InputError(f"program {missed.text}: choose a machine that reaches it")
@@ -193,8 +193,8 @@ def _piece(
     program = _plane_arcs(program, odd, tolerance)
     indexed = any(axis.indexed for axis in machine.chain.rotary)
     if tcp or indexed:
-        q, findings = _followed(program, machine, start, length, free)
-        return (program, q, findings) if tcp else (*_linearised(program, machine, q, length, tolerance), findings)
+        q, findings = _follow_axes(program, machine, start, length, free)
+        return (program, q, findings) if tcp else (*_linearise_rows(program, machine, q, length, tolerance), findings)
     pieces, findings = linearise(
         machine, program.p_work, program.axis, tolerance, ANGLE_TOLERANCE, start, length, None, free
     )
@@ -204,7 +204,7 @@ def _piece(
     return out, pieces.axes, findings
 
 
-def _followed(
+def _follow_axes(
     program: Program, machine: Machine, start: Floats | None, length: float, free: str
 ) -> tuple[Floats, tuple[Finding, ...]]:
     """Axes of the rows; index tables stand but in rapids, wherever another solution would take them."""
@@ -214,7 +214,7 @@ def _followed(
     )  # fmt: skip
 
 
-def _linearised(
+def _linearise_rows(
     program: Program, machine: Machine, q: Floats, length: float, tolerance: float
 ) -> tuple[Program, Floats]:
     """Rows in pieces: rotary axes in straight proportion, the tip on its line within the tolerance.

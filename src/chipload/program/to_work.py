@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError, Severity
 from chipload.machine.kinematics import forward, with_tip
-from chipload.machine.linearise import traced
+from chipload.machine.linearise import trace_path
 from chipload.machine.machine import Machine
 from chipload.program.commands import (
     ARC,
@@ -28,7 +28,7 @@ from chipload.program.commands import (
     PROBE,
     Commands,
     Frame,
-    chorded,
+    chord_arcs,
     extents,
     spirals,
 )
@@ -115,8 +115,8 @@ def to_work(
     base = work_frame(commands, placed)
     known = bool(base.offset.any())
     zero, shift = work_zero(machine, base, known)
-    commands = chorded(commands, _turning(commands) | spirals(commands, 0.999 * ARC_SKEW_MM), tolerance)
-    turning = _turning(commands)
+    commands = chord_arcs(commands, _turning_rows(commands) | spirals(commands, 0.999 * ARC_SKEW_MM), tolerance)
+    turning = _turning_rows(commands)
     # only rows that turn and arcs of a machine with rotary axes are traced by the axes
     axes = commands.machine() + shift if machine.chain.rotary or turning.any() else np.empty((0, 9))
     tool = np.array([tool_length(machine, f) for f in commands.frames])[commands.frame]
@@ -150,7 +150,7 @@ def to_work(
     time = turning_times(commands, cut)
     program = _with_controller_time(program, time)
     if cut.any():
-        program = _linearised(program, machine, axes, tool, zero, cut, time, tolerance)
+        program = _linearise_rows(program, machine, axes, tool, zero, cut, time, tolerance)
     return program, findings
 
 
@@ -186,7 +186,7 @@ def _off_normal(commands: Commands, axis: Floats) -> tuple[Finding, ...]:
     return (Finding("program-tilted-plane", int(commands.line[askew[0]]), text, Severity.UNPROVEN),)
 
 
-def _turning(commands: Commands) -> NDArray[np.bool_]:
+def _turning_rows(commands: Commands) -> NDArray[np.bool_]:
     """(n,) whether a rotary axis moves on each row."""
     rotary = np.empty((len(commands), 3))
     for k, frame in enumerate(commands.frames):
@@ -282,7 +282,7 @@ def turning_times(commands: Commands, turning: NDArray[np.bool_] | None = None) 
     ----------
     turning : (n,) such rows; None: those that move a rotary axis without tip control
     """
-    rows = _turning(commands) & ~commands.tcp if turning is None else turning
+    rows = _turning_rows(commands) & ~commands.tcp if turning is None else turning
     cuts = rows & np.isin(commands.motion, (LINE, PROBE, ARC)) & (commands.feed > 0.0)
     return np.where(cuts, extents(commands) / np.where(cuts, commands.feed, 1.0), 0.0)
 
@@ -295,7 +295,7 @@ def _with_controller_time(program: Program, time: Floats) -> Program:
     return replace(program, feed=np.where((time > 0.0) & (own > 0.0), own, program.feed))
 
 
-def _linearised(
+def _linearise_rows(
     program: Program,
     machine: Machine,
     axes: Floats,
@@ -314,7 +314,7 @@ def _linearised(
     begin = 0
     for count in _runs(tool):
         stop = begin + count
-        pieces = traced(machine, axes[begin:stop], tolerance, float(tool[begin]), zero)
+        pieces = trace_path(machine, axes[begin:stop], tolerance, float(tool[begin]), zero)
         row = pieces.row + begin
         keep = cut[row] | (pieces.part == 1.0)
         row, part = row[keep], pieces.part[keep]

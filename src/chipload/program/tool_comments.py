@@ -61,7 +61,7 @@ def stated_tools(text: str, mm: float) -> dict[int, Stated]:
     mm : in the unit of the text
     """
     out: dict[int, Stated] = {}
-    for number, words, comment in _described(text):
+    for number, words, comment in _described_tools(text):
         own = out.setdefault(number, {})
         for key, stated in _statement(words, mm, comment).items():
             own.setdefault(key, stated)
@@ -91,7 +91,7 @@ def stated_diameters(text: str, unit: str = "mm") -> dict[int, StatedDiameter]:
     mm = unit_mm(text, unit)
     for line, row in enumerate(text.split("\n"), start=1):
         for comment in _comments_of(row) if "(" in row or ";" in row else ():
-            found = next(_numbered(comment), None)
+            found = next(_numbered_tools(comment), None)
             if found is None or found[0] in out:
                 continue
             number, words = found
@@ -102,7 +102,7 @@ def stated_diameters(text: str, unit: str = "mm") -> dict[int, StatedDiameter]:
     return out
 
 
-def _numbered(comment: str) -> Iterator[tuple[int, str]]:
+def _numbered_tools(comment: str) -> Iterator[tuple[int, str]]:
     """The number of the tool that begins a comment, and the words about it."""
     if (found := _OFFSETS.match(comment)) is not None:
         yield int(found[1]), found[2]
@@ -111,11 +111,11 @@ def _numbered(comment: str) -> Iterator[tuple[int, str]]:
         yield int(found["tool"] or found["post"]), (found if shorter is None else shorter)["rest"]
 
 
-def _described(text: str) -> Iterator[tuple[int, str, str]]:
+def _described_tools(text: str) -> Iterator[tuple[int, str, str]]:
     """Number of a tool, words about it, and the comment that they stand in, the surest first."""
     for line in text.splitlines():
         for comment in _comments_of(line):
-            for number, words in _numbered(comment):
+            for number, words in _numbered_tools(comment):
                 yield number, words, comment
     for number, comment in _at_changes(text):
         yield number, comment, comment
@@ -163,7 +163,7 @@ def _only_tool(text: str) -> Iterator[tuple[int, str, str]]:
         return
     spoken = [c for line in text.splitlines() for c in _comments_of(line)]
     comments = dict.fromkeys(c.strip() for c in spoken if _describes(c))
-    if len(comments) == 1 and not any(True for c in spoken for _ in _numbered(c)):
+    if len(comments) == 1 and not any(True for c in spoken for _ in _numbered_tools(c)):
         comment = next(iter(comments))
         yield 0, comment, comment
 

@@ -162,7 +162,7 @@ def describe_tool(text: str, mm: float, where: str = "") -> Stated:
         if pattern.search(words):
             out.setdefault("modulus_gpa", (modulus, f"{body}: {where}"))
     taper = re.search(r"\bTAPER\s*[=:]", words) is not None
-    keyed, words = _taken(_DIAMETER, words, mm)
+    keyed, words = _take_length(_DIAMETER, words, mm)
     words, numbers = _measures(words, mm)
     for key, value in numbers.items():
         if key != "angle":
@@ -185,7 +185,7 @@ def _plain(text: str) -> str:
     return " ".join(re.sub(r"[_{}\[\]|,;()]", " ", text.upper()).split())
 
 
-def _taken(pattern: re.Pattern[str], words: str, mm: float) -> tuple[float | None, str]:
+def _take_length(pattern: re.Pattern[str], words: str, mm: float) -> tuple[float | None, str]:
     """The first length [mm] of a pattern, and the text without it."""
     found = pattern.search(words)
     if found is None:
@@ -215,7 +215,7 @@ def _measures(words: str, mm: float) -> tuple[str, dict[str, float | int]]:
             out["flutes"] = count
         words = f"{words[: flutes.start()]} {words[flutes.end() :]}"
     for pattern, key in ((_FLUTE_LENGTH, "flute_length_mm"), (_OVERHANG, "overhang_mm"), (_CORNER, "corner_radius_mm")):
-        value, words = _taken(pattern, words, mm)
+        value, words = _take_length(pattern, words, mm)
         if value is not None and value > 0.0:
             out[key] = value
     return _OTHER.sub(" ", words), out
@@ -225,12 +225,12 @@ def _first_size(words: str, kind: ToolKind | None, mm: float) -> float | None:
     """The diameter [mm] by the surest form of a number."""
     hole = kind in (ToolKind.DRILL, ToolKind.SPOT, ToolKind.REAMER)
     for pattern in (_NAMED, _WITH_UNIT, _FRACTION, _POINT):
-        value, _ = _taken(pattern, words, mm)
+        value, _ = _take_length(pattern, words, mm)
         if value is not None and 0.0 < value <= 2.0 * LARGEST_MM:
             return value
     if hole and (size := drill_size(words)) is not None:
         return size
-    value, _ = _taken(_WHOLE, words, mm) if kind is not None else (None, words)
+    value, _ = _take_length(_WHOLE, words, mm) if kind is not None else (None, words)
     return value if value is not None and 0.0 < value <= LARGEST_MM else None
 
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from chipload.errors import Finding
 from chipload.machine.axis import Axis
-from chipload.machine.limits import SLACK, beyond
+from chipload.machine.limits import SLACK, distance_beyond
 from chipload.machine.machine import Machine
-from chipload.program.commands import ARC, Commands, chorded
+from chipload.program.commands import ARC, Commands, chord_arcs
 from chipload.program.path_mode import PathControl
 
 Floats = NDArray[np.float64]
@@ -50,7 +50,7 @@ def travel_findings(commands: Commands, machine: Machine, lengths: bool = True) 
     ----------
     lengths : whether the lengths of the tools are known, without which Z is known up to a constant
     """
-    chords = chorded(commands, commands.motion == ARC, CHORD_MM)
+    chords = chord_arcs(commands, commands.motion == ARC, CHORD_MM)
     first = leading_rows(chords.path_mode)
     axes, frame, line = chords.machine()[first:], chords.frame[first:], chords.line[first:]
     known = np.array([f.stated or f.number == 0 for f in commands.frames])[frame]
@@ -60,16 +60,16 @@ def travel_findings(commands: Commands, machine: Machine, lengths: bool = True) 
         q, placed = axes[:, axis.column], known
         if axis.letter == "Z" and not lengths:
             placed = number == 0
-        found += _beyond(axis, machine, q, line, placed)
+        found += _row_beyond(axis, machine, q, line, placed)
         for one in np.unique(number[~placed]).tolist():
             rows = ~placed & (number == one)
             found += _wider(axis, machine, q[rows], line[rows])
     return tuple(found)
 
 
-def _beyond(axis: Axis, machine: Machine, q: Floats, line: Ints, known: Bools) -> list[Finding]:
+def _row_beyond(axis: Axis, machine: Machine, q: Floats, line: Ints, known: Bools) -> list[Finding]:
     """The row that is farthest beyond a limit, of those whose place in the machine is known."""
-    over = np.where(known, beyond(axis, q), 0.0)
+    over = np.where(known, distance_beyond(axis, q), 0.0)
     if not len(over) or over.max() <= SLACK:
         return []
     k = int(np.argmax(over))

@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from chipload.report.gltf import node_names, selected
+from chipload.report.gltf import node_names, select_nodes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -84,7 +84,7 @@ def scene_bodies(glb: bytes, most: int = TRIANGLES, without: Collection[str] = (
     if not wanted:
         return ()
     # only what is read takes memory: the path of a long program is most of its scene
-    glb = glb if len(wanted) == len(names) else selected(glb, frozenset(wanted))
+    glb = glb if len(wanted) == len(names) else select_nodes(glb, frozenset(wanted))
     scene = trimesh.load(io.BytesIO(glb), file_type="glb", force="scene")
     out = []
     for node in scene.graph.nodes_geometry:

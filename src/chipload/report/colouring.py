@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chipload.report.view import Colouring, ViewPath
 from chipload.result import COLUMNS, LimitCheck, Track
-from chipload.result.thinning import thinned
+from chipload.result.thinning import thin_rows
 from chipload.simulation.removal_mesh import RemovalMesh
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,7 @@ FIRST = (
 )
 
 
-def beyond(values: Floats, check: LimitCheck) -> Bools:
+def rows_beyond(values: Floats, check: LimitCheck) -> Bools:
     """(n,) rows beyond a limit, of those that the check covers."""
     size = np.abs(np.nan_to_num(values)) if check.column.signed else np.nan_to_num(values)
     above = size < check.limit if check.column.least else size > check.limit
@@ -56,7 +56,7 @@ def drawn_rows(path: ViewPath, values: Floats, points: int = POINTS) -> Ints:
     if n <= points:
         return np.arange(n)
     filled = np.where(np.isfinite(values), values, 0.0)
-    keep = [thinned(path.place[:, k], points // 4) for k in range(3)] + [thinned(filled, points // 4)]
+    keep = [thin_rows(path.place[:, k], points // 4) for k in range(3)] + [thin_rows(filled, points // 4)]
     gaps = np.flatnonzero(path.apart)
     if len(gaps) <= points:
         keep += [gaps, gaps - 1]
@@ -77,7 +77,7 @@ def colouring_of(
     rows = drawn_rows(path, values, points)
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
-    above = beyond(values, check) if check is not None else np.zeros(len(values), dtype=np.bool_)
+    above = rows_beyond(values, check) if check is not None else np.zeros(len(values), dtype=np.bool_)
     least = known is not None and known.least
     return Colouring(
         label, unit, low, high, None if check is None else check.limit, least, (), rows, values[rows], above[rows],

@@ -104,14 +104,14 @@ def diagram_figure(
             line = {"color": STOCK, "width": 1.2, "dash": "dot"}
             _outline(figure, shapely.get_coordinates(polygon.exterior), "stock", line, None)
         for chip in found:
-            _outline(figure, _closed(chip.rings), "chip", {"width": 0, "color": CHIP}, CHIP)
+            _outline(figure, _close_rings(chip.rings), "chip", {"width": 0, "color": CHIP}, CHIP)
         shown = [ring for chip in found for ring in chip.rings]
     else:
-        _outline(figure, _closed(made.covered.rings), "covered", {"width": 0, "color": CHIP}, CHIP)
+        _outline(figure, _close_rings(made.covered.rings), "covered", {"width": 0, "color": CHIP}, CHIP)
         shown = rings
     _edges(figure, rings, 1)
     _edges(figure, shown, 2)
-    return _styled(figure, title)
+    return _style_figure(figure, title)
 
 
 def _edges(figure: go.Figure, rings: list[Ring], col: int) -> None:
@@ -153,7 +153,7 @@ def _segments(x0: Floats, y0: Floats, x1: Floats, y1: Floats, angles: bool = Fal
     return np.column_stack([x0, x1, gap]).ravel(), np.column_stack([y0, y1, gap]).ravel()
 
 
-def _closed(rings: tuple[Ring, ...]) -> Floats:
+def _close_rings(rings: tuple[Ring, ...]) -> Floats:
     """All rings as one line, each closed, gaps between."""
     parts = [np.vstack([ring.points, ring.points[:1], [[np.nan, np.nan]]]) for ring in rings]
     return np.vstack(parts)[:-1]
@@ -172,7 +172,7 @@ def _outline(figure: go.Figure, p: Floats, name: str, line: dict[str, Any], fill
     )  # fmt: skip
 
 
-def _styled(figure: go.Figure, title: str) -> go.Figure:
+def _style_figure(figure: go.Figure, title: str) -> go.Figure:
     axis = {"gridcolor": GRID, "zeroline": False, "linecolor": INK, "showline": True, "ticks": "outside"}
     figure.update_xaxes(**axis)
     figure.update_yaxes(**axis)

@@ -128,13 +128,13 @@ def _vtk(result: Result, folder: Path) -> dict[str, Callable[[], Content]]:
     if stock.is_file():
         bodies: list[Any] = []
 
-        def left() -> Any:
+        def stock_mesh() -> Any:
             if not bodies:
                 bodies.append(LayeredStock.load(stock).mesh())
             return bodies[0]
 
-        files["stock.vtu"] = lambda: faces_file(left().vertices, left().faces)
-        files["stock.stl"] = lambda: _stl(left())
+        files["stock.vtu"] = lambda: faces_file(stock_mesh().vertices, stock_mesh().faces)
+        files["stock.stl"] = lambda: _stl(stock_mesh())
     return files
 
 

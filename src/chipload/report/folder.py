@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO
 
 from chipload.errors import InputError, OutputError
-from chipload.files import HashingWriter, cannot_write, exchanged, fresh_folder, read_regular, sweep
+from chipload.files import HashingWriter, cannot_write, exchange_names, fresh_folder, read_regular, sweep
 from chipload.memory import return_free_memory
 from chipload.progress import Progress, silent
 from chipload.report.bodies import SceneBody
@@ -216,7 +216,7 @@ def _swap(fresh: Path, target: Path) -> None:
     """Put ``fresh`` in the place of ``target`` at one moment; what was there is then where ``fresh`` was."""
     if not target.exists():
         fresh.rename(target)
-    elif not exchanged(fresh, target):
+    elif not exchange_names(fresh, target):
         with fresh_folder(target.parent) as old:
             target.rename(old)
             try:

@@ -148,7 +148,7 @@ def _head(tree: Mapping[str, Any], size: int) -> list[bytes]:
     return [head, content, struct.pack("<2I", size, BIN)]
 
 
-def selected(glb: bytes, wanted: frozenset[str]) -> bytes:
+def select_nodes(glb: bytes, wanted: frozenset[str]) -> bytes:
     """A file of glTF with the bodies of some nodes alone: what the others draw is left out of its tree."""
     size = struct.unpack_from("<I", glb, 12)[0]
     tree = json.loads(glb[20 : 20 + size])

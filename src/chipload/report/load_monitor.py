@@ -183,13 +183,13 @@ def _sections(track: Track) -> Iterator[LoadSection]:
             (int(c["line"][rows[cuts]].min()), int(c["line"][rows[cuts]].max())),
             (float(before[first]), float(c["t_s"][last])),
             float(c["power_w"][top] / c["torque_mean_nm"][top]),
-            _cutting(power, c["power_sd_w"][rows] if "power_sd_w" in c else None, error),
+            _cutting_power(power, c["power_sd_w"][rows] if "power_sd_w" in c else None, error),
             float(power[cuts] @ spent / spent.sum()) if spent.sum() > 0.0 else float(power[cuts].mean()),
             None, None if limit is None else limit.limit,
         )  # fmt: skip
 
 
-def _cutting(power: Floats, deviation: Floats | None, error: float) -> Power:
+def _cutting_power(power: Floats, deviation: Floats | None, error: float) -> Power:
     most = float(power.max())
     if deviation is None:
         return Power(most, None, None)

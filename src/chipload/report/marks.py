@@ -35,7 +35,7 @@ def marks_of(
         if k is not None:
             value, limit = number_text(c.worst or 0.0), number_text(c.limit, 6)
             text = f"{c.column.label} {value} {c.column.unit}, limit {limit}"
-            out.append(ViewMark(k, _at(place[k]), text, "limit"))
+            out.append(ViewMark(k, _place_of(place[k]), text, "limit"))
     touched = []
     for f in track.findings:
         k = row(f) if f.code == COLLISION else None
@@ -47,7 +47,7 @@ def marks_of(
 
 def _collision(result: Result, track: Track, f: Finding, k: int, place: NDArray[np.float64]) -> ViewMark:
     """The mark of a collision: which bodies touch, and how deep, is in the numbers of the operation."""
-    at = f.place if f.place is not None else _at(place[k])
+    at = f.place if f.place is not None else _place_of(place[k])
     operation = result.operations[track.operation] if track.operation < len(result.operations) else {}
     text = f"line {f.line}: {f.text}" if f.line else f.text
     for one in operation.get("collisions") or ():
@@ -64,5 +64,5 @@ def _share(c: LimitCheck) -> float:
     return value / c.limit if c.limit > 0.0 else np.inf
 
 
-def _at(p: NDArray[np.float64]) -> tuple[float, float, float]:
+def _place_of(p: NDArray[np.float64]) -> tuple[float, float, float]:
     return float(p[0]), float(p[1]), float(p[2])

@@ -16,7 +16,7 @@ import plotly.graph_objects as go
 from chipload.errors import Finding, Severity
 from chipload.number_text import number_text, percent_text
 from chipload.report.presentation import Presentation
-from chipload.report.sheet import definitions, folded, framed, heading, items, table
+from chipload.report.sheet import definitions, fold_sections, frame_page, heading_lines, items, table
 from chipload.report.view import viewer_script
 from chipload.report.view_section import DATA, VIEW
 from chipload.result import LimitCheck, Result, Track, TrackKind, Verdict
@@ -58,14 +58,14 @@ def page_bytes(result: Result, presentation: Presentation, view: Sequence[str] =
         definitions(asdict(result.provenance)),
     ]
     body = [
-        *heading(result.title, BANNERS[verdict], verdict.value, result.first_lines),
+        *heading_lines(result.title, BANNERS[verdict], verdict.value, result.first_lines),
         *findings_table("Findings", tuple(f for f in findings if f.severity is not Severity.NOTE)),
         "<h2>Not checked</h2>",
         items(result.unchecked) if result.unchecked else "<p>Every limit and check is stated.</p>",
-        *folded(sections, ["In space", *(["Limits"] if unheld else [])]),
+        *fold_sections(sections, ["In space", *(["Limits"] if unheld else [])]),
     ]
     shown = (VIEW, DATA, viewer_script()) if view else None
-    return framed(result.title, verdict.value, body, figures, shown)
+    return frame_page(result.title, verdict.value, body, figures, shown)
 
 
 def limits_table(tracks: Iterable[Track]) -> list[str]:

@@ -50,14 +50,14 @@ def one_page(title: str, blocks: Sequence[Block]) -> bytes | None:
     require_extra("export")
     size = LARGEST
     while size >= SMALLEST:
-        page = _drawn(title, blocks, size)
+        page = _draw_document(title, blocks, size)
         if page.page_no() == 1:
             return bytes(page.output())
         size -= 0.5
     return None
 
 
-def _drawn(title: str, blocks: Sequence[Block], size: float) -> FPDF:
+def _draw_document(title: str, blocks: Sequence[Block], size: float) -> FPDF:
     """The document with letters of a size; it has a second page where the first is full."""
     from fpdf import FPDF
     from fpdf.fonts import FontFace

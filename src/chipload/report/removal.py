@@ -82,7 +82,7 @@ def _removal(
     path = tool_path(result.tracks[k], blank)
     if path is None or blank.mesh is None:
         return None
-    before, cutters = _before(result, blanks, blank)
+    before, cutters = _paths_before(result, blanks, blank)
     solid = {n: c for n, c in (cutters | dict(blank.cutters)).items() if not c.body}
     # a copy: tracks may share their blank, and its index of triangles is not for two threads
     return blank.mesh.copy(), path, solid, before, blank.wider
@@ -98,7 +98,9 @@ def _stock(
         return str(err)
 
 
-def _before(result: Result, blanks: Mapping[str, Blank], blank: Blank) -> tuple[list[ToolPoses], dict[int, Cutter]]:
+def _paths_before(
+    result: Result, blanks: Mapping[str, Blank], blank: Blank
+) -> tuple[list[ToolPoses], dict[int, Cutter]]:
     """The paths that have cut a stock before, with their cutters."""
     paths: list[ToolPoses] = []
     cutters: dict[int, Cutter] = {}
@@ -183,7 +185,7 @@ def read_cutter_parts(path: Path, track: int) -> dict[int, list[tuple[str, Float
     for name, profile in read_arrays(path, wanted=re.compile(rf"{track}-cutter-\d+-\d+-[a-z]+").fullmatch).items():
         _, _, tool, n, kind = name.split("-")
         if profile.ndim != 2 or profile.shape[1] != 2 or profile.dtype.kind != "f" or not np.isfinite(profile).all():
-            raise _damaged(path)
+            raise _damaged_error(path)
         out.setdefault(int(tool), []).append((int(n), kind, profile))
     return {number: [(kind, p) for _, kind, p in sorted(parts, key=lambda x: x[0])] for number, parts in out.items()}
 
@@ -213,7 +215,7 @@ def read_removal(path: Path, track: int) -> RemovalMesh | None:
     if "corners" not in arrays:
         return None
     if arrays.keys() != set(ARRAYS):
-        raise _damaged(path)
+        raise _damaged_error(path)
     corners, seen, rows, volumes = (arrays[name] for name in ("corners", "seen", "rows", "volumes"))
     boxes = [arrays[name] for name in ("low", "high", "cell")]
     fits = (
@@ -224,9 +226,9 @@ def read_removal(path: Path, track: int) -> RemovalMesh | None:
         and all(np.isfinite(values).all() for values in (*boxes, volumes))
     )  # fmt: skip
     if not fits:
-        raise _damaged(path)
+        raise _damaged_error(path)
     return RemovalMesh(**arrays)
 
 
-def _damaged(path: Path) -> InputError:
+def _damaged_error(path: Path) -> InputError:
     return InputError(f"{path.name}: damaged: its parts do not match: run the job again")

@@ -51,10 +51,10 @@ def slab(contours: Sequence[Contour], low: float, high: float) -> tuple[Floats, 
     top, _ = cap(contours, high)
     parts = [(bottom, faces[:, ::-1]), (top, faces)]
     parts += [ribbon(c, low, high) for c in Region.of(contours).contours]
-    return merged(parts)
+    return merge_meshes(parts)
 
 
-def merged(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
+def merge_meshes(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
     """One mesh from several."""
     if not parts:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)

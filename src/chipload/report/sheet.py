@@ -91,7 +91,7 @@ def style() -> str:
     return _STYLE
 
 
-def framed(
+def frame_page(
     title: str,
     word: str,
     body: Sequence[str],
@@ -137,7 +137,7 @@ def _shown_view(view: tuple[str, str, str] | None) -> str:
     return _library("viewer", script) + f'<script>library("viewer").then(() => {call});</script>\n'
 
 
-def heading(title: str, banner: str, word: str, lines: Sequence[str]) -> list[str]:
+def heading_lines(title: str, banner: str, word: str, lines: Sequence[str]) -> list[str]:
     """The first lines of a page: what it is about, and the verdict; ``banner`` is `good`, `open` or `bad`."""
     message, *more = lines
     texts = [f"<span>{escape(message)}</span>", *(f'<span class="more">{escape(line)}</span>' for line in more)]
@@ -153,10 +153,10 @@ def figure(name: str, drawn: go.Figure, figures: dict[str, go.Figure]) -> str:
     return f'<div class="figure" id="{name}" style="height:{drawn.layout.height}px"></div>'
 
 
-def folded(body: Sequence[str], opened: Collection[str] = ()) -> list[str]:
+def fold_sections(body: Sequence[str], opened: Collection[str] = ()) -> list[str]:
     """Each section of a body, from its <h2> to the next, folded under its heading; those in ``opened`` are open.
 
-    >>> folded(["<h2>Limits</h2>", "<p>none</p>"])
+    >>> fold_sections(["<h2>Limits</h2>", "<p>none</p>"])
     ['<details><summary><h2>Limits</h2></summary><p>none</p></details>']
     """
     before, *sections = re.split(r"<h2>(.*?)</h2>", "\n".join(body), flags=re.S)

@@ -75,10 +75,10 @@ def shown_maps(result: Result, track: Track, bounds: Mapping[str, float]) -> tup
     """The maps of a track and of its whole result that have faces; ``bounds`` are its limits by column."""
     own = [one for one in result.maps if one.track in ("", track.name)]
     usable = [one for one in own if len(one.faces) and len(one.points) <= POINTS and np.isfinite(one.values).any()]
-    return tuple(_shown(one, bounds) for one in usable[:MAPS])
+    return tuple(_show_map(one, bounds) for one in usable[:MAPS])
 
 
-def _shown(one: SurfaceMap, bounds: Mapping[str, float]) -> ShownMap:
+def _show_map(one: SurfaceMap, bounds: Mapping[str, float]) -> ShownMap:
     column, values = COLUMNS[one.column], np.asarray(one.values, dtype=np.float64)
     limit = bounds.get(one.column)
     finite = values[np.isfinite(values)]

@@ -157,10 +157,10 @@ def scene_document(scene: ViewScene, kept: int = KEPT, shared: bool = False, cel
             {"row": m.row, "at": m.at, "text": m.text, "kind": m.kind, "bodies": m.bodies, "depth": m.depth_mm}
             for m in scene.marks
         ],
-        "colouring": None if scene.colouring is None else _colouring(scene.colouring, path, out),
-        "columns": [_colouring(c, path, out) for c in scene.columns],
+        "colouring": None if scene.colouring is None else _colour_values(scene.colouring, path, out),
+        "columns": [_colour_values(c, path, out) for c in scene.columns],
         "maps": [] if shared else [_map(one, out) for one in scene.maps],
-        "stability": None if scene.operating is None else _operating(scene.operating, len(path.t), kept, out),
+        "stability": None if scene.operating is None else _chart_values(scene.operating, len(path.t), kept, out),
         "engagement": None if scene.samples is None else _engagement(scene.samples, scene.bounds, out),
     }
     return _document(header, out)
@@ -169,7 +169,7 @@ def scene_document(scene: ViewScene, kept: int = KEPT, shared: bool = False, cel
 def colouring_document(colouring: Colouring, path: ViewPath) -> bytes:
     """The document of other colours of the same path."""
     out = Buffers()
-    return _document({"colouring": _colouring(colouring, path, out)}, out)
+    return _document({"colouring": _colour_values(colouring, path, out)}, out)
 
 
 def parts_of(cutter: Cutter) -> list[tuple[str, Floats]]:
@@ -284,7 +284,7 @@ def _path(path: ViewPath, out: Buffers, kept: int) -> dict[str, Any]:
     }
 
 
-def _colouring(c: Colouring, path: ViewPath, out: Buffers) -> dict[str, Any]:
+def _colour_values(c: Colouring, path: ViewPath, out: Buffers) -> dict[str, Any]:
     return {
         "label": c.label,
         "unit": c.unit,
@@ -325,7 +325,7 @@ def _kept_rows(n: int, kept: int) -> Ints:
     return np.arange(n) if n <= kept else np.unique(np.linspace(0, n - 1, kept).astype(np.int64))
 
 
-def _operating(points: OperatingPoints, n: int, kept: int, out: Buffers) -> dict[str, Any]:
+def _chart_values(points: OperatingPoints, n: int, kept: int, out: Buffers) -> dict[str, Any]:
     rows = _kept_rows(n, kept)
     charts = {str(tool): {"rpm": rpm, "margin": margin} for tool, (rpm, margin) in points.charts.items()}
     return {

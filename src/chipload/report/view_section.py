@@ -50,7 +50,7 @@ def view_section(
     samples: Mapping[str, EngagementSamples] = MappingProxyType({}),
 ) -> list[str]:
     """HTML of the view of the tracks in use that have a place, else of the first one; empty: there is none."""
-    shown = _shown(result)
+    shown = _shown_tracks(result)
     if not shown:
         return []
     documents: dict[str, str] = {}
@@ -121,7 +121,7 @@ def _scene(
     )  # fmt: skip
 
 
-def _shown(result: Result) -> list[tuple[int, Track, dict[str, NDArray[Any]]]]:
+def _shown_tracks(result: Result) -> list[tuple[int, Track, dict[str, NDArray[Any]]]]:
     """Number, track and columns of the tracks in use that have a place; where none has, of the first that has."""
     out: list[tuple[int, Track, dict[str, NDArray[Any]]]] = []
     for k, track in sorted(enumerate(result.tracks), key=lambda item: not item[1].in_use):

@@ -32,7 +32,7 @@ def headline(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Tra
     findings : of the whole result
     tracks : those in use
     """
-    checks = [(_of(track, tracks), check) for track in tracks for check in track.limits]
+    checks = [(_track_prefix(track, tracks), check) for track in tracks for check in track.limits]
     critical = min(
         ((of, check) for of, check in checks if check.margin is not None),
         key=lambda one: (one[1].margin or 0.0, one[1].name),
@@ -58,7 +58,7 @@ def coverage_line(tracks: Sequence[Track]) -> str:
             covered, column = check.coverage, check.column
             worst = covered.excluded_worst
             if worst is not None and (worst < check.limit if column.least else worst > check.limit):
-                key = (_of(track, tracks), replace(covered, excluded_worst=None))
+                key = (_track_prefix(track, tracks), replace(covered, excluded_worst=None))
                 left.setdefault(key, []).append(covered.excluded_text(column.label, column.unit, check.limit))
     parts = [f"{of}{covered.outside}: {', '.join(texts)}" for (of, covered), texts in left.items()]
     return f"Not covered: {'; '.join(parts)}." if parts else ""
@@ -68,7 +68,7 @@ def confidence_line(tracks: Sequence[Track]) -> str:
     """Return the value at the confidence, with the parts of its error, of the limit that it uses most; empty: no limit
     has an error budget.
     """
-    checks = [(_of(track, tracks), c) for track in tracks for c in track.limits if c.limit > 0.0]
+    checks = [(_track_prefix(track, tracks), c) for track in tracks for c in track.limits if c.limit > 0.0]
     known = [(of, c, c.value_at_confidence / c.limit) for of, c in checks if c.value_at_confidence is not None]
     if not known:
         return ""
@@ -103,12 +103,12 @@ def _texts(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Track
         if Verdict.of_finding(f) is verdict:
             guesses += f.code == GUESS
             if f.code != GUESS:
-                yield located(f)
+                yield located_text(f)
     for track in tracks:
-        of = _of(track, tracks)
+        of = _track_prefix(track, tracks)
         for f in track.findings:
             if Verdict.of_finding(f) is verdict:
-                yield of + located(f)
+                yield of + located_text(f)
         own = [c for c in track.limits if c.state is verdict and not (guesses and c.reason.startswith(HELD_BY_GUESS))]
         for check in sorted(own, key=lambda c: 0.0 if c.margin is None else c.margin):
             beyond = verdict is Verdict.EXCEEDS and check.margin_text
@@ -127,16 +127,16 @@ def _critical_text(of: str, check: LimitCheck) -> str:
     return of + ", ".join(filter(None, parts))
 
 
-def located(finding: Finding) -> str:
+def located_text(finding: Finding) -> str:
     """Return the text of a finding with its line.
 
-    >>> located(Finding("x", 18, "would be a rapid through the guessed stock")), located(Finding("x", 2, "no feed"))
-    ('line 18 would be a rapid through the guessed stock', 'line 2: no feed')
+    >>> located_text(Finding("x", 18, "would be a rapid")), located_text(Finding("x", 2, "no feed"))
+    ('line 18 would be a rapid', 'line 2: no feed')
     """
     if not finding.line:
         return finding.text
     return f"line {finding.line}{' ' if finding.text.startswith('would ') else ': '}{finding.text}"
 
 
-def _of(track: Track, tracks: Sequence[Track]) -> str:
+def _track_prefix(track: Track, tracks: Sequence[Track]) -> str:
     return f"{track.name}: " if len(tracks) > 1 else ""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.machine.machine import Machine
-from chipload.program.motions import is_arc, lengths, radii, straightened
+from chipload.program.motions import is_arc, lengths, radii, straighten_arcs
 from chipload.program.program import DWELL, Program
 from chipload.program.read import times_on
 from chipload.result.limits import Columns
@@ -24,7 +24,7 @@ def chords_of(program: Program) -> Program:
     """Return the program with chords in place of arcs, for pictures."""
     r = radii(program)
     turn = 2.0 * np.arccos(1.0 - np.minimum(CHORD_MM / np.where(r > 0.0, r, np.inf), 1.0))
-    return straightened(program, np.where(is_arc(program) & (r > 0.0), np.maximum(turn, 0.02), np.inf))
+    return straighten_arcs(program, np.where(is_arc(program) & (r > 0.0), np.maximum(turn, 0.02), np.inf))
 
 
 def motion_columns(program: Program, seconds: NDArray[np.float64]) -> Columns:

@@ -14,7 +14,7 @@ from plotly.subplots import make_subplots
 from chipload.errors import InputError
 from chipload.result.columns import COLUMNS, column_of
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS
-from chipload.result.thinning import thinned
+from chipload.result.thinning import thin_rows
 from chipload.tables import nearest
 
 #: the columns that are drawn where none is named
@@ -65,7 +65,7 @@ def columns_figure(
     out = make_subplots(rows=len(names), cols=1, shared_xaxes=True, vertical_spacing=0.24 / (2 + 2 * len(names)))
     for row, name in enumerate(names, start=1):
         y = np.asarray(columns[name], dtype=np.float64)
-        keep = thinned(y, LINE_POINTS)
+        keep = thin_rows(y, LINE_POINTS)
         text = f"{name}: %{{y:.4g}}, line %{{customdata}}<extra></extra>"
         given = {"x": across[keep], "y": y[keep], "customdata": lines[keep], "hovertemplate": text}
         counts = own_rows.get(name, np.ones(len(y), dtype=np.bool_))

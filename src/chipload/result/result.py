@@ -179,7 +179,7 @@ class Result:
         """
         from chipload.result.plot import USUAL, columns_figure
 
-        chosen, history = self._chosen(track), self._history(track)
+        chosen, history = self._choose_track(track), self._history(track)
         bound = [check.column.name for check in chosen.limits]
         names = columns or tuple(dict.fromkeys(c for c in (*bound, *USUAL) if c in history))[:MOST_ROWS]
         n = len(next(iter(history.values())))
@@ -216,14 +216,14 @@ class Result:
         """
         return {track.name: track for track in self.tracks}[name]
 
-    def _chosen(self, name: str) -> Track:
+    def _choose_track(self, name: str) -> Track:
         names = [one.name for one in self.tracks]
         if not names or (name and name not in names):
             raise InputError(f"track {name!r}: is not in the result, which has {', '.join(names) or 'none'}")
         return self.track(name or names[0])
 
     def _history(self, name: str) -> Columns:
-        chosen = self._chosen(name)
+        chosen = self._choose_track(name)
         columns = chosen.columns
         if not columns:
             with_history = [one.name for one in self.tracks if any(True for _ in one.blocks())]

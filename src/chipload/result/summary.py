@@ -201,7 +201,7 @@ def summary_of(result: Result, rows: Mapping[str, int], history_sha256: str = ""
         note=result.note,
         limits=tuple(map(_limit, result.limits)),
         tracks=tuple(_track(track, rows.get(track.name, 0)) for track in result.tracks),
-        findings=tuple(map(_finding, result.findings)),
+        findings=tuple(map(_finding_model, result.findings)),
         unchecked=result.unchecked,
         maps=tuple(map(_map, result.maps)),
         operations=tuple(plain(x) for x in result.operations),
@@ -280,7 +280,7 @@ def _budget(check: LimitCheck) -> BudgetModel | None:
     return BudgetModel(confidence=own.confidence, shown_at=own.shown_at, value=value, parts=parts)
 
 
-def _finding(f: Finding) -> FindingModel:
+def _finding_model(f: Finding) -> FindingModel:
     severity: Any = f.severity.name.lower()
     return FindingModel(code=f.code, text=f.text, severity=severity, line=f.line, place=f.place, row=f.row)
 
@@ -300,7 +300,7 @@ def _track(track: Track, rows: int) -> TrackModel:
         rows=rows,
         energy_balance={int(tool): float(value) for tool, value in track.energy_balance.items()},
         limits=tuple(map(_limit, track.limits)),
-        findings=tuple(map(_finding, track.findings)),
+        findings=tuple(map(_finding_model, track.findings)),
     )
 
 

@@ -11,12 +11,12 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def thinned(values: Floats, most: int) -> Ints:
+def thin_rows(values: Floats, most: int) -> Ints:
     """Return the (m,) rows of a column to draw, at most about ``most``: extremes of each bucket, first and last row.
 
     Rows with NaN separate pieces of the curve and are kept.
 
-    >>> thinned(np.array([0.0, 1.0, 9.0, 1.0, 0.0, -5.0, 0.0, 2.0]), 4).tolist()
+    >>> thin_rows(np.array([0.0, 1.0, 9.0, 1.0, 0.0, -5.0, 0.0, 2.0]), 4).tolist()
     [0, 2, 5, 7]
     """
     n = len(values)

@@ -83,9 +83,9 @@ class Track:
         if high is not None and not (math.isfinite(high) and high >= (self.time_s or 0.0) * (1.0 - 1e-9)):
             raise ValueError(f"track {self.name}: time_high_s = {high}: must be a finite number from time_s")
         if all(finding.code != UNBALANCED for finding in self.findings):
-            object.__setattr__(self, "findings", (*self.findings, *self._unbalanced()))
+            object.__setattr__(self, "findings", (*self.findings, *self._balance_findings()))
 
-    def _unbalanced(self) -> Iterator[Finding]:
+    def _balance_findings(self) -> Iterator[Finding]:
         loads = (c.error for c in self.limits if c.column.unit in LOAD_UNITS)
         error = max((e for e in loads if math.isfinite(e)), default=0.0)
         for tool, balance in self.energy_balance.items():

@@ -74,7 +74,7 @@ from chipload.engagement.tooth_surfaces import SHARE as PARTS_OF_EDGE
 from chipload.engagement.tooth_surfaces import chip_error
 from chipload.simulation.checkpoint import in_rows
 from chipload.simulation.loads import LOADS, Cuts
-from chipload.simulation.moves import MoveRun, moved
+from chipload.simulation.moves import MoveRun, remove_by_moves
 from chipload.simulation.steps import Steps
 from chipload.simulation.swept_area import boxes, swept_ahead
 from chipload.stock.layers import LayeredStock
@@ -264,10 +264,11 @@ def resolution_error(
             _keep_worst(parts, int(windows[step].own.tool[0]), again(windows[step])[2])
     # the flank of a flat mill is cut into slices where its contact changes: exact
     straight = all(
-        c.corner_radius == c.taper == c.bottom == 0.0 and c.barrel_radius is None for c in _used(windows, setting)
+        c.corner_radius == c.taper == c.bottom == 0.0 and c.barrel_radius is None
+        for c in _used_cutters(windows, setting)
     )
-    barrels = any(c.barrel_radius is not None for c in _used(windows, setting))
-    if "chip_max_mm" in chip and not all(c.teeth_alike for c in _used(windows, setting)):
+    barrels = any(c.barrel_radius is not None for c in _used_cutters(windows, setting))
+    if "chip_max_mm" in chip and not all(c.teeth_alike for c in _used_cutters(windows, setting)):
         chip["chip_max_mm"] += 2.0 * PARTS_OF_EDGE
     films, least = _films(columns), FLOOR if all(w.upright for w in windows.values()) else LEANING_FLOOR
     for name in names:
@@ -301,7 +302,7 @@ def _of_worst(parts: PartsOfTools, columns: Columns) -> PartsOfTools:
     return out
 
 
-def _used(windows: Mapping[int, Window], setting: RunSettings) -> list[Cutter]:
+def _used_cutters(windows: Mapping[int, Window], setting: RunSettings) -> list[Cutter]:
     """Return the cutters of the steps that are computed once more; of a run by moves those that made a move."""
     some = {int(w.own.tool[0]) for w in windows.values()}
     if setting.moves is not None:
@@ -420,7 +421,7 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
         finer = replace(run, stock=stock, corner_slices=MORE * run.corner_slices, flank_mm=flank)
         for some in window.earlier:
             finer.make(some, len(some))
-        found = moved(own, finer, 0, setting.cutters, setting.material, rotation)
+        found = remove_by_moves(own, finer, 0, setting.cutters, setting.material, rotation)
         loads = dict(zip(LOADS, found.loads.T, strict=True))
         worst = {name: float(loads[name].max()) for name in COMPARABLE} | {AXIAL: float(axial_force(loads).max())}
         worst[CHIP] = max((float(chip_error(c.plain, c.cutter).max(initial=0.0)) for c in found.cuts), default=0.0)

@@ -67,12 +67,12 @@ class Stored(Mapping[str, NDArray[Any]]):
         schemas = [pq.read_schema(file).names for file, _ in self.files]
         self.held = [frozenset(names) for names in schemas]
         self.names = tuple(dict.fromkeys(name for names in schemas for name in names))
-        self._kept = dict[str, NDArray[Any]]()
+        self._kept_files = dict[str, NDArray[Any]]()
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self.names:
             raise KeyError(name)
-        found = self._kept.pop(name, None)
+        found = self._kept_files.pop(name, None)
         if found is None:
             found = np.concatenate(
                 [
@@ -81,9 +81,9 @@ class Stored(Mapping[str, NDArray[Any]]):
                 ]
             )
             found.flags.writeable = False
-        while len(self._kept) >= KEPT:
-            del self._kept[next(iter(self._kept))]
-        self._kept[name] = found
+        while len(self._kept_files) >= KEPT:
+            del self._kept_files[next(iter(self._kept_files))]
+        self._kept_files[name] = found
         return found
 
     def __iter__(self) -> Iterator[str]:
@@ -182,7 +182,7 @@ class Checkpoint:
             state = None
             if not self.fresh and (self.folder / LAST).exists():
                 try:
-                    state = self._kept()
+                    state = self._kept_files()
                 except _Damaged as err:
                     self.set_aside(str(err))
                     return None
@@ -197,7 +197,7 @@ class Checkpoint:
             self._clear()
         return None
 
-    def _kept(self) -> dict[str, Path] | None:
+    def _kept_files(self) -> dict[str, Path] | None:
         """Files of the state; None: of another run."""
         last = json.loads((self.folder / LAST).read_bytes())
         if last["kind"] != KIND or last["key"] != self.key:

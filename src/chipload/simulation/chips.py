@@ -45,11 +45,11 @@ from chipload.simulation.loads import (
     Cuts,
     bands_of_steps,
     engagement_of_steps,
-    joined,
+    join_cuts,
     loads_of_steps,
     over_turn,
 )
-from chipload.simulation.moves import Engine, HandOver, MoveRun, moved, run_by_moves, with_contact
+from chipload.simulation.moves import Engine, HandOver, MoveRun, remove_by_moves, run_by_moves, with_contact
 from chipload.simulation.removal import (
     ChipAreas,
     Columns,
@@ -140,7 +140,7 @@ def remove(
     -----
     O(n l m): n steps, l layers under the cutter, m edges of the stock around it; m does not grow with n.
     """
-    count = counted(program, cutters, resolution)
+    count = count_steps(program, cutters, resolution)
     progress(0.0, "removing")
     setting = setting_of(cutters, material, resolution, interpolation, watch, workers, processes)
     setting, handed = with_engine(engine, setting, program, stock)
@@ -158,10 +158,12 @@ def remove(
         except HandOver as why:
             setting, handed = by_layers(engine, setting, why, program, stock)
     progress(1.0, "removed")
-    cut = tuple(joined(kept[number]) for number in sorted(kept))
+    cut = tuple(join_cuts(kept[number]) for number in sorted(kept))
     if setting.moves is not None:
         setting.moves.finish(stock, setting.workers)
-    return with_accuracy(removal_of(program, stock, material, sums, stacked(columns), cut), program, before, setting)
+    return with_accuracy(
+        removal_of(program, stock, material, sums, stack_blocks(columns), cut), program, before, setting
+    )
 
 
 def _blocks_removed(
@@ -317,7 +319,7 @@ def require_steps(program: Program, step_mm: float) -> float:
     return least
 
 
-def counted(program: Program, cutters: Mapping[int, Cutter], resolution: Resolution) -> int:
+def count_steps(program: Program, cutters: Mapping[int, Cutter], resolution: Resolution) -> int:
     """Return the number of steps of a program; refuse it if a tool has no cutter.
 
     Raises
@@ -374,24 +376,26 @@ def remove_block(
             each = mean_basis(bitten, cutter, material, bitten.frame)
             basis = basis + np.tensordot(steps.seconds[at], each, 1)
     columns = {**_columns(steps, removed, loads, sums), **watched}
-    return _after(sums, steps, removed, columns, basis, piece), columns, cut
+    return _add_steps(sums, steps, removed, columns, basis, piece), columns, cut
 
 
 def _moved_block(
     steps: Steps, run: MoveRun, sums: RunningSums, setting: RunSettings, contact: Engaged | None
 ) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
     """:func:`remove_block` by moves."""
-    found = moved(steps, run, sums.steps, setting.cutters, setting.material, setting.resolution.rotation, contact)
+    found = remove_by_moves(
+        steps, run, sums.steps, setting.cutters, setting.material, setting.resolution.rotation, contact
+    )
     watched: dict[str, Floats] = dict(found.bands)
     if setting.watch is not None:
         for cut in found.cuts:
             for name, values in setting.watch(cut).items():
                 watched.setdefault(name, np.zeros(len(steps)))[cut.step - sums.steps] = values
     columns = {**_columns(steps, found.removed, found.loads, sums), **watched}
-    return _after(sums, steps, found.removed, columns, sums.basis + found.basis, sums.piece), columns, found.cuts
+    return _add_steps(sums, steps, found.removed, columns, sums.basis + found.basis, sums.piece), columns, found.cuts
 
 
-def _after(
+def _add_steps(
     sums: RunningSums,
     steps: Steps,
     removed: Floats,
@@ -436,7 +440,7 @@ def removal_of(
     return Removal(columns, sums.before, stock.volume(), band, sums.piece, found, program.labels, cuts)
 
 
-def stacked(blocks: Sequence[Columns]) -> dict[str, NDArray[Any]]:
+def stack_blocks(blocks: Sequence[Columns]) -> dict[str, NDArray[Any]]:
     """Return the columns of blocks one below the other; a column that a block lacks is 0 there."""
     count = [len(b["line"]) for b in blocks]
     return {

@@ -30,11 +30,11 @@ from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.chips import (
     block_of,
     by_layers,
-    counted,
+    count_steps,
     removal_of,
     remove_block,
     setting_of,
-    stacked,
+    stack_blocks,
     with_accuracy,
     with_engine,
 )
@@ -108,7 +108,7 @@ def remove_in_chunks(
     InputError
         As :func:`chipload.simulation.chips.remove`, and where the folder cannot be used.
     """
-    count = counted(program, cutters, resolution)
+    count = count_steps(program, cutters, resolution)
     setting = setting_of(cutters, material, resolution, interpolation, watch, workers, processes)
     shape = (stock.bounds, stock.xs, stock.ys, stock.cut, stock.room, stock.tidied, stock.tiles)
     part = None if stock.part is None else (np.asarray(stock.part.vertices), np.asarray(stock.part.faces))
@@ -138,23 +138,23 @@ def remove_in_chunks(
             setting.moves.skip(program, resolution.step_mm, sums.steps)
         unfinished.notice(f"continues after step {sums.steps} of {count}, kept in {unfinished.folder}")
     try:
-        sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, keeps, progress)
+        sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, progress)
     except HandOver as found:
         setting, handed = by_layers(engine, setting, found, program, stock)
         unfinished.again(f"starts from the beginning with the engine layers: line {found.line}: {found.why}")
         sums = RunningSums(stock.volume(), handed=handed)
         for state_of in keeps.values():
             state_of.clear()
-        sums, columns = _removed(program, stock, sums, setting, unfinished, count, times, keeps, progress)
+        sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, progress)
     if setting.moves is not None:
         setting.moves.finish(stock, setting.workers)
         return_free_memory()
     progress(1.0, "removed")
-    every: Columns = unfinished.columns() if unfinished.parts else stacked(columns)
+    every: Columns = unfinished.columns() if unfinished.parts else stack_blocks(columns)
     return with_accuracy(removal_of(program, stock, material, sums, every), program, before, setting)
 
 
-def _removed(
+def _remove_steps(
     program: Program,
     stock: LayeredStock,
     sums: RunningSums,
@@ -190,7 +190,7 @@ def _removed(
             due = unfinished.every_s == 0.0 or now - since >= max(unfinished.every_s, cost / SHARE)
             due = due and (strips is None or strips.complete)
             if due or waiting >= MOST:
-                unfinished.add(stacked(columns))
+                unfinished.add(stack_blocks(columns))
                 columns, waiting = [], 0
                 return_free_memory()
             if due:
@@ -199,7 +199,7 @@ def _removed(
                 cost = since - now
     if unfinished.parts:
         if columns:
-            unfinished.add(stacked(columns))
+            unfinished.add(stack_blocks(columns))
         if unfinished.safe < count:
             unfinished.commit(state())
     return sums, columns

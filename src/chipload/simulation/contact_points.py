@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def touched(
+def touch_points(
     removal: Removal,
     first_line: int,
     contact: NDArray[np.bool_],

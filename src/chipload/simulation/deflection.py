@@ -146,7 +146,7 @@ def contacts(removal: Removal) -> Contacts:
         The removal was made without ``keep``.
     """
     parts = [(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))]
-    for cuts in _kept(removal):
+    for cuts in _kept_cuts(removal):
         engagement = cuts.plain
         owner = np.repeat(np.arange(len(engagement)), np.diff(engagement.start))
         p, q, a, b, along, offset, across = engagement.rows.T
@@ -207,7 +207,7 @@ def step_deflections(
     stiff = _work(work, place.normal, "step_deflections")
     names = ("work_mm", "cutter_mm", "deflection_mm", "force_normal_n")
     out = {name: np.zeros(len(removal.columns["line"])) for name in names}
-    for cuts in _kept(removal):
+    for cuts in _kept_cuts(removal):
         at = np.searchsorted(place.step, cuts.step)
         if not (len(place.step) and (place.step[np.minimum(at, len(place.step) - 1)] == cuts.step).all()):
             raise InputError("step_deflections: the contacts are not those of this removal")
@@ -244,7 +244,7 @@ class _Parting:
 
     def __call__(self, k: Ints, theta: Floats) -> Floats:
         """Motion of the work and of the cutter, their sum [mm], and the force [N], (m, 4), of steps k at rotations."""
-        moments = _bent(self.cuts, k, theta, self.z[k], self.material, self.bars)
+        moments = _bend_cutter(self.cuts, k, theta, self.z[k], self.material, self.bars)
         force, n = moments[:, :3], self.normal[k]
         bent = np.einsum("mi,mi->m", force, self.gives[k])
         pushed = np.einsum("mi,mi->m", moments[:, 3:], n[:, :2])
@@ -296,7 +296,7 @@ def tip_deflections(
         force, bent = loads[..., [4, 5, 0]], loads[..., 6:]
     else:
         theta = np.arange(m) * (pitch / m)
-        moments = _bent(
+        moments = _bend_cutter(
             cuts, np.repeat(np.arange(n), m), np.tile(theta, n), np.zeros(n * m), material, {cuts.tool: bars}
         ).reshape(n, m, 5)
         force, bent = moments[..., :3], moments[..., 3:]
@@ -359,7 +359,7 @@ def form_error(
     if not 0.0 < near < math.inf:
         raise InputError(f"form_error: near_mm = {near:g}: must be above 0")
     stiff = _work(work, n, "form_error")
-    all_cuts = _kept(removal) if isinstance(removal, Removal) else removal
+    all_cuts = _kept_cuts(removal) if isinstance(removal, Removal) else removal
     least = np.full(len(q), np.inf)
     for cuts in all_cuts:
         _form_error.least_distances(q, n, cuts.ends, _shape(cuts.cutter), near, facing, least)
@@ -418,7 +418,7 @@ def _made_by(
         if lag > 0.0:
             there = phi
         theta = there + lag * z + cuts.cutter.tooth_angles[j]
-        loads = _bent(cuts, k, theta, z, model.material, model.bars)
+        loads = _bend_cutter(cuts, k, theta, z, model.material, model.bars)
         force = np.einsum("mi,mij->mj", loads[:, :3], frame)
         bent = np.einsum("mi,mij->mj", loads[:, 3:], frame[:, :2])
         away = np.einsum("mi,mi->m", force, n[point])
@@ -439,7 +439,7 @@ def _made_by(
     return widest
 
 
-def _kept(removal: Removal) -> tuple[Cuts, ...]:
+def _kept_cuts(removal: Removal) -> tuple[Cuts, ...]:
     if not removal.cuts:
         if not removal.columns["chip_volume_mm3"].any():
             raise InputError("deflection: the program cuts nothing")
@@ -472,7 +472,7 @@ def _shape(cutter: Cutter) -> Floats:
     return np.array([r, e, f, alpha, beta, h, e + r * math.sin(alpha), *bow])
 
 
-def _bent(
+def _bend_cutter(
     cuts: Cuts, k: Ints, theta: Floats, z: Floats, material: Material, bars: Mapping[int, tuple[Bar, ...]] | None
 ) -> Floats:
     """(m, 5) force along T, n, A [N] and displacement of the cutter at the height z along T, n [mm]."""

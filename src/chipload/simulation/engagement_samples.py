@@ -202,7 +202,7 @@ class EngagementRecorder:
 
     def samples(self) -> EngagementSamples | None:
         """Return the samples; None if no step cuts."""
-        return _joined([p.every(self.stride // p.stride) for p in self.parts]) if self.parts else None
+        return _join_samples([p.every(self.stride // p.stride) for p in self.parts]) if self.parts else None
 
     def to_bytes(self) -> bytes:
         """Return the samples so far for the state of a run, bit for bit."""
@@ -240,7 +240,7 @@ def _engagement_at(engagement: ToothEngagement, k: Ints) -> ToothEngagement:
     )  # fmt: skip
 
 
-def _joined(parts: Sequence[EngagementSamples]) -> EngagementSamples:
+def _join_samples(parts: Sequence[EngagementSamples]) -> EngagementSamples:
     """Samples of blocks and cutters in the order of their rows."""
     start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(p.start) for p in parts]))])
     names = ("row", "tool", "flutes", "periods")

@@ -93,11 +93,11 @@ def _clear(
     # the circle reaches R sqrt(1 - a_x^2) along x; between its ends the axis leaves its chord by its sagitta at most
     lean = np.sqrt(1.0 - np.minimum(np.abs(a0[:, :2]), np.abs(a1[:, :2])) ** 2)
     reach = R * lean + tolerance + (far + R) * np.linalg.norm(a1 - a0, axis=1)[:, None] ** 2
-    hit = met(tiles, stock, row[ask], ends.min(axis=0) - reach, ends.max(axis=0) + reach)
+    hit = boxes_meet_stock(tiles, stock, row[ask], ends.min(axis=0) - reach, ends.max(axis=0) + reach)
     return set(some.tolist()) - set(k[ask[hit]].tolist())
 
 
-def met(tiles: Tiles, stock: LayeredStock, layer: Ints, low: Floats, high: Floats) -> NDArray[np.bool_]:
+def boxes_meet_stock(tiles: Tiles, stock: LayeredStock, layer: Ints, low: Floats, high: Floats) -> NDArray[np.bool_]:
     """Return whether boxes (n, 2), (n, 2), each in its layer, meet the remaining stock there.
 
     Parameters

@@ -91,7 +91,7 @@ def refine_gouges(
         target = max(goal, float(long[coarse].max()) / SHORTER)
         count = len(points)
         kept = faces[~coarse]
-        points, some = _divided(points, faces[coarse], target, began + MOST)
+        points, some = _divide_triangles(points, faces[coarse], target, began + MOST)
         faces = np.vstack([kept, some])
         lower = LeastDistance(bodies, points[count:], max(target, tolerance), tolerance)
         own = [lower.take(block) for block in blocks_of(steps)]
@@ -109,7 +109,7 @@ def _sides(points: Floats, faces: Ints) -> Floats:
     return np.asarray(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2))
 
 
-def _divided(points: Floats, faces: Ints, target: float, most: int) -> tuple[Floats, Ints]:
+def _divide_triangles(points: Floats, faces: Ints, target: float, most: int) -> tuple[Floats, Ints]:
     """Points and triangles after halving of the longest side of each triangle until it is at most ``target`` [mm]."""
     done = list[Ints]()
     while len(faces) and len(points) < most:

@@ -33,12 +33,14 @@ def reversed_cuts(steps: StepBlocks, columns: Columns, cutters: Mapping[int, Cut
         wrong = (own * block.spindle < 0.0) & (force[at : at + len(block)] > 0.0)
         for number, k in zip(*np.unique(block.tool[wrong], return_index=True), strict=True):
             row = int(np.flatnonzero(wrong)[k])
-            out.setdefault(int(number), _finding(cutters[int(number)], int(number), int(block.line[row]), at + row))
+            out.setdefault(
+                int(number), _hand_finding(cutters[int(number)], int(number), int(block.line[row]), at + row)
+            )
         at += len(block)
     return tuple(out.values())
 
 
-def _finding(cutter: Cutter, number: int, line: int, row: int) -> Finding:
+def _hand_finding(cutter: Cutter, number: int, line: int, row: int) -> Finding:
     turns, hand, start, key = (
         ("clockwise (M3)", "left", "M4", "leave left_hand out of the [[cutter]]")
         if cutter.left_hand

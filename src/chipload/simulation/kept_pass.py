@@ -64,7 +64,7 @@ class KeptPasses:
             yield from blocks_of(steps)
             return
         key = np.frombuffer(digest(self.key, name, depends).encode(), dtype=np.uint8)
-        done = self._restored(kept, name, key, state(), restore)
+        done = self._restore_steps(kept, name, key, state(), restore)
         saved, seen = done, 0
         begun = since = time.monotonic()
         cost = 0.0
@@ -87,7 +87,7 @@ class KeptPasses:
         kept.keep_pass(name, shape_bytes(KIND, stored, np.empty(0, dtype=object)), steps)
 
     @staticmethod
-    def _restored(
+    def _restore_steps(
         kept: Checkpoint, name: str, key: NDArray[np.uint8], fresh: Arrays, restore: Callable[[Arrays], None]
     ) -> int:
         """Return the number of steps that the pass has already processed."""

@@ -55,7 +55,7 @@ def removed_by_layers(
     cutting: list[tuple[int, Move, Section]] = []
     waiting: list[Future[list[StepEngagement]]] = []
 
-    def engaged(those: list[tuple[int, Move, Section]]) -> list[StepEngagement]:
+    def engage_steps(those: list[tuple[int, Move, Section]]) -> list[StepEngagement]:
         tools = [int(steps.tool[k]) for k, _, _ in those]
         return [
             engagement_of_step(steps, k, move, setting.cutters[n], setting.profiles[n], there, tolerance)
@@ -90,9 +90,9 @@ def removed_by_layers(
             if most and not steps.rapid[k]:
                 cutting.append((k, swept.move, there))
             if len(cutting) == TOGETHER:
-                waiting.append(executor.submit(engaged, cutting))
+                waiting.append(executor.submit(engage_steps, cutting))
                 cutting = []
-        waiting.append(executor.submit(engaged, cutting))
+        waiting.append(executor.submit(engage_steps, cutting))
         tiles.finish()
         return TakenByLayers(removed, gained, [engaged for several in waiting for engaged in several.result()], best)
 

@@ -95,12 +95,12 @@ class Cuts:
         return len(self.step)
 
 
-def joined(cuts: list[Cuts]) -> Cuts:
+def join_cuts(cuts: list[Cuts]) -> Cuts:
     """Return consecutive cuts of one cutter joined to one."""
     columns = (np.concatenate([getattr(c, name) for c in cuts]) for name in ("step", "ends", "spindle"))
     step, ends, spindle = columns
-    engagement = _joined([c.engagement for c in cuts])
-    plain = engagement if all(c.plain is c.engagement for c in cuts) else _joined([c.plain for c in cuts])
+    engagement = _join_engagement([c.engagement for c in cuts])
+    plain = engagement if all(c.plain is c.engagement for c in cuts) else _join_engagement([c.plain for c in cuts])
     return Cuts(cuts[0].tool, cuts[0].cutter, step, ends, engagement, plain, spindle)
 
 
@@ -115,7 +115,7 @@ def part_of_cuts(cuts: Cuts, first: int, end: int) -> Cuts:
     )  # fmt: skip
 
 
-def _joined(parts: list[ToothEngagement]) -> ToothEngagement:
+def _join_engagement(parts: list[ToothEngagement]) -> ToothEngagement:
     start = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(b.start) for b in parts]))])
     rows, tooth = (np.concatenate([getattr(b, name) for b in parts]) for name in ("rows", "tooth"))
     frame = np.concatenate([b.frames for b in parts])
@@ -262,7 +262,7 @@ def loads_of_steps(
     force, torque, _ = turn
     mean, torque_mean = mean_forces(engagement, cutter, material)
     turned = in_work(force, engagement.frames)
-    left = _left(engagement, cuts)
+    left = _normals_left(engagement, cuts)
     volume, work = engaged_work(front, cutter, material, np.abs(spindle) * seconds)
     return np.column_stack(
         [
@@ -299,7 +299,7 @@ def engaged_work(
     return mean_forces(engagement, cutter, replace(plain, exponents=(0.0, 0.0, 0.0)))[1] * turned / material.Ktc, work
 
 
-def _left(engagement: ToothEngagement, cuts: list[StepEngagement]) -> Floats:
+def _normals_left(engagement: ToothEngagement, cuts: list[StepEngagement]) -> Floats:
     """(c, 3) outward normal of the cutter, in the work frame, where it leaves a surface behind: nu averaged over the
     ends of engagement at which h = 0, by their length along the profile; 0 where no surface or two that face each
     other are left.

@@ -210,7 +210,7 @@ def with_contact(blocks: Iterable[Steps], run: MoveRun | None, workers: int) -> 
             yield before, found.result()
 
 
-def moved(
+def remove_by_moves(
     steps: Steps,
     run: MoveRun,
     first: int,
@@ -253,7 +253,7 @@ def moved(
         plain = engagement_of(found, entries, steps, cutter)
         engagement = chips_of_teeth(plain, cutter)
         step = found.step[entries]
-        left, spindle = _left(found, entries), np.abs(steps.spindle[step])
+        left, spindle = _normals_left(found, entries), np.abs(steps.spindle[step])
         seconds = steps.seconds[step]
         each, at, mean = loads_of_instants(plain, engagement, cutter, material, rotation, left, spindle, seconds)
         weight = 1.0 / found.instants[entries]
@@ -388,7 +388,7 @@ def _slices(slices: Floats, cutter: Cutter) -> Floats:
     return np.column_stack([s0, rho, z, sk, ck, lead * z, lead * sk])
 
 
-def _left(found: Engaged, entries: Ints) -> Floats:
+def _normals_left(found: Engaged, entries: Ints) -> Floats:
     """Return unit normals (m, 3) of the surface that is left; 0 where none or two that face each other are left."""
     total, whole = found.left[entries], found.left_mm[entries]
     size = np.linalg.norm(total, axis=1)

@@ -40,7 +40,7 @@ _ANGLE = np.arange(DIRECTIONS) * (math.tau / DIRECTIONS)
 _U = np.column_stack([np.cos(_ANGLE), np.sin(_ANGLE)])
 
 
-def reached(
+def reached_layers(
     steps: Steps, some: Sequence[int], layers: Sequence[Ints], cutter: Cutter, stock: LayeredStock
 ) -> list[Ints]:
     """Return for each of ``some`` steps those of its ``layers`` (numbers) from which it may remove material."""
@@ -51,7 +51,7 @@ def reached(
     support = _support(steps, k, stock.heights[layer], cutter)
     nonempty = np.flatnonzero(np.isfinite(support).all(axis=1))
     touched = np.zeros(len(k), dtype=np.bool_)
-    touched[nonempty] = _touched(support[nonempty], layer[nonempty], stock)
+    touched[nonempty] = _touches_layer(support[nonempty], layer[nonempty], stock)
     ends = np.cumsum([len(rows) for rows in layers])[:-1]
     return [rows[on] for rows, on in zip(layers, np.split(touched, ends), strict=True)]
 
@@ -84,7 +84,7 @@ def _support(steps: Steps, k: Ints, height: Floats, cutter: Cutter) -> Floats:
     return out + ROUNDING
 
 
-def _touched(support: Floats, layer: Ints, stock: LayeredStock) -> NDArray[np.bool_]:
+def _touches_layer(support: Floats, layer: Ints, stock: LayeredStock) -> NDArray[np.bool_]:
     """Return whether the polygons of these supports touch the remaining stock of their layers."""
     after, u = np.roll(support, -1, axis=1), np.roll(_U, -1, axis=0)
     cross = math.sin(math.tau / DIRECTIONS)

@@ -120,7 +120,7 @@ def removal_mesh(
     stock = TriDexel.of_mesh(blank, pitch)
     for earlier, runs in zip(before, each, strict=False):
         for places in runs:
-            _removed(stock, earlier, places, cutters, pitch)
+            _remove_run(stock, earlier, places, cutters, pitch)
     net = SurfaceNet(stock)
     rows, volumes = list[int](), [_volume(net)]
     ends = _frames(instants, path, round(FRAMES / wider))
@@ -128,7 +128,7 @@ def removal_mesh(
     for run, frame in zip(_runs(instants, ends), range(1, len(ends) + 1), strict=True):
         changed: list[tuple[Floats, Floats]] = []
         for places in run:
-            tip, axis, cutter = _removed(stock, path, places, cutters, pitch)
+            tip, axis, cutter = _remove_run(stock, path, places, cutters, pitch)
             ends_of = np.concatenate([tip, tip + cutter.flute_length * axis])
             size = sizes[id(cutter)]
             changed.append((ends_of.min(axis=0) - size, ends_of.max(axis=0) + size))
@@ -140,12 +140,12 @@ def removal_mesh(
     return RemovalMesh(net.low, net.high, corners, seen, np.array(rows, np.int64), np.array(volumes), net.pitch)
 
 
-def _removed(
+def _remove_run(
     stock: TriDexel, path: ToolPoses, places: Ints, cutters: Mapping[int, Cutter], pitch: float
 ) -> tuple[Floats, Floats, Cutter]:
     """Take away what a run of rows cuts; its tips, axes and cutter."""
     cutter = cutters[int(path.tool[places[-1]])]
-    tip, axis = _between(path, places, APART * cutter.radius)
+    tip, axis = _poses_between(path, places, APART * cutter.radius)
     stock.remove_poses(tip, axis, cutter.outline, tol=0.02 * pitch)
     return tip, axis, cutter
 
@@ -228,7 +228,7 @@ def _runs(instants: list[Ints], ends: Ints) -> list[list[Ints]]:
     return out
 
 
-def _between(path: ToolPoses, places: Ints, far: float) -> tuple[Floats, Floats]:
+def _poses_between(path: ToolPoses, places: Ints, far: float) -> tuple[Floats, Floats]:
     """Tips and axes at some rows, and between rows that are farther apart than ``far`` [mm]; at least two."""
     if len(places) == 1:
         places = np.repeat(places, 2)
@@ -271,13 +271,13 @@ def merged_quads(
         up = (e[:, u] * f[:, v] - e[:, v] * f[:, u]) > 0
         table = np.column_stack([a[:, k], up, s.astype(np.int64), a[:, u], b[:, u], a[:, v], b[:, v]])
         for fixed, first in (([4, 5], 6), ([6, 7], 4)):
-            table = _joined(table, fixed, first)
+            table = _join_intervals(table, fixed, first)
         out_c.append(_rectangles(table, k))
         out_s.append(table[:, 2:4].astype(np.uint16))
     return np.concatenate(out_c), np.concatenate(out_s)
 
 
-def _joined(table: Ints, fixed: list[int], first: int) -> Ints:
+def _join_intervals(table: Ints, fixed: list[int], first: int) -> Ints:
     """Rows whose interval in columns first, first + 1 begins where that of a row alike ends become one row."""
     key = [0, 1, 2, 3, *fixed]
     order = np.lexsort((table[:, first], *(table[:, i] for i in key)))

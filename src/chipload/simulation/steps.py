@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.program.motions import is_arc, lengths, radii, spans, straightened
+from chipload.program.motions import is_arc, lengths, radii, spans, straighten_arcs
 from chipload.program.program import DWELL, RAPID, Program
 
 Floats = NDArray[np.float64]
@@ -118,10 +118,10 @@ def steps_in_blocks(
             kept.append(_cut(moves, at, to))
             count, at = count + to - at, to
             if count == size:
-                yield _joined(kept)
+                yield _join_steps(kept)
                 kept, count = [], 0
     if kept:
-        yield _joined(kept)
+        yield _join_steps(kept)
 
 
 def number_of_steps(program: Program, step_mm: float, chord_mm: float, turn: float = TURN) -> int:
@@ -207,7 +207,7 @@ def _angles(program: Program) -> Floats:
 
 def _chord_times(program: Program, chords: Program, most: Floats, timed: Floats) -> Floats:
     """(m, 2) times and waits of chords, from those of the rows (n, 2) that they are of."""
-    row = straightened(replace(program, line=np.arange(len(program))), most).line
+    row = straighten_arcs(replace(program, line=np.arange(len(program))), most).line
     span, turned = lengths(chords), _angles(chords)
     weight = np.where(np.bincount(row, span, len(program))[row] > 0.0, span, turned)
     whole = np.bincount(row, weight, len(program))[row]
@@ -224,7 +224,7 @@ def _moves(program: Program, step_mm: float, chord_mm: float, turn: float, timed
     most = np.full(len(program), np.inf)
     bent = is_arc(program) & (r > 0.0)
     most[bent] = np.maximum(2.0 * np.arccos(1.0 - np.minimum(chord_mm / r[bent], 1.0)), 1e-3)
-    chords = straightened(program, most)
+    chords = straighten_arcs(program, most)
     length, angle = lengths(chords), _angles(chords)
     row = np.flatnonzero(moving_rows(chords))
     if timed is not None:
@@ -252,8 +252,8 @@ def _cut(moves: _Moves, first: int, end: int) -> Steps:
     return Steps(
         _line(p0, p1, u0),
         _line(p0, p1, u1),
-        _turned(a0, a1, moves.angle[at], u0),
-        _turned(a0, a1, moves.angle[at], u1),
+        _turn_axes(a0, a1, moves.angle[at], u0),
+        _turn_axes(a0, a1, moves.angle[at], u1),
         seconds / parts,
         rapid,
         chords.spindle[at],
@@ -272,7 +272,7 @@ def _rows(program: Program, first: int, end: int) -> Program:
     return Program(**columns, labels=program.labels)
 
 
-def _joined(some: list[Steps]) -> Steps:
+def _join_steps(some: list[Steps]) -> Steps:
     if len(some) == 1:
         return some[0]
     return Steps(**{f.name: np.concatenate([getattr(s, f.name) for s in some]) for f in fields(Steps)})
@@ -282,7 +282,7 @@ def _line(begin: Floats, end: Floats, u: Floats) -> Floats:
     return np.where(u[:, None] == 1.0, end, begin + u[:, None] * (end - begin))
 
 
-def _turned(begin: Floats, end: Floats, angle: Floats, u: Floats) -> Floats:
+def _turn_axes(begin: Floats, end: Floats, angle: Floats, u: Floats) -> Floats:
     """Return axes (n, 3) along great circles."""
     if not angle.any():
         return np.asarray(end / np.linalg.norm(end, axis=1)[:, None])

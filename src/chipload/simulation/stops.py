@@ -138,7 +138,7 @@ def _spindle_stops(program: Program, away: Ints) -> list[_Event]:
     return [
         _Event(k, Finding("spindle-stopped-in-cut", int(program.line[k]), text, Severity.EXCEEDS))
         for k in np.flatnonzero(stopped).tolist()
-        if not _between(away, program, k)
+        if not _retracts_between(away, program, k)
     ]
 
 
@@ -203,6 +203,6 @@ def _stops(program: Program, stops: Sequence[int], away: Ints) -> list[_Event]:
     return out
 
 
-def _between(away: Ints, program: Program, k: int) -> bool:
+def _retracts_between(away: Ints, program: Program, k: int) -> bool:
     """Whether a retraction without a row stands between row k and the next."""
     return bool(((away >= program.line[k]) & (away <= program.line[k + 1])).any())

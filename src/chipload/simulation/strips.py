@@ -126,7 +126,7 @@ def strips_of(
     near, leans = (np.concatenate([f[i] for f in found]) for i in (3, 4))
     best, least = list[Strip](), GAIN * float(near.sum())
     for axis, borders in enumerate((stock.xs, stock.ys)):
-        strips = _divided(axis, len(borders) - 1, low[axis], middle[axis], high[axis], near, leans, count)
+        strips = _divide_columns(axis, len(borders) - 1, low[axis], middle[axis], high[axis], near, leans, count)
         if len(strips) < count:
             continue
         cost = _cost(strips, low[axis], middle[axis], high[axis], near)
@@ -185,7 +185,7 @@ def column_of(at: Floats, borders: Floats) -> Ints:
     return np.clip(np.searchsorted(borders, at, "right") - 1, 0, len(borders) - 2)
 
 
-def _divided(
+def _divide_columns(
     axis: int, columns: int, low: Ints, middle: Ints, high: Ints, near: NDArray[np.bool_], leans: NDArray[np.bool_],
     count: int,
 ) -> list[Strip]:  # fmt: skip
@@ -253,9 +253,9 @@ class Strips:
         self._states = [_State(strip, part_of(stock, strip), piece, first) for strip in strips]
         self._total = number_of_steps(program, setting.resolution.step_mm, setting.resolution.tolerance)
         self._blocks = list[tuple[Block, ...]]()
-        self._coming = executor.submit(self._round, 1)
+        self._coming = executor.submit(self._remove_round, 1)
 
-    def _round(self, blocks: int) -> list[tuple[list[Block], _State]]:
+    def _remove_round(self, blocks: int) -> list[tuple[list[Block], _State]]:
         """Remove the next blocks of all strips; return their results and the states after them, strip by strip."""
         done = dict(self._team.completed_shared(removed_in_strip, [(state, blocks) for state in self._states]))
         return [done[k] for k in range(len(done))]
@@ -269,7 +269,7 @@ class Strips:
             self._blocks = list(zip(*(found for found, _ in done), strict=False))
             failed = any(isinstance(one, ChiploadError) for one in self._blocks[-1])
             if not failed and self._states[0].first < self._total:
-                self._coming = self._executor.submit(self._round, ROUND)
+                self._coming = self._executor.submit(self._remove_round, ROUND)
         removed, gained = np.zeros((len(steps), 4)), np.zeros(len(steps))
         engagement, pieces = [], list[ChipAreas]()
         for each in self._blocks.pop(0):

@@ -20,8 +20,8 @@ from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
 from chipload.engagement.chips.section import cutter_numbers
 from chipload.errors import InputError
 from chipload.program.program import Program
-from chipload.simulation.flute_end import Tiles, in_air, met
-from chipload.simulation.reach import reached
+from chipload.simulation.flute_end import Tiles, boxes_meet_stock, in_air
+from chipload.simulation.reach import reached_layers
 from chipload.simulation.steps import StepBlocks, Steps
 from chipload.stock.areas import PlaneAreas
 from chipload.stock.layers import LayeredStock
@@ -85,14 +85,14 @@ def swept_ahead(
         ranges = {k: stock.layers_between(low[k, 2], high[k, 2]) for k in part if near[k]}
         ranges = {k: layers for k, layers in ranges.items() if layers}
         profiles = list(_profiles(steps, ranges, cutters, stock, before, tolerance))
-        for k, left in _left(steps, ranges, low, high, cutters, stock).items():
+        for k, left in _layers_left(steps, ranges, low, high, cutters, stock).items():
             # an axis that lies is refused in air too
             if left.any() or min(steps.a0[k, 2], steps.a1[k, 2]) < 2.0 * LEAST_AXIS_Z:
                 found[k] = _move(steps, k, interpolation), ranges[k], left
         out: dict[int, Swept] = {}
         for tool, K, those in profiles:
             own = {k: both for k, both in found.items() if k in those}
-            areas = _covered(steps, own, cutters[tool], K, stock, tolerance) if own else []
+            areas = _covered_layers(steps, own, cutters[tool], K, stock, tolerance) if own else []
             for (k, (move, layers, _)), (which, shape, of) in zip(own.items(), areas, strict=True):
                 out[k] = Swept(move, low[k], high[k], layers, which, shape, of)
         return sorted(out.items())
@@ -145,7 +145,7 @@ def near_stock(steps: Steps, plan: Plan, cutters: Mapping[int, Cutter]) -> tuple
     return low, high, near
 
 
-def _left(
+def _layers_left(
     steps: Steps,
     ranges: Mapping[int, range],
     low: Floats,
@@ -163,12 +163,12 @@ def _left(
     of = list(ranges)
     counts = [len(layers) for layers in ranges.values()]
     step, layer = np.repeat(of, counts), np.concatenate([np.array(r) for r in ranges.values()])
-    left = met(stock.tiles, stock, layer, low[step, :2], high[step, :2])
+    left = boxes_meet_stock(stock.tiles, stock, layer, low[step, :2], high[step, :2])
     out = dict(zip(of, np.split(left, np.cumsum(counts)[:-1]), strict=True))
     for tool in np.unique(steps.tool[of]).tolist():
         lean = [k for k in of if steps.tool[k] == tool and out[k].any() and min(steps.a0[k, 2], steps.a1[k, 2]) < 1.0]
         candidates = [np.array(ranges[k])[out[k]] for k in lean]
-        for k, near in zip(lean, reached(steps, lean, candidates, cutters[tool], stock), strict=True):
+        for k, near in zip(lean, reached_layers(steps, lean, candidates, cutters[tool], stock), strict=True):
             out[k] = np.isin(ranges[k], near)
     return out
 
@@ -196,7 +196,7 @@ def _profiles(
         yield tool, longer, those
 
 
-def _covered(
+def _covered_layers(
     steps: Steps, own: Mapping[int, Met], cutter: Cutter, K: Floats, stock: LayeredStock, tolerance: float
 ) -> list[tuple[Ints, Ints, PlaneAreas]]:
     """Return the layers that steps cover and their areas; layers that an upright flank crosses share one."""

@@ -73,7 +73,7 @@ def changes_in_stock(
     out = []
     for k in rows.tolist():
         old, new = int(program.tool[k - 1]), int(program.tool[k])
-        if old not in cutters or _between(away, int(program.line[k - 1]), int(program.line[k])):
+        if old not in cutters or _any_between(away, int(program.line[k - 1]), int(program.line[k])):
             continue
         tip, axis = np.asarray(program.p_work[k - 1]), np.asarray(program.axis[k - 1])
         by = retract_needed(tip, axis, cutters[old].radius, cutters[old].overhang, low, high)
@@ -88,7 +88,7 @@ def changes_in_stock(
     return tuple(out)
 
 
-def _between(lines: NDArray[np.int64], first: int, last: int) -> bool:
+def _any_between(lines: NDArray[np.int64], first: int, last: int) -> bool:
     """Whether one of the lines is carried out from ``first`` on and before ``last``, which stands above it after a
     subroutine at the end of the text.
     """

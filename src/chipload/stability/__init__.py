@@ -9,7 +9,7 @@ from chipload.lazy import attach
 if TYPE_CHECKING:
     from chipload.stability.chart import StabilityChart, critical_depth, stability_chart
     from chipload.stability.cuts import DynamicCuts, dynamic_cuts
-    from chipload.stability.grouping import CutGroups, grouped
+    from chipload.stability.grouping import CutGroups, group_steps
     from chipload.stability.margin import StabilityMargins, largest_multipliers, stability_margins
     from chipload.stability.modes import Modes
     from chipload.stability.probability import ModeSpread, stable_probability, variance_shares
@@ -31,7 +31,7 @@ __all__ = [
     "StabilityMargins",
     "critical_depth",
     "dynamic_cuts",
-    "grouped",
+    "group_steps",
     "largest_multipliers",
     "location_error",
     "quiet_speeds",
@@ -47,7 +47,7 @@ __getattr__, __dir__ = attach(
     {
         "chart": "StabilityChart critical_depth stability_chart",
         "cuts": "DynamicCuts dynamic_cuts",
-        "grouping": "CutGroups grouped",
+        "grouping": "CutGroups group_steps",
         "surface_error": "location_error",
         "margin": "StabilityMargins largest_multipliers stability_margins",
         "modes": "Modes",

@@ -107,7 +107,7 @@ def stability_chart(cut: DynamicCuts, speed: ArrayLike, depth: ArrayLike) -> Sta
         finer_i, finer_j = _every(len(speeds), step), _every(len(depths), step)
         corners = values[np.ix_(i, j)]
         wanted = _unsure(corners, i, j, finer_i, finer_j, values.shape)
-        filled = _interpolated(corners, i, j, finer_i, finer_j)
+        filled = _interpolate_corners(corners, i, j, finer_i, finer_j)
         own = values[np.ix_(finer_i, finer_j)]
         values[np.ix_(finer_i, finer_j)] = np.where(np.isnan(own), filled, own)
         i, j = finer_i, finer_j
@@ -207,7 +207,7 @@ def _unsure(
     return wanted
 
 
-def _interpolated(
+def _interpolate_corners(
     corners: Floats, i: NDArray[np.int64], j: NDArray[np.int64], finer_i: NDArray[np.int64], finer_j: NDArray[np.int64]
 ) -> Floats:
     """Return bilinear values on the finer grid."""

@@ -108,7 +108,7 @@ class DynamicCuts:
         return replace(self, damping=z, omega=w, U=np.ascontiguousarray(shapes))
 
 
-def joined(some: Sequence[DynamicCuts]) -> DynamicCuts:
+def join_dynamic_cuts(some: Sequence[DynamicCuts]) -> DynamicCuts:
     """Return cuts of one cutter with the same modes joined in order."""
     sizes = np.concatenate([np.diff(c.start) for c in some])
     start = np.concatenate([[0], np.cumsum(sizes)])

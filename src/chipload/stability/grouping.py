@@ -44,7 +44,7 @@ class CutGroups:
         return len(self.key)
 
 
-def grouped(engagement: ToothEngagement, speed: Floats, powers: bool) -> CutGroups:
+def group_steps(engagement: ToothEngagement, speed: Floats, powers: bool) -> CutGroups:
     """Return the steps with rounded cuts, and the keys of these cuts.
 
     Parameters

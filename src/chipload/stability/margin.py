@@ -89,7 +89,7 @@ def largest_multipliers(
     factor = np.array(np.broadcast_to(np.asarray(gain, dtype=np.float64), (len(cuts),)))
     dimension = 2 * len(cuts.damping) + SPARE_EXACT if most is None else most
     if cuts.several:
-        found = several_multipliers(cuts, factor, per_wave, dimension, still, shared)
+        found = several_multipliers(cuts, factor, per_wave, dimension, still, share_chunks)
         return np.asarray(found[:, 0] * np.exp(1j * found[:, 1]))
     out = np.zeros((len(cuts), 3))
     pitch = np.full(len(cuts), cuts.pitch)
@@ -100,7 +100,7 @@ def largest_multipliers(
             np.array(cuts.damping), cuts.U, factor, per_wave, dimension, still, out,
         )  # fmt: skip
 
-    shared(part, len(cuts))
+    share_chunks(part, len(cuts))
     if (out[:, 0] < 0.0).any():
         raise InputError("stability: a multiplier was not found: check frequency and damping of the modes")
     return np.asarray(out[:, 0] * np.exp(1j * out[:, 1]))
@@ -136,7 +136,7 @@ def _several_margins(cuts: DynamicCuts) -> StabilityMargins:
     last = np.zeros((n, 4))
 
     def growth(which: NDArray[np.int64], gain: Floats) -> Floats:
-        last[which] = several_multipliers(cuts.chosen(which), gain, PER_WAVE, most, STILL, shared)
+        last[which] = several_multipliers(cuts.chosen(which), gain, PER_WAVE, most, STILL, share_chunks)
         return np.asarray(np.log(np.maximum(last[which, 0], _tooth_period.TINY)) / teeth)
 
     every = np.arange(n)
@@ -191,11 +191,11 @@ def _margins(cuts: DynamicCuts, per_wave: float) -> Floats:
             np.array(cuts.damping), cuts.U, per_wave, 2 * len(cuts.damping) + SPARE, STILL, out,
         )  # fmt: skip
 
-    shared(part, len(cuts))
+    share_chunks(part, len(cuts))
     return out
 
 
-def shared(part: Callable[[int, int], None], count: int) -> None:
+def share_chunks(part: Callable[[int, int], None], count: int) -> None:
     """Call ``part(first, last)`` on chunks of ``count`` things in threads."""
     ends = [(k, min(k + CHUNK, count)) for k in range(0, count, CHUNK)]
     threads = min(cores(), MOST_THREADS, len(ends))

@@ -23,7 +23,7 @@ from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
 from chipload.lazy import LateModule
 from chipload.stability.cuts import DynamicCuts, dynamic_cuts
-from chipload.stability.margin import shared
+from chipload.stability.margin import share_chunks
 from chipload.stability.modes import Modes
 
 _surface_location = LateModule("chipload.stability._surface_location")
@@ -92,5 +92,5 @@ def wall_errors(cuts: DynamicCuts, rows: Floats) -> tuple[Floats, NDArray[np.boo
             out,
         )  # fmt: skip
 
-    shared(part, len(cuts))
+    share_chunks(part, len(cuts))
     return out[:, 0], out[:, 1] > 0.0

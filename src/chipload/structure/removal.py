@@ -292,7 +292,7 @@ def _cut_elements(base: Factored, solid: SolidWorkpiece) -> tuple[Indices, NDArr
     free = (rows >= 0) & (columns >= 0)
     xyz = solid.grid.nodes[elements]
 
-    def summed(kept: Array) -> csc_array:
+    def sum_kept(kept: Array) -> csc_array:
         K = np.zeros((len(e), 60, 60))
         part = kept[:, 1] > kept[:, 0]
         K[part] = stiffness(xyz[part], solid.modulus, solid.poisson, solid.rule, kept[part], e[part])
@@ -301,4 +301,4 @@ def _cut_elements(base: Factored, solid: SolidWorkpiece) -> tuple[Indices, NDArr
 
     other = np.zeros(len(solid.grid.nodes), dtype=np.bool_)
     other[solid.grid.elements[~differs & (solid.kept[:, 1] > solid.kept[:, 0])]] = True
-    return touched, other[base.free[touched] // 3], summed(base.solid.kept[e]), summed(solid.kept[e])
+    return touched, other[base.free[touched] // 3], sum_kept(base.solid.kept[e]), sum_kept(solid.kept[e])

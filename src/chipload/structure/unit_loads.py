@@ -46,7 +46,7 @@ def _forces(base: Factored, places: MeshPlaces, normals: ArrayLike | None) -> tu
     return loads(base, thrice, np.tile(np.eye(3), (len(places), 1))), 3
 
 
-def _shaped(values: Array) -> Array:
+def _shape_values(values: Array) -> Array:
     """(p,) of one direction, (p, 3, 3) of three."""
     return values[:, 0, 0] if values.shape[1] == 1 else 0.5 * (values + np.swapaxes(values, 1, 2))
 
@@ -107,7 +107,7 @@ def compliance(state: StructureRemoval, watched: UnitLoads) -> Array:
     on_cut = weight.reshape(-1, d).max(axis=1) > 0.0
     if on_cut.any():
         out[on_cut] = _on_cut(state, watched.F[:, np.repeat(on_cut, d)], d)
-    return _shaped(out)
+    return _shape_values(out)
 
 
 def cut_compliance(state: StructureRemoval, places: MeshPlaces, normals: ArrayLike | None = None) -> Array:
@@ -127,7 +127,7 @@ def cut_compliance(state: StructureRemoval, places: MeshPlaces, normals: ArrayLi
         )
     F, d = _forces(state.base, places, normals)
     _refuse_dead(_alive(state, F, d))
-    return _shaped(_on_cut(state, F, d))
+    return _shape_values(_on_cut(state, F, d))
 
 
 def _refuse_dead(living: NDArray[np.bool_]) -> None:

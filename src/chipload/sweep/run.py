@@ -16,7 +16,7 @@ from chipload.result import Verdict
 from chipload.sweep.case_run import REFUSED, Record, case_key, case_record, kept_record
 from chipload.sweep.cases import Case, Samples, cases_of
 from chipload.sweep.sampled import sample_files
-from chipload.tables import LARGEST_FILE, parsed
+from chipload.tables import LARGEST_FILE, parse_toml
 from chipload.workers import Workers
 
 #: share of the samples in which a combination must hold
@@ -118,15 +118,15 @@ class SweepResult:
         refused = sum(c.refused for c in all_of_them)
         head = f"{len(self.cases)} cases, {len(all_of_them)} combinations, {refused} refused"
         if best is None:
-            return f"{head}; none holds" + (f" in {self.confidence:.0%} of its samples" if self._sampled else "")
+            return f"{head}; none holds" + (f" in {self.confidence:.0%} of its samples" if self._is_sampled else "")
         values = ", ".join(f"{key}={value}" for key, value in best.values) or "the job as stated"
         time = "" if best.time_s is None else f" in {number_text(best.time_s)} s"
         low, high = best.interval
-        chance = f" with a probability of {best.probability:.3g} ({low:.3g} to {high:.3g})" if self._sampled else ""
+        chance = f" with a probability of {best.probability:.3g} ({low:.3g} to {high:.3g})" if self._is_sampled else ""
         return f"{head}; best: {values}: holds{time}{chance}"
 
     @property
-    def _sampled(self) -> bool:
+    def _is_sampled(self) -> bool:
         return any(case.sample for case in self.cases)
 
 
@@ -166,7 +166,7 @@ def run_sweep(
     files = sample_files(job, cases, samples, out)
     (out / CASES).mkdir(parents=True, exist_ok=True)
     inputs = _inputs(
-        job.parent, [parsed(job.name, text), *(value.strip("\"'") for c in cases for _, value in c.values)]
+        job.parent, [parse_toml(job.name, text), *(value.strip("\"'") for c in cases for _, value in c.values)]
     )
     records: dict[int, Record] = {}
     tasks, waiting = [], []

@@ -86,10 +86,10 @@ def _files(
     table = getattr(loaded.job.table, "dynamics", None)
     normal = ndtri(np.clip(samples.points(COEFFICIENTS + OF_MODE * len(modes)), 1e-9, 1.0 - 1e-9))
     drawn = samples.of(material, normal[:, :COEFFICIENTS])
-    materials = _written(out / MATERIALS, [material_text(one) for one in drawn], written)
+    materials = _write_files(out / MATERIALS, [material_text(one) for one in drawn], written)
     if table is None or not modes:
         return [SampleFiles(file, None) for file in materials]
-    files = _written(out / MODES, modes_texts(modes, table, normal[:, COEFFICIENTS:]), written)
+    files = _write_files(out / MODES, modes_texts(modes, table, normal[:, COEFFICIENTS:]), written)
     return [SampleFiles(*pair) for pair in zip(materials, files, strict=True)]
 
 
@@ -148,7 +148,7 @@ def _mode_text(mode: ModeTable, factors: Sequence[float]) -> str:
     return "\n".join([*lines, f"direction = {direction}", ""])
 
 
-def _written(folder: Path, texts: Sequence[str], written: dict[str, list[Path]]) -> list[Path]:
+def _write_files(folder: Path, texts: Sequence[str], written: dict[str, list[Path]]) -> list[Path]:
     """Files with the texts in a folder of their own, or those that hold the same texts already."""
     key = f"{folder.name}\n" + "\n".join(texts)
     if key not in written:

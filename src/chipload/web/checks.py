@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, Severity
-from chipload.report.colouring import beyond, lowest_limit
+from chipload.report.colouring import lowest_limit, rows_beyond
 from chipload.result import COLUMNS, LimitCheck, Verdict
 from chipload.web.result import PageResult, PageTrack, TextColumn
 
@@ -55,7 +55,7 @@ def bound_of(result: PageResult, track: PageTrack, column: str) -> Bound | None:
     values = result.column(track, column)
     if isinstance(values, TextColumn):
         return None
-    return Bound(check.limit, beyond(values, check), "" if check.coverage.whole else check.coverage.name)
+    return Bound(check.limit, rows_beyond(values, check), "" if check.coverage.whole else check.coverage.name)
 
 
 def limits(track: PageTrack) -> list[LimitCheck]:

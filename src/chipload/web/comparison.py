@@ -100,7 +100,7 @@ def matching_row(a: Side, b: Side, against: str, row: int) -> int:
     return min(found, len(other) - 1)
 
 
-def along(a: Side, b: Side, against: str) -> Floats:
+def rows_along(a: Side, b: Side, against: str) -> Floats:
     """(n,) time or path of the rows of ``b`` as they lie along ``a``."""
     if against == "time":
         return b.track.t

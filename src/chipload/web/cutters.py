@@ -41,7 +41,7 @@ def cutters_of(result: PageResult, track: PageTrack, size: float) -> tuple[dict[
     size : length of a pointer [mm], and of a cutter whose length CL data leave open
     """
     numbers = _numbers(result, track)
-    kept = _kept(result, track)
+    kept = _kept_parts(result, track)
     if kept and (numbers <= set(kept) or len(kept) == 1):
         return ({0: next(iter(kept.values()))} if len(kept) == 1 else kept), ""
     own = {n: c for n, c in _of_job(result).items() if not numbers or n in numbers}
@@ -76,7 +76,7 @@ def _numbers(result: PageResult, track: PageTrack) -> set[int]:
     return {number} if isinstance(number, int) else set()
 
 
-def _kept(result: PageResult, track: PageTrack) -> dict[int, Parts]:
+def _kept_parts(result: PageResult, track: PageTrack) -> dict[int, Parts]:
     """Parts that the result itself holds with its stock."""
     try:
         return read_cutter_parts(result.file(REMOVAL), result.result.tracks.index(track.own))

@@ -18,7 +18,7 @@ from chipload.files import read_regular
 from chipload.jobs import CAPABILITIES
 from chipload.result import Verdict, read_summary
 from chipload.result.load import SUMMARY
-from chipload.tables import parsed
+from chipload.tables import parse_toml
 
 #: folders within folders, and entries, that are searched
 DEEPEST, ENTRIES = 8, 20_000
@@ -104,7 +104,7 @@ def is_job(file: Path) -> bool:
     try:
         if file.suffix.lower() != ".toml":
             return False
-        raw = parsed(file.name, read_regular(file, file.name, LARGEST_JOB))
+        raw = parse_toml(file.name, read_regular(file, file.name, LARGEST_JOB))
     except InputError:
         return False
     return any(isinstance(raw.get(key), (dict, list)) for key in (c.key for c in CAPABILITIES))

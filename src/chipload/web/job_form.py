@@ -15,7 +15,7 @@ from chipload.files import read_regular
 from chipload.jobs import capability_of, load_job
 from chipload.jobs.reference import tables_in, value_words
 from chipload.result.columns import unit_of
-from chipload.tables import parsed
+from chipload.tables import parse_toml
 
 #: largest job [bytes] that is shown as a form
 LARGEST = 1_000_000
@@ -71,7 +71,7 @@ def job_fields(path: Path) -> list[FormField]:
     InputError
         The file cannot be read.
     """
-    raw = parsed(path.name, read_regular(path, path.name, LARGEST))
+    raw = parse_toml(path.name, read_regular(path, path.name, LARGEST))
     capability = capability_of(raw)
     schema = capability.root.model_json_schema()
     return list(_fields(raw, schema, schema.get("$defs", {}), capability.root, ""))
@@ -111,7 +111,7 @@ def _fields(
     raw: Mapping[str, Any], schema: Mapping[str, Any], defs: Mapping[str, Any], model: type[BaseModel] | None, at: str
 ) -> Iterator[FormField]:
     """Fields of a table: those that it states, then the others; then its tables that are stated."""
-    properties = {key: _resolved(one, defs) for key, one in schema.get("properties", {}).items()}
+    properties = {key: _resolve_schema(one, defs) for key, one in schema.get("properties", {}).items()}
     order = [k for k in raw if k in properties] + [k for k in properties if k not in raw]
     for key in order:
         own = model.model_fields.get(key) if model is not None else None
@@ -161,12 +161,12 @@ def _kind(schema: Mapping[str, Any]) -> Kind | None:
     return kinds.get(str(schema.get("type")))
 
 
-def _resolved(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Mapping[str, Any]:
+def _resolve_schema(schema: Mapping[str, Any], defs: Mapping[str, Any]) -> Mapping[str, Any]:
     """A schema with its reference followed, that of a list in its items, of a choice in each."""
     if "$ref" in schema:
         own: Mapping[str, Any] = defs.get(str(schema["$ref"]).rsplit("/", 1)[-1], {})
         return {**own, **{k: v for k, v in schema.items() if k != "$ref"}}
-    chosen = {word: [_resolved(one, defs) for one in schema[word]] for word in CHOICES if word in schema}
+    chosen = {word: [_resolve_schema(one, defs) for one in schema[word]] for word in CHOICES if word in schema}
     return {**schema, **chosen}
 
 
@@ -176,5 +176,5 @@ def _table_schema(schema: Mapping[str, Any], defs: Mapping[str, Any], repeated: 
     tables = [one for one in options if "properties" in one]
     lists = [one for one in options if one.get("type") == "array" and "items" in one]
     if lists and (repeated or not tables):
-        return _table_schema(_resolved(lists[0]["items"], defs), defs)
+        return _table_schema(_resolve_schema(lists[0]["items"], defs), defs)
     return dict(tables[0]) if tables else {}

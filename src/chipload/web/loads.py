@@ -93,7 +93,7 @@ def tool_uses(result: PageResult, track: PageTrack) -> list[ToolUse]:
     lasts = np.diff(track.t, prepend=0.0)
     cut = cutting_rows(result, track)
     length = np.diff(track.s, prepend=0.0)
-    loads = {c: np.abs(np.nan_to_num(_known(result, track, c))) for c in shown_loads(result, track)}
+    loads = {c: np.abs(np.nan_to_num(_known_values(result, track, c))) for c in shown_loads(result, track)}
     out = []
     for number in dict.fromkeys(tool.tolist()):
         own = tool == number
@@ -115,7 +115,8 @@ def line_loads(result: PageResult, track: PageTrack, line: Ints, by: str) -> lis
     lines, number = np.unique(line, return_inverse=True)
     lasts = np.bincount(number, np.diff(track.t, prepend=0.0), minlength=len(lines))
     table = {
-        c: np.abs(np.nan_to_num(_known(result, track, c))) for c in dict.fromkeys((by, *shown_loads(result, track)))
+        c: np.abs(np.nan_to_num(_known_values(result, track, c)))
+        for c in dict.fromkeys((by, *shown_loads(result, track)))
     }
     most = {}
     for column, values in table.items():
@@ -138,7 +139,7 @@ def _numbers(result: PageResult, track: PageTrack, column: str) -> Floats | None
     return None if values is None or isinstance(values, TextColumn) or not np.isfinite(values).any() else values
 
 
-def _known(result: PageResult, track: PageTrack, column: str) -> Floats:
+def _known_values(result: PageResult, track: PageTrack, column: str) -> Floats:
     values = _numbers(result, track, column)
     return np.zeros(len(track)) if values is None else values
 

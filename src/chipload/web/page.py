@@ -136,12 +136,12 @@ class Page:
             _button("Open", self._open, "folder_open").mark("open")
             self.title = ui.label("chipload").classes("cl-name").props("role=heading aria-level=1")
             self.name = ui.label("").classes("cl-path")
-            self.tracks = ui.select({0: ""}, value=0, on_change=self._tracked).props(
+            self.tracks = ui.select({0: ""}, value=0, on_change=self._show_track).props(
                 'dense options-dense outlined hide-bottom-space aria-label="track"'
             ).classes("cl-tracks").mark("track")  # fmt: skip
             self.tracks.on("popup-hide", js_handler=RELEASE)
             self.tracks.set_visibility(False)
-            self.others = ui.select({}, multiple=True, on_change=self._compared).props(
+            self.others = ui.select({}, multiple=True, on_change=self._show_comparison).props(
                 f'dense options-dense outlined hide-bottom-space max-values={MOST - 1} aria-label="compare with"'
                 ' display-value="compare with \u2026"'
             ).classes("cl-tracks").mark("compare")  # fmt: skip
@@ -196,7 +196,7 @@ class Page:
         found, all_seen = await asyncio.to_thread(list_folder, self.opened.root)
         self.list.clear()
         with self.list:
-            self._listed(found, all_seen)
+            self._list_results(found, all_seen)
         self.opening.open()
 
     async def _home(self, job: str | None = None) -> None:
@@ -222,9 +222,9 @@ class Page:
                         JobForm(resolve_name(self.opened.root, job), lambda values: self._request_folder(job, values))
                     ui.html(self._text(job), sanitize=True).classes("cl-scroll cl-code cl-job").props("tabindex=0")
             ui.label("Results and jobs in this folder").classes("cl-dialog-title")
-            self._listed(found, all_seen)
+            self._list_results(found, all_seen)
 
-    def _listed(self, found: list[FolderEntry], all_seen: bool) -> None:
+    def _list_results(self, found: list[FolderEntry], all_seen: bool) -> None:
         if not all_seen:
             ui.label(f"The folder holds more than {ENTRIES} files; the others were not read.").classes("cl-note")
         if not found:
@@ -322,7 +322,7 @@ class Page:
                 self.bar.set_visibility(False)
 
     # -- keys ---------------------------------------------------------------------------------------------------
-    async def _tracked(self) -> None:
+    async def _show_track(self) -> None:
         if self.result is not None and isinstance(self.tracks.value, int):
             await self.view.follow(self.tracks.value)
             if self.others.value:
@@ -342,7 +342,7 @@ class Page:
         self.others.set_options(options, value=[])
         self.others.set_visibility(len(options) > 1)
 
-    async def _compared(self) -> None:
+    async def _show_comparison(self) -> None:
         result, chosen = self.result, [str(v) for v in self.others.value or []]
         if result is None:
             return

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.result.style import FONT, GRID, INK, LIMIT
-from chipload.result.thinning import thinned
+from chipload.result.thinning import thin_rows
 from chipload.web.checks import Bound, bound_of, label_and_unit
-from chipload.web.comparison import Side, along, matching_row
+from chipload.web.comparison import Side, matching_row, rows_along
 from chipload.web.result import PageResult, PageTrack, TextColumn
 
 Floats = NDArray[np.float64]
@@ -58,7 +58,7 @@ def plots(
     ``sides``: the track itself and those that it is compared with, each drawn in its colour along the first.
     """
     x = abscissa(track, against)
-    others = [(side, along(sides[0], side, against)) for side in sides[1:]]
+    others = [(side, rows_along(sides[0], side, against)) for side in sides[1:]]
     at = float(x[row])
     data: list[dict[str, Any]] = []
     axes: dict[str, Any] = {}
@@ -233,7 +233,7 @@ def drawn_rows(values: Floats) -> NDArray[np.int64]:
     """
     void = np.isnan(values)
     some = np.flatnonzero(~(void & np.concatenate([[False], void[:-1]])))
-    return some[thinned(values[some], POINTS)]
+    return some[thin_rows(values[some], POINTS)]
 
 
 def _words(values: TextColumn) -> dict[str, Any]:

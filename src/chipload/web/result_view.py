@@ -61,7 +61,7 @@ class ResultView:
         with ui.element("div").classes("cl-body"):
             with ui.element("div").classes("cl-left"):
                 self.scene = ScenePanel(assets, self._row_reported)
-                self.plots = PlotPanel(self.pick, self._turned)
+                self.plots = PlotPanel(self.pick, self._change_slider)
             with ui.element("div").classes("cl-right"):
                 with ui.element("div").classes("cl-panel cl-tables"):
                     self.table = ui.toggle(TABLES, value="limits", on_change=self._show_table).props(
@@ -69,8 +69,8 @@ class ResultView:
                     ).classes("cl-tabs").mark("tables")  # fmt: skip
                     self.limits = LimitPanel(self.find)
                     self.cut = CutPanel()
-                    self.tools = ToolPanel(self._found)
-                    self.lines = LinePanel(self._found)
+                    self.tools = ToolPanel(self._go_to_row)
+                    self.lines = LinePanel(self._go_to_row)
                     self.compared = ComparisonPanel()
                 self._show_table()
                 self.source = SourcePanel(self.pick)
@@ -112,7 +112,7 @@ class ResultView:
             await self._stop_comparing()
             self.track = self.result.tracks[k]
             await self.scene.follow(self.result, self.track)
-            await self._tracked(self.result, self.track)
+            await self._show_track(self.result, self.track)
 
     async def compare(self, others: Sequence[tuple[PageResult, PageTrack, str]]) -> None:
         """Show other tracks next to the own one and over it; empty: it alone."""
@@ -167,7 +167,7 @@ class ResultView:
         self.row = int(np.clip(row, 0, len(self.track) - 1))
         self.slider.set_value(float(abscissa(self.track, self.plots.against.value)[self.row]))
         self.scene.at(self.row)
-        self._shown(self.track)
+        self._show_views(self.track)
 
     def move(self, rows: int) -> None:
         """Some rows on, or back."""
@@ -215,21 +215,21 @@ class ResultView:
         self.message.set_text(message)
         self.tip.set_text("\n".join(result.result.first_lines))
         await self.scene.open(result, track)
-        await self._tracked(result, track)
+        await self._show_track(result, track)
 
-    async def _tracked(self, result: PageResult, track: PageTrack) -> None:
+    async def _show_track(self, result: PageResult, track: PageTrack) -> None:
         self.limits.open(result, track)
         self.tools.open(result, track)
         self.scene.override.open(result, track)
         marks = self.scene.marks
         self.row = marks[0].row if marks else 0
         self.plots.open(result, track, self.row)
-        self._turned()
+        self._change_slider()
         await self.source.open(result, track)
         self.lines.open(result, track, self.source.text)
         self.first()
 
-    def _turned(self) -> None:
+    def _change_slider(self) -> None:
         """The slider counts as the plots do."""
         if self.track is None:
             return
@@ -253,7 +253,7 @@ class ResultView:
         if self.track is not None and chosen == "tools":
             self.tools.at(self.row)
 
-    async def _found(self, number: int, row: int) -> None:
+    async def _go_to_row(self, number: int, row: int) -> None:
         """A table requests a row, of another track where it names one."""
         if self.result is None or self.track is None:
             return
@@ -281,7 +281,7 @@ class ResultView:
         self.pause()
         self.stopping = False
         self.row = nearest(abscissa(self.track, self.plots.against.value), float(event.args))
-        self._shown(self.track)
+        self._show_views(self.track)
 
     async def _row_reported(self, row: int, why: Standing) -> None:
         """The 3D view stands at a row: it plays or was stopped, or its path was clicked."""
@@ -296,12 +296,12 @@ class ResultView:
         elif self.playing:  # else a message that was on its way when it was stopped
             self.row = int(np.clip(row, 0, len(self.track) - 1))
             self.slider.set_value(float(abscissa(self.track, self.plots.against.value)[self.row]))
-            self._shown(self.track)
+            self._show_views(self.track)
             if why is Standing.ENDED:
                 self.pause()
                 await self._next()
 
-    def _shown(self, track: PageTrack) -> None:
+    def _show_views(self, track: PageTrack) -> None:
         k = self.row
         self.plots.at(k)
         self.source.at(k)

@@ -149,7 +149,7 @@ def page_scene(
     marks = marks_of(result.result, track.own, row, track.place)
     scene = ViewScene(
         result.result.title, solids, removal, view_path(track), parts, marks,
-        colouring(result, track, column, removal, span), samples=samples,
+        colour_column(result, track, column, removal, span), samples=samples,
         bounds=bounds_of(track.own), operating=operating_of(result, track),
         maps=maps,
     )  # fmt: skip
@@ -160,7 +160,7 @@ def page_scene(
     )
 
 
-def colouring(
+def colour_column(
     result: PageResult,
     track: PageTrack,
     column: str,

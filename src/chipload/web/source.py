@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from chipload.errors import ChiploadError
 from chipload.machine.machine import machine_named, machine_names
 from chipload.program.apt.reader import read_apt_file
-from chipload.program.motions import is_arc, straightened
+from chipload.program.motions import is_arc, straighten_arcs
 from chipload.program.program import Program
 from chipload.program.read import read_program
 from chipload.web.folder_access import find_by_hash
@@ -79,7 +79,7 @@ def source_of(result: PageResult, track: PageTrack) -> TrackText | None:
         except (ChiploadError, OSError):
             continue
         if program is not None:
-            return TrackText(path.name, _lines(path), followed(track.place, program), note)
+            return TrackText(path.name, _lines(path), follow_lines(track.place, program), note)
     return None
 
 
@@ -96,12 +96,12 @@ def _with_new_feeds(result: PageResult, track: PageTrack) -> Path | None:
     return None
 
 
-def followed(place: Floats, program: Program) -> Ints:
+def follow_lines(place: Floats, program: Program) -> Ints:
     """(n,) line of the motion that each place lies on, going along the program; 0 before the first.
 
     A place that lies on no motion ahead keeps the line of the place before.
     """
-    chords = straightened(program, np.where(is_arc(program), TURN, np.inf))
+    chords = straighten_arcs(program, np.where(is_arc(program), TURN, np.inf))
     a = np.vstack([chords.p_work[:1], chords.p_work[:-1]])
     d = chords.p_work - a
     square = np.maximum((d * d).sum(axis=1), np.finfo(np.float64).tiny)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from chipload.errors import InputError
 from chipload.planning.impeller import assignment
-from chipload.planning.impeller.assignment import Changes, assigned, bound_of_cells, bound_of_strips
+from chipload.planning.impeller.assignment import Changes, assign_cutters, bound_of_cells, bound_of_strips
 
 
 def random_sides(seed, shape, sides, closed):
@@ -75,7 +75,7 @@ def brute(sides, changes, most):
 )  # fmt: skip
 def test_one_side_is_the_best_of_all_ways(seed, cutter, table, most, closed):
     sides, changes = random_sides(seed, (3, 2, 3, 2), 1, closed), Changes(cutter, table)
-    found, expected = assigned(sides, changes, most), brute(sides, changes, most)
+    found, expected = assign_cutters(sides, changes, most), brute(sides, changes, most)
     if found is None:
         assert expected == math.inf
     else:
@@ -87,7 +87,7 @@ def test_one_side_is_the_best_of_all_ways(seed, cutter, table, most, closed):
 @pytest.mark.parametrize("seed", range(4))
 def test_two_sides_share_their_cutters(seed, most):
     sides, changes = random_sides(seed, (2, 2, 2, 2), 2, 0.2), Changes(3.0, 1.0)
-    found, expected = assigned(sides, changes, most), brute(sides, changes, most)
+    found, expected = assign_cutters(sides, changes, most), brute(sides, changes, most)
     assert (found.total if found else math.inf) == pytest.approx(expected, rel=1e-12)
     if found:
         check(found, sides, changes, most)
@@ -117,17 +117,17 @@ def check(found, sides, changes, most):
 
 def test_more_cutters_are_not_slower():
     sides = random_sides(5, (5, 4, 6, 3), 2, 0.05)
-    times = [assigned(sides, Changes(4.0, 1.0), m).total for m in (1, 2, 3, 4, 5, 6)]
+    times = [assign_cutters(sides, Changes(4.0, 1.0), m).total for m in (1, 2, 3, 4, 5, 6)]
     assert times == sorted(times, reverse=True)
-    assert times[-1] == pytest.approx(assigned(sides, Changes(4.0, 1.0), None).total)
+    assert times[-1] == pytest.approx(assign_cutters(sides, Changes(4.0, 1.0), None).total)
 
 
 def test_no_cutter_mills_all():
     cost = np.full((2, 2, 2, 1), 1.0)
     cost[0, 0, 0], cost[1, 1, 1] = math.inf, math.inf
     side = (cost, cost.swapaxes(0, 1))
-    assert assigned([side], Changes(1.0, 1.0), 1) is None
-    assert assigned([side], Changes(1.0, 1.0), 2).total == pytest.approx(5.0)
+    assert assign_cutters([side], Changes(1.0, 1.0), 1) is None
+    assert assign_cutters([side], Changes(1.0, 1.0), 2).total == pytest.approx(5.0)
 
 
 def test_refused(monkeypatch):
@@ -135,7 +135,7 @@ def test_refused(monkeypatch):
     with pytest.raises(InputError, match="cutter_change_s = -1: must be at least 0"):
         Changes(-1.0, 0.0)
     with pytest.raises(InputError, match="most = 0: must be at least 1 cutter"):
-        assigned(side, Changes(1.0, 1.0), 0)
+        assign_cutters(side, Changes(1.0, 1.0), 0)
     monkeypatch.setattr(assignment, "SETS", 5)
     with pytest.raises(InputError, match="10 sets of 2 of 4 cutters: must be at most 5"):
-        assigned(side, Changes(1.0, 1.0), 2)
+        assign_cutters(side, Changes(1.0, 1.0), 2)

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.errors import InputError
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 from chipload.geometry.revolve import Revolved
 from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.covering.covering import covering_of, depth_of
@@ -35,7 +35,7 @@ def wavy(side=1):
     u, v = np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 7)
     U, V = np.meshgrid(u, v, indexing="ij")
     grid = np.stack([20.0 * U**1.5 + 4.0 * V, 12.0 * V, 1.5 * np.sin(4.0 * U) * np.cos(3.0 * V)], axis=-1)
-    return through(grid, u, v, side=side)
+    return patch_through(grid, u, v, side=side)
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_no_point_of_a_patch_is_far_from_a_node():
 
 
 def test_a_kink_of_a_patch_has_nodes():
-    corner = through(
+    corner = patch_through(
         [[[0, 0, 0], [0, 4, 0]], [[3, 0, 0], [3, 4, 0]], [[3, 0, 3], [3, 4, 3]]], [0, 0.5, 1], [0, 1], (1, 1)
     )
     made = patch_nodes(corner, 1.0)

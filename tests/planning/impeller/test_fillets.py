@@ -7,9 +7,9 @@ import pytest
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.errors import InputError
-from chipload.geometry.bspline import BSplinePatch, through
+from chipload.geometry.bspline import BSplinePatch, patch_through
 from chipload.geometry.revolve import Revolved
-from chipload.geometry.sections import Blade, facing
+from chipload.geometry.sections import Blade, face_patch
 from chipload.planning.impeller.answer import largest_cutters
 from chipload.planning.impeller.closed_form import axis_at, rho_limits
 from chipload.planning.impeller.compare import gouges
@@ -25,7 +25,7 @@ RADIUS = 3.0
 
 def plane(y: float, sign: float) -> BSplinePatch:
     grid = np.array([[[20.0, y, 0.0], [20.0, y, 30.0]], [[60.0, y, 0.0], [60.0, y, 30.0]]])
-    return facing(through(grid, [0.0, 1.0], [0.0, 1.0]), sign)
+    return face_patch(patch_through(grid, [0.0, 1.0], [0.0, 1.0]), sign)
 
 
 @pytest.fixture(scope="module")

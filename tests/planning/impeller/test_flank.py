@@ -9,12 +9,12 @@ from scipy.optimize import minimize
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 from chipload.machine.machine import machine_named
 from chipload.planning.impeller.five_axis_program import (
     LinkedPath,
     five_axis_program,
-    lifted,
+    lift_from_end,
     outline_of,
     rotary_share,
 )
@@ -31,7 +31,7 @@ CUTTER = CatalogueCutter(12.0, 1.0)
 def ruled(lower, upper, side=1):
     """The patch through straight lines between two curves (41, 3)."""
     v = np.linspace(0.0, 1.0, 5)
-    return through(lower[:, None] * (1.0 - v[:, None]) + upper[:, None] * v[:, None], U, v, side=side)
+    return patch_through(lower[:, None] * (1.0 - v[:, None]) + upper[:, None] * v[:, None], U, v, side=side)
 
 
 def cone(turn=0.9):
@@ -120,7 +120,7 @@ def test_rotary_axes_keep_their_rates_and_the_cutter_stays_above_between_passes(
     passes = []
     for up in ((0.0, 0.5), (0.5, 1.0)):
         path = flank_pass(side, (0.1, 0.9), up, CUTTER, 0.01)
-        ends = [lifted(path, k, scene, outline, CUTTER, how, 0.0) for k in (0, -1)]
+        ends = [lift_from_end(path, k, scene, outline, CUTTER, how, 0.0) for k in (0, -1)]
         assert ends[0] is not None
         assert ends[1] is not None
         passes.append(LinkedPath(path, *ends))

@@ -14,7 +14,7 @@ from chipload.planning.impeller.compare import clear_somewhere, cutter_choices, 
 from chipload.planning.impeller.costs import STEP, ChannelSide, Costs, MeasuredCost, Terms
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.patch import Patch
-from chipload.planning.impeller.patches import costs_of, divided, with_begins
+from chipload.planning.impeller.patches import costs_of, divide_sides, with_begins
 from chipload.planning.impeller.scene import Scene
 from chipload.planning.impeller.step_over import step_over
 
@@ -89,7 +89,7 @@ def test_times_are_those_of_the_gouge_test():
 @pytest.mark.parametrize("most", [1, 2])
 def test_least_time_of_all_ways(sides, most):
     side = sides[0]
-    found = divided(costs_of([side], TERMS), most)
+    found = divide_sides(costs_of([side], TERMS), most)
     costs = costs_of([side], TERMS)[0]
     costs.prove(list(product(*(range(n) for n in costs.known.shape))))
     K, T = costs.known.shape[1:]
@@ -109,7 +109,7 @@ def test_least_time_of_all_ways(sides, most):
 
 def test_every_point_of_a_patch_is_clear(sides):
     for most in (1, 2, None):
-        found = divided(costs_of(sides, TERMS), most)
+        found = divide_sides(costs_of(sides, TERMS), most)
         assert found.bound_any_shape <= found.bound <= found.total
         for side in sides:
             own = [p for p in found.patches if p.side == side.side]
@@ -145,10 +145,10 @@ def test_one_hard_point_decides_its_strip_alone():
     answer = largest_cutters(scene, SHOP, TABLES, 0.5)
     free = Terms(2.0, 0.1, 0.0, 0.0)
     hard = ChannelSide(0, "plus", scene, side.u, side.v, side.area, answer, 0.5)
-    small = divided(costs_of([hard], free), None)
+    small = divide_sides(costs_of([hard], free), None)
     sizes = {SHOP.cutters[p.cutter].diameter for p in small.patches}
     assert len(sizes) > 1
-    assert small.total > divided(costs_of([side], free), None).total
+    assert small.total > divide_sides(costs_of([side], free), None).total
 
 
 def test_what_nothing_reaches_is_listed():
@@ -168,7 +168,7 @@ def test_what_nothing_reaches_is_listed():
     missed = {x.point for x in answer.unreachable}
     assert 4 in missed
     assert len(missed) < 12
-    found = divided(costs_of([ChannelSide(0, "plus", scene, side.u, side.v, side.area, answer, 0.5)], TERMS), None)
+    found = divide_sides(costs_of([ChannelSide(0, "plus", scene, side.u, side.v, side.area, answer, 0.5)], TERMS), None)
     assert {x.point for x in found.unreachable[0]} == missed
     assert sum(p.area for p in found.patches) == pytest.approx(side.area[answer.cutter >= 0].sum())
     assert sum(len(rows) == 0 for p in found.patches for rows in p.ranges) == len(missed)

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 from chipload.jobs.impeller.five_axis import all_channels
 from chipload.machine.machine import machine_named
 from chipload.planning.impeller.axis_field import AxisField, AxisLimits, axis_field, clear_field, directions
 from chipload.planning.impeller.five_axis_program import (
     LinkedPath,
     five_axis_program,
-    lifted,
+    lift_from_end,
     outline_of,
     rotary_share,
 )
@@ -43,7 +43,7 @@ def scene_of(*patches):
 
 def plane():
     """30 x 20 mm, normal up."""
-    return through([[[40, 0, 0], [40, 20, 0]], [[70, 0, 0], [70, 20, 0]]], [0, 1], [0, 1])
+    return patch_through([[[40, 0, 0], [40, 20, 0]], [[70, 0, 0], [70, 20, 0]]], [0, 1], [0, 1])
 
 
 def hollow(radius=30.0, half=0.5):
@@ -51,12 +51,12 @@ def hollow(radius=30.0, half=0.5):
     a, x = np.linspace(-half, half, 41), np.linspace(0.0, 25.0, 5)
     rim = np.stack([0.0 * a, radius * np.sin(a), radius - radius * np.cos(a)], axis=-1)
     grid = rim[None] + x[:, None, None] * np.array([1.0, 0.0, 0.0]) + [40.0, 0.0, 0.0]
-    return through(grid, x / 25.0, (a + half) / (2.0 * half))
+    return patch_through(grid, x / 25.0, (a + half) / (2.0 * half))
 
 
 def fence(high):
     """A wall 7 mm behind the end of the trough."""
-    return through([[[72, -20, 0], [72, -20, high]], [[72, 20, 0], [72, 20, high]]], [0, 1], [0, 1])
+    return patch_through([[[72, -20, 0], [72, -20, high]], [[72, 20, 0], [72, 20, high]]], [0, 1], [0, 1])
 
 
 def away(points, tips, axes, cutter, parts=4):
@@ -121,7 +121,7 @@ def test_nothing_is_left_above_the_scallop_and_nothing_gouges(cutter, along):
 def test_lines_end_where_the_surface_becomes_too_narrow_for_them():
     """A wedge, 20 mm wide at one end and 6 at the other: with lines from end to end its narrow end is crowded."""
     corners = [[[40, 0, 0], [40, 20, 0]], [[100, 7, 0], [100, 13, 0]]]
-    wedge, ball, h = through(corners, [0, 1], [0, 1]), CatalogueCutter(6.0, 3.0), 0.05
+    wedge, ball, h = patch_through(corners, [0, 1], [0, 1]), CatalogueCutter(6.0, 3.0), 0.05
     path = point_path(wedge, "u", WHOLE, upright(wedge, 0.4), ball, h, 0.005)
     most = 2.0 * math.sqrt(2.0 * h * 3.0 - h * h)
     ends = np.array([[at[:, 0].min(), at[:, 0].max()] for at, _ in path.each_line])
@@ -153,7 +153,7 @@ def milled():
     nodes /= np.linalg.norm(nodes, axis=2)[..., None]
     field = AxisField(np.linspace(0, 1, 3), np.array([0.0, 1.0]), nodes, np.ones((2, 3, 2)))
     path = point_path(surface, "u", WHOLE, field, cutter, 0.3, 0.01)
-    begin, end = (lifted(path, k, scene, outline, cutter, LINK, 0.0) for k in (0, -1))
+    begin, end = (lift_from_end(path, k, scene, outline, cutter, LINK, 0.0) for k in (0, -1))
     linked = LinkedPath(path, begin, end)
 
     def at(feed, machine=MACHINE):

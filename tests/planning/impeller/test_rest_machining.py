@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 from chipload.planning.impeller.lines import LineMotion
 from chipload.planning.impeller.rest_machining import RestSettings, corner_step, face_of, left_over, regions
 from chipload.planning.impeller.scene import Scene
@@ -19,8 +19,8 @@ OWN = Catalogue("own", (BALL, SMALL))
 LARGE, LITTLE = OWN.cutters.index(BALL), OWN.cutters.index(SMALL)
 UP = np.array([0.0, 0.0, 1.0])
 #: 40 by 30 mm
-FLAT = through([[[0, 0, 0], [0, 30, 0]], [[40, 0, 0], [40, 30, 0]]], [0, 1], [0, 1])
-FLAT = FLAT if FLAT.normal(0.5, 0.5)[0, 2] > 0.0 else through(
+FLAT = patch_through([[[0, 0, 0], [0, 30, 0]], [[40, 0, 0], [40, 30, 0]]], [0, 1], [0, 1])
+FLAT = FLAT if FLAT.normal(0.5, 0.5)[0, 2] > 0.0 else patch_through(
     [[[0, 0, 0], [0, 30, 0]], [[40, 0, 0], [40, 30, 0]]], [0, 1], [0, 1], side=-1
 )  # fmt: skip
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 from chipload.planning.impeller import _scallop
 from chipload.planning.impeller.scallop_height import distance, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
@@ -65,7 +65,7 @@ def test_second_order_where_the_corner_alone_counts():
 def test_crest_between_two_lines_of_a_bent_surface(bend):
     x, y = np.linspace(-6.0, 6.0, 13), np.linspace(-2.0, 2.0, 5)
     X, Y = np.meshgrid(x, y, indexing="ij")
-    patch = through(np.stack([X, Y, 0.5 * bend * X**2], axis=-1), (x + 6) / 12, (y + 2) / 4)
+    patch = patch_through(np.stack([X, Y, 0.5 * bend * X**2], axis=-1), (x + 6) / 12, (y + 2) / 4)
     u = np.linspace(0.2, 0.8, 41)
     q = (0.4, 0.4 + 0.9 / 4.0)
     poses = []
@@ -165,7 +165,7 @@ def test_heights_are_those_of_a_search_through_all_poses(rho, corner, step):
     """
     x, y = np.linspace(-6.0, 6.0, 13), np.linspace(-4.0, 4.0, 7)
     X, Y = np.meshgrid(x, y, indexing="ij")
-    patch = through(np.stack([X, Y, 0.01 * X**2 - 0.02 * Y**2], axis=-1), (x + 6) / 12, (y + 4) / 8)
+    patch = patch_through(np.stack([X, Y, 0.01 * X**2 - 0.02 * Y**2], axis=-1), (x + 6) / 12, (y + 4) / 8)
     u = np.linspace(0.1, 0.9, 121)
     q = (np.full(len(u), 0.3), 0.3 + step * (1.0 + 0.4 * np.sin(2.0 * np.pi * u)) / 8.0)
     tips, axes = [], []

@@ -8,7 +8,7 @@ import numpy as np
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.jobs.impeller.checkpoint import part_bytes
-from chipload.planning.impeller.answer import joined, largest_cutters
+from chipload.planning.impeller.answer import join_answers, largest_cutters
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
 from chipload.planning.impeller.surfaces import ContactSampling, surface_of
 
@@ -27,4 +27,4 @@ def test_blocks_have_the_answer_of_all_points() -> None:
     for ends in ((0, 1, 12), (0, 5, 6, 12)):
         blocks = itertools.pairwise(ends)
         parts = [largest_cutters(scene, CUTTERS, TABLES, 0.5, points=np.arange(a, b)) for a, b in blocks]
-        assert part_bytes(joined(parts)) == part_bytes(whole)
+        assert part_bytes(join_answers(parts)) == part_bytes(whole)

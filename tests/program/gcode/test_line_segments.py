@@ -12,7 +12,7 @@ from chipload.errors import InputError
 from chipload.jobs.feeds.same_path import lines_off_path
 from chipload.machine.machine import machine_named
 from chipload.program.commands import ARC, PLANE_AXES, arc_sweeps, starts
-from chipload.program.gcode.line_segments import LinePath, line_forms, mismatch, rounded, with_segments
+from chipload.program.gcode.line_segments import LinePath, line_forms, mismatch, round_point, with_segments
 from chipload.program.gcode.reader import read_gcode
 from chipload.program.motions import lengths
 from chipload.program.program import ARC_CW
@@ -34,7 +34,7 @@ def in_segments(text: str, line: int, shares: list[float], dialect: str = "linux
     assert form.reason == ""
     assert mismatch(form, path) == ""
     sweep = float(arc_sweeps(commands)[k])
-    points = [rounded(path, (u, u + 0.01), sweep, form.unit, 4) for u in shares]
+    points = [round_point(path, (u, u + 0.01), sweep, form.unit, 4) for u in shares]
     whole = LinePath(path.start, path.end, np.array(points), path.plane, path.centre)
     return with_segments(text, line_forms(text), {line: whole}, 4)[0]
 

@@ -11,7 +11,7 @@ import shapely
 
 from chipload.errors import Severity
 from chipload.program.commands import ARC, LINE
-from chipload.program.corners import Element, chamfer, rounding
+from chipload.program.corners import Element, chamfer, rounding_arc
 from chipload.program.heidenhain.reader import read_heidenhain
 
 HEAD = ("BEGIN PGM A MM", "TOOL DEF 1 L+0 R+1", "TOOL CALL 1 Z S1000 F500", "L X+0 Y+10 Z+0 R0 FMAX M3")
@@ -90,7 +90,7 @@ def test_a_rounding_touches_both_elements(seed):
         return Element(start, end, middle + across * rng.uniform(-2, 2), int(rng.choice([-1, 1])))
 
     one, two = element(True), element(False)
-    arc = rounding(one, two, 0.3)
+    arc = rounding_arc(one, two, 0.3)
     if arc is None:
         return
     for e, point in ((one, arc.start), (two, arc.end)):
@@ -110,7 +110,7 @@ def test_most_random_corners_have_a_rounding():
     for seed in range(60):
         rng = np.random.default_rng(seed)
         a, b = complex(*rng.uniform(-20, 20, 2)), complex(*rng.uniform(-20, 20, 2))
-        found += rounding(Element(a, 0j), Element(0j, b), 0.3) is not None
+        found += rounding_arc(Element(a, 0j), Element(0j, b), 0.3) is not None
     assert found >= 55
 
 

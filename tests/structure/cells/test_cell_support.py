@@ -15,7 +15,7 @@ from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import Clamp
 from chipload.structure.cells.grid import grid_over
 from chipload.structure.cells.moments import StockRegion
-from chipload.structure.cells.support import supported
+from chipload.structure.cells.support import support_line
 from chipload.structure.cells.workpiece import Elastic, cell_workpiece, displacements, line_compliances, mode_weights
 from chipload.structure.factors import Factors
 
@@ -32,7 +32,7 @@ LINE, FORCE = [(12.0, 0.0, 24.0), (12.0, 0.0, 24.0)], np.array([3.0, 50.0, -8.0]
 
 def test_a_support_is_a_spring_in_the_stiffness(wall):
     points, normals = [(14.0, 2.5, 22.0), (40.0, 2.5, 5.0)], [(0.0, 1.0, 0.0), (0.0, 0.6, 0.8)]
-    found = supported(wall, LINE, FORCE, points, normals, 1e4)
+    found = support_line(wall, LINE, FORCE, points, normals, 1e4)
     for k, (point, normal) in enumerate(zip(points, normals, strict=True)):
         w = mode_weights(wall, np.array([point])).toarray()[0]
         r = np.outer(w, normal).ravel()
@@ -52,4 +52,4 @@ def test_displacements_are_those_of_the_compliance(wall):
 
 def test_a_support_without_stiffness_is_refused(wall):
     with pytest.raises(InputError, match="stiffness 0 N/mm: must be above 0"):
-        supported(wall, LINE, FORCE, [(1.0, 0.0, 5.0)], [(0.0, 1.0, 0.0)], 0.0)
+        support_line(wall, LINE, FORCE, [(1.0, 0.0, 5.0)], [(0.0, 1.0, 0.0)], 0.0)

@@ -210,7 +210,7 @@ def modes(body: Plate | ClampedPart, count: int = 4, points_mm: ArrayLike = ()) 
     if isinstance(body, Plate):
         if body.density_kg_m3 is None:
             raise InputError("plate.density_kg_m3: missing: natural modes need the mass of the plate")
-        factored = _factored(body)
+        factored = _factor_mesh(body)
         frequency, nodes = solid_modes.modes(factored, count)
         found = weights(factored.solid.grid, _on_face(body, factored, _points(points_mm, 2)))
         shape = np.einsum("pn,knc->kpc", found.toarray(), nodes)
@@ -246,7 +246,7 @@ def _points(points_mm: ArrayLike, columns: int) -> Floats:
 
 
 # -- plate ------------------------------------------------------------------------------------------------------
-def _factored(body: Plate) -> Factored:
+def _factor_mesh(body: Plate) -> Factored:
     """Return the mesh of a plate, factored; a density that is not stated has no effect on its stiffness."""
     grid = plate(body.length_mm, body.height_mm, body.thickness_mm, body.elements)
     fixed = np.unique(np.concatenate([grid.side(EDGES[edge]) for edge in body.clamped]))
@@ -271,7 +271,7 @@ def _of_plate(body: Plate, force_at_mm: ArrayLike, point_at_mm: ArrayLike | None
     point = force if point_at_mm is None else _points(point_at_mm, 2)
     if len(point) != len(force):
         raise InputError(f"compliance: {len(force)} forces and {len(point)} points: must be as many")
-    factored = _factored(body)
+    factored = _factor_mesh(body)
     normals = np.tile([0.0, 0.0, 1.0], (len(force), 1))
     acting, seen = (loads(factored, _on_face(body, factored, at), normals).toarray() for at in (force, point))
     return read_only(1000.0 * np.einsum("fp,fp->p", seen, factored.solve(acting)))

@@ -19,7 +19,7 @@ from chipload.api.mechanics.cut import (
 )
 from chipload.api.values import AnyCutter
 from chipload.cutting.force import forces_over_turn, greatest_forces, mean_forces
-from chipload.cutting.material import Material, beyond
+from chipload.cutting.material import Material, texts_beyond_range
 from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 
@@ -127,5 +127,5 @@ def tooth_forces(
         greatest_force_n=float(np.hypot(greatest["force_t"], greatest["force_n"])[0]),
         greatest_torque_nm=float(greatest["torque"][0]) / 1000.0,
         mean_power_w=float(mean_torque[0] * omega[0]) / 1000.0,
-        notes=beyond(metal, float(chips.chip_max()[0]), float(omega[0]) * mill.radius),
+        notes=texts_beyond_range(metal, float(chips.chip_max()[0]), float(omega[0]) * mill.radius),
     )

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
         SpindleState,
         advance,
         at_speed,
-        estimated,
+        estimate_state,
         read_current,
     )
 
@@ -28,7 +28,7 @@ __all__ = [
     "ToolPath",
     "advance",
     "at_speed",
-    "estimated",
+    "estimate_state",
     "locate",
     "panel_hal",
     "panel_xml",
@@ -44,6 +44,6 @@ __getattr__, __dir__ = attach(
         "hal_client": "ControlledMachine HalPins PinValues",
         "panel": "panel_hal panel_xml",
         "path": "ToolPath locate read_path tool_path write_path",
-        "simulated_spindle": "Load SpindleState advance at_speed estimated read_current",
+        "simulated_spindle": "Load SpindleState advance at_speed estimate_state read_current",
     },
 )

@@ -115,7 +115,7 @@ def read_current(spindle: Spindle, state: SpindleState, noise: float) -> float:
     return round(current / spindle.current_step) * spindle.current_step if spindle.current_step > 0.0 else current
 
 
-def estimated(believed: Spindle, state: SpindleState, current: float, seconds: float) -> SpindleState:
+def estimate_state(believed: Spindle, state: SpindleState, current: float, seconds: float) -> SpindleState:
     """The state after the estimator read ``current`` [A], ``seconds`` after the last reading."""
     values = np.array([state.last_speed, state.lagged_speed, state.filtered])
     _estimator.read(belief_of(believed), values, current, state.speed, seconds)
@@ -127,4 +127,4 @@ def estimated(believed: Spindle, state: SpindleState, current: float, seconds: f
 
 def measure(spindle: Spindle, state: SpindleState, noise: float, seconds: float) -> SpindleState:
     """The state after a reading with ``noise`` [A] of a spindle that is what the estimator takes it for."""
-    return estimated(spindle, state, read_current(spindle, state, noise), seconds)
+    return estimate_state(spindle, state, read_current(spindle, state, noise), seconds)

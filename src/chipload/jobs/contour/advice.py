@@ -66,15 +66,15 @@ def greatest_engagement(
     cut = CutConditions(cutter, material, depth, rad_s_from_rpm(op.speed_rpm), op.milling, *rigid)
     feed = mm_s_from_mm_min(op.feed_mm_min)
 
-    def exceeded(degrees: float) -> LimitCheck | None:
-        return _exceeded(cut, feed, math.radians(degrees), limits, checks, machine)
+    def limit_exceeded_at(degrees: float) -> LimitCheck | None:
+        return _exceeded_limit(cut, feed, math.radians(degrees), limits, checks, machine)
 
     most = min(GREATEST_DEG, limits.get("engagement_deg", GREATEST_DEG))
     # the rigid model needs a radial depth that is not too small: what holds need not hold below it
     candidates = [most, *np.arange(math.ceil(most / APART_DEG) - 1, 0, -1) * APART_DEG]
     by, high = None, most
     for low in (float(x) for x in candidates if x >= LEAST_DEG):
-        found = exceeded(low)
+        found = limit_exceeded_at(low)
         if found is None:
             break
         by, high = found, low
@@ -91,7 +91,7 @@ def greatest_engagement(
         return EngagementAdvice(math.radians(most), f"engagement {most:.4g} deg, by {what}")
     while high - low > CLOSE_DEG:
         middle = 0.5 * (low + high)
-        found = exceeded(middle)
+        found = limit_exceeded_at(middle)
         if found is None:
             low = middle
         else:
@@ -105,7 +105,7 @@ def _limit_text(check: LimitCheck) -> str:
     return f"{check.name}{value}{f', {check.reason}' if check.reason else ''}"
 
 
-def _exceeded(
+def _exceeded_limit(
     cut: CutConditions,
     feed: float,
     angle: float,

@@ -9,7 +9,7 @@ from html import escape
 import plotly.graph_objects as go
 
 from chipload.jobs.contour.outcome import ContourResult, Operation
-from chipload.jobs.contour.pass_figures import COLOURS, along, plan
+from chipload.jobs.contour.pass_figures import COLOURS, loads_along_pass, plan
 from chipload.jobs.contour.programs import program_files
 from chipload.jobs.contour.result import limits_of, samples_of
 from chipload.jobs.contour.scene import blanks_of, scene_bytes
@@ -54,7 +54,7 @@ def _operation(machine: Machine, k: int, op: Operation, figures: dict[str, go.Fi
         "limits states what each limit covers.</p>",
         _strategies(machine, op),
         f"<h3>Along the {'pass' if result.kind != 'contour' else 'finish pass'}</h3>",
-        figure(f"along-{k}", along(op), figures),
+        figure(f"along-{k}", loads_along_pass(op), figures),
         "<h3>Plan view</h3>",
         '<p class="note">The pass is coloured by engagement, dashed lines are passes before it, diamonds are events, '
         "crosses exceed a limit. Click a name to show or hide it.</p>",

@@ -108,7 +108,7 @@ def read_finish(
     cuts &= flat_lengths(p) > LEVEL_MM
     runs: list[NDArray[np.int64]] = []
     if labels:
-        ranges = _labelled(path, text, labels)
+        ranges = _lines_between_labels(path, text, labels)
     else:
         ranges = list(zip(lines[0::2], lines[1::2], strict=True)) or [(0, int(p.line.max(initial=0)))]
     for first, last in ranges:
@@ -153,7 +153,7 @@ def _heights(path: Path, p: Program, runs: Sequence[NDArray[np.int64]], top: flo
     return out
 
 
-def _labelled(path: Path, text: str, labels: Sequence[str]) -> list[tuple[int, int]]:
+def _lines_between_labels(path: Path, text: str, labels: Sequence[str]) -> list[tuple[int, int]]:
     """First and last line between each pair of labels; a label is found as a whole word."""
     lines = text.splitlines()
     places = [

@@ -65,7 +65,7 @@ def load(path: Path, table: ContourJobTable, overrides: Sequence[str]) -> Contou
     errors.texts += _contradictions(table, tools)
     errors.refuse()
     return ContourJob(
-        path, table, tools, folder / table.part.file, sources["machine"], sources["material"], _unused(table),
+        path, table, tools, folder / table.part.file, sources["machine"], sources["material"], _unused_keys(table),
         tuple(overrides),
     )  # fmt: skip
 
@@ -186,7 +186,7 @@ def _wrong_strategies(at: str, op: OperationTable) -> Iterator[str]:
         yield f"{at}.use = '{op.use}': must be one of {at}.strategies = {', '.join(listed)}"
 
 
-def _unused(table: ContourJobTable) -> tuple[str, ...]:
+def _unused_keys(table: ContourJobTable) -> tuple[str, ...]:
     """Stated keys that the kind of their operation does not use."""
     out = []
     for k, op in enumerate(table.operation):

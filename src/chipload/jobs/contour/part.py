@@ -49,7 +49,7 @@ def read_part(job: ContourJob) -> tuple[tuple[Contour, ...], tuple[Contour, ...]
     else:
         raise InputError(f"part.file = {part.file}: must end in .dxf, .step or .stp, or be a program")
     outline, contours = _stock_outline(part.stock_layers, drawing) if part.stock_layers else ((), drawing.contours)
-    contours, outline = moved(contours, part.origin_mm), moved(outline, part.origin_mm)
+    contours, outline = move_contours(contours, part.origin_mm), move_contours(outline, part.origin_mm)
     kept, left_out = closed_alone(contours) if part.open_chains == "dropped" else (contours, ())
     used, crossings = clear_of_each_other(kept)
     found = tuple(replace(f, text=f"part: {f.text}") for f in (*drawing.findings, *left_out, *crossings))
@@ -80,7 +80,7 @@ def require_heights(job: ContourJob, face: StepLevel) -> None:
             )
 
 
-def moved(contours: Sequence[Contour], origin: tuple[float, float]) -> tuple[Contour, ...]:
+def move_contours(contours: Sequence[Contour], origin: tuple[float, float]) -> tuple[Contour, ...]:
     """The contours in a frame whose origin is a place of the drawing [mm]."""
     if origin == (0.0, 0.0):
         return tuple(contours)

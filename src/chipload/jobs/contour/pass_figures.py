@@ -33,7 +33,7 @@ from chipload.result.style import (
     STOCK,
     WALL,
 )
-from chipload.result.thinning import thinned
+from chipload.result.thinning import thin_rows
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def shown_rows(strategy: StrategyResult) -> NDArray[np.bool_]:
     return next((some for some in (finish, cut) if some.any()), np.ones(len(names), dtype=np.bool_))
 
 
-def along(operation: Operation) -> go.Figure:
+def loads_along_pass(operation: Operation) -> go.Figure:
     """Engagement, force, form error and feed along the finish pass, all strategies overlaid."""
     shown = [r for r in ROWS if any(s.history[r][shown_rows(s)].any() for s in operation.result.strategies.values())]
     shown = shown or [ROWS[0]]
@@ -71,8 +71,8 @@ def along(operation: Operation) -> go.Figure:
         s, apart = _abscissa(strategy.history, where)
         for row, column in enumerate(shown, start=1):
             values = np.abs(np.asarray(strategy.history[column], dtype=np.float64)[where])
-            x, y = _gapped(s, values, apart)
-            keep = thinned(y, LINE_POINTS)
+            x, y = _leave_gaps(s, values, apart)
+            keep = thin_rows(y, LINE_POINTS)
             highest[row - 1] = max(highest[row - 1], float(values.max(initial=0.0)))
             figure.add_trace(
                 go.Scatter(
@@ -108,7 +108,7 @@ def along(operation: Operation) -> go.Figure:
             figure.add_annotation(**label, **at, row=row, col=1)
     figure.update_xaxes(title_text="length along the pass [mm]", row=len(shown), col=1)
     figure.update_layout(hovermode="x unified", legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0})
-    return _styled(figure, 110 + 172 * len(shown), {"l": 64, "r": 16, "t": 30, "b": 44})
+    return _style_figure(figure, 110 + 172 * len(shown), {"l": 64, "r": 16, "t": 30, "b": 44})
 
 
 def plan(machine: Machine, operation: Operation) -> go.Figure:
@@ -126,7 +126,7 @@ def plan(machine: Machine, operation: Operation) -> go.Figure:
         before = np.flatnonzero(names == "semifinish")
         if len(before):
             keep = before[:: max(1, len(before) // LINE_POINTS)]
-            x, y = _lifted(h, keep)
+            x, y = _places_of_rows(h, keep)
             figure.add_trace(
                 go.Scatter(
                     x=x, y=y, mode="lines", legendgroup=name, showlegend=False, visible=visible,
@@ -140,11 +140,11 @@ def plan(machine: Machine, operation: Operation) -> go.Figure:
     figure.update_yaxes(scaleanchor="x", scaleratio=1.0, title_text="y [mm]")
     figure.update_xaxes(title_text="x [mm]")
     figure.update_layout(legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0})
-    return _styled(figure, 640, {"l": 64, "r": 16, "t": 60, "b": 44})
+    return _style_figure(figure, 640, {"l": 64, "r": 16, "t": 60, "b": 44})
 
 
 # -- parts ------------------------------------------------------------------------------------------------------
-def _styled(figure: go.Figure, height: int, margin: Mapping[str, int]) -> go.Figure:
+def _style_figure(figure: go.Figure, height: int, margin: Mapping[str, int]) -> go.Figure:
     figure.update_layout(
         template="none", height=height, margin=dict(margin), font=FONT, paper_bgcolor="white", plot_bgcolor="white"
     )
@@ -162,11 +162,11 @@ def _abscissa(history: Mapping[str, NDArray[Any]], where: NDArray[np.int64]) -> 
     return np.cumsum(step), apart
 
 
-def _gapped(x: Floats, y: Floats, apart: NDArray[np.int64]) -> tuple[Floats, Floats]:
+def _leave_gaps(x: Floats, y: Floats, apart: NDArray[np.int64]) -> tuple[Floats, Floats]:
     return np.insert(x, apart, x[apart]), np.insert(y, apart, np.nan)
 
 
-def _lifted(history: Mapping[str, NDArray[Any]], rows: NDArray[np.int64]) -> tuple[Floats, Floats]:
+def _places_of_rows(history: Mapping[str, NDArray[Any]], rows: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """Places of rows, x and y, with a gap where rows between them belong to something else."""
     piece = stretches(history)[rows]
     apart = np.flatnonzero(piece[1:] != piece[:-1]) + 1
@@ -207,7 +207,7 @@ def _shaded_lines(
     rows = np.flatnonzero(shown_rows(strategy))
     engagement = np.asarray(h["engagement_deg"], dtype=np.float64)
     even = rows[:: max(1, len(rows) // PLAN_POINTS)]
-    keep = np.union1d(even, rows[thinned(engagement[rows], PLAN_POINTS // 2)])
+    keep = np.union1d(even, rows[thin_rows(engagement[rows], PLAN_POINTS // 2)])
     piece = stretches(h)[keep]
     joined = np.flatnonzero(piece[1:] == piece[:-1])
     a = engagement[keep[joined + 1]]

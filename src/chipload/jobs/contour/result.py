@@ -51,7 +51,7 @@ def result_of(outcome: ContourResult) -> Result:
         operations=tuple(_operation(k, op) for k, op in enumerate(outcome.operations)),
         findings=outcome.findings,
         unchecked=(
-            *_unchecked(outcome),
+            *_unchecked_texts(outcome),
             *(f"limit {name}: not stated" for name in outcome.unchecked),
             *_not_compared(outcome),
         ),
@@ -143,13 +143,13 @@ def _track(outcome: ContourResult, k: int, op: Operation, name: str) -> Track:
         time_high_s=time_high(strategy.program, outcome.machine, float(strategy.summary["time_s"])),
         limits=limits_of(outcome.machine, op, strategy, track),
         findings=findings_of(op, name),
-        programs=(f"{stem}.{ENDINGS[outcome.machine.dialect]}", f"{stem}.apt", *_inserted(k, op, name)),
+        programs=(f"{stem}.{ENDINGS[outcome.machine.dialect]}", f"{stem}.apt", *_inserted_program(k, op, name)),
         operation=k,
         blocks=in_memory(history_of(op, strategy)),
     )
 
 
-def _inserted(k: int, op: Operation, name: str) -> tuple[str, ...]:
+def _inserted_program(k: int, op: Operation, name: str) -> tuple[str, ...]:
     """The program that the finish path came from, with semi-finish passes; of the strategy in use."""
     return (f"{k}-semifinish-{op.inserted[0]}",) if op.inserted[1] and name == op.result.use else ()
 
@@ -179,7 +179,7 @@ def _event(e: Event, z: float) -> Finding:
     return Finding(e.code, 0, e.text, Severity.EXCEEDS if e.failure else Severity.NOTE, (e.x, e.y, z))
 
 
-def _unchecked(outcome: ContourResult) -> tuple[str, ...]:
+def _unchecked_texts(outcome: ContourResult) -> tuple[str, ...]:
     """Default checks that are not made, each once."""
     out: dict[str, None] = {}
     for op in outcome.operations:

@@ -208,7 +208,7 @@ def plan_inputs(job: ContourJob, inputs: Inputs, provenance: Provenance, progres
 
         operations.append(_operation(job, own, op, [done.result for done in operations], part))
     if inputs.finish:
-        operations[0] = replace(operations[0], inserted=_inserted(inputs, operations))
+        operations[0] = replace(operations[0], inserted=_inserted_text(inputs, operations))
     progress(1.0, "done")
     return ContourResult(
         title=title_of(job.path),
@@ -236,8 +236,8 @@ def check(job: ContourJob) -> tuple[list[str], bool]:
     ]
     beyond, cleared = list[str](), list[tuple[float, Clearing, float]]()
     for k, (op, own) in enumerate(_cuts(job, inputs)):
-        op, _ = _resolved(job, own, op)
-        cutter, setting = job.cutters[op.cutter], _setting(job, own, op)
+        op, _ = _resolve_operation(job, own, op)
+        cutter, setting = job.cutters[op.cutter], _planner_request(job, own, op)
         if isinstance(setting, Clearing):
             cleared.append((check_pocket(own.contours, setting, cutter), setting, cutter.radius))
             what = f"{cleared[-1][0]:.6g} mm2"
@@ -272,7 +272,7 @@ def _operation(
     job: ContourJob, inputs: Inputs, op: OperationTable, planned: Sequence[OperationResult], progress: Progress
 ) -> Operation:
     cutter = job.cutters[op.cutter]
-    op, advice = _resolved(job, inputs, op)
+    op, advice = _resolve_operation(job, inputs, op)
     result = _plan(job, inputs, op, cutter, planned, lambda done, what: progress(0.5 * done, what))
     result = replace(result, findings=(*result.findings, *advice))
     settings = {k: v for k, v in op.model_dump().items() if v is not None}
@@ -292,7 +292,7 @@ def _operation(
     return made
 
 
-def _inserted(inputs: Inputs, operations: Sequence[Operation]) -> tuple[str, str]:
+def _inserted_text(inputs: Inputs, operations: Sequence[Operation]) -> tuple[str, str]:
     """Name and text of the program that the finish path came from, with the semi-finish passes of all levels."""
     planned = [op.result.strategies[op.result.use].program for op in operations]
     return inputs.finish[0].file.name, with_semifinish(inputs.finish, planned, inputs.machine)
@@ -307,7 +307,7 @@ def _plan(
     progress: Progress,
 ) -> OperationResult:
     """Call the planner of the operation's kind."""
-    setting = _setting(job, inputs, op, planned)
+    setting = _planner_request(job, inputs, op, planned)
     if isinstance(setting, Clearing):
         return plan_pocket(
             inputs.contours, setting, cutter, inputs.material, inputs.machine, limits=job.limits, progress=progress
@@ -321,7 +321,7 @@ def _rigid(job: ContourJob) -> tuple[float, float]:
     return job.table.checks.deflection_of_feed, job.table.checks.deflection_of_depth
 
 
-def _resolved(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[OperationTable, tuple[str, ...]]:
+def _resolve_operation(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[OperationTable, tuple[str, ...]]:
     """The operation with its radial depth, and how it was found where it is not stated."""
     if op.engagement_deg is None:
         return op, ()
@@ -348,7 +348,7 @@ def _larger(job: ContourJob, op: OperationTable, planned: Sequence[OperationResu
     return LargerCutter(job.cutters[before.cutter].radius, left_on_walls(before), left)
 
 
-def _standing(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[Contour, ...] | None:
+def _standing_material(job: ContourJob, inputs: Inputs, op: OperationTable) -> tuple[Contour, ...] | None:
     """Material in the depth of a pocket before it begins; None where no file states it."""
     if inputs.standing is None:
         return None
@@ -369,7 +369,7 @@ def _wall_finish(op: OperationTable) -> WallFinish | None:
     return WallFinish(feed, speed, own.axial_depth_mm, own.allowance_mm)
 
 
-def _setting(
+def _planner_request(
     job: ContourJob, inputs: Inputs, op: OperationTable, planned: Sequence[OperationResult] = ()
 ) -> Finishing | Clearing:
     """Request of an operation to its planner, after those that are ``planned``."""
@@ -393,7 +393,7 @@ def _setting(
             around=op.side == "outside",
             holes=op.holes_mm or (),
             larger=_larger(job, op, planned),
-            standing=_standing(job, inputs, op),
+            standing=_standing_material(job, inputs, op),
             floor_allowance=op.floor_allowance_mm or 0.0,
             floor_finish=_floor_finish(op),
             wall_finish=_wall_finish(op),

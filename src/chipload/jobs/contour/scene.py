@@ -15,7 +15,7 @@ from chipload.jobs.contour.outcome import ContourResult, Operation
 from chipload.jobs.contour.result import track_name
 from chipload.report.presentation import Blank
 from chipload.report.scene import ROWS, STOCK, TOOL, WALL, engagement_colours
-from chipload.report.shape import merged, ribbon, slab, stretches
+from chipload.report.shape import merge_meshes, ribbon, slab, stretches
 
 Floats = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def _add(scene: Any, prefix: str, op: Operation) -> None:
         contours = used.drawn.get(name, ())
         closed = [c for c in contours if c.closed]
         solid = [slab(closed, low, high)] if name == "stock" and closed else [ribbon(c, low, high) for c in closed]
-        vertices, faces = merged(solid + [ribbon(c, low, high) for c in contours if not c.closed])
+        vertices, faces = merge_meshes(solid + [ribbon(c, low, high) for c in contours if not c.closed])
         if len(faces):
             mesh = trimesh.Trimesh(vertices, faces, process=False)
             mesh.visual.face_colors = np.tile(np.array(colour, dtype=np.uint8), (len(faces), 1))

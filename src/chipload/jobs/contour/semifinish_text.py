@@ -61,14 +61,14 @@ def _feed_after(p: Program, k: int) -> float | None:
 
 
 def _blocks(planned: Program, rows: Ints, p: Program, k: int, decimals: int) -> list[str]:
-    def at(letters: str, values: Sequence[float]) -> str:
+    def words_of(letters: str, values: Sequence[float]) -> str:
         return " ".join(f"{a}{decimal(v, decimals, point=True)}" for a, v in zip(letters, values, strict=True))
 
     x, y, z = p.p_work[k].tolist()
     safe = float(planned.p_work[rows, 2].max())
     out = [f"({COMMENT})"]
     if safe > z:
-        out.append(f"G0 {at('Z', [safe])}")
+        out.append(f"G0 {words_of('Z', [safe])}")
     place = np.array([x, y, max(safe, z)])
     feed = 0.0
     for row in rows.tolist():
@@ -78,50 +78,50 @@ def _blocks(planned: Program, rows: Ints, p: Program, k: int, decimals: int) -> 
         if motion != RAPID:
             feed = float(planned.feed[row])
         if motion == RAPID and place[2] < safe:
-            out.append(f"G0 {at('Z', to[2:])}")
+            out.append(f"G0 {words_of('Z', to[2:])}")
             place = np.array([*place[:2], to[2]])
         if motion in (ARC_CW, ARC_CCW):
             centre = planned.centre[row, :2] - place[:2]
-            out.append(f"G{2 if motion == ARC_CW else 3} {at('XY', to[:2])} {at('IJ', centre)}{word}")
+            out.append(f"G{2 if motion == ARC_CW else 3} {words_of('XY', to[:2])} {words_of('IJ', centre)}{word}")
         else:
-            out.append(f"G{0 if motion == RAPID else 1} {at('XYZ', to)}{word}")
+            out.append(f"G{0 if motion == RAPID else 1} {words_of('XYZ', to)}{word}")
         place = to
-    out += [f"G0 {at('XY', [x, y])}"]
+    out += [f"G0 {words_of('XY', [x, y])}"]
     if z < safe:
-        out.append(f"G0 {at('Z', [z])}")
+        out.append(f"G0 {words_of('Z', [z])}")
     cut = np.flatnonzero(np.isin(p.motion[: k + 1], (LINE, ARC_CW, ARC_CCW)))
     if len(cut):  # the modes that the next lines rely on
         modal = f"F{decimal(mm_min_from_mm_s(1.0) * p.feed[cut[-1]], 3, point=True)}"
-        out.append(modal if p.motion[k] == RAPID else f"G1 {at('XYZ', [x, y, z])} {modal}")
+        out.append(modal if p.motion[k] == RAPID else f"G1 {words_of('XYZ', [x, y, z])} {modal}")
     return out
 
 
 def _conversational(planned: Program, rows: Ints, p: Program, k: int, decimals: int) -> list[str]:
-    def at(letters: str, values: Sequence[float]) -> str:
+    def words_of(letters: str, values: Sequence[float]) -> str:
         pairs = zip(letters, values, strict=True)
         return " ".join(f"{a}{'' if v < 0.0 else '+'}{decimal(v, decimals)}" for a, v in pairs).replace("+-0", "+0")
 
     x, y, z = p.p_work[k].tolist()
     safe = max(float(planned.p_work[rows, 2].max()), z)
-    out = [f"; {COMMENT}", f"L {at('Z', [safe])} R0 FMAX"]
+    out = [f"; {COMMENT}", f"L {words_of('Z', [safe])} R0 FMAX"]
     low = False
     for row in rows.tolist():
         to, motion = planned.p_work[row], int(planned.motion[row])
         word = f"F{decimal(mm_min_from_mm_s(1.0) * planned.feed[row], 3)}"
         if motion == RAPID:
             if low:
-                out.append(f"L {at('Z', [safe])} FMAX")
-            out.append(f"L {at('XYZ', to)} FMAX")
+                out.append(f"L {words_of('Z', [safe])} FMAX")
+            out.append(f"L {words_of('XYZ', to)} FMAX")
         elif motion == LINE:
-            out.append(f"L {at('XYZ', to)} {word}")
+            out.append(f"L {words_of('XYZ', to)} {word}")
         else:
-            out.append(f"CC {at('XY', planned.centre[row, :2].tolist())}")
-            out.append(f"C {at('XY', to[:2])} DR{'-' if motion == ARC_CW else '+'} {word}")
+            out.append(f"CC {words_of('XY', planned.centre[row, :2].tolist())}")
+            out.append(f"C {words_of('XY', to[:2])} DR{'-' if motion == ARC_CW else '+'} {word}")
         low = to[2] < safe - 1e-9
-    out += [f"L {at('Z', [safe])} FMAX", f"L {at('XY', [x, y])} FMAX"]
+    out += [f"L {words_of('Z', [safe])} FMAX", f"L {words_of('XY', [x, y])} FMAX"]
     feed = _feed_after(p, k)
     if z < safe or feed is not None:
-        out.append(f"L {at('Z', [z])} " + ("FMAX" if feed is None else f"F{decimal(feed, 3)}"))
+        out.append(f"L {words_of('Z', [z])} " + ("FMAX" if feed is None else f"F{decimal(feed, 3)}"))
     return out
 
 

@@ -42,18 +42,18 @@ class WrittenOperation:
 
         A pocket whose entries exceed limits of loads gets entries at a lower feed, if they hold there.
         """
-        done = self._simulated(made, strategy, progress)
+        done = self._simulate_text(made, strategy, progress)
         if made.result.kind != "pocket":
             return done
         share = entry_share(
             self._entry_checks(done, strategy.name),
             lambda x: self._entry_checks(
-                self._simulated(made, with_entry_feed(strategy, x), progress), strategy.name
+                self._simulate_text(made, with_entry_feed(strategy, x), progress), strategy.name
             ),
         )  # fmt: skip
-        return done if share == 1.0 else self._simulated(made, with_entry_feed(strategy, share), progress)
+        return done if share == 1.0 else self._simulate_text(made, with_entry_feed(strategy, share), progress)
 
-    def _simulated(self, made: Operation, strategy: StrategyResult, progress: Progress) -> Operation:
+    def _simulate_text(self, made: Operation, strategy: StrategyResult, progress: Progress) -> Operation:
         name, top = strategy.name, made.top
         result = replace(made.result, strategies={**made.result.strategies, name: strategy})
         text = program_text(self.title, self.machine, self.number, result, name, made.cutter, top, NOT_SIMULATED)

@@ -49,7 +49,7 @@ def draft_sections(file: Path, folder: Path, machine: str | None = None) -> Draf
     InputError
         The sections cannot be read.
     """
-    files = _numbered(file)
+    files = _numbered_files(file)
     unit = _unit(files)
     points = read_sections(files, unit)
     if len(points) < 2:
@@ -103,7 +103,7 @@ def draft_blade_model(file: Path, folder: Path, model: Model, machine: str | Non
     return _draft(f"Cut the blade of {file.name} as a thin wall.", entries, size, height, machine)
 
 
-def _numbered(file: Path) -> list[Path]:
+def _numbered_files(file: Path) -> list[Path]:
     """The file, or all files in its folder whose names differ in their last number only."""
     found = _NUMBERED.match(file.stem)
     if file.suffix.lower() in ENDINGS or found is None:

@@ -94,14 +94,14 @@ def _read_contours(file: Path, machine: Machine) -> tuple[Drawing, Sequence[Cont
     whole = [layer for layer in layers if all(c.closed for c in _of_layer(drawing, layer))]
     if len(whole) < len(layers) and whole:
         best = max(whole, key=lambda layer: sum(abs(c.area) for c in _of_layer(drawing, layer)))
-        entries.append(Entry("layers", [best], f"the closed contours of those of {_listed(layers)}", True))
+        entries.append(Entry("layers", [best], f"the closed contours of those of {_list_names(layers)}", True))
         return drawing, _of_layer(drawing, best), entries
     example = str(layers[:1]).replace("'", '"')
-    note = f"layers that are read; the drawing has {_listed(layers)}"
+    note = f"layers that are read; the drawing has {_list_names(layers)}"
     entries.append(Entry("layers", note=note, example=example))
     if whole:
         return drawing, drawing.contours, entries
-    joined = _joined(file, drawing, {e.key: e.value for e in entries if e.guess})
+    joined = _join_gaps(file, drawing, {e.key: e.value for e in entries if e.guess})
     if joined is not None:
         gap, drawing = joined
         why = f"ends of its lines are up to {gap:g} mm apart, they meet half-way"
@@ -113,7 +113,7 @@ def _read_contours(file: Path, machine: Machine) -> tuple[Drawing, Sequence[Cont
     return drawing, closed, [*entries, Entry("open_chains", "dropped", why, True)]
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_names(names: Sequence[str]) -> str:
     """The first names of a list, and how many more there are."""
     more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
     return ", ".join(names[:LISTED]) + more
@@ -145,7 +145,7 @@ def _origin(contours: Sequence[Contour], machine: Machine) -> list[Entry]:
     return [Entry("origin_mm", middle, f"the middle: the drawing lies beyond the travel of {machine.name}", True)]
 
 
-def _joined(file: Path, drawing: Drawing, unit: dict[str, str]) -> tuple[float, Drawing] | None:
+def _join_gaps(file: Path, drawing: Drawing, unit: dict[str, str]) -> tuple[float, Drawing] | None:
     """The narrowest gap [mm] that closes all contours of a drawing, and it read so; None: none does."""
     size = float(_extent(drawing.contours).sum())
     for gap in (g for g in GAPS if g <= GAP_SHARE * size):

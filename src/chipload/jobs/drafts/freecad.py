@@ -224,14 +224,14 @@ def _of_part(file: Path, folder: Path, document: Document, machine: str | None) 
             made = draft_model(path, Path(above), machine)
         named = f"{one.label} of {file.name}"
         tables = tuple(
-            DraftTable(t.name, tuple(_noted(e, named) for e in t.entries), t.repeated, t.note) for t in made.tables
+            DraftTable(t.name, tuple(_note_entry(e, named) for e in t.entries), t.repeated, t.note) for t in made.tables
         )
         title = made.title.replace("part.step", named)
         return Draft(title, tables, made.notes, {"part.step": step})
     raise InputError(f"{file.name}: neither a CAM job nor a part: {reason}")
 
 
-def _noted(entry: Entry, named: str) -> Entry:
+def _note_entry(entry: Entry, named: str) -> Entry:
     if entry.key == "file" and entry.value == "part.step":
         return Entry("file", "part.step", named)
     return entry

@@ -12,7 +12,7 @@ import numpy as np
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import cutter_from_table
-from chipload.errors import InputError, Severity, grouped
+from chipload.errors import InputError, Severity, group_findings
 from chipload.files import read_regular
 from chipload.jobs.drafts.comments import Box, Header, read_header
 from chipload.jobs.drafts.cutters import cutter_table
@@ -121,12 +121,12 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     setups = lines_of_setups(chosen.reading, text)
     first = reading_of_lines(chosen.reading, setups[0], setups[1:]).program if setups else program
     block, stock_entries = _stock(first, known, header)
-    cuts = _cutting(program)
+    cuts = _rows_at_feed(program)
     numbers = [int(n) for n in np.unique(program.tool[cuts])] if cuts.any() else [int(program.tool[-1])]
     deepest = {
         n: block[1][2] - float(program.p_work[cuts & (program.tool == n), 2].min(initial=block[1][2])) for n in numbers
     }
-    sizes = [_size(next((s for s in _stated(n, known, header) if s), {})) for n in numbers]
+    sizes = [_size(next((s for s in _stated_values(n, known, header) if s), {})) for n in numbers]
     motions = {n: _kind_by_motions(program, cuts & (program.tool == n)) for n in numbers}
     tables = [
         _program_table(path, folder, chosen, known, min(sizes), text),
@@ -135,7 +135,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
             "stock", (*stock_entries, _layer(deepest, sizes)), note="the block that the program starts from [mm]"
         ),
         _material_table(header),
-        *(cutter_table(n, _stated(n, known, header), deepest[n], motions[n]) for n in numbers),
+        *(cutter_table(n, _stated_values(n, known, header), deepest[n], motions[n]) for n in numbers),
         _operation_table(program, cuts, sizes),
         *setup_tables(chosen.reading, text, setups, block),
         _limits_table(chosen.machine),
@@ -144,7 +144,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     rest = [f for f in chosen.reading.findings if f not in found and not f.code.endswith(PLAIN)]
     # a speed is guessed where the spindle rests
     violations = [f for f in chosen.reading.violations if f.code != "machine-spindle-off"]
-    notes = [text for _, text in grouped((*found, *violations, *rest))][:LISTED]
+    notes = [text for _, text in group_findings((*found, *violations, *rest))][:LISTED]
     origin = known.origin or path.name
     return Draft(
         f"Simulate {origin}: chips, forces, torque and collisions of the program in its stock.",
@@ -158,7 +158,7 @@ def _unit(reading: ProgramReading) -> str:
     return next(("inch" if "read as inch" in f.text else "mm" for f in reading.findings if f.code == "nc-unit"), "mm")
 
 
-def _stated(number: int, known: Known, header: Header) -> list[Stated]:
+def _stated_values(number: int, known: Known, header: Header) -> list[Stated]:
     """Return the stated values of a tool, the most reliable source first."""
     stated = header.cutters.get(number, {})
     if number == 0 and len(header.cutters) == 1:  # a text without a change of tools cuts with the one that it names
@@ -187,7 +187,7 @@ def _cutters(program: Program, known: Known, header: Header) -> dict[int, Cutter
     """The tools of a program whose diameter is stated, for the compensation of its path."""
     out: dict[int, Cutter] = {}
     for n in (int(n) for n in np.unique(program.tool)):
-        sources = _stated(n, known, header)
+        sources = _stated_values(n, known, header)
         if any("diameter_mm" in source for source in sources):
             entries = cutter_table(n, sources).entries
             out[n] = cutter_from_table({e.key: e.value for e in entries if e.value is not None})
@@ -281,7 +281,7 @@ def _best(
     return None if best is None else best[1]
 
 
-def _cutting(program: Program) -> np.ndarray:
+def _rows_at_feed(program: Program) -> np.ndarray:
     """(n,) whether each row moves at a feed."""
     return np.asarray((program.motion != RAPID) & (program.motion != DWELL))
 
@@ -296,7 +296,7 @@ def _stock(program: Program, known: Known, header: Header) -> tuple[Box, tuple[E
             return (low, high), (
                 Entry("low_mm", list(low), note, not sure), Entry("high_mm", list(high), note, not sure)
             )  # fmt: skip
-    lowest, highest, why = _around(program)
+    lowest, highest, why = _block_around(program)
     box = (
         (float(lowest[0]), float(lowest[1]), float(lowest[2])),
         (float(highest[0]), float(highest[1]), float(highest[2])),
@@ -304,10 +304,10 @@ def _stock(program: Program, known: Known, header: Header) -> tuple[Box, tuple[E
     return box, (Entry("low_mm", list(box[0]), why, True), Entry("high_mm", list(box[1]), why, True))
 
 
-def _around(program: Program) -> tuple[np.ndarray, np.ndarray, str]:
+def _block_around(program: Program) -> tuple[np.ndarray, np.ndarray, str]:
     """Corners of a block around the motions below the clearance."""
     low, high = bounds(program)
-    cuts = _cutting(program)
+    cuts = _rows_at_feed(program)
     rapid = (program.motion == RAPID) & (
         np.hypot(*np.diff(program.p_work[:, :2], axis=0, prepend=program.p_work[:1, :2]).T) > 1e-9
     )
@@ -398,7 +398,7 @@ def _speed(chosen: _Chosen, smallest: float, text: str) -> tuple[float, str] | N
     """Spindle speed [rpm] for a program that cuts with the spindle at rest, and its reason; None: it never does."""
     program = chosen.reading.program
     first = int(np.argmax(program.spindle != 0.0)) if program.spindle.any() else len(program)
-    if not _cutting(program)[:first].any():
+    if not _rows_at_feed(program)[:first].any():
         return None
     low, high = rpm_from_rad_s(chosen.machine.spindle_min), rpm_from_rad_s(chosen.machine.spindle_max)
     # a tool change stops the spindle that was started before it

@@ -25,7 +25,7 @@ from chipload.cutting.load_parts import LoadParts, load_parts
 from chipload.cutting.material import Material
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.engagement.tooth_surfaces import thickest_of_teeth
-from chipload.jobs.feeds.division import Allowed, DividedProgram, divide_lines, undivided, whole_feeds
+from chipload.jobs.feeds.division import Allowed, DividedProgram, divide_lines, undivided_program, whole_feeds
 from chipload.jobs.feeds.outcome import FeedResult
 from chipload.jobs.feeds.tables import FeedsTable
 from chipload.jobs.feeds.verify import require_same, rubbing_lines, speeds_of, tooth_feeds
@@ -130,7 +130,7 @@ class FeedRequest:
         return (1.0 + (error if math.isfinite(error) else 0.0)) * (1.0 + peaks) - 1.0
 
 
-def watching(
+def allowed_feed_watch(
     steps: Steps,
     request: FeedRequest,
     cutters: Mapping[int, Cutter],
@@ -226,12 +226,12 @@ def _chip_of_instant(chip: Floats, cutter: Cutter, sines: Floats) -> Callable[[F
         thicker = thickest_of_teeth(middle, cutter, sine, lags) >= chip[counts, None]
         least, most = np.where(thicker, least, middle), np.where(thicker, middle, most)
 
-    def at(factor: Floats) -> Floats:
+    def loads_at(factor: Floats) -> Floats:
         out = factor * chip
         out[counts] = thickest_of_teeth(factor[counts, None] * most, cutter, sine, lags).max(axis=1)
         return out
 
-    return at
+    return loads_at
 
 
 def with_new_feeds(
@@ -254,7 +254,7 @@ def with_new_feeds(
     text, dialect : see :func:`changeable`
     reading : of this text
     steps, before : steps of its program, and their removal
-    allowed : columns of a removal with the watch of :func:`watching`
+    allowed : columns of a removal with the watch of :func:`allowed_feed_watch`
     read : function that reads a text
     seconds : time of the unchanged program [s]
 
@@ -275,7 +275,7 @@ def with_new_feeds(
         air = np.where(feeds, _air_factor(speeds_of(steps), request.table, machine), 1.0)
         divided = divide_lines(text, reading, steps, of_steps, air, machine, read)
     else:
-        divided = undivided(text, reading, steps, of_steps)
+        divided = undivided_program(text, reading, steps, of_steps)
     of_steps, at = divided.allowed, divided.step
     lines = line_feeds(divided.line, of_steps.touch[at], of_steps.least[at], of_steps.most[at], of_steps.by[at])
     lines = _in_air(lines, divided, speeds_of(steps), request.table, machine)

@@ -22,7 +22,7 @@ from chipload.machine.machine import Machine
 from chipload.planning.feeds import AIR, StepContact
 from chipload.planning.line_division import line_ends
 from chipload.program.commands import ARC, LINE, PLANE_AXES, arc_sweeps, starts
-from chipload.program.gcode.line_segments import LineForm, LinePath, line_forms, mismatch, rounded, with_segments
+from chipload.program.gcode.line_segments import LineForm, LinePath, line_forms, mismatch, round_point, with_segments
 from chipload.program.motions import directions, is_arc, lengths
 from chipload.program.path_mode import PathControl
 from chipload.program.program import DWELL, RAPID
@@ -125,7 +125,7 @@ class _Cuts:
     ends: Ints
 
 
-def undivided(text: str, reading: ProgramReading, steps: Steps, allowed: Allowed) -> DividedProgram:
+def undivided_program(text: str, reading: ProgramReading, steps: Steps, allowed: Allowed) -> DividedProgram:
     """Return a program whose lines all keep one feed."""
     at = np.flatnonzero(~steps.rapid)
     return DividedProgram(text, reading, at, steps.line[at], allowed)
@@ -150,7 +150,7 @@ def divide_lines(
     air : (n,) feed factor of steps that cut nothing
     read : function that reads a text
     """
-    passed = _passed(steps, allowed, air)
+    passed = _passed_factors(steps, allowed, air)
     motions = _motions(reading, machine, steps, passed)
     forms, cuts, kept = line_forms(text), dict[int, _Cuts](), Counter[str]()
     decimals, jerk = min(machine.decimals, MOST_DECIMALS), machine.jerk or machine.jerk_low
@@ -177,21 +177,21 @@ def divide_lines(
             break
         off = lines_off_path(reading.program, after.program, first, set(cuts), 10.0**-decimals)
         if not off:
-            return _divided(new, after, steps, first, cuts, +kept, allowed, passed)
+            return _divided_entries(new, after, steps, first, cuts, +kept, allowed, passed)
         if not off & cuts.keys():
             break
         for line in off & cuts.keys():
             kept[OTHER_PATH] += 1
             del cuts[line]
     kept[OTHER_PATH] += len(cuts)
-    return replace(undivided(text, reading, steps, allowed), kept=+kept)
+    return replace(undivided_program(text, reading, steps, allowed), kept=+kept)
 
 
 #: why a line is not divided whose segments were read as another path
 OTHER_PATH = "other path in segments"
 
 
-def _passed(steps: Steps, allowed: Allowed, air: Floats) -> Floats:
+def _passed_factors(steps: Steps, allowed: Allowed, air: Floats) -> Floats:
     """Return the feed factor (n,) of each step in a divided line."""
     factor = np.where(np.isnan(allowed.most), allowed.least, allowed.most)
     cuts = allowed.touch == StepContact.CUT
@@ -305,11 +305,11 @@ def _with_points(
     for k, end in enumerate(ends.tolist()):
         towards = -room if least[k] > least[k + 1] else room
         there = (float(shares[end]), float(shares[end]) + towards)
-        points.append(rounded(path, there, float(motions.sweep[own.command]), form.unit, decimals))
+        points.append(round_point(path, there, float(motions.sweep[own.command]), form.unit, decimals))
     return replace(path, points=np.array(points))
 
 
-def _divided(
+def _divided_entries(
     text: str,
     reading: ProgramReading,
     steps: Steps,

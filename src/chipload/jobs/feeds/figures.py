@@ -12,7 +12,7 @@ from plotly.subplots import make_subplots
 from chipload.checking.figures import program_presentation
 from chipload.checking.outcome import SimulationResult
 from chipload.checking.result import changed_name
-from chipload.jobs.feeds.numbers import COMPARED, exceeding, feed_numbers
+from chipload.jobs.feeds.numbers import COMPARED, feed_numbers, lines_that_exceed
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
 from chipload.jobs.feeds.result import division_notes, result_of
 from chipload.number_text import number_text
@@ -20,7 +20,7 @@ from chipload.report.presentation import Presentation
 from chipload.report.sheet import figure, table
 from chipload.result import COLUMNS, LimitCheck
 from chipload.result.style import FONT, GRID, LIMIT, LINE_POINTS
-from chipload.result.thinning import thinned
+from chipload.result.thinning import thin_rows
 
 #: colours of the program as it was, and with its new feeds
 BEFORE, AFTER = "#c9821a", "#3457a6"
@@ -73,11 +73,11 @@ def feed_sections(
         f"{'less' if gain >= 0.0 else 'more'} time. {escape(' '.join((*division_notes(feeds), '')))}"
         f"<b>{escape(program)}</b> is its text; it was read again and simulated from fresh stock.</p>",
         table(["", "before", "after", "limit"], rows, numbers=(1, 2, 3)),
-        figure("feeds", along(feeds, simulation, checks), figures),
+        figure("feeds", feed_along_path(feeds, simulation, checks), figures),
     ]
     counts = [[escape(CAUSES.get(k, f"limit {k}")), str(n)] for k, n in what["by"].items()]
     body += ["<h3>What limits the feed of the lines</h3>", table(["cause", "lines"], counts, numbers=(1,))]
-    listed = exceeding(feeds, simulation, checks)
+    listed = lines_that_exceed(feeds, simulation, checks)
     if listed:
         cells_of = [
             [
@@ -93,7 +93,7 @@ def feed_sections(
     return body
 
 
-def along(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck]) -> go.Figure:
+def feed_along_path(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck]) -> go.Figure:
     """Plot the feed and the limited loads along the path, before and after the change."""
     c = simulation.removal.columns
     rows: list[tuple[str, str, float | None]] = [("feed_mm_min", "feed [mm/min]", None)]
@@ -105,7 +105,7 @@ def along(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[Limi
         for values, name, colour in ((feeds.before.columns, "before", BEFORE), (c, "after", AFTER)):
             s = np.asarray(values["s_mm"])
             y = np.where(~np.asarray(values["rapid"]), np.asarray(values[column], dtype=np.float64), 0.0)
-            keep = thinned(y, LINE_POINTS)
+            keep = thin_rows(y, LINE_POINTS)
             out.add_trace(
                 go.Scatter(
                     x=s[keep].astype(np.float32), y=y[keep].astype(np.float32), name=name, mode="lines",

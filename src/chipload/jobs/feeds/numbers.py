@@ -37,7 +37,9 @@ def steps_before(after: Floats, before: Floats) -> Ints:
     return np.searchsorted(before, after - SAME_MM).clip(0, len(before) - 1)
 
 
-def exceeding(feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck]) -> list[dict[str, Any]]:
+def lines_that_exceed(
+    feeds: FeedResult, simulation: SimulationResult, checks: Sequence[LimitCheck]
+) -> list[dict[str, Any]]:
     """Return the lines of the new program that exceed a load limit, each with its worst step."""
     c, before, out = simulation.removal.columns, feeds.before.columns, []
     factor = dict(zip(feeds.line.tolist(), zip(feeds.factor.tolist(), feeds.by, strict=True), strict=True))
@@ -84,7 +86,7 @@ def feed_numbers(
     time_s : time of that program
     program : its file
     """
-    c, listed = simulation.removal.columns, exceeding(feeds, simulation, checks)
+    c, listed = simulation.removal.columns, lines_that_exceed(feeds, simulation, checks)
 
     def loads(columns: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         some = columns["feed_mm_min"][(columns["chip_areas"] > 0) & ~columns["rapid"]]

@@ -23,7 +23,7 @@ def result_of(program: FeedsProgram) -> Result:
     time_s, name = float(program.seconds.sum()), changed_name(program, "feeds")
     tracks = changed_tracks(
         program, simulation, own, name, "gouge_mm", "excess_mm",
-        found=_rubbing(own), blocks=lambda: _with_cause(simulation, own),
+        found=_rubbing_findings(own), blocks=lambda: _with_cause(simulation, own),
     )  # fmt: skip
     numbers = {"feeds": feed_numbers(own, simulation, tracks[0].limits, time_s, name)}
     note = f"The program takes {number_text(time_s)} s instead of {number_text(own.seconds_before)} s."
@@ -43,7 +43,7 @@ def division_notes(feeds: FeedResult) -> tuple[str, ...]:
     return tuple(out)
 
 
-def _rubbing(feeds: FeedResult) -> tuple[Finding, ...]:
+def _rubbing_findings(feeds: FeedResult) -> tuple[Finding, ...]:
     """Return a finding for each line that cuts below the least feed per tooth."""
     least = feeds.tooth_feed_least
     return tuple(

@@ -10,13 +10,13 @@ from chipload.checking.default_checks import PROGRAM_COLUMNS, default_checks, wi
 from chipload.checking.drilling import with_drilling
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.limits import spindle_limits
-from chipload.checking.preparation import resolution_of, timed
+from chipload.checking.preparation import resolution_of, time_rows
 from chipload.checking.program_text import read_as
 from chipload.checking.run import compliance_of_workpiece, simulate_program
-from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.checking.stiffness import deflection_watch, stiffness_of, watched_columns, with_columns
 from chipload.checking.workpiece_compliance import WorkpieceCompliance, with_compliance_error
 from chipload.cutting.drilling import is_pointed
-from chipload.jobs.feeds.allowed import FeedRequest, watching, with_new_feeds
+from chipload.jobs.feeds.allowed import FeedRequest, allowed_feed_watch, with_new_feeds
 from chipload.jobs.feeds.job import FeedsJob
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
 from chipload.jobs.simulation import run as simulation
@@ -99,15 +99,15 @@ def _new_feeds(
     if "spindle" not in inputs.checks.off:
         limits |= spindle_limits(machine, turning)
     gives = stiffness_of(inputs.elasticity.stiffness, cutters, None if compliance is None else compliance.steps)
-    bends = with_checks(inputs.checks, material, deflecting(gives, material))
+    bends = with_checks(inputs.checks, material, deflection_watch(gives, material))
     checks = default_checks(inputs.checks, cutters, material)
-    program, times = timed(reading, cutters, machine)
+    program, times = time_rows(reading, cutters, machine)
     # as it is: what its loads are, and how well they are known
     before = remove(
         program, stock, cutters, material, fine, interpolation=op.interpolation, times=times, watch=bends,
         engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.0, 0.5),
     )  # fmt: skip
-    before = with_columns(before, (*watched(gives), *PROGRAM_COLUMNS))
+    before = with_columns(before, (*watched_columns(gives), *PROGRAM_COLUMNS))
     if any(is_pointed(c) for c in cutters.values()):
         before = with_drilling(before, cutters, material)
     more = bends if limits.keys() & {"deflection_um", "deflection_workpiece_um"} else None
@@ -122,7 +122,8 @@ def _new_feeds(
     fresh = inputs.stock.layered(reading.program, cutters)
     allowed = remove(
         program, fresh, cutters, material, fine, interpolation=op.interpolation,
-        times=times, watch=watching(steps, request, cutters, material, machine, before.columns), accuracy=False,
+        times=times, accuracy=False,
+        watch=allowed_feed_watch(steps, request, cutters, material, machine, before.columns),
         engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.5, 1.0),
     )  # fmt: skip
     return with_new_feeds(

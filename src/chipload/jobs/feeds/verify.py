@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.checking.program_text import differing
+from chipload.checking.program_text import rows_that_differ
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.jobs.feeds.division import DividedProgram
@@ -32,7 +32,9 @@ def require_same(old: Program, new: Program, line: Ints, factor: Floats) -> None
     """
     at, wrong = 0, len(old) != len(new)
     if not wrong:
-        off = differing(old, new, "motion", "p_work", "axis", "centre", "normal", "turns", "spindle", "tool", "line")
+        off = rows_that_differ(
+            old, new, "motion", "p_work", "axis", "centre", "normal", "turns", "spindle", "tool", "line"
+        )
         off |= (old.motion == DWELL) & (old.feed != new.feed)
         moves = np.isin(old.line, line) & (old.motion != RAPID) & (old.motion != DWELL)
         wanted = old.feed[moves] * factor[np.searchsorted(line, old.line[moves])]

@@ -12,7 +12,7 @@ import trimesh
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from chipload.cutting.fit import NAMES, predicted, predicted_mean
+from chipload.cutting.fit import NAMES, predict_forces, predicted_mean
 from chipload.cutting.material import material_text
 from chipload.jobs.fit.job import CHANNELS
 from chipload.jobs.fit.outcome import FitResult
@@ -156,7 +156,7 @@ def _means(done: FitResult) -> go.Figure:
             )  # fmt: skip
     out.update_xaxes(title_text="feed per tooth [mm]", rangemode="tozero")
     out.update_yaxes(title_text="mean force on the cutter [N]")
-    return _styled(out, 380)
+    return _style_figure(out, 380)
 
 
 def _turn(done: FitResult, left: bool) -> go.Figure:
@@ -174,7 +174,7 @@ def _turn(done: FitResult, left: bool) -> go.Figure:
         n = len(c.cut.force)
         some = np.unique(np.linspace(0, n - 1, min(n, CLOUD)).astype(int))
         theta = np.mod(c.turns.speed * some / c.cut.rate + c.phase, math.tau)
-        model = predicted(done.fit, c.cut, theta if left else angles)
+        model = predict_forces(done.fit, c.cut, theta if left else angles)
         for row, k in enumerate(shown, start=1):
             y = c.cut.force[some, k] - model[:, k] if left else c.cut.force[some, k]
             both = y if left or not np.isfinite(model[:, k]).all() else np.concatenate([y, model[:, k]])
@@ -204,10 +204,10 @@ def _turn(done: FitResult, left: bool) -> go.Figure:
             room = 0.06 * (reach[k, 1] - reach[k, 0])
             out.update_yaxes(range=[reach[k, 0] - room, reach[k, 1] + room], row=row)
     out.update_xaxes(tickvals=[0, 90, 180, 270, 360], range=[0, 360])
-    return _styled(out, 114 + 190 * len(shown))
+    return _style_figure(out, 114 + 190 * len(shown))
 
 
-def _styled(out: go.Figure, height: int) -> go.Figure:
+def _style_figure(out: go.Figure, height: int) -> go.Figure:
     out.update_layout(
         height=height, font=FONT, plot_bgcolor="white", paper_bgcolor="white",
         margin={"l": 64, "r": 16, "t": 58, "b": 48},

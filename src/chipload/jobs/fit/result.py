@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.cutting.fit import NAMES, TURN, predicted
+from chipload.cutting.fit import NAMES, TURN, predict_forces
 from chipload.jobs.fit.job import CHANNELS
 from chipload.jobs.fit.outcome import Comparison, FitResult
 from chipload.number_text import number_text
@@ -50,7 +50,7 @@ def history(done: FitResult, c: Comparison) -> Columns:
     A channel whose coefficients are not identified has no column of predicted forces.
     """
     theta = np.linspace(0.0, math.tau, TURN, endpoint=False)
-    measured, model = c.measured(theta), predicted(done.fit, c.cut, theta)
+    measured, model = c.measured(theta), predict_forces(done.fit, c.cut, theta)
     out: dict[str, NDArray[Any]] = {"t_s": theta / c.turns.speed, "rotation_deg": np.degrees(theta)}
     for k in np.flatnonzero(c.cut.measured):
         out[f"force_{CHANNELS[k]}_measured_n"] = measured[:, k]
@@ -113,10 +113,10 @@ def numbers(done: FitResult) -> dict[str, Any]:
         "harmonics": fit.search.harmonics,
         "runout_mm": _number(size),
         "runout_deg": _number(math.degrees(direction)) if fit.cutter.flutes > 2 else None,
-        "residual_sd_n": _named(fit.channels.residual),
-        "r2": _named(fit.channels.r2),
-        "dynamometer_hz": _named(fit.channels.resonance[:, 0] / math.tau),
-        "dynamometer_damping": _named(fit.channels.resonance[:, 1]),
+        "residual_sd_n": _name_values(fit.channels.residual),
+        "r2": _name_values(fit.channels.r2),
+        "dynamometer_hz": _name_values(fit.channels.resonance[:, 0] / math.tau),
+        "dynamometer_damping": _name_values(fit.channels.resonance[:, 1]),
         "measurements": [_measurement(c) for c in done.comparisons],
     }
 
@@ -136,14 +136,18 @@ def _measurement(c: Comparison) -> dict[str, Any]:
         "feed_mm_min": mm_min_from_mm_s(c.cut.feed),
         "speed_rpm": rpm_from_rad_s(c.turns.speed),
         "turns": len(c.turns.mean),
-        "scatter_n": _named(c.turns.scatter),
+        "scatter_n": _name_values(c.turns.scatter),
         **{
-            f"{key}_n": {"measured": _named(seen), "model": _named(predicted), "half_95": _named(half)}
+            f"{key}_n": {
+                "measured": _name_values(seen),
+                "model": _name_values(predicted),
+                "half_95": _name_values(half),
+            }
             for key, (seen, predicted, half) in rows.items()
         },
         "plane_max_n": {"measured": _number(c.forces.plane), "model": _number(model.resultant)},
-        "mean_error_percent": _named(c.mean_percent),
-        "peak_error_percent": _named(c.peak_percent),
+        "mean_error_percent": _name_values(c.mean_percent),
+        "peak_error_percent": _name_values(c.peak_percent),
     }
 
 
@@ -151,5 +155,5 @@ def _number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _named(values: Floats) -> dict[str, float | None]:
+def _name_values(values: Floats) -> dict[str, float | None]:
     return {key: _number(v) for key, v in zip(CHANNELS, values, strict=True)}

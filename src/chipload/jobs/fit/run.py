@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.cutting.fit import NAMES, TURN, Fit, aligned, fit_average, predict
+from chipload.cutting.fit import NAMES, TURN, Fit, align_turn, fit_average, predict
 from chipload.cutting.fit_turns import fit_instantaneous, turns_in_band
 from chipload.cutting.material import Material
 from chipload.cutting.measured import read_forces
@@ -86,7 +86,7 @@ def run(job: FitJob, progress: Progress = silent) -> FitResult:
             ringing=[None if hz is None else math.tau * hz for hz in rings],
         )  # fmt: skip
     progress(0.7, "predict")
-    comparisons = tuple(_compared(fit, cut, use) for cut, use in zip(cuts, uses, strict=True))
+    comparisons = tuple(_compare_cut(fit, cut, use) for cut, use in zip(cuts, uses, strict=True))
     material, why = _material(job, fit, comparisons)
     notes = tuple(Finding("fit-note", 0, text) for text in fit.notes)
     if not fit.search.converged:
@@ -118,7 +118,7 @@ def _provenance(job: FitJob) -> Provenance:
     return Provenance(hashes(files), job.overrides, "", {job.table.name: job.table.source}, versions())
 
 
-def _compared(fit: Fit, cut: MeasuredCut, use: str) -> Comparison:
+def _compare_cut(fit: Fit, cut: MeasuredCut, use: str) -> Comparison:
     predicted = predict(fit, cut)
     turns = turns_of(cut, fit.search.harmonics or min(8, math.floor(0.8 * math.pi * cut.rate / cut.speed)))
     mean, high, low = (x.mean(axis=0) for x in (turns.mean, turns.high, turns.low))
@@ -129,7 +129,7 @@ def _compared(fit: Fit, cut: MeasuredCut, use: str) -> Comparison:
     return Comparison(
         cut, use, turns, predicted,
         MeasuredForces(mean, high, low, band.max(axis=0), band.min(axis=0), float(turns.plane.mean())),
-        aligned(fit, cut, turns), _percent(predicted.mean, mean),
+        align_turn(fit, cut, turns), _percent(predicted.mean, mean),
         _percent(np.where(larger, predicted.high, predicted.low), np.where(larger, high, low)),
     )  # fmt: skip
 

@@ -20,7 +20,7 @@ from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, NoFiveAxisPat
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.tables import FlankTable, PathsTable, SurfaceTable
 from chipload.planning.impeller.clearance import clearance
-from chipload.planning.impeller.five_axis_program import LinkedPath, five_axis_program, lifted, outline_of
+from chipload.planning.impeller.five_axis_program import LinkedPath, five_axis_program, lift_from_end, outline_of
 from chipload.planning.impeller.flank import FlankPass, flank_pass, offset_pass
 from chipload.planning.impeller.kept import Keep, PlanTask, anew
 from chipload.planning.impeller.settings import FinishSettings
@@ -148,7 +148,7 @@ def _pass(
     if path.left.max() > table.excess_mm or -path.gouge.min() > deep:
         return None, path.deviation
     got, _ = clearance(scene, cutter, path.tip, path.axis, 1.0, above)
-    begin, end = (lifted(path, k, scene, outline, cutter, how.link, above) for k in (0, -1))
+    begin, end = (lift_from_end(path, k, scene, outline, cutter, how.link, above) for k in (0, -1))
     if got.min() < -deep or begin is None or end is None:
         return None, None
     return LinkedPath(path, begin, end), path.deviation

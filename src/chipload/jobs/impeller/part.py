@@ -16,7 +16,7 @@ from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.geometry.overlap import splitter_apart
 from chipload.geometry.revolve import Revolved
-from chipload.geometry.sections import Blade, checked, checked_diameter, loft, read_meridian, read_sections
+from chipload.geometry.sections import Blade, check_sections, checked_diameter, loft, read_meridian, read_sections
 from chipload.geometry.sides import blade_of, foot_off, radius_of
 from chipload.geometry.step_faces import Face, Model, Name, read_faces
 from chipload.geometry.step_meridian import meridian_of
@@ -24,7 +24,7 @@ from chipload.geometry.step_patch import four_sided, patch_of
 from chipload.geometry.step_side import side_of
 from chipload.jobs.impeller.job import ImpellerJob
 from chipload.jobs.impeller.tables import ImpellerTable, SectionsTable, ShapeTable, StepTable
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.planning.impeller.fillets import with_fillets
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.parametric import ImpellerShape, impeller_of
@@ -84,7 +84,7 @@ def _require_narrow_end_up(hub: Revolved, part: ImpellerTable) -> None:
     if part.step is not None:
         key, value = "impeller.step.flow", str(part.step.flow)
         other = ("-" if value.startswith("+") else "+") + value[1:]
-    elif not stated(part.sections, "impeller.sections").flow_along_x:
+    elif not require_stated(part.sections, "impeller.sections").flow_along_x:
         value, other = other, value
     raise InputError(
         f"{key} = {value}: the hub would be {high:.4g} mm in radius at its upper end, {low:.4g} mm at the table: the "
@@ -125,7 +125,7 @@ def _without_fillets(job: ImpellerJob) -> ImpellerPart:
         made = _of_sections(folder, given, over, part.blades, part.outer_diameter_mm)
         found = f"flow: along {'+' if over else '-'}X of the files, by the hub, whose narrow end is up"
         return ImpellerPart(made, (found,) if given.flow_along_x is None else ())
-    return ImpellerPart(_of_shape(stated(part.shape, "impeller.shape"), part.blades, part.outer_diameter_mm))
+    return ImpellerPart(_of_shape(require_stated(part.shape, "impeller.shape"), part.blades, part.outer_diameter_mm))
 
 
 def _of_shape(given: ShapeTable, blades: int, outer_diameter: float) -> Impeller:
@@ -142,7 +142,7 @@ def _of_sections(folder: Path, given: SectionsTable, over: bool, blades: int, ou
     def blade(names: tuple[str, ...], key: str) -> tuple[Blade, tuple[Floats, ...]]:
         try:
             found = read_sections([folder / name for name in names], given.unit, over, given.columns)
-            return loft(checked(found, outer_diameter)), found
+            return loft(check_sections(found, outer_diameter)), found
         except InputError as err:
             raise InputError(f"impeller.sections.{key}: {err}") from None
 
@@ -167,7 +167,7 @@ def _of_step(files: dict[str, Path], given: StepTable, blades: int, outer_diamet
     def revolved(key: str, side: int) -> Revolved:
         names = getattr(given, key)
         if isinstance(names, str):
-            unit = stated(given.unit, "impeller.step.unit")
+            unit = require_stated(given.unit, "impeller.step.unit")
             return Revolved(read_meridian(files[key], unit, given.flow.startswith("+"), side < 0), side)
         at = f"impeller.step.{key}"
         faces = [model.face(name, at) for name in names]

@@ -24,7 +24,7 @@ from chipload.planning.impeller.compare import CutterChoice, Partition
 from chipload.planning.impeller.costs import Costs, MeasuredCost
 from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.patch import Patch
-from chipload.planning.impeller.planned_settings import PlannedSettings, announce_millings, planned
+from chipload.planning.impeller.planned_settings import PlannedSettings, announce_millings, plan_settings
 from chipload.planning.impeller.settings import (
     CutterSetting,
     FinishSettings,
@@ -154,7 +154,7 @@ def _planned(
     progress: Progress, keep: Keep,
 ) -> _Planned:  # fmt: skip
     own = job.with_catalogue(partition.catalogue)
-    plan = planned(
+    plan = plan_settings(
         own, partition.division.patches, _changes(choice), progress=progress, known=memory.millings, keep=keep
     )
     rows = tuple(times_on(s.program, machine) for s in plan.settings)
@@ -221,7 +221,7 @@ def _checked(
     for fine in _FINER:
         if not _refinable(_left_shares(programs, covered)):
             break
-        plan = planned(
+        plan = plan_settings(
             own, done.partition.division.patches, _changes(choice), known=memory.millings, keep=keep, fine=fine
         )  # fmt: skip
         again = _checked_plan(own, plan, machine, paths, memory, keep)

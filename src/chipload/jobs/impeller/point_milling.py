@@ -25,12 +25,12 @@ from chipload.planning.impeller.coverage import between_lines
 from chipload.planning.impeller.five_axis_program import (
     LinkedPath,
     five_axis_program,
-    lifted,
+    lift_from_end,
     outline_of,
     rotary_share,
 )
 from chipload.planning.impeller.kept import Keep, PlanTask, anew
-from chipload.planning.impeller.lines import stretched
+from chipload.planning.impeller.lines import stretch_stations
 from chipload.planning.impeller.point_milling import PointPath, point_path
 from chipload.planning.impeller.settings import FinishSettings
 from chipload.planning.impeller.surfaces import BODIES
@@ -113,7 +113,7 @@ def _planned(
             over = _overrun(cutter, paths.overrun_mm, limits.scallop)
             box = tuple(
                 (float(x[0]), float(x[-1]))
-                for x in (stretched(surface, "u", u, v, 2, over), stretched(surface, "v", v, u, 2, over))
+                for x in (stretch_stations(surface, "u", u, v, 2, over), stretch_stations(surface, "v", v, u, 2, over))
             )
             field = clear_field(surface, (box[0], box[1]), how.scene, cutter, reachable, limits)
             if isinstance(field, str):
@@ -163,7 +163,7 @@ def _path(
         if best is not None and points.length >= best.points.length:
             continue
         begin, end = (
-            lifted(points, k, how.scene, outline, cutter, how.link, limits.above) for k in (0, -1)
+            lift_from_end(points, k, how.scene, outline, cutter, how.link, limits.above) for k in (0, -1)
         )  # fmt: skip
         if begin is not None and end is not None:
             best = PlannedPoints(cutter, along, LinkedPath(points, begin, end), points)

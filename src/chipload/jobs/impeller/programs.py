@@ -17,7 +17,7 @@ from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.program.apt.writer import write_apt
 from chipload.program.gcode.writer import Repeat, write_gcode
 from chipload.program.program import Program
-from chipload.program.release import Release, released
+from chipload.program.release import Release, release_of_text
 from chipload.report.programs import ENDINGS
 from chipload.result import Result, release_of
 
@@ -53,7 +53,7 @@ def program_files(milled: ImpellerResult, result: Result) -> dict[str, bytes]:
 def _released(text_of: Callable[[Release], str], release: Release, read: ReadProgram | None) -> bytes:
     """The text of a program, which is not released if its blocks are not those that were read and simulated."""
     text = text_of(release)
-    given = release if read is None else released(text, read.text, release)
+    given = release if read is None else release_of_text(text, read.text, release)
     return (text if given is release else text_of(given)).encode("ascii")
 
 

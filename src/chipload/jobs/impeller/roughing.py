@@ -24,7 +24,7 @@ from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import LineMotion
 from chipload.planning.impeller.links import Link
 from chipload.planning.impeller.programs import pallet_rate, too_fast
-from chipload.planning.impeller.rough_settings import RoughingSetting, roughed
+from chipload.planning.impeller.rough_settings import RoughingSetting, rough_channels
 from chipload.planning.impeller.roughing import RoughingSettings, uncut
 from chipload.planning.impeller.surfaces import hub_range
 from chipload.planning.impeller.tables import IndexTable
@@ -70,7 +70,7 @@ def checked_roughing(
         paths.lift_mm, paths.margin_mm, paths.touch_mm, 0.0, mm_s_from_mm_min(paths.link_feed_mm_min), paths.above_mm,
         paths.lift_mm,
     )  # fmt: skip
-    plans = roughed(
+    plans = rough_channels(
         impeller, catalogue, stated, how, link, rad_s_from_rpm(rough.speed_rpm), table, rough.share, ahead, workers,
         lambda done, what: progress(0.6 * done, what), keep,
     )  # fmt: skip

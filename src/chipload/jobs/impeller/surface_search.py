@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import Catalogue
-from chipload.planning.impeller.answer import Answer, Unreachable, joined, largest_cutters, one_cutter
+from chipload.planning.impeller.answer import Answer, Unreachable, join_answers, largest_cutters, one_cutter
 from chipload.planning.impeller.kept import Keep, PlanTask
 from chipload.planning.impeller.surfaces import ContactSurface
 from chipload.planning.impeller.tables import IndexTable
@@ -102,7 +102,7 @@ def searched_surfaces(
     for k, tasks in enumerate(blocks):
         part = part_of(progress, 0.9 * k / len(blocks), 0.9 * (k + 1) / len(blocks))
         found = [_made(inputs, task, keep, part) for task in tasks]
-        answers.append(joined([answer for answer, _ in found]))
+        answers.append(join_answers([answer for answer, _ in found]))
         seconds.append(math.fsum(took for _, took in found))
     ones = [PlanTask(("one of surface", k), _one, (k, answer)) for k, answer in enumerate(answers)]
     keep.ahead(ones, lambda done, what: progress(0.9 + 0.1 * done, f"one cutter, {what}"))

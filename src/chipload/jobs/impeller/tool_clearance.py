@@ -63,11 +63,12 @@ def tool_clearance(
 
     Examples
     --------
-    >>> from chipload.geometry.bspline import through
+    >>> from chipload.geometry.bspline import patch_through
     >>> from chipload.simulation.channel.channel import wall
     >>> grid, tip = np.linspace(0.0, 1.0, 21), np.array([[5.0, 5.0, 0.0]])
     >>> def side(y):
-    ...     return wall("side", through([[[0, y, 0], [0, y, 9]], [[9, y, 0], [9, y, 9]]], [0, 1], [0, 1]), grid, grid)
+    ...     patch = patch_through([[[0, y, 0], [0, y, 9]], [[9, y, 0], [9, y, 9]]], [0, 1], [0, 1])
+    ...     return wall("side", patch, grid, grid)
     >>> mill, up = CatalogueCutter(6.0, 0.0), np.array([[0.0, 0.0, 1.0]])
     >>> tool_clearance([side(1.5), side(10.0)], mill, tip, up, np.array([False])).round(2).tolist()
     [0.5]

@@ -15,16 +15,16 @@ import numpy as np
 from chipload.checking.default_checks import PROGRAM_COLUMNS, with_checks
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.outcome import SpeedResult, ToolSpeed
-from chipload.checking.preparation import resolution_of, timed
-from chipload.checking.program_text import differing, read_as
+from chipload.checking.preparation import resolution_of, time_rows
+from chipload.checking.program_text import read_as, rows_that_differ
 from chipload.checking.stability import StabilityResult, rounded_rpm, stability_of, watch_of
-from chipload.checking.stiffness import deflecting, stiffness_of, watched, with_columns
+from chipload.checking.stiffness import deflection_watch, stiffness_of, watched_columns, with_columns
 from chipload.checking.workpiece_compliance import WorkpieceCompliance
 from chipload.errors import InputError
 from chipload.jobs.program.zones import row_speeds, zone_speeds
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.simulation.run import read_for, text_to_change
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.program.gcode.feed_words import DIGITS
 from chipload.program.gcode.speed_words import speed_words, with_speeds
 from chipload.program.program import DWELL, RAPID, Program
@@ -78,10 +78,10 @@ def new_speeds(
     """
     op, cutters, material, machine = inputs.settings, inputs.cutters, inputs.material, inputs.machine
     (text, dialect), seconds = own, float(line_times(reading, machine)[1].sum())
-    stability = stated(watch_of(inputs, workpiece), "dynamics")
+    stability = require_stated(watch_of(inputs, workpiece), "dynamics")
     gives = stiffness_of(inputs.elasticity.stiffness, cutters)
-    bends = with_checks(inputs.checks, material, deflecting(gives, material))
-    program, times = timed(reading, cutters, machine)
+    bends = with_checks(inputs.checks, material, deflection_watch(gives, material))
+    program, times = time_rows(reading, cutters, machine)
 
     def watch(cuts: Cuts) -> dict[str, Floats]:
         return {**bends(cuts), **stability(cuts)}
@@ -90,11 +90,11 @@ def new_speeds(
         program, stock, cutters, material, resolution_of(op, cutters, reading.program), interpolation=op.interpolation,
         times=times, watch=watch, accuracy=False, engine=op.engine, processes=workers or op.workers, progress=progress,
     )  # fmt: skip
-    before = with_columns(before, (*watched(gives), *PROGRAM_COLUMNS, *stability.columns))
+    before = with_columns(before, (*watched_columns(gives), *PROGRAM_COLUMNS, *stability.columns))
     found = stability_of(inputs, stability)
-    table = stated(job.table.operation[0].speeds, "operation.0.speeds")
+    table = require_stated(job.table.operation[0].speeds, "operation.0.speeds")
     tools: list[tuple[ToolSpeed, int]] = []
-    for one in _advised(found, reading.program):
+    for one in _advise_speeds(found, reading.program):
         zones = zone_speeds(found, reading.program, before.columns, one.tool) if table.by == "zone" else ()
         tools += zones if len(zones) > 1 else [(one, one.lines[0])]
     tools.sort(key=lambda zone: zone[0].lines)
@@ -106,7 +106,7 @@ def new_speeds(
     return SpeedResult(new, dialect, before, seconds, tuple(t for t, _ in tools), found), after
 
 
-def _advised(stability: StabilityResult, program: Program) -> tuple[ToolSpeed, ...]:
+def _advise_speeds(stability: StabilityResult, program: Program) -> tuple[ToolSpeed, ...]:
     """Return the new speed of each tool with known cuts; a tool with one speed that is as good keeps it."""
     out = []
     for tool, quiet in stability.quiet.items():
@@ -169,7 +169,7 @@ def _same(old: Program, new: Program, wanted: Floats) -> None:
     """Refuse a new text that differs from the old program in more than the wanted speeds at the same feed per tooth."""
     wrong, at = len(old) != len(new), 0
     if not wrong:
-        off = differing(old, new, "motion", "p_work", "axis", "centre", "normal", "turns", "tool", "line")
+        off = rows_that_differ(old, new, "motion", "p_work", "axis", "centre", "normal", "turns", "tool", "line")
         off |= (old.motion == DWELL) & (old.feed != new.feed)
         moves = (old.motion != RAPID) & (old.motion != DWELL)
         speed = np.where(np.isnan(wanted), old.spindle, np.sign(old.spindle) * wanted)

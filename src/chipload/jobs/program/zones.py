@@ -17,7 +17,7 @@ from chipload.checking.stability import SPEEDS, StabilityResult, rounded_rpm
 from chipload.checking.stability_watch import engaged_edge
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.result.limits import Columns
-from chipload.stability.cuts import joined
+from chipload.stability.cuts import join_dynamic_cuts
 from chipload.stability.margin import stability_margins
 from chipload.stability.zones import speed_zones
 from chipload.units import rad_s_from_rpm, rpm_from_rad_s
@@ -110,9 +110,9 @@ def zone_speeds(
     if len(passes) < 2 or not high > low:
         return ()
     speeds = np.geomspace(low, high, SPEEDS)
-    chosen = _chosen(stability, tool, passes)
+    chosen = _choose_cuts(stability, tool, passes)
     every = np.unique(np.concatenate(chosen))
-    cuts = joined(stability.watch.cuts[tool]).chosen(every)
+    cuts = join_dynamic_cuts(stability.watch.cuts[tool]).chosen(every)
     some = cuts.chosen(np.repeat(np.arange(len(cuts)), len(speeds)))
     found = stability_margins(some.at_speeds(np.tile(cuts.pitch / speeds, len(cuts))))
     margin = found.margin.reshape(len(cuts), len(speeds))
@@ -127,10 +127,10 @@ def zone_speeds(
     return tuple(out)
 
 
-def _chosen(stability: StabilityResult, tool: int, passes: Sequence[ProgramPass]) -> list[Ints]:
+def _choose_cuts(stability: StabilityResult, tool: int, passes: Sequence[ProgramPass]) -> list[Ints]:
     """Return for each pass the cuts with which its speed is searched."""
     margin = np.array([x[0] for x in stability.watch.known[tool].values()])
-    edge = engaged_edge(joined(stability.watch.cuts[tool]))
+    edge = engaged_edge(join_dynamic_cuts(stability.watch.cuts[tool]))
     near, large = (max(LEAST, count // len(passes)) for count in (NEAREST, LARGEST))
     out = []
     for own in passes:

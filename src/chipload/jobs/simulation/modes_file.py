@@ -10,7 +10,7 @@ from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.jobs.messages import table_errors
 from chipload.jobs.simulation.dynamics_tables import ModesFileTable, ModeTable
-from chipload.tables import parsed
+from chipload.tables import parse_toml
 
 #: largest file of modes [bytes]
 LARGEST_FILE = 1_000_000
@@ -24,7 +24,7 @@ def read_modes(path: Path) -> tuple[ModeTable, ...]:
     InputError
         It cannot be read or is no table of modes.
     """
-    raw = parsed(path.name, read_regular(path, path.name, LARGEST_FILE))
+    raw = parse_toml(path.name, read_regular(path, path.name, LARGEST_FILE))
     for mode in raw.get("mode", ()) if isinstance(raw.get("mode"), list) else ():
         if isinstance(mode, dict):
             for key in ("residual_percent", "coherence"):

@@ -15,12 +15,12 @@ from chipload.checking.run import simulation_estimate
 from chipload.checking.settings import CheckSettings, Limits
 from chipload.checking.workpiece import FinishedPart, Stock, Surroundings
 from chipload.cutting.material import Material, material_named, read_material
-from chipload.errors import Finding, InputError, Severity, grouped, worst_severity
+from chipload.errors import Finding, InputError, Severity, group_findings, worst_severity
 from chipload.jobs.simulation.fixtures import fixtures_of
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.simulation.tables import ProgramTable
 from chipload.jobs.simulation.values import elasticity_of, machine_table_of, settings_of, stock_of
-from chipload.jobs.tables import stated, value_of
+from chipload.jobs.tables import require_stated, value_of
 from chipload.machine.ini import read_ini
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.machine.saved_offsets import saved_offsets
@@ -43,7 +43,7 @@ def material_of(job: ProgramJob) -> Material:
     """Return the force coefficients that the job names."""
     if isinstance(job.material, Path):
         return read_material(job.material)
-    return material_named(stated(job.material, "material"))
+    return material_named(require_stated(job.material, "material"))
 
 
 def inputs_of(job: ProgramJob, machine: Machine, stock: Stock | None = None) -> CheckInputs:
@@ -64,7 +64,7 @@ def inputs_of(job: ProgramJob, machine: Machine, stock: Stock | None = None) -> 
         part = FinishedPart.read(
             folder / of.file, of.spacing_mm, of.excess_range_mm, units=of.units, chord_mm=of.chord_mm
         )
-    stock = stock_of(stated(table.stock, "stock"), folder) if stock is None else stock
+    stock = stock_of(require_stated(table.stock, "stock"), folder) if stock is None else stock
     fixtures = [body for k, f in enumerate(table.fixture) for body in fixtures_of(f, k, folder, stock)]
     return CheckInputs(
         cutters=job.cutters,
@@ -105,14 +105,16 @@ def read_for(job: ProgramJob, machine: Machine, progress: Progress = silent, tex
         speed=rad_s_from_rpm(table.speed_rpm) if table.speed_rpm is not None else None,
         tolerance=table.tolerance_mm,
         text=text,
-        setup=Setup(table.parameters, {**offsets, **table.work_offsets}, job.cutters, table.placed_in, _stated(table)),
+        setup=Setup(
+            table.parameters, {**offsets, **table.work_offsets}, job.cutters, table.placed_in, _stated_control(table)
+        ),
         comments=table.tool_comments,
         progress=progress,
     )
     return replace(reading, findings=(*found, *reading.findings)) if found else reading
 
 
-def _stated(table: ProgramTable) -> StatedControl:
+def _stated_control(table: ProgramTable) -> StatedControl:
     """Return what a job states about the control of its program."""
     settings = ControlSettings(**table.settings.model_dump())
     return StatedControl(table.control, table.unit, table.tools_unit, table.compensation, settings)
@@ -146,7 +148,7 @@ def check_lines(job: ProgramJob, done: ProgramResult, passes: int) -> tuple[list
         inputs = inputs_of(job, done.machine)
         stock = inputs.stock.layered(done.reading.program, inputs.cutters)
         needs = [simulation_estimate(inputs, done.reading, stock, passes)]
-    found = [text for _, text in grouped((*done.reading.findings, *done.reading.violations))]
+    found = [text for _, text in group_findings((*done.reading.findings, *done.reading.violations))]
     count = len(done.reading.violations)
     state = f"{count} finding{'s exceed' if count > 1 else ' exceeds'}" if count else "the program stays within"
     holds = not count and worst_severity(done.reading.findings) < Severity.UNPROVEN

@@ -27,7 +27,7 @@ from chipload.jobs.tables import (
     Text,
     Unit,
     Whole,
-    setting,
+    setting_field,
 )
 
 
@@ -192,42 +192,42 @@ class SimulateTable(Table):
     """Simulate the program in the stock: chips, forces, torque, power."""
 
     kind: Literal["simulate"] = Field(description="kind of the operation")
-    step_mm: Number = setting(SimulationSettings, "step_mm", "longest step of the tip")
-    tolerance_mm: Number = setting(
+    step_mm: Number = setting_field(SimulationSettings, "step_mm", "longest step of the tip")
+    tolerance_mm: Number = setting_field(
         SimulationSettings, "tolerance_mm", "greatest deviation of chords from the edges of chips"
     )
-    interpolation: Literal["slerp", "lerp"] = setting(
+    interpolation: Literal["slerp", "lerp"] = setting_field(
         SimulationSettings,
         "interpolation",
         "how the tool axis turns within a step: at constant rate, or along a straight line",
     )
-    engine: Literal["auto", "moves", "layers"] = setting(
+    engine: Literal["auto", "moves", "layers"] = setting_field(
         SimulationSettings,
         "engine",
         "moves: exact; layers: polygons in layers of the stock; auto: moves, or layers if moves cannot simulate the "
         "program",
     )
-    workers: Whole = setting(
+    workers: Whole = setting_field(
         SimulationSettings, "workers", "processes that share a layered stock in strips; does not change the result"
     )
-    corner_slices: Whole | None = setting(
+    corner_slices: Whole | None = setting_field(
         SimulationSettings,
         "corner_slices",
         "slices of a corner radius, of equal angle; default: 24, narrower near the bottom, or 48 equal "
         "ones if the axis leans",
     )
-    flank_mm: Number | None = setting(
+    flank_mm: Number | None = setting_field(
         SimulationSettings,
         "flank_mm",
         "length of a slice of the flank; default: half the radius, or a tenth of it if the axis leans",
     )
-    resolution_error: bool = setting(
+    resolution_error: bool = setting_field(
         SimulationSettings,
         "resolution_error",
         "estimate the error of the loads by steps and slices from some steps that are computed again; false: limits on "
         "loads are unproven",
     )
-    stock_points_mm: Number | None = setting(
+    stock_points_mm: Number | None = setting_field(
         SimulationSettings,
         "stock_points_mm",
         "greatest distance of the columns, or where the axis leans of the points, of the stock that are compared with "
@@ -237,7 +237,7 @@ class SimulateTable(Table):
 
 
 def _limit(name: str, description: str) -> Any:
-    return setting(Limits, name, description)
+    return setting_field(Limits, name, description)
 
 
 class ProgramLimitsTable(LimitsTable):
@@ -280,7 +280,7 @@ Stiff = Annotated[float, BeforeValidator(_stiff)]
 
 
 def _stiffness(name: str, description: str) -> Any:
-    return setting(MachineStiffness, name, description)
+    return setting_field(MachineStiffness, name, description)
 
 
 class StiffnessTable(Table):
@@ -321,30 +321,30 @@ class WorkpieceTable(Table):
     left at that step.
     """
 
-    modulus_gpa: Number = setting(Workpiece, "modulus_gpa", "Young's modulus")
-    poisson: Number = setting(Workpiece, "poisson", "Poisson's ratio")
+    modulus_gpa: Number = setting_field(Workpiece, "modulus_gpa", "Young's modulus")
+    poisson: Number = setting_field(Workpiece, "poisson", "Poisson's ratio")
     clamp: tuple[ClampTable, ...] = Field(min_length=1, description="clamps; together they allow no rigid motion")
-    density_kg_m3: Number | None = setting(
+    density_kg_m3: Number | None = setting_field(
         Workpiece, "density_kg_m3", "density; required for natural frequencies of the workpiece"
     )
-    damping_ratio: Number | None = setting(
+    damping_ratio: Number | None = setting_field(
         Workpiece,
         "damping_ratio",
         "damping ratio of the clamped workpiece; without it, stability with [dynamics] is unproven",
     )
-    yield_mpa: Number | None = setting(
+    yield_mpa: Number | None = setting_field(
         Workpiece, "yield_mpa", "yield stress; if stated, it limits the stress of the workpiece"
     )
-    modes: Whole = setting(Workpiece, "modes", "number of lowest modes that are tracked as material is removed")
+    modes: Whole = setting_field(Workpiece, "modes", "number of lowest modes that are tracked as material is removed")
     order: Literal[2, 3] = Field(
         Workpiece.order,
         description="polynomial order of a cell; 3 takes longer and is more accurate in corners",
     )
-    cell_mm: Number | None = setting(
+    cell_mm: Number | None = setting_field(
         Workpiece, "cell_mm", "side of the cells; default: from the thinnest remaining wall"
     )
-    states: Whole = setting(Workpiece, "states", "greatest number of states of removal that are solved")
-    state_change_percent: Number = setting(
+    states: Whole = setting_field(Workpiece, "states", "greatest number of states of removal that are solved")
+    state_change_percent: Number = setting_field(
         Workpiece,
         "state_change_percent",
         "a state is added between two whose deflections differ by more than this share of the greatest",

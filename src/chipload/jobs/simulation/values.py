@@ -22,7 +22,7 @@ from chipload.jobs.simulation.tables import (
     SolidTable,
     WorkpieceTable,
 )
-from chipload.jobs.tables import stated, value_of
+from chipload.jobs.tables import require_stated, value_of
 from chipload.machine.table import MachineTable
 from chipload.stability.process_damping import ProcessDamping
 
@@ -35,7 +35,9 @@ def settings_of(table: SimulateTable) -> SimulationSettings:
 def stock_of(table: SolidTable, folder: Path) -> Stock:
     """Return the initial stock of a table; its file is read."""
     if table.file is None:
-        return Stock.block(stated(table.low_mm, "stock.low_mm"), stated(table.high_mm, "stock.high_mm"), table.layer_mm)
+        return Stock.block(
+            require_stated(table.low_mm, "stock.low_mm"), require_stated(table.high_mm, "stock.high_mm"), table.layer_mm
+        )
     return Stock.read(folder / table.file, units=table.units, chord_mm=table.chord_mm, layer_mm=table.layer_mm)
 
 

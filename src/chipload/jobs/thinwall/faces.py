@@ -16,7 +16,7 @@ from chipload.geometry.sides import wall_of
 from chipload.geometry.step_faces import ON, Face, Model, Name, read_faces
 from chipload.geometry.step_patch import patch_of
 from chipload.geometry.thin_wall import ThinWall, opposite, through_sections
-from chipload.jobs.tables import FaceName, stated
+from chipload.jobs.tables import FaceName, require_stated
 from chipload.jobs.thinwall.job import ThinWallJob
 
 Floats = NDArray[np.float64]
@@ -35,7 +35,9 @@ def wall_of_faces(job: ThinWallJob) -> ThinWall:
     """
     w = job.wall
     model, fit = read_faces(job.section_files[0], "wall.file"), w.fit_mm or _FIT
-    named: dict[str, FaceName] = {key: stated(getattr(w, key), f"wall.{key}") for key in ("front", "back", "clamp")}
+    named: dict[str, FaceName] = {
+        key: require_stated(getattr(w, key), f"wall.{key}") for key in ("front", "back", "clamp")
+    }
     front, back = (model.face(named[key], f"wall.{key}") for key in ("front", "back"))
     if front.number == back.number:
         raise InputError(f"wall.back: face {back.number} is wall.front too: state the opposite face")

@@ -11,7 +11,7 @@ from chipload.jobs.thinwall.program_text import program_file, program_text, prog
 from chipload.jobs.thinwall.scene import scene_bytes
 from chipload.jobs.thinwall.sections import sections_of
 from chipload.program.apt.writer import write_apt
-from chipload.program.release import NOT_SIMULATED, released
+from chipload.program.release import NOT_SIMULATED, release_of_text
 from chipload.report.presentation import Blank, Presentation
 from chipload.report.programs import program_name
 from chipload.result import Result, release_of
@@ -39,7 +39,7 @@ def program_files(walled: ThinWallResult, result: Result) -> dict[str, bytes]:
     for name, one in walled.variants.items():
         file, cl = program_file(walled, one), f"{program_name(0, name)}.apt"
         text = program_text(walled, one, NOT_SIMULATED)
-        release = released(text, walled.texts[name], release_of(result, file))
+        release = release_of_text(text, walled.texts[name], release_of(result, file))
         out[file] = program_text(walled, one, release).encode("ascii")
         title, release = program_title(walled, one), release_of(result, cl)
         out[cl] = write_apt(one.program, walled.planning.cutters, title=title, release=release).encode("ascii")

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutting.force import forces_over_turn, in_work
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.jobs.thinwall.mesh_error import error_at
 from chipload.jobs.thinwall.outcome import Finish
@@ -68,7 +68,7 @@ def floor_loads(places: Places, removal: Removal, left: Sequence[Floats], side: 
     error : (n, m) of the compliance of the side
     """
     inputs = places.inputs
-    floor = stated(inputs.floor(inputs.body.side_numbers[side]), "floor")
+    floor = require_stated(inputs.floor(inputs.body.side_numbers[side]), "floor")
     parts = []
     for cuts in removal.cuts:
         uv = arc_places(cuts, floor)
@@ -116,7 +116,7 @@ def floor_finish(places: Places, removal: Removal, left: Sequence[Floats], side:
     """Form error of a floor by its last pass."""
     inputs = places.inputs
     number = inputs.body.side_numbers[side]
-    floor = stated(inputs.floor(number), "floor")
+    floor = require_stated(inputs.floor(number), "floor")
     parameters = np.linspace(0.0, 1.0, POINTS[0]), np.linspace(0.0, 1.0, POINTS[1])
     u, v = np.meshgrid(*parameters, indexing="ij")
     # what no cutter of this diameter reaches, in corners between walls, is no error of deflection

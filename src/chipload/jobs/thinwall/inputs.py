@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from chipload.cutting.material import material_named, need_directions, read_material
 from chipload.errors import Finding, InputError
 from chipload.geometry.mesh import read_mesh
-from chipload.geometry.sections import checked, loft, read_sections
+from chipload.geometry.sections import check_sections, loft, read_sections
 from chipload.geometry.thin_wall import ThinWall, blade, plate, through_sections
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.jobs.thinwall.faces import wall_of_faces
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_blank import PartBlank, part_blank
@@ -194,7 +194,7 @@ class WallInputs:
 
     def floor_area(self, side: int, operation: int = -1) -> FloorArea:
         """Where the cutter of an operation may go over a floor."""
-        floor, own = stated(self.floor(side), "floor"), self.operations[operation]
+        floor, own = require_stated(self.floor(side), "floor"), self.operations[operation]
         return floor.area(own.cut.cutter, own.table.step_mm, math.radians(own.table.ramp_deg or RAMP_DEG))
 
     def fine(self, side: int, operation: int = -1) -> FineSide | FlankSide | FloorSide:
@@ -249,8 +249,8 @@ class WallInputs:
         def measured(left: Sequence[Floats], side: int) -> Threshold:
             u, v = np.meshgrid(*self.body.places, indexing="ij")
             place = np.stack([u.ravel(), v.ravel()], axis=1)
-            table = stated(self.job.table.threshold, "threshold")
-            return calibrated(stated(self.depths.experiments, "threshold"), place, table.deviations)
+            table = require_stated(self.job.table.threshold, "threshold")
+            return calibrated(require_stated(self.depths.experiments, "threshold"), place, table.deviations)
 
         return limited if self.depths.experiments is None else measured
 
@@ -369,7 +369,7 @@ def _wall_body(job: ThinWallJob, shape: ThinWall, sides: tuple[int, ...], foot: 
 def _shape(job: ThinWallJob) -> ThinWall:
     w = job.wall
     if w.shape == "plate":
-        return plate(*(stated(getattr(w, key), f"wall.{key}") for key in SHAPES["plate"][0]))
+        return plate(*(require_stated(getattr(w, key), f"wall.{key}") for key in SHAPES["plate"][0]))
     if w.shape == "blade":
         value = {key: float(x) for key, x in w.model_dump().items() if isinstance(x, (int, float))}
         return blade(
@@ -382,8 +382,8 @@ def _shape(job: ThinWallJob) -> ThinWall:
         )
     if w.shape == "step":
         return wall_of_faces(job)
-    unit, edge_share = stated(w.unit, "wall.unit"), stated(w.edge_share, "wall.edge_share")
-    made = loft(checked(read_sections(job.section_files, unit, columns=w.columns)))
+    unit, edge_share = require_stated(w.unit, "wall.unit"), require_stated(w.edge_share, "wall.edge_share")
+    made = loft(check_sections(read_sections(job.section_files, unit, columns=w.columns)))
     return through_sections(made, edge_share, w.span or (0.0, 1.0))
 
 

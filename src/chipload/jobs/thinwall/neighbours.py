@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from chipload.checking.workpiece import stock_points
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.planning.thinwall.pass_program import PassProgram
 from chipload.program.program import Program
@@ -57,7 +57,7 @@ def part_collisions(
     InputError
         The points of part or stock would be too many.
     """
-    op, table = inputs.job.operation, stated(inputs.job.table.part, "part")
+    op, table = inputs.job.operation, require_stated(inputs.job.table.part, "part")
     cutters = {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
     steps = steps_of(Program.join([one.program for one in pass_programs]), op.step_mm, op.tolerance_mm)
     solids = {"part": fine(inputs.finished_mesh(), table.spacing_mm, "part")[0]}

@@ -24,7 +24,7 @@ from scipy.interpolate import RegularGridInterpolator
 from chipload.checking.clamped import Workpiece, clamped_volumes, elastic_of, placed_clamps
 from chipload.checking.workpiece_compliance import COARSER, CORNER, FLOOR
 from chipload.jobs.simulation.values import clamps_of
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_floor import PartFloor
 from chipload.jobs.thinwall.part_shape import PartShape
@@ -173,7 +173,7 @@ def part_blank(job: ThinWallJob, body: PartShape, step_over: float) -> PartBlank
         A clamp holds nothing, a rigid motion is free, or the cells do not resolve the thinnest wall.
     """
     made = job.table.workpiece
-    n, m = stated(job.table.part, "part").places
+    n, m = require_stated(job.table.part, "part").places
     places = np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, m)
     workpiece = Workpiece(
         modulus_gpa=made.modulus_gpa,

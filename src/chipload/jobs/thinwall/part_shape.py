@@ -24,7 +24,7 @@ from chipload.geometry.mesh import read_mesh
 from chipload.geometry.step_faces import Face, read_faces
 from chipload.geometry.step_patch import patch_of
 from chipload.geometry.thin_wall import closed_between
-from chipload.jobs.tables import FaceName, stated
+from chipload.jobs.tables import FaceName, require_stated
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_floor import PartFloor, floor_of
 from chipload.jobs.thinwall.tables import FaceWallTable
@@ -158,7 +158,7 @@ def part_of_faces(job: ThinWallJob) -> PartShape:
     InputError
         The file cannot be read, or a face is no standing side of a wall.
     """
-    table, file = stated(job.table.part, "part"), stated(job.part_file, "part.file")
+    table, file = require_stated(job.table.part, "part"), require_stated(job.part_file, "part.file")
     model = read_faces(file, "part.file")
     if not model.solid:
         raise InputError(f"part.file = {file.name}: its faces bound no solid: write the part as a solid")
@@ -188,7 +188,7 @@ def _side(face: Face, key: str, wall: FaceWallTable, number: int, allowance: flo
     patch = _standing(patch_of(face, key, wall.fit_mm).patch, key, face)
     made = PartSide(f"{face.number}", patch, 0.0, number, allowance)
     height = made.size()[1]
-    foot = stated(wall.foot_mm, f"wall.{number}.foot_mm")
+    foot = require_stated(wall.foot_mm, f"wall.{number}.foot_mm")
     if not foot < 0.8 * height:
         raise InputError(
             f"wall.{number}.foot_mm = {foot:g}: must be below 0.8 of the height of face {face.number}, "

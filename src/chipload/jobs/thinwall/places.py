@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 
 from chipload.jobs.kept_parts import KeptRecords
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.jobs.thinwall.chatter import WallChatter, chatter_of
 from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.jobs.thinwall.mesh_error import error_at, mesh_error
@@ -142,7 +142,7 @@ class Places:
 
     def motion(self, left: Sequence[Floats], side: int) -> Floats:
         """Displacement (n, m, 3) [mm/N] of the elements' places of a part's side under a normal force of 1 N."""
-        states, part = self.inputs.both(self.coarse(left)), stated(self.inputs.body.part, "part")
+        states, part = self.inputs.both(self.coarse(left)), require_stated(self.inputs.body.part, "part")
         key = (b"".join(D.tobytes() for D in states), side)
         if key not in self._moved:
             number = self.inputs.body.side_numbers[side]
@@ -205,7 +205,7 @@ class Places:
             number = self.inputs.body.side_numbers[side]
             floor, radius = self.inputs.floor(number), max(o.cut.cutter.radius for o in self.inputs.operations)
             u, v = (x.ravel() for x in np.meshgrid(self.u, self.v, indexing="ij"))
-            self._reached[side] = stated(floor, "floor").reached(u, v, self.inputs.floor_area(number), radius)
+            self._reached[side] = require_stated(floor, "floor").reached(u, v, self.inputs.floor_area(number), radius)
         reached = self._reached[side]
         C = self.pressed(left, side, reached)[..., 2]
         if spare:

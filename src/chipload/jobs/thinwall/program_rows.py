@@ -27,7 +27,7 @@ from chipload.planning.thinwall.read_rows import sides_of_program
 from chipload.program.gcode.tools import Tool, ToolTable
 from chipload.program.program import RAPID, Program
 from chipload.program.read import read_program
-from chipload.result.first_lines import located
+from chipload.result.first_lines import located_text
 
 Floats = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ def program_rows(
     sides, step_over = sides_of_program(program, cutter, at, foot, op.step_mm, name, tool)
     stands = [one for k, side in enumerate(sides) for one in _stands(side, f"{name}: side {k + 1}")]
     # limits of the machine are checked on the job's own programs, which follow the rows
-    found = (replace(f, text=f"{name}: {located(f)}", line=0, row=None) for f in reading.findings)
+    found = (replace(f, text=f"{name}: {located_text(f)}", line=0, row=None) for f in reading.findings)
     return ProgramRows(sides, step_over, tuple(dict.fromkeys(stands)), tuple(dict.fromkeys(found)))
 
 

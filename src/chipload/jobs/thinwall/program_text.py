@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from chipload.checking.preparation import timed
+from chipload.checking.preparation import time_rows
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs.thinwall.outcome import USED, ThinWallResult, Variant
 from chipload.jobs.thinwall.part_shape import PartShape
@@ -75,7 +75,7 @@ def _read(walled: ThinWallResult, one: Variant, text: str) -> tuple[ProgramReadi
 
 def _simulated_text(walled: ThinWallResult, one: Variant, reading: ProgramReading, tried: Tried) -> Variant:
     """A variant as the simulation of its text finds it, which names the lines of its program."""
-    program, times = timed(reading, walled.planning.cutters, walled.planning.machine)
+    program, times = time_rows(reading, walled.planning.cutters, walled.planning.machine)
     lines = one.program.line[rows_of_source(one.program, reading)][len(reading.program) - len(program) :]
     return tried.prove_text(one, replace(program, line=lines), times)
 

@@ -34,8 +34,8 @@ from chipload.planning.thinwall.pass_program import PassProgram
 from chipload.planning.thinwall.passes import Plan
 from chipload.program.program import Program
 from chipload.progress import Progress
-from chipload.simulation.chips import remove, stacked
-from chipload.simulation.contact_points import touched
+from chipload.simulation.chips import remove, stack_blocks
+from chipload.simulation.contact_points import touch_points
 from chipload.simulation.deflection import Contacts, form_error, step_deflections
 from chipload.simulation.moves import Engine
 from chipload.simulation.removal import Removal, Resolution, removal_between
@@ -170,7 +170,7 @@ def prove(
         load_error, program, places.uncut, whole, cutters, inputs.cut.material, fine, floors=floors, layers=by_layers
     )
     return Proof(
-        stacked(parts),
+        stack_blocks(parts),
         tuple(thresholds),
         tuple(finish.values()),
         _shape(places, stock, pass_programs, program),
@@ -246,7 +246,7 @@ def _columns(
     n = len(columns["line"])
     known = np.column_stack([pass_program.place, pass_program.depth])
     spots = [
-        touched(
+        touch_points(
             removal,
             int(pass_program.program.line[0]),
             pass_program.contact,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chipload.checking.default_checks import default_checks
 from chipload.checking.settings import CheckSettings
-from chipload.cutting.material import beyond
+from chipload.cutting.material import texts_beyond_range
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs.tables import value_of
 from chipload.jobs.thinwall.inputs import WallInputs, read_wall
@@ -40,7 +40,7 @@ from chipload.progress import Progress, silent
 from chipload.result import Provenance
 from chipload.result.provenance import provenance_of, title_of
 from chipload.simulation.checkpoint import Checkpoint
-from chipload.simulation.chips import counted
+from chipload.simulation.chips import count_steps
 from chipload.simulation.estimate import estimate
 
 Floats = NDArray[np.float64]
@@ -166,7 +166,7 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
     on_machine(inputs, program)
     wall_stock(inputs)
     cutters = {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
-    count = counted(program, cutters, resolution_of(inputs, program))
+    count = count_steps(program, cutters, resolution_of(inputs, program))
     length, height, thickness = inputs.body.shape.size()
     part = inputs.body.part
     if part is None:
@@ -242,7 +242,7 @@ def _findings(inputs: WallInputs) -> tuple[Finding, ...]:
         cut = one.cut
         lean = math.sin(cut.posture.beta) if isinstance(cut.posture, CutterPose) else 1.0
         speed = cut.pass_motion.spindle * cut.cutter.radius * lean
-        texts += beyond(cut.material, cut.posture.feed_per_tooth, speed)
+        texts += texts_beyond_range(cut.material, cut.posture.feed_per_tooth, speed)
     beyond_range = (Finding("chip-beyond-coefficients", 0, text, Severity.UNPROVEN) for text in dict.fromkeys(texts))
     return (*beyond_range, *inputs.findings)
 

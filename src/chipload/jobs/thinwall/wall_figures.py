@@ -12,7 +12,7 @@ from plotly.subplots import make_subplots
 
 from chipload.jobs.thinwall.outcome import ThinWallResult, Variant
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SCALE, SPACE_POINTS
-from chipload.result.thinning import thinned
+from chipload.result.thinning import thin_rows
 
 Floats = NDArray[np.float64]
 
@@ -125,7 +125,7 @@ def along(walled: ThinWallResult) -> go.Figure:
         t = np.asarray(c["t_s"]) / 60.0
         for k, (column, factor, title, _) in enumerate(rows, start=1):
             y = factor * np.asarray(c[column], dtype=np.float64)
-            keep = thinned(y, LINE_POINTS // 2)
+            keep = thin_rows(y, LINE_POINTS // 2)
             out.add_trace(
                 go.Scatter(
                     x=t[keep].astype(np.float32), y=y[keep].astype(np.float32), name=name, legendgroup=name,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.program_rows import ProgramRows
 from chipload.jobs.thinwall.tables import WallOperationTable, WallTable
@@ -113,7 +113,7 @@ def wall_operation(
     if cutter.flank_arc is not None:
         _check_foot(job, max(pose.below for pose in poses))
     # between rows: an axial depth apart where the flank cuts
-    step_over = abs(stated(poses[0].step, f"operation.{number}.step_over_mm"))
+    step_over = abs(require_stated(poses[0].step, f"operation.{number}.step_over_mm"))
     # step-over^2 / 8 r of a plane; the stock has the scallops of the pass before, which may be one of the one before
     scallop = 0.0 if op.contact != "corner" else step_over**2 / (8.0 * cutter.finishing_arc[0])
     deepest_scallop = scallop if before is None else max(scallop, before.cut.scallop)
@@ -133,7 +133,7 @@ def wall_operation(
             machine=machine,
             posture=posture,
             pass_motion=PassMotion(posture, feed, machine.rapid, spindle, op.clearance_mm),
-            step_over=stated(posture.step, f"operation.{number}.step_over_mm"),
+            step_over=require_stated(posture.step, f"operation.{number}.step_over_mm"),
             scallop=scallop,
             measure="greatest",
         ),
@@ -151,15 +151,15 @@ def wall_operation(
 
 def _planned_poses(op: WallOperationTable, number: int, cutter: Cutter, feed_per_tooth: float) -> tuple[Pose, ...]:
     """How the cutter stands along planned rows."""
-    right = clockwise_milling(stated(op.milling, f"operation.{number}.milling"), cutter) == "down"
+    right = clockwise_milling(require_stated(op.milling, f"operation.{number}.milling"), cutter) == "down"
     clockwise = not cutter.left_hand
     if op.contact == "flank":
-        deep = stated(op.axial_depth_mm, f"operation.{number}.axial_depth_mm")
+        deep = require_stated(op.axial_depth_mm, f"operation.{number}.axial_depth_mm")
         return (FlankPose(cutter, feed_per_tooth, deep if right else -deep, clockwise),)
     if op.contact == "end":
-        across = stated(op.step_over_mm, f"operation.{number}.step_over_mm")
+        across = require_stated(op.step_over_mm, f"operation.{number}.step_over_mm")
         return (EndPose(cutter, feed_per_tooth, -across if right else across, clockwise),)
-    lean, lead = (stated(getattr(op, key), f"operation.{number}.{key}") for key in ("lean_deg", "lead_deg"))
+    lean, lead = (require_stated(getattr(op, key), f"operation.{number}.{key}") for key in ("lean_deg", "lead_deg"))
     step = _step_over(op, number, cutter) * (-1.0 if right else 1.0)
     tilt = -math.copysign(math.radians(lean), step)
     return (CutterPose(cutter, feed_per_tooth, step, math.radians(lead), tilt, clockwise),)
@@ -185,7 +185,7 @@ def _step_over(op: WallOperationTable, number: int, cutter: Cutter) -> float:
     """
     if op.step_over_mm is not None:
         return op.step_over_mm
-    r, h = cutter.finishing_arc[0], stated(op.scallop_um, f"operation.{number}.scallop_um") / 1000.0
+    r, h = cutter.finishing_arc[0], require_stated(op.scallop_um, f"operation.{number}.scallop_um") / 1000.0
     if cutter.flank_arc is not None and op.lead_deg:
         raise InputError(
             f"operation.{number}.scallop_um: of a barrel only with lead_deg = 0, where its arc lies across the feed: "

@@ -130,12 +130,12 @@ def limit_of(job: TorqueJob, planned: Cut, material: Material) -> tuple[Ritz, Pa
 
     def limit(factors: Floats) -> PathLimit:
         more = UnitResponse(factors * wall.compliance, factors * wall.stress)
-        return path_limit(planned.loads, more, *allowed(job))
+        return path_limit(planned.loads, more, *allowed_bending(job))
 
     return thin, limit_at_confidence(job, planned, material, limit)[0]
 
 
-def allowed(job: TorqueJob) -> tuple[float, float]:
+def allowed_bending(job: TorqueJob) -> tuple[float, float]:
     """Allowed deflection [mm] and stress [MPa]."""
     limits = job.table.limits
     return 1e-3 * limits.form_error_um, limits.strength_share * job.shell.strength_mpa

@@ -48,7 +48,7 @@ def controller_of(job: TorqueJob, torque: float) -> Override:
     return Override(kind="mamdani", torque_ref=hold * torque, quantum=0.0, **newton_mm, **plain)
 
 
-def tuned(job: TorqueJob, config: Override, path: ToolPath, spindle: Spindle, loop: Loop) -> Override:
+def tune_controller(job: TorqueJob, config: Override, path: ToolPath, spindle: Spindle, loop: Loop) -> Override:
     """The controller with PI gains by the rule, for the heaviest cut of the model, unless the job states them."""
     override_table = job.table.torque_control.override
     gain = float(path.over_relief.cut.max()) / config.torque_ref
@@ -71,8 +71,10 @@ def cases_of(
     out = []
     for k, (latency, quantum) in enumerate(((0.0, 0.0), (1e-3 * loop_table.latency_ms, loop_table.override_step))):
         loop = Loop(acceleration, period, latency, min(1e-3, period), seed=loop_table.seed)
-        config = tuned(job, replace(controller, quantum=quantum), path, spindle, loop)
-        runs = compared(path, config, player(path, table, spindle, deviation_of(job), loop, torque, walls), torque)
+        config = tune_controller(job, replace(controller, quantum=quantum), path, spindle, loop)
+        runs = compare_controllers(
+            path, config, player(path, table, spindle, deviation_of(job), loop, torque, walls), torque
+        )
         out.append(ControllerCase(loop, quantum, runs))
         progress(0.75 + 0.05 * k, "controllers")
     return tuple(out)
@@ -98,14 +100,14 @@ def player(
     return play
 
 
-def compared(path: ToolPath, config: Override, play: Play, torque: float) -> dict[str, ControllerRun]:
+def compare_controllers(path: ToolPath, config: Override, play: Play, torque: float) -> dict[str, ControllerRun]:
     """Runs of every controller by its name."""
     runs: dict[str, ControllerRun] = {}
     for name, (override, modelled) in comparison(_constant(path, config, torque, play), config).items():
         runs[name] = play(override, modelled)
         if name == PLAIN:
             # their override follows the model, nothing is measured
-            runs[MODEL] = _derated(config, torque, play)
+            runs[MODEL] = _derate_schedule(config, torque, play)
             runs[MODEL_FULL] = play(replace(config, kind="fixed"), True)
     return runs
 
@@ -130,7 +132,7 @@ def _constant(path: ToolPath, config: Override, torque: float, play: Play) -> fl
     return value
 
 
-def _derated(config: Override, torque: float, play: Play) -> ControllerRun:
+def _derate_schedule(config: Override, torque: float, play: Play) -> ControllerRun:
     """The feed schedule of the model, planned with the greatest torque at which it respects the limit in truth."""
     low, high = config.light, DERATED_MOST * torque
     best = None

@@ -22,7 +22,7 @@ from chipload.cutting.force import mean_forces
 from chipload.cutting.material import Material
 from chipload.engagement.extent import contact_range
 from chipload.errors import InputError, Severity
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.jobs.torque.job import TorqueJob
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable
 from chipload.machine.machine import Machine
@@ -66,7 +66,7 @@ class Place:
     table: ShellTable
 
     @property
-    def _up(self) -> float:
+    def _sense(self) -> float:
         return 1.0 if self.table.clamped == "low" else -1.0
 
     @property
@@ -77,12 +77,12 @@ class Place:
     @property
     def ends(self) -> tuple[float, float]:
         """Lowest and highest z [mm]."""
-        other = self.table.clamp_z_mm + self._up * self.table.length_mm * math.cos(self.angle)
+        other = self.table.clamp_z_mm + self._sense * self.table.length_mm * math.cos(self.angle)
         return min(self.table.clamp_z_mm, other), max(self.table.clamp_z_mm, other)
 
     def along(self, z: Floats) -> Floats:
         """Distance s along the wall of heights [mm]; outside 0 .. length beyond the wall."""
-        return np.asarray(self._up * (z - self.table.clamp_z_mm) / math.cos(self.angle))
+        return np.asarray(self._sense * (z - self.table.clamp_z_mm) / math.cos(self.angle))
 
     def outer(self, z: Floats) -> Floats:
         """Radius of the finished outer surface at heights [mm]."""
@@ -148,7 +148,7 @@ def program_of(job: TorqueJob, machine: Machine, progress: Progress = silent) ->
         It cannot be read, does not hold on the machine, leans its axis, or changes its spindle speed while it cuts.
     """
     if job.program_file is None:
-        round_table = stated(job.table.round, "round")
+        round_table = require_stated(job.table.round, "round")
         cutter = job.cutters[round_table.cutter]
         require_hand(machine, cutter)
         program = round_program(round_table, Place(job.shell), cutter)
@@ -176,7 +176,7 @@ def read_file(job: TorqueJob, file: Path, machine: Machine, progress: Progress =
     InputError
         It cannot be read, does not hold on the machine, or moves otherwise with block delete on.
     """
-    table = stated(job.table.program, "program")
+    table = require_stated(job.table.program, "program")
     feed = mm_s_from_mm_min(table.feed_mm_min) if table.feed_mm_min is not None else None
     reading = read_program(
         file, machine, dialect=table.dialect, feed=feed, tolerance=table.tolerance_mm,
@@ -439,7 +439,7 @@ def true_loads(loads: Loads, points: Floats, place: Place, surprises: tuple[Surp
 
     def away(x: SurpriseTable) -> Floats:
         """Distance from a hard spot, round the wall."""
-        turn = np.arctan2(middle[:, 1], middle[:, 0]) - math.radians(stated(x.at_deg, "surprise.at_deg"))
+        turn = np.arctan2(middle[:, 1], middle[:, 0]) - math.radians(require_stated(x.at_deg, "surprise.at_deg"))
         return np.asarray(around * np.abs(np.angle(np.exp(1j * turn))))
 
     edge, cut = surprise_factors(len(middle), away, surprises)
@@ -457,9 +457,9 @@ def surprise_factors(
     for x in surprises:
         if x.kind == "worn-cutter":
             cut *= 1.0 + x.share
-            edge *= 1.0 + stated(x.edge_share, "surprise.edge_share")
+            edge *= 1.0 + require_stated(x.edge_share, "surprise.edge_share")
         elif x.kind == "hard-spot":
-            width, ramp = stated(x.width_mm, "surprise.width_mm"), stated(x.ramp_mm, "surprise.ramp_mm")
+            width, ramp = require_stated(x.width_mm, "surprise.width_mm"), require_stated(x.ramp_mm, "surprise.ramp_mm")
             there = np.clip((0.5 * width - away(x)) / ramp + 1.0, 0.0, 1.0)
             cut *= 1.0 + x.share * there
             edge *= 1.0 + x.share * there
@@ -471,7 +471,7 @@ def off_centre(stock_mm: float, surprises: tuple[SurpriseTable, ...]) -> tuple[f
     x = y = 0.0
     for one in surprises:
         if one.kind == "thicker-side":
-            at = math.radians(stated(one.at_deg, "surprise.at_deg"))
+            at = math.radians(require_stated(one.at_deg, "surprise.at_deg"))
             x += one.share * stock_mm * math.cos(at)
             y += one.share * stock_mm * math.sin(at)
     return x, y

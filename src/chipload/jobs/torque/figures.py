@@ -25,7 +25,7 @@ from chipload.jobs.torque.outcome import (
 )
 from chipload.jobs.torque.result import track_name
 from chipload.jobs.torque.scene import scene_bytes
-from chipload.jobs.torque.unrolled_figure import unrolled
+from chipload.jobs.torque.unrolled_figure import unrolled_torques
 from chipload.number_text import number_text
 from chipload.report.presentation import Blank, Presentation
 from chipload.report.sheet import figure, items, table
@@ -126,13 +126,13 @@ def _limit(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     return [
         *body,
         figure("allowable", drawn.allowable(outcome), figures),
-        *_unrolled(outcome, figures),
+        *_unrolled_figures(outcome, figures),
         "<h3>Deviations from the plan</h3>",
         items(surprises),
     ]
 
 
-def _unrolled(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
+def _unrolled_figures(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]:
     """Only a tube or a cone has angles round it."""
     if not isinstance(outcome.wall, ShellWall):
         return []
@@ -140,7 +140,7 @@ def _unrolled(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[str]
         "<h3>On the unrolled wall</h3>",
         '<p class="note">Each point of the path by its angle and height, with one colour scale; dashed: the angle of a '
         "surprise.</p>",
-        figure("unrolled", unrolled(outcome), figures),
+        figure("unrolled", unrolled_torques(outcome), figures),
     ]
 
 
@@ -174,9 +174,9 @@ def _controllers(outcome: TorqueResult, figures: dict[str, go.Figure]) -> list[s
         "with all deviations, which are unknown beforehand. The last row is the shortest time that is physically "
         "possible: the torque is at its limit at every instant.</p>",
         f"<h3>Along the path, {1e3 * late.loop.latency:g} ms latency</h3>",
-        figure("path", drawn.along(outcome, late, "path"), figures),
+        figure("path", drawn.torques_along(outcome, late, "path"), figures),
         "<h3>Over time</h3>",
-        figure("time", drawn.along(outcome, late, "time"), figures),
+        figure("time", drawn.torques_along(outcome, late, "time"), figures),
     ]
     return body
 
@@ -249,7 +249,7 @@ def _wall(wall: ShellWall, outcome: TorqueResult, figures: dict[str, go.Figure])
         f"<p>A force of 1 N at the free end deflects the wall of {wall.thinnest:.4g} mm by "
         f"{number_text(1e3 * whole)} µm, "
         f"nearly all of it because the section becomes oval. {beam}</p>",
-        figure("oval", drawn.ovalised(wall), figures),
+        figure("oval", drawn.ovalisation_figure(wall), figures),
         "<h3>Comparison with finite elements</h3>",
         f'<p class="note">Half of the wall by {a} x {b} x {c} hexahedra of 20 nodes (half round, along, through), '
         f"{solid.nodes} nodes; the same force on the same area, displacement of the end of the depth of cut.</p>",
@@ -282,7 +282,7 @@ def _estimate(e: SpindleEstimate, outcome: TorqueResult, figures: dict[str, go.F
         f"<p>Do not trust torques below {number_text(1e-3 * e.light, 3)} N m"
         f"; changes within {3e3 * e.lag:.3g} ms; speeds other than the programmed one, for which the idle current is "
         "not stated.</p>",
-        figure("measured", drawn.measured(outcome), figures),
+        figure("measured", drawn.measured_torque_figure(outcome), figures),
     ]
 
 

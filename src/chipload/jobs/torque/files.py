@@ -23,7 +23,7 @@ from chipload.machine.machine import Machine
 from chipload.program.gcode.writer import write_gcode
 from chipload.program.motions import is_arc
 from chipload.program.program import DWELL, RAPID, Program
-from chipload.program.release import released
+from chipload.program.release import release_of_text
 from chipload.report.programs import ENDINGS
 from chipload.result import Result, release_of
 
@@ -49,7 +49,7 @@ def program_files(outcome: TorqueResult, result: Result) -> dict[str, bytes]:
     written = outcome.job.written
     release = replace(release_of(result, name), condition="with chipload hal")
     text = override_text(outcome.job.title, written.planned, machine, release)
-    given = released(text, written.text, release)
+    given = release_of_text(text, written.text, release)
     if given is not release:
         text = override_text(outcome.job.title, written.planned, machine, given)
     out = {name: text.encode("ascii")}
@@ -103,7 +103,11 @@ def feed_forward(outcome: TorqueResult, config: Override) -> Program:
             continue
         last = _next(points, at, p.p_work[k])
         for j in range(at, last):
-            ends = j + 1 == last or override[j + 1] != override[j] or _turned(p, k, arc[k], points, at, j + 2) > LONGEST
+            ends = (
+                j + 1 == last
+                or override[j + 1] != override[j]
+                or _swept_angle(p, k, arc[k], points, at, j + 2) > LONGEST
+            )
             if ends:
                 row_of.append(k)
                 end.append(p.p_work[k] if j + 1 == last else _on_arc(p, k, arc[k], points[j + 1]))
@@ -123,7 +127,7 @@ def _next(points: Floats, at: int, end: Floats) -> int:
     return at + 1 + int(np.argmax(np.abs(points[at + 1 :] - end).max(axis=1) <= SAME_MM))
 
 
-def _turned(p: Program, k: int, arc: bool, points: Floats, first: int, last: int) -> float:
+def _swept_angle(p: Program, k: int, arc: bool, points: Floats, first: int, last: int) -> float:
     if not arc or last >= len(points):
         return 0.0
     a, b = ((x - p.centre[k]) - ((x - p.centre[k]) @ p.normal[k]) * p.normal[k] for x in (points[first], points[last]))

@@ -15,7 +15,7 @@ from chipload.jobs.messages import Errors
 from chipload.jobs.simulation.tables import WorkpieceTable
 from chipload.jobs.simulation.values import clamps_of
 from chipload.jobs.sources import entries_of, sources_and_cutters, unknown_cutter
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.jobs.torque.tables import RoundTable, ShellTable, SurpriseTable, TorqueJobTable
 
 ONE_PROGRAM = "state a [program] with a file, or a [round] to generate one"
@@ -65,7 +65,7 @@ class TorqueJob:
     @property
     def shell(self) -> ShellTable:
         """The finished wall of a thin tube or cone."""
-        return stated(self.table.torque_control.shell, "torque_control.shell")
+        return require_stated(self.table.torque_control.shell, "torque_control.shell")
 
     @property
     def workpiece(self) -> WorkpieceTable | None:

@@ -44,24 +44,26 @@ def remedies(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit, mater
     k = limit.step
     depth, tolerance, modes = float(planned.far[k] - planned.near[k]), job.shell.wall_tolerance_mm, ritz(shell)
 
-    def allowed(modes: Ritz, *changed: HardestPlace) -> bool:
-        return all(_allowed(job, modes, at) >= margin * at.edge for at in changed)
+    def is_allowed(modes: Ritz, *changed: HardestPlace) -> bool:
+        return all(_force_limit_at(job, modes, at) >= margin * at.edge for at in changed)
 
     def shallower(share: float) -> bool:
-        return allowed(modes, *(
+        return is_allowed(modes, *(
             replace(at, near=at.far - share * (at.far - at.near), edge=share * at.edge) for at in places
         ))  # fmt: skip
 
     def thicker(thickness: float) -> bool:
-        return allowed(ritz(replace(shell, thickness=thickness)), *places)
+        return is_allowed(ritz(replace(shell, thickness=thickness)), *places)
 
     def shorter(share: float) -> bool:
         less = shell.length * (1.0 - share)
         moved = [replace(at, near=at.near - less, far=at.far - less) for at in places]
-        return all(at.near >= 0.0 for at in moved) and allowed(ritz(replace(shell, length=shell.length - less)), *moved)
+        return all(at.near >= 0.0 for at in moved) and is_allowed(
+            ritz(replace(shell, length=shell.length - less)), *moved
+        )
 
     def stiffer(share: float) -> bool:
-        return allowed(modes, *(replace(at, tool=at.tool * share**3) for at in places))
+        return is_allowed(modes, *(replace(at, tool=at.tool * share**3) for at in places))
 
     least = float(min(shell.radius, shell.radius + shell.length * np.sin(shell.cone_angle)))
     cutter = min(job.cutters.values(), key=lambda c: c.radius)
@@ -76,7 +78,7 @@ def remedies(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit, mater
     )  # fmt: skip
     out = []
     for does, good, bad, text in changes:
-        found = _between(does, good, bad)
+        found = _nearest_value(does, good, bad)
         if found is not None:
             out.append(text(found))
     return out
@@ -103,7 +105,7 @@ def remedy_text(job: TorqueJob, shell: Shell, planned: Cut, limit: PathLimit, ma
     return f"no feed keeps the limits; one of these changes does: {'; '.join(found)}; or a sharper cutter"
 
 
-def _allowed(job: TorqueJob, modes: Ritz, place: HardestPlace) -> float:
+def _force_limit_at(job: TorqueJob, modes: Ritz, place: HardestPlace) -> float:
     """F_lim at a place [N]."""
     width = contact_width(job.shell.stock_mm, job.cutters)
     near, far, tool = (np.array([x]) for x in (place.near, place.far, place.tool))
@@ -113,7 +115,7 @@ def _allowed(job: TorqueJob, modes: Ritz, place: HardestPlace) -> float:
     return float(min(deflection / wall.compliance[0], stress / wall.stress[0]))
 
 
-def _between(does: Callable[[float], bool], good: float, bad: float) -> float | None:
+def _nearest_value(does: Callable[[float], bool], good: float, bad: float) -> float | None:
     """The value nearest to ``bad`` that would do; None: even ``good`` does not."""
     if does(bad):
         return bad

@@ -168,7 +168,7 @@ def _programs(outcome: TorqueResult, case: ControllerCase, name: str) -> tuple[s
 
 def _columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
     """(n,) columns of the whole program with a controller: rapids, a row for each step of the controller, rapids."""
-    found, written, own = _controlled(outcome, run), outcome.job.written, outcome.job.written.controlled
+    found, written, own = _controller_columns(outcome, run), outcome.job.written, outcome.job.written.controlled
     rows = list(range(own.start - 1)), list(range(own.stop, len(written.program) if run.outcome.finished else 0))
     before, after = (_rapids(outcome, found, r, end) for r, end in zip(rows, (0, -1), strict=True))
     out = {name: np.concatenate([before[name], values, after[name]]) for name, values in found.items()}
@@ -195,7 +195,7 @@ def _rapids(outcome: TorqueResult, found: Columns, rows: list[int], end: int) ->
     return {name: stated.get(name, np.zeros(len(rows), dtype=values.dtype)) for name, values in found.items()}
 
 
-def _controlled(outcome: TorqueResult, run: ControllerRun) -> Columns:
+def _controller_columns(outcome: TorqueResult, run: ControllerRun) -> Columns:
     """(n,) columns of a controller, one row for each step of it."""
     o, path = run.outcome, outcome.allowable.path
     relief = np.interp(o.s, path.model.s, path.relief)

@@ -18,7 +18,7 @@ from chipload.checking.settings import CheckSettings
 from chipload.checking.stock_check import check_stock
 from chipload.checking.workpiece import Stock, insides, stock_box
 from chipload.control.fuzzy import FuzzyTable, read_fuzzy, standard
-from chipload.control.identification import aliased, bandwidth
+from chipload.control.identification import alias_frequency, bandwidth
 from chipload.control.override import Override
 from chipload.control.resolution import check_light, torque_resolution
 from chipload.control.spindle import first_order
@@ -56,7 +56,7 @@ from chipload.report.presentation import Blank
 from chipload.result import Provenance
 from chipload.result.provenance import provenance_of, title_of
 from chipload.simulation.accuracy import energy_balance
-from chipload.simulation.chips import counted
+from chipload.simulation.chips import count_steps
 from chipload.simulation.estimate import estimate
 from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.program_findings import ProgramSurroundings, program_findings
@@ -73,7 +73,7 @@ def run(job: TorqueJob, progress: Progress = silent) -> TorqueResult:
     InputError
         A file cannot be read, or values do not go together.
     """
-    machine, material, table, written, spindle = opened(job)
+    machine, material, table, written, spindle = open_inputs(job)
     program = written.program
     cutting = part_of(progress, 0.0, 0.65)
     wall: ShellWall | ClampedWorkpiece
@@ -200,7 +200,7 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     InputError
         As :func:`run`, but for what only the exact limit of torque shows.
     """
-    machine, material, table, written, spindle = opened(job)
+    machine, material, table, written, spindle = open_inputs(job)
     program = written.program
     if job.workpiece is not None:
         stock = real_stock_body(job, program)
@@ -218,7 +218,7 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     least = torque_resolution(spindle, 1e-3 * job.table.loop.period_ms).total / granted if granted > 0.0 else math.inf
     # below this set point the readings count as air, or the estimate is not valid
     least = max(least, estimate_range(job, spindle)[0] / job.table.torque_control.override.hold)
-    count, number = counted(program, job.cutters, resolution_in_stock(job, program)), len(job.table.surprise)
+    count, number = count_steps(program, job.cutters, resolution_in_stock(job, program)), len(job.table.surprise)
     return [
         f"{job.path.name}: {what}; "
         f"{len(program)} motions on machine {machine.name}, stock of {number_text(stock.volume(), 5)} mm3, material "
@@ -229,7 +229,7 @@ def check(job: TorqueJob) -> tuple[list[str], bool]:
     ], attainable
 
 
-def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, WrittenProgram, Spindle]:
+def open_inputs(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, WrittenProgram, Spindle]:
     """Machine, material, fuzzy table, written program and spindle of a job, checked against one another.
 
     Raises
@@ -237,7 +237,7 @@ def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, WrittenProgra
     InputError
         A file cannot be read, the spindle does not resolve the torque, or the loop exceeds the machine.
     """
-    machine, material, table = _named(job)
+    machine, material, table = _read_named(job)
     require_linear(material)
     _acceleration(job, machine)
     written = written_program(job, machine)
@@ -248,7 +248,7 @@ def opened(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable, WrittenProgra
     if job.table.limits.torque_nm is not None:
         # the limit is at most this one, so that a spindle that cannot hold this one holds none
         require_resolved(job, spindle, 1e3 * job.table.limits.torque_nm)
-    counted(program, job.cutters, resolution_in_stock(job, program))
+    count_steps(program, job.cutters, resolution_in_stock(job, program))
     if job.workpiece is not None:
         require_clamped(workpiece_of(job.workpiece), real_stock_body(job, program))
     return machine, material, table, written, spindle
@@ -264,7 +264,7 @@ def _acceleration(job: TorqueJob, machine: Machine) -> float:
     return stated or most
 
 
-def _named(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable]:
+def _read_named(job: TorqueJob) -> tuple[Machine, Material, FuzzyTable]:
     machine = machine_named(job.machine) if isinstance(job.machine, str) else read_machine(job.machine)
     material = material_named(job.material) if isinstance(job.material, str) else read_material(job.material)
     need_directions(material, "the wall of a shell" if job.workpiece is None else "an elastic workpiece")
@@ -292,7 +292,7 @@ def _estimate(
         constant_error=spindle.torque_constant_error,
         light=controller.light,
         light_share=float((found.torque[cutting] < controller.light).mean()) if cutting.any() else 0.0,
-        aliased=(passing, aliased(passing, 1.0 / case.loop.period)),
+        aliased=(passing, alias_frequency(passing, 1.0 / case.loop.period)),
     )
 
 

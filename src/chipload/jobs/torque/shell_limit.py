@@ -7,7 +7,7 @@ import numpy as np
 from chipload.control.limit import torque_limit
 from chipload.control.wall import PathLimit, path_limit
 from chipload.cutting.material import Material
-from chipload.jobs.torque.allowable import Allowable, allowed, coarser, limit_of, limit_text, thinnest, wall_of
+from chipload.jobs.torque.allowable import Allowable, allowed_bending, coarser, limit_of, limit_text, thinnest, wall_of
 from chipload.jobs.torque.cut import (
     Cut,
     Place,
@@ -23,7 +23,7 @@ from chipload.jobs.torque.remedies import remedy_text
 from chipload.machine.machine import Machine
 from chipload.program.program import Program
 from chipload.progress import silent
-from chipload.simulation.chips import counted
+from chipload.simulation.chips import count_steps
 from chipload.stock.layers import LayeredStock
 from chipload.stock.rings import surface_off
 from chipload.structure.shell import Ritz, compliance, ovalisation
@@ -38,7 +38,7 @@ MOST_PREVIEWED = 3000
 def shell_wall(job: TorqueJob, a: Allowable) -> ShellWall:
     """Data of the wall in the result."""
     place = Place(job.shell)
-    low, high = _finished(place, a.real)
+    low, high = _finished_heights(place, a.real)
     return ShellWall(
         shell=wall_of(job),
         thinnest=a.thin.shell.thickness,
@@ -58,7 +58,7 @@ def shell_torque(job: TorqueJob, a: Allowable, material: Material) -> AllowableT
     return AllowableTorque(
         limit=a.limit,
         torque=a.torque,
-        true_torque=path_limit(a.loads, a.response, *allowed(job)).torque,
+        true_torque=path_limit(a.loads, a.response, *allowed_bending(job)).torque,
         one_tooth=_one_tooth(a.limit, a.planned, material, job),
         remedy="" if a.torque > 0.0 else remedy_text(job, a.thin.shell, a.planned, a.limit, material),
         path=a.path,
@@ -75,7 +75,7 @@ def real_shell_stock(job: TorqueJob, program: Program) -> LayeredStock:
 def preview_of_shell(job: TorqueJob, program: Program, material: Material, machine: Machine) -> tuple[str, bool]:
     """Torque limit by a coarse simulation of the plan, in a sentence, and whether there is one."""
     rough = coarser(job)
-    if counted(program, job.cutters, resolution_in_stock(rough, program)) > MOST_PREVIEWED:
+    if count_steps(program, job.cutters, resolution_in_stock(rough, program)) > MOST_PREVIEWED:
         return "the run finds the torque limit", True
     planned = cut(rough, program, shell_stock(rough, program), material, machine.rapid, silent)
     _, limit = limit_of(rough, planned, material)
@@ -114,7 +114,7 @@ def _solid_comparison(modes: Ritz, width: float, planned: Cut) -> SolidCompariso
     return SolidComparison(tuple(out), wall.counts, len(wall.factored.solid.grid.nodes))
 
 
-def _finished(place: Place, cut_: Cut) -> tuple[float, float]:
+def _finished_heights(place: Place, cut_: Cut) -> tuple[float, float]:
     """Heights between which the surface was made [mm]."""
     rows = np.flatnonzero(cut_.makes)
     if not len(rows):

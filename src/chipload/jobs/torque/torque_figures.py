@@ -13,7 +13,7 @@ from chipload.control.fuzzy import FuzzyTable, surface
 from chipload.jobs.torque.outcome import HELD, ControllerCase, ShellWall, TorqueResult
 from chipload.number_text import number_text
 from chipload.result.style import FONT, GRID, INK, LIMIT, LINE_POINTS, SCALE, STOCK
-from chipload.result.thinning import thinned
+from chipload.result.thinning import thin_rows
 from chipload.units import mm_min_from_mm_s
 
 Floats = NDArray[np.float64]
@@ -38,7 +38,7 @@ NAMES = {
 EXAGGERATED = 0.35
 
 
-def along(outcome: TorqueResult, case: ControllerCase, by: str) -> go.Figure:
+def torques_along(outcome: TorqueResult, case: ControllerCase, by: str) -> go.Figure:
     """Torque over what is allowable, override, feed and form error of every controller, by ``path`` or ``time``."""
     titles = ("torque / allowable", "override", "feed [mm/min]", "form error [µm]")
     figure = make_subplots(rows=4, cols=1, shared_xaxes=True, vertical_spacing=0.03)
@@ -54,7 +54,7 @@ def along(outcome: TorqueResult, case: ControllerCase, by: str) -> go.Figure:
             1e3 * run.error,
         )
         for row, (y, title) in enumerate(zip(values, titles, strict=True), start=1):
-            keep = thinned(y, LINE_POINTS // 4)
+            keep = thin_rows(y, LINE_POINTS // 4)
             figure.add_trace(
                 go.Scatter(
                     x=x[keep].astype(np.float32), y=y[keep].astype(np.float32), name=NAMES[name], legendgroup=name,
@@ -72,7 +72,7 @@ def along(outcome: TorqueResult, case: ControllerCase, by: str) -> go.Figure:
         figure.update_yaxes(title_text=title, rangemode="tozero", row=row, col=1)
     figure.update_xaxes(title_text="along the path [mm]" if by == "path" else "time [s]", row=4, col=1)
     figure.update_layout(legend={"orientation": "h", "y": 1.01, "yanchor": "bottom", "x": 0.0})
-    return _styled(figure, 860)
+    return _style_figure(figure, 860)
 
 
 def allowable(outcome: TorqueResult) -> go.Figure:
@@ -89,16 +89,16 @@ def allowable(outcome: TorqueResult) -> go.Figure:
         lines.append((f"allowable for the {what}", outcome.allowable.torque * path.relief, LIMIT, "dash"))
     figure = go.Figure()
     for name, y, colour, dash in lines:
-        keep = thinned(y, LINE_POINTS)
+        keep = thin_rows(y, LINE_POINTS)
         style = {"color": colour, "width": 1.5, "dash": dash}
         figure.add_trace(go.Scatter(x=s[keep], y=1e-3 * y[keep], name=name, mode="lines", line=style))
     figure.update_xaxes(title_text="along the path [mm]")
     figure.update_yaxes(title_text="torque at the programmed feed [N m]", rangemode="tozero")
     figure.update_layout(legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0})
-    return _styled(figure, 380)
+    return _style_figure(figure, 380)
 
 
-def ovalised(wall: ShellWall) -> go.Figure:
+def ovalisation_figure(wall: ShellWall) -> go.Figure:
     """Rim under the cutter's force, and the part of each harmonic, compared with a beam."""
     oval, shell = wall.oval, wall.shell
     figure = make_subplots(
@@ -131,7 +131,7 @@ def ovalised(wall: ShellWall) -> go.Figure:
     figure.update_xaxes(title_text="harmonic around the wall (1: bending of a beam, 2: oval)", dtick=1, row=1, col=2)
     figure.update_polars(radialaxis={"visible": False})
     figure.update_layout(legend={"orientation": "h", "y": -0.15, "x": 0.0})
-    return _styled(figure, 430)
+    return _style_figure(figure, 430)
 
 
 def answers(table: FuzzyTable) -> go.Figure:
@@ -140,10 +140,10 @@ def answers(table: FuzzyTable) -> go.Figure:
     figure = go.Figure(go.Surface(x=d, y=e, z=f, colorscale=SCALE, colorbar={"thickness": 12, "title": "answer"}))
     axes = {"xaxis": {"title": "change"}, "yaxis": {"title": "error"}, "zaxis": {"title": "answer"}}
     figure.update_layout(scene={**axes, "camera": {"eye": {"x": -1.5, "y": -1.6, "z": 0.9}}})
-    return _styled(figure, 460)
+    return _style_figure(figure, 460)
 
 
-def measured(outcome: TorqueResult) -> go.Figure:
+def measured_torque_figure(outcome: TorqueResult) -> go.Figure:
     """Measured and true torque of the controller of the verdict, and the measurements that it does not trust."""
     run_of = outcome.control.cases[-1].runs[HELD]
     run = run_of.outcome
@@ -164,10 +164,10 @@ def measured(outcome: TorqueResult) -> go.Figure:
     )  # fmt: skip
     figure.update_xaxes(title_text="true torque [N m]")
     figure.update_yaxes(title_text="measured by the spindle [N m]")
-    return _styled(figure, 400)
+    return _style_figure(figure, 400)
 
 
-def _styled(figure: go.Figure, height: int) -> go.Figure:
+def _style_figure(figure: go.Figure, height: int) -> go.Figure:
     figure.update_xaxes(gridcolor=GRID, zeroline=False)
     figure.update_yaxes(gridcolor=GRID, zeroline=False)
     figure.update_layout(template="none", height=height, font=FONT, margin={"l": 70, "r": 20, "t": 46, "b": 50})

@@ -19,12 +19,12 @@ Floats = NDArray[np.float64]
 PLACES = 2500
 
 
-def unrolled(outcome: TorqueResult) -> go.Figure:
+def unrolled_torques(outcome: TorqueResult) -> go.Figure:
     """The torques of :func:`torques` at each place of the wall, in one scale, with the angles of the surprises."""
     values = torques(outcome)
     rows = np.unique(np.linspace(0, len(values["allowable"]) - 1, min(len(values["allowable"]), PLACES)).astype(int))
     path = outcome.allowable.path
-    theta, z = around(path.points[rows])
+    theta, z = angles_and_heights(path.points[rows])
     most = max(float(v[rows].max(initial=0.0)) for v in values.values())
     figure = make_subplots(
         rows=len(values), cols=1, shared_xaxes=True, vertical_spacing=0.06, subplot_titles=tuple(values)
@@ -66,10 +66,10 @@ def torques(outcome: TorqueResult) -> dict[str, Floats]:
     return out
 
 
-def around(points: Floats) -> tuple[Floats, Floats]:
+def angles_and_heights(points: Floats) -> tuple[Floats, Floats]:
     """Angle [deg], 0 to 360, and height [mm] of points (n, 3).
 
-    >>> theta, z = around(np.array([[0.0, -20.0, -3.0], [-20.0, 0.0, -5.0]]))
+    >>> theta, z = angles_and_heights(np.array([[0.0, -20.0, -3.0], [-20.0, 0.0, -5.0]]))
     >>> theta.tolist(), z.tolist()
     ([270.0, 180.0], [-3.0, -5.0])
     """

@@ -35,7 +35,7 @@ from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.jobs.simulation.tables import SolidTable
 from chipload.jobs.simulation.values import stock_of, workpiece_of
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.jobs.torque.allowable import path_of, relief_of
 from chipload.jobs.torque.confidence import limit_at_confidence
 from chipload.jobs.torque.cut import (
@@ -160,7 +160,7 @@ def workpiece_cut(
     """
     require_linear(material)
     stock = stock_of_workpiece(job, solid).layered(program, job.cutters)
-    fine, elastic = resolution_in_stock(job, program), workpiece_of(stated(job.workpiece, "workpiece"))
+    fine, elastic = resolution_in_stock(job, program), workpiece_of(require_stated(job.workpiece, "workpiece"))
     known = workpiece_compliance(
         elastic, program, stock, job.cutters, material, fine, "auto", progress=part_of(progress, 0.0, 0.5)
     )
@@ -225,7 +225,9 @@ def responses_of(
     e, c = factors or (ones, ones)
     e, c = (1.0 + margin) * e, (1.0 + margin) * c
     most = 1e-3 * limits.form_error_um
-    strength = limits.strength_share * stated(stated(job.workpiece, "workpiece").yield_mpa, "workpiece.yield_mpa")
+    strength = limits.strength_share * require_stated(
+        require_stated(job.workpiece, "workpiece").yield_mpa, "workpiece.yield_mpa"
+    )
     force = TwoParts(cut.loads.force_edge, cut.loads.force_cut)
     out = [
         ("deflection", cut.error, most),
@@ -273,7 +275,7 @@ def allowable_on_workpiece(
         As :func:`workpiece_cut`; the real stock is not cut by the same steps.
     """
     table, half = job.table, part_of(progress, 0.0, 0.5)
-    planned = workpiece_cut(job, stated(table.stock, "stock"), program, material, machine.rapid, half)
+    planned = workpiece_cut(job, require_stated(table.stock, "stock"), program, material, machine.rapid, half)
     real = planned
     if table.real_stock is not None:
         real = workpiece_cut(job, table.real_stock, program, material, machine.rapid, part_of(progress, 0.5, 1.0))
@@ -293,11 +295,11 @@ def allowable_on_workpiece(
 
 def real_stock_body(job: TorqueJob, program: Program) -> LayeredStock:
     """The real stock before the program."""
-    solid = job.table.real_stock or stated(job.table.stock, "stock")
+    solid = job.table.real_stock or require_stated(job.table.stock, "stock")
     return stock_of_workpiece(job, solid).layered(program, job.cutters)
 
 
 def _spot_distance(cut: WorkpieceCut, x: SurpriseTable) -> Floats:
     """(n,) distance of the steps from the middle of a hard spot [mm]."""
     middle = 0.5 * (cut.points[1:] + cut.points[:-1])
-    return np.asarray(np.linalg.norm(middle - np.array(stated(x.at_mm, "surprise.at_mm")), axis=1))
+    return np.asarray(np.linalg.norm(middle - np.array(require_stated(x.at_mm, "surprise.at_mm")), axis=1))

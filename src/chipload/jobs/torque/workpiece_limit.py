@@ -14,7 +14,7 @@ import numpy as np
 
 from chipload.control.wall import PathLimit
 from chipload.cutting.material import Material
-from chipload.jobs.tables import stated
+from chipload.jobs.tables import require_stated
 from chipload.jobs.torque.allowable import coarser, limit_text
 from chipload.jobs.torque.cut import resolution_in_stock
 from chipload.jobs.torque.job import TorqueJob
@@ -30,7 +30,7 @@ from chipload.jobs.torque.workpiece_cut import (
 from chipload.machine.machine import Machine
 from chipload.number_text import number_text
 from chipload.program.program import Program
-from chipload.simulation.chips import counted
+from chipload.simulation.chips import count_steps
 
 #: a check simulates the plan if that takes at most so many coarse steps, in so many states of removal
 MOST_PREVIEWED, STATES = 1500, 2
@@ -38,7 +38,7 @@ MOST_PREVIEWED, STATES = 1500, 2
 
 def clamped_workpiece(job: TorqueJob, a: AllowableWorkpiece) -> ClampedWorkpiece:
     """Data of the workpiece in the result."""
-    strength = stated(stated(job.workpiece, "workpiece").yield_mpa, "workpiece.yield_mpa")
+    strength = require_stated(require_stated(job.workpiece, "workpiece").yield_mpa, "workpiece.yield_mpa")
     planned, real = a.planned.compliance, a.real.compliance
     return ClampedWorkpiece(planned, real, (a.planned.strained, a.real.strained), strength, a.real.stock)
 
@@ -58,10 +58,10 @@ def allowable_torque(job: TorqueJob, a: AllowableWorkpiece, material: Material) 
 def preview_on_workpiece(job: TorqueJob, program: Program, material: Material, machine: Machine) -> tuple[str, bool]:
     """Torque limit by a coarse simulation of the plan, in a sentence, and whether there is one."""
     rough = coarser(job)
-    few = stated(rough.workpiece, "workpiece").model_copy(update={"states": STATES})
+    few = require_stated(rough.workpiece, "workpiece").model_copy(update={"states": STATES})
     rough = replace(rough, table=rough.table.model_copy(update={"workpiece": few}))
-    stock = stated(rough.table.stock, "stock")
-    if counted(program, job.cutters, resolution_in_stock(rough, program)) > MOST_PREVIEWED:
+    stock = require_stated(rough.table.stock, "stock")
+    if count_steps(program, job.cutters, resolution_in_stock(rough, program)) > MOST_PREVIEWED:
         return "the run finds the torque limit", True
     planned = workpiece_cut(rough, stock, program, material, machine.rapid)
     limit, _ = planned_limit(rough, planned, material)

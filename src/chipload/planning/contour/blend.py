@@ -81,7 +81,7 @@ def _chained_segments(table: Floats, start: Floats, heading: float) -> Floats:
     return np.array(rows)
 
 
-def eased(path: Contour, radius: float, engagement: float, tolerance_mm: float) -> Blend:
+def ease_arcs(path: Contour, radius: float, engagement: float, tolerance_mm: float) -> Blend:
     """``path`` with clothoids at both ends of every arc that stands between two lines it is tangent to.
 
     The arc's radius is chosen so that the path leaves the drawn one least; where that is still more than

@@ -20,7 +20,7 @@ from chipload.engagement.contact import PIECES
 from chipload.machine.machine import Machine
 from chipload.planning.contour.moves import Speeds, speeds
 from chipload.planning.contour.sampled import SampledPass
-from chipload.planning.contour.schedule import constant_force, stepped, within_machine
+from chipload.planning.contour.schedule import constant_force, step_feeds, within_machine
 from chipload.planning.cost import CutConditions
 from chipload.units import mm_min_from_mm_s
 
@@ -47,10 +47,10 @@ def programmed_feeds(
     if wanted is None:
         return np.full(len(steps.s), feed)
     ideal = constant_force(cut, steps.engagement, feed, wanted)
-    return stepped(within_machine(steps.s, ideal, machine.acceleration_xy, machine.jerk), feed)
+    return step_feeds(within_machine(steps.s, ideal, machine.acceleration_xy, machine.jerk), feed)
 
 
-def compared(
+def compare_strategies(
     finish: Mapping[str, FinishPasses], use: str, cut: CutConditions, feed: float, machine: Machine
 ) -> dict[str, dict[str, object]]:
     """Values `at_equal_force` and `at_equal_time` of each strategy, relative to the strategy ``use`` at ``feed``

@@ -1,7 +1,7 @@
 """Walls from drawn chains, with the material on the right of travel, and the centre paths of the cutter.
 
 Notation: the planning frame has the material on the RIGHT (down milling). For up milling everything is mirrored in y,
-planned, and mirrored back: :func:`mirrored` is its own inverse. R cutter radius, Q the wall, O the centre path.
+planned, and mirrored back: :func:`mirror_contour` is its own inverse. R cutter radius, Q the wall, O the centre path.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Walls:
     run_on: float
 
 
-def mirrored(contour: Contour) -> Contour:
+def mirror_contour(contour: Contour) -> Contour:
     """The contour reflected in y: what lay on its right lies on its left."""
     seg = contour.segments * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0])
     return Contour(seg)
@@ -72,7 +72,7 @@ def walls_of(contours: Sequence[Contour], side: str, milling: str, length: float
         if side == "outside":
             turned = [c.reversed() for c in turned]
     if milling == "up":
-        turned = [mirrored(c.reversed()) for c in turned]
+        turned = [mirror_contour(c.reversed()) for c in turned]
     return Walls(tuple(turned), tuple(run_on(c, length) for c in turned), length)
 
 

@@ -26,11 +26,11 @@ from chipload.geometry.offset import offset
 from chipload.machine.machine import Machine
 from chipload.number_text import number_text
 from chipload.planning.contour.backward import concave_kinks, leading_curve
-from chipload.planning.contour.blend import eased
-from chipload.planning.contour.compare import FinishPasses, compared, programmed_feeds
+from chipload.planning.contour.blend import ease_arcs
+from chipload.planning.contour.compare import FinishPasses, compare_strategies, programmed_feeds
 from chipload.planning.contour.forward import forward_pass
 from chipload.planning.contour.moves import Speeds, pass_program, speeds
-from chipload.planning.contour.offsets import Walls, centre_paths, mirrored, run_on, walls_of
+from chipload.planning.contour.offsets import Walls, centre_paths, mirror_contour, run_on, walls_of
 from chipload.planning.contour.passes import (
     ContourPass,
     boundary,
@@ -41,10 +41,10 @@ from chipload.planning.contour.passes import (
     surface,
     with_leads,
 )
-from chipload.planning.contour.sampled import SampledPass, mirrored_pass, sampled, stations
+from chipload.planning.contour.sampled import SampledPass, mirrored_pass, sample_pass, stations
 from chipload.planning.contour.schedule import LEAST_SHARE, straight_force
-from chipload.planning.contour.totals import cleared_percent, counts, elapsed
-from chipload.planning.cost import CutConditions, cost, stacked
+from chipload.planning.contour.totals import cleared_percent, counts, elapsed_time
+from chipload.planning.cost import CutConditions, cost, stack_histories
 from chipload.planning.hand import clockwise_milling, engagement_of_hand, signed_speed
 from chipload.planning.link_rows import row_ends, with_links
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
@@ -156,7 +156,7 @@ def plan_contour(
     InputError
         The contour, the cutter and the depths do not go together; the message states where, and the remedy.
     """
-    job = _prepared(contours, setting, cutter, material, machine, limits)
+    job = _prepare_job(contours, setting, cutter, material, machine, limits)
     a = setting.engagement(cutter.radius)
     if setting.strategies == ("forward",):
         only, _ = _strategy(job, "forward", _forward_passes(job, a))
@@ -166,7 +166,7 @@ def plan_contour(
         progress(k / len(setting.strategies), f"contour, {name}")
         results[name], finish[name] = _strategy(job, name, _passes(job, a if name == "backward" else None))
     if len(finish) > 1:
-        equal = compared(finish, setting.use, job.cut, setting.feed, machine)
+        equal = compare_strategies(finish, setting.use, job.cut, setting.feed, machine)
         results = {name: replace(r, summary={**r.summary, **equal[name]}) for name, r in results.items()}
     progress(1.0, "contour")
     return OperationResult("contour", setting.use, results)
@@ -182,7 +182,7 @@ def check_contour(
     InputError
         As :func:`plan_contour`.
     """
-    job = _prepared(contours, setting, cutter, material, machine, {})
+    job = _prepare_job(contours, setting, cutter, material, machine, {})
     _stock(job)
     if setting.strategies == ("forward",):
         return len(job.walls.walls) * setting.passes
@@ -190,7 +190,7 @@ def check_contour(
     return sum(len(_passes(job, a if name == "backward" else None)) for name in setting.strategies)
 
 
-def _prepared(
+def _prepare_job(
     contours: Sequence[Contour],
     setting: Finishing,
     cutter: Cutter,
@@ -209,7 +209,7 @@ def _prepared(
     finish = tuple(start_at_widest(p) for p in centre_paths(walls, radius, setting.tolerance))
     deviation, events = 0.0, []
     if setting.joint == "clothoid":
-        easings = [eased(p, radius, a, setting.tolerance) for p in finish]
+        easings = [ease_arcs(p, radius, a, setting.tolerance) for p in finish]
         finish = tuple(start_at_widest(e.path) for e in easings)
         deviation = max(e.deviation_mm for e in easings)
         events = [x for e in easings for x in e.events]
@@ -298,7 +298,7 @@ def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> tuple[Strategy
     programs: list[Program] = []
     clocks: list[tuple[SampledPass, Speeds]] = []
     for run in runs:
-        steps = sampled(run, job.radius, setting.step)
+        steps = sample_pass(run, job.radius, setting.step)
         steps = replace(steps, engagement=engagement_of_hand(steps.engagement, job.cut.cutter))
         regulated = wanted if name == "feed" and run.name == "finish" else None
         speed = speeds(steps, programmed_feeds(steps, job.cut, setting.feed, job.machine, regulated), job.machine)
@@ -321,7 +321,7 @@ def _strategy(job: _Job, name: str, planar: list[ContourPass]) -> tuple[Strategy
             )
         )
     program = Program.join(programs)
-    history = {**stacked(histories), "t_s": _pass_times(programs, clocks, row_ends(program, job.machine))}
+    history = {**stack_histories(histories), "t_s": _pass_times(programs, clocks, row_ends(program, job.machine))}
     on_wall = np.isin(history["pass"], ["finish", "forward"])
     events = (*job.events, *_events(job, runs, history, name))
     if name == "backward":
@@ -361,7 +361,7 @@ def _pass_times(
 
 
 def _back(contour: Contour, flip: bool) -> Contour:
-    return mirrored(contour).reversed() if flip else contour
+    return mirror_contour(contour).reversed() if flip else contour
 
 
 def _chains(seg: NDArray[np.float64]) -> list[Contour]:
@@ -394,7 +394,7 @@ def _summary(job: _Job, name: str, history: Columns, on_wall: NDArray[np.bool_])
         "feed_mm_min": span("feed_mm_min"),
         "force_straight_n": straight_force(job.cut, math.radians(wanted), job.setting.feed),
         "time_s": float(history["t_s"][-1]),
-        "finish_time_s": float(elapsed(history, finish)),
+        "finish_time_s": float(elapsed_time(history, finish)),
         "path_mm": float(history["s_mm"][-1]),
         "deviation_mm": job.deviation,
     }

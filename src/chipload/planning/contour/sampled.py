@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from chipload.engagement.contact import Engagement, StockBoundary, engagement
 from chipload.geometry.contour import Contour
 from chipload.geometry.distance import distance
-from chipload.planning.contour.offsets import mirrored
+from chipload.planning.contour.offsets import mirror_contour
 from chipload.planning.contour.passes import ContourPass
 
 Floats = NDArray[np.float64]
@@ -36,7 +36,7 @@ class SampledPass:
     engagement: Engagement
 
 
-def sampled(run: ContourPass, radius: float, step: float) -> SampledPass:
+def sample_pass(run: ContourPass, radius: float, step: float) -> SampledPass:
     """The pass in steps of at most ``step`` mm, the joints of the path among them.
 
     The exact engagement is taken against the stock before the pass; the last piece of a closed pass, where the rim
@@ -57,7 +57,7 @@ def sampled(run: ContourPass, radius: float, step: float) -> SampledPass:
     named = np.concatenate(zones)
     met = engagement(run.stock, o, t, radius)
     if run.path.closed:
-        named, met = _closing(run, radius, named, s, o, t, met)
+        named, met = _close_pass(run, radius, named, s, o, t, met)
     return SampledPass(named, s, o, t, kappa, met)
 
 
@@ -70,7 +70,7 @@ def stations(path: Contour, step: float) -> Floats:
     return np.concatenate([*parts, [path.length]])
 
 
-def _closing(
+def _close_pass(
     run: ContourPass, radius: float, zone: NDArray[Any], s: Floats, o: Floats, t: Floats, met: Engagement
 ) -> tuple[NDArray[Any], Engagement]:
     """Take what the beginning of a closed pass has cut away from the engagement of its end.
@@ -118,7 +118,7 @@ def mirrored_pass(run: ContourPass, flip: bool) -> ContourPass:
     """The pass in the work frame: reflected in y where ``flip``."""
     if not flip:
         return run
-    lead_in, lead_out = (None if c is None else mirrored(c) for c in (run.lead_in, run.lead_out))
+    lead_in, lead_out = (None if c is None else mirror_contour(c) for c in (run.lead_in, run.lead_out))
     seg = run.stock.segments * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0])
     seg = seg[:, [2, 3, 0, 1, 4, 5, 6]] * np.array([1, 1, 1, 1, 1, 1, -1.0])
-    return ContourPass(run.name, mirrored(run.path), lead_in, lead_out, StockBoundary(seg), run.stopped)
+    return ContourPass(run.name, mirror_contour(run.path), lead_in, lead_out, StockBoundary(seg), run.stopped)

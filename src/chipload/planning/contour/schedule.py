@@ -103,7 +103,7 @@ def _jerk(v: Floats, ds: float) -> float:
     return float(np.abs(v * np.gradient(accelerated, ds)).max())
 
 
-def stepped(feeds: Floats, feed: float) -> Floats:
+def step_feeds(feeds: Floats, feed: float) -> Floats:
     """Feeds as they are written: rounded down to a multiple of ``FEED_SHARE`` of f0, at least ``LEAST_SHARE``."""
     share = np.floor(feeds / feed / FEED_SHARE + 1e-9) * FEED_SHARE
     return np.asarray(feed * np.maximum(share, LEAST_SHARE))

@@ -45,7 +45,7 @@ def cleared_percent(
 
 def counts(passes: int, history: Columns) -> dict[str, object]:
     """Time [s] by kind of motion, number of passes, and number of retracts between them."""
-    linked = elapsed(history, history["pass"] == "link")
+    linked = elapsed_time(history, history["pass"] == "link")
     return {
         "cutting_s": float(history["t_s"][-1]) - linked,
         "link_s": linked,
@@ -54,6 +54,6 @@ def counts(passes: int, history: Columns) -> dict[str, object]:
     }
 
 
-def elapsed(history: Columns, where: NDArray[np.bool_]) -> float:
+def elapsed_time(history: Columns, where: NDArray[np.bool_]) -> float:
     """Time of the steps that end in a row ``where`` [s]."""
     return float(np.diff(history["t_s"], prepend=0.0)[where].sum())

@@ -99,7 +99,7 @@ def largest_cutters(
     ----------
     clearance : [mm] of neck, shank and holder
     every : as :func:`limits`
-    points : (c,) int, which contact points; None: all. :func:`joined` makes one answer of several selections
+    points : (c,) int, which contact points; None: all. :func:`join_answers` makes one answer of several selections
     """
     alpha = np.atleast_1d(np.asarray(tables, dtype=np.float64))
     among = np.arange(len(scene.contact)) if points is None else np.asarray(points, dtype=np.int64)
@@ -148,10 +148,10 @@ def largest_cutters(
     )  # fmt: skip
 
 
-def joined(parts: Sequence[Answer]) -> Answer:
+def join_answers(parts: Sequence[Answer]) -> Answer:
     """The answer of all contact points from those of selections that follow one another; the same to the last bit."""
     first = parts[0]
-    families = tuple(_joined([part.families[k] for part in parts]) for k in range(len(first.families)))
+    families = tuple(_join_bounds([part.families[k] for part in parts]) for k in range(len(first.families)))
     return Answer(
         first.catalogue,
         first.tables,
@@ -167,7 +167,7 @@ def joined(parts: Sequence[Answer]) -> Answer:
     )
 
 
-def _joined(parts: Sequence[SearchLimits]) -> SearchLimits:
+def _join_bounds(parts: Sequence[SearchLimits]) -> SearchLimits:
     """The bounds of a family; where a part has fewer blockers, its rows are filled up with -1."""
     blockers = np.full((*np.shape(parts[0].rho)[1:], max(f.blockers.shape[2] for f in parts)), -1, dtype=np.int64)
     rows = [np.repeat(blockers[None], len(f.rho), axis=0) for f in parts]
@@ -216,14 +216,14 @@ def one_cutter_of(
     catalogue, tables = parts[0][1].catalogue, parts[0][1].tables
     tries = []
     for k, cutter in enumerate(catalogue.cutters):
-        bounds = [_of(answer, cutter) for _, answer in parts]
+        bounds = [_bounds_of(answer, cutter) for _, answer in parts]
         goes = [left_open(f, cutter.rho)[row].all(axis=0) for f, row in zip(bounds, reachable, strict=True)]
         least = np.min([f.rho[row].min(axis=0) for f, row in zip(bounds, reachable, strict=True)], axis=0)
         tries += [(cutter.diameter, least[t], k, int(t)) for t in np.flatnonzero(np.logical_and.reduce(goes))]
     for _, _, k, t in sorted(tries, reverse=True):
         cutter, found = catalogue.cutters[k], []
         for (scene, answer), row in zip(parts, reachable, strict=True):
-            rho = _of(answer, cutter).rho[:, t]
+            rho = _bounds_of(answer, cutter).rho[:, t]
             got = _everywhere(
                 scene, cutter, tables[t], clearance, pallets, row[np.argsort(rho[row], kind="stable")], workers
             )
@@ -249,7 +249,7 @@ def _everywhere(
     return found
 
 
-def _of(answer: Answer, cutter: CatalogueCutter) -> SearchLimits:
+def _bounds_of(answer: Answer, cutter: CatalogueCutter) -> SearchLimits:
     """The bounds of a cutter's corner radius."""
     return next(f for f in answer.families if f.corner_radius == cutter.corner_radius)
 

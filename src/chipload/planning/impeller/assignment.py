@@ -62,7 +62,9 @@ class Assignment:
     steps: tuple[Step, ...]
 
 
-def assigned(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int | None = None) -> Assignment | None:
+def assign_cutters(
+    sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int | None = None
+) -> Assignment | None:
     """Assignment in the least time over all sides in their order, with at most ``most`` different cutters.
 
     Parameters
@@ -85,14 +87,14 @@ def assigned(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int
     Two strips; the second cutter is faster on the second strip by more than a change costs.
 
     >>> t = np.array([[[[1.0], [5.0]]], [[[9.0], [2.0]]]])
-    >>> assigned([(t, t.swapaxes(0, 1))], Changes(3.0, 0.0)).total
+    >>> assign_cutters([(t, t.swapaxes(0, 1))], Changes(3.0, 0.0)).total
     6.0
     """
     if most is not None and most < 1:
         raise InputError(f"most = {most}: must be at least 1 cutter")
     count = sides[0][0].shape[2]
     if most is None:
-        return _solved(sides, np.arange(count), changes)
+        return _solve_chosen(sides, np.arange(count), changes)
     bounds, sets = _sets(sides, changes, most)
     best, who = math.inf, -1
     for first in range(0, len(sets), _BATCH):
@@ -101,7 +103,7 @@ def assigned(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int
         totals = _totals(sides, sets[first : first + _BATCH], changes)
         if totals.min() < best:
             best, who = float(totals.min()), first + int(totals.argmin())
-    return None if who < 0 else _solved(sides, np.unique(sets[who]), changes)
+    return None if who < 0 else _solve_chosen(sides, np.unique(sets[who]), changes)
 
 
 def bound_of_strips(sides: Sequence[tuple[Floats, Floats]], changes: Changes, most: int | None = None) -> float:
@@ -147,7 +149,9 @@ class _Either(NamedTuple):
 _Node = _Leaf | _AssignmentRow | _Either
 
 
-def _solved(sides: Sequence[tuple[Floats, Floats]], chosen: NDArray[np.int64], changes: Changes) -> Assignment | None:
+def _solve_chosen(
+    sides: Sequence[tuple[Floats, Floats]], chosen: NDArray[np.int64], changes: Changes
+) -> Assignment | None:
     """The least time with the chosen cutters alone."""
     tree = _AssignmentRow(tuple(_side(k, [cost[:, :, chosen] for cost in side]) for k, side in enumerate(sides)))
     start = np.zeros((len(chosen), sides[0][0].shape[3]))
@@ -180,7 +184,7 @@ def _side(number: int, orders: list[Floats]) -> _Node:
 def _forward(node: _Node, before: Floats, changes: Changes) -> tuple[Floats, object]:
     """Least times (cutters, tables) after a node, and the data for the steps back."""
     if isinstance(node, _Leaf):
-        return _entered(before, changes) + node.cost, before
+        return _enter_states(before, changes) + node.cost, before
     records = []
     if isinstance(node, _AssignmentRow):
         for part in node.parts:
@@ -263,7 +267,7 @@ def _bounds(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64]) -> 
 
 
 def _totals(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64], changes: Changes) -> Floats:
-    """Least times (n,) of many sets, as :func:`_solved` without the steps; inf: cells are left."""
+    """Least times (n,) of many sets, as :func:`_solve_chosen` without the steps; inf: cells are left."""
     state = np.zeros((*sets.shape, sides[0][0].shape[3]))
     for side in sides:
         options = []
@@ -273,14 +277,14 @@ def _totals(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64], cha
                 after = state
                 for cells in of_sets[::forth]:
                     whole = cells.sum(axis=0)
-                    through = _entered(after, changes) + whole
+                    through = _enter_states(after, changes) + whole
                     split = ~np.isfinite(whole).any(axis=(1, 2))
                     if split.any():
                         both = []
                         for direction in (1, -1):
                             part = after[split]
                             for cell in cells[::direction, split]:
-                                part = _entered(part, changes) + cell
+                                part = _enter_states(part, changes) + cell
                             both.append(part)
                         through[split] = np.minimum(*both)
                     after = through
@@ -290,7 +294,7 @@ def _totals(sides: Sequence[tuple[Floats, Floats]], sets: NDArray[np.int64], cha
     return out
 
 
-def _entered(before: Floats, changes: Changes) -> Floats:
+def _enter_states(before: Floats, changes: Changes) -> Floats:
     """Least times (..., cutters, tables) when each state may be come to from every other."""
     table, cutter = before.min(axis=-1, keepdims=True), before.min(axis=-2, keepdims=True)
     out = np.minimum(before, table + changes.table)

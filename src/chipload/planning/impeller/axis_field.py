@@ -211,7 +211,7 @@ def axis_field(
     used = np.flatnonzero(clear.any(axis=0))
     cost, depth = job.costs(T, clear, used, along)
     turn = np.arccos(np.clip(T[used] @ T[used].T, -1.0, 1.0))
-    chosen = _chosen(cost.reshape(*count, -1), _SMOOTH * turn**2)
+    chosen = _choose_directions(cost.reshape(*count, -1), _SMOOTH * turn**2)
     rows = np.arange(len(U))
     start = T[used][chosen.ravel()]
     drawn = job.drawn(start, count, T, clear, depth[rows, chosen.ravel()])
@@ -287,7 +287,7 @@ class _Nodes:
         return out
 
 
-def _chosen(cost: Floats, turn: Floats) -> NDArray[np.intp]:
+def _choose_directions(cost: Floats, turn: Floats) -> NDArray[np.intp]:
     """(a, b) direction of each node with the least cost (a, b, k) and turns (k, k) between neighbours."""
     a, b, _ = cost.shape
     chosen = np.full((a, b), -1, dtype=np.intp)

@@ -22,7 +22,7 @@ from chipload.planning.impeller.answer import Answer, largest_cutters
 from chipload.planning.impeller.closed_form import axis_at, contact_limit
 from chipload.planning.impeller.costs import ChannelSide, Costs, Terms
 from chipload.planning.impeller.kept import Keep, anew
-from chipload.planning.impeller.patches import PatchDivision, costs_of, divided
+from chipload.planning.impeller.patches import PatchDivision, costs_of, divide_sides
 from chipload.planning.impeller.scene import Scene
 from chipload.progress import Progress, silent
 
@@ -84,8 +84,10 @@ class CutterChoice:
     def partition(self, workers: int = 1, progress: Progress = silent, keep: Keep = anew) -> Partition:
         """The partition in the least time by the present costs."""
         sides = [c.side for c in self.costs]
-        found = divided(self.costs, self.most, workers, progress, keep)
-        return Partition(self.name, found, sides[0].answer.catalogue, _share(sides), *_proved(sides), self.took)
+        found = divide_sides(self.costs, self.most, workers, progress, keep)
+        return Partition(
+            self.name, found, sides[0].answer.catalogue, _share(sides), *_count_unreached(sides), self.took
+        )
 
 
 def cutter_choices(
@@ -114,7 +116,7 @@ def cutter_choices(
         picked = Catalogue("hand-picked", (catalogue.cutters[hand_picked],))
         feed = terms.feed[hand_picked] if isinstance(terms.feed, tuple) else terms.feed
 
-        def searched() -> tuple[tuple[Answer, ...], float]:
+        def search_surfaces() -> tuple[tuple[Answer, ...], float]:
             begin = time.perf_counter()
             answers = tuple(
                 largest_cutters(
@@ -124,7 +126,7 @@ def cutter_choices(
             )
             return answers, time.perf_counter() - begin
 
-        answers, took = keep(("hand-picked",), searched)
+        answers, took = keep(("hand-picked",), search_surfaces)
         own = [replace(s, answer=answer) for s, answer in zip(sides, answers, strict=True)]
         out.append(CutterChoice("hand-picked", costs_of(own, replace(terms, feed=feed), workers), 1, took))
     for m in numbers:
@@ -176,7 +178,7 @@ def clear_somewhere(
     return False
 
 
-def _proved(sides: Sequence[ChannelSide]) -> tuple[int, bool]:
+def _count_unreached(sides: Sequence[ChannelSide]) -> tuple[int, bool]:
     """Contact points that are not reached, and whether all is proved."""
     return sum(len(s.answer.unreachable) for s in sides), all(bool(s.answer.certified.all()) for s in sides)
 

@@ -164,7 +164,7 @@ class Costs:
         allowed = self._open(reached)
         clear = self._clear(allowed, workers)
         for order in range(2):
-            seen = self._seen(order, np.repeat(np.arange(points), T), np.tile(tables, points), self._grid)
+            seen = self._see_contacts(order, np.repeat(np.arange(points), T), np.tile(tables, points), self._grid)
             for k in range(K):
                 free = self._widths(seen, k)
                 w = np.where(clear[:, k].reshape(free.shape), free, 0.0).max(axis=1)
@@ -208,7 +208,7 @@ class Costs:
         for k, members in groups.items():
             which = np.array(members)
             c, t = which[:, 0], which[:, 1]
-            got = self._proved(c, k, t, workers, keep)
+            got = self._prove_ranges(c, k, t, workers, keep)
             self.computed += len(c)
             self.undecided += int((~got.complete).sum())
             self.known[c, k, t] = True
@@ -219,17 +219,19 @@ class Costs:
             c, t, rows = c[feasible], t[feasible], [r for r in got.ranges if len(r)]
             for one in zip(c.tolist(), t.tolist(), rows, strict=True):
                 self.ranges[one[0], k, one[1]] = one[2]
-            valid = np.array([_within(self._grid, r) for r in rows])
+            valid = np.array([_in_ranges(self._grid, r) for r in rows])
             middle = np.array([[r[(r[:, 1] - r[:, 0]).argmax()].mean()] for r in rows])
             for order in range(2):
-                free = self._widths(self._seen(order, c, self.tables[t], self._grid), k)
+                free = self._widths(self._see_contacts(order, c, self.tables[t], self._grid), k)
                 inside = np.where(valid, free, 0.0).max(axis=1)
-                w = np.where(inside > 0.0, inside, self._widths(self._seen(order, c, self.tables[t], middle), k)[:, 0])
+                w = np.where(
+                    inside > 0.0, inside, self._widths(self._see_contacts(order, c, self.tables[t], middle), k)[:, 0]
+                )
                 # a step-over of nothing: the cutter does not fit there, whatever its ranges
                 paid = np.where(w > 0.0, self._paid(w[:, None], c, k)[:, 0], np.inf)
                 self.time[order, c, k, t] = np.maximum(self.time[order, c, k, t], paid)
 
-    def _proved(self, c: NDArray[np.int64], k: int, t: NDArray[np.int64], workers: int, keep: Keep) -> Ranges:
+    def _prove_ranges(self, c: NDArray[np.int64], k: int, t: NDArray[np.int64], workers: int, keep: Keep) -> Ranges:
         """Ranges of a cutter at contact points and table angles."""
         side, cutter = self.side, self.catalogue.cutters[k]
         return keep(
@@ -263,7 +265,7 @@ class Costs:
             out[:, k, self._where] = cutter.rho <= limit[cutter.corner_radius] + _TOUCH
         return np.array(out & allowed[..., None], dtype=np.bool_)
 
-    def _seen(self, order: int, points: NDArray[np.int64], tables: Floats, pallets: Floats) -> _Seen:
+    def _see_contacts(self, order: int, points: NDArray[np.int64], tables: Floats, pallets: Floats) -> _Seen:
         """The contacts of points (n,) at table angles (n,) and pallet angles (B,) of all, or (n, B)."""
         scene = self.side.scene
         B = np.broadcast_to(pallets, (len(points), np.shape(pallets)[-1]))
@@ -290,7 +292,7 @@ class _Seen(NamedTuple):
     contact: Contact
 
 
-def _within(grid: Floats, ranges: Floats) -> NDArray[np.bool_]:
+def _in_ranges(grid: Floats, ranges: Floats) -> NDArray[np.bool_]:
     """(B,) whether an angle, or one that is whole turns from it, lies in a range."""
     turn = 2.0 * math.pi
     away = (grid[:, None] - ranges[None, :, 0]) % turn

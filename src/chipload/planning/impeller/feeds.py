@@ -286,7 +286,7 @@ def pass_feeds(
         cutter = terms.cutter(size)
         found = [(k, p) for k, one in enumerate(passes) if (p := one.places()) is not None]
         feeds = np.full(len(passes), feed)
-        whole = _joined([p for _, p in found])
+        whole = _join_places([p for _, p in found])
         owner = np.repeat([k for k, _ in found], [len(p) for _, p in found]).astype(np.int64)
         engagement = engagement_at(
             whole, cutter, per_tooth(feed, terms), terms.allowance, earlier, np.array(own, dtype=np.int64)[owner]
@@ -305,7 +305,7 @@ def pass_feeds(
     return out
 
 
-def _joined(places: Sequence[PassPlaces]) -> PassPlaces:
+def _join_places(places: Sequence[PassPlaces]) -> PassPlaces:
     names = ("contact", "normal", "curvature", "tip", "axis", "feed")
     if not places:
         return PassPlaces(*(np.zeros((0, 3, 3) if name == "curvature" else (0, 3)) for name in names))

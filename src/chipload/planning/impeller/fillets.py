@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
-from chipload.geometry.fillet import Filleted, filleted
+from chipload.geometry.fillet import Filleted, add_fillet
 from chipload.geometry.sections import Blade
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.surfaces import hub_range
@@ -38,7 +38,7 @@ def with_fillets(impeller: Impeller, radius: float) -> tuple[Impeller, tuple[str
         sides: list[Filleted] = []
         for key, side in (("plus", body.plus), ("minus", body.minus)):
             try:
-                made = filleted(side, impeller.hub, radius)
+                made = add_fillet(side, impeller.hub, radius)
             except InputError as err:
                 raise InputError(f"impeller.fillet_mm = {radius:g}: {name} {key}: {err}: state a smaller one") from None
             sides.append(made)

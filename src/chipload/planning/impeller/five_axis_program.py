@@ -74,7 +74,7 @@ def outline_of(scene: Scene, blades: int) -> Floats:
     return out
 
 
-def lifted(
+def lift_from_end(
     path: AxisPath, end: int, scene: Scene, outline: Floats, cutter: CatalogueCutter, how: Link, above: float
 ) -> Floats | None:
     """Tip beside an end (0, -1) of a pass, from which the retract along the axis is free; None: there is none.
@@ -105,7 +105,7 @@ def top_of(outline: Floats, axis: Floats, how: Link) -> float:
 
 @dataclass(frozen=True, eq=False)
 class LinkedPath:
-    """A pass with the tips (3,) [mm] beside its beginning and its end, of :func:`lifted`."""
+    """A pass with the tips (3,) [mm] beside its beginning and its end, of :func:`lift_from_end`."""
 
     path: AxisPath
     begin: Floats
@@ -135,9 +135,9 @@ def five_axis_program(
         turned = one if k % 2 == 0 else one.back()
         path, begin, end = turned.path, turned.begin, turned.end
         A0, A1 = path.axis[0], path.axis[-1]
-        over = [_over(outline, p, A, how) for p, A in ((begin, A0), (end, A1))]
+        over = [_move_above(outline, p, A, how) for p, A in ((begin, A0), (end, A1))]
         if last is not None:
-            parts.append(_round(outline, last, (over[0], A0), how))
+            parts.append(_rapids_above(outline, last, (over[0], A0), how))
         parts += [
             Moves.of(RAPID, over[0][None], A0[None], 0.0, "link"),
             Moves.of(LINE, begin[None], A0[None], how.feed, "link"),
@@ -151,20 +151,20 @@ def five_axis_program(
         c, s = math.cos(pitch), math.sin(pitch)
         R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         onward = R @ first[0], R @ first[1]
-        parts.append(_round(outline, last, onward, how))
+        parts.append(_rapids_above(outline, last, onward, how))
         parts.append(Moves.of(RAPID, onward[0][None], onward[1][None], 0.0, "link"))
     program = program_of(Moves.join(parts), spindle, tool)
     share = rotary_share(program, machine)
     return replace(program, feed=program.feed / np.maximum(share, 1.0))
 
 
-def _over(outline: Floats, tip: Floats, axis: Floats, how: Link) -> Floats:
+def _move_above(outline: Floats, tip: Floats, axis: Floats, how: Link) -> Floats:
     """The tip moved up along the axis until it is above the part."""
     out: Floats = tip + max(top_of(outline, axis, how) - float(tip @ axis), 0.0) * axis
     return out
 
 
-def _round(outline: Floats, a: tuple[Floats, Floats], b: tuple[Floats, Floats], how: Link) -> Moves:
+def _rapids_above(outline: Floats, a: tuple[Floats, Floats], b: tuple[Floats, Floats], how: Link) -> Moves:
     """Rapids above the part from one tip and axis to another: at every turn of the axis the tip is above the part."""
     angle = float(np.arccos(np.clip(a[1] @ b[1], -1.0, 1.0)))
     share = np.linspace(0.0, 1.0, max(int(np.ceil(angle / _TURN)), 1) + 1)[:-1]
@@ -173,7 +173,7 @@ def _round(outline: Floats, a: tuple[Floats, Floats], b: tuple[Floats, Floats], 
     # between two of them the part may turn up towards the tip by its size times half of the angle
     size = float(np.linalg.norm(outline, axis=1).max())
     more = 2.0 * size * _TURN
-    raised = np.array([_over(outline, p, A, how) + more * A for p, A in zip(tips, axes, strict=True)])
+    raised = np.array([_move_above(outline, p, A, how) + more * A for p, A in zip(tips, axes, strict=True)])
     return Moves.of(RAPID, raised, axes, 0.0, "link")
 
 

@@ -101,8 +101,8 @@ def flank_pass(
     --------
     A plane wall 30 mm long and 10 mm high: the deviation is 0.
 
-    >>> from chipload.geometry.bspline import through
-    >>> wall = through([[[0, 0, 0], [0, 0, 10]], [[30, 0, 0], [30, 0, 10]]], [0, 1], [0, 1])
+    >>> from chipload.geometry.bspline import patch_through
+    >>> wall = patch_through([[[0, 0, 0], [0, 0, 10]], [[30, 0, 0], [30, 0, 10]]], [0, 1], [0, 1])
     >>> found = flank_pass(wall, (0.1, 0.9), (0.0, 1.0), CatalogueCutter(10.0, 1.0), 0.01)
     >>> round(abs(found.deviation), 6), found.tip[0].round(6).tolist()
     (0.0, [3.0, -5.0, -1.0])
@@ -116,7 +116,7 @@ def flank_pass(
     edge = surface.at(np.linspace(*along, 65), up[1])
     length = float(np.linalg.norm(np.diff(edge, axis=0), axis=1).sum())
     u = np.linspace(*along, max(math.ceil(length / _SPACING), 4) + 1)
-    ends, least = _fitted(job, u)
+    ends, least = _fit_axes(job, u)
     for _ in range(_REFINEMENTS):
         middle = 0.5 * (u[1:] + u[:-1])
         half = np.array([job.deviations(m, 0.5 * (ends[k] + ends[k + 1])) for k, m in enumerate(middle)])
@@ -124,7 +124,7 @@ def flank_pass(
         coarse = np.flatnonzero(np.abs(half).max(axis=1) > np.maximum(own[1:], own[:-1]) + chord)
         if not len(coarse):
             break
-        more, bound = _fitted(job, middle[coarse])
+        more, bound = _fit_axes(job, middle[coarse])
         u, ends = np.insert(u, coarse + 1, middle[coarse]), np.insert(ends, coarse + 1, more, axis=0)
         least = np.insert(least, coarse + 1, bound)
     found = [job.nearest(x, e) for x, e in zip(u.tolist(), ends, strict=True)]
@@ -233,7 +233,7 @@ def _from_line(points: Floats, ends: Floats) -> tuple[Floats, Floats]:
     return y - at[..., None] * A, at
 
 
-def _fitted(job: _Side, u: Floats) -> tuple[Floats, Floats]:
+def _fit_axes(job: _Side, u: Floats) -> tuple[Floats, Floats]:
     """Ends (n, 2, 3) of the axes at places (n,), and the bounds (n,); each begins with the x of the one before."""
     x: Floats = np.zeros(3)
     ends, least = [], []

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.geometry.bspline import BSplinePatch, through
+from chipload.geometry.bspline import BSplinePatch, patch_through
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.scene import Floats
 from chipload.planning.impeller.surfaces import BODIES, hub_range
@@ -38,7 +38,7 @@ def patch_of(impeller: Impeller, body: str, side: str, ahead: float = 0.0) -> BS
     u, v = np.linspace(0.0, 1.0, _ALONG), np.linspace(0.0, 1.0, _ACROSS)
     s = low + u * (high - low)
     theta = impeller.across(index, s, v)
-    return _fitted(impeller.hub.curve(s), theta, u, v)
+    return _fit_floor(impeller.hub.curve(s), theta, u, v)
 
 
 def layer_of(
@@ -66,7 +66,7 @@ def layer_of(
         theta = np.vstack([theta, np.repeat(theta[-1:], rows, axis=0)])
         length = np.concatenate([[0.0], np.linalg.norm(np.diff(m, axis=0), axis=1).cumsum()])
         u = length / length[-1]
-    return _fitted(m, theta, u, v)
+    return _fit_floor(m, theta, u, v)
 
 
 def meridian(impeller: Impeller, s: Floats, share: float, allowance: float, where: tuple[float, float]) -> Floats:
@@ -113,11 +113,11 @@ def _round_at(patch: BSplinePatch, m: Floats) -> tuple[Floats, Flags]:
     return np.arctan2(p[:, 1], p[:, 0]), away < _MET
 
 
-def _fitted(m: Floats, theta: Floats, u: Floats, v: Floats) -> BSplinePatch:
+def _fit_floor(m: Floats, theta: Floats, u: Floats, v: Floats) -> BSplinePatch:
     """Patch through the meridional curve m (k, 2) at theta (k, l), its normal away from the axis and up."""
     r = m[:, :1]
     grid = np.stack([r * np.cos(theta), r * np.sin(theta), np.repeat(m[:, 1:], theta.shape[1], axis=1)], axis=-1)
-    patch = through(grid, u, v)
+    patch = patch_through(grid, u, v)
     p, n = patch.at(0.5, 0.5)[0], patch.normal(0.5, 0.5)[0]
     out = n @ np.array([p[0], p[1], 0.0]) / np.hypot(p[0], p[1]) + n[2]
-    return patch if out > 0.0 else through(grid, u, v, side=-1)
+    return patch if out > 0.0 else patch_through(grid, u, v, side=-1)

@@ -27,7 +27,7 @@ from chipload.planning.impeller.refinement import Refinement
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.step_over import contact_of, width
 from chipload.planning.impeller.steps import Flags, runs
-from chipload.planning.impeller.track import ToolTrack, posed, written
+from chipload.planning.impeller.track import ToolTrack, pose_cutter, written_angles
 
 #: points of a line whose pallet angles are searched together, and greatest distance from those of the line before [rad]
 _GROUP, _WINDOW = 6, math.radians(10.0)
@@ -194,10 +194,10 @@ class Lines:
             contacts = self._wall_contacts(scene.contact, scene.normal, pieces, exact)
             if not contacts:
                 return pieces
-            windows = [windowed(ranges[k], B, _EXACT) for k, B in contacts.items()]
+            windows = [window_ranges(ranges[k], B, _EXACT) for k, B in contacts.items()]
             got = self._clear_ranges(scene, [*contacts], tuple(inside for inside, _ in windows))
             for (k, B), (_, outside), inside in zip(contacts.items(), windows, got, strict=True):
-                ranges[k] = merged(np.vstack([outside, inside]))
+                ranges[k] = merge_ranges(np.vstack([outside, inside]))
                 exact[k].append(B)
                 if not len(ranges[k]) and k not in whole:
                     whole.add(k)
@@ -230,12 +230,12 @@ class Lines:
             open_ = np.flatnonzero(np.isnan(high))
             if not len(open_):
                 break
-            got = self._reached(knots[open_], np.full(len(open_), Q[0] + f * (Q[1] - Q[0])))
+            got = self._reached_stations(knots[open_], np.full(len(open_), Q[0] + f * (Q[1] - Q[0])))
             high[open_[got]], low[open_[~got]] = f, f
         some = np.isfinite(high) & (high > 0.0)
         for _ in range(_BISECT if some.any() else 0):
             f = 0.5 * (low[some] + high[some])
-            got = self._reached(knots[some], Q[0] + f * (Q[1] - Q[0]))
+            got = self._reached_stations(knots[some], Q[0] + f * (Q[1] - Q[0]))
             high[some] = np.where(got, f, high[some])
             low[some] = np.where(got, low[some], f)
         known = np.isfinite(high)
@@ -253,7 +253,7 @@ class Lines:
         (a, b), (c, d) = edge[4][0].tolist(), self.on(q)[4][k].tolist()
         return UnreachedSpan(-1, (a, b), (c, d), length, "no pallet angle")
 
-    def _reached(self, stations: Ints, q: Floats) -> Flags:
+    def _reached_stations(self, stations: Ints, q: Floats) -> Flags:
         u, v = self.places(self.p[stations], q)
         S, N, K = (f(u, v) for f in (self.surface.at, self.surface.normal, self.surface.curvature))
         scene = self.scene.at_contacts(S, N, K, self.number)
@@ -298,24 +298,24 @@ class Lines:
                 for row in bad[:1]:
                     k = i + min(int(row), j - i - 1)
                     if need[k]:
-                        missed.append(self._missed(number, line.at[k : min(k + 2, j)], "touches"))
+                        missed.append(self._unreached_span(number, line.at[k : min(k + 2, j)], "touches"))
         for a, b in runs(need & ~covered):
             ends = [*line.at[a:b]]
             if a and use[a - 1]:
                 ends.insert(0, line.at[a - 1] + shares.get((a - 1, 1), 0.0) * (line.at[a] - line.at[a - 1]))
             if b < len(use) and use[b]:
                 ends.append(line.at[b] + shares.get((b, -1), 0.0) * (line.at[b - 1] - line.at[b]))
-            missed.append(self._missed(number, np.array(ends), "no pallet angle"))
+            missed.append(self._unreached_span(number, np.array(ends), "no pallet angle"))
         for k in range(1, len(use)):
             if need[k - 1] and need[k] and covered[k - 1] and covered[k] and owner[k - 1] != owner[k]:
                 first, last = shares.get((k - 1, 1), 0.0), 1.0 - shares.get((k, -1), 0.0)
                 if first < last:
                     step = line.at[k] - line.at[k - 1]
                     between = line.at[k - 1] + np.array([[first], [last]]) * step
-                    missed.append(self._missed(number, between, "cannot follow"))
+                    missed.append(self._unreached_span(number, between, "cannot follow"))
         return tracks, missed
 
-    def _missed(self, number: int, at: Floats, reason: str) -> UnreachedSpan:
+    def _unreached_span(self, number: int, at: Floats, reason: str) -> UnreachedSpan:
         (a, b), (c, d) = at[0].tolist(), at[-1].tolist()
         return UnreachedSpan(number, (a, b), (c, d), self._length(at), reason)
 
@@ -346,7 +346,7 @@ class Lines:
             return out
         for piece in pieces:
             own = slice(piece.first, piece.last)
-            tips, axes = posed(S[own], N[own], self.table, written(piece.pallet), self.cutter)
+            tips, axes = pose_cutter(S[own], N[own], self.table, written_angles(piece.pallet), self.cutter)
             for k in np.flatnonzero(covering.node_depth(self.cutter, tips, axes, self.how.clearance) > 0.0).tolist():
                 at, B = piece.first + k, float(piece.pallet[k])
                 if not any(abs(math.remainder(B - one, math.tau)) <= _EXACT for one in exact[at]):
@@ -373,7 +373,7 @@ class Lines:
             if not np.isfinite(known).all():
                 continue
             low, high = known.min() - _WINDOW, known.max() + _WINDOW
-            spans = _within(low, high, self.pallets)
+            spans = _parts_within(low, high, self.pallets)
             if high - low > math.pi or not spans:
                 continue
             got = self._valid(scene, group, spans)
@@ -415,7 +415,7 @@ def stations(
     raise InputError(f"finish.chord = {chord:g} mm: more than 513 points a line: raise it")
 
 
-def stretched(
+def stretch_stations(
     surface: BSplinePatch, along: str, P: tuple[float, float], Q: tuple[float, float], count: int, overrun: float
 ) -> Floats:
     """Even stations from P[0] to P[1], and more beyond by ``overrun`` [mm] where the surface extends so far."""
@@ -433,10 +433,10 @@ def stretched(
     return np.sort(np.concatenate(out))
 
 
-def windowed(ranges: Floats, angle: float, width: float) -> tuple[Floats, Floats]:
+def window_ranges(ranges: Floats, angle: float, width: float) -> tuple[Floats, Floats]:
     """Parts of ranges (k, 2) within a width of an angle, modulo whole turns, and the remaining parts.
 
-    >>> inside, outside = windowed(np.array([[0.0, 2.0], [3.0, 4.0]]), 1.0 + math.tau, 0.5)
+    >>> inside, outside = window_ranges(np.array([[0.0, 2.0], [3.0, 4.0]]), 1.0 + math.tau, 0.5)
     >>> inside.round(9).tolist(), outside.round(9).tolist()
     ([[0.5, 1.5]], [[0.0, 0.5], [1.5, 2.0], [3.0, 4.0]])
     """
@@ -456,10 +456,10 @@ def windowed(ranges: Floats, angle: float, width: float) -> tuple[Floats, Floats
     return np.array(inside).reshape(-1, 2), np.array(outside).reshape(-1, 2)
 
 
-def merged(ranges: Floats) -> Floats:
+def merge_ranges(ranges: Floats) -> Floats:
     """Ranges (k, 2) in ascending order, joined where one ends and the next begins.
 
-    >>> merged(np.array([[1.5, 2.0], [0.0, 0.5], [0.5, 1.0]])).tolist()
+    >>> merge_ranges(np.array([[1.5, 2.0], [0.0, 0.5], [0.5, 1.0]])).tolist()
     [[0.0, 1.0], [1.5, 2.0]]
     """
     out: list[list[float]] = []
@@ -471,7 +471,7 @@ def merged(ranges: Floats) -> Floats:
     return np.array(out).reshape(-1, 2)
 
 
-def _within(low: float, high: float, pallets: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+def _parts_within(low: float, high: float, pallets: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
     """Parts of low..high, shifted by whole turns, that lie in the ``pallets``."""
     out = []
     for a, b in pallets:

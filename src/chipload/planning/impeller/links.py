@@ -31,9 +31,9 @@ from chipload.errors import InputError
 from chipload.planning.impeller.clearance import clearance, interpolated_axes, moves_clear
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.pass_order import pass_order
-from chipload.planning.impeller.passes import Joint, Pass, joined, single
+from chipload.planning.impeller.passes import Joint, Pass, join_tracks, single
 from chipload.planning.impeller.scene import Floats, Ints, Scene
-from chipload.planning.impeller.track import ToolTrack, pallet_of, written
+from chipload.planning.impeller.track import ToolTrack, pallet_of, written_angles
 from chipload.program.program import LINE, RAPID
 
 _SMALL = 24  # places at which a lift is checked
@@ -137,7 +137,7 @@ def safe_height(points: Floats, table: float) -> float:
     return float((np.hypot(points[:, 0], points[:, 1]) * math.sin(table) + points[:, 2] * math.cos(table)).max())
 
 
-def linked(
+def link_tracks(
     tracks: tuple[ToolTrack, ...],
     scene: Scene,
     cutter: CatalogueCutter,
@@ -173,7 +173,7 @@ def linked(
     if joint is not None and not one_way:
         # a lifted link: both leads, both lifts, up and down again
         seconds = 2.0 * how.lead / feed + 2.0 * max(how.lift - how.lead, 0.0) / how.feed + _OVER
-        passes, stayed = joined(tracks, joint, seconds * feed, label)
+        passes, stayed = join_tracks(tracks, joint, seconds * feed, label)
     if not one_way:
         passes = _in_order(job, passes, stages)
     parts: list[Moves] = []
@@ -277,21 +277,21 @@ class _LinkJob:
                     continue
                 lead = min(self.how.lead / length, 1.0)
                 tips_off = (p + step,) if lead == 1.0 else (p + lead * step, p + step)
-                if got[-1] > self.how.margin + self.how.allowance and self._up(
+                if got[-1] > self.how.margin + self.how.allowance and self._retract_is_clear(
                     tips[-1], T, self.how.margin + self.how.allowance
                 ):
                     return _Pose(tips_off, T, True)
-                if found is None and self._up(tips[-1], T, self.how.margin):
+                if found is None and self._retract_is_clear(tips[-1], T, self.how.margin):
                     found = _Pose(tips_off, T, False)
         # too narrow for a lift: up along the axis as it stands, where it may touch what it touches now
-        if found is not None or not self._up(p, T, -self.how.touch):
+        if found is not None or not self._retract_is_clear(p, T, -self.how.touch):
             return found
         return _Pose((p + min(self.how.lead, self._rise(p, T)) * T, self.over(p, T)), T, False)
 
     def _rise(self, tip: Floats, axis: Floats) -> float:
         return max(self.top - float(tip @ axis), 0.0)
 
-    def _up(self, tip: Floats, axis: Floats, margin: float) -> bool:
+    def _retract_is_clear(self, tip: Floats, axis: Floats, margin: float) -> bool:
         tips = [tip, self.over(tip, axis)]
         return bool(moves_clear(self.scene, self.cutter, tips, [axis, axis], margin, self.clear_of).all())
 
@@ -320,7 +320,7 @@ class _LinkJob:
         count = max(1, math.ceil(abs(turn) / _TURN))
         share = np.arange(1, count + 1) / count
         tips = a.tip + share[:, None] * (b.tip - a.tip)
-        axes = np.vstack([axis_at(self.table, written(B0 + share[:-1] * turn)).reshape(-1, 3), b.axis[None]])
+        axes = np.vstack([axis_at(self.table, written_angles(B0 + share[:-1] * turn)).reshape(-1, 3), b.axis[None]])
         ok = moves_clear(
             self.scene, self.cutter, np.vstack([a.tip, tips]), np.vstack([a.axis, axes]), self.how.margin, self.clear_of
         )
@@ -332,9 +332,9 @@ class _LinkJob:
         turn = (B1 - B0 + math.pi) % math.tau - math.pi
         count = max(1, math.ceil(abs(turn) / _TURN))
         share = np.arange(1, count + 1) / count
-        B = written(B0 + share * turn)
-        p0, p1 = _turned(a[0], -B0), _turned(b[0], -(B0 + turn))
-        tips = np.array([_turned(p0 + s * (p1 - p0), x) for s, x in zip(share, B, strict=True)])
+        B = written_angles(B0 + share * turn)
+        p0, p1 = _turn_point(a[0], -B0), _turn_point(b[0], -(B0 + turn))
+        tips = np.array([_turn_point(p0 + s * (p1 - p0), x) for s, x in zip(share, B, strict=True)])
         tips[-1] = b[0]
         axes = axis_at(self.table, B)
         axes[-1] = b[1]
@@ -364,7 +364,7 @@ def deepest(moves: Moves, scene: Scene, cutter: CatalogueCutter, above: float, p
     return float(got[k]), int(row[k])
 
 
-def _turned(p: Floats, angle: float) -> Floats:
+def _turn_point(p: Floats, angle: float) -> Floats:
     c, s = math.cos(angle), math.sin(angle)
     out: Floats = np.array([c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]])
     return out

@@ -68,7 +68,7 @@ def pallet_angles(
     >>> [(t.first, t.last) for t in pallet_angles(two, np.ones(2), np.ones(2))]
     [(0, 2), (2, 3)]
     """
-    joined = [_joined(r) for r in ranges]
+    joined = [_join_ends(r) for r in ranges]
     draw = np.full(len(ranges), np.nan) if preferred is None else preferred
     states = [_states(r, wanted, p) for r, p in zip(joined, draw, strict=True)]
     if widths is not None:
@@ -85,7 +85,7 @@ def pallet_angles(
     return tuple(out)
 
 
-def _joined(ranges: Floats) -> Floats:
+def _join_ends(ranges: Floats) -> Floats:
     """The ranges, the last joined to the first over 2 pi."""
     r = np.asarray(ranges, dtype=np.float64).reshape(-1, 2)
     over = len(r) > 1 and r[0, 0] <= 1e-9 and r[-1, 1] >= math.tau - 1e-9

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chipload.errors import InputError
-from chipload.geometry.bspline import through
+from chipload.geometry.bspline import patch_through
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import Blade
 from chipload.planning.impeller.impeller import Impeller
@@ -72,8 +72,8 @@ def impeller_of(shape: ImpellerShape, along: int = 41, up: int = 9) -> Impeller:
     for sign in (1.0, -1.0):
         a = theta + sign * 0.5 * shape.thickness / m[..., 0]
         grid = np.stack([m[..., 0] * np.cos(a), m[..., 0] * np.sin(a), m[..., 1]], axis=-1)
-        patch = through(grid, share, v)
+        patch = patch_through(grid, share, v)
         at = patch.at(0.5, 0.5)[0]
         outward = patch.normal(0.5, 0.5)[0] @ np.array([-at[1], at[0], 0.0]) * sign > 0.0
-        sides.append(patch if outward else through(grid, share, v, side=-1))
+        sides.append(patch if outward else patch_through(grid, share, v, side=-1))
     return Impeller(Blade(*sides), None, Revolved(hub, 1), Revolved(shroud, -1), shape.blades)

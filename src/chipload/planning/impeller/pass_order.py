@@ -62,7 +62,7 @@ def pass_order(
     begins = np.argsort(first, kind="stable")
     for begin in begins[np.unique(np.linspace(0, len(begins) - 1, min(len(begins), _STARTS)).round().astype(int))]:
         order = _nearest(cost, int(begin), n)
-        total, order = _turned(cost, first, order)
+        total, order = _reverse_parts(cost, first, order)
         if total < best[0] - 1e-9:
             best = total, order
     return [(k // 2, k % 2 == 0) for k in best[1]]
@@ -95,7 +95,7 @@ def _nearest(cost: Floats, begin: int, n: int) -> list[int]:
     return order
 
 
-def _turned(cost: Floats, first: Floats, order: Sequence[int]) -> tuple[float, list[int]]:
+def _reverse_parts(cost: Floats, first: Floats, order: Sequence[int]) -> tuple[float, list[int]]:
     """The sequence with parts of it reversed while that saves time, and its time."""
     at = np.array(order)
     n = len(at)

@@ -67,7 +67,7 @@ def single(number: int, track: ToolTrack, label: str) -> Pass:
     return Pass((number,), track.tip, track.axis, track.normal, zero + number, zero, label)
 
 
-def joined(tracks: Sequence[ToolTrack], joint: Joint, longest: float, label: str) -> tuple[list[Pass], int]:
+def join_tracks(tracks: Sequence[ToolTrack], joint: Joint, longest: float, label: str) -> tuple[list[Pass], int]:
     """Tracks that follow one another, joined where their contacts end and begin within ``longest`` [mm].
 
     Returns
@@ -92,7 +92,7 @@ def joined(tracks: Sequence[ToolTrack], joint: Joint, longest: float, label: str
                     if between is not None:
                         out[-1] = single(out[-1].numbers[0], turned, label)
             if between is not None:
-                out[-1] = _grown(out[-1], between, number, track)
+                out[-1] = _grow_pass(out[-1], between, number, track)
                 stayed += 1
                 last = track
                 continue
@@ -127,7 +127,7 @@ def surface_joint(refinements: Sequence[Refinement | None]) -> Joint:
     return joint
 
 
-def _grown(one: Pass, between: ToolTrack, number: int, track: ToolTrack) -> Pass:
+def _grow_pass(one: Pass, between: ToolTrack, number: int, track: ToolTrack) -> Pass:
     """A pass that continues through a link to a further track."""
     # the way begins where the pass ends and ends where the track begins
     inner = slice(1, len(between.tip) - 1)

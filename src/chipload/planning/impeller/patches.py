@@ -21,7 +21,7 @@ import numpy as np
 
 from chipload.errors import InputError
 from chipload.planning.impeller.answer import Unreachable
-from chipload.planning.impeller.assignment import Changes, Step, assigned, bound_of_cells, bound_of_strips
+from chipload.planning.impeller.assignment import Changes, Step, assign_cutters, bound_of_cells, bound_of_strips
 from chipload.planning.impeller.costs import ChannelSide, Costs, Terms
 from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.patch import Patch
@@ -64,7 +64,7 @@ class PatchDivision:
 
 
 def costs_of(sides: Sequence[ChannelSide], terms: Terms, workers: int = 1) -> tuple[Costs, ...]:
-    """Times of the sides, shared by calls of :func:`divided`; the sides have one catalogue."""
+    """Times of the sides, shared by calls of :func:`divide_sides`; the sides have one catalogue."""
     if not sides:
         raise InputError("sides: none: must be at least one")
     catalogue = sides[0].answer.catalogue
@@ -74,7 +74,7 @@ def costs_of(sides: Sequence[ChannelSide], terms: Terms, workers: int = 1) -> tu
     return tuple(Costs(side, tables, terms, workers) for side in sides)
 
 
-def divided(
+def divide_sides(
     costs: Sequence[Costs],
     most: int | None = None,
     workers: int = 1,
@@ -104,7 +104,7 @@ def divided(
     rounds = 0
     while True:
         times = [(c.cells(0) * terms.repeats, c.cells(1) * terms.repeats) for c in costs]
-        best = assigned(times, changes, most)
+        best = assign_cutters(times, changes, most)
         if best is None:
             return None
         open_ = [_open_times(c, [s for s in best.steps if s.side == k]) for k, c in enumerate(costs)]

@@ -25,14 +25,14 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.closed_form import axis_at
-from chipload.planning.impeller.lines import Line, LineMotion, Lines, Tracks, UnreachedSpan, stations, stretched
+from chipload.planning.impeller.lines import Line, LineMotion, Lines, Tracks, UnreachedSpan, stations, stretch_stations
 from chipload.planning.impeller.pallet_ranges import FULL
 from chipload.planning.impeller.patch import Begin
 from chipload.planning.impeller.scallop_height import pose_distance, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
 from chipload.planning.impeller.scene import Floats, Scene
-from chipload.planning.impeller.steps import Flags, even_steps, straightened
-from chipload.planning.impeller.track import ToolTrack, posed
+from chipload.planning.impeller.steps import Flags, even_steps, straighten_line
+from chipload.planning.impeller.track import ToolTrack, pose_cutter
 from chipload.progress import Progress, silent
 
 _MENDS, _ROUNDS = 6, 12
@@ -71,7 +71,7 @@ class PatchFinish:
             raise InputError(f"scallop_mm = {self.scallop:g}, aim {self.aim:g}: must be above 0, aim at most 1")
 
 
-def finishing(
+def finish_tracks(
     surface: BSplinePatch,
     along: str,
     box: tuple[tuple[float, float], tuple[float, float]],
@@ -104,7 +104,7 @@ def finishing(
     if not (0.0 <= P[0] < P[1] <= 1.0 and 0.0 <= Q[0] < Q[1] <= 1.0):
         raise InputError(f"box = {box}: must be ascending, within 0..1")
     count = stations(surface, along, P, Q, how.motion.chord, _STATION)
-    p = stretched(surface, along, P, Q, count, how.overrun)
+    p = stretch_stations(surface, along, P, Q, count, how.overrun)
     need = (p >= P[0]) & (p <= P[1])
     job = Lines(surface, along, p, scene, number, cutter, table, how.motion, pallets, workers)
     up = _March(_Stepper(job, how.scallop, how.aim, need), Q, progress)
@@ -115,7 +115,7 @@ def finishing(
         middle = job.line(np.full(len(p), 0.5 * sum(Q)), np.full(len(p), np.nan))
         if np.isfinite(middle.pallet[need]).all():
             before, after = down.after(replace(middle, q=-middle.q), 1), up.after(middle, 1)
-            found = _stacked(before, up.alone(middle), after)
+            found = _stack_lines(before, up.alone(middle), after)
             # which way lines run also decides how wide their passes are
             return found if begin == "middle" else min(up.from_border(), found, key=_rank)
     return up.from_border()
@@ -135,7 +135,7 @@ def _narrows(job: Lines, Q: tuple[float, float], need: Flags) -> bool:
     return bool(width.max() > _NARROWS * width.min())
 
 
-def _stacked(before: Tracks, middle: Tracks, after: Tracks) -> Tracks:
+def _stack_lines(before: Tracks, middle: Tracks, after: Tracks) -> Tracks:
     """Lines on either side of one, numbered from the first to the last; ``before`` goes away from it, from 1 on."""
     n = before.lines
     low = [replace(t, line=n - t.line) for t in reversed(before.tracks)]
@@ -256,7 +256,7 @@ class _Stepper:
         for turn in range(_MENDS):
             if turn:
                 w = self._step(line, w, B)
-            out = self.lines.line(self._moved(line, self._even(line, less * w), end), B)
+            out = self.lines.line(self._move_line(line, self._even(line, less * w), end), B)
             scallop = self._scallop(line, out.q, out.pallet)
             # what is used of the scallop where the line is not at the border; below 0: by how much it is too high
             inner = scallop[np.isfinite(scallop) & (out.q < end)]
@@ -274,7 +274,7 @@ class _Stepper:
             B = out.pallet
         return line if best is None else best[1]
 
-    def _moved(self, line: Line, w: Floats, end: float) -> Floats:
+    def _move_line(self, line: Line, w: Floats, end: float) -> Floats:
         out: Floats = np.minimum(self._straight(line, line.q + self._dq(line, w)), end)
         return out
 
@@ -282,7 +282,7 @@ class _Stepper:
         """The step at which the scallop is as high as aimed, if the next line is milled at these pallet angles."""
         aim = self.aim * self.scallop
         for _ in range(_ROUNDS):
-            scallop = self._scallop(line, self._moved(line, w, self.lines.ends[1]), pallet)
+            scallop = self._scallop(line, self._move_line(line, w, self.lines.ends[1]), pallet)
             ratio = np.clip(np.sqrt(aim / np.clip(scallop, 0.1 * aim, None)), 0.6, 1.3)
             if not np.isfinite(ratio).any() or (np.nanmin(ratio) > 0.99 and np.nanmax(ratio) < 1.03):
                 break
@@ -303,7 +303,7 @@ class _Stepper:
         sub = 2 * max(1, math.ceil(0.5 * length / pose_distance(self.lines.cutter.corner_radius)))
         at = np.arange((n - 1) * sub + 1) / sub
         p, q0, q1 = (np.interp(at, np.arange(n), x) for x in (self.lines.p, line.q, q))
-        B0, B1 = (_blended(x, at) for x in (line.pallet, pallet))
+        B0, B1 = (_blend_pallet(x, at) for x in (line.pallet, pallet))
         share = shares()
         P, Q = np.repeat(p, len(share)), (q0[:, None] + share * (q1 - q0)[:, None]).ravel()
         points, normals = (x.reshape(len(at), len(share), 3) for x in self.lines.facing(P, Q))
@@ -318,7 +318,7 @@ class _Stepper:
 
     def _poses(self, S: Floats, N: Floats, pallet: Floats) -> tuple[Floats, Floats]:
         known = np.isfinite(pallet)
-        tip, axis = posed(S, N, self.lines.table, np.where(known, pallet, 0.0), self.lines.cutter)
+        tip, axis = pose_cutter(S, N, self.lines.table, np.where(known, pallet, 0.0), self.lines.cutter)
         return np.where(known[:, None], tip, np.nan), np.where(known[:, None], axis, np.nan)
 
     def reach(self, line: Line) -> tuple[Floats, Floats]:
@@ -337,9 +337,9 @@ class _Stepper:
 
     def _sign(self, line: Line) -> Floats:
         """(n,) S_q.e: mm across the line for a growth of q by 1."""
-        return self._across(line, line.q)
+        return self._distance_across(line, line.q)
 
-    def _across(self, line: Line, q: Floats) -> Floats:
+    def _distance_across(self, line: Line, q: Floats) -> Floats:
         u, v = self.lines.places(self.lines.p, q)
         Sq = self.lines.sign * self.lines.surface.at(u, v, *((0, 1) if self.lines.along == "u" else (1, 0)))
         out: Floats = (Sq * np.cross(line.N, line.d)).sum(axis=1)
@@ -356,16 +356,16 @@ class _Stepper:
     def _straight(self, line: Line, q: Floats) -> Floats:
         """Places (n,) of the line after ``line``, held back where it would run askew to the parameter lines."""
         size = np.linalg.norm(np.diff(line.S, axis=0), axis=1)
-        return straightened(q, line.q, self._across(line, line.q), size)
+        return straighten_line(q, line.q, self._distance_across(line, line.q), size)
 
     def _dq(self, line: Line, w: Floats) -> Floats:
-        first = w / np.abs(self._across(line, line.q))
+        first = w / np.abs(self._distance_across(line, line.q))
         middle = np.clip(line.q + 0.5 * first, *self.lines.ends)
-        out: Floats = w / np.abs(self._across(line, middle))
+        out: Floats = w / np.abs(self._distance_across(line, middle))
         return out
 
 
-def _blended(pallet: Floats, at: Floats) -> Floats:
+def _blend_pallet(pallet: Floats, at: Floats) -> Floats:
     """Pallet angles between stations; nan next to a station that has none, and where a line is split."""
     i = np.minimum(at.astype(np.int64), len(pallet) - 2)
     w = at - i

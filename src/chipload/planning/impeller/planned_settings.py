@@ -59,7 +59,7 @@ class PlannedSettings:
     unreached: dict[tuple[int, str], float]
 
 
-def planned(
+def plan_settings(
     job: FinishSettings,
     patches: Sequence[Patch],
     changes: Changes,
@@ -97,7 +97,7 @@ def planned(
     left: list[Floats] = []
     memory: LeftMemory = {}
     for turn in range(rounds + 1):
-        left = [_left(f, settings.values(), memory) for f in faces]
+        left = [_excess_left(f, settings.values(), memory) for f in faces]
         if turn == rounds:
             break
         open_yet = [
@@ -249,7 +249,7 @@ def _pass_rows(job: FinishSettings, s: CutterSetting) -> list[tuple[int, PassRow
 LeftMemory = dict[tuple[int, tuple[int, ...]], tuple[Floats, tuple[ToolTrack, ...]]]
 
 
-def _left(face: SurfaceGrid, settings: Iterable[CutterSetting], memory: LeftMemory) -> Floats:
+def _excess_left(face: SurfaceGrid, settings: Iterable[CutterSetting], memory: LeftMemory) -> Floats:
     """Excess (a, b) float [mm] of all tracks that are in the moves, on the grid of a surface."""
     out = np.full((len(face.u), len(face.v)), np.inf)
     for s in settings:

@@ -33,7 +33,7 @@ from chipload.planning.impeller.pass_order import pass_order
 from chipload.planning.impeller.scallop_height import profile_scallops, scallop_heights, shares
 from chipload.planning.impeller.scallop_width import reaches
 from chipload.planning.impeller.scene import Floats
-from chipload.planning.impeller.steps import Flags, even_steps, runs, straightened
+from chipload.planning.impeller.steps import Flags, even_steps, runs, straighten_line
 
 #: distance between the stations of a line [mm]
 _SPACING = 0.5
@@ -147,7 +147,7 @@ def point_path(
     inner = box[0] if along == "u" else box[1]
     # also between the last station inside and the next one
     need = binary_dilation((job.p >= inner[0] - 1e-9) & (job.p <= inner[1] + 1e-9))
-    paths = [_joined(job, laid, chord) for laid in job.laid_out(low, high, need)]
+    paths = [_join_lines(job, laid, chord) for laid in job.laid_out(low, high, need)]
     return min(paths, key=lambda path: path.length)
 
 
@@ -324,7 +324,7 @@ class _Lines:
 
     def after(self, line: Floats, w: Floats) -> Floats:
         """Places (n,) of the line w beyond another one."""
-        return straightened(self.moved(line, w), line, self.across(line)[2], self.sizes(line), self.smooth)
+        return straighten_line(self.moved(line, w), line, self.across(line)[2], self.sizes(line), self.smooth)
 
     def scallops(self, line: Floats, other: Floats) -> Floats:
         """(n,) height of the scallop between two lines [mm]."""
@@ -355,7 +355,7 @@ def _spread(lines: list[Floats], last: Floats) -> Floats:
     return np.array([np.interp(every * x[-1], x, q) for x, q in zip(at.T, np.array(lines).T, strict=True)]).T
 
 
-def _joined(job: _Lines, laid: tuple[_LinePiece, ...], chord: float) -> PointPath:
+def _join_lines(job: _Lines, laid: tuple[_LinePiece, ...], chord: float) -> PointPath:
     """All lines in alternate directions, joined on the surface, with as many rows as the chord requires."""
     p: list[Floats] = []
     q: list[Floats] = []
@@ -372,7 +372,7 @@ def _joined(job: _Lines, laid: tuple[_LinePiece, ...], chord: float) -> PointPat
         q.append(piece.q[order])
         number.append(np.full(len(piece.p), piece.line))
     P, Q, of = np.concatenate(p), np.concatenate(q), np.concatenate(number)
-    keep = _needed(P, Q, of, np.abs(job.across_at(P, Q)))
+    keep = _needed_rows(P, Q, of, np.abs(job.across_at(P, Q)))
     P, Q, of = P[keep], Q[keep], of[keep]
     for _ in range(_HALVINGS):
         tip, axis, _ = job.poses(P, Q)
@@ -392,7 +392,7 @@ def _joined(job: _Lines, laid: tuple[_LinePiece, ...], chord: float) -> PointPat
     return PointPath(np.column_stack(job.places(P, Q)), normal, tip, axis, of)
 
 
-def _needed(P: Floats, Q: Floats, of: NDArray[np.int64], size: Floats) -> Flags:
+def _needed_rows(P: Floats, Q: Floats, of: NDArray[np.int64], size: Floats) -> Flags:
     """Which rows (n,) of lines are needed: every fourth, and more where a line bends between them.
 
     ``size`` (n,) [mm] across the line for a growth of q by 1. Rows are added again where the chord requires them.

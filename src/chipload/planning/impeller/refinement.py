@@ -19,7 +19,7 @@ from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller.clearance import clearance, interpolated_axes
 from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.scene import Floats, Ints, Scene
-from chipload.planning.impeller.track import ToolTrack, posed, track_of
+from chipload.planning.impeller.track import ToolTrack, pose_cutter, track_of
 
 _ROUNDS = 7
 _BISECT = 7
@@ -66,7 +66,7 @@ class Refinement:
         at = 0.5 * (track.at[1:] + track.at[:-1])
         S, N = self.surface.at(*at.T), self.surface.normal(*at.T)
         B = 0.5 * (track.pallet[1:] + track.pallet[:-1])
-        true, _ = posed(S, N, self.table, B, self.cutter)
+        true, _ = pose_cutter(S, N, self.table, B, self.cutter)
         off = np.abs(((true - 0.5 * (track.tip[1:] + track.tip[:-1])) * N).sum(axis=1))
         row = np.repeat(np.arange(len(at)), len(_SHARES))
         share = np.tile(_SHARES, len(at))

@@ -22,7 +22,7 @@ from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch
 from chipload.planning.impeller import _scallop
 from chipload.planning.impeller.kept import Keep, anew
-from chipload.planning.impeller.lines import LineMotion, Lines, stretched
+from chipload.planning.impeller.lines import LineMotion, Lines, stretch_stations
 from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.scallop_height import pose_distance
 from chipload.planning.impeller.scene import Floats, Ints, Scene
@@ -184,7 +184,7 @@ class RestSettings:
 
     def chosen(self, face: SurfaceGrid, region: Flags) -> Pair | None:
         """The cutter and table angle for a region; None: no untried one reaches any of its points."""
-        return self.keep(self.pair_key(face, region), lambda: self._chosen(face, region))
+        return self.keep(self.pair_key(face, region), lambda: self._choose_pair(face, region))
 
     def pair_key(self, face: SurfaceGrid, region: Flags) -> tuple[object, ...]:
         """Key of the cutter and table angle of a region: everything that they depend on."""
@@ -199,7 +199,7 @@ class RestSettings:
         """What a region is known by."""
         return (face.body, face.side, face.u, face.v, region)
 
-    def _chosen(self, face: SurfaceGrid, region: Flags) -> Pair | None:
+    def _choose_pair(self, face: SurfaceGrid, region: Flags) -> Pair | None:
         where = np.argwhere(region)
         some = where[np.unique(np.linspace(0, len(where) - 1, _SAMPLE).round().astype(int))]
         best: tuple[float, float] = (0.0, 0.0)
@@ -258,13 +258,13 @@ class RestSettings:
         middle = float(q_at[int(np.median(y))])
         ends = [face.surface.at(*((x, middle) if along == "u" else (middle, x)))[0] for x in P]
         count = max(3, math.ceil(float(np.linalg.norm(ends[1] - ends[0])) / _STATIONS) + 1)
-        p = stretched(face.surface, along, P, (middle, middle), count, self.overrun)
+        p = stretch_stations(face.surface, along, P, (middle, middle), count, self.overrun)
         lines = Lines(
             face.surface, along, p, self.scene, face.number, cutter, alpha, self.motion, self.pallets, self.workers
         )
         step = _STEP * corner_step(cutter.corner_radius, self.scallop)
         bottom, top = (
-            _drawn(np.interp(p, p_at[columns], q_at[edge]), sign) for edge, sign in ((low, -1.0), (high, 1.0))
+            _draw_smooth(np.interp(p, p_at[columns], q_at[edge]), sign) for edge, sign in ((low, -1.0), (high, 1.0))
         )
         number = max(1, math.ceil((int((high - low).max()) + 1) * width / step))
         tracks: list[ToolTrack] = []
@@ -279,7 +279,7 @@ class RestSettings:
         return RestPasses(face.body, face.side, box, tuple(tracks))
 
 
-def _drawn(q: Floats, sign: float) -> Floats:
+def _draw_smooth(q: Floats, sign: float) -> Floats:
     """A border drawn smooth, nowhere inside the given one."""
     soft = gaussian_filter1d(q, 1.0, mode="nearest")
     out: Floats = np.clip(np.maximum(soft, q) if sign > 0.0 else np.minimum(soft, q), 0.0, 1.0)

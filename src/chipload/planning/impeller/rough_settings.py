@@ -22,10 +22,10 @@ from chipload.planning.impeller.floor import layer_of
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import Tracks
-from chipload.planning.impeller.links import Link, Linked, linked
+from chipload.planning.impeller.links import Link, Linked, link_tracks
 from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.programs import program_of
-from chipload.planning.impeller.roughing import RoughingSettings, layers, roughing, thickened, uncut
+from chipload.planning.impeller.roughing import RoughingSettings, layers, roughing_tracks, thicken_walls, uncut
 from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.tables import IndexTable
 from chipload.planning.impeller.track import ToolTrack
@@ -75,7 +75,7 @@ class RoughingSetting:
         remaining = tuple(t for k, t in enumerate(self.tracks.tracks) if k not in removed)
         left_out = tuple(t for k, t in enumerate(self.tracks.tracks) if k in removed)
         tracks = replace(self.tracks, tracks=remaining)
-        linked = _linked(remaining, self.walls, self.cutter, self.table, self.how, self.link, self.top)
+        linked = _link_rows(remaining, self.walls, self.cutter, self.table, self.how, self.link, self.top)
         program = program_of(linked.moves, self.spindle, self.tool)
         return replace(self, tracks=tracks, linked=linked, program=program, stopped=(*self.stopped, *left_out))
 
@@ -90,7 +90,7 @@ class RoughingSetting:
         return tuple(t for k, t in enumerate(self.tracks.tracks) if k not in refused)
 
 
-def roughed(
+def rough_channels(
     impeller: Impeller, catalogue: Catalogue, stated: CatalogueCutter | None, how: RoughingSettings, link: Link,
     spindle: float,
     table: IndexTable, share: float, ahead: float = 0.0, workers: int = 1, progress: Progress = silent,
@@ -138,14 +138,14 @@ def roughed(
         tracks = keep(
             ("rough rows", index, cutter, alpha, before),
             partial(
-                roughing, impeller, index, cutter, alpha, how, ahead, spans, workers, _part(progress, k, len(plans)),
-                before,
+                roughing_tracks, impeller, index, cutter, alpha, how, ahead, spans, workers,
+                _part(progress, k, len(plans)), before,
             ),
         )  # fmt: skip
-        walls, top = thickened(impeller, index, how, ahead), uncut(impeller, index, how, ahead, whole=True)
+        walls, top = thicken_walls(impeller, index, how, ahead), uncut(impeller, index, how, ahead, whole=True)
         linked = keep(
             ("rough links", index, cutter, alpha, before),
-            partial(_linked, tracks.tracks, walls, cutter, alpha, how, link, top),
+            partial(_link_rows, tracks.tracks, walls, cutter, alpha, how, link, top),
         )
         count = len(layers(impeller, how.depth, how.hub, ahead))
         program, tool = program_of(linked.moves, spindle, len(out) + 1), len(out) + 1
@@ -157,7 +157,7 @@ def roughed(
     return tuple(out)
 
 
-def _linked(
+def _link_rows(
     tracks: tuple[ToolTrack, ...],
     walls: Scene,
     cutter: CatalogueCutter,
@@ -167,7 +167,7 @@ def _linked(
     top: Floats,
 ) -> Linked:
     motion = how.motion
-    return linked(
+    return link_tracks(
         tracks, walls, cutter, alpha, motion.feed, link, motion.clearance, "rough", motion.rate, one_way=True,
         outline=top,
     )  # fmt: skip
@@ -187,7 +187,7 @@ def _channel_scene(impeller: Impeller, index: int, how: RoughingSettings, ahead:
         patch = layer_of(impeller, index, float(share), how.hub, ahead)
         parts.append((patch.at(u, v), patch.normal(u, v), patch.curvature(u, v)))
     S, N, K = (np.concatenate([p[k] for p in parts]) for k in range(3))
-    return thickened(impeller, index, how, ahead).at_contacts(S, N, K, 2)
+    return thicken_walls(impeller, index, how, ahead).at_contacts(S, N, K, 2)
 
 
 def _largest(

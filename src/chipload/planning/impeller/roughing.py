@@ -76,7 +76,7 @@ def layers(impeller: Impeller, depth: float, allowance: float, ahead: float = 0.
     return out
 
 
-def roughing(
+def roughing_tracks(
     impeller: Impeller,
     index: int,
     cutter: CatalogueCutter,
@@ -88,7 +88,7 @@ def roughing(
     progress: Progress = silent,
     before: Sequence[ToolTrack] = (),
 ) -> Tracks:
-    """Roughing tracks of the channel on the plus side of a body, clear of its walls as :func:`thickened` gives them.
+    """Roughing tracks of the channel on the plus side of a body, clear of walls as :func:`thicken_walls` gives them.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def roughing(
     before : rows that are milled already, at another table angle: where they come as near as a row here is to its
         neighbour, there is no row
     """
-    scene = thickened(impeller, index, how, ahead)
+    scene = thicken_walls(impeller, index, how, ahead)
     done = cKDTree(np.concatenate([_places(t) for t in before])) if before else None
     tracks: list[ToolTrack] = []
     missed: list[UnreachedSpan] = []
@@ -125,7 +125,7 @@ def roughing(
     return Tracks(tuple(tracks), tuple(missed), number)
 
 
-def thickened(impeller: Impeller, index: int, how: RoughingSettings, ahead: float = 0.0) -> Scene:
+def thicken_walls(impeller: Impeller, index: int, how: RoughingSettings, ahead: float = 0.0) -> Scene:
     """Check points of the channel's walls and those around, moved out by the allowances; the hub is surface 2.
 
     Surface 4 is the top of the blank beside the channel, which is uncut.
@@ -169,7 +169,7 @@ def _places(track: ToolTrack) -> Floats:
     return np.column_stack([np.interp(at, length, track.contact[:, k]) for k in range(3)])
 
 
-def guarded(
+def guard_walls(
     impeller: Impeller, index: int, milled: int, spacing: float, corner: float, around: int = 1, ahead: float = 0.0
 ) -> Scene:
     """Check points for finishing one wall of the channel on the plus side of a body; nothing is cut between them.

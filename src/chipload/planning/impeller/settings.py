@@ -21,10 +21,10 @@ from chipload.planning.impeller.floor import patch_of
 from chipload.planning.impeller.impeller import FILLET, Impeller
 from chipload.planning.impeller.kept import Keep, PlanTask, anew
 from chipload.planning.impeller.lines import Tracks
-from chipload.planning.impeller.links import Link, Linked, linked
+from chipload.planning.impeller.links import Link, Linked, link_tracks
 from chipload.planning.impeller.passes import surface_joint
 from chipload.planning.impeller.patch import Patch
-from chipload.planning.impeller.paths import PatchFinish, finishing
+from chipload.planning.impeller.paths import PatchFinish, finish_tracks
 from chipload.planning.impeller.programs import program_of
 from chipload.planning.impeller.refinement import Refinement
 from chipload.planning.impeller.rest_machining import (
@@ -170,7 +170,7 @@ class FinishSettings:
     def _tracks_of(self, cutter: CatalogueCutter, patch: Patch) -> Tracks:
         along, box = lines_of(patch)
         surface, number = self.surface(patch.body, patch.side), surface_number(patch.body, patch.side)
-        return finishing(
+        return finish_tracks(
             surface, along, box, self.scene, number, cutter, patch.table, self.how, self.spans, self.workers,
             begin=patch.begin,
         )  # fmt: skip
@@ -216,7 +216,7 @@ class FinishSettings:
                 motion.clearance,
             )
             refinements += [refinement] * count
-        return linked(
+        return link_tracks(
             tracks, self.scene, cutter, alpha, motion.feed, self.link, motion.clearance, rate=motion.rate,
             joint=surface_joint(refinements), stages=stages,
         )  # fmt: skip

@@ -120,17 +120,17 @@ def width(contact: Contact, rho: float, corner: float, scallop: float) -> Floats
     if not 0.0 < scallop < math.inf:
         raise InputError(f"scallop_mm = {scallop:g}: must be above 0")
     k = contact.across
-    w = _between(trace_curvature(contact, rho, corner), k, scallop, 2.0 * (rho + corner))
+    w = _ridge_distance(trace_curvature(contact, rho, corner), k, scallop, 2.0 * (rho + corner))
     if rho <= 0.0:
         return w
     # a disc of radius rho lying flat with a ball on either side is the widest
     ball = 1.0 - corner * k
     side = np.where(ball > 0.0, ball, 0.0) / corner if corner > 0.0 else np.full(k.shape, np.inf)
-    out: Floats = np.minimum(w, 2.0 * rho + _between(side, k, scallop, 2.0 * corner))
+    out: Floats = np.minimum(w, 2.0 * rho + _ridge_distance(side, k, scallop, 2.0 * corner))
     return out
 
 
-def _between(q: Floats, k: Floats, scallop: float, most: float) -> Floats:
+def _ridge_distance(q: Floats, k: Floats, scallop: float, most: float) -> Floats:
     """Distance along the arc k of two arcs k + q whose ridge is so high; at most ``most``; 0 where q is 0."""
     some = (q > 0.0) & np.isfinite(q)
     qs = np.where(some, q, 1.0)

@@ -36,7 +36,7 @@ def even_steps(w: Floats, size: Floats, over: float = 1.0) -> Floats:
     return out
 
 
-def straightened(q: Floats, before: Floats, across: Floats, size: Floats, over: float = 1.0) -> Floats:
+def straighten_line(q: Floats, before: Floats, across: Floats, size: Floats, over: float = 1.0) -> Floats:
     """Places (n,) of the line after ``before``, held back where it would run askew to the parameter lines.
 
     ``across`` (n,) [mm] across the line for a growth of q by 1, ``size`` (n - 1,) [mm] from station to station,

@@ -52,22 +52,22 @@ class ToolTrack:
         return ToolTrack(**columns, line=self.line)
 
 
-def written(pallet: ArrayLike) -> Floats:
+def written_angles(pallet: ArrayLike) -> Floats:
     """Pallet angles [rad] as they are written in the program.
 
-    >>> float(np.degrees(written(np.radians(12.3456789))).round(9))
+    >>> float(np.degrees(written_angles(np.radians(12.3456789))).round(9))
     12.345679
     """
     out: Floats = np.radians(np.round(np.degrees(np.asarray(pallet, dtype=np.float64)), DECIMALS))
     return out
 
 
-def posed(
+def pose_cutter(
     contact: Floats, normal: Floats, table: float, pallet: Floats, cutter: CatalogueCutter
 ) -> tuple[Floats, Floats]:
     """Tips (n, 3) [mm] and axes (n, 3) of the cutter at the contact points.
 
-    >>> tip, axis = posed(np.zeros((1, 3)), np.array([[1.0, 0, 0]]), 0.0, np.zeros(1), CatalogueCutter(20.0, 2.0))
+    >>> tip, axis = pose_cutter(np.zeros((1, 3)), np.array([[1.0, 0, 0]]), 0.0, np.zeros(1), CatalogueCutter(20.0, 2.0))
     >>> tip.tolist(), axis.tolist()
     ([[10.0, 0.0, -2.0]], [[0.0, 0.0, 1.0]])
     """
@@ -82,8 +82,8 @@ def track_of(
     at: Floats, contact: Floats, normal: Floats, table: float, pallet: Floats, cutter: CatalogueCutter, line: int
 ) -> ToolTrack:
     """Track of a cutter through contact points at pallet angles, which are rounded as in the program."""
-    B = written(pallet)
-    tip, axis = posed(contact, normal, table, B, cutter)
+    B = written_angles(pallet)
+    tip, axis = pose_cutter(contact, normal, table, B, cutter)
     return ToolTrack(at, contact, normal, B, tip, axis, line)
 
 

@@ -287,7 +287,7 @@ class _Run:
         """Bores into what no pass came to, the widest place first, as long as that clears anything."""
         allowed = self.centres.flatten(1e-4 * self.radius)
         for _ in range(ENTRIES):
-            x, y, room = self._left().widest(allowed)
+            x, y, room = self._pocket_remainder().widest(allowed)
             if room < LEAST_ROOM * self.radius:
                 break
             before = self.area
@@ -316,7 +316,7 @@ class _Run:
             places = []
             for arcs, engaged in loops.circles(path_line, begins):
                 first = arcs[0, 0:2]
-                clear = bool(self.rows) and self._linked(first)
+                clear = bool(self.rows) and self._link_to(first)
                 self.add(first[None, :], LINK if clear else LIFT)
                 self.passes += 1
                 self.add(arcs[:, 2:4], CUT, engaged, arcs[:, 4:7])
@@ -332,7 +332,7 @@ class _Run:
             self.starts.revive()
             while self.steps <= self.most:
                 self.starts.search(self.stock, self.reach, depth)
-                k = self.starts.nearest(self.at, self._linked)
+                k = self.starts.nearest(self.at, self._link_to)
                 if k is None:
                     break
                 if not self._pass_from(k):
@@ -355,7 +355,7 @@ class _Run:
         )
         self.events.append(Event("pocket-narrow", float(x), float(y), text))
 
-    def _linked(self, p: Floats) -> bool:
+    def _link_to(self, p: Floats) -> bool:
         return self._clear_line(self.at, p)
 
     def _clear_line(self, p: Floats, q: Floats) -> bool:
@@ -382,7 +382,7 @@ class _Run:
         """One pass from the start k; whether it took enough for the start to be tried again."""
         for x, y, heading in self.starts.candidates(k):
             start = np.array([x, y])
-            clear = bool(self.rows) and self._linked(start)  # of what is there before the pass
+            clear = bool(self.rows) and self._link_to(start)  # of what is there before the pass
             segments, places, took, reason, at = self._pass(x, y, heading)
             if not len(segments):
                 continue
@@ -434,7 +434,7 @@ class _Run:
                 self.progress(min(0.99, self.area / self.whole), f"front, pass {self.passes + 1}")
         return np.vstack(segments), np.vstack(places), took, int(reason), state[0:2]
 
-    def _left(self) -> PocketRemainder:
+    def _pocket_remainder(self) -> PocketRemainder:
         """What the path so far has left."""
         new = self.rows[max(0, self.taken - 1) :]
         if self.taken < len(self.rows):
@@ -455,7 +455,7 @@ class _Run:
             raise InputError("nothing is left for the cutter to clear: free space covers all that it can reach")
         rows = np.vstack(self.rows)
         kind = rows[:, 2].astype(np.int64)
-        area, contours, places = self._left().parts()
+        area, contours, places = self._pocket_remainder().parts()
         events = list(self.events)
         for mm2, (x, y) in places:
             events.append(Event("pocket-leftover", x, y, f"{number_text(mm2)} mm2 that the cutter can reach is left"))

@@ -68,7 +68,7 @@ def places_along(contour: Contour, step: float) -> tuple[Floats, Floats]:
 def outside_of(stock: Region, radius: float) -> Region:
     """Band, ``BAND`` R wide, around the outline of the stock."""
     outer = offset_region(stock, -BAND * radius)
-    return _reached(
+    return _require_reach(
         Region.of([*outer.contours, *stock.contours]), radius, "part.stock_layers: the outline of the stock"
     )
 
@@ -128,7 +128,7 @@ def without_leftover(region: Region, left: Sequence[Contour], radius: float, kep
     return offset_region(Region.of([Contour.polyline(np.asarray(r.coords)[:-1], closed=True) for r in rings]), -radius)
 
 
-def _reached(region: Region, radius: float, what: str) -> Region:
+def _require_reach(region: Region, radius: float, what: str) -> Region:
     """The region, if a disc of radius R reaches all of it beside the stock."""
     opened = offset_region(offset_region(region, radius), -radius)
     missed = region.area - opened.area

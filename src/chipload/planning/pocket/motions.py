@@ -159,7 +159,7 @@ def places(seg: Floats, share: Floats) -> tuple[Floats, Floats]:
     return at, d / np.where(length == 0.0, 1.0, length)[:, None]
 
 
-def replayed(
+def replay_motions(
     motions: Motions,
     samples: MotionSamples,
     radius: float,

@@ -35,7 +35,7 @@ from chipload.planning.pocket.motions import (
     entries,
     motions_of,
     programs_of,
-    replayed,
+    replay_motions,
     samples_of,
     speeds,
 )
@@ -112,7 +112,7 @@ def _strategy(
         with_last_link(history, setting.heights.safe, whole),
         summary_of(stages, history, len(program), whole),
         (
-            *(event for stage in _planned(stages) for event in stage.path.events),
+            *(event for stage in _planned_stages(stages) for event in stage.path.events),
             *misses(name, stages, history, on_front, areas, most),
         ),
         np.append(on_front, False),
@@ -132,7 +132,7 @@ def _reach(task: ClearingTask, setting: Clearing, radius: float) -> Region:
     return offset_region(offset_region(task.region, radius + setting.left_on_walls), -radius)
 
 
-def _planned(stages: Sequence[PocketStage]) -> list[PocketStage]:
+def _planned_stages(stages: Sequence[PocketStage]) -> list[PocketStage]:
     """The stages with a path of their own: the finish of the floor runs that of the clearing."""
     return [stage for stage in stages if stage.name != FLOOR]
 
@@ -185,7 +185,7 @@ def _columns(
 ) -> tuple[Columns, Floats]:
     """Columns of one level of a stage, and the time within its runs [s]."""
     radius, task = cutter.radius, stage.task
-    met, most = replayed(motions, samples, radius, task.free, stage.before)
+    met, most = replay_motions(motions, samples, radius, task.free, stage.before)
     met = engagement_of_hand(met, cutter)
     length, speed, own = speeds(motions, samples, machine)
     kind = motions.kind[samples.motion]
@@ -291,7 +291,7 @@ def misses(
         text = f"engagement {most[k]:.4f} deg: must be at most {math.degrees(wanted):.4f} deg"
         at = float(history["x_mm"][k]), float(history["y_mm"][k])
         out.append(Event("pocket-engagement", *at, text, failure=bool(most[k] > limit_deg)))
-    for stage in _planned(stages):
+    for stage in _planned_stages(stages):
         path, within = stage.path, areas[stage.section]
         if not stage.makes_wall or path.leftover_mm2 <= (1.0 - CLEARED) * within:
             continue

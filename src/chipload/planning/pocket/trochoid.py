@@ -83,11 +83,11 @@ class Trochoid:
                 return
             centre, wide = found
             self._most(centre, wide, math.inf)
-            arcs = self._cutting(centre, wide, line[-1] - line[0])
+            arcs = self._cutting_arcs(centre, wide, line[-1] - line[0])
             along, advance, rho = along + low, low, wide
             if not len(arcs):
                 continue
-            engaged = np.array([self._along(seg) for seg in arcs])
+            engaged = np.array([self._engagement_along(seg) for seg in arcs])
             if engaged.max() > self.most_engaged:  # it is greater between the checked places
                 along, rho, advance = along - low, max(LEAST * R, wide - low), 0.45 * low
                 if advance < SLOWEST * R:
@@ -128,7 +128,7 @@ class Trochoid:
             )
         )  # fmt: skip
 
-    def _cutting(self, centre: Floats, rho: float, ahead: Floats) -> Floats:
+    def _cutting_arcs(self, centre: Floats, rho: float, ahead: Floats) -> Floats:
         """Arcs (m, 7) of the part of a circle that meets stock, a place more at both ends; all of it where it meets
         stock nearly all round.
         """
@@ -148,7 +148,7 @@ class Trochoid:
         p = centre + rho * np.column_stack([np.cos(a), np.sin(a)])
         return np.column_stack([p[:-1], p[1:], np.tile(centre, (n, 1)), np.full(n, sweep / n)])
 
-    def _along(self, seg: Floats) -> float:
+    def _engagement_along(self, seg: Floats) -> float:
         """Greatest engagement along an arc."""
         s, R = self.stock, self.radius
         return float(

@@ -19,7 +19,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.planning.thinwall.contact import ContactFinder, SideAt, SideContacts, tangents
 from chipload.planning.thinwall.finish_rows import FinishRow, FinishSide, heights_of
-from chipload.program.motions import radii, straightened
+from chipload.program.motions import radii, straighten_arcs
 from chipload.program.program import LINE, Program
 
 Floats = NDArray[np.float64]
@@ -109,7 +109,7 @@ def _path(program: Program, step: float, tool: int | None) -> _FeedMotions:
     """The feed motions of a program in steps of at most ``step`` [mm]."""
     r = radii(program)
     turn = 2.0 * np.arccos(1.0 - np.minimum(CHORD / np.where(r > 0.0, r, math.inf), 1.0))
-    program = straightened(program, np.where(r > 0.0, turn, math.inf))
+    program = straighten_arcs(program, np.where(r > 0.0, turn, math.inf))
     cuts = (program.motion == LINE) & (True if tool is None else program.tool == tool)
     cuts[0] = False
     ends = np.flatnonzero(np.diff(np.concatenate([[0], cuts.astype(np.int64), [0]])))

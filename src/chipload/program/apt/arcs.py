@@ -78,7 +78,7 @@ def read_circle(record: AptRecord) -> Circle | str:
         sweep, rest = math.radians(abs(angle)), rest[:k] + rest[k + 2 :]
         senses = senses or (["CLOCKWISE"] if angle < 0.0 else [])
     if senses == ["CLOCKWISE"]:
-        n = _reversed(n)
+        n = _reverse_vector(n)
     radius = number(rest[0]) if rest else None
     unread = ",".join(rest[1:] if radius is not None else rest)
     return Circle((v[0], v[1], v[2]), n, radius, sweep, record, unread)
@@ -121,7 +121,7 @@ def sweep_of(start: Point, end: Point, centre: Point, normal: Point) -> float:
     return angle if angle > 1e-9 else math.tau
 
 
-def _reversed(n: Point) -> Point:
+def _reverse_vector(n: Point) -> Point:
     return (-n[0] + 0.0, -n[1] + 0.0, -n[2] + 0.0)
 
 

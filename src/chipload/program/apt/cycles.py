@@ -117,7 +117,7 @@ def read_cycle(record: AptRecord, mm: float) -> tuple[Cycle, tuple[str, ...]] | 
     if words[1:2] in (["G98"], ["G99"]):
         return _in_places(record, words, mm), ()
     if len(words) > 1 and number(words[1]) is not None:
-        words = _named(words)
+        words = _name_words(words)
     values: dict[str, float] = {}
     unread: list[str] = []
     feed: tuple[float, str] | None = None
@@ -151,13 +151,13 @@ def read_cycle(record: AptRecord, mm: float) -> tuple[Cycle, tuple[str, ...]] | 
     if clear is not None:
         values["rapto"] = clear - abs(values["rapto"]) if "rapto" in values else clear
         values.setdefault("rtrcto", clear)
-    return _checked(record, kind, values, feed), tuple(unread)
+    return _check_cycle(record, kind, values, feed), tuple(unread)
 
 
-def _named(words: list[str]) -> list[str]:
+def _name_words(words: list[str]) -> list[str]:
     """kind,d[,INCR,step],unit,feed,c,... with the words that name its numbers; a feed may stand before its unit.
 
-    >>> _named(["DEEP", "20", "INCR", "5", "MMPM", "100", "2", "RAPTO", "1"])
+    >>> _name_words(["DEEP", "20", "INCR", "5", "MMPM", "100", "2", "RAPTO", "1"])
     ['DEEP', 'DEPTH', '20', 'INCR', '5', 'MMPM', '100', 'CLEAR', '2', 'RAPTO', '1']
     """
     out, k, clear = [words[0], "DEPTH", words[1]], 2, False
@@ -191,7 +191,7 @@ def _in_places(record: AptRecord, words: list[str], mm: float) -> Cycle:
     if "DWELL" in words:
         values["dwell"] = v[-1]
     kind = "DEEP" if words[0] == "DRILL" else words[0]
-    return _checked(record, kind, values, _feed(words[6], v[7], mm))
+    return _check_cycle(record, kind, values, _feed(words[6], v[7], mm))
 
 
 def _feed(word: str, value: float, mm: float) -> tuple[float, str]:
@@ -199,7 +199,7 @@ def _feed(word: str, value: float, mm: float) -> tuple[float, str]:
     return value * (mm if scale is None else scale), counts
 
 
-def _checked(record: AptRecord, kind: str, values: dict[str, float], feed: tuple[float, str] | None) -> Cycle:
+def _check_cycle(record: AptRecord, kind: str, values: dict[str, float], feed: tuple[float, str] | None) -> Cycle:
     if "depth" not in values or "rapto" not in values:
         raise record.error("must state the depth, by FEDTO or DEPTH, and the start, by RAPTO or CLEAR")
     values["depth"] = abs(values["depth"])

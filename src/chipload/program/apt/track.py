@@ -92,7 +92,7 @@ class AptRows:
         """A cut counter-clockwise about ``normal`` through ``centre``."""
         if self.at is None:
             raise InputError(f"line {line}: an arc before the first point: a GOTO to its start must come before it")
-        middle, r = self._centred(p, centre, normal, line)
+        middle, r = self._centre_arc(p, centre, normal, line)
         if r <= JOIN_MM:
             self.note("apt-arc", line, "an arc without a radius: a straight line")
             self.straight(p, axis, line)
@@ -145,7 +145,7 @@ class AptRows:
             return math.radians(value)
         return value
 
-    def _centred(self, p: Point, centre: Point, normal: Point, line: int) -> tuple[Point, float]:
+    def _centre_arc(self, p: Point, centre: Point, normal: Point, line: int) -> tuple[Point, float]:
         """The centre as far from both ends, and that distance [mm]."""
         n, c = np.array(normal), np.array(centre)
         v0, v1 = ((w - (w @ n) * n) for w in (np.array(self.at) - c, np.array(p) - c))

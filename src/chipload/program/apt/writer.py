@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.program.build import LONGEST_ARC
-from chipload.program.motions import is_arc, lengths, radii, rises, spans, starts, straightened, sweeps
+from chipload.program.motions import is_arc, lengths, radii, rises, spans, starts, straighten_arcs, sweeps
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.release import Release
 from chipload.units import mm_min_from_mm_s, rpm_from_rad_s
@@ -62,7 +62,7 @@ def write_apt(
     helical = np.abs(rises(program)) > HELIX_MM
     r = radii(program)
     turn = 2.0 * np.arccos(1.0 - np.minimum(chord_mm / np.where(r > 0.0, r, math.inf), 1.0))
-    program = straightened(program, np.where(helical & (r > 0.0), turn, math.inf))
+    program = straighten_arcs(program, np.where(helical & (r > 0.0), turn, math.inf))
     p0, sweep = starts(program), sweeps(program)
     short = (np.linalg.norm(program.p_work - p0, axis=1) < SHORT_MM) & (np.abs(sweep) < 1.0)
     arc = is_arc(program) & (sweep != 0.0) & ~short

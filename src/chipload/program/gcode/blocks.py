@@ -60,7 +60,7 @@ class _Written:
     ij: Floats
 
 
-def _written(commands: Commands, decimals: int) -> _Written:
+def _write_blocks(commands: Commands, decimals: int) -> _Written:
     if any(f.tilt is not None for f in commands.frames):
         raise InputError("commands: rows in a tilted plane are not written: convert the program to rows of the axes")
     unit = 10.0**-decimals
@@ -107,7 +107,7 @@ class Blocks:
         self.commands, self.machine = commands, machine
         self.fanuc, d = control_named(machine.dialect).text.program_number, machine.decimals
         self.columns = [LETTERS.index(x) for x in LETTERS if x in machine.chain.letters]
-        done = _written(commands, d)
+        done = _write_blocks(commands, d)
         self.arc = done.arc
         self.ends = [[decimal(x, d, self.fanuc) for x in row] for row in done.q.tolist()]
         self.centres = [[decimal(x, d, self.fanuc) for x in row] for row in done.ij.tolist()]
@@ -123,7 +123,7 @@ class Blocks:
         for k in range(len(self.commands)):
             yield from self.row(k)
         for _, block in reversed(self.waiting):
-            yield self._kept(block)
+            yield self._keep_block(block)
         if self.inverse:
             yield "G94"
         if self.tcp:
@@ -140,7 +140,7 @@ class Blocks:
             yield from self._change(k)
         yield from self._settings(k)
         while self.waiting and c.line[k] and self.waiting[-1][0] <= c.line[k]:
-            yield self._kept(self.waiting.pop()[1])
+            yield self._keep_block(self.waiting.pop()[1])
         if c.motion[k] == DWELL:
             seconds = float(c.feed[k])
             yield f"G4 P{max(1, round(1000.0 * seconds))}" if self.fanuc else f"G4 P{decimal(seconds, 6)}"
@@ -213,7 +213,7 @@ class Blocks:
             words.insert(0, turn)
             self.mode = turn
         if turn != "G0":
-            feed = self._rounded(1.0 / self.minutes[k] if self.inverse else self.feeds[k], k)
+            feed = self._feed_text(1.0 / self.minutes[k] if self.inverse else self.feeds[k], k)
             if feed != self.feed or self.inverse:
                 words.append(f"F{feed}")
                 self.feed = feed
@@ -246,7 +246,7 @@ class Blocks:
             words.insert(0, ("G17", "G18", "G19")[plane])
         return words
 
-    def _kept(self, block: str) -> str:
+    def _keep_block(self, block: str) -> str:
         return comment(block[1:-1], self.fanuc) if block.startswith("(") else block
 
     def _tcp(self, on: bool, k: int) -> str:
@@ -257,7 +257,7 @@ class Blocks:
             raise InputError(f"program row {k}: machine {name} has no tool centre point control: give its axes")
         return words[0].replace("{tool}", str(self.tool)) if on else words[1]
 
-    def _rounded(self, per_min: float, k: int) -> str:
+    def _feed_text(self, per_min: float, k: int) -> str:
         text = decimal(per_min, 3 if per_min >= 1.0 else 6, self.fanuc)
         if float(text) == 0.0:
             raise InputError(f"program row {k}: feed {per_min:g} mm/min rounds to 0: raise it")

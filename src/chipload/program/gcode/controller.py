@@ -14,7 +14,7 @@ from chipload.errors import InputError, Severity
 from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, XY, YZ, ZX
 from chipload.program.compensation import CentreMove, Compensation
 from chipload.program.control import Control, control_named
-from chipload.program.corners import Corner, Piece, joined
+from chipload.program.corners import Corner, Piece, join_corner
 from chipload.program.corners import turns as turns_at
 from chipload.program.gcode import arcs
 from chipload.program.gcode.expression import integer_of
@@ -313,7 +313,7 @@ class Controller:
         self.end_corner()
         if code == 400:
             if self._beside is not None:
-                self._compensated(self._beside, Compensation.finish, self.state.at)
+                self._compensate_rows(self._beside, Compensation.finish, self.state.at)
                 self._beside = None
             state.compensation = 400
             return
@@ -380,7 +380,9 @@ class Controller:
             )
         return radius
 
-    def _compensated(self, beside: Compensation, make: Callable[[Compensation], list[CentreMove]], end: Nine) -> None:
+    def _compensate_rows(
+        self, beside: Compensation, make: Callable[[Compensation], list[CentreMove]], end: Nine
+    ) -> None:
         """Rows beside the contour; where the tool does not fit, it goes straight on to the next part of the contour."""
         try:
             moves = make(beside)
@@ -450,7 +452,7 @@ class Controller:
         if held is not None:
             before, line, corner, modal = held
             flat = PLANES[self.state.plane] == XY and self.state.feed_mode != 930
-            made = joined(before, piece, corner) if flat else None
+            made = join_corner(before, piece, corner) if flat else None
             # a modal rounding rounds what are corners of the contour
             if made is None and (not modal or (motion in (LINE, ARC) and turns_at(before, piece))):
                 self._sharp(line, corner)
@@ -485,9 +487,9 @@ class Controller:
     def _carry(self, piece: Piece) -> None:
         end, (context, line) = nine(piece.end), cast(tuple[int, int], piece.tail)
         if self._beside is not None and piece.motion == ARC:
-            self._compensated(self._beside, lambda b: b.arc(end, piece.centre, piece.turns, (context, line)), end)
+            self._compensate_rows(self._beside, lambda b: b.arc(end, piece.centre, piece.turns, (context, line)), end)
         elif self._beside is not None:
-            self._compensated(self._beside, lambda b: b.line(piece.motion, end, (context, line)), end)
+            self._compensate_rows(self._beside, lambda b: b.line(piece.motion, end, (context, line)), end)
         elif piece.motion == ARC:
             self._arc_row((ARC, *end, context, line), *piece.centre, piece.turns)
         else:
@@ -592,7 +594,7 @@ class Controller:
         if self.in_corner:
             self._piece(motion, end, (0.0, 0.0), 0, context)
         elif self._beside is not None:
-            self._compensated(self._beside, lambda b: b.line(motion, end, (context, self.line)), end)
+            self._compensate_rows(self._beside, lambda b: b.line(motion, end, (context, self.line)), end)
         else:
             self._row((motion, *end, context, self.line))
         self.state.at = end
@@ -619,7 +621,7 @@ class Controller:
         if self.in_corner:
             self._piece(ARC, end, centre, turns, context)
         elif self._beside is not None:
-            self._compensated(self._beside, lambda b: b.arc(end, centre, turns, (context, self.line)), end)
+            self._compensate_rows(self._beside, lambda b: b.arc(end, centre, turns, (context, self.line)), end)
         else:
             self._arc_row((ARC, *end, context, self.line), *centre, turns)
         self.state.at = end

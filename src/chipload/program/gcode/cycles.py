@@ -65,7 +65,7 @@ def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
         yield from _pecks(code, a, b, hole)
     else:
         if code in (740, 840):
-            _tapping(code, hole.sense)
+            _require_spindle_sense(code, hole.sense)
         elif code in (860, 880) and hole.sense == 0:
             raise InputError(f"G{code // 10}: the spindle does not turn: start it by M3 or M4")
         yield LINE, a, b, bottom, 0.0
@@ -91,7 +91,7 @@ def cycle_steps(code: int, a: float, b: float, hole: Hole) -> Iterator[Step]:
         yield SPIN, a, b, clear, hole.sense
 
 
-def _tapping(code: int, sense: int) -> None:
+def _require_spindle_sense(code: int, sense: int) -> None:
     right = 1 if code == 840 else -1
     if sense != right:
         state = {0: "does not turn", 1: "turns clockwise", -1: "turns counter-clockwise"}[sense]

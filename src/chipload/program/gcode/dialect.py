@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from chipload.errors import InputError, Severity
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
-from chipload.program.gcode.modal import COVET, GROUP_OF, M_GROUP_OF, USER_M, has_axes, shown
+from chipload.program.gcode.modal import COVET, GROUP_OF, M_GROUP_OF, USER_M, code_text, has_axes
 from chipload.program.gcode.words import Block, bare, read_block
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def _other_controllers(block: Block, c: Controller) -> None:
     units = {700: 200, 710: 210}
     if not has_axes(block):
         for code in [code for code in block.g if code in units]:
-            c.once("nc-units", f"{shown(code)}: taken as {shown(units[code])}")
+            c.once("nc-units", f"{code_text(code)}: taken as {code_text(units[code])}")
             block.g[block.g.index(code)] = units[code]
     arc = next((code for code in block.g if code in (20, 30)), c.state.motion)
     if arc in (20, 30) and c.state.plane == 170 and block.words.get("k") == 0.0:
@@ -128,7 +128,7 @@ def lenient(block: Block, c: Controller, unread: frozenset[int] = UNREAD) -> Blo
     """
     bad = [code for code in block.g if code not in GROUP_OF or code in unread]
     if bad:
-        names = ", ".join(shown(code) for code in bad if code != NOTED) or "a motion"
+        names = ", ".join(code_text(code) for code in bad if code != NOTED) or "a motion"
         if bad != [NOTED]:
             c.leave_out("nc-unknown-word", f"{names}: is not read: the motion of its block is left out")
         c.unread = names if has_axes(block) else c.unread

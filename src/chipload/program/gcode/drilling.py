@@ -16,7 +16,7 @@ from chipload.program.commands import DWELL, LINE, PLANE_AXES, RAPID
 from chipload.program.gcode import cycles
 from chipload.program.gcode.controller import PLANES, Controller
 from chipload.program.gcode.expression import integer_of
-from chipload.program.gcode.modal import shown
+from chipload.program.gcode.modal import code_text
 from chipload.program.gcode.state import put
 from chipload.program.gcode.targets import axes, polar, rate
 from chipload.program.gcode.words import Block
@@ -68,25 +68,25 @@ class Drilling:
         if state.sense == 0 and state.speed > 0.0 and (which == "all" or (which == "tapping" and tapping)):
             state.sense = -1 if code == 740 else 1
             self.started = tapping
-            self.c.once("nc-cycle-spindle", f"{shown(code)}: the spindle is at rest: the cycle starts it")
+            self.c.once("nc-cycle-spindle", f"{code_text(code)}: the spindle is at rest: the cycle starts it")
             self.c.changed()
 
     def move(self, block: Block, code: int) -> None:
         """Carry out the cycle ``code`` over the holes of a block."""
         c, state, words = self.c, self.c.state, block.words
-        c.not_compensated(shown(code))
+        c.not_compensated(code_text(code))
         for axis in "abcuvw":
             if axis in words:
                 raise InputError(f"{axis.upper()}: is not allowed in a canned cycle")
         if state.plane % 10:
-            raise InputError(f"{shown(code)}: cycles lie in the planes of G17, G18 and G19")
+            raise InputError(f"{code_text(code)}: cycles lie in the planes of G17, G18 and G19")
         if state.feed_mode == 930:
-            raise InputError(f"{shown(code)}: a cycle has no inverse time: write G94 and F")
+            raise InputError(f"{code_text(code)}: a cycle has no inverse time: write G94 and F")
         if state.feed_mode == 950 and state.speed == 0.0 and state.feed != 0.0:
-            message = f"{shown(code)}: feed per revolution (G95) and no spindle speed"
+            message = f"{code_text(code)}: feed per revolution (G95) and no spindle speed"
             c.once("nc-feed-unknown", message, Severity.UNPROVEN)
         else:
-            rate(self.c, block, shown(code))
+            rate(self.c, block, code_text(code))
         first, second, along = PLANE_AXES[PLANES[state.plane]]
         scale, old = state.scale, self.series
         self._start(code)
@@ -163,19 +163,19 @@ class Drilling:
                     state.sense = int(value)
                     c.changed()
                 else:
-                    c.note("nc-stop", f"{shown(code)}: the program waits for its operator, who retracts by hand")
+                    c.note("nc-stop", f"{code_text(code)}: the program waits for its operator, who retracts by hand")
             height = hole.clear
             c.track.spill()
 
     def _sticky(self, block: Block, code: int, old: Series | None, normal: str, here: float) -> Series:
         words = block.words
         if self.c.state.diameter and normal == "x":
-            raise InputError(f"{shown(code)}: no cycle along X with diameters (G7)")
+            raise InputError(f"{code_text(code)}: no cycle along X with diameters (G7)")
         if old is None or old.code != code:
             if "r" not in words:
-                raise InputError(f"{shown(code)}: R is missing: where feeding begins")
+                raise InputError(f"{code_text(code)}: R is missing: where feeding begins")
             if normal not in words:
-                raise InputError(f"{shown(code)}: {normal.upper()} is missing: the bottom of the hole")
+                raise InputError(f"{code_text(code)}: {normal.upper()} is missing: the bottom of the hole")
             new = Series(code, here if old is None else old.level, words["r"], words[normal])
         else:
             new = replace(old, r=words.get("r", old.r), bottom=words.get(normal, old.bottom))
@@ -191,9 +191,9 @@ class Drilling:
             k=words.get("k", new.k),
         )
         if code in cycles.NEED_P and new.dwell is None and not self.c.control.cycles.dwell_optional:
-            raise InputError(f"{shown(code)}: P is missing: the time at the bottom")
+            raise InputError(f"{code_text(code)}: P is missing: the time at the bottom")
         if code in cycles.NEED_Q and new.peck is None:
-            raise InputError(f"{shown(code)}: Q is missing: the depth of a peck")
+            raise InputError(f"{code_text(code)}: Q is missing: the depth of a peck")
         return new
 
     def _hole(

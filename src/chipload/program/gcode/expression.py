@@ -64,7 +64,7 @@ def read_value(text: str, at: int, parameters: Parameters, depth: int = 0) -> tu
         end = number.end()
         if text[end : end + 1] == ".":
             raise InputError(f"number {text[at : end + 1]}...: has two decimal points")
-        return _checked(float(number[0])), end
+        return _require_finite(float(number[0])), end
     function = _FUNCTION.match(text, at)
     if function is not None:
         return _function(function[1], text, function.end(), parameters, depth + 1)
@@ -73,7 +73,7 @@ def read_value(text: str, at: int, parameters: Parameters, depth: int = 0) -> tu
     raise InputError(f"{text[at : at + 12]!r}: a number, #, [ or a function is expected here")
 
 
-def _checked(value: float) -> float:
+def _require_finite(value: float) -> float:
     if not abs(value) <= LARGEST:
         raise InputError(f"value {value:g}: must be within {LARGEST:g}")
     return value
@@ -116,7 +116,7 @@ def _bracket(text: str, at: int, parameters: Parameters, depth: int) -> tuple[fl
             step = _STEP[operator]
         while pending and _STEP[pending[-1]] >= step:
             right = values.pop()
-            values.append(_checked(_apply(pending.pop(), values.pop(), right)))
+            values.append(_require_finite(_apply(pending.pop(), values.pop(), right)))
         if not operator:
             return values[0], end
         pending.append(operator)
@@ -161,7 +161,7 @@ _BINARY: dict[str, Callable[[float, float], float]] = {
 }
 
 
-def _round(x: float) -> float:
+def _round_half_up(x: float) -> float:
     return math.copysign(math.floor(abs(x) + 0.5), x) if abs(x) < 2.0**52 else x
 
 
@@ -199,7 +199,7 @@ _UNARY: dict[str, Callable[[float], float]] = {
     "fix": lambda x: float(math.floor(x)),
     "fup": lambda x: float(math.ceil(x)),
     "ln": _positive("LN", math.log, "above 0"),
-    "round": _round,
+    "round": _round_half_up,
     "sin": lambda x: math.sin(math.radians(x)),
     "sqrt": _positive("SQRT", math.sqrt, "0 or more"),
     "tan": lambda x: math.tan(math.radians(x)),
@@ -217,7 +217,7 @@ def _function(name: str, text: str, at: int, parameters: Parameters, depth: int)
         return float(parameters.exists(key)), at + 1
     x, at = _bracket(text, at, parameters, depth)
     if name != "atan":
-        return _checked(_UNARY[name](x)), at
+        return _require_finite(_UNARY[name](x)), at
     if text[at : at + 2] != "/[":
         raise InputError("ATAN[y]: /[x] is missing after it")
     y, at = _bracket(text, at + 2, parameters, depth)

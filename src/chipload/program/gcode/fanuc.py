@@ -34,13 +34,13 @@ from chipload.program.gcode.frames import remove, turn_about
 from chipload.program.gcode.haas_cycles import circular_pocket, hole_pattern
 from chipload.program.gcode.interpolation_codes import change_plane, refuse_within
 from chipload.program.gcode.macros import ALARM, OUTPUTS, macro_step, read_macro_call, system_variables, with_brackets
-from chipload.program.gcode.modal import GROUP_OF, shown
+from chipload.program.gcode.modal import GROUP_OF, code_text
 from chipload.program.gcode.numbers import count_increments, decide_increments, seconds_of
-from chipload.program.gcode.offsets import choose, probed
+from chipload.program.gcode.offsets import choose, probe_motion
 from chipload.program.gcode.other_codes import replace_codes, without_next_tool
-from chipload.program.gcode.tilted_plane import align, at_angles, level, tilted
+from chipload.program.gcode.tilted_plane import align, at_angles, level, tilt_coordinates
 from chipload.program.gcode.words import Block, bare, read_block
-from chipload.program.tilt import tilt_of, turned
+from chipload.program.tilt import tilt_of, turn_matrix
 
 if TYPE_CHECKING:
     from chipload.program.gcode.flow import Flow
@@ -139,10 +139,10 @@ class Fanuc(Dialect):
         for code in block.g:
             unread = rules.unread.get(code) or NOT_READ.get(code)
             if unread is not None:
-                raise NotReadError(f"{shown(code)}: {unread}")
+                raise NotReadError(f"{code_text(code)}: {unread}")
             letters, what = NOT_READ_WITH.get(code, ("", ""))
             if not block.words.keys().isdisjoint(letters):
-                raise NotReadError(f"{shown(code)}: {what}")
+                raise NotReadError(f"{code_text(code)}: {what}")
         if any(key == ALARM for key, _ in block.sets):
             c.leave_out("nc-alarm", f"#{ALARM}: an alarm ends the program here")
             block.sets, block.m = [], [30]
@@ -168,17 +168,17 @@ class Fanuc(Dialect):
         if HAAS_UNTILTED in g:
             g[g.index(HAAS_UNTILTED)] = UNTURNED
         for code in g:
-            if c.left_out and code in ENDS and c.left_out.split(":")[0] in map(shown, ENDS[code]):
+            if c.left_out and code in ENDS and c.left_out.split(":")[0] in map(code_text, ENDS[code]):
                 go_on(c)
         for code in [code for code in g if code in CHANGED]:
-            leave_out(c, f"{shown(code)}: {CHANGED[code]}")
+            leave_out(c, f"{code_text(code)}: {CHANGED[code]}")
             g.remove(code)
             words.clear()
-        self._tilted(block, c)
+        self._tilt_plane(block, c)
         if DYNAMIC in g:
             g.remove(DYNAMIC)
             remove(c)
-            if not tilted(c, tilt_of(at_angles(c, {})[1], (0.0, 0.0, 0.0))):
+            if not tilt_coordinates(c, tilt_of(at_angles(c, {})[1], (0.0, 0.0, 0.0))):
                 leave_out(c, "G254: the origin follows the table, and no machine with rotary axes")
         elif STATIC in g:
             g.remove(STATIC)
@@ -197,22 +197,22 @@ class Fanuc(Dialect):
             remove(c)
             level(c)
 
-    def _tilted(self, block: Block, c: Controller) -> None:
+    def _tilt_plane(self, block: Block, c: Controller) -> None:
         """Tilted planes by Euler angles, and the tool along their normal."""
         words, g = block.words, block.g
         for code in [code for code in g if code in TILTED]:
-            name = shown(code)
+            name = code_text(code)
             euler = words.get("p", 0.0) == 0.0 and words.get("q", EULER) == EULER and "r" not in words
             given = {x: words.pop(x, 0.0) for x in "xyzijk"}
             g.remove(code)
             words.clear()
             remove(c)
             origin = tuple(given[x] * c.state.scale for x in "xyz")
-            R = turned("zxz", (given["i"], given["j"], given["k"]))
+            R = turn_matrix("zxz", (given["i"], given["j"], given["k"]))
             if not euler:
                 level(c)
                 leave_out(c, "G68.2: a tilted plane that is not stated by an origin and Euler angles")
-            elif not tilted(c, tilt_of(R, origin)):
+            elif not tilt_coordinates(c, tilt_of(R, origin)):
                 leave_out(c, f"G68.2: {name}: a tilted plane, and no machine with rotary axes")
         for code in [code for code in g if code in ALIGN]:
             if c.state.datum.tilt is None:
@@ -220,11 +220,11 @@ class Fanuc(Dialect):
             g.remove(code)
             p = words.pop("p", 0.0)
             if p not in SIGNS:
-                raise InputError(f"{shown(code)}: P{p:g}: must be 0, 1 or 2")
+                raise InputError(f"{code_text(code)}: P{p:g}: must be 0, 1 or 2")
             align(c, SIGNS[p])
         changing = [code for code in g if self._offsets(code, c)] if c.state.datum.tilt is not None else []
         if changing:
-            leave_out(c, f"G68.2: {shown(changing[0])} within a tilted plane")
+            leave_out(c, f"G68.2: {code_text(changing[0])} within a tilted plane")
             block.g = [code for code in g if code not in changing]
             words.clear()
 
@@ -245,7 +245,7 @@ class Fanuc(Dialect):
             for letter in NO_POSITIONS.get(code, ""):
                 words.pop(letter, None)
             if code in (51, 50, 80, 81):
-                c.once("nc-ignored", f"{shown(code)}: look-ahead and smoothing do not change the path")
+                c.once("nc-ignored", f"{code_text(code)}: look-ahead and smoothing do not change the path")
             g.remove(code)
         if idle:
             for letter in "pqr" if not any(x in CYCLES or x in (20, 30) for x in g) else "":
@@ -262,7 +262,7 @@ class Fanuc(Dialect):
         if HAAS_TIP in g:
             g[g.index(HAAS_TIP)] = 434
         if EXTENDED in g or (540 in g and "p" in words and 40 not in g):
-            self._extended(block, c)
+            self._extended_offset(block, c)
         if 100 in g and words.get("l") != 2.0:
             if words.get("l") == 20.0:
                 words.pop("l")
@@ -280,7 +280,7 @@ class Fanuc(Dialect):
             words["k"] = words.pop("f")
         if SKIP in g:
             g[g.index(SKIP)] = 10
-            probed(c, "nc-skip", shown(SKIP), "its signal comes")
+            probe_motion(c, "nc-skip", code_text(SKIP), "its signal comes")
         motion = next((x for x in g if x in CYCLES), c.state.motion)
         if motion in CYCLES:
             self._shorter_pecks(words, g, motion, c)
@@ -304,7 +304,7 @@ class Fanuc(Dialect):
         """
         if motion in NEED_Q and "i" in words and c.control.cycles.peck_letters:
             if "q" in words:
-                raise NotReadError(f"{shown(motion)}: I with Q: pecks that retract after a depth Q")
+                raise NotReadError(f"{code_text(motion)}: I with Q: pecks that retract after a depth Q")
             words["q"] = words.pop("i")
             c.pecks = words.pop("j", 0.0), words.pop("k", 0.0)
         elif any(code in CYCLES for code in g) or "q" in words:
@@ -355,7 +355,7 @@ class Fanuc(Dialect):
         """Whether a code of motion or G80 stands among the codes."""
         return any(GROUP_OF.get(code) in ("motion", "none") for code in g)
 
-    def _extended(self, block: Block, c: Controller) -> None:
+    def _extended_offset(self, block: Block, c: Controller) -> None:
         """G54.1 P: a work offset whose origin is not known here."""
         number = block.words.pop("p", 0.0)
         if number != int(number) or not 1 <= number <= 300:

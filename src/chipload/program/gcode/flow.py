@@ -206,7 +206,7 @@ class Flow:
             self.c.modal_macro = block.macro, self.c.level
         elif block.macro is not None:
             self._macro(block.macro)
-        elif self.c.modal_macro is not None and self.c.modal_macro[1] == self.c.level and self._moved(block):
+        elif self.c.modal_macro is not None and self.c.modal_macro[1] == self.c.level and self._moves_axis(block):
             self._macro(self.c.modal_macro[0])
         elif block.block_call:
             self._call_block(block.block_call)
@@ -222,7 +222,7 @@ class Flow:
         except NotReadError as error:
             self.c.leave_out("nc-not-read", f"{error}: the block is left out")
 
-    def _moved(self, block: Block) -> bool:
+    def _moves_axis(self, block: Block) -> bool:
         """Whether a block moves an axis, so that a modal macro is called behind it."""
         return has_axes(block) and not self.c.left_out and COVET.isdisjoint(block.g)
 
@@ -256,7 +256,7 @@ class Flow:
             raise InputError(f"{rest[:12]!r}: nothing may follow an O-word but a comment")
         return value
 
-    def _nothing(self, word: OWord) -> None:
+    def _ignore_word(self, word: OWord) -> None:
         if word.rest:
             raise InputError(f"{word.rest[:12]!r}: nothing may follow an O-word but a comment")
 
@@ -266,7 +266,7 @@ class Flow:
         if isinstance(word, str):
             raise InputError(word)
         if word.keyword == "dynamic":
-            word = self._calculated(word)
+            word = self._calculated_word(word)
         source, line, key = self.source, self.line, word.key
         match word.keyword:
             case "":
@@ -288,10 +288,10 @@ class Flow:
                 self.line = source.after(line, key, ("endif",)) + 1
             case "endif":
                 source.before(line, key, ("if",))
-                self._nothing(word)
+                self._ignore_word(word)
                 self.line += 1
             case "do":
-                self._nothing(word)
+                self._ignore_word(word)
                 self.line += 1
             case "while":
                 self._while(word)
@@ -309,7 +309,7 @@ class Flow:
                 self._leave_loop(word)
         return True
 
-    def _calculated(self, word: OWord) -> OWord:
+    def _calculated_word(self, word: OWord) -> OWord:
         value, at = read_value(word.rest, 0, self.c.parameters)
         label = str(integer_of(value, "O"))
         for keyword in KEYWORDS:
@@ -361,7 +361,7 @@ class Flow:
 
     def _leave_loop(self, word: OWord) -> None:
         """``break`` and ``continue``."""
-        self._nothing(word)
+        self._ignore_word(word)
         source, line, key = self.source, self.line, word.key
         head = source.before(line, key, ("while", "do", "repeat"))
         if source.keyword(head) == "repeat":

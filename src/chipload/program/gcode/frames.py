@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from chipload.program.gcode.controller import Controller
-from chipload.program.gcode.state import ZERO, Datum, Nine, nine, rotated
+from chipload.program.gcode.state import ZERO, Datum, Nine, nine, rotate_point
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def place(c: Controller, turn: float, shift: Nine) -> None:
         return
     base = c.state.datum
     moved = [a + b for a, b in zip(shift, base.shift, strict=True)]
-    moved[0], moved[1] = rotated(moved[0], moved[1], base.rotation)
+    moved[0], moved[1] = rotate_point(moved[0], moved[1], base.rotation)
     offset = nine([a + b for a, b in zip(moved, base.offset, strict=True)])
     c.program_frame = ProgramFrame(turn, shift, base)
     c.rebase(replace(base, offset=offset, rotation=base.rotation + turn, shift=ZERO))
@@ -54,7 +54,7 @@ def remove(c: Controller) -> None:
 
 def turn_about(c: Controller, x: float, y: float, degrees: float) -> None:
     """Turn the coordinates of the work offset about a point (x, y) [mm] of it (G68)."""
-    a, b = rotated(x, y, degrees)
+    a, b = rotate_point(x, y, degrees)
     place(c, degrees, nine([x - a, y - b, *ZERO[2:]]))
 
 
@@ -62,7 +62,7 @@ def further(c: Controller, turn: float, shift: Nine) -> None:
     """A turn and a shift within the coordinates that there are (ATRANS, AROT)."""
     old_turn, old_shift = current(c)
     moved = list(shift)
-    moved[0], moved[1] = rotated(moved[0], moved[1], old_turn)
+    moved[0], moved[1] = rotate_point(moved[0], moved[1], old_turn)
     place(c, old_turn + turn, nine([a + b for a, b in zip(moved, old_shift, strict=True)]))
 
 

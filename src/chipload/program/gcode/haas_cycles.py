@@ -18,7 +18,7 @@ from chipload.program.commands import LINE
 from chipload.program.gcode.cycles import CYCLES
 from chipload.program.gcode.dialect import NotReadError
 from chipload.program.gcode.expression import integer_of
-from chipload.program.gcode.modal import shown
+from chipload.program.gcode.modal import code_text
 from chipload.program.gcode.state import put
 from chipload.program.gcode.words import Block
 
@@ -40,10 +40,10 @@ def hole_pattern(block: Block, c: Controller) -> None:
     block.g.remove(code)
     cycle = next((x for x in block.g if x in CYCLES), state.motion)
     if cycle not in CYCLES or state.plane != 170 or not state.absolute:
-        raise NotReadError(f"{shown(code)}: holes need an active cycle, G17 and G90")
+        raise NotReadError(f"{code_text(code)}: holes need an active cycle, G17 and G90")
     count = integer_of(words.pop("l"), "L")
     if not 1 <= count <= MOST_HOLES:
-        raise NotReadError(f"{shown(code)}: L{count}: must be from 1 to {MOST_HOLES}")
+        raise NotReadError(f"{code_text(code)}: L{count}: must be from 1 to {MOST_HOLES}")
     size, angle, step = (words.pop(x, 0.0) for x in "ijk")
     x, y = (words.pop(axis, state.at[k] / state.scale) for k, axis in enumerate("xy"))
     for k in range(count):
@@ -59,7 +59,7 @@ def circular_pocket(block: Block, c: Controller) -> bool:
     words, state = block.words, c.state
     if code is None or "i" not in words:
         return False
-    name, scale = shown(code), state.scale
+    name, scale = code_text(code), state.scale
     if state.plane != 170 or state.compensation != 400:
         raise NotReadError(f"{name}: circular pockets lie in G17, without G41 and G42")
     number = integer_of(words.get("d", 0.0), "D")

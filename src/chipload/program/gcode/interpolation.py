@@ -87,7 +87,7 @@ class Interpolation:
         at_pole = r < POLE
         whole = np.concatenate([[angle], np.where(at_pole, np.nan, own)])
         out[:, self.linear] = r
-        out[:, self.rotary] = (_filled(whole) if at_pole.any() else np.unwrap(whole, period=360.0))[1:]
+        out[:, self.rotary] = (_fill_unknown(whole) if at_pole.any() else np.unwrap(whole, period=360.0))[1:]
         return out
 
     def end(self, flat: Nine, angle: float) -> Nine:
@@ -188,7 +188,7 @@ class Interpolation:
         return bool(((wide * turned + 2.0 * np.abs(np.diff(r))) * turned).max() <= 8.0 * TOLERANCE)
 
 
-def _filled(values: Floats) -> Floats:
+def _fill_unknown(values: Floats) -> Floats:
     """Values with those that are not known as the one before, and angles unwrapped over the gaps."""
     out = np.array(values)
     for k in range(1, len(out)):

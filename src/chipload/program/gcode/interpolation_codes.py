@@ -12,7 +12,7 @@ from chipload.program.commands import PLANE_AXES, XY
 from chipload.program.gcode.controller import PLANES
 from chipload.program.gcode.dialect import NotReadError, leave_out
 from chipload.program.gcode.interpolation import Interpolation
-from chipload.program.gcode.modal import shown
+from chipload.program.gcode.modal import code_text
 from chipload.program.gcode.state import AXES, ZERO
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def refuse_within(block: Block, c: Controller) -> None:
     """
     wrong = [code for code in block.g if code in EXCLUDED]
     if c.interpolation is not None and wrong:
-        raise NotReadError(f"{shown(wrong[0])} within {c.interpolation.name}")
+        raise NotReadError(f"{code_text(wrong[0])} within {c.interpolation.name}")
 
 
 def change_plane(block: Block, c: Controller) -> None:
@@ -55,7 +55,7 @@ def change_plane(block: Block, c: Controller) -> None:
     code = own[0]
     g.remove(code)
     if now is not None and (code in NO_POLAR or code in (CYLINDER, MAPPED)):
-        c.not_compensated(shown(code))
+        c.not_compensated(code_text(code))
         c.interpolate(None)
         words.clear()
         return
@@ -64,12 +64,12 @@ def change_plane(block: Block, c: Controller) -> None:
     reason = _begin(code, words, c)
     words.clear()
     if reason:
-        leave_out(c, f"{shown(code)}: {reason}")
+        leave_out(c, f"{code_text(code)}: {reason}")
 
 
 def _begin(code: int, words: dict[str, float], c: Controller) -> str:
     """Begin a plane; why it cannot be, empty if it can."""
-    c.not_compensated(shown(code))
+    c.not_compensated(code_text(code))
     at = c.state.at
     turns = "" if c.swivel is None else "".join(axis.letter.lower() for axis in c.swivel.machine.chain.rotary)
     if code in POLAR:
@@ -77,14 +77,14 @@ def _begin(code: int, words: dict[str, float], c: Controller) -> str:
             return "polar interpolation, and no machine with an axis C"
         if abs(at[1]) > BESIDE:
             return f"polar interpolation beside the axis: Y = {at[1]:g} mm"
-        c.interpolate(Interpolation(shown(code), 5, 0, 1, None, at[1], at[5], c.state.plane, at, XY))
+        c.interpolate(Interpolation(code_text(code), 5, 0, 1, None, at[1], at[5], c.state.plane, at, XY))
         c.state.plane = 170
         return ""
     if code == MAPPED:
         return "cylindrical mapping of a linear axis"
     given = [letter for letter in "abc" if letter in words]
     if len(given) != 1 or not 0.0 <= words[given[0]] * c.state.scale <= LARGEST:
-        raise NotReadError(f"{shown(code)}: must name one rotary axis with the radius of the cylinder")
+        raise NotReadError(f"{code_text(code)}: must name one rotary axis with the radius of the cylinder")
     letter = given[0]
     radius = words[letter] * c.state.scale
     if radius == 0.0:
@@ -95,10 +95,10 @@ def _begin(code: int, words: dict[str, float], c: Controller) -> str:
     linear, plane = AXES.index(ALONG[letter]), PLANES[c.state.plane]
     first, second, _ = PLANE_AXES[plane]
     if linear not in (first, second):
-        plane_word = shown(c.state.plane)
+        plane_word = code_text(c.state.plane)
         return f"cylindrical interpolation about {letter.upper()} in the plane of {plane_word}, which it is not in"
     flat = second if linear == first else first
-    name = shown(code)
+    name = code_text(code)
     made = Interpolation(name, AXES.index(letter), linear, flat, radius, at[flat], ZERO[0], c.state.plane, at, plane)
     c.interpolate(made)
     return ""

@@ -19,7 +19,7 @@ from chipload.program.gcode import offsets, targets
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.mirror import mirror
-from chipload.program.gcode.modal import USER_M, check_codes, motion_of, motion_of_group_one, shown, unused
+from chipload.program.gcode.modal import USER_M, check_codes, code_text, motion_of, motion_of_group_one, unused_letters
 from chipload.program.gcode.motion import ControllerMotion
 from chipload.program.gcode.state import NO_MOTION, State
 from chipload.program.gcode.words import Block
@@ -89,7 +89,7 @@ class BlockInterpreter:
             motion = motion_of(block, codes, lasting)
         if motion < 0 and lasting == 52 and "p" in block.words and "motion" not in codes:
             motion = 52
-        for letter in unused(block, motion):
+        for letter in unused_letters(block, motion):
             message = f"{letter.upper()}{block.words[letter]:g}: no code of the block uses it"
             if c.strict:
                 raise InputError(f"{message}: remove it")
@@ -99,7 +99,7 @@ class BlockInterpreter:
                 c.refused("nc-unused-word", message)
             del block.words[letter]
         if codes.get("once") == 40 and motion in (20, 30) and "p" in block.words:
-            raise InputError(f"G4 with {shown(motion)}: both use P: write two blocks")
+            raise InputError(f"G4 with {code_text(motion)}: both use P: write two blocks")
         for text in block.comments:
             self.comment(text)
         self._speeds(block, codes)
@@ -121,7 +121,7 @@ class BlockInterpreter:
         c = self.c
         message = _MESSAGE.match(text)
         if message is not None:
-            text_out = message[2] if message[1].lower() == "msg" else self._filled(message[2])
+            text_out = message[2] if message[1].lower() == "msg" else self._fill_message(message[2])
             code = "nc-print" if message[1].lower() == "print" else "nc-message"
             c.note(code, text_out.strip()[:LONGEST])
             return
@@ -136,7 +136,7 @@ class BlockInterpreter:
                 c.label = label
                 c.changed()
 
-    def _filled(self, text: str) -> str:
+    def _fill_message(self, text: str) -> str:
         """A message with the values of its parameters."""
         parameters = self.c.parameters
         form = "%f"
@@ -186,7 +186,7 @@ class BlockInterpreter:
                 if units is not None and (units == 200) != (state.scale != 1.0):
                     c.note(
                         "nc-feed-before-units",
-                        f"F{words['f']:g}: is read in the units before the {shown(units)} of this block",
+                        f"F{words['f']:g}: is read in the units before the {code_text(units)} of this block",
                     )
         if "s" in words:
             if words["s"] < 0.0:
@@ -298,7 +298,7 @@ class BlockInterpreter:
         plane = codes.get("plane")
         if plane is not None:
             if plane != state.plane:
-                c.not_compensated(shown(plane))
+                c.not_compensated(code_text(plane))
             state.plane = plane
             c.changed()
         if "units" in codes:
@@ -317,7 +317,7 @@ class BlockInterpreter:
             state.path_mode = path_mode(state.path, words, state.scale)
             c.changed()
             tolerances = "".join(f" {x.upper()}{words[x]:g}" for x in "pqr" if x in words and state.path == 640)
-            c.note("nc-path-mode", f"{shown(state.path)}{tolerances}")
+            c.note("nc-path-mode", f"{code_text(state.path)}{tolerances}")
         if "distance" in codes:
             state.absolute = codes["distance"] == 900
         if "centre" in codes:

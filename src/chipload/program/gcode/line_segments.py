@@ -175,7 +175,7 @@ def with_segments(
     Parameters
     ----------
     forms : of the lines, see :func:`line_forms`
-    paths : of the lines that are divided; ``points`` are rounded already, see :func:`rounded`
+    paths : of the lines that are divided; ``points`` are rounded already, see :func:`round_point`
     decimals : of a length in mm
 
     >>> text = "G90 G1 X10 Y4 F600 (wall)\nG91 X8 ; on"
@@ -289,7 +289,7 @@ def point_at(path: LinePath, share: float, sweep: float) -> Floats:
     return out
 
 
-def rounded(path: LinePath, shares: tuple[float, float], sweep: float, unit: float, decimals: int) -> Floats:
+def round_point(path: LinePath, shares: tuple[float, float], sweep: float, unit: float, decimals: int) -> Floats:
     """Return the point (3,) [mm] in the decimals of the text that is nearest to the path.
 
     The place of a cut is free within a range: of the points that can be written, the one that leaves the path least is

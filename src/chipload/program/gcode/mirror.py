@@ -24,11 +24,11 @@ def mirror(c: Controller) -> None:
     def absolute(k: int) -> float:
         return c.machine_position()[k] / (state.scale if k in LINEAR else 1.0)
 
-    def loaded() -> Tool:
+    def loaded_tool() -> Tool:
         return (c.tools or {}).get(state.tool, Tool(state.tool))
 
     def length(k: int) -> float:
-        value = loaded().offset[k]
+        value = loaded_tool().offset[k]
         return value / c.machine_scale if k in LINEAR else math.degrees(value)
 
     for k, axis in enumerate(AXES):
@@ -38,10 +38,10 @@ def mirror(c: Controller) -> None:
         live[5401 + k] = lambda k=k: length(k)  # type: ignore[misc]
     live[5220] = lambda: float(state.datum.number)
     live[5400] = lambda: float(state.tool)
-    live[5410] = lambda: loaded().diameter / c.machine_scale
-    live[5411] = lambda: math.degrees(loaded().front)
-    live[5412] = lambda: math.degrees(loaded().back)
-    live[5413] = lambda: float(loaded().orientation)
+    live[5410] = lambda: loaded_tool().diameter / c.machine_scale
+    live[5411] = lambda: math.degrees(loaded_tool().front)
+    live[5412] = lambda: math.degrees(loaded_tool().back)
+    live[5413] = lambda: float(loaded_tool().orientation)
     flags = {
         "_metric": lambda: state.scale == 1.0,
         "_imperial": lambda: state.scale != 1.0,
@@ -77,7 +77,7 @@ def mirror(c: Controller) -> None:
         "_feed": lambda: state.feed / state.scale,
         "_rpm": lambda: state.speed,
         "_current_tool": lambda: state.tool,
-        "_current_pocket": lambda: loaded().pocket,
+        "_current_pocket": lambda: loaded_tool().pocket,
         "_selected_tool": lambda: state.selected,
         "_selected_pocket": lambda: (c.tools or {}).get(state.selected, Tool(0)).pocket,
         "_value": lambda: c.returned[0],

@@ -74,10 +74,10 @@ USES: dict[str, tuple[frozenset[int], frozenset[int], frozenset[int]]] = {
 }
 
 
-def shown(code: int) -> str:
+def code_text(code: int) -> str:
     """G code in tenths as text.
 
-    >>> shown(382), shown(10)
+    >>> code_text(382), code_text(10)
     ('G38.2', 'G1')
     """
     return f"G{code // 10}.{code % 10}" if code % 10 else f"G{code // 10}"
@@ -100,10 +100,10 @@ def check_codes(block: Block, rules: ModalRules) -> dict[str, int]:
         group = "cycle" if rules.cycle_group and (code in CYCLES or code == NO_MOTION) else GROUP_OF.get(code)
         if group is None:
             raise InputError(
-                f"{shown(code)}: is not a code of LinuxCNC: remove it, or read the text in its own dialect"
+                f"{code_text(code)}: is not a code of LinuxCNC: remove it, or read the text in its own dialect"
             )
         if group in found and not rules.last_code_wins:
-            raise InputError(f"{shown(found[group])} and {shown(code)}: exclude each other in one block")
+            raise InputError(f"{code_text(found[group])} and {code_text(code)}: exclude each other in one block")
         found[group] = code
     if rules.last_code_wins:
         return found
@@ -136,9 +136,9 @@ def motion_of(block: Block, codes: dict[str, int], lasting: int) -> int:
         return NO_MOTION
     if own >= 0:
         if covets:
-            raise InputError(f"{shown(once)} and {shown(own)}: both use the axes: write two blocks")
+            raise InputError(f"{code_text(once)} and {code_text(own)}: both use the axes: write two blocks")
         if own in _NOT_ALONE and not axes and own not in (52,):
-            raise InputError(f"{shown(own)}: needs at least one axis")
+            raise InputError(f"{code_text(own)}: needs at least one axis")
         return own
     if axes and not covets and codes.get("length") != 431:
         if lasting == NO_MOTION:
@@ -170,7 +170,7 @@ def motion_of_group_one(block: Block, codes: dict[str, int], state: State) -> in
     return state.motion if axes and not covets and codes.get("length") != 431 else -1
 
 
-def unused(block: Block, motion: int) -> list[str]:
+def unused_letters(block: Block, motion: int) -> list[str]:
     """Letters of words that no code of the block uses."""
     g, m = block.g, block.m
     out = []

@@ -16,11 +16,11 @@ from chipload.program.gcode.controller import PLANES, Controller
 from chipload.program.gcode.cycles import CYCLES
 from chipload.program.gcode.drilling import Drilling
 from chipload.program.gcode.expression import integer_of
-from chipload.program.gcode.modal import GROUP_ONE, shown
-from chipload.program.gcode.offsets import in_machine_unknown, note_machine_coordinates, probed
+from chipload.program.gcode.modal import GROUP_ONE, code_text
+from chipload.program.gcode.offsets import in_machine_unknown, note_machine_coordinates, probe_motion
 from chipload.program.gcode.splines import Splines
 from chipload.program.gcode.state import LINEAR, NO_MOTION, Nine, put
-from chipload.program.gcode.synchronised import synchronised
+from chipload.program.gcode.synchronised import run_synchronised
 from chipload.program.gcode.targets import axes, end, rate
 from chipload.program.gcode.tilted_plane import turn
 from chipload.program.gcode.words import Block
@@ -42,7 +42,7 @@ class ControllerMotion:
         """Carry out the motion ``code`` of a block; ``machine``: G53 stands in it."""
         state = self.c.state
         if self.splines.spline is not None and code not in (52, 53):
-            raise InputError(f"{shown(code)}: G5.2 is open: close it by G5.3")
+            raise InputError(f"{code_text(code)}: G5.2 is open: close it by G5.3")
         if code != 50:
             self.splines.tangent = (0.0, 0.0)
         if code not in CYCLES:
@@ -50,7 +50,7 @@ class ControllerMotion:
         if code in (0, 10):
             self._straight(block, code, machine)
         elif machine:
-            raise InputError(f"{self.c.machine_word} with {shown(code)}: goes with G0 and G1 only")
+            raise InputError(f"{self.c.machine_word} with {code_text(code)}: goes with G0 and G1 only")
         elif code in (20, 30):
             self._arc(block, code)
         elif code in (50, 51, 52, 53):
@@ -64,9 +64,9 @@ class ControllerMotion:
         elif 382 <= code <= 385:
             self._probe(block, code)
         elif code in (330, 331):
-            synchronised(self.c, block, code)
+            run_synchronised(self.c, block, code)
         elif code != NO_MOTION:
-            raise InputError(f"{shown(code)}: threading cycles of a lathe are not read: write the moves out")
+            raise InputError(f"{code_text(code)}: threading cycles of a lathe are not read: write the moves out")
         state.motion = code
         if code in GROUP_ONE:
             state.group_one = code
@@ -86,12 +86,12 @@ class ControllerMotion:
             to = c.position(put(c.machine_position(), axes(self.c, block)))
         else:
             goal = end(self.c, block)
-            to = self._turned(goal)
+            to = self._turned_end(goal)
             if to != goal and to == state.at:
                 return
         c.straight(LINE if code == 10 else RAPID, to, pace)
 
-    def _turned(self, to: Nine) -> Nine:
+    def _turned_end(self, to: Nine) -> Nine:
         """An end in a tilted plane once the rotary axes that it moves have turned: what it gives of X Y Z, the rest
         where that has brought the tip.
         """
@@ -104,8 +104,8 @@ class ControllerMotion:
     def _arc(self, block: Block, code: int) -> None:
         c, state, words = self.c, self.c.state, block.words
         if state.plane % 10:
-            raise InputError(f"{shown(code)}: arcs lie in the planes of G17, G18 and G19")
-        pace = rate(self.c, block, shown(code))
+            raise InputError(f"{code_text(code)}: arcs lie in the planes of G17, G18 and G19")
+        pace = rate(self.c, block, code_text(code))
         turns = 1
         if "p" in words:
             turns = integer_of(words["p"], "P")
@@ -122,7 +122,7 @@ class ControllerMotion:
         else:
             letters = "ijk"
             if not words.keys() & set(letters):
-                raise InputError(f"{shown(code)}: neither R nor I, J, K: an arc needs its radius or its centre")
+                raise InputError(f"{code_text(code)}: neither R nor I, J, K: an arc needs its radius or its centre")
             if letters[along] in words:
                 raise InputError(f"{letters[along].upper()}: is not a coordinate of the arc's plane")
             if state.absolute_centre:
@@ -140,13 +140,13 @@ class ControllerMotion:
 
     def _probe(self, block: Block, code: int) -> None:
         c, state = self.c, self.c.state
-        c.not_compensated(shown(code))
+        c.not_compensated(code_text(code))
         if state.feed_mode != 940 or state.feed == 0.0:
-            raise InputError(f"{shown(code)}: needs a feed per minute (G94, F)")
+            raise InputError(f"{code_text(code)}: needs a feed per minute (G94, F)")
         to = end(self.c, block)
         if math.dist(state.at, to) < LEAST_PROBE:
-            raise InputError(f"{shown(code)}: ends less than {LEAST_PROBE:g} mm from where it starts: go farther")
-        probed(c, "nc-probe", shown(code), "the probe touches")
+            raise InputError(f"{code_text(code)}: ends less than {LEAST_PROBE:g} mm from where it starts: go farther")
+        probe_motion(c, "nc-probe", code_text(code), "the probe touches")
         c.straight(PROBE, to)
         for k, axis in enumerate(to):
             c.parameters.numbered[5061 + k] = axis / (c.machine_scale if k in LINEAR else 1.0)

@@ -49,7 +49,7 @@ def spline_points(points: Floats, weights: Floats, order: int, tolerance: float 
     knots = np.concatenate([np.zeros(order), np.arange(1.0, inner), np.full(order, float(inner))])
     curve = BSpline(knots, np.column_stack([points * weights[:, None], weights]), order - 1)
 
-    def at(u: Floats) -> Floats:
+    def curve_point(u: Floats) -> Floats:
         h = curve(np.minimum(u, inner))
         return np.asarray(h[:, :2] / h[:, 2:3])
 
@@ -57,12 +57,12 @@ def spline_points(points: Floats, weights: Floats, order: int, tolerance: float 
     # a smooth piece between knots may be S-shaped: never judge it by its middle alone
     u = np.interp(np.arange(4 * inner + 1) / 4.0, np.arange(inner + 1.0), u)
     while True:
-        ends = at(u)
+        ends = curve_point(u)
         a, b = ends[:-1], ends[1:]
         step = np.diff(u)
         away = np.zeros(len(step))
         for part in (0.25, 0.5, 0.75):
-            p = at(u[:-1] + part * step)
+            p = curve_point(u[:-1] + part * step)
             d, e = b - a, p - a
             size = np.einsum("ij,ij->i", d, d)
             t = np.clip(np.einsum("ij,ij->i", e, d) / np.where(size > 0.0, size, 1.0), 0.0, 1.0)

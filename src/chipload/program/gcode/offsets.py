@@ -20,7 +20,7 @@ from chipload.program.commands import ARC, LINE, RAPID, Commands
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.frames import without_frame
-from chipload.program.gcode.modal import shown
+from chipload.program.gcode.modal import code_text
 from chipload.program.gcode.state import LINEAR, ZERO, Nine, nine, put
 from chipload.program.gcode.words import Block
 
@@ -34,21 +34,21 @@ def select(c: Controller, code: int) -> None:
     number = (code - 530) // 10 if code < 591 else 6 + code % 10
     datum = c.state.datum
     if number == datum.number:
-        _stated(c, shown(code), number)
+        _require_stated(c, code_text(code), number)
         return
-    c.not_compensated(shown(code))
-    choose(c, shown(code), number)
+    c.not_compensated(code_text(code))
+    choose(c, code_text(code), number)
 
 
 def choose(c: Controller, name: str, number: int) -> None:
     """The coordinates of a work offset of any number; one whose origin is not stated counts as the machine's."""
-    _stated(c, name, number)
+    _require_stated(c, name, number)
     offset, rotation = c.work_offset(number) if 1 <= number < 10 or number in c.origins else (ZERO, 0.0)
     with without_frame(c):
         c.rebase(replace(c.state.datum, number=number, offset=offset, rotation=rotation))
 
 
-def _stated(c: Controller, name: str, number: int) -> None:
+def _require_stated(c: Controller, name: str, number: int) -> None:
     if number > 1 and number not in c.stated_offsets:
         c.unset_offsets.setdefault(number, (c.line, name))
 
@@ -120,7 +120,7 @@ def _is(offset: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
     return bool(np.abs(offset - other).max() <= SAME_MM)
 
 
-def probed(c: Controller, code: str, name: str, ends: str) -> None:
+def probe_motion(c: Controller, code: str, name: str, ends: str) -> None:
     """A motion that a probe or a signal ends: the position after it, and what it measures, is not known."""
     c.leave_out(
         code,
@@ -233,7 +233,7 @@ def _set_tool(c: Controller, block: Block, axes: Axes, kind: int) -> None:
 def length_offset(c: Controller, block: Block, code: int, axes: Axes) -> None:
     """G43, G43.1, G43.2, G43.4 and G49."""
     state = c.state
-    c.not_compensated(shown(code))
+    c.not_compensated(code_text(code))
     old = state.datum.length
     if code == 434:
         state.tcp = state.tcp_by_length = True
@@ -280,7 +280,7 @@ def _check_length(c: Controller, code: int, number: int) -> None:
     elif not known:
         c.once(
             "nc-length-unknown",
-            f"{shown(code)} H{number}: the length of tool {number} is unknown and is taken as 0: state Z of tool "
+            f"{code_text(code)} H{number}: the length of tool {number} is unknown and is taken as 0: state Z of tool "
             f"{number} in a tool table (program.tools)",
         )
     if code == 430 and number != tool and (known or tool != 0):
@@ -302,11 +302,11 @@ def shift(c: Controller, code: int, axes: Axes) -> None:
 
 def _shift(c: Controller, code: int, axes: Axes) -> None:
     state, numbered = c.state, c.parameters.numbered
-    c.not_compensated(shown(code))
+    c.not_compensated(code_text(code))
     datum = state.datum
     if code in (520, 920):
         if not axes:
-            raise InputError(f"{shown(code)}: needs at least one axis")
+            raise InputError(f"{code_text(code)}: needs at least one axis")
         if code == 520:
             new = put(datum.shift, dict(axes))
         else:
@@ -360,8 +360,8 @@ def in_machine_unknown(c: Controller, name: str, axes: Axes) -> bool:
 def go_home(c: Controller, code: int, axes: Axes, end: Nine) -> None:
     """G28 and G30: by way of ``end`` to the stored point, those axes alone that the block gives."""
     state = c.state
-    c.not_compensated(shown(code))
-    if in_machine_unknown(c, shown(code), axes or dict.fromkeys(range(3), 0.0)):
+    c.not_compensated(code_text(code))
+    if in_machine_unknown(c, code_text(code), axes or dict.fromkeys(range(3), 0.0)):
         if end != state.at:
             c.straight(RAPID, end)
             c.retracted = state.at if c.retracted is not None else None
@@ -370,10 +370,10 @@ def go_home(c: Controller, code: int, axes: Axes, end: Nine) -> None:
     if not any(first + k in c.parameters.numbered for k in range(9)):
         c.once(
             "nc-point-unset",
-            f"{shown(code)}: parameters #{first} to #{first + 8} are not set: it goes to the machine's origin: state "
-            "them in program.parameters",
+            f"{code_text(code)}: parameters #{first} to #{first + 8} are not set: it goes to the machine's origin: "
+            "state them in program.parameters",
         )
-    note_machine_coordinates(c, shown(code))
+    note_machine_coordinates(c, code_text(code))
     c.straight(RAPID, end)
     home = c.position(c.stored(first))
     c.straight(RAPID, put(end, {k: home[k] for k in (axes or range(9))}))

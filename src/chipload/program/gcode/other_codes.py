@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 from chipload.program.gcode.dialect import NotReadError
 from chipload.program.gcode.expression import integer_of
-from chipload.program.gcode.modal import shown
+from chipload.program.gcode.modal import code_text
 from chipload.program.gcode.offsets import choose
 from chipload.program.gcode.words import Block
 from chipload.units import MM_PER
@@ -58,7 +58,7 @@ def replace_codes(block: Block, codes: Mapping[int, str], c: Controller) -> None
     for code in [code for code in block.g if code in codes]:
         meaning = codes[code]
         if meaning == "unread":
-            raise NotReadError(f"{shown(code)}: is not read")
+            raise NotReadError(f"{code_text(code)}: is not read")
         if meaning.isdigit():
             block.g[block.g.index(code)] = int(meaning)
             continue
@@ -71,7 +71,7 @@ def replace_codes(block: Block, codes: Mapping[int, str], c: Controller) -> None
             _work_offset(block, code, c)
         elif meaning == "level":
             if "z" not in block.words:
-                raise NotReadError(f"{shown(code)}: Z is missing: the level")
+                raise NotReadError(f"{code_text(code)}: Z is missing: the level")
             c.return_level = block.words.pop("z")
     if "level" in codes.values():
         for m in (TO_LEVEL, TO_R):
@@ -82,7 +82,7 @@ def replace_codes(block: Block, codes: Mapping[int, str], c: Controller) -> None
     for code in [code for code in block.g if code in UNITS]:
         if block.words.keys().isdisjoint("xyzijklpqr"):
             block.g[block.g.index(code)] = UNITS[code]
-            c.once("nc-units", f"{shown(code)}: taken as {shown(UNITS[code])}")
+            c.once("nc-units", f"{code_text(code)}: taken as {code_text(UNITS[code])}")
 
 
 def _change_tool(block: Block) -> None:
@@ -110,13 +110,13 @@ def _tap(block: Block, code: int, tapping: int, c: Controller) -> None:
     speed = words.get("s", c.state.speed)
     words.pop("l", None)
     if not (pitch > 0.0 and speed > 0.0):
-        raise NotReadError(f"{shown(code)}: I (pitch) or J (threads an inch) and a spindle speed are missing")
+        raise NotReadError(f"{code_text(code)}: I (pitch) or J (threads an inch) and a spindle speed are missing")
     words["f"] = pitch * speed
     block.g.append(tapping)
 
 
 def _work_offset(block: Block, code: int, c: Controller) -> None:
-    number = integer_of(block.words.pop("h", 1.0), f"{shown(code)}: H")
+    number = integer_of(block.words.pop("h", 1.0), f"{code_text(code)}: H")
     if not 1 <= number <= 200:
-        raise NotReadError(f"{shown(code)} H{number}: must be from 1 to 200")
-    choose(c, f"{shown(code)} H{number}", number)
+        raise NotReadError(f"{code_text(code)} H{number}: must be from 1 to 200")
+    choose(c, f"{code_text(code)} H{number}", number)

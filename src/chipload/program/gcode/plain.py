@@ -47,7 +47,7 @@ def run_plain(c: Controller, motion: ControllerMotion, lines: list[str], line: i
         linear = not (sx is None and sy is None and sz is None)
         turning = not (sa is None and sb is None and sc is None)
         # without axes it is an F, a G or an arc by its centre alone
-        if not (linear or turning) or (turning and tilted) or new == 800 or not _centred(new, g, si, sj, sk, flat):
+        if not (linear or turning) or (turning and tilted) or new == 800 or not _centre_suits(new, g, si, sj, sk, flat):
             break
         if inverse:
             if (sf is None or new != 10) if new else sf is not None:
@@ -124,7 +124,7 @@ def _ready(c: Controller, motion: ControllerMotion) -> bool:
     )
 
 
-def _centred(new: int, g: str | None, i: str | None, j: str | None, k: str | None, flat: bool) -> bool:
+def _centre_suits(new: int, g: str | None, i: str | None, j: str | None, k: str | None, flat: bool) -> bool:
     """Whether I, J and K suit the code: an arc has its G and a centre in XY, a straight motion none."""
     if new >= 20:
         return flat and k is None and g is not None and not (i is None and j is None)

@@ -118,9 +118,9 @@ class Sinumerik(Dialect):
             elif found["name"] in ("SPOS", "SPOSA"):
                 _position_spindle(block, c, found["index"])
             elif found["name"]:
-                _named(block, c, found["name"], found["value"], values)
+                _set_named(block, c, found["name"], found["value"], values)
             elif found["call"]:
-                _called(block, c, found["call"], found["arguments"])
+                _call_named(block, c, found["call"], found["arguments"])
             elif not found["colon"]:
                 _keyword(block, c, found["word"], body)
         if block.frame:
@@ -274,7 +274,7 @@ def _position_spindle(block: Block, c: Controller, index: str | None) -> None:
         )
 
 
-def _named(block: Block, c: Controller, name: str, text: str, values: list[tuple[str, str, float]]) -> None:
+def _set_named(block: Block, c: Controller, name: str, text: str, values: list[tuple[str, str, float]]) -> None:
     if name in ("A3", "B3", "C3", "A2", "B2", "C2", "A4", "B4", "C4", "A5", "B5", "C5", "LEAD", "TILT"):
         raise NotReadError(
             f"{name}: tool directions as vectors or angles to the surface are not read: output rotary axes"
@@ -343,7 +343,7 @@ def _left_out(block: Block, c: Controller, word: str) -> None:
         block.g.append(NOTED)
 
 
-def _called(block: Block, c: Controller, name: str, arguments: str) -> None:
+def _call_named(block: Block, c: Controller, name: str, arguments: str) -> None:
     if name == "MSG":
         c.note("nc-message", arguments.strip().strip('"')[:200])
     elif name == "TRAORI":

@@ -158,11 +158,11 @@ def flow_step(flow: Flow, raw: str, value: Value) -> bool:
         flow.line = _next(flow, some, one, value)
     except NotReadError as error:
         flow.c.leave_out("nc-jump", f"{error}: {one.word} {one.rest[:40]}: the jump is not taken")
-        flow.line = _without(flow.line, some, one)
+        flow.line = _block_without(flow.line, some, one)
     return True
 
 
-def _without(line: int, some: Statements, one: Statement) -> int:
+def _block_without(line: int, some: Statements, one: Statement) -> int:
     """The block after a statement whose condition is not known: a branch or loop is not entered, or left."""
     if one.word == "IF" and one.opens:
         return some.other.get(line, some.partner[line]) + 1
@@ -301,7 +301,7 @@ def condition(text: str, c: Controller, value: Value) -> bool:
             return any(sides) if join == "OR" else all(sides) if join == "AND" else sum(sides) % 2 == 1
     if re.match(r"NOT(?![A-Z0-9_])", text):
         return not condition(text[3:], c, value)
-    if text.startswith("(") and _closing(text) == len(text) - 1:
+    if text.startswith("(") and _closing_bracket(text) == len(text) - 1:
         return condition(text[1:-1], c, value)
     return _side(text, c, value) != 0.0
 
@@ -311,7 +311,7 @@ def _side(text: str, c: Controller, value: Value) -> float:
     return {"TRUE": 1.0, "FALSE": 0.0}[plain] if plain in ("TRUE", "FALSE") else value(plain, c)
 
 
-def _closing(text: str) -> int:
+def _closing_bracket(text: str) -> int:
     """Where the bracket that opens a text closes; -1: nowhere."""
     depth = 0
     for k, character in enumerate(text):

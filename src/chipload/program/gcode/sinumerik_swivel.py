@@ -20,8 +20,8 @@ from chipload.program.gcode.dialect import go_on, leave_out
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.frames import remove
 from chipload.program.gcode.state import Nine, put
-from chipload.program.gcode.tilted_plane import align, at_angles, level, tilted, turn
-from chipload.program.tilt import tilt_of, turned
+from chipload.program.gcode.tilted_plane import align, at_angles, level, tilt_coordinates, turn
+from chipload.program.tilt import tilt_of, turn_matrix
 
 FR, ST, MODE, X0, A, X1, DIR, FR_I = 0, 2, 3, 4, 7, 10, 13, 14
 #: retractions along Z to a position of the machine, and along the tool to the end of the travel
@@ -60,7 +60,7 @@ def swivel(c: Controller, values: list[float]) -> None:
     if direct and c.swivel is not None and c.swivel.turns:
         target, turns = at_angles(c, dict(zip(c.swivel.numbered(), angles, strict=False)))
     elif order:
-        turns = turned(order, (angles[0], angles[1], angles[2]))
+        turns = turn_matrix(order, (angles[0], angles[1], angles[2]))
     else:
         leave_out(c, f"CYCLE800: MODE {mode}: a swivelled plane by solid or projected angles")
         return
@@ -74,7 +74,7 @@ def swivel(c: Controller, values: list[float]) -> None:
     origin = origin + R @ moved * c.state.scale
     remove(c)
     plane = tilt_of(R, tuple(origin.tolist()))
-    if not tilted(c, plane):
+    if not tilt_coordinates(c, plane):
         leave_out(c, "CYCLE800: a swivelled plane, and no machine with rotary axes")
         return
     go_on(c)

@@ -43,7 +43,7 @@ def speed_words(text: str) -> tuple[SpeedWord, ...]:
     >>> speed_words("T1 M6 (S 12)\nS6000 M3\nG1 X1 F100 S7000.")
     (SpeedWord(line=2, rpm=6000.0), SpeedWord(line=3, rpm=7000.0))
     """
-    return tuple(SpeedWord(line, float(found[1])) for line, found in _found(text))
+    return tuple(SpeedWord(line, float(found[1])) for line, found in _find_speeds(text))
 
 
 def with_speeds(
@@ -74,7 +74,7 @@ def with_speeds(
     """
     lines = text.split("\n")
     left, more, address = dict(speeds), dict(added or {}), "S"
-    for line, found in _found(text):
+    for line, found in _find_speeds(text):
         address = found[0][: found.start(1) - found.start()]
         if line in more:
             raise InputError(f"line {line}: has an S word: change it")
@@ -99,7 +99,7 @@ def _possible(line: int, speed: float) -> float:
     return speed
 
 
-def _found(text: str) -> list[tuple[int, re.Match[str]]]:
+def _find_speeds(text: str) -> list[tuple[int, re.Match[str]]]:
     out = []
     for line, raw in enumerate(text.split("\n"), 1):
         open_text = COMMENTS.sub(lambda found: " " * len(found[0]), raw)

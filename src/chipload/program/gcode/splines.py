@@ -17,7 +17,7 @@ from chipload.program.commands import LINE, Floats
 from chipload.program.gcode import nurbs
 from chipload.program.gcode.controller import Controller
 from chipload.program.gcode.expression import integer_of
-from chipload.program.gcode.modal import shown
+from chipload.program.gcode.modal import code_text
 from chipload.program.gcode.state import put
 from chipload.program.gcode.targets import axes, end, rate
 from chipload.program.gcode.words import Block
@@ -43,15 +43,15 @@ class Splines:
     def move(self, block: Block, code: int) -> None:
         """Carry out G5, G5.1, or one block of G5.2, or G5.3."""
         c, state, words = self.c, self.c.state, block.words
-        c.not_compensated(shown(code))
+        c.not_compensated(code_text(code))
         if state.plane != 170 and code in (50, 51):
-            raise InputError(f"{shown(code)}: splines lie in the XY plane (G17)")
+            raise InputError(f"{code_text(code)}: splines lie in the XY plane (G17)")
         if code == 53:
             self._close()
             return
-        pace = rate(self.c, block, shown(code))
+        pace = rate(self.c, block, code_text(code))
         if any(axis in words for axis in "zabcuvw"):
-            raise InputError(f"{shown(code)}: a spline moves X and Y only")
+            raise InputError(f"{code_text(code)}: a spline moves X and Y only")
         scale = state.scale
         if code == 52:
             self._point(block, pace)
@@ -94,13 +94,13 @@ class Splines:
             raise InputError("G5.2: a control point needs both X and Y")
         if given:
             points = spline.points
-            x, y = end(self.c, block)[:2] if state.absolute else self._after(block, points[-1])
+            x, y = end(self.c, block)[:2] if state.absolute else self._end_after(block, points[-1])
             if len(points) >= nurbs.MOST_CONTROL_POINTS:
                 raise InputError(f"G5.2: more than {nurbs.MOST_CONTROL_POINTS} control points: split the spline")
             spline = replace(spline, points=(*points, (x, y, weight)))
         self.spline = spline
 
-    def _after(self, block: Block, last: tuple[float, float, float]) -> tuple[float, float]:
+    def _end_after(self, block: Block, last: tuple[float, float, float]) -> tuple[float, float]:
         stated = axes(self.c, block)
         return last[0] + stated[0], last[1] + stated[1]
 

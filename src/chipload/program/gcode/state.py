@@ -57,14 +57,14 @@ class Datum:
             p = (x, y, z, *p[3:])
         q = [a + b for a, b in zip(p, self.shift, strict=True)]
         if self.rotation:
-            q[0], q[1] = rotated(q[0], q[1], self.rotation)
+            q[0], q[1] = rotate_point(q[0], q[1], self.rotation)
         return nine([a + b + c for a, b, c in zip(q, self.offset, self.length, strict=True)])
 
     def from_machine(self, m: Nine) -> Nine:
         """Position in these coordinates."""
         q = [a - b - c for a, b, c in zip(m, self.offset, self.length, strict=True)]
         if self.rotation:
-            q[0], q[1] = rotated(q[0], q[1], -self.rotation)
+            q[0], q[1] = rotate_point(q[0], q[1], -self.rotation)
         p = nine([a - b for a, b in zip(q, self.shift, strict=True)])
         if self.tilt is not None:
             x, y, z = self.tilt.from_offset(np.array([p[:3]]))[0].tolist()
@@ -83,7 +83,7 @@ class Datum:
         )
 
 
-def rotated(x: float, y: float, degrees: float) -> tuple[float, float]:
+def rotate_point(x: float, y: float, degrees: float) -> tuple[float, float]:
     """(x, y) turned about the origin."""
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     return c * x - s * y, s * x + c * y

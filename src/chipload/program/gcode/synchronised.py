@@ -14,13 +14,13 @@ import math
 from chipload.errors import InputError
 from chipload.program.commands import LINE
 from chipload.program.gcode.controller import Controller
-from chipload.program.gcode.modal import shown
+from chipload.program.gcode.modal import code_text
 from chipload.program.gcode.state import Nine
 from chipload.program.gcode.targets import end
 from chipload.program.gcode.words import Block
 
 
-def synchronised(c: Controller, block: Block, code: int) -> None:
+def run_synchronised(c: Controller, block: Block, code: int) -> None:
     """Carry out G33 (330) or G33.1 (331).
 
     Raises
@@ -28,7 +28,7 @@ def synchronised(c: Controller, block: Block, code: int) -> None:
     InputError
         K is missing or 0, the spindle does not turn or its speed is not known.
     """
-    state, name = c.state, shown(code)
+    state, name = c.state, code_text(code)
     c.not_compensated(name)
     if "k" not in block.words:
         raise InputError(f"{name}: K is missing: the distance for each revolution of the spindle")

@@ -31,7 +31,7 @@ def axes(c: Controller, block: Block) -> dict[int, float]:
     if c.polar is not None:
         out |= from_polar(c, words)
     if c.scaled is not None:
-        out |= scaled(c, out)
+        out |= scaled_targets(c, out)
     if state.diameter and 0 in out:
         out[0] *= 0.5
     return out
@@ -72,7 +72,7 @@ def from_polar(c: Controller, words: dict[str, float]) -> dict[int, float]:
     return {first: x - c.state.at[first], second: y - c.state.at[second]}
 
 
-def scaled(c: Controller, given: dict[int, float]) -> dict[int, float]:
+def scaled_targets(c: Controller, given: dict[int, float]) -> dict[int, float]:
     """Linear coordinates of a block in scaled or mirrored coordinates (G51, G51.1), in those without."""
     if c.scaled is None:
         return {}

@@ -47,7 +47,7 @@ def position_of(c: Controller, datum: Datum, m: Nine) -> Nine:
     return (x, y, z, *at[3:])
 
 
-def tilted(c: Controller, tilt: Tilt) -> bool:
+def tilt_coordinates(c: Controller, tilt: Tilt) -> bool:
     """Put the program's coordinates into a tilted plane of the work offset; the machine stays where it is.
 
     Returns

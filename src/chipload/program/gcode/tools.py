@@ -55,14 +55,14 @@ class ToolTable:
 
     def scaled(self, factor: float) -> ToolTable:
         """The table with all lengths times a factor, as one whose unit was taken as another."""
-        return ToolTable({n: _scaled(tool, factor) for n, tool in self.tools.items()})
+        return ToolTable({n: _scale_tool(tool, factor) for n, tool in self.tools.items()})
 
     def lengths(self) -> dict[int, float]:
         """Length [mm] of each tool: its offset along Z."""
         return {number: tool.offset[2] for number, tool in self.tools.items()}
 
 
-def _scaled(tool: Tool, factor: float) -> Tool:
+def _scale_tool(tool: Tool, factor: float) -> Tool:
     offset = tuple(x if k in range(3, 6) else factor * x for k, x in enumerate(tool.offset))
     return replace(tool, diameter=factor * tool.diameter, offset=offset)
 

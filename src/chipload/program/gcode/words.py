@@ -149,7 +149,7 @@ def read_block(text: str, comments: list[str], parameters: Parameters) -> Block:
         elif letter == "#":
             key, at = read_parameter_key(text, at, parameters)
             if text[at : at + 1] != "=":
-                raise InputError(f"#{_shown(key)}: = is missing after it")
+                raise InputError(f"#{_word_text(key)}: = is missing after it")
             value, at = read_value(text, at + 1, parameters)
             parameters.declare(key)
             block.sets.append((key, value))
@@ -167,5 +167,5 @@ def read_block(text: str, comments: list[str], parameters: Parameters) -> Block:
     return block
 
 
-def _shown(key: int | str) -> str:
+def _word_text(key: int | str) -> str:
     return str(key) if isinstance(key, int) else f"<{key}>"

@@ -106,7 +106,7 @@ def write_commands(
     head += [comment(text, fanuc) for text in (title, *comments)]
     blocks = [*_modes(machine), *Blocks(commands, machine, words).text()]
     if repeat is not None:
-        blocks = _repeated(blocks, repeat, fanuc)
+        blocks = _repeat_blocks(blocks, repeat, fanuc)
     blocks += ["M5", "M30" if fanuc else "M2"]
     if line_step > 0:
         blocks = [x if x.startswith("(") else f"N{line_step * (k + 1)} {x}" for k, x in enumerate(blocks)]
@@ -114,7 +114,7 @@ def write_commands(
     return "\n".join(lines) + "\n"
 
 
-def _repeated(blocks: list[str], repeat: Repeat, fanuc: bool) -> list[str]:
+def _repeat_blocks(blocks: list[str], repeat: Repeat, fanuc: bool) -> list[str]:
     """The blocks from the first rapid on in a loop, each time with another work offset of the rotary axis."""
     changes = sum(" M6" in block for block in blocks)
     if changes > 1:

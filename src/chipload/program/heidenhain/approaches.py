@@ -137,7 +137,7 @@ class Approach:
             ph = centre + (pa - centre) * cmath.rect(1.0, -sense * form.span)
         else:
             # the line from PS touches the path of the tool's centre, an arc of the radius R - r
-            ph = centre + form.size * touching(ps - centre, form.size - radius, -side)
+            ph = centre + form.size * touch_direction(ps - centre, form.size - radius, -side)
         self._to(ph, motion, feed)
         at, end = list(s.at), self.end
         s.carry(Piece(ARC, at, end, (centre.real, centre.imag), sense, self.feed, self.tail))
@@ -154,14 +154,14 @@ class Approach:
         self.s.at = end
 
 
-def touching(out: complex, radius: float, sense: int) -> complex:
+def touch_direction(out: complex, radius: float, sense: int) -> complex:
     """Unit vector from a circle's centre to where a line from ``out`` (seen from the centre) touches the circle.
 
     Parameters
     ----------
     sense : -1: the line leads to an arc that turns to the left, or from one to the right; +1: the others
 
-    >>> touching(2.0 + 0.0j, 1.0, -1).real  # cos 60 deg
+    >>> touch_direction(2.0 + 0.0j, 1.0, -1).real  # cos 60 deg
     0.4999999999999999
     """
     if not 0.0 < radius < abs(out):
@@ -201,7 +201,7 @@ def depart(s: ConversationalState, form: Form, end: list[float], named: set[int]
             ph = centre + (pe - centre) * cmath.rect(1.0, sense * form.span)
         else:
             pn = complex(*end[:2])
-            ph = centre + form.size * touching(pn - centre, form.size - radius, side)
+            ph = centre + form.size * touch_direction(pn - centre, form.size - radius, side)
         s.arc([ph.real, ph.imag, *s.at[2:]], (centre.real, centre.imag), sense)
         s.end_contour()
         if form.kind == "LCT":

@@ -79,7 +79,7 @@ class Cycles:
         if number == 7:
             if part > 0:
                 datum_shift(s, text, body)
-                self._mixed(text)
+                self._report_mixed(text)
             return
         for letters, digits, value in words.Q_VALUE.findall(body):
             s.q.set(q_number(letters, digits), self._q_value(value))
@@ -133,7 +133,7 @@ class Cycles:
             if values and (s.tilt is None or s.tilt.upright):
                 self.turned = values[0] + (self.turned if re.search(r"\bIROT", body) else 0.0)
                 enter(s, spatial(0.0, 0.0, self.turned))
-                self._mixed(text)
+                self._report_mixed(text)
             elif any(values):
                 leave_out(s, f"{text[:60]}: {how} coordinates are not read: motions are left out until they end")
             return
@@ -167,9 +167,9 @@ class Cycles:
         signed = [(-self.scaled if k in self.mirrored else self.scaled) for k in range(3)]
         s.factor = [a * f for a, f in zip(signed, factors, strict=True)]
         s.origin = [a * (1.0 - f) * c for a, f, c in zip(signed, factors, fixed, strict=True)]
-        self._mixed(text)
+        self._report_mixed(text)
 
-    def _mixed(self, text: str) -> None:
+    def _report_mixed(self, text: str) -> None:
         """Report a turn or a shift of mirrored coordinates, whose order depends on the control."""
         changed = self.s.factor != [1.0] * 3 or self.s.origin != [0.0] * 3
         if changed and (self.turned != 0.0 or text.startswith(("CYCL DEF 7", "CYCLE DEF 7"))):

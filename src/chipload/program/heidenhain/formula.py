@@ -150,7 +150,7 @@ class _Formula:
         while (sign := self._next("+-")) is not None:
             other = self._product(depth)
             value = value + other if sign == "+" else value - other
-        return _bounded(value)
+        return _require_bounded(value)
 
     def _product(self, depth: int) -> float:
         value = self._power(depth)
@@ -158,7 +158,7 @@ class _Formula:
             other = self._power(depth)
             if sign == "/" and other == 0.0:
                 raise InputError("formula: division by 0")
-            value = _bounded(value * other if sign == "*" else value / other)
+            value = _require_bounded(value * other if sign == "*" else value / other)
         return value
 
     def _power(self, depth: int) -> float:
@@ -171,7 +171,7 @@ class _Formula:
                 raise InputError(f"formula: {value:g} ^ {exponent:g} has no value") from None
             if isinstance(raised, complex):
                 raise InputError(f"formula: {value:g} ^ {exponent:g} has no value")
-            return _bounded(raised)
+            return _require_bounded(raised)
         return value
 
     def _value(self, depth: int) -> float:
@@ -190,7 +190,7 @@ class _Formula:
         token = self.tokens[self.at]
         self.at += 1
         if token[1] is not None:
-            return _bounded(float(token[1]))
+            return _require_bounded(float(token[1]))
         if token[2] is not None:
             return self.parameters.read(q_number(token[2], token[3]))
         if token[4] == "PI":
@@ -198,13 +198,13 @@ class _Formula:
         if token[4] in FUNCTIONS:
             argument = self._value(depth + 1)
             try:
-                return _bounded(FUNCTIONS[token[4]](argument))
+                return _require_bounded(FUNCTIONS[token[4]](argument))
             except (ValueError, OverflowError):
                 raise InputError(f"formula: {token[4]} {argument:g} has no value") from None
         raise InputError(f"formula: {token[0].strip()!r} stands where a value must be")
 
 
-def _bounded(value: float) -> float:
+def _require_bounded(value: float) -> float:
     if not abs(value) <= LARGEST:
         raise InputError(f"formula: {value:g}: must be at most {LARGEST:g}")
     return value

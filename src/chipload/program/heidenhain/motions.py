@@ -20,7 +20,7 @@ from chipload.program.corners import Corner
 from chipload.program.heidenhain import approaches, tilted_plane, words
 from chipload.program.heidenhain.formula import NotKnownError
 from chipload.program.heidenhain.state import FARTHEST, ConversationalState
-from chipload.program.heidenhain.switches import after, before, m_codes
+from chipload.program.heidenhain.switches import act_after, act_before, m_codes
 
 #: an arc may end so much nearer to its pole than it begins, or farther [mm]
 ROUNDED = 0.02
@@ -65,7 +65,7 @@ def _polar_end(s: ConversationalState, text: str) -> tuple[list[float], set[int]
 def _straight(
     s: ConversationalState, text: str, end: list[float], named: set[int], codes: list[int], fast: bool
 ) -> None:
-    before(s, codes)
+    act_before(s, codes)
     if s.left_out:
         s.unknown |= {k for k in named if k < 3}
     elif named and 91 in codes:
@@ -89,7 +89,7 @@ def _straight(
     else:
         s.select(_side(s, text), named)
     _retract(s, text)
-    after(s, codes)
+    act_after(s, codes)
 
 
 def _turn(s: ConversationalState, end: list[float], named: set[int], motion: int) -> None:
@@ -129,7 +129,7 @@ def pole(s: ConversationalState, text: str) -> None:
 def arc(s: ConversationalState, text: str) -> None:
     """C: an arc about the pole."""
     codes, fast = _read(s, text)
-    sense = _sense(text, "C") * _turned(s, s.pole_plane)
+    sense = _sense(text, "C") * _arc_sense(s, s.pole_plane)
     end, _ = s.ends(text)
     _arc(s, text, end, _centre(s), sense, codes, fast, about_pole=True)
 
@@ -141,9 +141,9 @@ def arc_of_radius(s: ConversationalState, text: str) -> None:
         raise InputError("CR: R is missing: the radius")
     without = words.RADIUS.sub(" ", text)
     codes, fast = _read(s, without)
-    sense = _sense(text, "CR") * _turned(s, XY)
+    sense = _sense(text, "CR") * _arc_sense(s, XY)
     end, _ = s.ends(without)
-    _placed(s)
+    _require_place(s)
     radius = s.signed(found[1], found[2]) * s.scale * abs(s.size_factor())
     start, chord = complex(*s.at[:2]), complex(end[0] - s.at[0], end[1] - s.at[1])
     under = radius**2 - 0.25 * abs(chord) ** 2
@@ -160,7 +160,7 @@ def tangent_arc(s: ConversationalState, text: str) -> None:
     """CT: an arc that goes on in the direction of the motion before it."""
     codes, fast = _read(s, text)
     end, named = s.ends(text)
-    _placed(s)
+    _require_place(s)
     if s.heading is None:
         raise NotKnownError("CT: the direction before it is not known: move in the plane first")
     chord = complex(end[0] - s.at[0], end[1] - s.at[1])
@@ -195,7 +195,7 @@ def helix(s: ConversationalState, text: str) -> None:
         raise InputError("CP: IPA or PA must be given")
     end[first] = x + a * (vx * math.cos(angle) - vy * math.sin(angle))
     end[second] = y + b * (vx * math.sin(angle) + vy * math.cos(angle))
-    sense *= _turned(s, s.pole_plane)
+    sense *= _arc_sense(s, s.pole_plane)
     turns = max(1, math.ceil(abs(angle) / math.tau - 1e-9))
     if turns > MOST_TURNS:
         raise InputError(f"CP: {turns} turns: must be at most {MOST_TURNS}")
@@ -211,7 +211,7 @@ def approach(s: ConversationalState, text: str) -> None:
     lasting, moved = s.feed, s.last_motion()
     codes, fast = _read(s, rest)
     end, named = _polar_end(s, rest) if found[1] else s.ends(rest)
-    before(s, codes)
+    act_before(s, codes)
     side = _side(s, rest)
     if s.left_out:
         s.unknown |= {k for k in named if k < 3}
@@ -222,7 +222,7 @@ def approach(s: ConversationalState, text: str) -> None:
         quick = fast or moved in (None, RAPID)
         s.approaching = approaches.Approach(s, form, f"APPR{text}", end, side, lasting, quick)
         s.at, s.unknown = end, s.unknown - named
-    after(s, codes)
+    act_after(s, codes)
 
 
 def corner(s: ConversationalState, text: str) -> None:
@@ -249,12 +249,12 @@ def departure(s: ConversationalState, text: str) -> None:
     form, rest = approaches.form_of(s, found[2], found[3])
     codes, fast = _read(s, rest)
     end, named = _polar_end(s, rest) if found[1] else s.ends(rest)
-    before(s, codes)
+    act_before(s, codes)
     if s.left_out:
         s.unknown |= {0, 1} | {k for k in named if k < 3}
     else:
         approaches.depart(s, form, end, named, fast)
-    after(s, codes)
+    act_after(s, codes)
 
 
 def _read(s: ConversationalState, text: str) -> tuple[list[int], bool]:
@@ -286,7 +286,7 @@ def _sense(text: str, word: str) -> int:
     return 1 if turn[1] == "+" else -1
 
 
-def _turned(s: ConversationalState, plane: int) -> int:
+def _arc_sense(s: ConversationalState, plane: int) -> int:
     """-1 where mirrored coordinates turn an arc of a plane the other way."""
     return 1 if s.size_factor(plane) > 0.0 else -1
 
@@ -298,7 +298,7 @@ def _centre(s: ConversationalState) -> tuple[float, float]:
     return x, y
 
 
-def _placed(s: ConversationalState) -> None:
+def _require_place(s: ConversationalState) -> None:
     if {0, 1} & s.unknown:
         raise NotKnownError("an arc begins at a position that is not known: move there first")
 
@@ -332,7 +332,7 @@ def _arc(
         mx, my = 0.5 * (end[first] + s.at[first]), 0.5 * (end[second] + s.at[second])
         along = (-dy * (x - mx) + dx * (y - my)) / chord
         x, y = mx - dy / chord * along, my + dx / chord * along
-    before(s, codes)
+    act_before(s, codes)
     s.select(_side(s, text), {first, second})
     if s.left_out:
         s.unknown |= {first, second}
@@ -340,4 +340,4 @@ def _arc(
         s.upright_arc(end, (x, y), turns, s.pole_plane)
     else:
         s.arc(end, (x, y), turns)
-    after(s, codes)
+    act_after(s, codes)

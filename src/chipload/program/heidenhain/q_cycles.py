@@ -68,11 +68,11 @@ def q_cycle_steps(number: int, q: Value, turns_s: float, scale: float) -> Iterat
         yield from _rigid_tapping(hole, turns_s)
     else:
         if number == 200:
-            yield from _drilling(hole, (RAPID, 0.0), steady=True)
+            yield from _drilling_steps(hole, (RAPID, 0.0), steady=True)
         elif number == 203:
-            yield from _drilling(hole, hole.retraction(206), steady=False)
+            yield from _drilling_steps(hole, hole.retraction(206), steady=False)
         elif number == 205:
-            yield from _pecking(hole)
+            yield from _pecking_steps(hole)
         else:
             yield LINE, hole.bottom, hole.feed(206)
         if number == 206:
@@ -136,7 +136,7 @@ class HoleValues:
         return out
 
 
-def _drilling(h: HoleValues, out: tuple[int, float], steady: bool) -> Iterator[Step]:
+def _drilling_steps(h: HoleValues, out: tuple[int, float], steady: bool) -> Iterator[Step]:
     """Plunges of 200 and 203; ``out`` the motion and feed between them."""
     feed, dwell = h.feed(206), h.q(210, 0.0)
     breaks, back = (0.0, 0.0) if steady else (h.q(213, 0.0), abs(h.mm(256, 0.2)))
@@ -155,7 +155,7 @@ def _drilling(h: HoleValues, out: tuple[int, float], steady: bool) -> Iterator[S
         done = depth
 
 
-def _pecking(h: HoleValues) -> Iterator[Step]:
+def _pecking_steps(h: HoleValues) -> Iterator[Step]:
     """Plunges of 205."""
     feed, start = h.feed(206), abs(h.mm(379, 0.0))
     every, back = abs(h.mm(257, 0.0)), abs(h.mm(256, 0.2))

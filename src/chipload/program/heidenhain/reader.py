@@ -278,7 +278,7 @@ class _Blocks:
                 call_positions(s, end)
             self.cycles.call()
             return
-        switches.before(s, switches.m_codes(text))
+        switches.act_before(s, switches.m_codes(text))
         s.feed_of(text)
         self.cycles.call()
-        switches.after(s, switches.m_codes(text))
+        switches.act_after(s, switches.m_codes(text))

@@ -14,7 +14,7 @@ from typing import Protocol, cast
 from chipload.errors import Finding, InputError, Severity
 from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, XY, YZ, Frame, Row
 from chipload.program.compensation import CentreMove, Compensation
-from chipload.program.corners import Corner, Piece, joined
+from chipload.program.corners import Corner, Piece, join_corner
 from chipload.program.heidenhain.formula import NotKnownError, QParameters, q_number
 from chipload.program.heidenhain.words import AXIS, FEED, RETRACT, SETTINGS, TURN_FEED, number, rest_of
 from chipload.program.swivel import Swivel
@@ -281,7 +281,7 @@ class ConversationalState:
         before, corner = self._waiting, self._corner
         self._waiting = self._corner = None
         if before is not None:
-            made = None if corner is None else joined(before, piece, corner)
+            made = None if corner is None else join_corner(before, piece, corner)
             if corner is not None and made is None:
                 self.sharp(corner.text)
             for some in (before,) if made is None else made[:-1]:

@@ -33,11 +33,11 @@ def m_codes(text: str) -> list[int]:
 def functions(s: ConversationalState, text: str) -> None:
     """A block of M functions alone."""
     codes = m_codes(text)
-    before(s, codes)
-    after(s, codes)
+    act_before(s, codes)
+    act_after(s, codes)
 
 
-def before(s: ConversationalState, codes: list[int]) -> None:
+def act_before(s: ConversationalState, codes: list[int]) -> None:
     """M functions that act at the beginning of their block."""
     for m in codes:
         if m in (3, 13):
@@ -54,7 +54,7 @@ def before(s: ConversationalState, codes: list[int]) -> None:
             s.note("nc-coolant", f"M{word}: coolant does not affect the path; it is ignored")
 
 
-def after(s: ConversationalState, codes: list[int]) -> None:
+def act_after(s: ConversationalState, codes: list[int]) -> None:
     """M functions that act at the end of their block."""
     for m in codes:
         if m in (5, 19):

@@ -19,7 +19,7 @@ from chipload.errors import InputError
 from chipload.program.commands import RAPID, Frame
 from chipload.program.heidenhain import words
 from chipload.program.heidenhain.state import ConversationalState
-from chipload.program.tilt import NEEDS_ROTARY, NO_ROTARY, Floats, of_vectors, spatial, tilt_of, turned
+from chipload.program.tilt import NEEDS_ROTARY, NO_ROTARY, Floats, of_vectors, spatial, tilt_of, turn_matrix
 
 #: Q parameters of the angles of A, B and C
 ANGLES_Q = 120
@@ -74,7 +74,7 @@ def _rotation(s: ConversationalState, kind: str, values: dict[str, float]) -> Fl
         return a, b, c
 
     if kind == "EULER":
-        return turned("zxz", three("EULPR", "EULNU", "EULROT"))
+        return turn_matrix("zxz", three("EULPR", "EULNU", "EULROT"))
     if kind == "VECTOR":
         return of_vectors(np.array(three("BX", "BY", "BZ")), np.array(three("NX", "NY", "NZ")))
     R = spatial(*three("SPA", "SPB", "SPC"))

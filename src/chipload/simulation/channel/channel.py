@@ -68,8 +68,8 @@ def wall(name: str, surface: BSplinePatch, u: Floats, v: Floats) -> SurfacePoint
     Leave out the edges of the metal, such as the tip of a blade: there an inward ray lies in the adjacent face, which a
     cutter may touch.
 
-    >>> from chipload.geometry.bspline import through
-    >>> flat = through([[[0, 0, 0], [0, 2, 0]], [[3, 0, 0], [3, 2, 0]]], [0, 1], [0, 1])
+    >>> from chipload.geometry.bspline import patch_through
+    >>> flat = patch_through([[[0, 0, 0], [0, 2, 0]], [[3, 0, 0], [3, 2, 0]]], [0, 1], [0, 1])
     >>> float(wall("flat", flat, np.linspace(0, 1, 7), np.linspace(0, 1, 5)).area.sum())
     6.0
     """

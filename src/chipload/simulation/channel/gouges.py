@@ -148,10 +148,10 @@ def deepest_gouge(
         rows = np.column_stack([np.repeat(cells.wall, 4), at.reshape(-1, 2)])
         once, corner = np.unique(rows, axis=0, return_inverse=True)
         number, corner = once[:, 0].astype(np.int64), corner.reshape(-1, 4)
-        points, normals = _on(walls, number, np.asarray(once[:, 1:], dtype=np.float64))
+        points, normals = _places_on(walls, number, np.asarray(once[:, 1:], dtype=np.float64))
         t, w = _reach(points[corner], normals[corner])
         grown = _GROWN * float(t.max())
-        known = _known(cutter.corner_radius, grown, t, w).any()
+        known = _has_bound(cutter.corner_radius, grown, t, w).any()
         if not known and cutter.corner_radius > resolution and level < _LEVELS and 16 * len(t) <= _MOST:
             # every cell is divided, whatever the rays meet
             cells = cells.divided(np.ones(len(t), dtype=np.bool_))
@@ -206,7 +206,7 @@ def deepest_gouge(
     return Gouge(best.found, max(settled, best.found), best.wall, best.place, best.row, best.part)
 
 
-def _known(r: float, grown: float, t: Floats, w: Floats) -> NDArray[np.bool_]:
+def _has_bound(r: float, grown: float, t: Floats, w: Floats) -> NDArray[np.bool_]:
     """Whether cells (n,) have a bound at all."""
     return np.isfinite(_sag(r, t, w)) & np.isfinite(_sag(grown, t, w))
 
@@ -221,7 +221,7 @@ def _enough(
     """
     out = np.full((count, 3), -found)
     out[:, 2] = -np.inf
-    known = _known(r, grown, t, w)
+    known = _has_bound(r, grown, t, w)
     for kind, least in ((0, _sag(r, t, w) - bound), (2, _sag(grown, t, w) - grown - bound)):
         np.maximum.at(out[:, kind], corner[known].ravel(), np.repeat(least[known] + _ROUNDED, 4))
     return out
@@ -287,7 +287,7 @@ def _first(walls: Sequence[SurfacePoints]) -> _Cells:
     return _Cells(np.concatenate(number), np.concatenate(boxes))
 
 
-def _on(walls: Sequence[SurfacePoints], number: NDArray[np.int64], at: Floats) -> tuple[Floats, Floats]:
+def _places_on(walls: Sequence[SurfacePoints], number: NDArray[np.int64], at: Floats) -> tuple[Floats, Floats]:
     """Points and normals (n, 3) at u and v (n, 2) of the walls of these numbers."""
     points, normals = np.empty((len(at), 3)), np.empty((len(at), 3))
     for k in np.unique(number).tolist():

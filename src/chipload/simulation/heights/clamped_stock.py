@@ -44,21 +44,21 @@ def find_clamped_stock(
     clamps : on the stock before the program
     fixtures : closed bodies [mm]
     """
-    clamped = _clamped(found, label, clamps)
+    clamped = _clamped_bodies(found, label, clamps)
     side = np.zeros((0, 2))
     number = np.zeros(0, dtype=np.int64)
     for mesh in fixtures:
         middles, normals = _faces(found, mesh)
-        clamped |= set(_pressed(found, label, middles[normals[:, 2] < -FACING]).tolist())
+        clamped |= set(_pressed_bodies(found, label, middles[normals[:, 2] < -FACING]).tolist())
         beside = np.abs(normals[:, 2]) < FACING
-        at = _touched(found, label, middles[beside], normals[beside])
+        at = _touched_bodies(found, label, middles[beside], normals[beside])
         side = np.concatenate([side, normals[beside][at > 0, :2]])
         number = np.concatenate([number, at[at > 0]])
     clamped |= {k for k in np.unique(number).tolist() if _opposite(side[number == k])}
     return frozenset(clamped)
 
 
-def _clamped(found: HeightMap, label: Ints, clamps: Sequence[Clamp]) -> set[int]:
+def _clamped_bodies(found: HeightMap, label: Ints, clamps: Sequence[Clamp]) -> set[int]:
     """Pieces that clamps together hold along x, y and z."""
     x, y = (a.ravel() for a in np.meshgrid(found.x, found.y, indexing="ij"))
     half = 0.5 * max(found.x[1] - found.x[0], found.y[1] - found.y[0]) + 1e-6
@@ -108,14 +108,14 @@ def _columns_at(found: HeightMap, points: Floats) -> tuple[Ints, Ints, NDArray[n
     return np.clip(i, 0, len(found.x) - 1), np.clip(j, 0, len(found.y) - 1), there
 
 
-def _pressed(found: HeightMap, label: Ints, points: Floats) -> Ints:
+def _pressed_bodies(found: HeightMap, label: Ints, points: Floats) -> Ints:
     """Pieces whose tops lie at points of faces that look down."""
     i, j, there = _columns_at(found, points)
     there &= np.abs(found.top[i, j] - points[:, 2]) <= GAP
     return np.unique(label[i, j][there & (label[i, j] > 0)])
 
 
-def _touched(found: HeightMap, label: Ints, points: Floats, normals: Floats) -> Ints:
+def _touched_bodies(found: HeightMap, label: Ints, points: Floats, normals: Floats) -> Ints:
     """Piece that each point of a side touches, 0 if none."""
     level = normals[:, :2] / np.hypot(normals[:, 0], normals[:, 1])[:, None]
     step = max(found.x[1] - found.x[0], found.y[1] - found.y[0])

@@ -128,7 +128,7 @@ def stiffness(
             out[..., i, i] += trace
         return out
 
-    return _assembled(modes, M, gradients, law)
+    return _assemble_cells(modes, M, gradients, law)
 
 
 def springs(grid: CellGrid, modes: CellModes, moments: Array, per_volume: Array) -> csr_array:
@@ -141,7 +141,7 @@ def springs(grid: CellGrid, modes: CellModes, moments: Array, per_volume: Array)
     """
     _, values = product_tensors(grid.order)
     M = _cells_of(moments, modes) * (_volumes(grid, modes) / 8.0)[:, None]
-    return _assembled(modes, M, values, lambda N, own: N[..., None, None] * per_volume)
+    return _assemble_cells(modes, M, values, lambda N, own: N[..., None, None] * per_volume)
 
 
 def mass(grid: CellGrid, modes: CellModes, moments: Array, density: float) -> csr_array:
@@ -160,7 +160,7 @@ def _volumes(grid: CellGrid, modes: CellModes) -> Array:
     return np.asarray(grid.volumes[tuple(modes.cells.T)])
 
 
-def _assembled(modes: CellModes, M: Array, tensors: Array, law: Callable[[Array, Indices], Array]) -> csr_array:
+def _assemble_cells(modes: CellModes, M: Array, tensors: Array, law: Callable[[Array, Indices], Array]) -> csr_array:
     """The sum over cells of blocks (e, m, 3, 3) that ``law`` makes of M (e, n^3) times ``tensors`` (n^3, m, m, ...).
 
     Parameters

@@ -54,7 +54,7 @@ def flat_faces(stock: LayeredStock) -> Faces:
         before, low = section.area, high
     steps.append(before)
     rows = [*(np.concatenate(part) for part in upright), np.column_stack([levels, steps])]
-    return tuple(_joined(r) for r in rows)
+    return tuple(_join_places(r) for r in rows)
 
 
 def _edges(section: shapely.MultiPolygon, axis: int) -> Array:
@@ -66,7 +66,7 @@ def _edges(section: shapely.MultiPolygon, axis: int) -> Array:
     return np.column_stack([0.5 * (xy[:-1] + xy[1:])[some, axis], d[some, 1 - axis]])
 
 
-def _joined(rows: Array) -> tuple[Array, Array]:
+def _join_places(rows: Array) -> tuple[Array, Array]:
     """Places that lie together as one, with the sum of their areas, largest first."""
     rows = rows[rows[:, 1] > 0.0]
     rows = rows[np.argsort(rows[:, 0], kind="stable")]
@@ -93,13 +93,13 @@ def grid_on_faces(stock: LayeredStock, faces: Faces, cell_mm: float, order: int 
     ends = [np.array([v[0], v[-1]], dtype=np.float64) for v in (stock.xs, stock.ys, stock.bounds)]
     size = np.array([v[1] - v[0] for v in ends])
     x, y, z = (
-        _chosen(v, place[area >= LEAST_AREA * np.prod(size) / side], cell_mm)
+        _choose_planes(v, place[area >= LEAST_AREA * np.prod(size) / side], cell_mm)
         for v, side, (place, area) in zip(ends, size.tolist(), faces, strict=True)
     )
     return grid_between((x, y, z), cell_mm, order)
 
 
-def _chosen(ends: Array, places: Array, cell_mm: float) -> Array:
+def _choose_planes(ends: Array, places: Array, cell_mm: float) -> Array:
     """Planes between two ends at those of the places, taken in turn, that make few more cells."""
     planes = ends
     most = MORE * int(cells_between(ends, cell_mm).sum()) + FEW

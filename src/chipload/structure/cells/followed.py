@@ -126,7 +126,7 @@ class ModesOfStates:
             if middle is None:
                 break
             self(middle, states[middle].build())
-        return self._joined(states, error)
+        return self._join_states(states, error)
 
     def _change(self, a: int, b: int) -> float:
         """Greatest relative change of a frequency from state a to b."""
@@ -134,7 +134,7 @@ class ModesOfStates:
         _, column = linear_sum_assignment(-np.abs(overlap(first, last)))
         return float(np.abs(np.log(last.frequency[column] / first.frequency)).max())
 
-    def _joined(self, states: Sequence[RemovalState], error: float) -> FollowedModes:
+    def _join_states(self, states: Sequence[RemovalState], error: float) -> FollowedModes:
         """Modes of all states with the same column for the same mode, and between them."""
         order, steps = sorted(self.known), self.steps
         frequency, shapes = [self.known[order[0]][0].frequency], [self.known[order[0]][1]]

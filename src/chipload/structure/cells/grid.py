@@ -174,7 +174,7 @@ def grid_between(faces: Planes, cell_mm: float, order: int = 2) -> CellGrid:
             f"workpiece.cell_mm = {cell_mm:g}: {number_text(total)} cells: must be at most {MOST_CELLS}: "
             "state larger cells"
         )
-    x, y, z = (_divided(v, n) for v, n in zip(faces, counts, strict=True))
+    x, y, z = (_divide_planes(v, n) for v, n in zip(faces, counts, strict=True))
     return CellGrid((x, y, z), order, faces)
 
 
@@ -183,7 +183,7 @@ def cells_between(planes: Array, cell_mm: float) -> Indices:
     return np.maximum(np.ceil(np.diff(planes) / cell_mm * (1.0 - 1e-9)), 1.0).astype(np.int64)
 
 
-def _divided(planes: Array, counts: Indices) -> Array:
+def _divide_planes(planes: Array, counts: Indices) -> Array:
     """Planes with ``counts`` equal cells between each and the next."""
     parts = [
         np.linspace(a, b, n + 1)[:-1] for (a, b), n in zip(pairwise(planes.tolist()), counts.tolist(), strict=True)

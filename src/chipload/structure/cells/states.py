@@ -136,7 +136,7 @@ def step_compliances(
     built : called with each state that is solved, by its number, each time that it is built
     """
     solver = _Solver(steps, states, spaced_rows(steps.lines, spacing, LINES), built)
-    chosen, spans = _chosen(solver, tolerance, most, progress)
+    chosen, spans = _choose_states(solver, tolerance, most, progress)
     out, doubt = np.zeros((len(steps.step), len(STATIONS), 3, 3)), np.zeros(len(steps.step))
     for a, b in spans:
         own, rows = solver.rows(a, b), solver.sampled(a, b)
@@ -226,7 +226,7 @@ class _Solver:
         return float(np.abs(later - earlier).max(initial=0.0))
 
 
-def _chosen(
+def _choose_states(
     solver: _Solver, tolerance: float, most: int, progress: Progress
 ) -> tuple[list[int], list[tuple[int, int]]]:
     """States that differ by at most ``tolerance`` of the greatest deflection or are ``most``, and their intervals."""

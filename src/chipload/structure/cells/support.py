@@ -41,7 +41,7 @@ class Support:
         return int(np.argmin(self.after))
 
 
-def supported(
+def support_line(
     work: CellWorkpiece, line: ArrayLike, force: ArrayLike, points: ArrayLike, normals: ArrayLike, stiffness: float
 ) -> Support:
     """Deflection in the middle of a contact line with a support at each of some points.

@@ -133,7 +133,7 @@ def cell_workpiece(
             modes = modes_of(grid, share)
             springs = clamp_stiffness(clamps, stock, grid, modes, elastic.modulus, first)
     K = stiffness(grid, modes, moments, elastic.modulus, elastic.poisson) + springs.matrix
-    order = (3 * dissected(modes.lattice, grid.order)[:, None] + np.arange(3)).ravel()
+    order = (3 * dissect_modes(modes.lattice, grid.order)[:, None] + np.arange(3)).ravel()
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
     options = {"SymmetricMode": True}
@@ -145,7 +145,7 @@ def cell_workpiece(
     )  # fmt: skip
 
 
-def dissected(lattice: Indices, p: int) -> Indices:
+def dissect_modes(lattice: Indices, p: int) -> Indices:
     """Order of modes by nested dissection, (u,) int; ``lattice`` (u, 3) int their places, ``p`` the order of cells."""
     out: list[Indices] = []
     waiting: list[tuple[Indices, bool]] = [(np.arange(len(lattice)), False)]
@@ -227,12 +227,12 @@ def line_compliances(work: CellWorkpiece, lines: ArrayLike) -> Array:
     out = np.empty((c, len(STATIONS), 3, 3))
     if not c:
         return out
-    loads, stations = line_means(work, ends), _along(work, ends, np.array(STATIONS))
+    loads, stations = line_means(work, ends), _modes_along(work, ends, np.array(STATIONS))
     cell = work.grid.cell_of(ends.mean(axis=1))[0]
     near = np.lexsort(cell.T)
     for at in range(0, c, ABREAST):
         some = near[at : at + ABREAST]
-        out[some] = _solved(work, csr_array(loads[some]), stations, some)
+        out[some] = _solve_lines(work, csr_array(loads[some]), stations, some)
     return out
 
 
@@ -241,13 +241,13 @@ def line_means(work: CellWorkpiece, lines: Array) -> csr_array:
     t = _spread(work, lines)
     c, count = len(lines), len(t)
     mean = csr_array((np.full(c * count, 1.0 / count), np.arange(c * count), np.arange(c + 1) * count))
-    return csr_array(mean @ _along(work, lines, t))
+    return csr_array(mean @ _modes_along(work, lines, t))
 
 
 def displacements(work: CellWorkpiece, line: ArrayLike, points: ArrayLike) -> Array:
     """Displacement of points (n, 3) per force that is spread over a contact line (2, 3): (n, 3, 3) float [mm/N]."""
     ends = np.asarray(line, dtype=np.float64).reshape(1, 2, 3)
-    w = _along(work, ends, _spread(work, ends)).mean(axis=0)
+    w = _modes_along(work, ends, _spread(work, ends)).mean(axis=0)
     right = np.zeros((len(work.modes), 3, 3))
     for d in range(3):
         right[:, d, d] = w
@@ -263,13 +263,13 @@ def _spread(work: CellWorkpiece, ends: Array) -> Array:
     return np.asarray((np.arange(count) + 0.5) / count)
 
 
-def _along(work: CellWorkpiece, ends: Array, t: Array) -> csr_array:
+def _modes_along(work: CellWorkpiece, ends: Array, t: Array) -> csr_array:
     """(c t, u) values of the modes at shares ``t`` of lines."""
     points = ends[:, None, 0] + t[:, None] * (ends[:, None, 1] - ends[:, None, 0])
     return mode_weights(work, points.reshape(-1, 3))
 
 
-def _solved(work: CellWorkpiece, loads: csr_array, stations: csr_array, some: NDArray[np.int64]) -> Array:
+def _solve_lines(work: CellWorkpiece, loads: csr_array, stations: csr_array, some: NDArray[np.int64]) -> Array:
     """(c, s, 3, 3) compliance of a few lines."""
     c, s, u = len(some), len(STATIONS), len(work.modes)
     dense = np.zeros((u, 3, c, 3))

@@ -67,19 +67,19 @@ class JobForm:
         title = field.key
         hint = "; ".join(text for text in (field.bounds, field.meaning) if text)
 
-        def changed(event: Any, path: str = field.path) -> Any:
+        def change_value(event: Any, path: str = field.path) -> Any:
             self.entered[path] = event.value
             return self._check()
 
         made: Any
         if field.kind == "switch":
-            made = ui.checkbox(title, value=bool(field.value), on_change=changed).props("dense")
+            made = ui.checkbox(title, value=bool(field.value), on_change=change_value).props("dense")
         elif field.kind == "choice":
             words = list(dict.fromkeys([*field.choices, *([field.value] if field.value is not None else [])]))
-            made = ui.select(words, label=title, value=field.value, on_change=changed)
+            made = ui.select(words, label=title, value=field.value, on_change=change_value)
         else:
             text = "" if field.value is None else f"{field.value}"
-            made = ui.input(title, value=text, on_change=changed)
+            made = ui.input(title, value=text, on_change=change_value)
         made.props(f'dense outlined debounce=250 aria-label="{escape(field.path)}"').mark(f"field-{field.path}")
         if field.kind != "switch":
             made.props(f'suffix="{escape(field.unit)}" hide-bottom-space')

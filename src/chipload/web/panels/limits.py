@@ -32,7 +32,7 @@ class LimitPanel:
                 ui.html("", sanitize=True)
                 .classes("cl-scroll")
                 .props("tabindex=0")
-                .on("click", self._clicked, js_handler=CLICK)
+                .on("click", self._on_click, js_handler=CLICK)
             )
             self.html.mark("limits")
 
@@ -40,7 +40,7 @@ class LimitPanel:
         """Show a track."""
         self.html.set_content(limit_table(track) + time_line(track.times) + finding_list(findings(result, track)))
 
-    def _clicked(self, event: Any) -> None:
+    def _on_click(self, event: Any) -> None:
         if isinstance(event.args, int) and event.args >= 0:
             self.pick(event.args)
 

@@ -34,7 +34,7 @@ class ToolPanel:
         self.track: PageTrack | None = None
         self.starts: dict[int, float] = {}
         self.whole = 1.0
-        self.html = _table_box(self._clicked).mark("tools")
+        self.html = _table_box(self._on_click).mark("tools")
 
     def open(self, result: PageResult, track: PageTrack) -> None:
         """Show the tools of a track, or of all programs that are run one after another."""
@@ -58,7 +58,7 @@ class ToolPanel:
             cursors = f"document.querySelectorAll('#c{self.html.id} .cl-time-now')"
             ui.run_javascript(f"{cursors}.forEach(e => e.style.left = '{share:.3f}%')")
 
-    async def _clicked(self, event: Any) -> None:
+    async def _on_click(self, event: Any) -> None:
         if isinstance(event.args, list) and len(event.args) == 2:
             await self.pick(int(event.args[0]), int(event.args[1]))
 
@@ -76,7 +76,7 @@ class LinePanel:
                 "dense options-dense outlined hide-bottom-space"
             ).classes("cl-colour").mark("lines-by")  # fmt: skip
             self.by.on("popup-hide", js_handler=RELEASE)
-            self.html = _table_box(self._clicked).mark("lines")
+            self.html = _table_box(self._on_click).mark("lines")
 
     def open(self, result: PageResult, track: PageTrack, source: TrackText | None) -> None:
         """Show the lines of a track, as its text counts them."""
@@ -97,7 +97,7 @@ class LinePanel:
             lines = [] if self.line is None else line_loads(self.result, self.track, self.line, by)
             self.html.set_content(line_table(lines, by))
 
-    async def _clicked(self, event: Any) -> None:
+    async def _on_click(self, event: Any) -> None:
         if isinstance(event.args, list) and len(event.args) == 2:
             await self.pick(-1, int(event.args[1]))
 
@@ -130,7 +130,7 @@ def tool_table(
             f'<div class="cl-time"><span>{escape(label)}</span><div class="cl-time-bar">{bars}'
             f'<i class="cl-time-now"></i></div></div>'
         )
-    head = "".join(f"<th class=n>{escape(_titled(c))}</th>" for c in loads)
+    head = "".join(f"<th class=n>{escape(_axis_title(c))}</th>" for c in loads)
     body = []
     for number, track, use in uses:
         tool = f"T{use.tool}" if use.tool else "cutter"
@@ -163,7 +163,7 @@ def line_table(lines: Sequence[LineLoad], by: str) -> str:
         return '<div class="cl-none">The history of this track names no lines of a program under load.</div>'
     columns = list(lines[0].worst)
     most = max(line.worst[by] for line in lines)
-    head = "".join(f"<th class=n>{escape(_titled(c))}</th>" for c in columns)
+    head = "".join(f"<th class=n>{escape(_axis_title(c))}</th>" for c in columns)
     body = []
     for line in lines:
         share = 100.0 * line.worst[by] / most
@@ -179,7 +179,7 @@ def line_table(lines: Sequence[LineLoad], by: str) -> str:
     )
 
 
-def _titled(column: str) -> str:
+def _axis_title(column: str) -> str:
     word, unit = label_and_unit(column)
     return f"{word} [{unit}]" if unit else word
 

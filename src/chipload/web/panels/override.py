@@ -35,10 +35,10 @@ class OverrideGauge:
     def at(self, row: int) -> None:
         """Stand at a row."""
         if self.columns:
-            self.html.set_content(gauge({name: _at(column, row) for name, column in self.columns.items()}))
+            self.html.set_content(gauge({name: _value_in_row(column, row) for name, column in self.columns.items()}))
 
 
-def _at(column: Any, row: int) -> float | str:
+def _value_in_row(column: Any, row: int) -> float | str:
     """Value of a row, or its word."""
     return column.words[column.codes[row]] if isinstance(column, TextColumn) else float(column[row])
 

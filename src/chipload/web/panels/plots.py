@@ -33,15 +33,15 @@ class PlotPanel:
         self.sides: tuple[Side, ...] = ()
         with ui.element("div").classes("cl-panel cl-plots").props('role=region aria-label="plots"'):
             with ui.element("div").classes("cl-head"):
-                self.columns = ui.select({}, multiple=True, on_change=self._changed).props(
+                self.columns = ui.select({}, multiple=True, on_change=self._change_columns).props(
                     f"dense options-dense borderless use-chips hide-bottom-space max-values={MOST} aria-label=columns"
                 ).classes("cl-columns").mark("columns")  # fmt: skip
                 self.columns.on("popup-hide", js_handler=RELEASE)
-                self.against = ui.toggle({"time": "time", "path": "path"}, value="time", on_change=self._turned).props(
-                    "dense no-caps size=sm unelevated toggle-color=blue-grey-7"
-                )
+                self.against = ui.toggle(
+                    {"time": "time", "path": "path"}, value="time", on_change=self._change_abscissa
+                ).props("dense no-caps size=sm unelevated toggle-color=blue-grey-7")
             self.figure = ui.plotly({"data": [], "layout": {}, "config": {}}).classes("cl-figure")
-            self.figure.on("plotly_click", self._clicked, js_handler=CLICK)
+            self.figure.on("plotly_click", self._on_click, js_handler=CLICK)
 
     def compare(self, sides: tuple[Side, ...]) -> None:
         """Draw other tracks over the own one, the first of ``sides``; empty: it alone."""
@@ -54,7 +54,7 @@ class PlotPanel:
         self.sides = ()
         self.result, self.track, self.row = result, track, row
         if not same:
-            options = {c: _called(c) for c in result.columns}
+            options = {c: _column_label(c) for c in result.columns}
             kept = [c for c in self.columns.value or [] if c in options]
             first = [c for c in FIRST if c in options and not _flat(result, track, c)][:AT_FIRST]
             self.columns.set_options(options, value=kept or first or [result.columns[0]])
@@ -74,24 +74,24 @@ class PlotPanel:
             )
         self.figure.run_plot_method("relayout", change)
 
-    def _chosen(self) -> list[str]:
+    def _chosen_columns(self) -> list[str]:
         return [c for c in self.columns.value or [] if isinstance(c, str)][:MOST]
 
     def _draw(self) -> None:
         if self.result is not None and self.track is not None:
-            self.bounds = bounds_of(self.result, self.track, self._chosen())
+            self.bounds = bounds_of(self.result, self.track, self._chosen_columns())
             figure = plots(self.result, self.track, self.bounds, self.against.value, self.row, self.sides)
             self.figure.update_figure(figure)
             self.drawn = self.row
 
-    def _changed(self) -> None:
+    def _change_columns(self) -> None:
         self._draw()
 
-    def _turned(self) -> None:
+    def _change_abscissa(self) -> None:
         self._draw()
         self.turned()
 
-    def _clicked(self, event: Any) -> None:
+    def _on_click(self, event: Any) -> None:
         if self.track is not None and isinstance(event.args, (int, float)):
             x = abscissa(self.track, self.against.value)
             self.pick(nearest(x, float(event.args)))
@@ -112,6 +112,6 @@ def _flat(result: PageResult, track: PageTrack, column: str) -> bool:
     return isinstance(values, TextColumn) or not np.nanmax(np.abs(np.nan_to_num(values)), initial=0.0) > 0.0
 
 
-def _called(column: str) -> str:
+def _column_label(column: str) -> str:
     word, unit = label_and_unit(column)
     return f"{word} [{unit}]" if unit else word

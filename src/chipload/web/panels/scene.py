@@ -25,7 +25,7 @@ from chipload.web.comparison import Side, common_span, knots, matching_row
 from chipload.web.panels import RELEASE
 from chipload.web.panels.override import OverrideGauge
 from chipload.web.result import PageResult, PageTrack
-from chipload.web.scene import PageScene, bodies, colouring, page_scene, view_path
+from chipload.web.scene import PageScene, bodies, colour_column, page_scene, view_path
 
 #: names of views and what is said of them
 VIEWS = {"iso": "from a corner", "top": "from above", "front": "from the front", "side": "from the side"}
@@ -61,13 +61,13 @@ class ScenePanel:
         self.counted = "time"
         with ui.element("div").classes("cl-panel cl-space").props('role=region aria-label="3D view"') as self.frame:
             self.stage = ui.element("div").classes("cl-stage")
-            self.stage.on("viewrow", self._moved, js_handler="(e) => emit(e.detail)")
+            self.stage.on("viewrow", self._move_slider, js_handler="(e) => emit(e.detail)")
             self.second = ui.element("div").classes("cl-second")
             self.second.on("viewrow", self._moved_second, js_handler="(e) => emit(e.detail)")
             self.second.set_visibility(False)
             self.titles = [ui.label("").classes(f"cl-over cl-side cl-side-{k}") for k in range(2)]
             with ui.element("div").classes("cl-controls"):
-                self.column = ui.select({}, label="path coloured by", on_change=lambda: self._recoloured()).props(
+                self.column = ui.select({}, label="path coloured by", on_change=lambda: self._recolour_path()).props(
                     "dense options-dense outlined hide-bottom-space"
                 ).classes("cl-colour").mark("colour")  # fmt: skip
                 self.column.on("popup-hide", js_handler=RELEASE)
@@ -141,7 +141,7 @@ class ScenePanel:
         else:
             self._first("alone()")
         if sides is self.sides:
-            await self._recoloured(1)
+            await self._recolour_path(1)
 
     async def _open_second(self, found: Any) -> None:
         """The second view, led by the first."""
@@ -165,7 +165,7 @@ class ScenePanel:
         """Show a result from its beginning."""
         self.result, self.track = result, track
         self.found = await asyncio.to_thread(bodies, result)
-        columns = {c: _called(c) for c in result.columns}
+        columns = {c: _column_label(c) for c in result.columns}
         chosen = self.column.value if self.column.value in columns else None
         self.track = None
         self.column.set_options(columns, value=chosen or next((c for c in FIRST if c in columns), result.columns[0]))
@@ -228,12 +228,12 @@ class ScenePanel:
             if detail.get("why") == Standing.CLICKED:
                 await self.report_row(matching_row(self.sides[1], self.sides[0], self.counted, row), Standing.CLICKED)
 
-    async def _moved(self, event: Any) -> None:
+    async def _move_slider(self, event: Any) -> None:
         detail = event.args
         if isinstance(detail, dict) and isinstance(detail.get("row"), int) and detail.get("why") in set(Standing):
             await self.report_row(detail["row"], Standing(detail["why"]))
 
-    async def _recoloured(self, views: int = 2) -> None:
+    async def _recolour_path(self, views: int = 2) -> None:
         """Colour the path by the column that is chosen, in the first views."""
         result, track, column, scene = self.result, self.track, self.column.value, self.scene
         if result is None or track is None or scene is None or not isinstance(column, str):
@@ -245,7 +245,7 @@ class ScenePanel:
         span = common_span([side for _, side, _ in shown], column) if len(shown) > 1 else None
 
         def document(side: Side, own: PageScene) -> bytes:
-            made = colouring(side.result, side.track, column, own.removal, span)
+            made = colour_column(side.result, side.track, column, own.removal, span)
             return colouring_document(made, view_path(side.track))
 
         for view, side, own in shown[:views]:
@@ -334,7 +334,7 @@ class ScenePanel:
         return button
 
 
-def _called(column: str) -> str:
+def _column_label(column: str) -> str:
     word, unit = label_and_unit(column)
     return f"{word} [{unit}]" if unit else word
 

@@ -29,7 +29,7 @@ class SourcePanel:
         with ui.element("div").classes("cl-panel cl-source").props('role=region aria-label="program"'):
             self.name = ui.label("").classes("cl-head cl-file")
             self.html = ui.html("", sanitize=True).classes("cl-scroll cl-code").props("tabindex=0").on(
-                "click", self._clicked, js_handler=CLICK
+                "click", self._on_click, js_handler=CLICK
             ).mark("source")  # fmt: skip
 
     async def open(self, result: PageResult, track: PageTrack) -> None:
@@ -88,7 +88,7 @@ class SourcePanel:
         out += [f'<div class="cl-none">\u2026 {count - last} lines below</div>'] if last < count else []
         self.html.set_content("".join(out))
 
-    def _clicked(self, event: Any) -> None:
+    def _on_click(self, event: Any) -> None:
         if self.text is not None and isinstance(event.args, int):
             row = self.text.row_of(event.args)
             if row is not None:

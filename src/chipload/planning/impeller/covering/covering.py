@@ -195,16 +195,16 @@ def covering_of(
         reach, bend = max(x.reach for x in parts), max(x.bend for x in parts)
         if depth_of(corner, reach, bend, sunk) <= tolerance:
             break
-        edge *= max(_narrowing(corner, reach, bend, sunk, tolerance), _STEP)
+        edge *= max(_cell_factor(corner, reach, bend, sunk, tolerance), _STEP)
     parts = [*_nodes_of_all(impeller, around, sides), hub]
     points = np.concatenate([x.points - sunk * x.normals for x in parts])
     return Covering(points, tolerance + slack, corner, reach, bend, sunk, slack)
 
 
-def _narrowing(corner: float, reach: float, bend: float, sunk: float, tolerance: float) -> float:
+def _cell_factor(corner: float, reach: float, bend: float, sunk: float, tolerance: float) -> float:
     """Factor by which the cells are made narrower: reach is proportional to their width, bend to its square.
 
-    >>> round(_narrowing(2.0, 0.5, 0.0, 0.0, 0.04), 3)
+    >>> round(_cell_factor(2.0, 0.5, 0.0, 0.0, 0.04), 3)
     0.792
     """
     low, high = 0.1, 1.0

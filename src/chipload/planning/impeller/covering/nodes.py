@@ -42,8 +42,8 @@ class Nodes:
 def patch_nodes(patch: BSplinePatch, edge: float) -> Nodes:
     """Nodes of a patch at the corners of cells at most ``edge`` [mm] wide.
 
-    >>> from chipload.geometry.bspline import through
-    >>> flat = through([[[0, 0, 0], [0, 3, 0]], [[4, 0, 0], [4, 3, 0]]], [0, 1], [0, 1])
+    >>> from chipload.geometry.bspline import patch_through
+    >>> flat = patch_through([[[0, 0, 0], [0, 3, 0]], [[4, 0, 0], [4, 3, 0]]], [0, 1], [0, 1])
     >>> made = patch_nodes(flat, 1.0)
     >>> len(made.points), round(made.reach, 9), made.bend
     (20, 0.707106781, 0.0)
