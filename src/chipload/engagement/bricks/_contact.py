@@ -42,7 +42,8 @@ from chipload.engagement.bricks._index import INDEX, enter
 from chipload.engagement.bricks._line_chain import joined
 from chipload.engagement.bricks._slices import sliced
 from chipload.engagement.bricks._sweep import A0, COS_B, LENGTH, THETA, B, turn
-from chipload.engagement.moves._contact import APART, JUMP, STEADY, turns
+from chipload.engagement.moves._circle import APART
+from chipload.engagement.moves._contact import JUMP, STEADY, turns
 from chipload.engagement.moves._sweep import FLUTE, RHO1, TA, TB, WIDE, Z2
 from chipload.engagement.moves._uncounted_arrays import borrowed
 

@@ -13,7 +13,7 @@ from numba import njit
 from chipload.engagement.bricks._circle import intervals
 from chipload.engagement.bricks._index import BY, MANY, SIDE, UNTOUCHED
 from chipload.engagement.bricks._sweep import COS_A, COS_B, SIN_A, SIN_B, from_profile
-from chipload.engagement.moves._contact import ALONG, APART
+from chipload.engagement.moves._circle import ALONG, APART
 from chipload.engagement.moves._sweep import CORNER, FLUTE, RHO1, RHO2, TA, TB, WIDE, Z2, E, F
 
 PI = math.pi

@@ -28,7 +28,7 @@ front = LateModule("chipload.engagement.bricks._contact")
 index = LateModule("chipload.engagement.bricks._index")
 outline = LateModule("chipload.engagement.bricks._outline")
 moves = LateModule("chipload.engagement.moves._sweep")
-moves_front = LateModule("chipload.engagement.moves._contact")
+moves_circle = LateModule("chipload.engagement.moves._circle")
 initial = LateModule("chipload.engagement.moves._initial_faces")
 
 Floats = NDArray[np.float64]
@@ -227,7 +227,7 @@ class BrickStock:
 
     def _work(self, pieces: int) -> tuple[NDArray[Any], ...]:
         wide = float(self.cutters[:, moves.WIDE].max())
-        apart = min(front.BRICKS * float(self.grid[3:].min()) / wide, moves_front.APART)
+        apart = min(front.BRICKS * float(self.grid[3:].min()) / wide, moves_circle.APART)
         room = int(math.tau / (apart * min(front.SLICES / pieces, 1.0))) + 8
         return (
             np.empty((room, 2)), np.empty(5), np.empty(9), np.empty(9), np.empty((3, 2)), np.zeros((3, RANGES, 7)),

@@ -14,114 +14,31 @@ import math
 
 from numba import njit, types
 
-from chipload.engagement.moves._border import border, ridge
-from chipload.engagement.moves._edge import add_slice, candidates, sliced, windows
-from chipload.engagement.moves._sweep import AIR, FLUTE, MATERIAL, WIDE, keep, swept_by, what_is
+from chipload.engagement.moves._circle import ALONG, APART, intervals
+from chipload.engagement.moves._edge import FLANK, SAME, add_slice, candidates, sliced, windows
+from chipload.engagement.moves._flank import BEGIN, COUNT, divide_flank
+from chipload.engagement.moves._sweep import FLUTE, WIDE, keep
 from chipload.engagement.moves._uncounted_arrays import borrowed
 
 PI = math.pi
-TAU = 2.0 * math.pi
-#: distance from the end of the front at which the contact is tested [rad]
-BESIDE = 1e-4
-#: greatest angle between two samples [rad], and least number of intervals between them: the range that is searched is
-#: little wider than what may be in material, and an edge of the stock may lie between its ends alone
-APART, FEWEST = 0.35, 4
-#: greatest number of heights of the stock at which the flank is divided; above it the slices are equally thick
-LEVELS = 16
+#: greatest number of heights of the stock at which the flank is divided: those of cells, above which the slices are
+#: equally thick, and as many floors of moves
+LEVELS = 32
 #: greatest relative change of the volume per length between two steps that cut alike, and least change of one that
 #: enters or leaves the material
 STEADY, JUMP = 0.03, 0.3
 #: cosine of the least angle between two moves that make a corner
 CORNER = 0.985
-#: least sine of the angle at which the front ends
-ALONG = 1e-9
-
-
-@njit(cache=True, nogil=True, inline="always")
-def intervals(p, T, rho, z, low, high, end, apart, index, out, begin):
-    """Find the ranges of psi in material on the circle of a slice.
-
-    Parameters
-    ----------
-    p : (3,) tip [mm]; T : (2,) unit vector of psi = 0
-    rho, z : radius and height of the circle [mm]
-    low, high, end : range that is searched; end of the front, near which the contact is tested just inside [rad]
-    apart : greatest angle between two samples [rad]
-    index : see :func:`chipload.engagement.moves._sweep.what_is`
-    out : (m, 2) the ranges (from, to), written from row ``begin`` on
-
-    Returns
-    -------
-    Number of ranges
-    """
-    count = begin
-    first = max(low, BESIDE - end) if end < PI else low
-    last = min(high, end - BESIDE) if end < PI else high
-    n = max(math.ceil((last - first) / apart), FEWEST) if last > first else -1
-    d = (last - first) / n
-    c = math.cos(first)
-    s = math.sin(first)
-    cd = math.cos(d)
-    sd = math.sin(d)
-    before = AIR
-    inside = False
-    c0 = c
-    s0 = s
-    x0 = 0.0
-    y0 = 0.0
-    for i in range(n + 1):
-        x = p[0] + rho * (c * T[0] - s * T[1])
-        y = p[1] + rho * (c * T[1] + s * T[0])
-        f = what_is(x, y, z, index, before)
-        # directions of which one is in material, and the borders on both of its sides or on one
-        cm = c0 if inside else c
-        sm = s0 if inside else s
-        borders = 0
-        if (f == MATERIAL) != inside:
-            if i > 0:
-                borders = 1
-            else:
-                out[count, 0] = -end if first < 2.0 * BESIDE - end else first
-                inside = True
-        elif i > 0 and f != MATERIAL and f != before:
-            # the move that swept one of both places may have swept the other, and all between
-            alone = swept_by(f, x0, y0, z, index) if f >= 0 else swept_by(before, x, y, z, index)
-            if not alone:
-                found, cm, sm = ridge(p[0], p[1], z, rho, T, c0, s0, c, s, before, f, index)
-                borders = 2 if found else 0
-        for _ in range(borders):
-            # towards the sample before, but where the material ends
-            back = not inside
-            psi = border(
-                p[0], p[1], z, rho, T, cm, sm, c0 if back else c, s0 if back else s, before if back else f, index
-            )
-            if inside:
-                out[count, 1] = psi
-                count += 1
-            else:
-                out[count, 0] = psi
-            inside = not inside
-        x0 = x
-        y0 = y
-        if f != MATERIAL:
-            before = f
-        c0 = c
-        s0 = s
-        c, s = c * cd - s * sd, c * sd + s * cd
-    if inside:
-        out[count, 1] = end if last > end - 2.0 * BESIDE else last
-        count += 1
-    return count - begin
 
 
 @njit(cache=True, nogil=True)
-def parts_of(spans, slice_of, first, count, room):
+def parts_of(rows, first, slice_of, count, room):
     """Number of connected areas that are engaged: overlapping spans of consecutive slices are one area.
 
     Parameters
     ----------
-    spans : (count, 2) from and to [rad]
-    slice_of : numbers of their slices, from row ``first`` on
+    rows : spans from and to [rad], from row ``first`` on
+    slice_of : (count,) numbers of their slices
     room : (count,) working array
     """
     for i in range(count):
@@ -129,12 +46,12 @@ def parts_of(spans, slice_of, first, count, room):
     pieces = count
     for i in range(count):
         for j in range(i - 1, -1, -1):
-            apart = slice_of[first + i] - slice_of[first + j]
+            apart = slice_of[i] - slice_of[j]
             if apart > 1:
                 break
             if apart < 1:
                 continue
-            if spans[i, 0] < spans[j, 1] and spans[j, 0] < spans[i, 1]:
+            if rows[first + i, 0] < rows[first + j, 1] and rows[first + j, 0] < rows[first + i, 1]:
                 a = i
                 while room[a] != a:
                     a = room[a]
@@ -147,8 +64,66 @@ def parts_of(spans, slice_of, first, count, room):
     return pieces
 
 
+@njit(cache=True, nogil=True, inline="always")
+def leading_angle(side, rise, whole):
+    """Psi at which the front of a slice ends; below 0 where it has none. ``whole`` is the size of the motion."""
+    if side <= rise + ALONG * whole:
+        return -1.0
+    return PI if rise <= -side else math.acos(rise / side)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def add_ranges(table, k, spans, begin, found, place, end, p, u, T, slices, rows, owner, first_row, mine, at, out):
+    """Add the ranges of row k of a table of slices to what an instant engages; False: no room.
+
+    Parameters
+    ----------
+    table : (m, 7 or more) see :func:`chipload.engagement.moves._edge.add_slice`
+    spans, begin, found : ranges of the slice, the first of them and their number
+    place : number of the slice, by which slices follow one another
+    end : of the front [rad]
+    first_row : of the instant
+    p, u, T, slices, rows, owner, mine, at, out : see :func:`engaged`
+    """
+    row = at[0]
+    have = at[1]
+    if have == len(slices) or row + found > len(rows):
+        return False
+    rho = table[k, 2]
+    sk = table[k, 4]
+    ck = table[k, 5]
+    side = sk * math.hypot(u[0], u[1])
+    rise = ck * u[2]
+    ds = table[k, 1] - table[k, 0]
+    for i in range(begin, begin + found):
+        a = spans[i, 0]
+        b = spans[i, 1]
+        out[0] += (side * (math.sin(b) - math.sin(a)) - rise * (b - a)) * rho * ds
+        rows[row, 0] = a
+        rows[row, 1] = b
+        owner[row] = have
+        mine[row - first_row] = place
+        row += 1
+        for e in (a, b):
+            if end < PI and abs(abs(e) - end) < 1e-12:
+                out[4] += ds * sk * (math.cos(e) * T[0] - math.sin(e) * T[1])
+                out[5] += ds * sk * (math.cos(e) * T[1] + math.sin(e) * T[0])
+                out[6] -= ds * ck
+                out[7] += ds
+    for i in range(6):
+        slices[have, i] = table[k, i]
+    out[2] = min(out[2], p[2] + table[k, 3])
+    out[3] = max(out[3], p[2] + 2.0 * table[k, 6] - table[k, 3])
+    out[9] += ds
+    at[0] = row
+    at[1] = have + 1
+    return True
+
+
 @njit(cache=True, nogil=True)
-def engaged(p, u, c, T, parts, flank, index, near, levels, scratch, spans, mine, room, slices, rows, owner, at, out):
+def engaged(
+    p, u, c, T, parts, flank, index, near, levels, scratch, spans, mine, room, held, slices, rows, owner, at, out
+):  # fmt: skip
     """Find the engagement at a tip position; False: no room in ``rows`` or ``slices``.
 
     Parameters
@@ -156,7 +131,7 @@ def engaged(p, u, c, T, parts, flank, index, near, levels, scratch, spans, mine,
     p, u : (3,) tip, and motion of the step [mm]
     c : (12,) cutter; T : (2,) unit vector of psi = 0
     parts, flank : slices of a corner; longest slice of the flank [mm]
-    near, levels, scratch, spans, mine, room : working arrays, see ``WORK``
+    near, levels, scratch, spans, mine, room, held : working arrays, see ``WORK``
     slices, rows, owner : slices; spans (psi from, to) [rad]; slice of each span; from ``at[1]`` and ``at[0]`` on
     out : (10,) volume of the step [mm^3], number of areas, least and greatest height of a slice [mm], sum of the
         normals at ends of the front times their length (x, y, z), that length [mm], 1 if there is material above the
@@ -165,71 +140,58 @@ def engaged(p, u, c, T, parts, flank, index, near, levels, scratch, spans, mine,
     # what a call passes counts again
     index = borrowed(index)
     p, u, c, T, near, levels, scratch, spans = borrowed((p, u, c, T, near, levels, scratch, spans))
+    held = borrowed(held)
     out[:] = 0.0
     hu = math.hypot(u[0], u[1])
     grid = index[0]
     count = candidates(p, T, u[2] >= 0.0, c, grid, index[1], index[2], near)
     if count == 0:
         return True
-    number = sliced(c, near, count, u, parts, flank, levels, scratch)
+    number, askew = sliced(p, c, near, count, u, parts, flank, levels, index, scratch)
     apart = 2.5 * min(grid[2], grid[3])
     # above the flutes
     add_slice(scratch, number, 0.0, 0.0, c[WIDE], c[FLUTE], 1.0, 0.0, c[FLUTE], c[WIDE], c[WIDE])
     windows(near, count, 0.5 * math.hypot(grid[2], grid[3]), scratch, number + 1)
-    row = at[0]
-    have = at[1]
-    total = 0
+    first_row = at[0]
     out[2] = math.inf
     out[3] = -math.inf
-    for k in range(number + 1):
-        probe = k == number
+    flank_from = number
+    while flank_from > 0 and scratch[flank_from - 1, FLANK] >= 0.0:
+        flank_from -= 1
+    for n in range(flank_from + 1):
+        # last above the flutes
+        k = n if n < flank_from else number
         rho = scratch[k, 2]
-        sk = scratch[k, 4]
-        ck = scratch[k, 5]
-        side = sk * hu
-        rise = ck * u[2]
-        if side <= rise + ALONG * (hu + abs(u[2])):
-            continue
-        end = PI if rise <= -side else math.acos(rise / side)
+        end = leading_angle(scratch[k, 4] * hu, scratch[k, 5] * u[2], hu + abs(u[2]))
         low = max(scratch[k, 9], -end)
         high = min(scratch[k, 10], end)
         if low >= high:
             continue
-        found = intervals(p, T, rho, p[2] + scratch[k, 6], low, high, end, min(apart / rho, APART), index, spans, total)
+        found = intervals(p, T, rho, p[2] + scratch[k, 6], low, high, end, min(apart / rho, APART), index, spans, 0)
         if found == 0:
             continue
-        if probe:
+        if k == number:
             out[8] = 1.0
-            break
-        if have == len(slices) or row + found > len(rows):
+        elif not add_ranges(
+            scratch, k, spans, 0, found, k, end, p, u, T, slices, rows, owner, first_row, mine, at, out
+        ):
             return False
-        ds = scratch[k, 1] - scratch[k, 0]
-        for i in range(total, total + found):
-            a = spans[i, 0]
-            b = spans[i, 1]
-            out[0] += (side * (math.sin(b) - math.sin(a)) - rise * (b - a)) * rho * ds
-            rows[row, 0] = a
-            rows[row, 1] = b
-            owner[row] = have
-            mine[i] = k
-            row += 1
-            for e in (a, b):
-                if end < PI and abs(abs(e) - end) < 1e-12:
-                    out[4] += ds * sk * (math.cos(e) * T[0] - math.sin(e) * T[1])
-                    out[5] += ds * sk * (math.cos(e) * T[1] + math.sin(e) * T[0])
-                    out[6] -= ds * ck
-                    out[7] += ds
-        total += found
-        for i in range(6):
-            slices[have, i] = scratch[k, i]
-        have += 1
-        out[2] = min(out[2], p[2] + scratch[k, 3])
-        out[3] = max(out[3], p[2] + 2.0 * scratch[k, 6] - scratch[k, 3])
-        out[9] += ds
-    if total > 0:
-        out[1] = parts_of(spans, mine, 0, total, room)
-    at[0] = row
-    at[1] = have
+    if flank_from < number:
+        end = leading_angle(scratch[flank_from, 4] * hu, scratch[flank_from, 5] * u[2], hu + abs(u[2]))
+        pieces = divide_flank(p, T, c, flank_from, number, end, askew, scratch, index, spans, held)
+        place = flank_from
+        for k in range(pieces):
+            # pieces that do not follow one another are separate areas
+            if k > 0:
+                place += 1 if held[k, 3] - (2.0 * held[k - 1, 6] - held[k - 1, 3]) < SAME else 2
+            begin = int(held[k, BEGIN])
+            found = int(held[k, COUNT])
+            if not add_ranges(
+                held, k, spans, begin, found, place, end, p, u, T, slices, rows, owner, first_row, mine, at, out
+            ):
+                return False
+    if at[0] > first_row:
+        out[1] = parts_of(rows, first_row, mine, at[0] - first_row, room)
     return True
 
 
@@ -240,8 +202,9 @@ _F1, _F2, _I1, _I2, _S = (
     types.int64[:, ::1],
     types.int32[::1],
 )
-#: room for :func:`run`: candidates, levels, slices, spans, their slices, pieces, place, rows and slices so far
-WORK = types.Tuple((_F2, _F1, _F2, _F2, _I1, _I1, _F1, _I1))
+#: room for :func:`run`: candidates, levels, slices, spans, their slices, areas, place, rows and slices so far, and
+#: pieces of the flank
+WORK = types.Tuple((_F2, _F1, _F2, _F2, _I1, _I1, _F1, _I1, _F2))
 INDEX = types.Tuple((_F1, _I1, _F2, _I2, _S, types.uint16[::1], _F2, _I1, _F2, _F1, _F1, _I1, _S, _F2))
 
 
@@ -275,7 +238,7 @@ def step_engaged(k, frame, instants, state, index, work, parts, flank, slices, r
     """
     # what a call passes counts again
     index = borrowed(index)
-    near, levels, scratch, spans, mine, room, p, at = borrowed(work)
+    near, levels, scratch, spans, mine, room, p, at, held = borrowed(work)
     frame, instants, state, parts, flank = borrowed((frame, instants, state, parts, flank))
     slices, rows, owner, entry, out = borrowed((slices, rows, owner, entry, out))
     q = state[0] + k
@@ -299,7 +262,7 @@ def step_engaged(k, frame, instants, state, index, work, parts, flank, slices, r
             return False
         before = at[0]
         if not engaged(
-            p, m[3:], c, frame[k], parts, longest, index, near, levels, scratch, spans, mine, room,
+            p, m[3:], c, frame[k], parts, longest, index, near, levels, scratch, spans, mine, room, held,
             slices, rows, owner, at, out[entries],
         ):  # fmt: skip
             return False
@@ -328,7 +291,7 @@ def step_engaged(k, frame, instants, state, index, work, parts, flank, slices, r
             slices_before = at[1]
             if not engaged(
                 p, m[3:], c, frame[k], parts, longest, index, near, levels, scratch, spans, mine,
-                room, slices, rows, owner, at, out[entries],
+                room, held, slices, rows, owner, at, out[entries],
             ):  # fmt: skip
                 return False
             end = out[entries, 0] / length

@@ -9,11 +9,29 @@ import math
 
 from numba import njit
 
-from chipload.engagement.moves._sweep import CORNER, FLUTE, RHO1, RHO2, TA, TB, WIDE, Z1, Z2, E, F, profile
+from chipload.engagement.moves._sweep import (
+    CORNER,
+    FLAT,
+    FLUTE,
+    KIND,
+    RHO1,
+    RHO2,
+    TA,
+    TB,
+    WIDE,
+    Z1,
+    Z2,
+    E,
+    F,
+    profile,
+)
+from chipload.engagement.moves._uncounted_arrays import borrowed
 
 PI = math.pi
 #: heights closer than this count as one [mm]
 SAME = 1e-6
+#: column of a slice: 0 for one of the flank, 1 for one of the flank that begins at a height of the stock, else below 0
+FLANK = 11
 #: number of slices of the part of a corner whose circles cut all round in a downward motion, where there is material
 ROUND = 4
 #: by how many more slices a flank has than a corner where it is a cone, or goes down beside a floor that does: on a
@@ -59,6 +77,7 @@ def candidates(p, T, narrow, c, grid, shape, level, near):
             near[count, 3] = dy * T[0] - dx * T[1]
             near[count, 4] = ceil
             near[count, 5] = level[i * shape[1] + j, 0] - p[2]
+            near[count, 6] = i * shape[1] + j
             count += 1
     return count
 
@@ -124,7 +143,9 @@ def windows(near, count, half, out, slices):
 
 @njit(cache=True, nogil=True)
 def add_slice(out, k, s0, s1, rho, z0, sk, ck, z, rho0, rho1):
-    """Row k of the slices: s from, s to, rho, z from, sin, cos kappa, z of the circle, least and greatest rho."""
+    """Row k of the slices: s from, s to, rho, z from, sin, cos kappa, z of the circle, least and greatest rho; not of
+    the flank.
+    """
     out[k, 0] = s0
     out[k, 1] = s1
     out[k, 2] = rho
@@ -134,6 +155,7 @@ def add_slice(out, k, s0, s1, rho, z0, sk, ck, z, rho0, rho1):
     out[k, 6] = z
     out[k, 7] = rho0
     out[k, 8] = rho1
+    out[k, FLANK] = -1.0
     return k + 1
 
 
@@ -148,8 +170,12 @@ def add_corner(out, k, c, alpha, k0, k1, mid):
 
 
 @njit(cache=True, nogil=True)
-def sliced(c, near, count, u, parts, flank, levels, out):
-    """Cut the part of the profile that the candidates touch into slices; their number."""
+def sliced(p, c, near, count, u, parts, flank, levels, index, out):
+    """Cut the part of the profile that the candidates touch into slices: their number, and whether the contact of the
+    flank may change between its slices and its ends.
+    """
+    # what a call passes counts again
+    index = borrowed(index)
     pieces = len(parts)
     inner = math.inf
     outer = 0.0
@@ -200,15 +226,69 @@ def sliced(c, near, count, u, parts, flank, levels, out):
             )
     if outer >= c[RHO2] and top > c[Z2]:
         many = pieces * (DOWN if u[2] < 0.0 or c[TB] > 0.0 else 1)
-        k = flanked(c, near, count, top, many, flank, levels, out, k)
-    return k
+        return flanked(p, c, near, count, top, many, flank, levels, index, out, k)
+    return k, False
 
 
 @njit(cache=True, nogil=True)
-def flanked(c, near, count, top, pieces, flank, levels, out, k):
-    """Slices of the flank: between the heights of the stock beside it, none longer than ``flank``; where these are too
-    many, ``pieces`` equal ones.
+def floors_of_moves(p, c, near, count, top, levels, n, index):
+    """Write the heights above the tip of the floors that moves left beside the flank behind the first ``n`` of
+    ``levels``, the lowest of them where there is no room for all: the number of levels, and whether there are floors
+    that are not level.
     """
+    index = borrowed(index)
+    lists = index[3]
+    kept = index[4]
+    moves = index[6]
+    of = index[7]
+    cutters = index[8]
+    begin = n
+    askew = False
+    for i in range(count):
+        if near[i, 1] < c[RHO2]:
+            continue
+        cell = int(near[i, 6])
+        # beside upright faces of a mesh
+        askew = askew or near[i, 5] == -math.inf
+        last = math.inf
+        for k in range(lists[cell, 0], lists[cell, 0] + lists[cell, 1]):
+            m = kept[k]
+            low = moves[m, 2] + min(moves[m, 5], 0.0)
+            if moves[m, 5] != 0.0 and moves[m, 6] > 0.0:
+                # a floor that falls along the move
+                low -= p[2]
+                askew = askew or (low < top and low + abs(moves[m, 5]) > c[Z2])
+                continue
+            if low == last:
+                continue
+            last = low
+            if cutters[of[m], KIND] != FLAT:
+                askew = True
+                continue
+            h = low - p[2]
+            if not c[Z2] < h < top:
+                continue
+            fresh = True
+            highest = begin
+            for j in range(n):
+                if abs(levels[j] - h) < SAME:
+                    fresh = False
+                if j >= begin and levels[j] > levels[highest]:
+                    highest = j
+            if fresh and n < len(levels):
+                levels[n] = h
+                n += 1
+            elif fresh and begin < n and h < levels[highest]:
+                levels[highest] = h
+    return n, askew
+
+
+@njit(cache=True, nogil=True)
+def flanked(p, c, near, count, top, pieces, flank, levels, index, out, k):
+    """Slices of the flank: between the heights of the stock beside it, none longer than ``flank``; where the cells have
+    too many heights, ``pieces`` equal ones between the floors of level moves. Returns as :func:`sliced`.
+    """
+    index = borrowed(index)
     n = 2
     levels[0] = c[Z2]
     levels[1] = top
@@ -223,7 +303,7 @@ def flanked(c, near, count, top, pieces, flank, levels, out, k):
             for j in range(n):
                 if abs(levels[j] - h) < SAME:
                     fresh = False
-            if fresh and n == len(levels):
+            if fresh and 2 * n == len(levels):
                 many = True
             elif fresh:
                 levels[n] = h
@@ -231,6 +311,7 @@ def flanked(c, near, count, top, pieces, flank, levels, out, k):
     if many:
         # no level floors around: a surface that rises and falls
         n = 2
+    n, askew = floors_of_moves(p, c, near, count, top, levels, n, index)
     if many or c[TB] > 0.0:
         # beside an upright wall the contact of a cone changes all along it
         flank = min(flank, (top - c[Z2]) / pieces)
@@ -251,4 +332,5 @@ def flanked(c, near, count, top, pieces, flank, levels, out, k):
                 out, k, start + (z0 - c[Z2]) / sk, start + (z1 - c[Z2]) / sk, 0.5 * (rho0 + rho1), z0, sk, ck, mid,
                 rho0, rho1,
             )  # fmt: skip
-    return k
+            out[k - 1, FLANK] = 1.0 if i == 0 else 0.0
+    return k, askew or many

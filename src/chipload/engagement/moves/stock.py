@@ -24,7 +24,9 @@ from chipload.engagement.moves.net import area_of, nodes_of, rings
 from chipload.lazy import LateModule
 
 _sweep = LateModule("chipload.engagement.moves._sweep")
+circle = LateModule("chipload.engagement.moves._circle")
 edge = LateModule("chipload.engagement.moves._edge")
+flanks = LateModule("chipload.engagement.moves._flank")
 front = LateModule("chipload.engagement.moves._contact")
 initial = LateModule("chipload.engagement.moves._initial_faces")
 outline = LateModule("chipload.engagement.moves._outline")
@@ -104,13 +106,13 @@ def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tupl
             most, (3 + 2 * edge.DOWN) * pieces + 2 * front.LEVELS + edge.ROUND + int(c[_sweep.FLUTE] / sk / longest) + 4
         )
         samples = max(
-            samples, int(math.tau / min(min(grid[2], grid[3]) / c[_sweep.WIDE], front.APART)) + 4 + front.FEWEST
+            samples, int(math.tau / min(min(grid[2], grid[3]) / c[_sweep.WIDE], circle.APART)) + 4 + circle.FEWEST
         )
-    spans = most * (samples + 1)
+    spans = (most + flanks.SEARCHES) * (samples + 1)
     return (
-        np.empty((cells, 6)), np.empty(front.LEVELS), np.empty((most, 11)), np.empty((spans, 2)),
+        np.empty((cells, 7)), np.empty(front.LEVELS), np.empty((most, 12)), np.empty((spans, 2)),
         np.empty(spans, np.int64), np.empty(spans, np.int64), np.array([0.0, 0.0, 0.0, 0.0]),
-        np.empty(2, np.int64),
+        np.empty(2, np.int64), np.empty((most + 2 * flanks.SEARCHES, 12)),
     )  # fmt: skip
 
 

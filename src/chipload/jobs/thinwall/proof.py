@@ -98,13 +98,8 @@ def resolution_of(inputs: WallInputs, program: Program) -> Resolution:
 
 
 def engine_of(inputs: WallInputs) -> Engine:
-    """The engine of the simulation: moves where corners cut.
-
-    A flank meets the floors of the rows above it within one cell of the index of moves, beside the wall, where they are
-    not known: its slices of half a radius then reach too high by up to 50 %. Floors are cut with the same upright
-    cutters. Both are simulated by layers.
-    """
-    return "auto" if all(o.table.contact == "corner" for o in inputs.operations) else "layers"
+    """The engine of the simulation: moves but for floors, whose stock is a body beside the part, not one with it."""
+    return "layers" if any(o.table.contact == "end" for o in inputs.operations) else "auto"
 
 
 def prove(
