@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -70,12 +71,32 @@ def test_without_what_it_hits_the_verdict_is_unproven(folder: Path) -> None:
 
 
 def test_what_is_refused(folder: Path) -> None:
-    feeds = "[operation.feeds]\nslowest_percent = 50.0\nfastest_percent = 150.0\n"
-    (folder / "feeds.toml").write_text(JOB.replace("[limits]", f"{feeds}[limits]"))
-    code, _, said = call("check", folder / "feeds.toml")
+    (folder / "speeds.toml").write_text(JOB.replace("[limits]", "[operation.speeds]\n[limits]"))
+    code, _, said = call("check", folder / "speeds.toml")
     assert code == 2
-    assert "operation.0.feeds: cutter 2 is a body (body_mm) whose load is unknown: leave feeds out" in said
+    assert "operation.0.speeds: cutter 2 is a body (body_mm) whose load is unknown: leave speeds out" in said
     (folder / "moves.toml").write_text(JOB.replace('kind = "simulate"', 'kind = "simulate"\nengine = "moves"'))
     code, _, said = call("run", folder / "moves.toml", "--out", folder / "moves")
     assert code == 2
     assert "tool 2 is a body without chips" in said
+
+
+TAPPED = (
+    "G21 G90 G94\nT1 M6\nS3000 M3\nG0 X-8 Y5 Z5\nG1 Z-2 F300\nX28\nG0 Z5\n"
+    "T2 M6\nS500 M3\nG0 X10 Y5 Z5\nG84 Z-1 R2 F500\nG80\nM5\nM2\n"
+)
+
+
+def test_new_feeds_leave_a_tap_alone(folder: Path) -> None:
+    """The cutter becomes faster; the tap, whose load is not known, keeps its F, which is its pitch times the speed."""
+    (folder / "tapped.ngc").write_text(TAPPED)
+    feeds = "[operation.feeds]\nslowest_percent = 50.0\nfastest_percent = 150.0\nair_mm_min = 2000.0\n"
+    text = JOB.replace("slot.ngc", "tapped.ngc").replace("[limits]", f"{feeds}[limits]")
+    (folder / "feeds.toml").write_text(text)
+    code, out, said = call("run", folder / "feeds.toml", "--out", folder / "feeds")
+    assert code == 3, said
+    (written,) = (folder / "feeds").rglob("*.ngc")
+    before, _, behind = written.read_text().partition("G84")
+    assert re.findall(r" F([0-9.]+)", behind)[0] == "500"
+    # the greatest feed of the cut, 1.5 times 300
+    assert "450" in re.findall(r" F([0-9.]+)", before), out

@@ -45,8 +45,9 @@ from chipload.planning.feeds import (
     steady_feeds,
 )
 from chipload.program.gcode.feed_words import DIGITS, with_feeds
-from chipload.program.program import DWELL, RAPID
+from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import ProgramReading
+from chipload.program.tapping import tapping_motions
 from chipload.program.time import peak_speed, program_time
 from chipload.result import column_of, error_of
 from chipload.simulation.loads import Cuts, at_feeds, greatest_loads
@@ -279,6 +280,7 @@ def with_new_feeds(
     of_steps, at = divided.allowed, divided.step
     lines = line_feeds(divided.line, of_steps.touch[at], of_steps.least[at], of_steps.most[at], of_steps.by[at])
     lines = _in_air(lines, divided, speeds_of(steps), request.table, machine)
+    lines = _with_kept_feeds(lines, divided.reading.program, cutters)
     segments = np.isin(lines.line, [line for lines_of in divided.segments.values() for line in lines_of])
     factor, useful = _feed_factors(lines, divided.reading, machine, request.table, segments)
     new = with_feeds(divided.text, dict(zip(lines.line.tolist(), factor.tolist(), strict=True)))
@@ -342,6 +344,18 @@ def _in_air(lines: LineFeeds, divided: DividedProgram, speed: Floats, table: Fee
             air & (factor > 1.0), MACHINE if mm_s_from_mm_min(table.air_mm_min) > machine.feed_max else AIR, by
         )
     return replace(lines, least=np.where(air, 1.0, lines.least), allowed=allowed, by=by)
+
+
+def _with_kept_feeds(lines: LineFeeds, program: Program, cutters: Mapping[int, Cutter]) -> LineFeeds:
+    """Keep the feed of lines on which a tool without chips moves (its load is not known) or taps (F is the pitch)."""
+    bodies = [number for number, cutter in cutters.items() if cutter.body]
+    kept = np.isin(program.tool, bodies)
+    kept[tapping_motions(program).rows] = True
+    own = np.isin(lines.line, program.line[kept])
+    return replace(
+        lines, least=np.where(own, 1.0, lines.least), allowed=np.where(own, 1.0, lines.allowed),
+        by=np.where(own, KEPT, lines.by),
+    )  # fmt: skip
 
 
 def _feed_factors(

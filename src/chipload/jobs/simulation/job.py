@@ -78,11 +78,10 @@ def program_job(
         errors.texts += [*_contradictions(table), *wrong]
         with errors.collect():
             tools = cutters(table.cutter, folder)
-        changed = [key for key in ("feeds", "speeds") if getattr(table.operation[0], key, None) is not None]
         errors.texts += [
-            f"operation.0.{changed[0]}: cutter {n} is a body (body_mm) whose load is unknown: leave {changed[0]} out"
+            f"operation.0.speeds: cutter {n} is a body (body_mm) whose load is unknown: leave speeds out"
             for n, cutter in tools.items()
-            if cutter.body and changed
+            if cutter.body and getattr(table.operation[0], "speeds", None) is not None
         ]
         errors.texts += [text for k, f in enumerate(table.fixture) for text in fixture_errors(f, f"fixture.{k}")]
         with errors.collect("operation.0."):
