@@ -177,3 +177,13 @@ def test_rows_of_a_subprogram_stay_with_the_setup_that_calls_it(tmp_path: Path):
     second = reading_of_lines(reading, (8, 11), [(1, 7)]).program
     assert first.p_work[:, 0].tolist() == [0.0, 1.0]
     assert second.p_work[:, 0].tolist() == [9.0, 10.0]
+
+
+def test_offsets_between_two_stops_are_asked_for(tmp_path: Path):
+    """The same cuts in two offsets without a stop: equal parts or sides of one; the program does not say."""
+    (tmp_path / "part.nc").write_text(f"{HEAD}{faced('G54', 1)}{faced('G55', 1)}M30\n%\n")
+    draft = draft_program(tmp_path / "part.nc", tmp_path)
+    assert draft.questions[0].startswith("program.work_offsets: do G55 hold equal parts, or sides of one")
+    assert "[[setup]]" not in draft.text()
+    (tmp_path / "one.nc").write_text(f"{HEAD}{faced('G55', 1)}M30\n%\n")
+    assert not any("work_offsets" in q for q in draft_program(tmp_path / "one.nc", tmp_path).questions)

@@ -30,7 +30,7 @@ class Entry:
     ----------
     key, value : as the job file has them; a value None is written as a comment, as an example of an optional key
     note : where the value comes from, or why it was guessed
-    guess : whether the user must confirm it
+    guess : whether the user must confirm it; without a value, that it is left out
     example : of an optional key that is left out, as TOML; only without a value
     """
 
@@ -107,7 +107,9 @@ class Draft:
             if table.repeated:
                 name = f"{table.name}.{count.get(table.name, 0)}"
                 count[table.name] = count.get(table.name, 0) + 1
-            out += [f"{name}.{e.key} = {toml(e.value)}: {e.note}" for e in table.guesses]
+            out += [
+                f"{name}.{e.key}{'' if e.value is None else f' = {toml(e.value)}'}: {e.note}" for e in table.guesses
+            ]
         return tuple(out)
 
     @property

@@ -22,7 +22,7 @@ from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.program.apt.reader import apt_text
 from chipload.program.control import is_cl_data
 from chipload.program.gcode.reader import gcode_text
-from chipload.program.lines_of import reading_of_lines
+from chipload.program.lines_of import UNSET, reading_of_lines
 from chipload.program.motions import bounds, lengths
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import ENDINGS, ProgramReading, read_program, read_tools
@@ -129,7 +129,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     sizes = [_size(next((s for s in _stated_values(n, known, header) if s), {})) for n in numbers]
     motions = {n: _kind_by_motions(program, cuts & (program.tool == n)) for n in numbers}
     tables = [
-        _program_table(path, folder, chosen, known, min(sizes), text),
+        _program_table(path, folder, chosen, known, min(sizes), text, bool(setups)),
         _machine_table(chosen, known),
         DraftTable(
             "stock", (*stock_entries, _layer(deepest, sizes)), note="the block that the program starts from [mm]"
@@ -353,7 +353,9 @@ def _of_table(tools: Path | None, number: int) -> Stated:
     return own
 
 
-def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known, smallest: float, text: str) -> DraftTable:
+def _program_table(
+    path: Path, folder: Path, chosen: _Chosen, known: Known, smallest: float, text: str, setups: bool
+) -> DraftTable:
     entries = [Entry("file", path.name if known.text is not None else relative(path, folder))]
     if chosen.dialect is not None:
         entries.append(Entry("dialect", chosen.dialect, "the one that leaves the fewest words unread", True))
@@ -374,8 +376,21 @@ def _program_table(path: Path, folder: Path, chosen: _Chosen, known: Known, smal
     speed = _speed(chosen, smallest, text)
     if speed is not None:
         entries.append(Entry("speed_rpm", speed[0], f"the text cuts with the spindle at rest; {speed[1]}", True))
-    offsets = Entry("work_offsets", note="origins in the machine", example="{ G54 = [0.0, 0.0, 0.0] }")
-    return DraftTable("program", (*entries, offsets), note="the program; lengths here are in mm, whatever unit it has")
+    return DraftTable(
+        "program",
+        (*entries, _work_offsets(chosen.reading, setups)),
+        note="the program; lengths here are in mm, whatever unit it has",
+    )
+
+
+def _work_offsets(reading: ProgramReading, setups: bool) -> Entry:
+    """The origins of the work offsets: a question where several are used between two stops."""
+    example = "{ G54 = [0.0, 0.0, 0.0] }"
+    unset = [f.text.split(":")[0] for f in reading.findings if f.code == UNSET and f.severity >= Severity.UNPROVEN]
+    if setups or not unset:
+        return Entry("work_offsets", note="origins in the machine", example=example)
+    named = ", ".join(unset[:4])
+    return Entry("work_offsets", None, f"do {named} hold equal parts, or sides of one; where are they", True, example)
 
 
 def _guesses(reading: ProgramReading) -> list[Entry]:

@@ -19,6 +19,7 @@ PROGRAM = {
     "control": "another control reads the program in another way",
     "dialect": "another language reads the program in another way",
     "compensation": "wear alone leaves the path as it stands; the radius moves it by the cutter's radius",
+    "work_offsets": "nothing says how the parts lie beside one another: all are simulated in the place of the first",
     "tools_unit": "the other unit changes diameters and lengths by 25.4",
     "feed_mm_min": "times and loads of the cuts before the first F",
     "speed_rpm": "times the teeth's feed and the loads",
@@ -65,7 +66,8 @@ def questions(tables: Sequence[DraftTable]) -> tuple[str, ...]:
 
 
 def _one(table: str, entry: Entry, effect: str) -> str:
-    return f"{table}.{entry.key} = {toml(entry.value)}: {entry.note}? {effect}"
+    value = "" if entry.value is None else f" = {toml(entry.value)}"
+    return f"{table}.{entry.key}{value}: {entry.note}? {effect}"
 
 
 def _table(table: DraftTable, question: str, effect: str) -> str:
