@@ -130,7 +130,7 @@ def read_faces(path: str | Path, key: str = "part.file") -> Model:
     file = Path(path)
     part = open_step(file, key)
     try:
-        rows, solid = part.call("step_faces.listed")
+        rows, solid = part.call("step_faces.list_faces")
     except BaseException:
         part.close()
         raise

@@ -49,7 +49,7 @@ def meridian_of(faces: Sequence[Face], R: Floats, key: str, tips: bool = False) 
     InputError
         A face is not of revolution about the axis, or the faces do not join smoothly.
     """
-    out: Floats = faces[0].part.call("step_meridian.joined", [f.number for f in faces], R, key, tips)
+    out: Floats = faces[0].part.call("step_meridian.join_meridians", [f.number for f in faces], R, key, tips)
     return out
 
 

@@ -98,7 +98,7 @@ def side_of(faces: Sequence[Face], key: str, fit: float, R: Floats, hub: Revolve
     names = f"face {numbers[0]}" if len(numbers) == 1 else f"faces {', '.join(map(str, numbers))}"
     parts, rest = [], 0.0
     for face in faces:
-        ku, kv, control, side, off, loop = face.part.call("step_side.trimmed", face.number, key)
+        ku, kv, control, side, off, loop = face.part.call("step_side.trim_face", face.number, key)
         parts.append(_trim_patch(BSplinePatch(ku, kv, control @ R.T, side), loop))
         rest = max(rest, off)
     edges = _edges(_region(parts, hub, shroud, key, names), hub, shroud, key, names)
