@@ -1,6 +1,7 @@
 """Moves a second and peak memory of a simulated program, at three lengths.
 
     python benchmarks/simulation.py [--moves 10000 30000 100000] [--memory]
+    python benchmarks/simulation.py --teeth
 
 The program is a three-axis finishing program as a CAM writes it: a ball nose of 8 mm in rows 0.4 mm apart over a wavy
 surface, short lines of 0.4 mm, rows there and back; the stock is a block in layers of 0.25 mm. Every move is a step:
@@ -8,6 +9,11 @@ its chip, force, torque and power are calculated and kept. The length of a row s
 rows. Each length runs in a process of its own, with its columns in files (``remove_in_chunks``, as `chipload run` has
 them) or, with ``--memory``, in memory (``remove``). Peak memory is the most that the process ever had in memory;
 "before" is what it had with libraries, program and stock, when the simulation began.
+
+``--teeth`` measures what the exact surfaces of the teeth cost: the same simulation by moves, in turn with the chips
+between the true paths of the teeth and with those of circles (cutters with equal teeth), or with one radius of each
+tooth for every slice (cutters with runout). It prints the ratio of the least processor times of several rounds; the
+exit code is 1 where it is above 1.3.
 """
 
 from __future__ import annotations
@@ -20,10 +26,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+import chipload.engagement.tooth_surfaces as surfaces
+import chipload.simulation.loads
+import chipload.simulation.moves
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import material_named
 from chipload.program.program import LINE, RAPID, Program
@@ -94,12 +104,57 @@ def block(program: Program) -> LayeredStock:
     return LayeredStock.block((-6.0, -6.0, -8.0), (ALONG * ROW + 6.0, y + 6.0, 0.0), 0.25, 32.0)
 
 
+#: mills of the finishing program and of rows that go 3 mm deep, without and with runout
+MILLS = {
+    "ball": BALL,
+    "ball, runout 5 um": replace(BALL, runout=(0.005, 0.5)),
+    "flat": Cutter(8.0, 4, math.radians(35.0), 20.0, 35.0, 6e5),
+    "flat, runout 5 um": Cutter(8.0, 4, math.radians(35.0), 20.0, 35.0, 6e5, runout=(0.005, 0.5)),
+}
+#: rounds of the comparison, moves of the program, greatest ratio of times
+ROUNDS, MOVES, MOST = 4, 3000, 1.3
+
+
+def level_rows(moves: int) -> Program:
+    """Rows there and back on one level, 2 mm apart, 3 mm deep."""
+    program = finishing(moves)
+    p = np.array(program.p_work)
+    p[:, 1] *= 2.0 / ACROSS
+    p[:, 2] = -3.0
+    return replace(program, p_work=p)
+
+
+def cost_of_teeth() -> int:
+    """Print the ratio of processor times with and without the exact surfaces of the teeth."""
+    material, exact, share, worst = material_named("al7075-t6"), surfaces.chips_of_teeth, surfaces.SHARE, 0.0
+    users = (chipload.simulation.moves, chipload.simulation.loads)
+    for name, mill in MILLS.items():
+        program = finishing(MOVES) if mill.corner_radius else level_rows(MOVES)
+        alike, least = mill.teeth_alike, [math.inf, math.inf]
+        for turn in range(2 * ROUNDS + 2):
+            first = turn % 2 == 0
+            for user in users:
+                user.chips_of_teeth = (lambda front, _: front) if first and alike else exact
+            surfaces.SHARE = 1e9 if first and not alike else share
+            begin = time.process_time()
+            remove(program, block(program), {1: mill}, material, RESOLUTION, engine="moves", accuracy=False)
+            if turn > 1:
+                least[turn % 2] = min(least[turn % 2], time.process_time() - begin)
+        worst = max(worst, least[1] / least[0])
+        what = "circles" if alike else "one radius of each tooth for every slice"
+        print(f"{name}: {least[1]:.3f} s, with {what} {least[0]:.3f} s: {least[1] / least[0]:.2f} times", flush=True)
+    return int(worst > MOST)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--moves", type=int, nargs="+", default=[10_000, 30_000, 100_000])
     parser.add_argument("--memory", action="store_true", help="keep the columns in memory")
     parser.add_argument("--one", action="store_true", help="run in this process")
+    parser.add_argument("--teeth", action="store_true", help="cost of the exact surfaces of the teeth")
     args = parser.parse_args()
+    if args.teeth:
+        sys.exit(cost_of_teeth())
     if args.one:
         print(json.dumps(one(args.moves[0], args.memory)))
         return

@@ -1,13 +1,14 @@
 """Random ordinary cuts against the true paths of the teeth: how many are within the stated error.
 
-    python benchmarks/truth.py [NUMBER] [--first SEED] [--kind KIND ...] [--chips NUMBER]
+    python benchmarks/truth.py [NUMBER] [--first SEED] [--kind KIND ...] [--chips NUMBER] [--walls NUMBER]
 
 Each cut is a program that chipload.simulate runs at its default settings, with steps of 0.5 to 2 mm: a flat, ball,
 bull-nose, tapered or barrel mill of 3 to 20 mm, 2 to 6 teeth, a helix of 20 to 50 deg, a depth of 0.1 to 2 diameters (a
 ball: to 0.4), a radial depth of 0.004 to 1 diameter, a feed per tooth of 0.2 to 1.5 % of the diameter, up or down
 milling, runout of 0 to 15 µm, a fifth uneven pitch, and coefficients that vary by 30 %; or a flat mill on a helix into
 solid material. The oracles, ``tests/engagement/tooth_paths.py`` and ``helix_paths.py``, use no code of the package.
-``--chips`` compares the chips of a number of flat and ball mills alone, without a simulation.
+``--chips`` compares the chips of a number of flat and ball mills alone, without a simulation. ``--walls`` compares the
+greatest form error of a number of walls that helical flat mills finish, most of them in down milling.
 
 Compared are the greatest force over all directions, the greatest torque and the mean torque, in the middle of the cut.
 The exit code is 1 where fewer than 99 % are within the stated error, one is beyond twice that, or the median of the
@@ -25,6 +26,7 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+import trimesh
 
 import chipload
 from chipload.cutter.cutter import Cutter
@@ -51,6 +53,7 @@ def oracle(name: str) -> ModuleType:
 
 
 Cut, true_loads = oracle("tooth_paths").Cut, oracle("tooth_paths").true_loads
+greatest_wall_error = oracle("tooth_paths").greatest_wall_error
 Helix, helix_loads = oracle("helix_paths").Helix, oracle("helix_paths").helix_loads
 
 COEFFICIENTS = np.array([800.0, 300.0, 150.0, 20.0, 15.0, 5.0])
@@ -192,6 +195,39 @@ def errors_of_helix(cut: Helix, K: np.ndarray, step: float) -> tuple[np.ndarray,
     return worst / known - 1.0, np.array([stated[name] for name in COLUMNS])
 
 
+def random_wall(seed: int) -> tuple[Cut, np.ndarray, float]:
+    """A finishing cut of a wall by a flat mill, three of four in down milling, its coefficients, and the overhang."""
+    g = np.random.default_rng(seed)
+    D, N = float(g.choice([4, 6, 8, 10, 12, 16, 20])), int(g.integers(2, 7))
+    ap = D * math.exp(g.uniform(math.log(0.5), math.log(1.8)))
+    ae, fz = D * math.exp(g.uniform(math.log(0.01), math.log(0.1))), D * float(g.uniform(0.002, 0.01))
+    cut = Cut(D, N, float(g.uniform(20.0, 50.0)), ap, ae, fz, bool(g.uniform() < 0.25))
+    return cut, COEFFICIENTS * np.exp(0.3 * g.normal(size=6)), ap + 2.0 + D * float(g.uniform(1.0, 2.5))
+
+
+def error_of_wall(cut: Cut, K: np.ndarray, overhang: float) -> tuple[float, float]:
+    """True error of the greatest form error of a wall whose points are 1 mm apart, and the stated one."""
+    known = 1e3 * greatest_wall_error(cut, K, overhang, 6e5, 300, 1500)
+    mill = Cutter(cut.D, cut.N, math.radians(cut.helix), cut.ap + 2.0, overhang, 6e5)
+    feed, side = cut.fz * cut.N * 300.0 / math.tau, 1.0 if not cut.up else -1.0
+    y, low, length = side * mill.radius, -cut.ap - 3.0, 1.5 * cut.D
+    away = side * 3.0 * cut.D
+    path = [[-cut.D, away, 5.0], [-cut.D, y, 5.0], [-cut.D, y, -cut.ap]]
+    program = Program.join([rapid(path, 300.0, 1, "link"), plunge([length + cut.D, y, -cut.ap], feed, 300.0, 1, "cut")])
+    box = sorted((0.0, -side * 8.0)), sorted((side * cut.ae, -side * 8.0))
+    wall = trimesh.creation.box(bounds=[[0.0, box[0][0], low], [length, box[0][1], 0.0]])
+    free = ("holder_gpa", "grip_n_um", "grip_nm_rad", "spindle_n_um", "spindle_nm_rad", "work_n_um")
+    found = chipload.simulate(
+        program, chipload.Stock.block((0.0, box[1][0], low), (length, box[1][1], 0.0)), mill,
+        Material("m", *K, source="made up"), "vmc", chipload.Limits(form_error_um=1e4),
+        part=chipload.FinishedPart(wall, 1.0), stiffness=chipload.MachineStiffness(**dict.fromkeys(free, math.inf)),
+        settings=chipload.SimulationSettings(1.0),
+    )  # fmt: skip
+    numbers = found.numbers
+    greatest = max((numbers["form_error_um"][key] for key in ("greatest", "least")), key=abs)
+    return greatest / known - 1.0, numbers["resolution_error"]["form_error_um"]
+
+
 def say(name: str, off: np.ndarray, stated: np.ndarray) -> bool:
     """Print the share within the stated error; whether it is right."""
     size = np.abs(off)
@@ -235,6 +271,7 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=10_000)
     parser.add_argument("--kind", nargs="*", choices=KINDS, default=KINDS)
     parser.add_argument("--chips", type=int, default=0)
+    parser.add_argument("--walls", type=int, default=0)
     given = parser.parse_args()
     right = True
     for kind in ("flat", "ball") if given.chips else ():
@@ -242,6 +279,9 @@ def main() -> int:
         some = [errors_of_chips(seed) for seed in seeds]
         for k, name in enumerate(COLUMNS):
             right &= say(f"chips, {kind}, {name}", np.array([o[k] for o, _ in some]), np.array([s for _, s in some]))
+    if given.walls:
+        walls = np.array([error_of_wall(*random_wall(s)) for s in range(given.first, given.first + given.walls)])
+        right &= say("walls, form_error_um", *walls.T)
     found: dict[str, list[tuple[int, np.ndarray, np.ndarray]]] = {kind: [] for kind in given.kind}
     nothing = 0
     for seed in range(given.first, given.first + given.number):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named
-from chipload.engagement.tooth_surfaces import BEYOND, SHARE, TIP
+from chipload.engagement.tooth_surfaces import BEYOND, TIP, UNLIKE
 from chipload.errors import Cancelled, InputError
 from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, Program
@@ -128,14 +128,15 @@ def test_layers_find_the_same_loads() -> None:
 
 
 def test_accuracy_of_a_run_with_a_turning_axis() -> None:
-    """Runout adds what the chips of a ball leave out: 0.01 + 0.7 e / ae, and half of the share of divided edges."""
+    """Runout adds what the chips of a ball leave out: 0.002 + 0.07 x + 4 x^2, x = e / ae, at most 1."""
     removal, plain = (run_of_ball(replace(BALL, runout=runout)) for runout in (BALL.runout, (0.0, 0.0)))
     for one in (removal, plain):
         assert abs(one.energy_balance[2]) < 1e-6
     error = plain.resolution_error["force_n"]
     assert LEANING_MOVES_FLOOR["force_n"] <= error < 0.2
     more = removal.resolution_error["force_n"] - error
-    assert more == pytest.approx(TIP + BEYOND * 0.01 / BALL.diameter + 0.5 * SHARE, abs=0.01)
+    x = 0.01 / BALL.diameter
+    assert more == pytest.approx(UNLIKE + TIP * x + BEYOND * x * x, abs=0.01)
 
 
 def run_of_ball(ball: Cutter) -> Removal:

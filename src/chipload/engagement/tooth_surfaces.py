@@ -40,11 +40,13 @@ Ints = NDArray[np.int64]
 
 #: share of the chip that may be missed where the edge is divided into parts of one radius
 SHARE = 0.01
-#: parts of :func:`chip_error`: at any cut, of the square of feed over radius, of the runout over the radial depth
-LEAST, SECOND, RUNOUT = 0.003, 0.75, 0.04
-#: the same where the surface leans, as that of a ball nose or a cone: at any cut, with runout, and of the runout over
-#: the greatest radial depth of the step: a longer tooth also cuts on parts of the edge that no circle reaches
-LEANS, TIP, BEYOND = 0.01, 0.01, 0.7
+#: parts of :func:`chip_error`: at any cut, with runout, of the square of feed over radius, of the runout over the
+#: radial depth
+LEAST, UNLIKE, SECOND, RUNOUT = 0.0025, 0.002, 0.75, 0.04
+#: the same where the surface leans, as that of a ball nose or a cone: at any cut, of the feed over the radius, of the
+#: runout over the greatest radial depth of the step, and of its square: a longer tooth also cuts on parts of the edge
+#: that no circle reaches
+LEANS, NARROW, TIP, BEYOND = 0.002, 0.15, 0.07, 4.0
 
 
 def tooth_radii(cutter: Cutter, lag: ArrayLike = 0.0) -> Floats:
@@ -151,11 +153,11 @@ def thickest_of_teeth(plain: ArrayLike, cutter: Cutter, sine: ArrayLike = 1.0, l
 
 def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
     """Return the greatest relative error (n,) of the loads of each step by what the chips of :func:`chips_of_teeth`
-    leave out: 0.003 + 0.75 (f / R)^2 / phi_w + 0.04 e / max(ae, e), phi_w the engaged arc, ae its radial depth.
+    leave out: 0.0025 + 0.75 (f / R)^2 / phi_w + 0.04 e / max(ae, e), phi_w the engaged arc, ae its radial depth.
 
-    With runout half of :data:`SHARE` is added. Where a range moves along the axis and leans, its chip is of first order
-    in that motion: f / R is added. A surface that leans has 0.01 at least, and with runout 0.01 + 0.7 e / ae more, ae
-    the greatest radial depth of the step.
+    With runout 0.002 is added. Where a range moves along the axis and leans, its chip is of first order in that motion:
+    f / R is added. A surface that leans has 0.002 + 0.15 f / R more, and with runout 0.07 x + 4 x^2, x = e / ae at most
+    1, ae the greatest radial depth of the step.
     Ranges count by their share of the chip. 0 where nothing is cut.
 
     The constants are those within which random cuts by all kinds of mills lie (benchmarks/truth.py).
@@ -165,7 +167,7 @@ def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
     >>> from chipload.engagement.tooth_engagement import engagement_of_arcs
     >>> mill = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5)
     >>> chip_error(engagement_of_arcs([0.0, 0.0], [0.1, 1.2], 0.1, mill, 1.0), mill).round(5).tolist()
-    [0.006, 0.00325]
+    [0.0055, 0.00275]
     """
     low, high, s0, s1, along, offset, across = front.rows.T
     step = np.repeat(np.arange(len(front)), np.diff(front.start))
@@ -178,14 +180,15 @@ def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
     share = np.minimum(np.divide(feed, rho, out=np.zeros(len(low)), where=turned), _tooth_chips.LARGE)
     e = cutter.runout[0] if cutter.flutes > 1 else 0.0
     leans = np.abs(cosine) > _tooth_chips.LEVEL
-    each = np.where(leans, LEANS, LEAST)
+    each = LEAST + np.where(leans, LEANS + NARROW * share, 0.0)
     each[turned] += SECOND * share[turned] ** 2 / (high - low)[turned]
     each += np.where(np.abs(offset) > _tooth_chips.LEVEL * swing, share, 0.0)
     if e > 0.0:
-        each += 0.5 * SHARE + RUNOUT * e / np.maximum(depth, e)
+        each += UNLIKE + RUNOUT * e / np.maximum(depth, e)
         widest = np.zeros(len(front))
         np.maximum.at(widest, step, depth)
-        each += np.where(leans, TIP + BEYOND * e / np.maximum(widest[step], e), 0.0)
+        x = e / np.maximum(widest[step], e)
+        each += np.where(leans, TIP * x + BEYOND * x * x, 0.0)
     weight = (swing + np.abs(offset)) * np.maximum(high - low, 1e-12) * (s1 - s0)
     whole = np.bincount(step, weight, len(front))
     return np.divide(np.bincount(step, weight * each, len(front)), whole, out=np.zeros(len(front)), where=whole > 0.0)

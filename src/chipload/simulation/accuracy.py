@@ -25,7 +25,7 @@ A small load matters to a limit only if the finer one exceeds the worst.
   order, and the finer ones are at most half as large, which gives 2. If the axis leans, slices do not end where contact
   ends and the instants of the peak are uneven: 3.
 * FLOOR, 1 % (2 % if an axis leans), is the error that both runs share: the sampled rotations, and edges of the stock
-  within the tolerance. Of barrel cutters, which meet a wall at a small angle, it is at least :data:`MOVES_FLOOR`.
+  within the tolerance. Of barrel cutters, which meet a wall at a small angle, it is at least :data:`BARREL_FLOOR`.
 
 The computed steps are: a worst one of each column; those that remove most; others at even distances among those in cut;
 some that remove nothing, at the height of a section, although the cutter is in the stock; and MISSED of those that
@@ -38,16 +38,18 @@ computed in any case.
 initial body. The step is computed with MORE times the slices and half the angle between rotations, once at the same
 instants, which gives f - c, and once in halves, which gives the loads above the worst. The contact is exact, so that a
 load that differs between the halves of a step, as where the cutter enters, is not an error of the resolution unless it
-exceeds every load of the run. FLOOR is :data:`MOVES_FLOOR`, within which 99 of 100 moves of the benchmark are
-(docs/design/engines.md); only some of the steps are computed a second time. If all cutters have a straight flank and a
-flat bottom, on which slices are exact, it is that of the layers; if an axis leans, :data:`LEANING_MOVES_FLOOR`.
+exceeds every load of the run. FLOOR is :data:`MOVES_FLOOR`: with twice the difference of the two resolutions and what
+the chips leave out it holds the true loads of random cuts by all kinds of mills (benchmarks/truth.py,
+docs/design/engines.md). If all cutters have a straight flank and a flat bottom, on which slices are exact, it is
+:data:`FLAT_FLOOR`; if an axis leans, :data:`LEANING_MOVES_FLOOR`.
 
 **Chip.** To each error what the chips between the paths of the teeth leave out is added, of the steps that are computed
 a second time and have at least half of the worst load: :func:`chipload.engagement.tooth_surfaces.chip_error`. The
 thickest chip of teeth with runout is that of parts of the edge, and may be off by twice
 :data:`chipload.engagement.tooth_surfaces.SHARE` more.
 
-Deflection and form error are proportional to the force and have its error.
+Deflection and form error are proportional to the force. Deflection has its error. In the form error parts of the force
+cancel out: its error is that of the force times the deflection over the form error of its worst step.
 
 **Other parts** of the error of a load (:mod:`chipload.cutting.load_parts`) are calculated from the tooth engagement of
 the steps that are computed a second time: of each tool and load those of the step whose load is greatest with them.
@@ -98,7 +100,8 @@ PartsOfTools = dict[tuple[int, str], LoadParts]
 
 #: columns that are compared; columns of other limits that are proportional to the force
 COMPARED = ("force_n", "torque_nm", "torque_mean_nm", "power_w", "chip_max_mm")
-WITH_FORCE = ("deflection_um", "form_error_um")
+FORM = "form_error_um"
+WITH_FORCE = ("deflection_um", FORM)
 #: columns that can be compared
 COMPARABLE = (*COMPARED, "force_normal_n")
 #: greatest size of the force along z: it is compared too where a run asks for it, with a column of that name
@@ -115,6 +118,17 @@ FACTOR, LEANING = 2.0, 3.0
 FLOOR, LEANING_FLOOR = 0.01, 0.02
 #: by moves: error of a column that a few steps do not show
 MOVES_FLOOR = {
+    "force_n": 0.005, "torque_nm": 0.005, "torque_mean_nm": 0.005, "power_w": 0.005, "chip_max_mm": 0.035,
+    "force_normal_n": 0.035, AXIAL: 0.035,
+}  # fmt: skip
+#: the same if all cutters are flat mills with a straight flank: slices are exact, and what is left are places between
+#: the steps
+FLAT_FLOOR = {
+    "force_n": 0.01, "torque_nm": 0.01, "torque_mean_nm": 0.005, "power_w": 0.005, "chip_max_mm": 0.01,
+    "force_normal_n": 0.01, AXIAL: 0.01,
+}  # fmt: skip
+#: by layers, of barrel cutters
+BARREL_FLOOR = {
     "force_n": 0.035, "torque_nm": 0.035, "torque_mean_nm": 0.01, "power_w": 0.01, "chip_max_mm": 0.035,
     "force_normal_n": 0.035, AXIAL: 0.035,
 }  # fmt: skip
@@ -274,14 +288,30 @@ def resolution_error(
     for name in names:
         if worst[name] > 0.0 and films < 1.0:
             floor = least
-            if setting.moves is not None and not setting.moves.upright:
-                floor = LEANING_MOVES_FLOOR[name]
-            elif not straight and (setting.moves is not None or barrels):
-                floor = max(MOVES_FLOOR.get(name, 0.035), least)
+            if setting.moves is not None:
+                floor = (MOVES_FLOOR if setting.moves.upright else LEANING_MOVES_FLOOR)[name]
+                if straight and setting.moves.upright:
+                    floor = FLAT_FLOOR[name]
+            elif barrels:
+                floor = max(BARREL_FLOOR[name], least)
             found[name] = excess[name] / worst[name] + floor + films / (1.0 - films) + chip[name]
         elif excess[name] > 0.0 or films > 0.0:
             found[name] = math.inf
-    return found | dict.fromkeys(WITH_FORCE, found["force_n"]), _of_worst(parts, columns)
+    force = found["force_n"]
+    return found | {name: force * _levers(columns, name) for name in WITH_FORCE}, _of_worst(parts, columns)
+
+
+def _levers(columns: Columns, name: str) -> float:
+    """Return by how much an error of the force counts in the worst value of a column, 1 at least: in the form error
+    parts of the force cancel out, of which only the deflection of the step has the whole.
+    """
+    if name != FORM or name not in columns or "deflection_um" not in columns:
+        return 1.0
+    left = np.abs(np.asarray(columns[name], dtype=np.float64))
+    k = int(np.argmax(left)) if len(left) else 0
+    if not len(left) or left[k] <= 0.0:
+        return 1.0
+    return max(float(np.asarray(columns["deflection_um"])[k] / left[k]), 1.0)
 
 
 def _keep_worst(parts: PartsOfTools, tool: int, some: SomeParts) -> None:
