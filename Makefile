@@ -40,7 +40,7 @@ test: setup
 	  && $(BIN)/lint-imports && $(BIN)/mkdocs build --strict --quiet --site-dir $(VENV)/site; } \
 	  > $(CHECKED) 2>&1 & checks=$$!; \
 	{ $(BIN)/pytest -p no:xdist --collect-only -qq > $(COLLECTED) 2>&1 || { cat $(COLLECTED); false; }; } \
-	&& OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal -ra; tested=$$?; \
+	&& OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal -ra --durations=60 --durations-min=5; tested=$$?; \
 	wait $$checks; checked=$$?; cat $(CHECKED); \
 	exit $$((tested ? tested : checked))
 

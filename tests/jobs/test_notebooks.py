@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -15,17 +16,29 @@ from chipload.jobs import load_job, run_job
 
 nbformat = pytest.importorskip("nbformat")
 nbclient = pytest.importorskip("nbclient")
+jupyter_client = pytest.importorskip("jupyter_client")
 pytest.importorskip("ipykernel")
 
 FOLDER = Path(str(files("chipload") / "examples" / "notebooks"))
 NAMES = sorted(p.stem for p in FOLDER.glob("*.ipynb"))
 
 
-def ran(name: str) -> tuple[Any, list[Any]]:
-    """The value of the last cell of a notebook, and all outputs."""
+@pytest.fixture(scope="module")
+def ran() -> Iterator[Callable[[str], tuple[Any, list[Any]]]]:
+    """The value of the last cell of a notebook, and all outputs; one kernel for all, which imports libraries once."""
+    kernel = jupyter_client.KernelManager(kernel_name="python3")
+    kernel.start_kernel(cwd=str(FOLDER))
+    yield lambda name: _executed(name, kernel)
+    kernel.shutdown_kernel(now=True)
+
+
+def _executed(name: str, kernel: Any) -> tuple[Any, list[Any]]:
+    """A notebook without any name of one before it."""
     book = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
-    place = {"metadata": {"path": str(FOLDER)}}
-    nbclient.NotebookClient(book, timeout=300, kernel_name="python3", resources=place).execute()
+    book.cells.insert(0, nbformat.v4.new_code_cell("%reset -f"))
+    client = nbclient.NotebookClient(book, km=kernel, timeout=300)
+    client.execute()
+    client.kc.stop_channels()
     out = [o for cell in book.cells for o in cell.get("outputs", ())]
     return ast.literal_eval(out[-1].data["text/plain"]), out
 
@@ -40,7 +53,7 @@ def test_no_outputs_are_kept(name: str) -> None:
     assert f"`{name}.ipynb`" in (FOLDER / "README.md").read_text()
 
 
-def test_program() -> None:
+def test_program(ran) -> None:
     said, out = ran("program")
     # a slot 10 wide round a corner, inner and outer radius 1 and 11, and 1.5 mm off the outer wall; 4 deep
     slot = 400.0 + 0.25 * math.pi * (11.0**2 - 1.0) + 240.0
@@ -55,7 +68,7 @@ def test_program() -> None:
     assert len(out[1].data["application/vnd.plotly.v1+json"]["data"]) >= 3
 
 
-def test_chip() -> None:
+def test_chip(ran) -> None:
     said, out = ran("chip")
     assert said["pieces"] == 2
     # the turn about the point is the same seen from its end: the pieces are alike
@@ -64,7 +77,7 @@ def test_chip() -> None:
     assert sum("application/vnd.plotly.v1+json" in o.get("data", {}) for o in out) == 3
 
 
-def test_wall() -> None:
+def test_wall(ran) -> None:
     said, _ = ran("wall")
     # by plate theory the edge's middle bears 0.504 of what its corner bears where b = 2 a, 0.73 where b = a
     assert 0.504 < 1.0 / said["corner_over_middle"] < 0.73
@@ -76,7 +89,7 @@ def test_wall() -> None:
     assert 7.0 / 8.0 + 27.0 / 64.0 < said["weaker_by"] < 27.0 / 8.0
 
 
-def test_contour() -> None:
+def test_contour(ran) -> None:
     found, out = ran("contour")
     # radial depth 0.1 on a straight wall; in the corner the centre runs on a radius of 3 and the stock begins at 7.9
     assert found["straight_deg"] == pytest.approx(math.degrees(math.acos(1.0 - 0.1 / 5.0)), abs=0.01)
@@ -88,7 +101,7 @@ def test_contour() -> None:
     assert "<table>" in out[0].data["text/html"]
 
 
-def test_torque() -> None:
+def test_torque(ran) -> None:
     found, _ = ran("torque")
     own, over = found["in_use"], found["over_percent"]
     assert over[own] <= 0.0
@@ -98,7 +111,7 @@ def test_torque() -> None:
     assert sum(value <= 0.0 for value in over.values()) == 3
 
 
-def test_impeller() -> None:
+def test_impeller(ran) -> None:
     found, out = ran("impeller")
     largest, times = found["largest_mm"], found["time_min"]
     assert len(largest) == 24

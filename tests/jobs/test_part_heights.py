@@ -12,7 +12,7 @@ from chipload.program.read import read_program
 from command import call
 from step_files import written
 
-#: plate 40 x 30 mm with its face at 8 mm, and a rib across it that rises to 20 mm
+#: plate 28 x 14 mm with its face at 8 mm, and a rib across it that rises to 20 mm
 FACE, RIB = 8.0, 20.0
 
 
@@ -23,8 +23,8 @@ def job(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from OCP.gp import gp_Pnt
 
     folder = tmp_path_factory.mktemp("ribs")
-    plate = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(40, 30, FACE)).Shape()
-    rib = BRepPrimAPI_MakeBox(gp_Pnt(19, -5, FACE), gp_Pnt(21, 35, RIB)).Shape()
+    plate = BRepPrimAPI_MakeBox(gp_Pnt(0, 0, 0), gp_Pnt(28, 14, FACE)).Shape()
+    rib = BRepPrimAPI_MakeBox(gp_Pnt(13, -5, FACE), gp_Pnt(15, 19, RIB)).Shape()
     written(folder / "ribs.step", BRepAlgoAPI_Fuse(plate, rib).Shape())
     assert call("init", folder / "ribs.step", folder / "job")[0] == 0
     return folder / "job" / "job.toml"
@@ -43,7 +43,7 @@ def test_no_rapid_of_the_program_crosses_the_rib_below_its_top(job: Path, tmp_pa
     read = read_program(program, machine_named("vmc")).program
     # before the first motion in Z the height is not stated
     path = read.p_work[int((read.p_work[:, 2] > RIB).argmax()) :]
-    crossing = (path[:-1, 0] - 20.0) * (path[1:, 0] - 20.0) < 0.0
+    crossing = (path[:-1, 0] - 14.0) * (path[1:, 0] - 14.0) < 0.0
     assert crossing.any()
     assert min(path[:-1][crossing][:, 2].min(), path[1:][crossing][:, 2].min()) > RIB
     assert path[:, 2].min() == pytest.approx(FACE)
