@@ -137,16 +137,6 @@ def leaning() -> Program:
     return replace(program, axis=axis)
 
 
-def test_what_moves_cannot_do_goes_by_layers() -> None:
-    found = run(leaning(), "auto", interpolation="lerp")
-    assert [(f.code, f.line) for f in found.findings] == [("handed-over", int(leaning().line[1]))]
-    known = run(leaning(), "layers", interpolation="lerp")
-    for name in known.columns:
-        np.testing.assert_array_equal(found.columns[name], known.columns[name])
-    with pytest.raises(InputError, match=r'the axis turns with interpolation = "lerp": state engine'):
-        run(leaning(), "moves", interpolation="lerp")
-
-
 def test_auto_takes_moves_where_the_axis_leans() -> None:
     one, two = run(leaning(), "auto"), run(leaning(), "moves")
     assert one.findings == two.findings == ()
@@ -164,13 +154,6 @@ def test_material_above_the_flutes_goes_by_layers() -> None:
     known = remove(program, other, {1: short}, ALLOY, FINE, engine="layers")
     np.testing.assert_array_equal(found.columns["force_n"], known.columns["force_n"])
     assert stock.to_bytes() == other.to_bytes()
-
-
-def test_a_stock_that_was_cut_goes_by_layers() -> None:
-    stock = block()
-    run(path([[-8.0, 5.0, -1.0], [20.0, 5.0, -1.0]]), stock=stock)
-    found = run(path([[-8.0, 9.0, -1.0], [20.0, 9.0, -1.0]]), "auto", stock)
-    assert "the stock was cut before" in found.findings[0].text
 
 
 def test_a_mesh_is_cut_as_its_box() -> None:

@@ -61,7 +61,7 @@ def test_a_box_holds_all_that_its_layer_is_covered_by() -> None:
     low, high = swept_area.boxes(steps, CUTTERS)
     stock = LayeredStock.block((-60.0, -60.0, -16.0), (60.0, 60.0, 0.0), 2.0, 120.0)
     seen = 0
-    for k, found in swept_area.swept_ahead(steps, stock, CUTTERS, "slerp", 0.01, 1):
+    for k, found in swept_area.swept_ahead(steps, stock, CUTTERS, 0.01, 1):
         for i, shape in zip(found.met[::3].tolist(), found.shape[::3].tolist(), strict=True):
             x, y = shapely.get_coordinates(found.areas.polygon(shape))[0]
             tiny = shapely.box(x - 1e-6, y - 1e-6, x + 1e-6, y + 1e-6)

@@ -22,7 +22,6 @@ from chipload.simulation.loads import GRAZES, Cuts
 from chipload.simulation.moves import Engine, HandOver
 from chipload.simulation.removal import Resolution, RunningSums, RunSettings
 from chipload.simulation.steps import steps_in_blocks
-from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.states import StepLines
 
@@ -56,7 +55,6 @@ def cut_ahead(
     cutters: Mapping[int, Cutter],
     material: Material,
     resolution: Resolution,
-    interpolation: Interpolation,
     engine: Engine,
     progress: Progress = silent,
 ) -> CutAhead:
@@ -68,7 +66,7 @@ def cut_ahead(
         wall at its end cuts by moves, and does not by layers, which look at its middle
     """
     count = count_steps(program, cutters, resolution)
-    setting = setting_of(cutters, material, resolution, interpolation, None, 2)
+    setting = setting_of(cutters, material, resolution, None, 2)
     found = _lines_by_moves(program, stock, with_engine(engine, setting, program, stock)[0])
     sums, own = RunningSums(stock.volume()), list[_Lines]()
     stocks, before = [(0, 0.0, stock.copied())], [np.zeros(1)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from chipload.program.read import ProgramReading, times_of
 from chipload.program.travel import leading_rows
 from chipload.simulation.chips import count_steps, require_steps
 from chipload.simulation.heights.height_map import require_columns
+from chipload.simulation.linear_axes import with_linear_axes
 from chipload.simulation.moves import leans
 from chipload.simulation.removal import Resolution
 from chipload.simulation.surface import require_points
@@ -71,11 +73,11 @@ def bodies_of(inputs: CheckInputs, reading: ProgramReading, stock: LayeredStock)
     checks = default_checks(inputs.checks, cutters, inputs.material)
     stiffness = stiffness_of(inputs.elasticity.stiffness, cutters)
     require_clamped(inputs.elasticity.workpiece, stock)
-    program, times = time_rows(reading, cutters, machine)
+    program, times = time_rows(reading, cutters, machine, op.interpolation)
     fine = resolution_of(op, cutters, program)
     count = count_steps(program, cutters, fine)
     if op.engine == "layers":
-        require_upright(program, op.step_mm, op.tolerance_mm, stock, cutters, op.interpolation)
+        require_upright(program, op.step_mm, op.tolerance_mm, stock, cutters)
     points = _points_of_stock(inputs, program, stock)
     part = inputs.surroundings.part
     if part is not None:
@@ -115,12 +117,18 @@ def resolution_of(op: SimulationSettings, cutters: Mapping[int, Cutter], program
 
 
 def time_rows(
-    reading: ProgramReading, cutters: Mapping[int, Cutter], machine: Machine
+    reading: ProgramReading,
+    cutters: Mapping[int, Cutter],
+    machine: Machine,
+    interpolation: Literal["slerp", "lerp"] = "slerp",
 ) -> tuple[Program, NDArray[np.float64]]:
-    """Return the program from its first tool on and the time of each row; omitted rows count with the first row."""
+    """Return the program from its first tool on and the time of each row; omitted rows count with the first row. Where
+    its axis turns along straight lines, its rows are divided.
+    """
     program, times = with_tool(reading.program, cutters), times_of(reading, machine)
     first = len(times) - len(program)
-    return program, np.concatenate([[times[: first + 1].sum()], times[first + 1 :]])
+    times = np.concatenate([[times[: first + 1].sum()], times[first + 1 :]])
+    return with_linear_axes(program, times) if interpolation == "lerp" else (program, times)
 
 
 def with_tool(program: Program, cutters: Mapping[int, Cutter]) -> Program:

@@ -69,8 +69,7 @@ def simulation_estimate(inputs: CheckInputs, reading: ProgramReading, stock: Lay
 def _step_times(inputs: CheckInputs, program: Program, stock: LayeredStock) -> tuple[float, float]:
     """Return the least and greatest processor time of a step [s] by the engine that will simulate most of a program."""
     cutters = inputs.cutters
-    bodies = any(c.body and n in program.tool for n, c in cutters.items())
-    if inputs.settings.engine == "layers" or stock.cut.any() or bodies:
+    if inputs.settings.engine == "layers":
         return QUICK, SLOW
     if leans(program).any():
         return LEANING
@@ -139,13 +138,13 @@ def simulate_program(
     removing = part_of(progress, SHARE, SHARE + 0.8)
     if checkpoint is None:
         removal = remove(
-            program, stock, cutters, material, fine, interpolation=op.interpolation, watch=watch, times=times,
+            program, stock, cutters, material, fine, watch=watch, times=times,
             engine=op.engine, processes=workers or op.workers, progress=removing,
         )  # fmt: skip
     else:
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
         removal = remove_in_chunks(
-            program, stock, cutters, material, fine, checkpoint, interpolation=op.interpolation, watch=watch,
+            program, stock, cutters, material, fine, checkpoint, watch=watch,
             keeps={"engagement": recorder} | ({} if stability_watch is None else {"watch": stability_watch}),
             times=times, engine=op.engine, processes=workers or op.workers, progress=removing,
             also=(
@@ -268,8 +267,6 @@ def compliance_of_workpiece(
     workpiece, cutters, op = inputs.elasticity.workpiece, inputs.cutters, inputs.settings
     if workpiece is None:
         return None
-    program, _ = time_rows(reading, cutters, inputs.machine)
+    program, _ = time_rows(reading, cutters, inputs.machine, op.interpolation)
     fine = resolution_of(op, cutters, program)
-    return workpiece_compliance(
-        workpiece, program, stock, cutters, inputs.material, fine, op.engine, op.interpolation, progress
-    )
+    return workpiece_compliance(workpiece, program, stock, cutters, inputs.material, fine, op.engine, progress)

@@ -22,7 +22,7 @@ class SimulationSettings:
     ----------
     step_mm : longest step of the tip
     tolerance_mm : greatest deviation of chords from the edges of chips
-    interpolation : how the tool axis turns within a step: ``slerp`` at constant rate, ``lerp`` along a straight line
+    interpolation : how the tool axis turns on a row: ``slerp`` at constant rate, ``lerp`` along a straight line
     engine : ``moves``, ``layers``, or ``auto``: moves, or layers where moves cannot simulate the program
     workers : processes that share a layered stock in strips; the result does not depend on them
     corner_slices : slices of a corner radius, of equal angle; None: by the inclination of the axis

@@ -30,7 +30,6 @@ from chipload.progress import Progress, silent
 from chipload.simulation.deflection_jumps import jump_findings
 from chipload.simulation.moves import Engine
 from chipload.simulation.removal import Columns, Resolution
-from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.followed import FollowedModes, ModesOfStates
 from chipload.structure.cells.grid import CellGrid
@@ -156,7 +155,6 @@ def workpiece_compliance(
     material: Material,
     resolution: Resolution,
     engine: Engine,
-    interpolation: Interpolation = "slerp",
     progress: Progress = silent,
 ) -> WorkpieceCompliance:
     """Return the compliance of the workpiece where its program cuts.
@@ -165,7 +163,6 @@ def workpiece_compliance(
     ----------
     stock : before the program; it does not change
     engine : of the simulation that will use the compliance
-    interpolation : how the tool axis turns within a step
 
     Raises
     ------
@@ -175,7 +172,7 @@ def workpiece_compliance(
     elastic, clamps = elastic_of(workpiece), placed_clamps(workpiece, stock)
     clamped_parts = clamped_volumes(workpiece, stock)
     ahead = cut_ahead(
-        program, stock.copied(), cutters, material, resolution, interpolation, engine,
+        program, stock.copied(), cutters, material, resolution, engine,
         lambda done, what: progress(0.4 * done, what),
     )  # fmt: skip
     grid, wall = cells_over(stock, ahead.stocks[-1][2], workpiece.cell_mm, workpiece.order)

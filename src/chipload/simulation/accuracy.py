@@ -336,7 +336,7 @@ def _used_cutters(windows: Mapping[int, Window], setting: RunSettings) -> list[C
     """Return the cutters of the steps that are computed once more; of a run by moves those that made a move."""
     some = {int(w.own.tool[0]) for w in windows.values()}
     if setting.moves is not None:
-        some |= set(setting.moves.stock.table)
+        some |= set(setting.moves.stock.table) & set(setting.cutters)
     return [setting.cutters[n] for n in sorted(some)]
 
 
@@ -444,7 +444,7 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
     def loads_of(
         window: Window, own: Steps, more: tuple[int, int] | None
     ) -> tuple[Mapping[str, float], float, list[Cuts]]:
-        stock = run.stock.cropped(window.low, window.high)
+        stock = run.cropped(window.low, window.high)
         if stock is None:
             return dict.fromkeys((*COMPARABLE, AXIAL, CHIP), 0.0), 0.0, []
         stock.more = stock.more if more is None else more
@@ -502,7 +502,7 @@ def _finer_layers(window: Window, before: LayeredStock, setting: RunSettings, re
     tolerance = fine.tolerance
     for some in window.earlier:
         tiles = TileRings(stock)
-        for _, swept in swept_ahead(some, stock, setting.cutters, setting.interpolation, tolerance, setting.workers):
+        for _, swept in swept_ahead(some, stock, setting.cutters, tolerance, setting.workers):
             tiles.remove(swept.met, swept.shape, swept.areas, 0.0, 0.5 * tolerance)
         tiles.finish()
     columns = remove(_parts(window.own, window.parts), stock, again)

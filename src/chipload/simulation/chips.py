@@ -62,7 +62,7 @@ from chipload.simulation.removal import (
 )
 from chipload.simulation.steps import BLOCK, StepBlocks, Steps, moving_rows, number_of_steps, steps_in_blocks
 from chipload.simulation.strips import strips_for
-from chipload.simulation.swept_area import Interpolation, require_upright
+from chipload.simulation.swept_area import require_upright
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_min_from_mm_s
 from chipload.workers import Workers
@@ -84,7 +84,6 @@ def remove(
     material: Material,
     resolution: Resolution,
     *,
-    interpolation: Interpolation = "slerp",
     keep: bool = False,
     watch: Watch | None = None,
     times: Floats | None = None,
@@ -103,7 +102,6 @@ def remove(
     ----------
     program : in the work frame of the stock
     cutters : by tool number
-    interpolation : of the axis within a step: along a great circle (slerp) or normalised straight line (lerp)
     keep : keep the tooth engagement of every step, for :mod:`chipload.simulation.deflection`; some kB a step
     watch : called with what one cutter cut in some hundred steps; gives more columns, a value for each of them; they
         are 0 in steps that do not cut
@@ -142,7 +140,7 @@ def remove(
     """
     count = count_steps(program, cutters, resolution)
     progress(0.0, "removing")
-    setting = setting_of(cutters, material, resolution, interpolation, watch, workers, processes)
+    setting = setting_of(cutters, material, resolution, watch, workers, processes)
     setting, handed = with_engine(engine, setting, program, stock)
     before = stock.copied() if accuracy else None
     while True:
@@ -197,11 +195,7 @@ def with_engine(
     if engine == "layers":
         return setting, None
     fine = setting.resolution
-    bodies = np.isin(program.tool, [n for n, c in setting.cutters.items() if c.body])
     try:
-        if bodies.any():
-            k = int(np.argmax(bodies))
-            raise HandOver(int(program.line[k]), f"tool {int(program.tool[k])} is a body without chips")
         barrels = np.isin(program.tool, [n for n, c in setting.cutters.items() if c.flank_arc is not None])
         if barrels.any():
             k = int(np.argmax(barrels))
@@ -210,7 +204,6 @@ def with_engine(
             )
         run = run_by_moves(
             program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm,
-            setting.interpolation,
         )  # fmt: skip
     except HandOver as found:
         return by_layers(engine, setting, found, program, stock)
@@ -232,7 +225,7 @@ def by_layers(
         raise InputError(f'{place}: {found.why}: state engine = "layers" or "auto"')
     fine = setting.resolution
     try:
-        require_upright(program, fine.step_mm, fine.tolerance, stock, setting.cutters, setting.interpolation)
+        require_upright(program, fine.step_mm, fine.tolerance, stock, setting.cutters)
     except InputError as err:
         raise InputError(f"{place}: {found.why}, which is simulated by layers only, and {err}") from None
     return replace(setting, moves=None), (found.line, found.why)
@@ -279,7 +272,6 @@ def setting_of(
     cutters: Mapping[int, Cutter],
     material: Material,
     resolution: Resolution,
-    interpolation: Interpolation,
     watch: Watch | None,
     workers: int,
     processes: int | Workers = 1,
@@ -287,7 +279,7 @@ def setting_of(
     """Return the settings of a run."""
     profiles = {n: profile_of(c, resolution) for n, c in cutters.items()}
     shared = processes if isinstance(processes, Workers) else Workers(processes)
-    return RunSettings(cutters, profiles, material, resolution, interpolation, watch, workers, None, shared)
+    return RunSettings(cutters, profiles, material, resolution, watch, workers, None, shared)
 
 
 def profile_of(cutter: Cutter, resolution: Resolution) -> Slices:

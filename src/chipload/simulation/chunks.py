@@ -42,7 +42,6 @@ from chipload.simulation.moves import Engine, HandOver, with_contact
 from chipload.simulation.removal import ChipAreas, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.steps import BLOCK, steps_in_blocks
 from chipload.simulation.strips import strips_for
-from chipload.simulation.swept_area import Interpolation
 from chipload.stock.layers import LayeredStock
 from chipload.stock.shapes import read_shapes, shape_bytes
 from chipload.workers import Workers
@@ -79,7 +78,6 @@ def remove_in_chunks(
     resolution: Resolution,
     unfinished: Checkpoint,
     *,
-    interpolation: Interpolation = "slerp",
     watch: Watch | None = None,
     keeps: Mapping[str, WatchState] = MappingProxyType({}),
     times: Floats | None = None,
@@ -109,10 +107,10 @@ def remove_in_chunks(
         As :func:`chipload.simulation.chips.remove`, and where the folder cannot be used.
     """
     count = count_steps(program, cutters, resolution)
-    setting = setting_of(cutters, material, resolution, interpolation, watch, workers, processes)
+    setting = setting_of(cutters, material, resolution, watch, workers, processes)
     shape = (stock.bounds, stock.xs, stock.ys, stock.cut, stock.room, stock.tidied, stock.tiles)
     part = None if stock.part is None else (np.asarray(stock.part.vertices), np.asarray(stock.part.faces))
-    depends = (program, cutters, material, resolution, shape, part, interpolation, watch is not None, BLOCK, times)
+    depends = (program, cutters, material, resolution, shape, part, watch is not None, BLOCK, times)
     kept = unfinished.begin(digest(*depends, engine, also))
     setting, handed = with_engine(engine, setting, program, stock)
     sums, before, state = RunningSums(stock.volume(), handed=handed), stock.copied(), None

@@ -62,7 +62,7 @@ def removed_by_layers(
             for n, (k, move, there) in zip(tools, those, strict=True)
         ]
 
-    ahead = swept_ahead(steps, stock, setting.cutters, setting.interpolation, tolerance, setting.workers, plan)
+    ahead = swept_ahead(steps, stock, setting.cutters, tolerance, setting.workers, plan)
     tiles = TileRings(stock)
     with ThreadPoolExecutor(1) as executor:
         for k, swept in ahead:

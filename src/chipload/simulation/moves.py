@@ -5,7 +5,9 @@ turns. A step is calculated at its middle, and a long step at more instants, the
 volume and mean loads are the means over the instants, its greatest loads the greatest of any. A ``watch`` receives the
 tooth engagement at the instant of the greatest force; of several equal ones, that nearest to the middle.
 
-A program that this engine cannot simulate is handed over: :class:`HandOver` names the line and the reason.
+The initial body is a block, a mesh, or what was left before: the body of a stock less the moves that cut it, where they
+are known (:mod:`chipload.stock.earlier_moves`), else its layers. Tools that are bodies without chips make no move. A
+program that this engine cannot simulate is handed over: :class:`HandOver` names the line and the reason.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -31,9 +33,10 @@ from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
 from chipload.lazy import LateModule
 from chipload.program.program import Program
+from chipload.simulation.initial_stock import initial_stock, make_earlier, moves_of, skip_moves
 from chipload.simulation.loads import BANDS, LOADS, ONE_SIDE, Cuts, engaged_work
 from chipload.simulation.steps import ROWS, Steps, steps_in_blocks
-from chipload.simulation.swept_area import Interpolation
+from chipload.stock.earlier_moves import EarlierMoves
 from chipload.stock.layers import LayeredStock
 
 skew = LateModule("chipload.engagement.moves._skew_slices")
@@ -46,6 +49,8 @@ Engine = Literal["auto", "moves", "layers"]
 #: within 3 % of the converged one in 99 of 100 moves of a finishing program at the default of a job, see
 #: docs/design/engines.md
 ENGAGED = 0.5
+#: longest slice of the flank beside layers of a stock, over the smallest radius
+LAYERED_FLANK = 0.1
 #: an axis that differs from z by no more than this is upright
 UPRIGHT = 1e-9
 #: columns of the loads that are means, of :data:`chipload.simulation.loads.LOADS`
@@ -97,6 +102,8 @@ class MoveRun:
     layers : heights of the layers of the stock [mm], ascending bounds
     corner_slices, flank_mm : slices of an engaged corner, longest slice of the flank by tool number
     tolerance : of outlines [mm]
+    bodies : numbers of tools that are bodies without chips
+    earlier : moves that cut the body before the run; they are in ``stock``
     """
 
     stock: MoveStock | BrickStock
@@ -104,6 +111,8 @@ class MoveRun:
     corner_slices: int
     flank_mm: Mapping[int, float]
     tolerance: float
+    bodies: tuple[int, ...] = ()
+    earlier: EarlierMoves | None = None
 
     @property
     def upright(self) -> bool:
@@ -120,28 +129,43 @@ class MoveRun:
 
     def make(self, steps: Steps, count: int) -> None:
         """Make the first ``count`` of some steps without calculating them."""
-        p0, p1, tool = steps.p0[:count], steps.p1[:count], steps.tool[:count]
-        if isinstance(self.stock, BrickStock):
-            self.stock.skip(p0, p1, steps.a0[:count], steps.a1[:count], tool)
-        else:
-            self.stock.skip(p0, p1, tool)
+        own = self._moving(steps)[:count]
+        p0, p1, tool = steps.p0[:count][own], steps.p1[:count][own], steps.tool[:count][own]
+        skip_moves(self.stock, p0, p1, steps.a0[:count][own], steps.a1[:count][own], tool)
+
+    def cropped(self, low: Floats, high: Floats) -> MoveStock | BrickStock | None:
+        """Return the stock before the run in a box (3,), (3,) [mm]; None where it does not reach into it."""
+        stock = self.stock.cropped(low, high)
+        if stock is not None and self.earlier is not None:
+            make_earlier(stock, self.earlier, low, high)
+        return stock
 
     def contact(self, steps: Steps) -> Engaged:
         """Make some steps and return their engagement."""
-        pieces, flank = self.corner_slices, self.flank_mm
+        pieces, flank, own = self.corner_slices, self.flank_mm, self._moving(steps)
+        p0, p1, tool = steps.p0[own], steps.p1[own], steps.tool[own]
         if isinstance(self.stock, BrickStock):
-            poses = (steps.p0, steps.p1, steps.a0, steps.a1)
-            return self.stock.take(*poses, steps.tool, corner_slices=pieces, flank_mm=flank)
-        return self.stock.take(steps.p0, steps.p1, steps.tool, corner_slices=pieces, flank_mm=flank)
+            poses = (p0, p1, steps.a0[own], steps.a1[own])
+            found = self.stock.take(*poses, tool, corner_slices=pieces, flank_mm=flank)
+        else:
+            found = self.stock.take(p0, p1, tool, corner_slices=pieces, flank_mm=flank)
+        return found if own.all() else replace(found, step=np.flatnonzero(own)[found.step])
 
     def finish(self, stock: LayeredStock, workers: int) -> None:
-        """Remove the swept volume of the moves from the layers, with a number of threads, and drop the moves."""
+        """Remove the swept volume of the moves from the layers, with a number of threads, and store the moves there."""
         low = self.stock.lowest()
         at = [i for i, z in enumerate(stock.heights.tolist()) if z > low]
         with ThreadPoolExecutor(workers) as pool:
             shapes = list(pool.map(lambda i: self.stock.outlines(float(stock.heights[i]), 0.5 * self.tolerance), at))
+        # of a body that is not stored with the stock its layers are all that will be known
+        moves = moves_of(self.stock) if self.stock.body is stock.part else None
         self.stock.forget()
         stock.remove_many([i for i, s in zip(at, shapes, strict=True) if not s.is_empty], [s for s in shapes if s])
+        stock.earlier = moves
+
+    def _moving(self, steps: Steps) -> NDArray[np.bool_]:
+        """Return a mask (n,) of the steps of tools that cut, not of bodies without chips."""
+        return ~np.isin(steps.tool, self.bodies) if self.bodies else np.ones(len(steps), dtype=np.bool_)
 
 
 def run_by_moves(
@@ -152,42 +176,23 @@ def run_by_moves(
     tolerance: float,
     corner_slices: int,
     flank_mm: float,
-    interpolation: Interpolation = "slerp",
 ) -> MoveRun:
-    """Return the run of a program by moves: by heights over the plan if the axis is always upright, else by bricks.
-
-    Raises
-    ------
-    HandOver
-        The stock was cut already, or the axis turns along a straight line of its vector.
-    """
-    if stock.cut.any():
-        raise HandOver(0, "the stock was cut before: its layers are all that is known of it")
-    axis = np.asarray(program.axis)
-    turns = np.append(False, np.abs(np.diff(axis, axis=0)).max(axis=1, initial=0.0) > UPRIGHT)
-    if interpolation != "slerp" and turns.any():
-        raise HandOver(int(program.line[int(np.argmax(turns))]), 'the axis turns with interpolation = "lerp"')
-    low = np.array([stock.xs[0], stock.ys[0], stock.bounds[0]])
-    high = np.array([stock.xs[-1], stock.ys[-1], stock.bounds[-1]])
+    """Return the run of a program by moves: by heights over the plan if the axis is always upright, else by bricks."""
     used = {n: c for n, c in cutters.items() if bool((program.tool == n).any())}
-    if stock.part is None and not _is_block(stock):
-        raise HandOver(0, "the stock is neither a block nor a mesh")
-    moves = (BrickStock if leans(program).any() else MoveStock)(low, high, used, stock.part)
-    return MoveRun(
-        moves, np.asarray(stock.bounds), math.ceil(ENGAGED * corner_slices), dict.fromkeys(used, flank_mm), tolerance
-    )
+    bodies = tuple(n for n, c in used.items() if c.body)
+    cutting = {n: c for n, c in used.items() if n not in bodies} or used
+    made = initial_stock(stock, cutting, upright=not leans(program).any())
+    if made.body is not stock.part:
+        # the layers that are the body have edges at every height
+        flank_mm = min(flank_mm, LAYERED_FLANK * min(c.radius for c in cutting.values()))
+    flank = dict.fromkeys(made.table, flank_mm)
+    slices = math.ceil(ENGAGED * corner_slices)
+    return MoveRun(made, np.asarray(stock.bounds), slices, flank, tolerance, bodies, stock.earlier)
 
 
 def leans(program: Program) -> NDArray[np.bool_]:
     """Return a mask of the rows of a program whose axis is not upright."""
     return np.asarray(np.abs(np.asarray(program.axis) - (0.0, 0.0, 1.0)).max(axis=1) > UPRIGHT)
-
-
-def _is_block(stock: LayeredStock) -> bool:
-    """Return whether the layers fill their box."""
-    x, y, z = stock.xs, stock.ys, stock.bounds
-    whole = (x[-1] - x[0]) * (y[-1] - y[0]) * (z[-1] - z[0])
-    return bool(abs(stock.volume() - whole) <= 1e-9 * whole)
 
 
 def with_contact(blocks: Iterable[Steps], run: MoveRun | None, workers: int) -> Iterator[tuple[Steps, Engaged | None]]:

@@ -20,7 +20,6 @@ from chipload.errors import Finding
 from chipload.simulation.engagement_samples import EngagementSamples
 from chipload.simulation.loads import Cuts, StepEngagement, part_of_cuts
 from chipload.simulation.moves import MoveRun
-from chipload.simulation.swept_area import Interpolation
 from chipload.workers import Workers
 
 Floats = NDArray[np.float64]
@@ -188,7 +187,6 @@ class RunSettings:
     profiles: Mapping[int, Slices]
     material: Material
     resolution: Resolution
-    interpolation: Interpolation
     watch: Watch | None
     workers: int
     moves: MoveRun | None = None

@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,6 @@ from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Interpolation = Literal["slerp", "lerp"]
 
 #: x0, y0, x1, y1 [mm]
 Plan = tuple[float, float, float, float]
@@ -60,7 +58,6 @@ def swept_ahead(
     steps: Steps,
     stock: LayeredStock,
     cutters: Mapping[int, Cutter],
-    interpolation: Interpolation,
     tolerance: float,
     workers: int,
     plan: Plan | None = None,
@@ -88,7 +85,7 @@ def swept_ahead(
         for k, left in _layers_left(steps, ranges, low, high, cutters, stock).items():
             # an axis that lies is refused in air too
             if left.any() or min(steps.a0[k, 2], steps.a1[k, 2]) < 2.0 * LEAST_AXIS_Z:
-                found[k] = _move(steps, k, interpolation), ranges[k], left
+                found[k] = _move(steps, k), ranges[k], left
         out: dict[int, Swept] = {}
         for tool, K, those in profiles:
             own = {k: both for k, both in found.items() if k in those}
@@ -111,7 +108,6 @@ def require_upright(
     chord_mm: float,
     stock: LayeredStock,
     cutters: Mapping[int, Cutter],
-    interpolation: Interpolation,
 ) -> None:
     """Refuse a program whose axis lies, or looks down, beside or in the stock; O(rows) where none lies.
 
@@ -128,7 +124,7 @@ def require_upright(
         low, high, near = near_stock(steps, plan_of(stock), cutters)
         for k in np.flatnonzero(lies & near).tolist():
             if stock.layers_between(low[k, 2], high[k, 2]):
-                _move(steps, k, interpolation)
+                _move(steps, k)
 
 
 def plan_of(stock: LayeredStock) -> Plan:
@@ -254,11 +250,10 @@ def boxes(steps: Steps, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats]:
     return np.asarray(ends.min(axis=0) - reach), np.asarray(ends.max(axis=0) + reach)
 
 
-def _move(steps: Steps, k: int, interpolation: Interpolation) -> Move:
+def _move(steps: Steps, k: int) -> Move:
     if steps.a0[k, 2] == steps.a1[k, 2] == 1.0:
         return Move.upright(steps.p0[k], steps.p1[k])
-    make = Move.slerp if interpolation == "slerp" else Move.lerp
     try:
-        return make(steps.p0[k], steps.a0[k], steps.p1[k], steps.a1[k])
+        return Move.slerp(steps.p0[k], steps.a0[k], steps.p1[k], steps.a1[k])
     except InputError as err:
         raise InputError(f"line {steps.line[k]}: {err}") from None

@@ -24,9 +24,10 @@ from chipload.errors import InputError
 from chipload.files import write_whole
 from chipload.geometry.mesh import require_closed
 from chipload.stock._ring_edges import ring_edges
+from chipload.stock.earlier_moves import SAVED_MOVES, EarlierMoves, no_moves
 from chipload.stock.shapes import read_shapes, shape_bytes
 from chipload.stock.simpler import simplify_tiles
-from chipload.stock.solid import glb, prisms
+from chipload.stock.solid import glb, prisms, stepped_body
 from chipload.stock.tile_grid import (
     LAYER_LIMIT,
     MULTIPOLYGON,
@@ -46,9 +47,9 @@ Ints = NDArray[np.int64]
 Shapes = NDArray[np.object_]
 
 #: kind of a saved stock
-KIND = "chipload layered stock 1"
+KIND = "chipload layered stock 2"
 #: arrays of a saved stock and their numbers of dimensions
-SAVED = {"bounds": 1, "xs": 1, "ys": 1, "cut": 1, "room": 1, "tidied": 1, "vertices": 2, "faces": 2}
+SAVED = {"bounds": 1, "xs": 1, "ys": 1, "cut": 1, "room": 1, "tidied": 1, "vertices": 2, "faces": 2} | SAVED_MOVES
 #: shortest side of a block [mm]
 LEAST_MM = 1e-3
 #: least number of points of a tile that is simplified
@@ -74,6 +75,8 @@ class LayeredStock:
     points of each tile above which it is simplified next. ``by_geos`` is the number of tiles that
     :class:`chipload.stock.tile_rings.TileRings` left to GEOS, since the stock was made or loaded. ``sections`` of the
     part by height [mm] are shared by copies and parts of a stock, which are split at the same heights again and again.
+    ``earlier`` are the moves that cut the stock: its body is the part, or the box of its layers, less what they swept.
+    None where nothing was removed, or where its layers are all that is known.
 
     Examples
     --------
@@ -95,6 +98,7 @@ class LayeredStock:
         self.room: Ints = np.full(tiles.shape, ROOM, dtype=np.int64)
         self.tidied = 0.0
         self.by_geos = 0
+        self.earlier: EarlierMoves | None = None
         self.sections: dict[float, MultiPolygon] = {}
 
     @classmethod
@@ -265,6 +269,7 @@ class LayeredStock:
         if not (((kind == POLYGON) | (kind == MULTIPOLYGON)) & shapely.is_valid(geometries)).all():
             raise InputError("stock: a shape to remove is no polygon or crosses itself: repair it first")
         chips: list[list[Polygon]] = [[] for _ in rows]
+        self.earlier = None
         for turn in turns_of(rows):
             self._remove_turn(turn, rows, geometries, chips, tidy)
         return chips
@@ -316,7 +321,7 @@ class LayeredStock:
         """Return a copy of the present stock; polygons are shared."""
         out = LayeredStock(self.bounds, self.xs, self.ys, self.tiles.copy(), self.part)
         out.cut, out.room, out.tidied = self.cut.copy(), self.room.copy(), self.tidied
-        out.sections = self.sections
+        out.earlier, out.sections = self.earlier, self.sections
         return out
 
     def cropped(self, low: ArrayLike, high: ArrayLike) -> LayeredStock | None:
@@ -346,6 +351,10 @@ class LayeredStock:
         whole = math.prod(b - a for a, b in zip(low, high, strict=True))
         return self.mesh() if self.volume() < whole * (1.0 - 1e-12) else trimesh.creation.box(bounds=[low, high])
 
+    def exposed_body(self) -> trimesh.Trimesh:
+        """Return the remaining stock as a mesh [mm] without the faces that two layers share."""
+        return stepped_body([self.section(i) for i in range(self.layers)], self.bounds)
+
     def mesh(self) -> trimesh.Trimesh:
         """Return the remaining stock as one closed mesh [mm] of a prism for each layer, z up."""
         return prisms([polygons(self.section(i)) for i in range(self.layers)], self.bounds)
@@ -354,14 +363,14 @@ class LayeredStock:
         """Return the remaining stock as binary glTF, in metres with y up as the format requires."""
         return glb(self.mesh())
 
-    def state(self) -> tuple[Floats, Shapes, NDArray[np.bool_], Ints, float]:
+    def state(self) -> tuple[Floats, Shapes, NDArray[np.bool_], Ints, float, EarlierMoves | None]:
         """Return the state with which :meth:`restore` undoes all later changes."""
-        return self.bounds, self.tiles.copy(), self.cut.copy(), self.room.copy(), self.tidied
+        return self.bounds, self.tiles.copy(), self.cut.copy(), self.room.copy(), self.tidied, self.earlier
 
-    def restore(self, state: tuple[Floats, Shapes, NDArray[np.bool_], Ints, float]) -> None:
+    def restore(self, state: tuple[Floats, Shapes, NDArray[np.bool_], Ints, float, EarlierMoves | None]) -> None:
         """Restore the stock to a state."""
         self.bounds, self.tiles, self.cut = state[0], state[1].copy(), state[2].copy()
-        self.room, self.tidied = state[3].copy(), state[4]
+        self.room, self.tidied, self.earlier = state[3].copy(), state[4], state[5]
 
     def save(self, path: str | Path) -> None:
         """Write the stock to one ``.npz`` file, completely or not at all."""
@@ -374,6 +383,7 @@ class LayeredStock:
         faces = np.zeros((0, 3), dtype=np.int64) if part is None else np.asarray(part.faces, dtype=np.int64)
         arrays = {"bounds": self.bounds, "xs": self.xs, "ys": self.ys, "cut": self.cut}
         arrays |= {"room": self.room.ravel(), "tidied": np.array([self.tidied])}
+        arrays |= no_moves() if self.earlier is None else self.earlier.arrays()
         return shape_bytes(KIND, arrays | {"vertices": vertices, "faces": faces}, areas_alone(self.tiles.ravel()))
 
     @classmethod
@@ -401,11 +411,17 @@ class LayeredStock:
             or (len(faces) > 0 and not (faces.min() >= 0 and faces.max() < len(vertices)))
         ):
             raise InputError(f"stock.file = {Path(path).name}: damaged: its parts do not fit each other")
+        damaged = InputError(f"stock.file = {Path(path).name}: damaged: its moves do not fit each other")
+        try:
+            earlier = EarlierMoves.from_arrays(a)
+        except ValueError:
+            raise damaged from None
         part = trimesh.Trimesh(vertices, faces.astype(np.int64), process=False) if len(faces) else None
         stock = cls(axes[0], axes[1], axes[2], tiles.reshape(shape), part)
         stock.cut = a["cut"].astype(np.bool_)
         stock.room = a["room"].astype(np.int64).reshape(shape)
         stock.tidied = float(a["tidied"][0])
+        stock.earlier = earlier
         return stock
 
     def _remove_turn(self, turn: Ints, rows: Ints, geometries: Shapes, chips: list[list[Polygon]], tidy: float) -> None:

@@ -49,6 +49,46 @@ def prisms(sections: Sequence[Sequence[Polygon]], bounds: Floats) -> trimesh.Tri
     return trimesh.Trimesh(np.vstack(points), np.vstack(faces), process=False)
 
 
+def stepped_body(sections: Sequence[shapely.MultiPolygon], bounds: Floats) -> trimesh.Trimesh:
+    """Return the faces of the prisms over ``sections[i]`` from ``bounds[i]`` to ``bounds[i + 1]`` [mm], but for those
+    that two layers share: walls, and what of a section has nothing above or below it.
+
+    A ray along z enters and leaves the body by them. They do not meet edge to edge.
+
+    Examples
+    --------
+    >>> step = [shapely.MultiPolygon([shapely.box(0.0, 0.0, x, 1.0)]) for x in (2.0, 2.0, 1.0)]
+    >>> body = stepped_body(step, np.array([0.0, 1.0, 2.0, 3.0]))
+    >>> flat = np.abs(body.face_normals[:, 2]) > 0.5
+    >>> float(body.area_faces[flat].sum()), float(body.volume)
+    (4.0, 5.0)
+    """
+    none = shapely.MultiPolygon()
+    triangles: list[Floats] = []
+    for below, above, z in zip([none, *sections], [*sections, none], bounds, strict=True):
+        if below is above or shapely.equals_exact(below, above):
+            continue
+        for shape, up in ((shapely.difference(below, above), True), (shapely.difference(above, below), False)):
+            polygons = [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon"]
+            parts = shapely.get_parts(shapely.constrained_delaunay_triangles(polygons))
+            parts = shapely.get_parts(parts)
+            xy = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]
+            (ux, uy), (vx, vy) = (xy[:, 1] - xy[:, 0]).T, (xy[:, 2] - xy[:, 0]).T
+            turned = (ux * vy - uy * vx > 0.0) != up
+            xy[turned] = xy[turned][:, ::-1]
+            triangles.append(np.dstack([xy, np.full((*xy.shape[:2], 1), z)]))
+    for shape, z0, z1 in zip(sections, bounds[:-1], bounds[1:], strict=True):
+        polygons = shapely.orient_polygons(shapely.get_parts(shape))
+        points, ring = shapely.get_coordinates(shapely.get_rings(polygons), return_index=True)
+        same = np.flatnonzero(ring[1:] == ring[:-1])
+        a, b = points[same], points[same + 1]
+        low, high = (np.full((len(a), 1), z) for z in (z0, z1))
+        corners = [np.hstack([p, z]) for p, z in ((a, low), (b, low), (b, high), (a, high))]
+        triangles += [np.stack([corners[k] for k in three], axis=1) for three in ((0, 1, 2), (0, 2, 3))]
+    every = np.vstack(triangles) if triangles else np.zeros((0, 3, 3))
+    return trimesh.Trimesh(every.reshape(-1, 3), np.arange(3 * len(every)).reshape(-1, 3), process=False)
+
+
 def _prism(part: Polygon, z0: float, z1: float) -> tuple[Floats, Ints]:
     """Vertices (n, 3) and faces (m, 3) of the prism over one polygon, counter-clockwise from outside."""
     parts = shapely.get_parts(shapely.constrained_delaunay_triangles(part))

@@ -215,6 +215,7 @@ class TileRings:
             return
         layer, j, i, slot = ops[:, [kernels.LAYER, kernels.J, kernels.I, kernels.NEW]].T
         self.stock.cut[layer] = True
+        self.stock.earlier = None
         if tidy <= 0.0:
             return
         # GEOS counts the first point of a ring twice

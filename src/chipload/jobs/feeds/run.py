@@ -101,10 +101,10 @@ def _new_feeds(
     gives = stiffness_of(inputs.elasticity.stiffness, cutters, None if compliance is None else compliance.steps)
     bends = with_checks(inputs.checks, material, deflection_watch(gives, material))
     checks = default_checks(inputs.checks, cutters, material)
-    program, times = time_rows(reading, cutters, machine)
+    program, times = time_rows(reading, cutters, machine, op.interpolation)
     # as it is: what its loads are, and how well they are known
     before = remove(
-        program, stock, cutters, material, fine, interpolation=op.interpolation, times=times, watch=bends,
+        program, stock, cutters, material, fine, times=times, watch=bends,
         engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.0, 0.5),
     )  # fmt: skip
     before = with_columns(before, (*watched_columns(gives), *PROGRAM_COLUMNS))
@@ -121,7 +121,7 @@ def _new_feeds(
     # again, for the greatest feed of each step
     fresh = inputs.stock.layered(reading.program, cutters)
     allowed = remove(
-        program, fresh, cutters, material, fine, interpolation=op.interpolation,
+        program, fresh, cutters, material, fine,
         times=times, accuracy=False,
         watch=allowed_feed_watch(steps, request, cutters, material, machine, before.columns),
         engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.5, 1.0),

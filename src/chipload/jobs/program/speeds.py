@@ -81,13 +81,13 @@ def new_speeds(
     stability = require_stated(watch_of(inputs, workpiece), "dynamics")
     gives = stiffness_of(inputs.elasticity.stiffness, cutters)
     bends = with_checks(inputs.checks, material, deflection_watch(gives, material))
-    program, times = time_rows(reading, cutters, machine)
+    program, times = time_rows(reading, cutters, machine, op.interpolation)
 
     def watch(cuts: Cuts) -> dict[str, Floats]:
         return {**bends(cuts), **stability(cuts)}
 
     before = remove(
-        program, stock, cutters, material, resolution_of(op, cutters, reading.program), interpolation=op.interpolation,
+        program, stock, cutters, material, resolution_of(op, cutters, reading.program),
         times=times, watch=watch, accuracy=False, engine=op.engine, processes=workers or op.workers, progress=progress,
     )  # fmt: skip
     before = with_columns(before, (*watched_columns(gives), *PROGRAM_COLUMNS, *stability.columns))

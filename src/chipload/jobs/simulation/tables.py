@@ -199,7 +199,7 @@ class SimulateTable(Table):
     interpolation: Literal["slerp", "lerp"] = setting_field(
         SimulationSettings,
         "interpolation",
-        "how the tool axis turns within a step: at constant rate, or along a straight line",
+        "how the tool axis turns on a row: at constant rate, or along a straight line",
     )
     engine: Literal["auto", "moves", "layers"] = setting_field(
         SimulationSettings,

@@ -46,7 +46,7 @@ def load_error(
     """
     names = (*COMPARED, AXIAL) if floors else COMPARABLE
     columns = {**removal.columns, AXIAL: axial_force(removal.columns)}
-    setting = setting_of(cutters, material, resolution, "slerp", None, 1)
+    setting = setting_of(cutters, material, resolution, None, 1)
     setting, _ = with_engine("layers" if layers else "moves", setting, program, before)
     found = resolution_error_of(program, before, columns, setting, names)[0]
     out = {name: found[name] for name in names}
