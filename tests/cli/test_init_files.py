@@ -37,6 +37,14 @@ def test_a_table_of_numbers_is_no_program(tmp_path: Path) -> None:
     )
 
 
+def test_a_mesh_is_named_as_one(tmp_path: Path) -> None:
+    path = tmp_path / "part.STL"
+    path.write_text("solid part\nendsolid part\n")
+    code, _, said = call("init", path, tmp_path / "job")
+    assert code == 2
+    assert said.startswith(f"chipload: {path}: a mesh has no faces or contours to plan from: export STEP or DXF")
+
+
 def test_a_program_without_known_motion_is_refused(tmp_path: Path) -> None:
     """Its only motions wait for what the controller measures; a dwell is none."""
     path = tmp_path / "cut.h"

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from chipload.cli.shipped import entry_lines
 from chipload.jobs import load_job
 from chipload.jobs.coarse import coarser
+from chipload.jobs.shipped import LISTINGS
 from chipload.tables import shipped_names
 from command import call
 from slot_job import slot_job, slot_text
@@ -149,3 +151,14 @@ def test_a_coarse_run_says_so(tmp_path: Path) -> None:
     assert sizes[1] < 0.5 * sizes[0]
     torque = [next(c["worst"] for c in s["limits"] if c["name"] == "torque_nm") for s in (fine, coarse)]
     assert torque[1] == pytest.approx(torque[0], rel=0.1)
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_long_tables_are_entries_of_short_lines(width) -> None:
+    """What a terminal of 80 columns shows: names whole, no line longer, all numbers of the table."""
+    listing = LISTINGS["machines"]()
+    lines = entry_lines(listing, width)
+    assert max(map(len, lines)) <= width
+    assert [line for line in lines if not line.startswith(" ")] == [row[0] for row in listing.rows]
+    text = " ".join(" ".join(line.split()) for line in lines)
+    assert all(cell in text for row in listing.rows for cell in row[:-1])

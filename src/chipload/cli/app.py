@@ -10,7 +10,6 @@ import typer
 from chipload.terminal import show
 
 app = typer.Typer(
-    add_completion=False,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

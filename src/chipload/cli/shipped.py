@@ -14,6 +14,9 @@ from chipload.terminal import plain, run_guarded, show
 if TYPE_CHECKING:
     from chipload.jobs.shipped import Listing
 
+#: a table of so few columns is folded into any width
+FEW = 3
+
 
 @app.command()
 def machines(debug: Debug = False) -> None:
@@ -63,13 +66,35 @@ def _show_entry(name: str) -> int:
 
 
 def _rich(listing: Listing) -> None:
-    """The table in the width of the terminal."""
+    """The table in the width of the terminal, or an entry of a few lines for each row where it does not fit."""
     from rich.console import Console
+    from rich.measure import Measurement
     from rich.table import Table
 
-    table = Table(show_edge=False, pad_edge=False)
+    console, table = Console(), Table(show_edge=False, pad_edge=False)
     for title in listing.head:
         table.add_column(title, overflow="fold")
     for row in listing.rows:
         table.add_row(*(plain(cell) for cell in row))
-    Console().print(table, markup=False)
+    wanted = Measurement.get(console, console.options.update(max_width=10_000), table).maximum
+    if len(listing.head) <= FEW or wanted <= console.width:
+        console.print(table, markup=False)
+        return
+    for line in entry_lines(listing, console.width):
+        show(plain(line))
+
+
+def entry_lines(listing: Listing, width: int) -> list[str]:
+    """Lines of at most ``width`` characters: the first cell of each row, below it the others with their units.
+
+    The last cell, the source, has a line of its own, cut off where it is longer; in a pipe it is whole.
+    """
+    from textwrap import shorten, wrap
+
+    out = []
+    for name, *cells, source in listing.rows:
+        known = [(head.partition(" ["), cell) for head, cell in zip(listing.head[1:-1], cells, strict=True) if cell]
+        texts = [f"{label} {cell}{f' {unit[:-1]}' if unit else ''}" for (label, _, unit), cell in known]
+        out += [name, *wrap(", ".join(texts), width, initial_indent="    ", subsequent_indent="    ")]
+        out.append("    " + shorten(f"{listing.head[-1]}: {source}", width - 4, placeholder=" ..."))
+    return out

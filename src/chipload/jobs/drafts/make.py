@@ -8,6 +8,9 @@ from chipload.errors import InputError
 from chipload.files import is_file, require_utf8
 from chipload.jobs.drafts.draft import Draft
 
+#: endings of meshes
+MESHES = (".stl", ".ply", ".obj", ".3mf", ".off")
+
 
 def draft_of(
     file: Path, folder: Path, *, machine: str | None = None, tools: Path | None = None, job: str | None = None
@@ -46,6 +49,11 @@ def draft_of(
 
         make = draft_drawing if ending == ".dxf" else draft_model
         return make(file, folder, machine)
+    if ending in MESHES:
+        raise InputError(
+            f"{file}: a mesh has no faces or contours to plan from: export STEP or DXF, or post the program of your "
+            "CAM and name the mesh in its job: [part] or [stock] file"
+        )
     from chipload.jobs.drafts.blade import draft_sections, holds_sections
     from chipload.jobs.drafts.program import Known, draft_program
 
