@@ -21,10 +21,14 @@ from chipload.errors import InputError
 
 #: folder of the profiles
 FOLDER = Path(__file__).parent / "controls"
-#: profiles by the word of a job, in the order of lists
-CONTROLS = (
+#: order of lists, and of controls that a text shows equally well; one that is not named here comes behind them
+_ORDER = (
     "linuxcnc", "fanuc", "haas", "sinumerik", "heidenhain", "mazak", "okuma", "mitsubishi", "brother", "grbl", "mach3",
 )  # fmt: skip
+#: profiles by the word of a job: every file of the folder is one
+CONTROLS = tuple(
+    sorted((path.stem for path in FOLDER.glob("*.toml")), key=lambda x: (_ORDER.index(x) if x in _ORDER else 99, x))
+)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ Jobs with `[program]` use them, whether or not they change feeds or speeds.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
@@ -29,6 +29,13 @@ from chipload.jobs.tables import (
     Whole,
     setting_field,
 )
+from chipload.program.control import CONTROLS
+
+if TYPE_CHECKING:
+    ControlName = str
+else:
+    # one of the profiles in program/controls
+    ControlName = Literal[CONTROLS]
 
 
 class ControlSettingsTable(Table):
@@ -53,22 +60,9 @@ class ProgramTable(Table):
     dialect: Literal["linuxcnc", "fanuc", "sinumerik", "heidenhain", "apt"] | None = Field(
         None, description="language of the program; default: by the file extension and by what the program shows"
     )
-    control: (
-        Literal[
-            "linuxcnc",
-            "fanuc",
-            "haas",
-            "sinumerik",
-            "heidenhain",
-            "mazak",
-            "okuma",
-            "mitsubishi",
-            "brother",
-            "grbl",
-            "mach3",
-        ]
-        | None
-    ) = Field(None, description="control whose rules apply; default: by what the program shows and by the machine")
+    control: ControlName | None = Field(
+        None, description="control whose rules apply; default: by what the program shows and by the machine"
+    )
     unit: Literal["mm", "inch"] | None = Field(
         None, description="unit of lengths before the program states one (G20, G21)"
     )
