@@ -15,8 +15,11 @@ import warnings
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from chipload.cli import app
 from chipload.machine.saved_offsets import saved_offsets
+from command import TIME_LEFT
 
 AXIS = Path("/usr/bin/axis")
 #: a LinuxCNC machine of three axes: travel 400 x 300 x 200 mm about no particular zero
@@ -46,6 +49,13 @@ def folder(tmp_path: Path) -> Path:
 
 
 def call(folder: Path, name: str, *words: str, **variables: str) -> tuple[int, bytes, str]:
+    """The command in this process."""
+    own = {"INI_FILE_NAME": str(folder / "mill.ini"), **variables}
+    done = CliRunner().invoke(app, ["filter", *words, str(folder / name)], env=own)
+    return done.exit_code, done.stdout_bytes, TIME_LEFT.sub("", done.stderr)
+
+
+def call_by_shell(folder: Path, name: str, *words: str, **variables: str) -> tuple[int, bytes, str]:
     """As the screen does it: the words of the ini and the file in quotes, by a shell."""
     line = f"{sys.executable} -m chipload filter {shlex.join(words)} {shlex.quote(str(folder / name))}"
     own = os.environ | {"INI_FILE_NAME": str(folder / "mill.ini")} | variables
@@ -54,7 +64,7 @@ def call(folder: Path, name: str, *words: str, **variables: str) -> tuple[int, b
 
 
 def test_a_good_program_passes_byte_by_byte(folder: Path) -> None:
-    code, out, err = call(folder, "it's good.ngc", AXIS_PROGRESS_BAR="1")
+    code, out, err = call_by_shell(folder, "it's good.ngc", AXIS_PROGRESS_BAR="1")
     assert (code, out) == (0, GOOD)
     assert err.splitlines()[-1] == "FILTER_PROGRESS=100"
     # X -10 is outside the travel of 0 to 400 mm only with the work offset at zero, and none is saved
