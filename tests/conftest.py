@@ -5,13 +5,15 @@ from __future__ import annotations
 import gc
 import math
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import cad_kernel
+import processor_time
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
 from chipload.geometry.contour import Contour
@@ -64,6 +66,30 @@ CAD = cad_kernel.used()
 def pytest_unconfigure() -> None:
     """End the process that has loaded the CAD kernel."""
     CAD.close()
+
+
+SPENT = processor_time.Spent()
+
+
+def pytest_runtest_logstart() -> None:
+    """What is spent between two tests counts for none."""
+    SPENT.since()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """State the processor time of a test in its reports, which workers send as well."""
+    report = yield
+    report.user_properties.append((processor_time.NAME, SPENT.since()))
+    return report
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Tell how much processor time each folder took."""
+    lines = processor_time.table(report for reports in terminalreporter.stats.values() for report in reports)
+    if lines:
+        terminalreporter.section("processor time")
+        terminalreporter.write("".join(f"{line}\n" for line in lines))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
