@@ -16,6 +16,8 @@ import numpy as np
 import shapely
 import trimesh
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from shapely import MultiPolygon, Polygon
 
 from chipload.errors import InputError
@@ -116,11 +118,22 @@ def sections(mesh: trimesh.Trimesh, heights: Sequence[float] | Floats) -> list[M
     [12.0, 12.0, 0.0]
     """
     vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-    return [_area_of_rings(_rings(vertices, faces, float(h))) for h in heights]
+    body = _bodies(vertices, faces)
+    return [_area_of_bodies(*_rings(vertices, faces, body, float(h))) for h in heights]
 
 
-def _rings(vertices: Floats, faces: Ints, h: float) -> list[Floats]:
-    """(k, 2) points of each ring in the plane z = h."""
+def _bodies(vertices: Floats, faces: Ints) -> Ints:
+    """(f,) number of the body of each face; -1: of a shell around a cavity, whose volume is below 0."""
+    edges = np.vstack([faces[:, :2], faces[:, 1:]])
+    graph = coo_array((np.ones(len(edges)), edges.T), shape=(len(vertices), len(vertices)))
+    shell = connected_components(graph, directed=False)[1][faces[:, 0]]
+    a, b, c = (vertices[faces[:, i]] - vertices.mean(axis=0) for i in range(3))
+    volume = np.bincount(shell, (a * np.cross(b, c)).sum(axis=1))
+    return np.where(volume[shell] < 0.0, -1, shell)
+
+
+def _rings(vertices: Floats, faces: Ints, body: Ints, h: float) -> tuple[list[Floats], list[int]]:
+    """(k, 2) points of each ring in the plane z = h, and its body."""
     above = (vertices[:, 2] >= h)[faces]
     cut = above.any(axis=1) & ~above.all(axis=1)
     f, up = faces[cut], above[cut]
@@ -135,7 +148,8 @@ def _rings(vertices: Floats, faces: Ints, h: float) -> list[Floats]:
     a, b = vertices[first[:, 0]], vertices[first[:, 1]]
     part = ((h - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
     points = a[:, :2] * (1.0 - part) + b[:, :2] * part
-    rings: list[Floats] = []
+    rings, of = list[Floats](), list[int]()
+    own = body[cut]
     onward = onward_of.tolist()
     done = [False] * len(onward)
     for start in range(len(onward)):
@@ -147,7 +161,22 @@ def _rings(vertices: Floats, faces: Ints, h: float) -> list[Floats]:
             at = onward[at]
         if len(ring) > 2:
             rings.append(points[ring])
-    return rings
+            of.append(int(own[start]))
+    return rings, of
+
+
+def _area_of_bodies(rings: list[Floats], of: list[int]) -> MultiPolygon:
+    """The area that rings of some bodies enclose: that of each body, joined."""
+    bodies = sorted({n for n in of if n >= 0})
+    if len(bodies) < 2:
+        return _area_of_rings(rings)
+    each = {n: [r for r, k in zip(rings, of, strict=True) if k == n] for n in bodies}
+    for ring in (r for r, k in zip(rings, of, strict=True) if k < 0):
+        # the cavity of the least body around it
+        around = [n for n in bodies if shapely.contains_xy(_area_of_rings(each[n]), *ring[0])]
+        if around:
+            each[min(around, key=lambda n: _area_of_rings(each[n]).area)].append(ring)
+    return _polygons(shapely.union_all([_area_of_rings(each[n]) for n in bodies]))
 
 
 def _area_of_rings(rings: list[Floats]) -> MultiPolygon:
@@ -158,5 +187,10 @@ def _area_of_rings(rings: list[Floats]) -> MultiPolygon:
     for solid, group in itertools.groupby(order, key=lambda i: areas[i] > 0.0):
         joined = shapely.union_all([shapely.make_valid(Polygon(rings[i])) for i in group])
         whole = shapely.union(whole, joined) if solid else shapely.difference(whole, joined)
-    parts = shapely.get_parts(whole)
+    return _polygons(whole)
+
+
+def _polygons(shape: shapely.Geometry) -> MultiPolygon:
+    """The polygons of a geometry that have an area."""
+    parts = shapely.get_parts(shape)
     return MultiPolygon(list(parts[(shapely.get_type_id(parts) == 3) & (shapely.area(parts) > 0.0)]))

@@ -251,14 +251,15 @@ def below(c, qx, qy, w, ux, uy, uz, h2, along, first, last):
 
 @njit(cache=True, nogil=True)
 def in_solid(x, y, z, low, high, first, ids, faces, cell):
-    """Whether a point is in the initial stock: within the block, or by the faces of the mesh that a ray along +z meets.
+    """Whether a point is in the initial stock: within the block, or by the faces of the mesh that a ray along +z meets:
+    it leaves bodies more often than it enters them. Bodies that overlap are joined.
 
     low, high : (3,) corners of the block [mm]; faces (f, 12) corners and normal; those of a cell are the rows
     ids[first[cell]] .. ids[first[cell + 1] - 1].
     """
     if len(faces) == 0:
         return low[0] <= x <= high[0] and low[1] <= y <= high[1] and low[2] <= z < high[2]
-    odd = False
+    left = 0
     for k in range(first[cell], first[cell + 1]):
         f = faces[ids[k]]
         over = False
@@ -272,8 +273,8 @@ def in_solid(x, y, z, low, high, first, ids, faces, cell):
                 if f[a] + (y - f[a + 1]) / (f[b + 1] - f[a + 1]) * (f[b] - f[a]) > x:
                     over = not over
         if over and f[2] - (f[9] * (x - f[0]) + f[10] * (y - f[1])) / f[11] > z:
-            odd = not odd
-    return odd
+            left += 1 if f[11] > 0.0 else -1
+    return left > 0
 
 
 @njit(cache=True, nogil=True)

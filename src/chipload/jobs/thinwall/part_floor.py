@@ -44,8 +44,8 @@ CORNER = 6
 BEYOND = 1.0
 #: how far stock reaches into the metal [mm], and its pieces along and across
 INSIDE, PIECES = 0.05, (24, 24)
-#: between the stock and the walls, and to which the area of centres is rounded [mm]
-SLIT, ROUNDED = 1e-6, 1e-6
+#: how far stock reaches into the walls, and to which the area of centres is rounded [mm]
+OVERLAP, ROUNDED = 1e-6, 1e-6
 #: segments of a quarter of a circle around a corner of a wall: within 0.4 µm for a radius of 5 mm
 QUARTER = 64
 #: points about the axis at which the force of the teeth may act
@@ -148,15 +148,13 @@ class PartFloor:
 
     @cached_property
     def _within(self) -> Polygon:
-        """Outline of the stock: a section joins bodies from the largest outline to the smallest, so that stock as large
-        as the pocket would be taken for it.
-        """
-        return self.face.buffer(-SLIT)
+        """Outline of the stock, which is one with the walls."""
+        return self.face.buffer(OVERLAP, join_style="mitre")
 
     @cached_property
     def _grid_prisms(self) -> list[tuple[Polygon, tuple[float, float]]]:
         """Pieces of the outline on a grid over the box, and the parameters of their middles."""
-        x, y = (np.linspace(0.0, size, k + 1) for size, k in zip(self.box, PIECES, strict=True))
+        x, y = (np.linspace(-OVERLAP, size + OVERLAP, k + 1) for size, k in zip(self.box, PIECES, strict=True))
         out = []
         for a, b in pairwise(x):
             for c, d in pairwise(y):

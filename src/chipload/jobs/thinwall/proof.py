@@ -37,7 +37,6 @@ from chipload.progress import Progress
 from chipload.simulation.chips import remove, stack_blocks
 from chipload.simulation.contact_points import touch_points
 from chipload.simulation.deflection import Contacts, form_error, step_deflections
-from chipload.simulation.moves import Engine
 from chipload.simulation.removal import Removal, Resolution, removal_between
 from chipload.simulation.section_deviation import nearest, section_deviation
 from chipload.stock.layers import LayeredStock
@@ -97,11 +96,6 @@ def resolution_of(inputs: WallInputs, program: Program) -> Resolution:
     )
 
 
-def engine_of(inputs: WallInputs) -> Engine:
-    """The engine of the simulation: moves but for floors, whose stock is a body beside the part, not one with it."""
-    return "layers" if any(o.table.contact == "end" for o in inputs.operations) else "auto"
-
-
 def prove(
     places: Places,
     plan: Plan,
@@ -122,7 +116,7 @@ def prove(
     fine, cutters = resolution_of(inputs, program), {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
     whole = remove(
         program, stock, cutters, inputs.cut.material, fine, keep=True, accuracy=False, times=times,
-        engine=engine_of(inputs), progress=progress,
+        engine="auto", progress=progress,
     )  # fmt: skip
     bars = {number: tool_bars(cutter) for number, cutter in cutters.items()}
     left = [np.full(places.shape, inputs.body.allowance[s]) for s in inputs.body.side_numbers]
@@ -160,7 +154,7 @@ def prove(
                 else _finish(inputs, removal, number, places.compliance(left, p.side, of_surface=True), error, bars)
             )
     floors = any(inputs.floor(number) is not None for number in inputs.body.side_numbers)
-    by_layers = engine_of(inputs) == "layers" or whole.handed_over
+    by_layers = whole.handed_over
     find = partial(
         load_error, program, places.uncut, whole, cutters, inputs.cut.material, fine, floors=floors, layers=by_layers
     )
