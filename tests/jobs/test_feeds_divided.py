@@ -142,12 +142,13 @@ def test_division_can_be_switched_off(tmp_path: Path) -> None:
 PLUNGE = HEAD + "G0 X20 Y0 Z5\nG1 Z-5 F900 (plunge)\nG1 X34 (slot)\nG0 Z5\nM2\n"
 
 
-def test_a_plunge_is_as_fast_as_its_axial_force_allows(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["force_n", "force_axial_n"])
+def test_a_plunge_is_as_fast_as_its_axial_force_allows(tmp_path: Path, name: str) -> None:
     """Bottom edges to the axis: the teeth push up with (Krc f_z + Kre) R each, and nothing across.
 
     Ahead of the material and in it the line has segments of their own.
     """
-    job = SLOT_JOB.replace("force_n = 300.0", "force_n = 400.0").replace(
+    job = SLOT_JOB.replace("force_n = 300.0", f"{name} = 400.0").replace(
         "overhang_mm = 30.0", "overhang_mm = 30.0\ncentre_cutting = true"
     )
     read = done(tmp_path, PLUNGE, job)

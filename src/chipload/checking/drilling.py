@@ -108,6 +108,8 @@ def with_drill_loads(loads: Mapping[str, Floats], cuts: Cuts, material: Material
         out[name][rows] += values
     out["force_n"] = np.array(loads["force_n"])
     out["force_n"][rows] = own.thrust
+    out["force_axial_n"] = np.array(loads["force_axial_n"])
+    out["force_axial_n"][rows] = own.thrust
     return out
 
 

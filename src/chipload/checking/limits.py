@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chipload.checking.default_checks import DIRECTED, default_limits, with_budget
+from chipload.checking.load_budget import AXIAL
 from chipload.checking.outcome import SimulationResult
 from chipload.checking.stability import STABILITY_LIMITS, StabilityResult, stability_limits
 from chipload.machine.machine import Machine
@@ -95,6 +96,8 @@ def _check_stated_limit(
     reason = simulation.checks.unknown_direction if name in DIRECTED else ""
     if not reason and name in BY_STIFFNESS and simulation.rigid:
         reason = f"{', '.join(simulation.rigid)} {'is' if len(simulation.rigid) == 1 else 'are'} not stated"
+    if name == AXIAL and not _upright(columns):
+        reason = "the axis of the tool leans: the force along it is not calculated"
     if name in ("gouge_mm", "excess_mm"):
         return _difference(simulation, columns, track, name, limit)
     if name == "form_error_um" and "form_points" in columns and not np.asarray(columns["form_points"]).any():
@@ -102,6 +105,12 @@ def _check_stated_limit(
     error = error_of(column_of(name).name, simulation.errors)
     check = check_limit(name, limit, columns, track=track, error=error, reason=reason)
     return with_budget(check, simulation.checks, columns)
+
+
+def _upright(columns: Columns) -> bool:
+    """Return whether the axis of the tool is upright wherever it cuts."""
+    cuts = np.asarray(columns["force_n"], dtype=np.float64) > 0.0
+    return bool((np.asarray(columns["axis_z"], dtype=np.float64)[cuts] > 1.0 - 1e-9).all())
 
 
 def _default_gouge(simulation: SimulationResult, columns: Columns, track: str) -> tuple[LimitCheck, ...]:

@@ -142,8 +142,7 @@ def unchecked_texts(program: ProgramResult) -> tuple[str, ...]:
     always: tuple[str, ...] = () if simulation.stability is None else ("stability_margin",)
     if simulation.left is not None and "gouge" not in simulation.checks.off:
         always += ("gouge_mm",)
-    if "thrust_n" not in simulation.removal.columns:
-        always += ("thrust_n",)
+    always += tuple(name for name in ("thrust_n", "force_axial_n") if name not in simulation.removal.columns)
     missing = [name for name in simulation.stated_limits.unstated if name not in always]
     out = [*unchecked_checks(simulation.checks), *(f"limit {name}: not stated" for name in missing)]
     out += program.reading.unchecked

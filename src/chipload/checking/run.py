@@ -35,6 +35,7 @@ from chipload.program.program import Program
 from chipload.program.read import ProgramReading
 from chipload.progress import Progress, part_of, silent
 from chipload.result.provenance import sources, versions
+from chipload.simulation.accuracy import AXIAL, axial_force
 from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
@@ -155,6 +156,8 @@ def simulate_program(
     removal = with_columns(removal, (*watched_columns(gives, formed=made is not None), *PROGRAM_COLUMNS))
     if inputs.limits.thrust_n is not None or any(is_pointed(c) for c in cutters.values()):
         removal = with_drilling(removal, cutters, material)
+    if inputs.limits.force_axial_n is not None:
+        removal = replace(removal, columns={**removal.columns, AXIAL: axial_force(removal.columns)})
     if leans(program).any():
         found, unchecked = check_leaning_stock(inputs, program, before, stock)
         stock_check = replace(

@@ -61,6 +61,7 @@ class Limits:
     Parameters
     ----------
     force_n, torque_nm : greatest force and torque on the cutter
+    force_axial_n : greatest force on the cutter along its axis, towards either end; the axis is upright
     thrust_n : greatest thrust of a drill along its axis
     power_w : greatest mean power over a revolution
     chip_max_mm : greatest undeformed chip thickness
@@ -79,6 +80,7 @@ class Limits:
 
     force_n: float | None = number_field(None, above=0.0)
     torque_nm: float | None = number_field(None, above=0.0)
+    force_axial_n: float | None = number_field(None, above=0.0)
     thrust_n: float | None = number_field(None, above=0.0)
     power_w: float | None = number_field(None, above=0.0)
     chip_max_mm: float | None = number_field(None, above=0.0)

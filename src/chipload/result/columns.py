@@ -131,6 +131,8 @@ _ROWS = (
     ("force_n", "N", "force", "greatest magnitude of the force on the cutter over a revolution", STATED),
     ("force_xy_n", "N", "force across the axis", "greatest force on the cutter across its axis over a revolution",
      FORCE),
+    ("force_axial_n", "N", "axial force", "greatest force on an upright cutter along its axis over a revolution, "
+     "towards either end", FORCE),
     ("force_x_n", "N", "force x", "force on the cutter where the force across the axis is greatest", FORCE),
     ("force_y_n", "N", "force y", "force on the cutter where the force across the axis is greatest", FORCE),
     ("force_z_n", "N", "force z", "force on the cutter where the force across the axis is greatest", FORCE),

@@ -206,7 +206,7 @@ def _with_parts(rows: Floats, owner: Ints, profile: Slices) -> tuple[Ints, Float
 def greatest_loads(cuts: Cuts, material: Material, rotation: float, bands: bool = False) -> dict[str, Floats]:
     """Return the columns (c,) of :data:`LOADS` that limits bound; with ``bands`` those of :data:`BANDS` too.
 
-    They are greatest force [N], greatest and mean torque [N m], mean power [W] and thickest chip [mm].
+    They are greatest force and axial force [N], greatest and mean torque [N m], mean power [W] and thickest chip [mm].
     """
     turn = over_turn(cuts.engagement, cuts.cutter, material, rotation)
     force, torque, _ = turn
@@ -214,6 +214,7 @@ def greatest_loads(cuts: Cuts, material: Material, rotation: float, bands: bool 
     _, mean = mean_forces(cuts.engagement, cuts.cutter, material)
     return {
         "force_n": np.linalg.norm(force, axis=2).max(axis=1),
+        "force_axial_n": np.abs(force[:, :, 2]).max(axis=1),
         "torque_nm": torque.max(axis=1) / 1000.0,
         "torque_mean_nm": mean / 1000.0,
         "power_w": mean * np.abs(cuts.spindle) / 1000.0,

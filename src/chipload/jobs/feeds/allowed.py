@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from chipload.checking.default_checks import DefaultChecks, peak_excess
 from chipload.checking.drilling import with_drill_loads
-from chipload.checking.load_budget import BUDGETED, factors_of_steps
+from chipload.checking.load_budget import AXIAL, BUDGETED, factors_of_steps
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
-from chipload.cutting.load_parts import LoadParts, load_parts
+from chipload.cutting.load_parts import LoadParts, bounded_parts, load_parts
 from chipload.cutting.material import Material
 from chipload.cutting.strength import allowed_stress, cutter_stress
 from chipload.engagement.tooth_surfaces import thickest_of_teeth
@@ -188,11 +188,14 @@ def allowed_feed_watch(
         def greatest(parts: Mapping[str, Sequence[LoadParts]]) -> Floats:
             return greatest_factor(lambda k: np.asarray(ratios(k, parts).max(axis=0)), low, high)
 
-        parts, factor = {}, np.ones(len(low))
+        parts: dict[str, Sequence[LoadParts]] = {}
+        factor = np.ones(len(low))
         if request.checks.confidence > 0.5:
             # at the programmed feeds, then at those that are found with them
             for _ in range(PARTS_AGAIN):
-                parts = load_parts(at_feeds(cuts, factor).plain, cuts.cutter, material)
+                parts = {**load_parts(at_feeds(cuts, factor).plain, cuts.cutter, material)}
+                if AXIAL in request.limits:
+                    parts[AXIAL] = _axial_parts(at_feeds(cuts, factor), material, request.rotation)
                 factor = greatest(parts)
                 factor = np.where(np.isnan(factor), low, factor)
         factor = greatest(parts)
@@ -200,6 +203,15 @@ def allowed_feed_watch(
         return {_FACTOR: factor, _BY: np.where(factor == high, by[cuts.step], worst).astype(np.float64)}
 
     return watch
+
+
+def _axial_parts(cuts: Cuts, material: Material, rotation: float) -> tuple[LoadParts, ...]:
+    """Return upper bounds of the parts of the axial force of each cut."""
+    loads = with_drill_loads(greatest_loads(cuts, material, rotation), cuts, material)
+    return tuple(
+        replace(bounded_parts(cuts.cutter, material, chip), load=load)
+        for chip, load in zip(loads[CHIP].tolist(), loads[AXIAL].tolist(), strict=True)
+    )
 
 
 def _chip_of_instant(chip: Floats, cutter: Cutter, sines: Floats) -> Callable[[Floats], Floats]:

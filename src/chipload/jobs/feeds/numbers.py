@@ -15,7 +15,8 @@ from chipload.result import LimitCheck
 
 #: columns of loads that are compared before and after new feeds
 COMPARED = (
-    "force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um", "deflection_workpiece_um", "cutter_stress_mpa",
+    "force_n", "force_axial_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um", "deflection_workpiece_um",
+    "cutter_stress_mpa",
 )  # fmt: skip
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -24,6 +24,7 @@ from chipload.jobs.simulation.tables import LOADS
 from chipload.program.program import RAPID
 from chipload.program.read import ProgramReading, line_times
 from chipload.progress import Progress, part_of, silent
+from chipload.simulation.accuracy import AXIAL, axial_force
 from chipload.simulation.checkpoint import Checkpoint
 from chipload.simulation.chips import remove
 from chipload.simulation.steps import steps_of
@@ -110,6 +111,8 @@ def _new_feeds(
     before = with_columns(before, (*watched_columns(gives), *PROGRAM_COLUMNS))
     if any(is_pointed(c) for c in cutters.values()):
         before = with_drilling(before, cutters, material)
+    if AXIAL in limits:
+        before = replace(before, columns={**before.columns, AXIAL: axial_force(before.columns)})
     more = bends if limits.keys() & {"deflection_um", "deflection_workpiece_um"} else None
     errors = {name: SPARE * error for name, error in before.resolution_error.items()}
     errors = with_compliance_error(errors, before.columns, compliance)  # the compliance does not change with the feed

@@ -239,6 +239,9 @@ class ProgramLimitsTable(LimitsTable):
 
     force_n: Number | None = _limit("force_n", "greatest force on the cutter")
     torque_nm: Number | None = _limit("torque_nm", "greatest torque on the cutter")
+    force_axial_n: Number | None = _limit(
+        "force_axial_n", "greatest force on the cutter along its axis, towards either end; the axis is upright"
+    )
     thrust_n: Number | None = _limit("thrust_n", "greatest thrust of a drill along its axis")
     power_w: Number | None = _limit("power_w", "greatest mean power over a revolution")
     chip_max_mm: Number | None = _limit("chip_max_mm", "greatest undeformed chip thickness")
@@ -261,7 +264,9 @@ class ProgramLimitsTable(LimitsTable):
 
 
 #: limits that new feeds can keep
-LOADS = ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um", "deflection_workpiece_um")
+LOADS = (
+    "force_n", "force_axial_n", "torque_nm", "power_w", "chip_max_mm", "deflection_um", "deflection_workpiece_um",
+)  # fmt: skip
 
 
 def _stiff(value: Any) -> Any:
