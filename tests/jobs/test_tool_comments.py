@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from chipload.jobs.drafts.comments import read_header
+from chipload.jobs.drafts.cutters import cutter_table
 from chipload.program.tool_sizes import drill_size, thread_size
 from command import call
 
@@ -108,6 +109,14 @@ def test_a_comment_of_a_post(text: str, mm: float, kind: str | None, stated: dic
 )
 def test_comments_that_describe_no_tool(text: str) -> None:
     assert not [own for own in read_header(text).cutters.values() if "diameter_mm" in own]
+
+
+def test_a_reamer_reaches_the_depth_of_its_tip() -> None:
+    """Its lead is short: with a point of 90 deg a reamer of 10 mm would leave the last 5 mm of its hole narrower."""
+    stated = read_header("(T6 D=10. REAMER)").cutters[6]
+    keys = {e.key: e.value for e in cutter_table(6, [stated], 20.0).entries if e.value is not None}
+    assert "bottom_deg" not in keys
+    assert (keys["diameter_mm"], keys["flutes"]) == (10.0, 6)
 
 
 def test_sizes_by_name() -> None:

@@ -28,7 +28,6 @@ POINTS = {
     ToolKind.SPOT: (45.0, "a point of 90 deg"),
     ToolKind.CHAMFER: (45.0, "a point of 90 deg, usual for chamfers"),
     ToolKind.COUNTERSINK: (45.0, "a point of 90 deg"),
-    ToolKind.REAMER: (45.0, "a lead of 45 deg"),
 }
 #: teeth of kinds whose number is usual
 TEETH = {ToolKind.DRILL: 2, ToolKind.SPOT: 2, ToolKind.REAMER: 6, ToolKind.BORING: 1, ToolKind.COUNTERSINK: 3}
