@@ -70,22 +70,48 @@ def demo(
 
 @app.command()
 def view(
-    path: Annotated[Path, typer.Argument(metavar="PATH", help="a result folder, a job, or a folder that holds them")],
+    path: Annotated[
+        Path,
+        typer.Argument(
+            metavar="PATH", help="a result folder, a job, a folder that holds them, or a file that init accepts"
+        ),
+    ],
     port: Annotated[
         int | None, typer.Option("--port", min=1, max=65535, help="port of the page; default: 8170, or a free port")
     ] = None,
     open_browser: Annotated[bool, typer.Option("--open/--no-open", help="open the page in the browser")] = True,
     debug: Debug = False,
 ) -> None:
-    """Show results and run jobs of a folder in the browser, on this computer only. Stop with Ctrl-C."""
+    """Show results and run jobs of a folder in the browser, on this computer only. Stop with Ctrl-C.
+
+    For a program, a drawing or a model the job is written first, into a folder beside it: the page has its questions.
+    """
 
     def work() -> int:
         from chipload.web.serve import serve
 
-        serve(path, port, open_browser, show)
+        serve(_drafted(path), port, open_browser, show)
         return 0
 
     run_guarded(work, debug)
+
+
+def _drafted(path: Path) -> Path:
+    """The folder of the job that is written for a file; a job, a result and a folder as they are."""
+    if path.suffix.lower() in (".toml", ".json", ".html") or not path.is_file():
+        return path
+    from chipload.jobs.drafts.draft import write_draft
+    from chipload.jobs.drafts.make import draft_of
+
+    folder = path.with_name(f"{path.stem}-job")
+    if (folder / "job.toml").exists():
+        show(f"{folder / 'job.toml'}: already there, as it is")
+        return folder
+    draft = draft_of(path, folder)
+    show(f"written: {write_draft(draft, folder)}: {len(draft.guesses)} guesses to confirm")
+    for question in draft.questions:
+        show(f"question: {question}")
+    return folder
 
 
 @app.command()
