@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,10 +92,11 @@ def _near(rows: Floats, cutter: Ints, cutters: Sequence[Cutter], low: Floats, hi
 
 
 def _cutters_of(earlier: EarlierMoves) -> list[Cutter]:
-    return [
-        Cutter(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
-        for values in earlier.cutters
-    ]
+    out = []
+    for values in earlier.cutters:
+        fields: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
+        out.append(Cutter(**fields))
+    return out
 
 
 def _is_block(stock: LayeredStock) -> bool:

@@ -48,7 +48,7 @@ class EarlierMoves:
     @property
     def upright(self) -> bool:
         """Whether the axis of every move is upright."""
-        return self.rows.shape[1] == 6
+        return bool(self.rows.shape[1] == 6)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the arrays of :data:`SAVED_MOVES`."""
