@@ -58,6 +58,8 @@ clearance_mm = 5.0
 {more}
 """
 SQUARE = [(0, 0), (30, 0), (30, 24), (0, 24)]
+#: where the room for an island is not needed: half the passes
+SMALL = [(0, 0), (22, 0), (22, 18), (0, 18)]
 
 
 def written(folder: Path, drawn, *operations: str, part: str = "", limits: str = "engagement_deg = 60.0") -> Path:

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from chipload.errors import InputError
-from pocket_job import SQUARE, checked, done, operation, swept, written
+from pocket_job import SMALL, checked, done, operation, swept, written
 
 FINISH = """radial_depth_mm = 1.2
 depth_mm = 6.0
@@ -19,12 +19,12 @@ floor_finish = { feed_mm_min = 600.0, speed_rpm = 9000.0 }
 wall_finish = { feed_mm_min = 500.0, speed_rpm = 9500.0, axial_depth_mm = 4.0 }
 """
 #: what a disc of 4 mm reaches of the square
-REACHED = 30.0 * 24.0 - (4.0 - math.pi) * 16.0
+REACHED = 22.0 * 18.0 - (4.0 - math.pi) * 16.0
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    (pocket,), outcome = done(written(tmp_path_factory.mktemp("finish"), {"part": [SQUARE]}, operation(FINISH)))
+    (pocket,), outcome = done(written(tmp_path_factory.mktemp("finish"), {"part": [SMALL]}, operation(FINISH)))
     return pocket, outcome
 
 
@@ -73,18 +73,18 @@ def test_the_finished_wall_stands_where_it_is_drawn(finished):
     """
     pocket, _ = finished
     assert pocket.summary["reachable_mm2"] == pytest.approx(REACHED, rel=1e-4)
-    assert pocket.summary["cleared_percent"] > 99.8
-    opening = shapely.buffer(shapely.box(4, 4, 26, 20), 4.0, quad_segs=256)
+    assert pocket.summary["leftover_mm2"] < 4.0 * 0.3
+    opening = shapely.buffer(shapely.box(4, 4, 18, 14), 4.0, quad_segs=256)
     for z in (-3.0, -6.0):
         cut = shapely.union_all([swept(pocket.program, 4.0, low) for low in (z, -6.0)])
         edge = shapely.get_coordinates(shapely.segmentize(opening.exterior, 0.2))
         off = shapely.distance(shapely.points(edge), cut.exterior)
-        corner = np.hypot(np.minimum(edge[:, 0], 30.0 - edge[:, 0]), np.minimum(edge[:, 1], 24.0 - edge[:, 1])) < 4.5
+        corner = np.hypot(np.minimum(edge[:, 0], 22.0 - edge[:, 0]), np.minimum(edge[:, 1], 18.0 - edge[:, 1])) < 4.5
         assert off[~corner].max() < 2e-3
         assert off.max() < 0.08
         assert cut.area == pytest.approx(REACHED - pocket.summary["leftover_mm2"], rel=1e-4)
     rough = swept(pocket.program, 4.0, -2.75)
-    assert rough.area == pytest.approx(REACHED - 2.0 * 0.3 * (30.0 + 24.0) + 4.0 * 0.09, rel=2e-3)
+    assert rough.area == pytest.approx(REACHED - 2.0 * 0.3 * (22.0 + 18.0) + 4.0 * 0.09, abs=1.4)
 
 
 def test_the_form_error_is_that_of_the_finished_wall(finished):
@@ -95,7 +95,7 @@ def test_the_form_error_is_that_of_the_finished_wall(finished):
 
 def test_an_allowance_of_the_floor_stays_without_its_finish(tmp_path):
     (pocket,), _ = done(
-        written(tmp_path, {"part": [SQUARE]}, operation("radial_depth_mm = 2.0\nfloor_allowance_mm = 0.5"))
+        written(tmp_path, {"part": [SMALL]}, operation("radial_depth_mm = 2.0\nfloor_allowance_mm = 0.5"))
     )
     assert pocket.program.p_work[:, 2].min() == pytest.approx(-3.5)
     assert "finish" not in pocket.summary
@@ -122,5 +122,5 @@ def test_an_allowance_of_the_floor_stays_without_its_finish(tmp_path):
 )
 def test_refused(tmp_path, more, text):
     with pytest.raises(InputError) as err:
-        checked(written(tmp_path, {"part": [SQUARE]}, operation(f"radial_depth_mm = 1.2\n{more}")))
+        checked(written(tmp_path, {"part": [SMALL]}, operation(f"radial_depth_mm = 1.2\n{more}")))
     assert text in str(err.value)

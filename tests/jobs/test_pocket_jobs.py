@@ -11,7 +11,7 @@ import pytest
 import shapely
 
 from chipload.errors import InputError
-from pocket_job import SQUARE, checked, done, operation, swept, written
+from pocket_job import SMALL, SQUARE, checked, done, operation, swept, written
 
 #: the limits are used up by the nominal loads
 NOMINAL = "\n[checks]\nconfidence = 0.5\n"
@@ -19,8 +19,8 @@ NOMINAL = "\n[checks]\nconfidence = 0.5\n"
 
 def test_levels(tmp_path):
     """10 mm in levels of at most 4: three of 3.333 mm, each the same path, and three times the cutting time."""
-    (one,), _ = done(written(tmp_path, {"part": [SQUARE]}, operation("radial_depth_mm = 1.2")))
-    (three,), outcome = done(written(tmp_path, {"part": [SQUARE]}, operation("radial_depth_mm = 1.2\ndepth_mm = 10.0")))
+    (one,), _ = done(written(tmp_path, {"part": [SMALL]}, operation("radial_depth_mm = 1.2")))
+    (three,), outcome = done(written(tmp_path, {"part": [SMALL]}, operation("radial_depth_mm = 1.2\ndepth_mm = 10.0")))
     assert three.summary["levels"] == 3
     floors = three.program.p_work[:, 2]
     for k, z in enumerate((-10.0 / 3.0, -20.0 / 3.0, -10.0)):
@@ -76,13 +76,13 @@ def test_a_pocket_open_to_one_side(tmp_path):
 def test_a_hole_to_enter_by(tmp_path):
     """No bore, and the first cut is made from the hole."""
     (pocket,), _ = done(
-        written(tmp_path, {"part": [SQUARE]}, operation("radial_depth_mm = 1.2\nholes_mm = [[15.0, 12.0, 10.0]]"))
+        written(tmp_path, {"part": [SMALL]}, operation("radial_depth_mm = 1.2\nholes_mm = [[11.0, 9.0, 10.0]]"))
     )
     assert not [e for e in pocket.events if e.code == "pocket-entry"]
     assert pocket.summary["entry_s"] < 1.0
     first = np.flatnonzero(pocket.history["pass"] == "pocket")[0]
     x, y = pocket.history["x_mm"][first], pocket.history["y_mm"][first]
-    assert math.hypot(x - 15.0, y - 12.0) < 2.5
+    assert math.hypot(x - 11.0, y - 9.0) < 2.5
 
 
 def test_what_a_larger_cutter_left(tmp_path):
@@ -133,12 +133,16 @@ def _ring(allowance: float) -> float:
 
 
 @pytest.mark.parametrize(
-    ("limits", "by"), [("force_xy_n = 260.0", "force_xy_n"), ("torque_nm = 0.9\nengagement_deg = 90.0", "torque_nm")]
+    ("limits", "by", "drawn"),
+    [
+        ("force_xy_n = 260.0", "force_xy_n", SMALL),
+        ("torque_nm = 0.9\nengagement_deg = 90.0", "torque_nm", SQUARE),
+    ],
 )
-def test_the_engagement_that_the_limits_allow(tmp_path, limits, by):
+def test_the_engagement_that_the_limits_allow(tmp_path, limits, by, drawn):
     """The limit is used, and nowhere exceeded."""
     (pocket,), outcome = done(
-        written(tmp_path, {"part": [SQUARE]}, operation('engagement_deg = "limit"'), limits=limits + NOMINAL)
+        written(tmp_path, {"part": [drawn]}, operation('engagement_deg = "limit"'), limits=limits + NOMINAL)
     )
     (text,) = outcome.operations[0].result.findings
     assert f"by {by}" in text
@@ -147,7 +151,7 @@ def test_the_engagement_that_the_limits_allow(tmp_path, limits, by):
     assert 0.6 * limit < pocket.history[by][cut].max() <= limit
     (tighter,), _ = done(
         written(
-            tmp_path, {"part": [SQUARE]}, operation('engagement_deg = "limit"'),
+            tmp_path, {"part": [drawn]}, operation('engagement_deg = "limit"'),
             limits=limits.replace(str(limit), str(0.9 * limit)) + NOMINAL,
         )
     )  # fmt: skip
@@ -155,7 +159,7 @@ def test_the_engagement_that_the_limits_allow(tmp_path, limits, by):
 
 
 def test_an_engagement_that_is_stated(tmp_path):
-    path = written(tmp_path, {"part": [SQUARE]}, operation("engagement_deg = 40.0"))
+    path = written(tmp_path, {"part": [SMALL]}, operation("engagement_deg = 40.0"))
     (pocket,), _ = done(path)
     assert pocket.summary["engagement_deg"]["wanted"] == pytest.approx(40.0)
 

@@ -16,7 +16,8 @@ from pocket_job import checked, done, operation, swept, written
 
 #: a slot of 11 mm for a cutter of 8 mm: a bore in it would be 1.5 mm beside its middle
 SLOT = [(0, 0), (40, 0), (40, 11), (0, 11)]
-WIDE = [(0, 0), (40, 0), (40, 26), (0, 26)]
+WIDE = [(0, 0), (24, 0), (24, 20), (0, 20)]
+SHORT = [(0, 0), (24, 0), (24, 11), (0, 11)]
 RAMP = 'radial_depth_mm = 1.2\ndepth_mm = 5.0\nentry = "ramp"\n'
 
 
@@ -94,7 +95,7 @@ def test_an_entry_is_no_steeper_than_its_cutter_allows(tmp_path, entry):
 
 
 def test_an_entry_of_a_cutter_without_teeth_at_its_centre_is_unproven(tmp_path):
-    job = written(tmp_path, {"0": [SLOT]}, operation(RAMP))
+    job = written(tmp_path, {"0": [SHORT]}, operation(RAMP))
     text = job.read_text()
     job.write_text(text.replace("diameter_mm = 8.0\n", "diameter_mm = 8.0\ncentre_cutting = false\n"))
     _, outcome = done(job)
