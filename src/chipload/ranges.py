@@ -54,14 +54,15 @@ class Range:
         return wrong[0] if wrong else ""
 
 
-def number_field(default: Any = MISSING, **limits: Any) -> Any:
+def number_field(default: Any = MISSING, *, text: str = "", **limits: Any) -> Any:
     """Return a field that holds a number within a :class:`Range`, or None where that is its default.
 
     Parameters
     ----------
+    text : what it is, for a key of the job file that is made of the field
     limits : parameters of the range
     """
-    return field(default=default, metadata={"range": Range(**limits)})
+    return field(default=default, metadata={"range": Range(**limits), "text": text})
 
 
 def choice_field(default: Any, *choices: str) -> Any:

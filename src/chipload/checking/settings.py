@@ -78,20 +78,34 @@ class Limits:
     {'force_n': 800.0}
     """
 
-    force_n: float | None = number_field(None, above=0.0)
-    torque_nm: float | None = number_field(None, above=0.0)
-    force_axial_n: float | None = number_field(None, above=0.0)
-    thrust_n: float | None = number_field(None, above=0.0)
-    power_w: float | None = number_field(None, above=0.0)
-    chip_max_mm: float | None = number_field(None, above=0.0)
-    deflection_um: float | None = number_field(None, above=0.0)
-    deflection_workpiece_um: float | None = number_field(None, above=0.0)
-    form_error_um: float | None = number_field(None, above=0.0)
-    gouge_mm: float | None = number_field(None, above=0.0)
-    excess_mm: float | None = number_field(None, above=0.0)
-    stability_margin: float | None = number_field(None, above=0.0, most=3.0)
-    stable_probability: float | None = number_field(None, above=0.0, below=1.0)
-    sle_um: float | None = number_field(None, above=0.0)
+    force_n: float | None = number_field(None, text="greatest force on the cutter", above=0.0)
+    torque_nm: float | None = number_field(None, text="greatest torque on the cutter", above=0.0)
+    force_axial_n: float | None = number_field(
+        None, text="greatest force on the cutter along its axis, towards either end; the axis is upright", above=0.0
+    )
+    thrust_n: float | None = number_field(None, text="greatest thrust of a drill along its axis", above=0.0)
+    power_w: float | None = number_field(None, text="greatest mean power over a revolution", above=0.0)
+    chip_max_mm: float | None = number_field(None, text="greatest undeformed chip thickness", above=0.0)
+    deflection_um: float | None = number_field(
+        None, text="greatest displacement between tool and workpiece, see [stiffness]", above=0.0
+    )
+    deflection_workpiece_um: float | None = number_field(None, text="greatest deflection of the [workpiece]", above=0.0)
+    form_error_um: float | None = number_field(
+        None, text="greatest thickness left on, or removed from, the [part] by deflection", above=0.0
+    )
+    gouge_mm: float | None = number_field(None, text="deepest cut into the [part]", above=0.0)
+    excess_mm: float | None = number_field(
+        None, text="greatest thickness left on the [part] where the tool came near it", above=0.0
+    )
+    stability_margin: float | None = number_field(
+        None, text="least stability margin, see [dynamics]; default 1 with [dynamics]", above=0.0, most=3.0
+    )
+    stable_probability: float | None = number_field(
+        None, text="least probability of stability; needs deviations in [dynamics]", above=0.0, below=1.0
+    )
+    sle_um: float | None = number_field(
+        None, text="greatest thickness left on, or removed from, a wall by forced vibration", above=0.0
+    )
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""

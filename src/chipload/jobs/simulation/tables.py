@@ -6,9 +6,10 @@ Jobs with `[program]` use them, whether or not they change feeds or speeds.
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, create_model
 
 from chipload.checking.clamped import Workpiece
 from chipload.checking.settings import Limits, SimulationSettings
@@ -230,37 +231,19 @@ class SimulateTable(Table):
     speeds: SpeedsTable | None = Field(None, description="new spindle speeds; needs [dynamics]; default: unchanged")
 
 
-def _limit(name: str, description: str) -> Any:
-    return setting_field(Limits, name, description)
+if TYPE_CHECKING:
 
+    class ProgramLimitsTable(LimitsTable):
+        """Limits of the simulated loads and of the part."""
 
-class ProgramLimitsTable(LimitsTable):
-    """Limits of the simulated loads and of the part."""
-
-    force_n: Number | None = _limit("force_n", "greatest force on the cutter")
-    torque_nm: Number | None = _limit("torque_nm", "greatest torque on the cutter")
-    force_axial_n: Number | None = _limit(
-        "force_axial_n", "greatest force on the cutter along its axis, towards either end; the axis is upright"
+else:
+    ProgramLimitsTable = create_model(
+        "ProgramLimitsTable",
+        __base__=LimitsTable,
+        __module__=__name__,
+        **{f.name: (Number | None, setting_field(Limits, f.name, f.metadata["text"])) for f in fields(Limits)},
     )
-    thrust_n: Number | None = _limit("thrust_n", "greatest thrust of a drill along its axis")
-    power_w: Number | None = _limit("power_w", "greatest mean power over a revolution")
-    chip_max_mm: Number | None = _limit("chip_max_mm", "greatest undeformed chip thickness")
-    deflection_um: Number | None = _limit(
-        "deflection_um", "greatest displacement between tool and workpiece, see [stiffness]"
-    )
-    deflection_workpiece_um: Number | None = _limit("deflection_workpiece_um", "greatest deflection of the [workpiece]")
-    form_error_um: Number | None = _limit(
-        "form_error_um", "greatest thickness left on, or removed from, the [part] by deflection"
-    )
-    gouge_mm: Number | None = _limit("gouge_mm", "deepest cut into the [part]")
-    excess_mm: Number | None = _limit("excess_mm", "greatest thickness left on the [part] where the tool came near it")
-    stability_margin: Number | None = _limit(
-        "stability_margin", "least stability margin, see [dynamics]; default 1 with [dynamics]"
-    )
-    stable_probability: Number | None = _limit(
-        "stable_probability", "least probability of stability; needs deviations in [dynamics]"
-    )
-    sle_um: Number | None = _limit("sle_um", "greatest thickness left on, or removed from, a wall by forced vibration")
+    ProgramLimitsTable.__doc__ = "Limits of the simulated loads and of the part."
 
 
 #: limits that new feeds can keep
