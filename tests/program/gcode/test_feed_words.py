@@ -31,6 +31,8 @@ def without_f(text: str) -> str:
         ("G93 G1 X1 F4.5\nX2 F3", {1: 0.1, 2: 1.0}, "G93 G1 X1 F0.45\nX2 F3"),
         ("G1 X1 F1000", {1: 1 / 3}, "G1 X1 F333.3"),
         ("G1 X1 F0.03 ", {1: 2 / 3}, "G1 X1 F0.02 "),
+        # a Haas counts F30 in ten thousandths of an inch: a feed with a point keeps one, also where F is new
+        ("G1 X1 F15.0\nX2\nX3", {1: 2.0, 2: 2.0, 3: 4.0}, "G1 X1 F30.\nX2\nX3 F60."),
         ("G1 X1 F123456", {1: 1.5}, "G1 X1 F185100"),
         ("#<f> = 3\nG1 X1 F100", {2: 0.5}, "#<f> = 3\nG1 X1 F50"),
     ],

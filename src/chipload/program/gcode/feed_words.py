@@ -52,21 +52,22 @@ def with_feeds(text: str, lines: Mapping[int, float]) -> str:
         if not 0.0 < times < math.inf:
             raise InputError(f"line {line}: a feed {times:g} times the old one: must be above 0")
     out: list[str] = []
-    old, now = math.nan, ""
+    old, now, pointed = math.nan, "", False
     units, stated_in = {"length": "mm", "time": "94"}, dict[str, str]()
     for number, raw in enumerate(text.split("\n"), 1):
         open_text = COMMENTS.sub(lambda found: " " * len(found[0]), raw)
         _straight(raw, open_text, number)
         word, factor = _feed_word(open_text, number), lines.get(number)
         if word is not None:
-            old, now, stated_in = float(word[1]), word[1], units
+            # a control may count a number without a decimal point in thousandths
+            old, now, stated_in, pointed = float(word[1]), word[1], units, "." in word[1]
         units = _units(open_text, units)
         if factor is None:
             out.append(raw)
             continue
         if math.isnan(old):
             raise InputError(f"line {number}: moves at a feed that no line above it states: state one")
-        new = now if factor == 1.0 and word is not None else _feed(old, factor, word)
+        new = now if factor == 1.0 and word is not None else _feed(old, factor, pointed)
         if word is not None:
             raw, now = raw[: word.start(1)] + new + raw[word.end(1) :], new
         elif float(new) != float(now):
@@ -106,11 +107,11 @@ def _feed_word(open_text: str, number: int) -> re.Match[str] | None:
     return found
 
 
-def _feed(old: float, factor: float, word: re.Match[str] | None) -> str:
-    """The new feed in digits, never above it.
+def _feed(old: float, factor: float, pointed: bool) -> str:
+    """The new feed in digits, never above it; with a decimal point where ``pointed``.
 
-    >>> _feed(1200.0, 1 / 3, None), _feed(0.25, 0.5, None)
-    ('400', '0.125')
+    >>> _feed(1200.0, 1 / 3, False), _feed(0.25, 0.5, False), _feed(15.0, 2.0, True)
+    ('400', '0.125', '30.')
     """
     value = old * factor * (1.0 + 1e-12)
     if factor == 1.0:
@@ -120,4 +121,4 @@ def _feed(old: float, factor: float, word: re.Match[str] | None) -> str:
         scale = 10.0**places
         text = f"{math.floor(value * scale) / scale:.{max(places, 0)}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
-    return text + "." if word is not None and word[1].endswith(".") and "." not in text else text
+    return text + "." if pointed and "." not in text else text
