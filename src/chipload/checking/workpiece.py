@@ -308,7 +308,7 @@ def layer_thickness(program: Program, cutters: Mapping[int, Cutter], top: float)
         heights, at = np.unique(p[level, 2].round(9), return_inverse=True)
         long = np.bincount(at.ravel(), distance[level], minlength=len(heights)) >= 0.05 * whole
         down = np.diff(np.append(heights[long], top))
-        straight = all(c.corner_radius == c.taper == c.bottom == 0.0 and not c.barrel_radius for c in cutters.values())
+        straight = all(c.straight for c in cutters.values())
         share = 0.2 if straight else 0.1
         layer = min(LEVEL * smallest, share * float(down.min(initial=math.inf)))
     else:
@@ -336,7 +336,7 @@ def _levels(program: Program, cutters: Mapping[int, Cutter], apart: float) -> ND
     p = np.asarray(program.p_work)
     level = (np.abs(np.diff(p[:, 2], prepend=p[:1, 2])) < 1e-9) & (program.motion != RAPID)
     upright = np.asarray(program.axis)[:, 2] > 1.0 - 1e-12
-    flat = np.isin(program.tool, [n for n, c in cutters.items() if c.bottom == 0.0 and c.apt[2] > 0.0])
+    flat = np.isin(program.tool, [n for n, c in cutters.items() if c.flat_radius > 0.0])
     kept = np.unique(p[level & upright & flat, 2].round(9))
     pointed = level & upright & ~flat
     heights, at = np.unique(p[pointed, 2].round(9), return_inverse=True)

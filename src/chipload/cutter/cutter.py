@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.barrel import FlankArc, flank_arc
 from chipload.cutter.bodies import Profile, check_body
+from chipload.cutter.profile import UPRIGHT, ProfileSegment, apt_segments, chords_of, radius_of
 from chipload.cutter.strength import ToolStrength, check_material
 from chipload.errors import InputError
 from chipload.units import rpm_from_rad_s
@@ -70,6 +71,8 @@ class Cutter:
     strength : of its material
     body : (rho, z) [mm] of the profile from the tip to ``flute_length`` of a tool of another shape, which is compared
         with part, stock and fixtures but not simulated; empty: the seven APT numbers are its shape
+    shape : segments of the profile of a shape beside those of APT and barrels, of :mod:`chipload.cutter.shapes`; the
+        numbers of APT are then left out; one that is undercut has ``shank_diameter``, its neck
     number : tool number, >= 0; 0: the tool of a program that names no tool
     name : name in the shop
     centre_cutting : whether its teeth reach its axis, so that it can plunge; None: not stated
@@ -118,6 +121,7 @@ class Cutter:
     hole_depth: float | None = None
     runout_size: float | None = None
     web: float | None = None
+    shape: tuple[ProfileSegment, ...] = ()
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: float, limit: str) -> None:
@@ -206,6 +210,9 @@ class Cutter:
 
     def _check_corner(self) -> None:
         """Check the corner against bottom and flank, or against the arc of a barrel."""
+        if self.shape:
+            self._check_shape()
+            return
         r, e, touching = self.corner_radius, self.corner_e or 0.0, self.apt[2:4]
         slack = 1e-9 * self.diameter
         if self.barrel_radius is None:
@@ -230,12 +237,31 @@ class Cutter:
                     f"cutter.flute_length_mm = {self.flute_length:g}: must be above {self.flank_arc.z_from:.6g}, where "
                     "the arc of barrel_radius_mm begins"
                 )
-        for key, given, where in zip(("e", "f"), (self.corner_e, self.corner_f), touching, strict=True):
-            if given is not None and abs(given - where) > 1e-3:
+        for key, others, where in zip(("e", "f"), (self.corner_e, self.corner_f), touching, strict=True):
+            if others is not None and abs(others - where) > 1e-3:
                 raise InputError(
-                    f"cutter.corner_{key}_mm = {given:g}: must be {where:.6g}, where the corner touches bottom and "
+                    f"cutter.corner_{key}_mm = {others:g}: must be {where:.6g}, where the corner touches bottom and "
                     f"flank; leave it out"
                 )
+
+    def _check_shape(self) -> None:
+        """Check a shape against the numbers beside it."""
+        wide, end = max(segment.widest for segment in self.shape), self.shape[-1]
+        others = (self.corner_radius, self.corner_e, self.corner_f, self.barrel_radius, self.bottom, self.taper)
+        if any(others) or self.body:
+            raise InputError("cutter.shape: it has its own corner, bottom, flank and body: leave the other ones out")
+        for key, value, own in (
+            ("diameter_mm", self.diameter, 2.0 * wide),
+            ("flute_length_mm", self.flute_length, end.z[1]),
+        ):
+            if abs(value - own) > 1e-6:
+                raise InputError(f"cutter.{key} = {value:g}: must be {own:.6g}, as of its shape")
+        neck = self.shank_diameter
+        if self.undercut and not (neck is not None and 0.0 < neck <= 2.0 * end.rho[1] + 1e-9):
+            raise InputError(
+                f"cutter.shank_diameter_mm = {neck or 0.0:g}: must be above 0 and at most {2.0 * end.rho[1]:.6g}, as "
+                "wide as its teeth end: the neck of an undercut cutter"
+            )
 
     def _check_pitch(self) -> None:
         if not self.pitch:
@@ -279,7 +305,10 @@ class Cutter:
         """
         if self.centre_cutting is not None:
             return self.centre_cutting
-        pointed = self.bottom > 0.0 or self.apt[2] <= 1e-9 * self.diameter
+        if self.undercut:
+            return None
+        first = self.segments[0]
+        pointed = not first.straight or first.kappa[0] > 0.0
         return True if pointed or (self.flutes <= CENTRE_FLUTES and self.diameter <= CENTRE_MM) else None
 
     @property
@@ -310,7 +339,17 @@ class Cutter:
         >>> bull = Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5, corner_radius=1.0)
         >>> bull.apt
         (10.0, 1.0, 4.0, 1.0, 0.0, 0.0, 20.0)
+
+        Raises
+        ------
+        InputError
+            Its shape has no such numbers.
         """
+        if self.shape:
+            raise InputError(
+                f"cutter {self.number}: its shape of {len(self.shape)} segments has no seven numbers of APT, which are "
+                'needed here: state engine = "moves", or another cutter'
+            )
         r, ta, tb = self.corner_radius, math.tan(self.bottom), math.tan(self.taper)
         pull = r / math.cos(self.taper) - r * tb / math.cos(self.bottom)
         e = max(self.radius - pull / (1.0 - ta * tb), 0.0)
@@ -323,6 +362,31 @@ class Cutter:
     def flank_arc(self) -> FlankArc | None:
         """The flank arc of a barrel cutter; None: it has none."""
         return None if self.barrel_radius is None else flank_arc(self.apt, self.barrel_radius)
+
+    @cached_property
+    def segments(self) -> tuple[ProfileSegment, ...]:
+        """Lines and arcs of the profile from the tip to the end of the teeth."""
+        return self.shape or apt_segments(self.apt, self.flank_arc)
+
+    @property
+    def undercut(self) -> bool:
+        """Whether it is narrower above its widest place."""
+        return self.segments[-1].kappa[1] > UPRIGHT
+
+    @property
+    def straight(self) -> bool:
+        """Whether it is a flat end mill: a flat bottom, a sharp corner, an upright flank."""
+        return self.corner_radius == self.taper == self.bottom == 0.0 and self.barrel_radius is None and not self.shape
+
+    @property
+    def flat_radius(self) -> float:
+        """Radius of the flat bottom [mm]; 0: it has none.
+
+        >>> Cutter(10.0, 4, 0.5, 20.0, 30.0, 6e5, corner_radius=1.0).flat_radius
+        4.0
+        """
+        first = self.segments[0]
+        return first.rho[1] if first.straight and first.kappa[0] == 0.0 else 0.0
 
     @property
     def outline(self) -> tuple[float, ...]:
@@ -372,6 +436,8 @@ class Cutter:
         if self.body:
             radii, heights = np.array(self.body).T
             return np.asarray(np.interp(z, heights, radii))
+        if self.shape:
+            return radius_of(self.shape, z)
         _, r, e, f, alpha, beta, _ = self.apt
         low, high = f - r * math.cos(alpha), f - r * math.sin(beta)
         bottom = np.where(z < low, z, 0.0) / math.tan(alpha) if alpha > 0.0 else e
@@ -392,6 +458,8 @@ class Cutter:
         """
         if self.body:
             return np.array([(0.0, 0.0), *self.body] if self.body[0][0] > 0.0 else self.body)
+        if self.shape:
+            return chords_of(self.shape, chord_mm)
         _, r, e, f, alpha, _, h = self.apt
         points = [(0.0, 0.0)]
 

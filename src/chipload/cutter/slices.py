@@ -34,7 +34,7 @@ Part = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
 
 @dataclass(frozen=True, eq=False)
 class Slices:
-    """Consecutive pieces of a cutter's profile, (k,) float each.
+    """Consecutive segments of a cutter's profile, (k,) float each.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Slices:
     sin_kappa, cos_kappa : at the middle
     lag : at ``s_from`` [rad]
     rate : of the lag [rad/mm]
-    radius : of the profile's arc [mm]; 0 on a straight piece
+    radius : of the profile's arc [mm]; 0 on a straight segment
     """
 
     s_from: Floats
@@ -70,8 +70,8 @@ class Slices:
 
     @property
     def z_middle(self) -> Floats:
-        """(k,) float [mm], height at the middle of the profile's piece, where ``rho`` is taken: the point (rho, z) lies
-        on the profile; the mean of the ends of an arc would lie inside it, by r cos(kappa) (1 - cos(half its angle)).
+        """(k,) float [mm], height at the middle of the slice, where ``rho`` is taken: the point (rho, z) lies on the
+        profile; the mean of the ends of an arc would lie inside it, by r cos(kappa) (1 - cos(half its angle)).
 
         >>> ball = slices(Cutter(12.0, 2, 0.0, 20.0, 30.0, 6e5, corner_radius=6.0), corner_slices=3)
         >>> (np.hypot(ball.rho, 6.0 - ball.z_middle)[:3]).round(12).tolist()
@@ -137,39 +137,26 @@ def slices(
         raise InputError(f"slices: grading = {grading:g}: must be from 1 (evenly) to 3")
     if flank_mm is not None and not flank_mm > 0.0:
         raise InputError(f"slices: flank_mm = {flank_mm:g}: must be above 0, or None for one slice")
-    _, r, e, f, alpha, beta, height = cutter.apt
-    tiny = 1e-9 * cutter.diameter
-    low, high = f - r * math.cos(alpha), f - r * math.sin(beta)
-    end = e + r * math.sin(alpha)
-    parts: list[Part] = []
-    if end > tiny:
-        rho = np.linspace(0.0, end, bottom_slices + 1)
-        s = (rho - end) / math.cos(alpha)
-        parts.append(_line(s, rho, rho * math.tan(alpha), alpha))
-    reach = 0.0
-    if r > tiny:
-        share = np.linspace(0.0, 1.0, corner_slices + 1)
-        kappa = alpha + (cutter.corner_end - alpha) * (share if grading == 1.0 else share**grading)
-        parts.append(_bow(0.0, kappa, e, f, r))
-        reach = float(parts[-1][0][-1])
-    else:
-        high = low
-    arc = cutter.flank_arc
-    if arc is not None:
-        last = arc.kappa_at(min(height, arc.z_to))
-        length = arc.radius * (last - arc.kappa_from)
-        number = corner_slices if flank_mm is None else max(corner_slices, math.ceil(length / flank_mm * (1.0 - 1e-12)))
-        parts.append(_bow(reach, np.linspace(arc.kappa_from, last, number + 1), arc.e, arc.f, arc.radius))
-        reach += length
-        high = arc.z_to
-    if height > high + tiny:
-        length = (height - high) / math.cos(beta)
-        number = 1 if flank_mm is None else max(1, math.ceil(length / flank_mm * (1.0 - 1e-12)))
-        along = np.linspace(0.0, length, number + 1)
-        foot = float(cutter.radius_at([high])[0]) if arc is not None else e + r * math.cos(beta) if r > tiny else end
-        parts.append(
-            _line(reach + along, foot + along * math.sin(beta), high + along * math.cos(beta), 0.5 * math.pi - beta)
-        )
+
+    def count(length: float, least: int) -> int:
+        return least if flank_mm is None else max(least, math.ceil(length / flank_mm * (1.0 - 1e-12)))
+
+    segments, parts = cutter.segments, list[Part]()
+    # 0 where the bottom line ends
+    s = -segments[0].length if segments[0].straight and len(segments) > 1 else 0.0
+    for i, segment in enumerate(segments):
+        (inner, outer), (low, top), (first, last), length = segment.rho, segment.z, segment.kappa, segment.length
+        if segment.straight:
+            number = count(length, 1) if i == len(segments) - 1 and i > 0 else bottom_slices
+            share = np.linspace(0.0, 1.0, number + 1)
+            parts.append(_line(s + length * share, inner + (outer - inner) * share, low + (top - low) * share, first))
+        elif segment.radius > 0.0:
+            # an arc of a larger radius than the cutter's is cut as a flank is
+            wide = segment.radius > cutter.radius
+            share = np.linspace(0.0, 1.0, (count(length, corner_slices) if wide else corner_slices) + 1)
+            kappa = first + (last - first) * (share if wide or grading == 1.0 else share**grading)
+            parts.append(_bow(s, kappa, *segment.centre, segment.radius))
+        s = 0.0 if i == 0 and s < 0.0 else s + length
     s_from = np.concatenate([p[0][:-1] for p in parts])
     s_to = np.concatenate([p[0][1:] for p in parts])
     rho, z, sin, cos, bend = (np.concatenate([p[i] for p in parts]) for i in range(1, 6))
@@ -187,7 +174,7 @@ def _bow(start: float, kappa: Floats, e: float, f: float, r: float) -> Part:
 
 
 def _line(s: Floats, rho: Floats, z: Floats, kappa: float) -> Part:
-    """Slices of a straight piece of the profile between nodes: nodes of s, middle rho, lower z, sine, cosine, 0."""
+    """Slices of a straight segment of the profile between nodes: nodes of s, middle rho, lower z, sine, cosine, 0."""
     one = np.ones(len(s) - 1)
-    cosine = 0.0 if kappa == 0.5 * math.pi else math.cos(kappa)
+    cosine = 0.0 if abs(kappa - 0.5 * math.pi) < 1e-12 else math.cos(kappa)
     return s, 0.5 * (rho[:-1] + rho[1:]), z[:-1], math.sin(kappa) * one, cosine * one, 0.0 * one

@@ -26,6 +26,8 @@ from chipload.cutter.cutter import (
 from chipload.cutter.fctb import read_fctb
 from chipload.cutter.fusion import read_fusion_tool
 from chipload.cutter.iso13399 import read_iso13399
+from chipload.cutter.profile import ProfileSegment
+from chipload.cutter.shapes import dovetail, lens, lollipop
 from chipload.cutter.strength import ToolMaterial, ToolStrength
 from chipload.cutter.tooltable import read_tool_table
 from chipload.errors import InputError, InputErrors
@@ -101,6 +103,13 @@ class CutterTable(BaseModel):
         description="barrel cutter: radius of the arc between corner and flank, tangent to both; with it "
         "corner_e_mm is free, default 0, a round tip",
     )
+    shape: Literal["lens", "lollipop", "dovetail"] | None = Field(
+        None,
+        description="shape of its own: `lens` with tip_radius_mm, `lollipop`, a ball on a neck of shank_diameter_mm, "
+        "`dovetail` with flank_deg and a neck; default: that of the corner, flank and bottom",
+    )
+    tip_radius_mm: float | None = Field(None, description="lens: radius of the arc at the tip")
+    flank_deg: float | None = Field(None, description="dovetail: angle between flank and bottom, from 10 to below 90")
     bottom_deg: float | None = Field(None, description="angle of the bottom, APT parameter alpha; default 0")
     taper_deg: float | None = Field(None, description="half angle of a tapered flank, APT parameter beta; default 0")
     runout_mm: float | None = Field(
@@ -154,6 +163,11 @@ class CutterTable(BaseModel):
             # nothing cuts with it: teeth and modulus have no effect
             sizes = {"diameter_mm": 2.0 * max(r for r, _ in body), "flute_length_mm": body[-1][1]}
             values = {"flutes": 1, "helix_deg": 0.0, "modulus_gpa": 210.0, **sizes, **values}
+        if values.get("shape") == "lollipop" and "diameter_mm" in values and "shank_diameter_mm" in values:
+            values = {
+                "flute_length_mm": lollipop(values["diameter_mm"], values["shank_diameter_mm"])[-1].z[1],
+                **values,
+            }
         where = f": {self.file} does not state it" if self.file else ""
         missing = [
             f"cutter.{key} is missing{where}: state it; dimensions of a cutter are never guessed"
@@ -164,6 +178,7 @@ class CutterTable(BaseModel):
             raise InputErrors(*missing) if len(missing) > 1 else InputError(missing[0])
         if "runout_deg" in values and "runout_mm" not in values:
             raise InputError("cutter.runout_mm is missing: state it with runout_deg, or leave both out")
+        shape = _shape(values)
         runout = float(values.get("runout_mm", 0.0))
         offset = runout if "runout_deg" in values else 0.0
         return Cutter(
@@ -173,7 +188,7 @@ class CutterTable(BaseModel):
             flute_length=values["flute_length_mm"],
             overhang=values["overhang_mm"],
             modulus=values["modulus_gpa"] * 1000.0,
-            corner_radius=values.get("corner_radius_mm", 0.0),
+            corner_radius=0.0 if shape else values.get("corner_radius_mm", 0.0),
             corner_e=values.get("corner_e_mm"),
             corner_f=values.get("corner_f_mm"),
             barrel_radius=values.get("barrel_radius_mm"),
@@ -199,6 +214,7 @@ class CutterTable(BaseModel):
             thread_pitch=values.get("thread_pitch_mm"),
             hole_depth=values.get("hole_depth_mm"),
             web=values.get("web_mm"),
+            shape=shape,
         )
 
     def _from_file(self, folder: Path) -> dict[str, Any]:
@@ -234,6 +250,26 @@ class CutterTable(BaseModel):
     def _checked(values: dict[str, Any]) -> dict[str, Any]:
         """Values of a file as this table has them: tuples for lists."""
         return {key: _rows(value) for key, value in values.items()}
+
+
+def _shape(values: Mapping[str, Any]) -> tuple[ProfileSegment, ...]:
+    """The segments of a shape of its own; empty: it has none."""
+    kind = values.get("shape")
+    for key, own in (("tip_radius_mm", "lens"), ("flank_deg", "dovetail"), ("shank_diameter_mm", "lollipop")):
+        if kind == own and key not in values:
+            raise InputError(f"cutter.{key} is missing: state it with shape = {own!r}")
+        if key in values and kind != own and key != "shank_diameter_mm":
+            raise InputError(f"cutter.{key} is stated without shape = {own!r}: state the shape, or leave it out")
+    d, r, height = values["diameter_mm"], values.get("corner_radius_mm", 0.0), values["flute_length_mm"]
+    if kind == "lens":
+        return lens(d, values["tip_radius_mm"], r, height)
+    if kind == "dovetail":
+        return dovetail(d, math.radians(values["flank_deg"]), r, height)
+    if kind == "lollipop":
+        if r not in (0.0, 0.5 * d):
+            raise InputError(f"cutter.corner_radius_mm = {r:g}: must be {0.5 * d:g} with shape = 'lollipop'")
+        return lollipop(d, values["shank_diameter_mm"])
+    return ()
 
 
 def _strength(values: Mapping[str, Any]) -> ToolStrength:

@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
+from chipload.cutter.profile import UPRIGHT
 from chipload.cutter.strength import ToolMaterial
 from chipload.cutting import _strength
 from chipload.cutting.levers import greatest_height, has_lever_loads, lever_loads_in_blocks
@@ -72,7 +73,11 @@ def sections_of(cutter: Cutter) -> Sections:
     ([20.0, 35.0], [8.0, 10.0])
     """
     top = cutter.flute_length
-    if cutter.taper > 0.0 or cutter.flank_arc is not None:
+    if cutter.shape:
+        end = cutter.segments[-1]
+        narrow = end.kappa[1] > UPRIGHT
+        height = np.unique(np.linspace(end.z[0], top, TAPER_SECTIONS)[1:]) if narrow else np.array([top])
+    elif cutter.taper > 0.0 or cutter.flank_arc is not None:
         _, r, _, f, _, _, _ = cutter.apt
         low = min(max(f - r * math.cos(cutter.corner_end), 0.0), top)
         height = np.unique(np.linspace(low, top, TAPER_SECTIONS))

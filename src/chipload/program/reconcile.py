@@ -140,6 +140,11 @@ def _same(name: str, number: int, cutter: Cutter, stated: StatedDiameter, remedy
 
 def _same_shape(name: str, number: int, cutter: Cutter, shape: Shape) -> None:
     """Refuse a CUTTER of CL data that is not the cutter of the job."""
+    if cutter.shape:
+        raise InputError(
+            f"{name}: CUTTER states seven numbers for tool {number}, the [[cutter]] has a shape of its own: state the "
+            "cutter of the program, or leave the CUTTER out"
+        )
     d, r, _, _, alpha, beta, _ = shape
     arc = ("corner radius", r, cutter.corner_radius, "corner_radius_mm")
     if cutter.barrel_radius is not None:

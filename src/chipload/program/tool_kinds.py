@@ -40,7 +40,7 @@ def _differences(cutter: Cutter, described: Stated) -> Iterator[tuple[str, str, 
         yield "a tap", "no thread_pitch_mm", where
     if kind in _POINTED and cutter.bottom == 0.0 and not cutter.body:
         yield f"a {kind.value}", "a flat bottom (bottom_deg = 0)", where
-    if cutter.body or cutter.barrel_radius is not None:
+    if cutter.body or cutter.barrel_radius is not None or cutter.shape:
         return
     radius, where = described.get("corner_radius_mm", (None, ""))
     if radius is not None and abs(radius - cutter.corner_radius) > WEAR_MM:

@@ -83,7 +83,7 @@ def _removal(
     if path is None or blank.mesh is None:
         return None
     before, cutters = _paths_before(result, blanks, blank)
-    solid = {n: c for n, c in (cutters | dict(blank.cutters)).items() if not c.body}
+    solid = {n: c for n, c in (cutters | dict(blank.cutters)).items() if not c.body and not c.shape}
     # a copy: tracks may share their blank, and its index of triangles is not for two threads
     return blank.mesh.copy(), path, solid, before, blank.wider
 

@@ -277,10 +277,7 @@ def resolution_error(
         if spent <= budget:
             _keep_worst(parts, int(windows[step].own.tool[0]), again(windows[step])[2])
     # the flank of a flat mill is cut into slices where its contact changes: exact
-    straight = all(
-        c.corner_radius == c.taper == c.bottom == 0.0 and c.barrel_radius is None
-        for c in _used_cutters(windows, setting)
-    )
+    straight = all(c.straight for c in _used_cutters(windows, setting))
     barrels = any(c.barrel_radius is not None for c in _used_cutters(windows, setting))
     if "chip_max_mm" in chip and not all(c.teeth_alike for c in _used_cutters(windows, setting)):
         chip["chip_max_mm"] += 2.0 * PARTS_OF_EDGE

@@ -196,12 +196,6 @@ def with_engine(
         return setting, None
     fine = setting.resolution
     try:
-        barrels = np.isin(program.tool, [n for n, c in setting.cutters.items() if c.flank_arc is not None])
-        if barrels.any():
-            k = int(np.argmax(barrels))
-            raise HandOver(
-                int(program.line[k]), f"tool {int(program.tool[k])} is a barrel cutter, whose flank is an arc"
-            )
         run = run_by_moves(
             program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm,
         )  # fmt: skip
@@ -223,6 +217,12 @@ def by_layers(
     place = f"line {found.line}" if found.line else "stock"
     if engine == "moves":
         raise InputError(f'{place}: {found.why}: state engine = "layers" or "auto"')
+    shaped = sorted(n for n in np.unique(program.tool).tolist() if n in setting.cutters and setting.cutters[n].shape)
+    if shaped:
+        raise InputError(
+            f"{place}: {found.why}, which is simulated by layers only, and layers do not know the shape of tool "
+            f"{shaped[0]}: change the program, or choose another cutter"
+        )
     fine = setting.resolution
     try:
         require_upright(program, fine.step_mm, fine.tolerance, stock, setting.cutters)

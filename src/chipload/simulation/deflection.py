@@ -466,10 +466,23 @@ def _work(work: ArrayLike | None, n: Floats, name: str) -> Floats:
 
 def _shape(cutter: Cutter) -> Floats:
     """Return the shape of the cutter for the kernels."""
+    if cutter.shape:
+        return _shape_of_segments(cutter)
     _, r, e, f, alpha, beta, h = cutter.apt
     arc, end = cutter.flank_arc, cutter.corner_end
     bow = (e, f, 0.0, end, end) if arc is None else (arc.e, arc.f, arc.radius, end, arc.kappa_at(min(h, arc.z_to)))
     return np.array([r, e, f, alpha, beta, h, e + r * math.sin(alpha), *bow])
+
+
+def _shape_of_segments(cutter: Cutter) -> Floats:
+    """Return :func:`_shape` of a profile of at most two arcs or sharp corners between a bottom and a flank."""
+    segments = cutter.segments
+    first, *more = (s for s in segments if not s.straight)
+    (e, f), r, (alpha, end) = first.centre, first.radius, first.kappa
+    bow = (e, f, 0.0, end, end)
+    if more:
+        bow = (*more[0].centre, more[0].radius, *more[0].kappa)
+    return np.array([r, e, f, alpha, 0.5 * math.pi - segments[-1].kappa[1], cutter.flute_length, first.rho[0], *bow])
 
 
 def _bend_cutter(

@@ -53,7 +53,6 @@ def slowest_step(cutter: Cutter) -> float:
     >>> slowest_step(Cutter(10.0, 4, 0.5, 20.0, 35.0, 5.8e5)) == FLAT
     True
     """
-    _, corner, _, _, bottom, taper, _ = cutter.apt
-    if taper > 0.0 or cutter.barrel_radius is not None:
+    if cutter.taper > 0.0 or cutter.barrel_radius is not None or cutter.shape:
         return TAPERED
-    return ROUND if corner > 0.0 or bottom > 0.0 else FLAT
+    return ROUND if cutter.corner_radius > 0.0 or cutter.bottom > 0.0 else FLAT

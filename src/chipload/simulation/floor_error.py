@@ -75,7 +75,7 @@ def floor_error(
     made = np.zeros(len(q), dtype=np.bool_)
     tree = cKDTree(q[:, :2])
     for cuts in all_cuts:
-        flat = cuts.cutter.radius - cuts.cutter.corner_radius
+        flat = cuts.cutter.flat_radius
         if not flat > 0.0 or float(cuts.ends[:, [8, 11]].min()) < 1.0 - 1e-9:
             raise InputError("floor_error: a cutter leans, or has no flat bottom: only upright end mills make floors")
         pitch = math.tau / cuts.cutter.flutes if cuts.cutter.teeth_alike else math.tau

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
+from chipload.cutter.profile import ProfileSegment
 from chipload.engagement.bricks.stock import BrickStock
 from chipload.engagement.moves.stock import MoveStock
 from chipload.stock.earlier_moves import EarlierMoves, cutter_fields
@@ -95,7 +96,8 @@ def _cutters_of(earlier: EarlierMoves) -> list[Cutter]:
     out = []
     for values in earlier.cutters:
         fields: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
-        out.append(Cutter(**fields))
+        rows = ([tuple(v) if isinstance(v, (list, tuple)) else v for v in row] for row in fields.pop("shape", ()))
+        out.append(Cutter(**fields, shape=tuple(ProfileSegment(*row) for row in rows)))
     return out
 
 

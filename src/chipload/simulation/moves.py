@@ -22,12 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
+from chipload.cutter.record import cutter_record
 from chipload.cutter.slices import edge_lag
 from chipload.cutting.band import deviations, force_deviation, torque_deviation, turned_basis
 from chipload.cutting.material import Material
 from chipload.cutting.revolution import loads_over_turn
 from chipload.engagement.bricks.stock import BrickStock
-from chipload.engagement.moves.stock import Engaged, MoveStock, cutter_row
+from chipload.engagement.moves.stock import Engaged, MoveStock
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
@@ -177,11 +178,15 @@ def run_by_moves(
     corner_slices: int,
     flank_mm: float,
 ) -> MoveRun:
-    """Return the run of a program by moves: by heights over the plan if the axis is always upright, else by bricks."""
+    """Return the run of a program by moves: by heights over the plan if the axis is always upright and no cutter is
+    undercut, else by bricks.
+    """
     used = {n: c for n, c in cutters.items() if bool((program.tool == n).any())}
     bodies = tuple(n for n, c in used.items() if c.body)
     cutting = {n: c for n, c in used.items() if n not in bodies} or used
-    made = initial_stock(stock, cutting, upright=not leans(program).any())
+    # heights over the plan know no undercut
+    upright = not leans(program).any() and not any(c.undercut for c in cutting.values())
+    made = initial_stock(stock, cutting, upright=upright)
     if made.body is not stock.part:
         # the layers that are the body have edges at every height
         flank_mm = min(flank_mm, LAYERED_FLANK * min(c.radius for c in cutting.values()))
@@ -369,7 +374,8 @@ def _upright(found: Engaged, entries: Ints, feed: Floats, hand: Floats, cutter: 
     rows, rows_of, table = np.empty((room, 7)), np.empty(room, dtype=np.int64), np.empty((len(slices) + room, 7))
     count = skew.tooth_rows(
         entries, found.start, np.ascontiguousarray(found.span), np.ascontiguousarray(found.slice), slices,
-        cutter_row(cutter), edge_lag(cutter), hand, size, np.ascontiguousarray(feed[:, 2]), begin, rows, rows_of, table,
+        cutter_record(cutter), edge_lag(cutter), hand, size, np.ascontiguousarray(feed[:, 2]), begin, rows, rows_of,
+        table,
     )  # fmt: skip
     # as large as they are, for they may be kept
     return ToothEngagement(
@@ -390,7 +396,8 @@ def _slices(slices: Floats, cutter: Cutter) -> Floats:
     """Return the slices (k, 7) in the form of :class:`ToothEngagement`."""
     s0, _, rho, z, sk, ck = slices[:, :6].T
     lead = edge_lag(cutter)
-    return np.column_stack([s0, rho, z, sk, ck, lead * z, lead * sk])
+    # an arc on the bottom begins at 0 but for rounding
+    return np.column_stack([s0, rho, z, sk, ck, lead * np.maximum(z, 0.0), lead * sk])
 
 
 def _normals_left(found: Engaged, entries: Ints) -> Floats:

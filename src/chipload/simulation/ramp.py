@@ -42,5 +42,5 @@ def ramp_angle(cuts: Cuts) -> Floats:
 
 def _bottom(cutter: Cutter) -> float:
     """Length of the bottom line from the axis to the corner along the profile [mm]."""
-    _, r, e, _, bottom, _, _ = cutter.apt
-    return max(e + r * math.sin(bottom), 0.0) / math.cos(bottom)
+    first = cutter.segments[0]
+    return first.length if first.straight else 0.0

@@ -59,7 +59,7 @@ def reached_layers(
 def _support(steps: Steps, k: Ints, height: Floats, cutter: Cutter) -> Floats:
     """(n, DIRECTIONS) [mm]; -inf where the layer is not met."""
     top = cutter.flute_length
-    _, r, _, _, bottom, taper, _ = cutter.apt
+    r, bottom, taper = (0.0, 0.0, 1.0) if cutter.shape else (cutter.corner_radius, cutter.bottom, cutter.taper)
     R = max(cutter.radius, float(cutter.radius_at([top])[0]))
     low = min(r, top) if bottom == taper == 0.0 else 0.0
     a0, a1, p0, p1 = steps.a0[k], steps.a1[k], steps.p0[k], steps.p1[k]

@@ -224,7 +224,7 @@ def _covered_layers(
 
 def _flank(steps: Steps, k: int, cutter: Cutter, heights: Floats) -> NDArray[np.bool_]:
     """Which layers only the flank of an upright cylinder crosses, in all of the step."""
-    if not (steps.a0[k, 2] == steps.a1[k, 2] == 1.0 and cutter.taper == 0.0):
+    if cutter.shape or not (steps.a0[k, 2] == steps.a1[k, 2] == 1.0 and cutter.taper == 0.0):
         return np.zeros(len(heights), dtype=np.bool_)
     _, r, _, f, _, _, top = cutter.apt
     low, high = sorted((steps.p0[k, 2], steps.p1[k, 2]))

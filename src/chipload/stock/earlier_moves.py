@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import astuple, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -87,4 +87,5 @@ def no_moves() -> dict[str, NDArray[Any]]:
 
 def cutter_fields(cutter: Cutter) -> CutterFields:
     """Return the fields of a cutter on which the volume that it sweeps depends."""
-    return {f.name: getattr(cutter, f.name) for f in fields(cutter) if f.name not in UNSWEPT}
+    values = {f.name: getattr(cutter, f.name) for f in fields(cutter) if f.name not in UNSWEPT}
+    return values | {"shape": [astuple(segment) for segment in cutter.shape]}

@@ -9,11 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
+from chipload.cutter.record import cutter_record
 from chipload.engagement.bricks._circle import crossing, swept_at
 from chipload.engagement.bricks._index import what_is
 from chipload.engagement.bricks._line_chain import joined
 from chipload.engagement.bricks._sweep import WAIT, estimated_least, least, swept
-from chipload.engagement.bricks.stock import BrickStock, cutter_row, move_rows
+from chipload.engagement.bricks.stock import BrickStock, move_rows
 from chipload.engagement.moves._border import BESIDE
 from chipload.engagement.moves._sweep import MATERIAL
 from engagement.bricks.programs import take, turned, unit, volumes
@@ -53,7 +54,7 @@ def near_surface(m: Floats, cutter: Cutter, n: int) -> Floats:
 @pytest.mark.parametrize("way", MOVES)
 def test_what_settles_a_point_agrees_with_the_search_of_the_least_distance(kind: str, way: str) -> None:
     """Chord, Newton's step beside the flank, and the value of which a border is the zero."""
-    c, m, wait = cutter_row(CUTTERS[kind]), move(way), np.empty((WAIT, 6))
+    c, m, wait = cutter_record(CUTTERS[kind])[0], move(way), np.empty((WAIT, 6))
     inside = outside = 0
     for p in near_surface(m, CUTTERS[kind], 300):
         low, high = least(m, c, *p, math.inf, -math.inf, 1e-10, wait)
@@ -79,7 +80,7 @@ def test_steps_of_a_line_are_the_move_of_the_whole_line(lean: tuple[float, float
     p, a = steps_of(np.array([1.0, 2.0, -3.0]), np.array([4.0, 3.0, -3.5]), a0, unit(a0 + lean), 6)
     rows = move_rows(p[:-1], p[1:], a[:-1], a[1:])
     known = move_rows(p[:1], p[-1:], a[:1], a[-1:])[0]
-    c, m = cutter_row(FLAT), rows[0].copy()
+    c, m = cutter_record(FLAT)[0], rows[0].copy()
     assert all(joined(m, s, c) for s in rows[1:])
     np.testing.assert_allclose(m[:9], known[:9], atol=1e-12)
     np.testing.assert_allclose(m[12:14], known[12:14], atol=1e-12)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from chipload.cutter.record import cutter_record
 from chipload.engagement.bricks._sweep import WAIT, least, outside, swept
-from chipload.engagement.bricks.stock import cutter_row, move_rows
+from chipload.engagement.bricks.stock import move_rows
 from engagement.bricks.programs import inside, turned, unit
 from engagement.moves.field import CUTTERS
 
@@ -26,7 +27,7 @@ def test_swept_is_what_some_time_of_the_move_covers(kind: str, way: str) -> None
     random = np.random.default_rng(5)
     p0, a0 = np.array([[1.0, 2.0, -3.0]]), unit([[0.3, 0.2, 1.0]])
     p1, a1 = p0 + u, unit(a0 + lean)
-    m, c, wait = move_rows(p0, p1, a0, a1)[0], cutter_row(cutter), np.empty((WAIT, 6))
+    m, c, wait = move_rows(p0, p1, a0, a1)[0], cutter_record(cutter)[0], np.empty((WAIT, 6))
     # around the surface of the cutter at some time
     n = 120
     x = np.empty((n, 3))
@@ -34,7 +35,7 @@ def test_swept_is_what_some_time_of_the_move_covers(kind: str, way: str) -> None
         tip, axis = p0[0] + t * np.asarray(u), turned(a0[0], a1[0], float(t))
         w = random.uniform(-0.2, 1.0) * 8.0
         across = np.cross(axis, unit(random.normal(size=3)))
-        x[k] = tip + w * axis + unit(across) * random.uniform(0.0, 1.3) * c[10]
+        x[k] = tip + w * axis + unit(across) * random.uniform(0.0, 1.3) * c["wide"]
     known = np.zeros(n, dtype=bool)
     depth = np.full(n, np.inf)
     for t in np.linspace(0.0, 1.0, 401):
@@ -54,7 +55,7 @@ def test_swept_is_what_some_time_of_the_move_covers(kind: str, way: str) -> None
 @pytest.mark.parametrize("kind", CUTTERS)
 def test_rates_are_those_of_differences(kind: str) -> None:
     random = np.random.default_rng(8)
-    c = cutter_row(CUTTERS[kind])
+    c = cutter_record(CUTTERS[kind])[0]
     a0, a1 = unit([[0.3, 0.2, 1.0]]), unit([[0.33, 0.17, 1.0]])
     m = move_rows(np.zeros((1, 3)), np.array([[1.0, 0.4, -0.3]]), a0, a1)[0]
     for p in random.uniform(-6.0, 9.0, (50, 3)):

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from chipload.cutter.cutter import Cutter
+from chipload.cutter.record import cutter_record
 from chipload.engagement.moves._border import crossing
 from chipload.engagement.moves._sweep import from_ball, off_ball, swept
-from chipload.engagement.moves.stock import MoveStock, cutter_row
+from chipload.engagement.moves.stock import MoveStock
 from engagement.moves.field import BALL, CUTTERS, FLAT, least_height
 
 MOVES = {
@@ -32,9 +33,9 @@ def test_swept_is_what_lies_above_the_least_height(kind: str, way: str) -> None:
     random = np.random.default_rng(3)
     a = np.array([1.0, 2.0, -3.0])
     b = a + u
-    m, row = np.array([*a, *u]), cutter_row(cutter)
+    m, row = np.array([*a, *u]), cutter_record(cutter)[0]
     n = 1500
-    wide = row[10] + 1.0
+    wide = row["wide"] + 1.0
     xy = a[:2] + random.uniform(0.0, 1.0, (n, 1)) * u[:2] + random.uniform(-wide, wide, (n, 2))
     height = least_height(cutter, a, b, xy[:, 0], xy[:, 1], 4000)
     z = np.where(np.isfinite(height), height, -3.0) + random.choice([-1.0, -0.1, -0.02, 0.02, 0.1, 1.0], n)
@@ -52,9 +53,9 @@ def test_swept_is_what_lies_above_the_least_height(kind: str, way: str) -> None:
 def test_the_border_itself_is_swept(kind: str) -> None:
     """So a second pass along the first finds nothing."""
     cutter = CUTTERS[kind]
-    row = cutter_row(cutter)
+    row = cutter_record(cutter)[0]
     m = np.array([100.0, 2.0, -3.0, 7.0, 0.0, 0.0])
-    rho = np.linspace(0.0, 0.99 * row[8], 50)
+    rho = np.linspace(0.0, 0.99 * row["rho_to"][row["count"] - 2], 50)
     z = least_height(cutter, m[:3], m[:3], 100.0 + 0.0 * rho, 2.0 + rho, 1)
     assert all(swept(m, row, 103.0, 2.0 + r, h) for r, h in zip(rho, z, strict=True))
     assert not any(swept(m, row, 103.0, 2.0 + r, h - 1e-6) for r, h in zip(rho, z, strict=True))
@@ -63,12 +64,12 @@ def test_the_border_itself_is_swept(kind: str) -> None:
 @pytest.mark.parametrize("way", MOVES)
 def test_a_ball_of_the_index_is_that_of_a_row(way: str) -> None:
     """Without a division, and with the reciprocals that the index keeps."""
-    row, u, random = cutter_row(BALL), np.array(MOVES[way]), np.random.default_rng(4)
+    row, u, random = cutter_record(BALL)[0], np.array(MOVES[way]), np.random.default_rng(4)
     square = [(u[:2] ** 2).sum(), (u**2).sum()]
     moves = np.array([[1.0, 2.0, -3.0, *u, *(1.0 / s if s > 0.0 else 0.0 for s in square)]])
     for x, y, z in random.uniform(-9.0, 9.0, (500, 3)).tolist():
-        known = from_ball(moves[0, :6].copy(), row[1], x, y, z)
-        assert off_ball(moves, 0, row[1], x, y, z) == pytest.approx(known, rel=1e-12, abs=1e-12)
+        known = from_ball(moves[0, :6].copy(), row["radius"][0], x, y, z)
+        assert off_ball(moves, 0, row["radius"][0], x, y, z) == pytest.approx(known, rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.parametrize("way", ["level", "ramp down", "ramp up", "short", "long ramp"])
@@ -78,7 +79,12 @@ def test_the_border_of_a_move_on_a_circle(cutter: Cutter, way: str) -> None:
     stock = MoveStock(np.array([-80.0, -80.0, -30.0]), np.array([80.0, 80.0, 30.0]), {1: cutter})
     a = np.array([1.0, 2.0, -3.0])
     stock.skip(a[None], a[None] + MOVES[way], np.array([1]))
-    m, row, index, random = np.array([*a, *MOVES[way]]), cutter_row(cutter), stock._index(), np.random.default_rng(6)
+    m, row, index, random = (
+        np.array([*a, *MOVES[way]]),
+        cutter_record(cutter)[0],
+        stock._index(),
+        np.random.default_rng(6),
+    )
     T, found = np.array([0.6, 0.8]), 0
     for _ in range(4000):
         px, py = a[:2] + random.uniform(-5.0, 5.0, 2) + random.uniform(0.0, 1.0) * np.array(MOVES[way][:2])

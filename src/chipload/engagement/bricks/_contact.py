@@ -6,10 +6,9 @@ n = sin(kappa) e - cos(kappa) A moves by
 
     v.n = (sin(kappa) (u + w W) + cos(kappa) rho W).e - cos(kappa) u.A,
 
-a sinusoid of its direction e, and the front is where that is above 0. The profile has three parts: the bottom (along
-rho), the corner (kappa), the flank (w). On each the contact is looked at on circles that are evenly apart; where it
-begins, ends or jumps the place is halved. Between these places slices lie at the weights and nodes of Gauss and
-Legendre.
+a sinusoid of its direction e, and the front is where that is above 0. The profile consists of lines (along rho or w)
+and arcs (kappa). On each the contact is looked at on circles that are evenly apart; where it begins, ends or jumps the
+place is halved. Between these places slices lie at the weights and nodes of Gauss and Legendre.
 Oracles: the upright engine for turned programs, points in the swept volume, in tests/engagement/bricks.
 """
 
@@ -20,16 +19,13 @@ import math
 import numpy as np
 from numba import njit, types
 
+from chipload.cutter.record import BY_KAPPA, BY_Z, FLANK_LINE
 from chipload.engagement.bricks._contact_places import (
     ALONG_N,
     ALONG_T,
-    ARC,
     AXIS,
-    BOTTOM,
     BRICKS,
-    FLANK,
     LOOKS,
-    PI,
     RATE,
     SLICES,
     TAU,
@@ -41,10 +37,9 @@ from chipload.engagement.bricks._contact_places import (
 from chipload.engagement.bricks._index import INDEX, enter
 from chipload.engagement.bricks._line_chain import joined
 from chipload.engagement.bricks._slices import sliced
-from chipload.engagement.bricks._sweep import A0, COS_B, LENGTH, THETA, B, turn
+from chipload.engagement.bricks._sweep import A0, LENGTH, THETA, B, turn
 from chipload.engagement.moves._circle import APART
 from chipload.engagement.moves._contact import JUMP, STEADY, turns
-from chipload.engagement.moves._sweep import FLUTE, RHO1, TA, TB, WIDE, Z2
 from chipload.engagement.moves._uncounted_arrays import borrowed
 
 __all__ = ["APART", "BRICKS", "SLICES", "run"]
@@ -113,23 +108,18 @@ def engaged(at, c, nodes, flank, index, work, slices, rows, owner, row_at, out):
     front[8] = min(SLICES / (len(nodes) - 1), 1.0)
     begin = row_at[0]
     most = len(nodes) - 1
-    for part in range(3):
-        a = ranges[part, 0]
-        b = ranges[part, 1]
-        if part == BOTTOM:
-            a = max(a, 0.0)
-            b = min(b, c[RHO1])
-        elif part == ARC:
-            a = max(a, math.atan(c[TA]))
-            b = min(b, 0.5 * PI - math.atan(c[TB]))
-        else:
-            a = max(a, c[Z2])
-            b = min(b, c[FLUTE])
-        if not a < b:
+    for part in range(c.count):
+        a = max(ranges[part, 0], c.q[part])
+        b = min(ranges[part, 1], c.q_to[part])
+        if not a < b or (c.by[part] == BY_KAPPA and c.radius[part] == 0.0):
             continue
-        size = (b - a) / c[COS_B] if part == FLANK else (b - a)
+        size = b - a
+        if c.by[part] == BY_Z:
+            size /= c.sin[part]
+        elif c.by[part] == BY_KAPPA:
+            size *= c.radius[part]
         looks = max(LOOKS, 2 * most // 3)
-        if part == FLANK:
+        if c.line[part] == FLANK_LINE or c.radius[part] > c.wide:
             looks = max(looks, min(math.ceil(size / flank), 4 * looks))
         found = sliced(
             at, c, part, a, b, looks, flank, known[part], counts[part], nodes, index, work, slices, rows, owner, row_at,
@@ -139,7 +129,8 @@ def engaged(at, c, nodes, flank, index, work, slices, rows, owner, row_at, out):
             return False
         counts[part] = found
     # above the flutes
-    if ranges[FLANK, 1] >= c[FLUTE] and contact(at, c, FLANK, c[FLUTE], index, wait, to, ring, front, spans) > 0:
+    end = c.count
+    if ranges[end - 1, 1] >= c.q_to[end - 1] and contact(at, c, end, c.z[end], index, wait, to, ring, front, spans) > 0:
         out[8] = 1.0
     total = row_at[0] - begin
     if total > 0:
@@ -209,7 +200,7 @@ def instants_of(k, q, n, count, each, once, state, index, work, nodes, flank, sl
     middle = 0.0
     low = math.inf
     high = -math.inf
-    way = m[LENGTH] + m[THETA] * c[FLUTE]
+    way = m[LENGTH] + m[THETA] * c.height
     ends = 1 if each == 1 and turns(index[6], q, state[0] + n) else 0
     for i in range(count + ends):
         # the middle of each part was looked at
@@ -218,7 +209,7 @@ def instants_of(k, q, n, count, each, once, state, index, work, nodes, flank, sl
         if entries == len(out):
             return -1, middle, low, high
         t = (i + 0.5) / count if i < count else 1.0 - 0.5 / (count * state[6])
-        instant(m, t, c[FLUTE], at)
+        instant(m, t, c.height, at)
         if not once:
             reach(at, c, index, 0.0, work[4])
         before = row_at[0]
@@ -291,10 +282,10 @@ def run(begin, instants, state, index, work, nodes, flank, slices, rows, owner, 
             row_at[1] = state[3]
             entries = state[4]
             # what of the profile is near material is found once, unless the cutter goes far
-            slack = 0.5 * (m[LENGTH] + m[THETA] * (c[FLUTE] + c[WIDE]))
-            once = slack < c[WIDE] * NEAR
+            slack = 0.5 * (m[LENGTH] + m[THETA] * (c.height + c.wide))
+            once = slack < c.wide * NEAR
             if once and count > 0:
-                instant(m, 0.5, c[FLUTE], at)
+                instant(m, 0.5, c.height, at)
                 reach(at, c, index, slack, work[4])
             while count > 0:
                 entries, middle, low, high = instants_of(

@@ -10,15 +10,14 @@ import math
 import numpy as np
 from numba import njit
 
+from chipload.cutter.record import BY_LESS_RHO, BY_RHO, BY_Z
 from chipload.engagement.bricks._circle import intervals
 from chipload.engagement.bricks._index import BY, MANY, SIDE, UNTOUCHED
-from chipload.engagement.bricks._sweep import COS_A, COS_B, SIN_A, SIN_B, from_profile
+from chipload.engagement.bricks._sweep import from_profile
 from chipload.engagement.moves._circle import ALONG, APART
-from chipload.engagement.moves._sweep import CORNER, FLUTE, RHO1, RHO2, TA, TB, WIDE, Z2, E, F
 
 PI = math.pi
 TAU = 2.0 * PI
-BOTTOM, ARC, FLANK = 0, 1, 2
 #: greatest distance of samples of a circle in bricks; it is smaller if a corner has more slices than the second number
 BRICKS, SLICES = 2.5, 12.0
 #: number of circles of a part that are tested first, and of halvings at a place where the contact changes
@@ -34,8 +33,8 @@ TIP, ALONG_T, ALONG_N, AXIS, RATE, WAY = 0, 3, 6, 9, 12, 15
 
 @njit(cache=True, nogil=True)
 def reach(at, c, index, slack, ranges):
-    """Ranges of the bottom [mm], the corner [rad] and the flank [mm] that may be in material where the cutter is, or no
-    farther away than ``slack`` [mm]: rows (from, to).
+    """Range of each piece of the profile that may be in material where the cutter is, or no farther away than ``slack``
+    [mm]: rows (from, to) of its parameter.
     """
     grid, shape, blocks, bricks = index[0], index[1], index[2], index[3]
     ranges[:, 0] = math.inf
@@ -47,13 +46,15 @@ def reach(at, c, index, slack, ranges):
     last = np.empty(3, np.int64)
     for d in range(3):
         a = at[AXIS + d]
-        across = c[WIDE] * math.sqrt(max(1.0 - a * a, 0.0)) + slack + 1e-6
-        low = at[TIP + d] + min(c[FLUTE] * a, 0.0) - across
-        high = at[TIP + d] + max(c[FLUTE] * a, 0.0) + across
+        across = c.wide * math.sqrt(max(1.0 - a * a, 0.0)) + slack + 1e-6
+        low = at[TIP + d] + min(c.height * a, 0.0) - across
+        high = at[TIP + d] + max(c.height * a, 0.0) + across
         first[d] = max(0, math.floor((low - grid[d]) / grid[3 + d]))
         last[d] = min(shape[d] - 1, math.floor((high - grid[d]) / grid[3 + d]))
         if first[d] > last[d]:
             return
+    end = c.count - 1
+    flank = c.by[end] == BY_Z
     levels = index[13]
     mesh = len(index[16]) > 0
     for bi in range(first[0] >> 3, (last[0] >> 3) + 1):
@@ -81,7 +82,7 @@ def reach(at, c, index, slack, ranges):
                                 continue
                             z = grid[2] + (k + 0.5) * grid[5] - at[TIP + 2]
                             w = x * at[AXIS] + y * at[AXIS + 1] + z * at[AXIS + 2]
-                            if w - r > c[Z2] and ranges[FLANK, 0] <= w - r and w + r <= ranges[FLANK, 1]:
+                            if flank and w - r > c.z[end] and ranges[end, 0] <= w - r and w + r <= ranges[end, 1]:
                                 continue
                             rho = math.sqrt(max(x * x + y * y + z * z - w * w, 0.0))
                             reached(c, rho, w, r, ranges)
@@ -90,46 +91,45 @@ def reach(at, c, index, slack, ranges):
 @njit(cache=True, nogil=True)
 def reached(c, rho, w, r, ranges):
     """Widen the ranges by what of the profile is within r of a point."""
-    vr = rho - c[E]
-    vw = w - c[F]
-    corner = c[CORNER]
-    if abs(vr * c[COS_B] - vw * c[SIN_B] - corner) < r and w + r > c[Z2]:
-        ranges[FLANK, 0] = min(ranges[FLANK, 0], w - r)
-        ranges[FLANK, 1] = max(ranges[FLANK, 1], w + r)
-    if c[RHO1] > 0.0 and abs(vr * c[SIN_A] - vw * c[COS_A] - corner) < r and rho - r < c[RHO1]:
-        ranges[BOTTOM, 0] = min(ranges[BOTTOM, 0], rho - r)
-        ranges[BOTTOM, 1] = max(ranges[BOTTOM, 1], rho + r)
-    if corner > 0.0:
-        size = math.sqrt(vr * vr + vw * vw)
-        if abs(size - corner) < r:
-            wide = math.asin(r / size) if size > r else TAU
-            kappa = math.atan2(vr, -vw) if size > 0.0 else 0.0
-            ranges[ARC, 0] = min(ranges[ARC, 0], kappa - wide)
-            ranges[ARC, 1] = max(ranges[ARC, 1], kappa + wide)
+    for i in range(c.count):
+        if c.line[i] > 0:
+            if abs((rho - c.rho_to[i]) * c.sin[i] - (w - c.z_to[i]) * c.cos[i]) < r:
+                q = w if c.by[i] == BY_Z else (rho if c.by[i] == BY_RHO else -rho)
+                if q + r <= c.q[i] or q - r >= c.q_to[i]:
+                    continue
+                ranges[i, 0] = min(ranges[i, 0], q - r)
+                ranges[i, 1] = max(ranges[i, 1], q + r)
+        elif c.radius[i] > 0.0:
+            vr = rho - c.e[i]
+            vw = w - c.f[i]
+            size = math.sqrt(vr * vr + vw * vw)
+            if abs(size - c.radius[i]) < r:
+                wide = math.asin(r / size) if size > r else TAU
+                kappa = math.atan2(vr, -vw) if size > 0.0 else 0.0
+                ranges[i, 0] = min(ranges[i, 0], kappa - wide)
+                ranges[i, 1] = max(ranges[i, 1], kappa + wide)
 
 
 @njit(cache=True, nogil=True)
 def place_of(c, part, s, to):
     """rho, w, sine and cosine of kappa and the length along the profile at a place of a part: ``to`` (5,)."""
-    if part == BOTTOM:
-        size = math.hypot(1.0, c[TA])
-        to[0] = s
-        to[1] = s * c[TA]
-        to[2] = c[TA] / size
-        to[3] = 1.0 / size
-        to[4] = (s - c[RHO1]) * size
-    elif part == ARC:
+    if c.line[part] == 0:
         to[2] = math.sin(s)
         to[3] = math.cos(s)
-        to[0] = c[E] + c[CORNER] * to[2]
-        to[1] = c[F] - c[CORNER] * to[3]
-        to[4] = c[CORNER] * (s - math.atan(c[TA]))
-    else:
-        to[0] = c[RHO2] + (s - c[Z2]) * c[TB]
+        to[0] = c.e[part] + c.radius[part] * to[2]
+        to[1] = c.f[part] - c.radius[part] * to[3]
+        to[4] = c.s[part] + c.radius[part] * (s - c.kappa[part])
+        return
+    to[2] = c.sin[part]
+    to[3] = c.cos[part]
+    if c.by[part] == BY_Z:
+        to[0] = c.rho[part] + (s - c.z[part]) * c.run[part]
         to[1] = s
-        to[2] = c[COS_B]
-        to[3] = c[SIN_B]
-        to[4] = c[CORNER] * (0.5 * PI - math.atan(c[TB]) - math.atan(c[TA])) + (s - c[Z2]) / c[COS_B]
+        to[4] = c.s[part] + (s - c.z[part]) / c.sin[part]
+    else:
+        to[0] = -s if c.by[part] == BY_LESS_RHO else s
+        to[1] = c.z[part] + (to[0] - c.rho[part]) * c.rise[part]
+        to[4] = c.s[part] + abs(to[0] - c.rho[part]) * math.hypot(1.0, c.rise[part])
 
 
 @njit(cache=True, nogil=True)

@@ -18,7 +18,7 @@ import math
 from numba import njit, types
 
 from chipload.engagement.bricks._sweep import A0, THETA, B, U, around, chord, nearest_time, swept
-from chipload.engagement.moves._sweep import AIR, EPS, FLUTE, MATERIAL, WIDE, in_solid, place
+from chipload.engagement.moves._sweep import AIR, CUTTERS, EPS, MATERIAL, in_solid, place
 
 #: bricks along a side of a block, and in it
 SIDE, MANY = 8, 512
@@ -32,7 +32,7 @@ _F1, _F2, _I1, _S1, _S2 = (
     types.int32[::1],
     types.int32[:, ::1],
 )
-INDEX = types.Tuple((_F1, _I1, _S1, _S2, _S1, _S1, _F2, _I1, _F2, _F1, _F1, _F1, _I1, _F2, _I1, _S1, _F2))
+INDEX = types.Tuple((_F1, _I1, _S1, _S2, _S1, _S1, _F2, _I1, CUTTERS, _F1, _F1, _F1, _I1, _F2, _I1, _S1, _F2))
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -107,7 +107,7 @@ def what_is(x, y, z, index, hint, wait):
             # most are far away
             x0, y0, w0, dx, dy, dw, bow = chord(moves[e], x, y, z)
             t = nearest_time(x0, y0, dx, dy)
-            over = cutters[of[e], WIDE] + bow + EPS
+            over = cutters[of[e]].wide + bow + EPS
             if (x0 + t * dx) ** 2 + (y0 + t * dy) ** 2 >= over * over or max(w0, w0 + dw) + bow <= -EPS:
                 continue
             if swept(moves[e], cutters[of[e]], x, y, z, wait):
@@ -120,7 +120,7 @@ def span(m, c, d, low, side, count):
     """First and last brick along the axis d that a move may reach."""
     a = m[d]
     b = m[d] + m[U + d]
-    height = c[FLUTE]
+    height = c.height
     theta = m[THETA]
     # the top goes along a curve, and the axis leans by no more than it turns
     slack = 0.125 * theta * theta * height + 1e-6
@@ -129,7 +129,7 @@ def span(m, c, d, low, side, count):
     first = m[A0 + d]
     last = first * cosine + m[B + d] * sine
     lean = max(min(abs(first), abs(last)) - theta, 0.0)
-    across = c[WIDE] * math.sqrt(max(1.0 - lean * lean, 0.0)) + slack
+    across = c.wide * math.sqrt(max(1.0 - lean * lean, 0.0)) + slack
     least_at = min(a + min(height * first, 0.0), b + min(height * last, 0.0)) - across
     most_at = max(a + max(height * first, 0.0), b + max(height * last, 0.0)) + across
     return max(0, math.floor((least_at - low) / side)), min(count - 1, math.floor((most_at - low) / side))

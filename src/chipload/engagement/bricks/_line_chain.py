@@ -26,7 +26,6 @@ from chipload.engagement.bricks._sweep import (
     N,
     turn,
 )
-from chipload.engagement.moves._sweep import FLUTE, WIDE
 
 #: greatest difference of the joined move from the end of a step [mm]
 EXACT = 1e-10
@@ -41,7 +40,7 @@ def joined(m, s, c):
     fixed = theta == 0.0
     if fixed != (s[THETA] == 0.0) or s[LENGTH] + s[THETA] == 0.0 or m[LENGTH] + theta == 0.0:
         return False
-    far = EXACT / (c[FLUTE] + c[WIDE])
+    far = EXACT / (c.height + c.wide)
     cosine, sine = turn(m, 1.0)
     for d in range(3):
         if abs(m[d] + m[3 + d] - s[d]) > EXACT or abs(m[A0 + d] * cosine + m[B + d] * sine - s[A0 + d]) > far:
@@ -76,7 +75,7 @@ def joined(m, s, c):
     uz = s[2] + s[5] - m[2]
     length = math.sqrt(ux * ux + uy * uy + uz * uz)
     bend = (theta + 2.0) * length
-    if theta > TURN or 0.125 * theta * (theta * (c[FLUTE] + c[WIDE]) + bend) > OFF * c[WIDE]:
+    if theta > TURN or 0.125 * theta * (theta * (c.height + c.wide) + bend) > OFF * c.wide:
         return False
     # the end of the one and the start of the other on the whole way
     way = m[LENGTH] + s[LENGTH]

@@ -10,20 +10,18 @@ import math
 
 from numba import njit
 
+from chipload.cutter.record import BOTTOM_LINE, BY_Z, FLANK_LINE
 from chipload.engagement.bricks._contact_places import (
     ALIKE,
     ALONG_N,
     ALONG_T,
     AXIS,
-    BOTTOM,
-    FLANK,
     PI,
     TAU,
     contact,
     place_of,
     places,
 )
-from chipload.engagement.bricks._sweep import COS_B
 
 
 @njit(cache=True, nogil=True)
@@ -124,12 +122,15 @@ def sliced(at, c, part, a, b, looks, flank, known, count, nodes, index, work, sl
         s1 = known[n, 0]
         if known[n, 1] > 0.0 or known[n, 5] > 0.0 or (n > 0 and known[n - 1, 3] > 0.0):
             many = most
-            if part == FLANK:
-                many = math.ceil((s1 - s0) / c[COS_B] / flank - 1e-9)
+            if c.line[part] == FLANK_LINE:
+                size = s1 - s0 if c.by[part] != BY_Z else (s1 - s0) / c.sin[part]
+                many = math.ceil(size / flank - 1e-9)
                 if known[n, 5] > ALIKE:
                     many = max(many, most // 2)
-            elif part == BOTTOM:
+            elif c.line[part] == BOTTOM_LINE:
                 many = most // 2
+            elif c.radius[part] > c.wide:
+                many = max(most, math.ceil((s1 - s0) * c.radius[part] / flank - 1e-9))
             if not laid(at, c, part, s0, s1, max(many, 1), nodes, index, work, slices, rows, owner, row_at, out):
                 return -1
         s0 = s1

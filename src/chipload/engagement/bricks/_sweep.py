@@ -3,7 +3,7 @@
 Notation: a move is a row: tip p0 at the start [mm], its motion u [mm], axis a0 at the start, direction b across it to
 which the axis turns, the angle theta of the turn [rad], the length of u, n = a0 x b, and the motion of the first tip in
 the cutter's frame; at the time t in 0..1 the tip is p0 + t u and the axis A = a0 cos(t theta) + b sin(t theta). A
-cutter is a row of :func:`chipload.engagement.bricks.stock.cutter_row`; rho, w [mm] are the distance of a point from
+cutter is a record of :mod:`chipload.cutter.record`; rho, w [mm] are the distance of a point from
 the axis and its height above the tip. The cutter is convex and closed at the end of its flutes; f(t) [mm] is the
 distance of a point from its surface, negative within.
 
@@ -20,15 +20,14 @@ import math
 
 from numba import njit
 
-from chipload.engagement.moves._sweep import CORNER, EPS, FLAT, FLUTE, KIND, TB, WIDE, Z2, E, F
+from chipload.cutter.record import FLAT
+from chipload.engagement.moves._sweep import EPS
 
 #: columns of a move: u from, a0 from, b from, theta, length of u, n from
 U, A0, B, THETA, LENGTH, N = 3, 6, 9, 12, 13, 14
 #: motion of a point at the first tip in the frame of the cutter along n, b and a, cosine of theta less 1, its sine, and
 #: the part of M that does not depend on the point, over theta
 ALONG_X, ALONG_Y, ALONG_W, TURNED, SINE, BEND = range(17, 23)
-#: further columns of a cutter: sine and cosine of the angles of bottom and flank
-SIN_A, COS_A, SIN_B, COS_B = range(12, 16)
 #: difference of the bounds of a least distance at which the search ends [mm]
 KNOWN = 1e-11
 #: greatest number of intervals that are still to be divided
@@ -40,31 +39,31 @@ NEAR = 0.1
 @njit(cache=True, nogil=True)
 def from_profile(c, rho, w):
     """Distance [mm] of a point (rho, w) from the cutter, negative within, and the normal: across, along the axis."""
-    vr = rho - c[E]
-    vw = w - c[F]
-    r = c[CORNER]
-    if vr * c[COS_A] + vw * c[SIN_A] >= 0.0 and vr * c[SIN_B] + vw * c[COS_B] <= 0.0:
-        size = math.sqrt(vr * vr + vw * vw)
-        f = size - r
-        if size > 0.0:
-            nr = vr / size
-            nw = vw / size
-        else:
-            nr = c[SIN_A]
-            nw = -c[COS_A]
-    else:
-        bottom = vr * c[SIN_A] - vw * c[COS_A]
-        flank = vr * c[COS_B] - vw * c[SIN_B]
-        if bottom > flank:
-            f = bottom - r
-            nr = c[SIN_A]
-            nw = -c[COS_A]
-        else:
-            f = flank - r
-            nr = c[COS_B]
-            nw = -c[SIN_B]
-    if w - c[FLUTE] > f:
-        return w - c[FLUTE], 0.0, 1.0
+    f = -math.inf
+    nr = 0.0
+    nw = 1.0
+    # the greatest distance from a tangent: of an arc or sharp corner from the one whose normal goes through the point
+    for i in range(c.count):
+        if c.line[i] > 0:
+            continue
+        vr = rho - c.e[i]
+        vw = w - c.f[i]
+        if vr * c.cos[i] + vw * c.sin[i] >= 0.0 and vr * c.cos_to[i] + vw * c.sin_to[i] <= 0.0:
+            size = math.sqrt(vr * vr + vw * vw)
+            if size - c.radius[i] > f:
+                f = size - c.radius[i]
+                nr = vr / size if size > 0.0 else c.sin[i]
+                nw = vw / size if size > 0.0 else -c.cos[i]
+    if f == -math.inf or c.arcs > 1:
+        for i in range(c.count):
+            if c.line[i] > 0:
+                g = (rho - c.rho_to[i]) * c.sin[i] - (w - c.z_to[i]) * c.cos[i]
+                if g >= f:
+                    f = g
+                    nr = c.sin[i]
+                    nw = -c.cos[i]
+    if w - c.height > f:
+        return w - c.height, 0.0, 1.0
     return f, nr, nw
 
 
@@ -283,9 +282,9 @@ def swept_by_flank(m, c, t, x0, y0, w0, dx, dy, off):
     bend = 8.0 * off
     t = min(max(t - 0.5 * from_axis(m, t, x0, y0, w0)[1] / (dx * dx + dy * dy + 1e-300), 0.0), 1.0)
     h, rate, w = from_axis(m, t, x0, y0, w0)
-    far = (c[WIDE] + EPS) ** 2
+    far = (c.wide + EPS) ** 2
     if h < far:
-        return 1 if -EPS < w < c[FLUTE] + EPS else -1
+        return 1 if -EPS < w < c.height + EPS else -1
     slope = max(abs(dy) - 0.5 * bend, 0.0)
     curve = 2.0 * (dx * dx + slope * slope - (max(abs(y0), abs(y0 + dy)) + off) * bend)
     if curve > 0.0:
@@ -311,8 +310,8 @@ def swept(m, c, x, y, z, wait):
     y1 = y0 + t * dy
     far = x1 * x1 + y1 * y1
     off = bow + EPS
-    wide = c[WIDE]
-    tall = c[FLUTE]
+    wide = c.wide
+    tall = c.height
     if far >= (wide + off) ** 2:
         return False
     least_w = min(w0, w0 + dw)
@@ -323,7 +322,7 @@ def swept(m, c, x, y, z, wait):
     if not whole and not in_cylinder(x0, y0, w0, dx, dy, dw, wide + off, -off, tall + off):
         return False
     w = w0 + t * dw
-    if c[KIND] == FLAT:
+    if c.kind == FLAT:
         if m[THETA] == 0.0:
             return True
         if far < (wide - off) ** 2 and off < w < tall - off:
@@ -332,11 +331,11 @@ def swept(m, c, x, y, z, wait):
             return True
     elif from_profile(c, math.sqrt(far), w)[0] < (-off if m[THETA] > 0.0 else EPS):
         return True
-    if c[TB] == 0.0 and least_w > c[Z2] + off:
+    if least_w > c.cylinder + off:
         known = swept_by_flank(m, c, t, x0, y0, w0, dx, dy, bow)
         if known >= 0:
             return known == 1
-    elif c[KIND] == FLAT:
+    elif c.kind == FLAT:
         h, _, w = from_axis(m, t, x0, y0, w0)
         if h < (wide + EPS) ** 2 and -EPS < w < tall + EPS:
             return True
@@ -366,7 +365,7 @@ def estimated_least(m, c, x, y, z):
     size = dx * dx + dy * dy + dw * dw
     if size == 0.0:
         return f
-    to = min(max(t - s * c[WIDE] / size, 0.0), 1.0)
+    to = min(max(t - s * c.wide / size, 0.0), 1.0)
     f1, s1 = outside(m, c, to, x, y, z)
     if s1 != s:
         f2, _ = outside(m, c, min(max(to - s1 * (to - t) / (s1 - s), 0.0), 1.0), x, y, z)
@@ -381,14 +380,14 @@ def around(m, c, x, y, z, r, wait):
     t = nearest_time(x0, y0, dx, dy)
     far = (x0 + t * dx) ** 2 + (y0 + t * dy) ** 2
     out = r + off
-    if far >= (c[WIDE] + out) ** 2:
+    if far >= (c.wide + out) ** 2:
         return 0
     least_w = min(w0, w0 + dw)
-    if max(w0, w0 + dw) <= -out or least_w >= c[FLUTE] + out:
+    if max(w0, w0 + dw) <= -out or least_w >= c.height + out:
         return 0
     if from_profile(c, math.sqrt(far), w0 + t * dw)[0] < -out:
         return 1
-    if c[TB] == 0.0 and least_w > c[Z2] + out:
+    if least_w > c.cylinder + out:
         return -1
     low, high = least_from(m, c, x, y, z, t, r, -r, NEAR * r, wait)
     if low >= r:

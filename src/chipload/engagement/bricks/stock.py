@@ -18,16 +18,15 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon
 
 from chipload.cutter.cutter import Cutter
+from chipload.cutter.record import MOST, cutter_record
 from chipload.engagement.moves.net import area_of, nodes_of, rings
-from chipload.engagement.moves.stock import INSTANT, Engaged, corner_parts, faces_of, walls_of
-from chipload.engagement.moves.stock import cutter_row as upright_row
+from chipload.engagement.moves.stock import INSTANT, Engaged, corner_parts, faces_of, side_radii, walls_of
 from chipload.lazy import LateModule
 
 _sweep = LateModule("chipload.engagement.bricks._sweep")
 front = LateModule("chipload.engagement.bricks._contact")
 index = LateModule("chipload.engagement.bricks._index")
 outline = LateModule("chipload.engagement.bricks._outline")
-moves = LateModule("chipload.engagement.moves._sweep")
 moves_circle = LateModule("chipload.engagement.moves._circle")
 initial = LateModule("chipload.engagement.moves._initial_faces")
 
@@ -47,14 +46,6 @@ FIXED = 1e-12
 FEW = 12
 #: ranges of a part of the profile that are distinguished
 RANGES = 32
-
-
-def cutter_row(cutter: Cutter) -> Floats:
-    """(16,) those of :func:`chipload.engagement.moves.stock.cutter_row`, then sine and cosine of the angles of bottom
-    and flank.
-    """
-    alpha, beta = cutter.apt[4:6]
-    return np.array([*upright_row(cutter), math.sin(alpha), math.cos(alpha), math.sin(beta), math.cos(beta)])
 
 
 def move_rows(p0: Floats, p1: Floats, a0: Floats, a1: Floats) -> Floats:
@@ -112,10 +103,10 @@ class BrickStock:
         self.low, self.high = np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
         self.table = dict(cutters)
         self.tools = {n: i for i, n in enumerate(sorted(cutters))}
-        self.cutters = np.array([cutter_row(cutters[n]) for n in self.tools])
+        self.cutters = np.concatenate([cutter_record(cutters[n]) for n in self.tools])
         size = self.high - self.low
         side = max(
-            BRICK * float(np.min(self.cutters[:, moves.WIDE])),
+            BRICK * float(self.cutters["wide"].min()),
             (float(size.prod()) / (index.MANY * BLOCKS)) ** (1.0 / 3.0),
         )
         count = np.maximum(np.ceil(size / side - 1e-9), 1.0)
@@ -166,7 +157,7 @@ class BrickStock:
         self.of[self.count : end] = of
         self.count = end
         if len(rows):
-            wide, tall = self.cutters[of, moves.WIDE], self.cutters[of, moves.FLUTE]
+            wide, tall = self.cutters["wide"][of], self.cutters["height"][of]
             # the axis leans at most by what it turns more than at the start
             down = np.maximum(-rows[:, 8], 0.0) + rows[:, 12]
             tips = np.minimum(rows[:, 2], rows[:, 2] + rows[:, 5])
@@ -192,8 +183,8 @@ class BrickStock:
     def instants(self, rows: Floats, tool: Ints) -> Ints:
         """Return the number of instants (n,) at which each step is calculated: odd, to include the middle."""
         of = np.array([self.tools[n] for n in tool.tolist()], dtype=np.int64)
-        length = rows[:, 13] + rows[:, 12] * self.cutters[of, moves.FLUTE]
-        more = np.maximum(0.5 * (length / (INSTANT * self.cutters[of, moves.WIDE]) - 1.0), 0.0)
+        length = rows[:, 13] + rows[:, 12] * self.cutters["height"][of]
+        more = np.maximum(0.5 * (length / (INSTANT * self.cutters["wide"][of]) - 1.0), 0.0)
         return np.asarray(2 * np.ceil(more - 1e-9).astype(np.int64) + 1)
 
     def skip(self, p0: Floats, p1: Floats, a0: Floats, a1: Floats, tool: Ints) -> None:
@@ -226,13 +217,13 @@ class BrickStock:
         return self._run(rows, tool, self.instants(rows, tool), corner_slices, flank_mm)
 
     def _work(self, pieces: int) -> tuple[NDArray[Any], ...]:
-        wide = float(self.cutters[:, moves.WIDE].max())
+        wide = float(self.cutters["wide"].max())
         apart = min(front.BRICKS * float(self.grid[3:].min()) / wide, moves_circle.APART)
         room = int(math.tau / (apart * min(front.SLICES / pieces, 1.0))) + 8
         return (
-            np.empty((room, 2)), np.empty(5), np.empty(9), np.empty(9), np.empty((3, 2)), np.zeros((3, RANGES, 7)),
-            np.empty((_sweep.WAIT, 6)), np.empty(18), np.zeros(1), np.empty(2, dtype=np.int64),
-            np.zeros(3, dtype=np.int64),
+            np.empty((room, 2)), np.empty(5), np.empty(9), np.empty(9), np.empty((MOST, 2)),
+            np.zeros((MOST, RANGES, 7)), np.empty((_sweep.WAIT, 6)), np.empty(18), np.zeros(1),
+            np.empty(2, dtype=np.int64), np.zeros(MOST, dtype=np.int64),
         )  # fmt: skip
 
     def _run(self, moves: Floats, tool: Ints, instants: Ints, pieces: int, flank_mm: Mapping[int, float]) -> Engaged:
@@ -281,7 +272,9 @@ class BrickStock:
         """Return the outlines of the swept area at a height, within the box of the body and a little beyond: see
         :meth:`chipload.engagement.moves.stock.MoveStock.outlines`.
         """
-        xs, ys = nodes_of(self.low, self.high, float(self.grid[3:5].min()), float(self.cutters[:, 8].min()), tolerance)
+        xs, ys = nodes_of(
+            self.low, self.high, float(self.grid[3:5].min()), float(side_radii(self.cutters).min()), tolerance
+        )
         inside = np.empty((len(xs), len(ys)), dtype=np.bool_)
         found = self._index()
         outline.marked(z, xs, ys, found, inside)

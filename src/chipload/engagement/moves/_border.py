@@ -11,11 +11,9 @@ import math
 
 from numba import njit
 
+from chipload.cutter.record import BALL
 from chipload.engagement.moves._sweep import (
-    BALL,
-    CORNER,
     EPS,
-    KIND,
     MATERIAL,
     section,
     swept,
@@ -74,11 +72,11 @@ def crossing(px, py, z, rho, T, cu, su, cs, ss, e, index):
     moves = index[6]
     cutters = index[8]
     of = index[7]
-    ball = cutters[of[e], KIND] == BALL
+    ball = cutters[of[e]].kind == BALL
     disc = ball
     first = 0.0
     last = 1.0
-    r = cutters[of[e], CORNER]
+    r = cutters[of[e]].radius[0]
     far2 = (r + EPS) * (r + EPS)
     if not ball:
         first, last, far2, disc = section(moves[e], cutters[of[e]], z)

@@ -17,7 +17,7 @@ from numba import njit, types
 from chipload.engagement.moves._circle import ALONG, APART, intervals
 from chipload.engagement.moves._edge import FLANK, SAME, add_slice, candidates, sliced, windows
 from chipload.engagement.moves._flank import BEGIN, COUNT, divide_flank
-from chipload.engagement.moves._sweep import FLUTE, WIDE, keep
+from chipload.engagement.moves._sweep import CUTTERS, keep
 from chipload.engagement.moves._uncounted_arrays import borrowed
 
 PI = math.pi
@@ -129,7 +129,7 @@ def engaged(
     Parameters
     ----------
     p, u : (3,) tip, and motion of the step [mm]
-    c : (12,) cutter; T : (2,) unit vector of psi = 0
+    c : cutter; T : (2,) unit vector of psi = 0
     parts, flank : slices of a corner; longest slice of the flank [mm]
     near, levels, scratch, spans, mine, room, held : working arrays, see ``WORK``
     slices, rows, owner : slices; spans (psi from, to) [rad]; slice of each span; from ``at[1]`` and ``at[0]`` on
@@ -139,7 +139,7 @@ def engaged(
     """
     # what a call passes counts again
     index = borrowed(index)
-    p, u, c, T, near, levels, scratch, spans = borrowed((p, u, c, T, near, levels, scratch, spans))
+    p, u, T, near, levels, scratch, spans = borrowed((p, u, T, near, levels, scratch, spans))
     held = borrowed(held)
     out[:] = 0.0
     hu = math.hypot(u[0], u[1])
@@ -150,7 +150,7 @@ def engaged(
     number, askew = sliced(p, c, near, count, u, parts, flank, levels, index, scratch)
     apart = 2.5 * min(grid[2], grid[3])
     # above the flutes
-    add_slice(scratch, number, 0.0, 0.0, c[WIDE], c[FLUTE], 1.0, 0.0, c[FLUTE], c[WIDE], c[WIDE])
+    add_slice(scratch, number, 0.0, 0.0, c.wide, c.height, 1.0, 0.0, c.height, c.wide, c.wide)
     windows(near, count, 0.5 * math.hypot(grid[2], grid[3]), scratch, number + 1)
     first_row = at[0]
     out[2] = math.inf
@@ -205,7 +205,7 @@ _F1, _F2, _I1, _I2, _S = (
 #: room for :func:`run`: candidates, levels, slices, spans, their slices, areas, place, rows and slices so far, and
 #: pieces of the flank
 WORK = types.Tuple((_F2, _F1, _F2, _F2, _I1, _I1, _F1, _I1, _F2))
-INDEX = types.Tuple((_F1, _I1, _F2, _I2, _S, types.uint16[::1], _F2, _I1, _F2, _F1, _F1, _I1, _S, _F2))
+INDEX = types.Tuple((_F1, _I1, _F2, _I2, _S, types.uint16[::1], _F2, _I1, CUTTERS, _F1, _F1, _I1, _S, _F2))
 
 
 @njit(cache=True, nogil=True)

@@ -9,22 +9,8 @@ import math
 
 from numba import njit
 
-from chipload.engagement.moves._sweep import (
-    CORNER,
-    FLAT,
-    FLUTE,
-    KIND,
-    RHO1,
-    RHO2,
-    TA,
-    TB,
-    WIDE,
-    Z1,
-    Z2,
-    E,
-    F,
-    profile,
-)
+from chipload.cutter.record import FLANK_LINE, FLAT
+from chipload.engagement.moves._sweep import profile
 from chipload.engagement.moves._uncounted_arrays import borrowed
 
 PI = math.pi
@@ -43,7 +29,7 @@ DOWN = 4
 def candidates(p, T, narrow, c, grid, shape, level, near):
     """Cells in which the surface of the cutter at p may be in material: rows of ``near``; their number."""
     half = 0.5 * math.hypot(grid[2], grid[3])
-    wide = c[WIDE]
+    wide = c.wide
     i0 = max(0, math.floor((p[0] - wide - grid[0]) / grid[2]))
     i1 = min(shape[0] - 1, math.floor((p[0] + wide - grid[0]) / grid[2]))
     j0 = max(0, math.floor((p[1] - wide - grid[1]) / grid[3]))
@@ -160,12 +146,15 @@ def add_slice(out, k, s0, s1, rho, z0, sk, ck, z, rho0, rho1):
 
 
 @njit(cache=True, nogil=True)
-def add_corner(out, k, c, alpha, k0, k1, mid):
-    """:func:`add_slice` of the corner from the angle k0 of its normal to k1 [rad], with the circle at ``mid``."""
-    r = c[CORNER]
+def add_arc(out, k, c, i, k0, k1, mid):
+    """:func:`add_slice` of the arc i from the angle k0 of its normal to k1 [rad], with the circle at ``mid``."""
+    r = c.radius[i]
+    e = c.e[i]
+    f = c.f[i]
     return add_slice(
-        out, k, r * (k0 - alpha), r * (k1 - alpha), c[E] + r * math.sin(mid), c[F] - r * math.cos(k0), math.sin(mid),
-        math.cos(mid), c[F] - r * math.cos(mid), c[E] + r * math.sin(k0), c[E] + r * math.sin(k1),
+        out, k, c.s[i] + r * (k0 - c.kappa[i]), c.s[i] + r * (k1 - c.kappa[i]), e + r * math.sin(mid),
+        f - r * math.cos(k0), math.sin(mid), math.cos(mid), f - r * math.cos(mid), e + r * math.sin(k0),
+        e + r * math.sin(k1),
     )  # fmt: skip
 
 
@@ -176,7 +165,6 @@ def sliced(p, c, near, count, u, parts, flank, levels, index, out):
     """
     # what a call passes counts again
     index = borrowed(index)
-    pieces = len(parts)
     inner = math.inf
     outer = 0.0
     top = 0.0
@@ -184,57 +172,77 @@ def sliced(p, c, near, count, u, parts, flank, levels, index, out):
         inner = min(inner, near[i, 0])
         outer = max(outer, near[i, 1])
         top = max(top, near[i, 4])
-    outer = min(outer, c[WIDE])
-    top = min(top, c[FLUTE])
+    outer = min(outer, c.wide)
+    top = min(top, c.height)
     k = 0
-    r = c[CORNER]
-    if c[RHO1] > 0.0 and inner < c[RHO1] and (u[2] < 0.0 or c[TA] > 0.0):
-        a = inner
-        b = min(outer, c[RHO1])
-        if c[TA] > 0.0:
-            b = min(b, top / c[TA])
-        n = max(pieces // 2, 1)
-        size = math.hypot(1.0, c[TA])
-        for i in range(n):
-            r0 = a + (b - a) * i / n
-            r1 = a + (b - a) * (i + 1) / n
-            mid = 0.5 * (r0 + r1)
-            k = add_slice(
-                out, k, (r0 - c[RHO1]) * size, (r1 - c[RHO1]) * size, mid, r0 * c[TA], c[TA] / size, 1.0 / size,
-                mid * c[TA], r0, r1,
-            )  # fmt: skip
-    if r > 0.0 and outer > c[RHO1] and inner < c[RHO2] and top > c[Z1]:
-        alpha = math.atan(c[TA])
-        a = alpha if inner <= c[RHO1] else max(alpha, math.asin((inner - c[E]) / r))
-        end = 0.5 * PI - math.atan(c[TB])
-        b = end if outer >= c[RHO2] else min(end, math.asin((outer - c[E]) / r))
-        if top < c[Z2]:
-            b = min(b, math.acos((c[F] - top) / r))
-        # where the normal leans against the motion the front ends: none below on the way up, all round on the way down
-        turn = math.atan2(abs(u[2]), math.hypot(u[0], u[1]))
-        if u[2] > 0.0:
-            a = max(a, turn)
-        elif a < turn < b:
-            for i in range(ROUND):
-                k0 = a + (turn - a) * i / ROUND
-                k1 = a + (turn - a) * (i + 1) / ROUND
-                k = add_corner(out, k, c, alpha, k0, k1, 0.5 * (k0 + k1))
-            a = turn
-        for i in range(pieces if b > a else 0):
-            k = add_corner(
-                out, k, c, alpha, a + (b - a) * parts[i, 0], a + (b - a) * parts[i, 1], a + (b - a) * parts[i, 2]
-            )
-    if outer >= c[RHO2] and top > c[Z2]:
-        many = pieces * (DOWN if u[2] < 0.0 or c[TB] > 0.0 else 1)
-        return flanked(p, c, near, count, top, many, flank, levels, index, out, k)
+    for i in range(c.count):
+        if c.line[i] == FLANK_LINE:
+            if outer >= c.rho[i] and top > c.z[i]:
+                many = len(parts) * (DOWN if u[2] < 0.0 or c.run[i] > 0.0 else 1)
+                return flanked(p, c, i, near, count, top, many, flank, levels, index, out, k)
+        elif c.line[i] > 0:
+            if inner < c.rho_to[i] and outer > c.rho[i] and top > c.z[i] and (u[2] < 0.0 or c.rise[i] > 0.0):
+                k = bottom_sliced(c, i, max(inner, c.rho[i]), min(outer, c.rho_to[i]), top, len(parts), out, k)
+        elif c.radius[i] > 0.0 and outer > c.rho[i] and inner < c.rho_to[i] and top > c.z[i]:
+            k = arc_sliced(c, i, inner, outer, top, u, parts, flank, out, k)
     return k, False
 
 
 @njit(cache=True, nogil=True)
-def floors_of_moves(p, c, near, count, top, levels, n, index):
-    """Write the heights above the tip of the floors that moves left beside the flank behind the first ``n`` of
-    ``levels``, the lowest of them where there is no room for all: the number of levels, and whether there are floors
-    that are not level.
+def bottom_sliced(c, i, a, b, top, pieces, out, k):
+    """Slices of the line i that is no flank, from rho = a to b."""
+    if c.rise[i] > 0.0:
+        b = min(b, c.rho[i] + (top - c.z[i]) * c.run[i])
+    n = max(pieces // 2, 1)
+    size = math.hypot(1.0, c.rise[i])
+    for j in range(n):
+        r0 = a + (b - a) * j / n
+        r1 = a + (b - a) * (j + 1) / n
+        mid = 0.5 * (r0 + r1)
+        k = add_slice(
+            out, k, c.s[i] + (r0 - c.rho[i]) * size, c.s[i] + (r1 - c.rho[i]) * size, mid,
+            c.z[i] + (r0 - c.rho[i]) * c.rise[i], c.sin[i], c.cos[i], c.z[i] + (mid - c.rho[i]) * c.rise[i], r0, r1,
+        )  # fmt: skip
+    return k
+
+
+@njit(cache=True, nogil=True)
+def arc_sliced(c, i, inner, outer, top, u, parts, flank, out, k):
+    """Slices of the arc i; an arc of a larger radius than the cutter has as many as a flank."""
+    pieces = len(parts)
+    r = c.radius[i]
+    a = c.kappa[i] if inner <= c.rho[i] else max(c.kappa[i], math.asin((inner - c.e[i]) / r))
+    b = c.kappa_to[i] if outer >= c.rho_to[i] else min(c.kappa_to[i], math.asin((outer - c.e[i]) / r))
+    if top < c.z_to[i]:
+        b = min(b, math.acos((c.f[i] - top) / r))
+    # where the normal leans against the motion the front ends: none below on the way up, all round on the way down
+    turn = math.atan2(abs(u[2]), math.hypot(u[0], u[1]))
+    if u[2] > 0.0:
+        a = max(a, turn)
+    elif a < turn < b:
+        for j in range(ROUND):
+            k0 = a + (turn - a) * j / ROUND
+            k1 = a + (turn - a) * (j + 1) / ROUND
+            k = add_arc(out, k, c, i, k0, k1, 0.5 * (k0 + k1))
+        a = turn
+    if b <= a:
+        return k
+    times = max(math.ceil(r * (b - a) / flank / pieces - 1e-9), 1) if r > c.wide else 1
+    size = (b - a) / times
+    for n in range(times):
+        from_k = a + n * size
+        for j in range(pieces):
+            k = add_arc(
+                out, k, c, i, from_k + size * parts[j, 0], from_k + size * parts[j, 1], from_k + size * parts[j, 2]
+            )
+    return k
+
+
+@njit(cache=True, nogil=True)
+def floors_of_moves(p, c, at, near, count, top, levels, n, index):
+    """Write the heights above the tip of the floors that moves left beside the flank, the line ``at``, behind the first
+    ``n`` of ``levels``, the lowest of them where there is no room for all: the number of levels, and whether there are
+    floors that are not level.
     """
     index = borrowed(index)
     lists = index[3]
@@ -245,7 +253,7 @@ def floors_of_moves(p, c, near, count, top, levels, n, index):
     begin = n
     askew = False
     for i in range(count):
-        if near[i, 1] < c[RHO2]:
+        if near[i, 1] < c.rho[at]:
             continue
         cell = int(near[i, 6])
         # beside upright faces of a mesh
@@ -257,16 +265,16 @@ def floors_of_moves(p, c, near, count, top, levels, n, index):
             if moves[m, 5] != 0.0 and moves[m, 6] > 0.0:
                 # a floor that falls along the move
                 low -= p[2]
-                askew = askew or (low < top and low + abs(moves[m, 5]) > c[Z2])
+                askew = askew or (low < top and low + abs(moves[m, 5]) > c.z[at])
                 continue
             if low == last:
                 continue
             last = low
-            if cutters[of[m], KIND] != FLAT:
+            if cutters[of[m]].kind != FLAT:
                 askew = True
                 continue
             h = low - p[2]
-            if not c[Z2] < h < top:
+            if not c.z[at] < h < top:
                 continue
             fresh = True
             highest = begin
@@ -284,20 +292,21 @@ def floors_of_moves(p, c, near, count, top, levels, n, index):
 
 
 @njit(cache=True, nogil=True)
-def flanked(p, c, near, count, top, pieces, flank, levels, index, out, k):
-    """Slices of the flank: between the heights of the stock beside it, none longer than ``flank``; where the cells have
-    too many heights, ``pieces`` equal ones between the floors of level moves. Returns as :func:`sliced`.
+def flanked(p, c, at, near, count, top, pieces, flank, levels, index, out, k):
+    """Slices of the flank, the line ``at``: between the heights of the stock beside it, none longer than ``flank``;
+    where the cells have too many heights, ``pieces`` equal ones between the floors of level moves. Returns as
+    :func:`sliced`.
     """
     index = borrowed(index)
     n = 2
-    levels[0] = c[Z2]
+    levels[0] = c.z[at]
     levels[1] = top
     many = False
     for i in range(count):
-        if near[i, 1] < c[RHO2]:
+        if near[i, 1] < c.rho[at]:
             continue
         for h in (near[i, 4], near[i, 5]):
-            if not c[Z2] < h < top:
+            if not c.z[at] < h < top:
                 continue
             fresh = True
             for j in range(n):
@@ -311,25 +320,24 @@ def flanked(p, c, near, count, top, pieces, flank, levels, index, out, k):
     if many:
         # no level floors around: a surface that rises and falls
         n = 2
-    n, askew = floors_of_moves(p, c, near, count, top, levels, n, index)
-    if many or c[TB] > 0.0:
+    n, askew = floors_of_moves(p, c, at, near, count, top, levels, n, index)
+    if many or c.run[at] > 0.0:
         # beside an upright wall the contact of a cone changes all along it
-        flank = min(flank, (top - c[Z2]) / pieces)
+        flank = min(flank, (top - c.z[at]) / pieces)
     levels[:n].sort()
-    beta = math.atan(c[TB])
-    sk = math.cos(beta)
-    ck = math.sin(beta) if c[TB] > 0.0 else 0.0
-    start = c[CORNER] * (0.5 * PI - beta - math.atan(c[TA]))
+    sk = c.sin[at]
+    ck = c.cos[at]
+    start = c.s[at]
     for j in range(n - 1):
         parts = max(1, math.ceil((levels[j + 1] - levels[j]) / sk / flank - 1e-9))
         for i in range(parts):
             z0 = levels[j] + (levels[j + 1] - levels[j]) * i / parts
             z1 = levels[j] + (levels[j + 1] - levels[j]) * (i + 1) / parts
             mid = 0.5 * (z0 + z1)
-            rho0 = c[RHO2] + (z0 - c[Z2]) * c[TB]
-            rho1 = c[RHO2] + (z1 - c[Z2]) * c[TB]
+            rho0 = c.rho[at] + (z0 - c.z[at]) * c.run[at]
+            rho1 = c.rho[at] + (z1 - c.z[at]) * c.run[at]
             k = add_slice(
-                out, k, start + (z0 - c[Z2]) / sk, start + (z1 - c[Z2]) / sk, 0.5 * (rho0 + rho1), z0, sk, ck, mid,
+                out, k, start + (z0 - c.z[at]) / sk, start + (z1 - c.z[at]) / sk, 0.5 * (rho0 + rho1), z0, sk, ck, mid,
                 rho0, rho1,
             )  # fmt: skip
             out[k - 1, FLANK] = 1.0 if i == 0 else 0.0

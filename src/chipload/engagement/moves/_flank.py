@@ -15,7 +15,7 @@ from numba import njit
 
 from chipload.engagement.moves._circle import APART, intervals
 from chipload.engagement.moves._edge import FLANK, add_slice
-from chipload.engagement.moves._sweep import AIR, CORNER, RHO2, TA, TB, WIDE, Z2, from_track, profile, what_is
+from chipload.engagement.moves._sweep import AIR, from_track, profile, what_is
 from chipload.engagement.moves._uncounted_arrays import borrowed
 
 PI = math.pi
@@ -78,7 +78,7 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
 
     Parameters
     ----------
-    p : (3,) tip [mm]; T : (2,) unit vector of psi = 0; c : (12,) cutter
+    p : (3,) tip [mm]; T : (2,) unit vector of psi = 0; c : cutter
     end : of the front [rad]
     askew : whether the contact may change between the slices and the ends of the flank
     scratch : slices, see :func:`chipload.engagement.moves._edge.add_slice`
@@ -88,12 +88,14 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
         ``SEARCHES`` more than there are slices, and as many samples behind them
     """
     index = borrowed(index)
-    p, T, c, scratch, spans, held = borrowed((p, T, c, scratch, spans, held))
+    p, T, scratch, spans, held = borrowed((p, T, scratch, spans, held))
     sk = scratch[first, 4]
     ck = scratch[first, 5]
     apart = 2.5 * min(index[0][2], index[0][3])
-    along = c[CORNER] * (0.5 * PI - math.atan(c[TB]) - math.atan(c[TA]))
-    near = BESIDE * c[WIDE]
+    # the flank is the last line of the profile
+    line = c.count - 1
+    along = c.s[line]
+    near = BESIDE * c.wide
     made = 0
     used = 0
     searches = 0
@@ -129,7 +131,7 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
                 at_top = False
             else:
                 break
-            rho = c[RHO2] + (z - c[Z2]) * c[TB]
+            rho = c.rho[line] + (z - c.z[line]) * c.run[line]
             a = max(scratch[at, 9], -end)
             b = min(scratch[at, 10], end)
             found = 0
@@ -168,7 +170,8 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
             if at != own and scratch[at, FLANK] > 0.0:
                 guess = scratch[at, 3]
             else:
-                guess = floor_between(p, T, c[RHO2] + (z - c[Z2]) * c[TB], z, spans, begin, many, start, found, index)
+                rho = c.rho[line] + (z - c.z[line]) * c.run[line]
+                guess = floor_between(p, T, rho, z, spans, begin, many, start, found, index)
             if below + 0.1 * near < guess - near < z:
                 ask = guess - near
             elif below < guess + near < z - 0.1 * near:
@@ -194,9 +197,11 @@ def add_part(c, along, sk, ck, low, high, begin, many, made, held):
     if many == 0 or high <= low:
         return made
     z = 0.5 * (low + high)
-    rho = c[RHO2] + (z - c[Z2]) * c[TB]
+    line = c.count - 1
+    foot = c.z[line]
+    rho = c.rho[line] + (z - foot) * c.run[line]
     add_slice(
-        held, made, along + (low - c[Z2]) / sk, along + (high - c[Z2]) / sk, rho, low, sk, ck, z, float(begin),
+        held, made, along + (low - foot) / sk, along + (high - foot) / sk, rho, low, sk, ck, z, float(begin),
         float(many),
     )  # fmt: skip
     return made + 1

@@ -13,7 +13,7 @@ import math
 
 from numba import njit, types
 
-from chipload.engagement.moves._sweep import CORNER, TA, TB, E, F
+from chipload.engagement.moves._sweep import CUTTERS
 
 #: by how much a border may run over a part [rad], and most parts of a slice
 SKEW, PARTS = 0.06, 3
@@ -29,6 +29,16 @@ _F1, _F2, _I1 = types.float64[::1], types.float64[:, ::1], types.int64[::1]
 def alone(piece, first, last, r):
     """Whether no other row of first .. last is of the slice of row r."""
     return (r == first or piece[r - 1] != piece[r]) and (r + 1 == last or piece[r + 1] != piece[r])
+
+
+@njit(cache=True, nogil=True)
+def arc_of(c, s0, s1):
+    """The arc of a cutter on which a slice from s0 to s1 lies; -1: none."""
+    for i in range(c.count):
+        end = c.s[i] + c.radius[i] * (c.kappa_to[i] - c.kappa[i])
+        if c.radius[i] > 0.0 and s0 > c.s[i] - SAME and s1 < end + SAME:
+            return i
+    return -1
 
 
 @njit(cache=True, nogil=True)
@@ -63,28 +73,29 @@ def add_slice(table, k, s0, rho, z, sk, ck, lead):
     table[k, 2] = z
     table[k, 3] = sk
     table[k, 4] = ck
-    table[k, 5] = lead * z
+    # an arc on the bottom begins at 0 but for rounding
+    table[k, 5] = lead * max(z, 0.0)
     table[k, 6] = lead * sk
 
 
 @njit(
-    types.int64(_I1, _I1, _F2, _I1, _F2, _F1, types.float64, _F1, _F1, _F1, _I1, _F2, _I1, _F2), cache=True, nogil=True
+    types.int64(_I1, _I1, _F2, _I1, _F2, CUTTERS, types.float64, _F1, _F1, _F1, _I1, _F2, _I1, _F2),
+    cache=True,
+    nogil=True,
 )
-def tooth_rows(entries, start, span, piece, slices, c, lead, hand, across, rise, begin, rows, rows_of, table):
+def tooth_rows(entries, start, span, piece, slices, cutters, lead, hand, across, rise, begin, rows, rows_of, table):
     """Rows of the tooth engagement of some entries, and the slice of each; their number.
 
     Parameters
     ----------
     start, span, piece, slices : of :class:`chipload.engagement.moves.stock.Engaged`, of which ``entries`` are some
-    c, lead : row of the cutter, and lag of its edge [rad/mm]
+    cutters, lead : (1,) the cutter, and lag of its edge [rad/mm]
     hand, across, rise : of each entry the sense of the spindle, motion a tooth in the plan and along the axis [mm]
     begin : (m + 2,) filled: row at which each entry begins, and the number of slices
     rows, rows_of, table : filled: rows and slices of :class:`chipload.engagement.tooth_engagement.ToothEngagement`;
         room for ``PARTS`` of every row; the slices of the parts follow those of ``slices``
     """
-    corner = c[CORNER]
-    alpha = math.atan(c[TA])
-    corner_end = corner * (0.5 * PI - math.atan(c[TB]) - alpha) + SAME
+    c = cutters[0]
     for k in range(len(slices)):
         add_slice(table, k, slices[k, 0], slices[k, 2], slices[k, 3], slices[k, 4], slices[k, 5], lead)
     count = 0
@@ -102,7 +113,8 @@ def tooth_rows(entries, start, span, piece, slices, c, lead, hand, across, rise,
             # by how much the borders run over the slice
             skew_a = 0.0
             skew_b = 0.0
-            if corner > 0.0 and s0 > -SAME and s1 < corner_end and alone(piece, first, last, r):
+            bow = arc_of(c, s0, s1)
+            if bow >= 0 and alone(piece, first, last, r):
                 whole = 0.0
                 low = r
                 high = r
@@ -125,7 +137,7 @@ def tooth_rows(entries, start, span, piece, slices, c, lead, hand, across, rise,
             for j in range(parts):
                 t0 = s0 + (s1 - s0) * j / parts
                 t1 = s0 + (s1 - s0) * (j + 1) / parts if j + 1 < parts else s1
-                kappa = alpha + 0.5 * (t0 + t1) / corner
+                kappa = c.kappa[bow] + (0.5 * (t0 + t1) - c.s[bow]) / c.radius[bow]
                 sk = math.sin(kappa)
                 ck = math.cos(kappa)
                 own = leading_end(across[i], rise[i], sk, ck)
@@ -137,8 +149,9 @@ def tooth_rows(entries, start, span, piece, slices, c, lead, hand, across, rise,
                 add_row(rows, count, low_psi, high_psi, t0, t1, sk, ck, hand[i], across[i], rise[i])
                 rows_of[count] = made
                 add_slice(
-                    table, made, t0, c[E] + corner * sk, c[F] - corner * math.cos(alpha + t0 / corner), sk, ck, lead
-                )
+                    table, made, t0, c.e[bow] + c.radius[bow] * sk,
+                    c.f[bow] - c.radius[bow] * math.cos(c.kappa[bow] + (t0 - c.s[bow]) / c.radius[bow]), sk, ck, lead,
+                )  # fmt: skip
                 count += 1
                 made += 1
     begin[len(entries)] = count

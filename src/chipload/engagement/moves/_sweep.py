@@ -1,8 +1,8 @@
 """Compiled loops of swept volumes and of the index of moves; arrays and scalars only.
 
 Notation: a move is a row (x, y, z, ux, uy, uz) of the tip at its start and of what it goes [mm], in the index followed
-by 1 / (ux^2 + uy^2) and 1 / (ux^2 + uy^2 + uz^2), 0 where it does not go; a cutter is a row of
-:func:`chipload.engagement.moves.stock.cutter_row`; g(rho) [mm] is the height of the cutter's surface above its tip at
+by 1 / (ux^2 + uy^2) and 1 / (ux^2 + uy^2 + uz^2), 0 where it does not go; a cutter is a record of
+:mod:`chipload.cutter.record`; g(rho) [mm] is the height of the cutter's surface above its tip at
 the distance rho from its axis. The axis stands along z. With d(t) the distance of a point (x, y, z) from the axis and
 w(t) its height above the tip at the time t, the point was swept if F(t) = g(d(t)) - w(t) is below 0 somewhere in 0..1;
 g rises and is convex, so that F is convex. A cell of the index is a square of the plan: above ``ceil`` is air, from
@@ -15,14 +15,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+from numba import from_dtype, njit
+
+from chipload.cutter.record import BALL, CUTTER, FLAT
 
 #: tolerance within which a point counts as swept [mm]: a second pass along the same path removes nothing
 EPS = 1e-8
-#: columns of a cutter: kind, corner radius r, e, f, tan(alpha), tan(beta), end of bottom (rho, z), end of corner
-#: (rho, z), greatest radius, flute length
-KIND, CORNER, E, F, TA, TB, RHO1, Z1, RHO2, Z2, WIDE, FLUTE = range(12)
-BALL, FLAT = 0.0, 1.0
+#: type of a cutter, and of an array of them
+ONE_CUTTER = from_dtype(CUTTER)
+CUTTERS = ONE_CUTTER[::1]
 #: results for a point that no move swept: in material, in air
 MATERIAL, AIR = -2, -1
 #: a list is thinned when it is longer by this than twice its length after it was last thinned
@@ -36,25 +37,26 @@ _F2, _I2 = "float64[:,::1]", "int64[:,::1]"
 @njit(cache=True, nogil=True)
 def profile(c, rho):
     """g(rho): height of the cutter's surface above its tip; infinite beyond its greatest radius."""
-    if rho <= c[RHO1]:
-        return rho * c[TA]
-    if rho <= c[RHO2]:
-        gap = c[CORNER] * c[CORNER] - (rho - c[E]) ** 2
-        return c[F] - (math.sqrt(gap) if gap > 0.0 else 0.0)
-    if rho <= c[WIDE] and c[TB] > 0.0:
-        return c[Z2] + (rho - c[RHO2]) / c[TB]
+    for i in range(c.count):
+        if rho <= c.rho_to[i]:
+            if c.line[i] > 0:
+                return c.z[i] + (rho - c.rho[i]) * c.rise[i]
+            gap = c.radius[i] * c.radius[i] - (rho - c.e[i]) ** 2
+            return c.f[i] - (math.sqrt(gap) if gap > 0.0 else 0.0)
     return math.inf
 
 
 @njit(cache=True, nogil=True)
 def slope(c, rho):
     """g'(rho); infinite where the surface is upright."""
-    if rho <= c[RHO1]:
-        return c[TA]
-    if rho < c[RHO2]:
-        gap = c[CORNER] * c[CORNER] - (rho - c[E]) ** 2
-        return (rho - c[E]) / math.sqrt(gap) if gap > 0.0 else math.inf
-    return 1.0 / c[TB] if c[TB] > 0.0 else math.inf
+    for i in range(c.count):
+        if c.line[i] > 0:
+            if rho <= c.rho_to[i]:
+                return c.rise[i]
+        elif rho < c.rho_to[i]:
+            gap = c.radius[i] * c.radius[i] - (rho - c.e[i]) ** 2
+            return (rho - c.e[i]) / math.sqrt(gap) if gap > 0.0 else math.inf
+    return math.inf
 
 
 @njit(cache=True, nogil=True)
@@ -134,11 +136,12 @@ def radius_at(c, w):
     """Greatest distance of the cutter from its axis at the height w above its tip; below 0 where there is none."""
     if w <= 0.0:
         return -1.0
-    if w < c[Z1]:
-        return w / c[TA]
-    if w < c[Z2]:
-        return c[E] + math.sqrt(max(c[CORNER] ** 2 - (c[F] - w) ** 2, 0.0))
-    return min(c[RHO2] + (w - c[Z2]) * c[TB], c[WIDE]) if c[TB] > 0.0 else c[WIDE]
+    for i in range(c.count):
+        if w < c.z_to[i]:
+            if c.line[i] > 0:
+                return c.rho[i] + (w - c.z[i]) * c.run[i]
+            return c.e[i] + math.sqrt(max(c.radius[i] ** 2 - (c.f[i] - w) ** 2, 0.0))
+    return c.wide
 
 
 @njit(cache=True, nogil=True)
@@ -149,7 +152,7 @@ def section(m, c, z):
     uz = m[5]
     w = z - m[2] + EPS
     level = uz == 0.0 or (m[3] == 0.0 and m[4] == 0.0)
-    if c[KIND] == BALL or not (level or c[KIND] == FLAT):
+    if c.kind == BALL or not (level or c.kind == FLAT):
         return 0.0, 1.0, -1.0, False
     if level:
         r = radius_at(c, w - min(uz, 0.0))
@@ -164,7 +167,7 @@ def section(m, c, z):
         if w <= uz:
             return 0.0, 1.0, -1.0, True
         first = max(w / uz, 0.0)
-    return first, last, (c[WIDE] + EPS) ** 2, True
+    return first, last, (c.wide + EPS) ** 2, True
 
 
 @njit(cache=True, nogil=True)
@@ -180,9 +183,9 @@ def from_track(m, first, last, x, y):
 
 @njit(cache=True, nogil=True)
 def swept(m, c, x, y, z):
-    """Whether the point (x, y, z) is in the volume that a move m (6,) of a cutter c (12,) sweeps."""
-    if c[KIND] == BALL:
-        return from_ball(m, c[CORNER], x, y, z) < (c[CORNER] + EPS) ** 2
+    """Whether the point (x, y, z) is in the volume that a move m (6,) of a cutter c sweeps."""
+    if c.kind == BALL:
+        return from_ball(m, c.radius[0], x, y, z) < (c.radius[0] + EPS) ** 2
     first, last, far2, disc = section(m, c, z)
     if disc:
         return far2 >= 0.0 and from_track(m, first, last, x, y) < far2
@@ -194,7 +197,7 @@ def swept(m, c, x, y, z):
     uz = m[5]
     h2 = ux * ux + uy * uy
     along = qx * ux + qy * uy
-    first, last = within(qx, qy, ux, uy, h2, along, c[WIDE] + EPS)
+    first, last = within(qx, qy, ux, uy, h2, along, c.wide + EPS)
     if first > last:
         return False
     return below(c, qx, qy, w + EPS, ux, uy, uz, h2, along, first, last)
@@ -211,7 +214,7 @@ def below(c, qx, qy, w, ux, uy, uz, h2, along, first, last):
     ends = (first, last)
     for i in range(2):
         t = ends[i]
-        rho = min(max(math.hypot(qx - t * ux, qy - t * uy) - EPS, 0.0), c[WIDE])
+        rho = min(max(math.hypot(qx - t * ux, qy - t * uy) - EPS, 0.0), c.wide)
         value[i] = profile(c, rho) - w + t * uz
         if value[i] < 0.0:
             return True
@@ -230,7 +233,7 @@ def below(c, qx, qy, w, ux, uy, uz, h2, along, first, last):
                 t = 0.5 * (first + last)
         if not first < t < last:
             return False
-        rho = min(max(math.hypot(qx - t * ux, qy - t * uy) - EPS, 0.0), c[WIDE])
+        rho = min(max(math.hypot(qx - t * ux, qy - t * uy) - EPS, 0.0), c.wide)
         v = profile(c, rho) - w + t * uz
         if v < 0.0:
             return True
@@ -299,8 +302,8 @@ def swept_by(e, x, y, z, index):
     of = index[7]
     cutters = index[8]
     k = of[e]
-    if cutters[k, KIND] == BALL:
-        r = cutters[k, CORNER]
+    if cutters[k].kind == BALL:
+        r = cutters[k].radius[0]
         return off_ball(moves, e, r, x, y, z) < (r + EPS) * (r + EPS)
     return swept(moves[e], cutters[k], x, y, z)
 
@@ -321,7 +324,7 @@ def what_is(x, y, z, index, hint):
     ``index`` is a tuple: grid (6,) corner and sides of the cells in the plan [mm], height from which the reach counts
     [mm], steps per mm; shape (2,) number of cells; level (cells, 3) floor, ceil, base [mm]; list_at (cells, 4) begin,
     length and room of a cell's list, its length when last thinned; kept, reach (k,) moves of the lists, their least
-    heights in steps; moves (m, 8), cutter of each, cutters (c, 12); low, high, first, ids, faces: :func:`in_solid`.
+    heights in steps; moves (m, 8), cutter of each, cutters; low, high, first, ids, faces: :func:`in_solid`.
     """
     grid = index[0]
     level = index[2]
@@ -382,7 +385,7 @@ def keep(q, m, c, grid, shape, level, list_at, kept, reach, used):
     Parameters
     ----------
     q : number of the move
-    m : (8,) of the move; c : (12,) of its cutter
+    m : (8,) of the move; c : its cutter
     grid, shape, level, list_at, kept, reach : of the index, see :func:`what_is`
     used : (1,) room taken of ``kept`` and ``reach``
     """
@@ -394,7 +397,7 @@ def keep(q, m, c, grid, shape, level, list_at, kept, reach, used):
     uz = m[5]
     h2 = ux * ux + uy * uy
     length = math.sqrt(h2)
-    wide = c[WIDE]
+    wide = c.wide
     far = wide + half
     lowest = m[2] + min(uz, 0.0)
     j0 = max(0, math.floor((m[1] + min(uy, 0.0) - wide - grid[1]) / gy))

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon
 
 from chipload.cutter.cutter import Cutter
+from chipload.cutter.record import cutter_record
 from chipload.engagement.moves.net import area_of, nodes_of, rings
 from chipload.lazy import LateModule
 
@@ -45,29 +46,6 @@ INSTANT = 0.25
 #: instants of a step that is evaluated once and does not cut as the one before it, and of one that enters or leaves;
 #: of longer steps, of each of their parts
 MORE = (3, 25)
-
-
-def cutter_row(cutter: Cutter) -> Floats:
-    """(12,) kind, r, e, f, tan(alpha), tan(beta), rho and z at the end of the bottom and of the corner, greatest radius
-    and the flute length.
-
-    >>> cutter_row(Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, corner_radius=1.0)).round(9).tolist()
-    [2.0, 1.0, 4.0, 1.0, 0.0, 0.0, 4.0, 0.0, 5.0, 1.0, 5.0, 20.0]
-    """
-    _, r, e, f, alpha, beta, height = cutter.apt
-    tiny = 1e-9 * cutter.diameter
-    kind = 2.0
-    if alpha == 0.0 and beta == 0.0:
-        kind = 0.0 if e <= tiny else (1.0 if r <= tiny else 2.0)
-    if kind == 0.0:
-        r, e, f = cutter.radius, 0.0, cutter.radius
-    end, out = e + r * math.sin(alpha), e + r * math.cos(beta)
-    if beta == 0.0:
-        out = cutter.radius
-    wide = max(float(cutter.radius_at([height])[0]), out) if beta > 0.0 else out
-    heights = (f - r * math.cos(alpha), f - r * math.sin(beta))
-    row = [kind, r, e, f, math.tan(alpha), math.tan(beta), end, heights[0], out, heights[1], wide, height]
-    return np.array(row)
 
 
 @lru_cache(64)
@@ -100,20 +78,26 @@ def work_room(grid: Floats, cutters: Floats, pieces: int, flank: Floats) -> tupl
     """
     cells, most, samples = 0, 0, 0
     for c, longest in zip(cutters, flank, strict=True):
-        cells = max(cells, (int(2.0 * c[_sweep.WIDE] / grid[2]) + 3) * (int(2.0 * c[_sweep.WIDE] / grid[3]) + 3))
-        sk = math.cos(math.atan(c[_sweep.TB]))
-        most = max(
-            most, (3 + 2 * edge.DOWN) * pieces + 2 * front.LEVELS + edge.ROUND + int(c[_sweep.FLUTE] / sk / longest) + 4
-        )
-        samples = max(
-            samples, int(math.tau / min(min(grid[2], grid[3]) / c[_sweep.WIDE], circle.APART)) + 4 + circle.FEWEST
-        )
+        wide, count = float(c["wide"]), int(c["count"])
+        cells = max(cells, (int(2.0 * wide / grid[2]) + 3) * (int(2.0 * wide / grid[3]) + 3))
+        # of the flanks, lines or arcs, along the profile, and of all else
+        length = float(np.hypot(c["rho_to"] - c["rho"], c["z_to"] - c["z"])[:count].sum())
+        each = (1 + 2 * edge.DOWN + 2 * count) * pieces + 2 * front.LEVELS + count * edge.ROUND
+        most = max(most, each + int(1.6 * length / longest) + 4)
+        samples = max(samples, int(math.tau / min(min(grid[2], grid[3]) / wide, circle.APART)) + 4 + circle.FEWEST)
     spans = (most + flanks.SEARCHES) * (samples + 1)
     return (
         np.empty((cells, 7)), np.empty(front.LEVELS), np.empty((most, 12)), np.empty((spans, 2)),
         np.empty(spans, np.int64), np.empty(spans, np.int64), np.array([0.0, 0.0, 0.0, 0.0]),
         np.empty(2, np.int64), np.empty((most + 2 * flanks.SEARCHES, 12)),
     )  # fmt: skip
+
+
+def side_radii(cutters: NDArray[np.void]) -> Floats:
+    """(n,) radius [mm] of each cutter where its last piece begins, for the net of an outline."""
+    last = cutters["count"] - 1
+    radii = cutters["rho"][np.arange(len(cutters)), last]
+    return np.where(cutters["line"][np.arange(len(cutters)), last] > 0, radii, cutters["wide"])
 
 
 def longer(values: NDArray[Any], used: int, count: int) -> NDArray[Any]:
@@ -217,7 +201,8 @@ class MoveStock:
         self.low, self.high = np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
         self.table = dict(cutters)
         self.tools = {n: i for i, n in enumerate(sorted(cutters))}
-        self.cutters = np.array([cutter_row(cutters[n]) for n in self.tools])
+        self.cutters = np.concatenate([cutter_record(cutters[n]) for n in self.tools])
+        self.sides = side_radii(self.cutters)
         size = self.high - self.low
         self.radii = np.array([0.5 * cutters[n].resolved_diameter for n in self.tools])
         side = max(CELL * float(self.radii.min()), math.sqrt(size[0] * size[1] / CELLS))
@@ -390,7 +375,7 @@ class MoveStock:
         smallest cutter's circle unless the net would have more than ``NODES`` nodes. Corners are cut off by a chord.
         ``tolerance`` [mm]: by which the outline is made simpler.
         """
-        xs, ys = nodes_of(self.low, self.high, float(self.grid[2:4].min()), float(self.cutters[:, 8].min()), tolerance)
+        xs, ys = nodes_of(self.low, self.high, float(self.grid[2:4].min()), float(self.sides.min()), tolerance)
         inside, index = np.empty((len(xs), len(ys)), dtype=np.bool_), self._index()
         outline.marked(z, xs, ys, index, self.tops, inside)
         sides, first = rings(inside)

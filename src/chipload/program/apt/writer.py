@@ -83,7 +83,12 @@ def write_apt(
                 own = cutters[tool]
                 if own.flank_arc is not None and own.corner_radius > 0.0:
                     out.append(f"PPRINT/{_text(f'BARREL CUTTER, TIP RADIUS {_number(own.corner_radius)}')}")
-                out.append(cutter_statement(own))
+                if own.shape:
+                    out.append(
+                        f"PPRINT/{_text(f'CUTTER {tool} HAS NO SEVEN NUMBERS, DIAMETER {_number(own.diameter)}')}"
+                    )
+                else:
+                    out.append(cutter_statement(own))
             out.append(f"LOADTL/{tool}")
         if speeds[k] != spindle:
             spindle = speeds[k]

@@ -6,7 +6,6 @@ counted from the direction -z towards +rho.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,15 +71,14 @@ def cutting_part(cutter: Cutter) -> Body:
     if cutter.body:
         p = cutter.profile(0.0)
         return Body(np.hstack([p[:-1], p[1:]]), np.zeros((0, 5)), cutter.flute_length)
-    _, r, e, f, alpha, beta, h = cutter.apt
-    foot = (e + r * math.sin(alpha), f - r * math.cos(alpha))
-    arcs = [(e, f, r, alpha, cutter.corner_end)] if r > 0.0 else []
-    low, bow = f - r * math.sin(beta), cutter.flank_arc
-    if bow is not None:
-        low = min(bow.z_to, h)
-        arcs.append((bow.e, bow.f, bow.radius, bow.kappa_from, bow.kappa_at(low)))
-    lines = [[0.0, 0.0, *foot], [float(cutter.radius_at(low)), low, float(cutter.radius_at(h)), h]]
-    return Body(np.array(lines), np.array(arcs, dtype=np.float64).reshape(-1, 5), h)
+    arcs = [(*segment.centre, segment.radius, *segment.kappa) for segment in cutter.segments if segment.radius > 0.0]
+    lines = [
+        (segment.rho[0], segment.z[0], segment.rho[1], segment.z[1]) for segment in cutter.segments if segment.straight
+    ]
+    end = cutter.segments[-1]
+    if cutter.undercut:
+        lines.append((0.5 * (cutter.shank_diameter or 0.0), end.z[1], end.rho[1], end.z[1]))
+    return Body(np.array(lines).reshape(-1, 4), np.array(arcs, dtype=np.float64).reshape(-1, 5), end.z[1])
 
 
 def above_cutting(cutter: Cutter) -> Body:

@@ -1,0 +1,139 @@
+"""Lens, lollipop and dovetail cutters by moves: volumes and forces against profiles in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from chipload.cutter.cutter import Cutter
+from chipload.cutter.shapes import dovetail, lens, lollipop
+from chipload.cutter.table import cutter_from_table
+from chipload.cutting.material import Material
+from chipload.errors import InputError
+from chipload.program.build import plunge, rapid
+from chipload.program.program import Program
+from chipload.simulation.chips import remove
+from chipload.simulation.removal import Removal, Resolution
+from chipload.stock.earlier_moves import EarlierMoves
+from chipload.stock.layers import LayeredStock
+from simulation.discs import mean_loads_of_discs
+
+Floats = NDArray[np.float64]
+
+PLAIN = Material("plain", 800.0, 250.0, 150.0, 12.0, 9.0, 4.0, source="made up")
+FINE = Resolution(step_mm=2.0, tolerance=1e-4, corner_slices=40, flank_mm=0.25)
+D, NECK, TIP, CORNER, ANGLE = 12.0, 5.0, 30.0, 1.5, math.radians(55.0)
+TOPS = {"lens": 10.0, "lollipop": 6.0 + math.sqrt(6.0**2 - 2.5**2), "dovetail": 5.0}
+SHAPES = {
+    "lens": lens(D, TIP, CORNER, TOPS["lens"]),
+    "lollipop": lollipop(D, NECK),
+    "dovetail": dovetail(D, ANGLE, 0.0, TOPS["dovetail"]),
+}
+SHANKS = {"lens": D, "lollipop": NECK, "dovetail": 4.0}
+CUTTERS = {n: Cutter(D, 3, 0.5, TOPS[n], 50.0, 6e5, shape=s, shank_diameter=SHANKS[n]) for n, s in SHAPES.items()}
+REST = 4.0  # distance of the stock's edge from the cutter's axis [mm]
+
+
+def radii(name: str, z: Floats) -> Floats:
+    """Closed forms of the profiles, without their pieces."""
+    if name == "dovetail":
+        return 0.5 * D - z / math.tan(ANGLE)
+    if name == "lollipop":
+        return np.sqrt(np.maximum(6.0**2 - (z - 6.0) ** 2, 0.0))
+    e = 0.5 * D - CORNER
+    f = TIP - math.sqrt((TIP - CORNER) ** 2 - e**2)
+    # both circles touch on the line through their centres
+    touch = TIP - TIP * (TIP - f) / (TIP - CORNER)
+    tip = np.sqrt(np.maximum(TIP**2 - (TIP - z) ** 2, 0.0))
+    corner = e + np.sqrt(np.maximum(CORNER**2 - np.minimum(z - f, 0.0) ** 2, 0.0))
+    return np.where(z < touch, tip, corner)
+
+
+def along(name: str, rest: float = REST, feed: float = 20.0, above: float = 0.0) -> Removal:
+    """A pass along x beside an edge of the stock, whose top is ``above`` the end of the teeth."""
+    deep = TOPS[name]
+    points = [-10.0, rest, -deep], [40.0, rest, -deep]
+    program = Program.join([rapid(points[0], 300.0, 1, "link"), plunge(points[1], feed, 300.0, 1, "cut")])
+    stock = LayeredStock.block((0.0, -20.0, -deep), (30.0, 0.0, above), 0.5, 30.0)
+    return remove(program, stock, {1: CUTTERS[name]}, PLAIN, FINE, accuracy=False)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_wall_takes_the_volume_under_the_profile(name: str) -> None:
+    found, deep = along(name), TOPS[name]
+    z = (np.arange(40_000) + 0.5) * (deep / 40_000)
+    area = np.maximum(radii(name, z) - REST, 0.0).mean() * deep
+    assert area > 1.0
+    assert found.findings == ()
+    volume = found.columns["chip_volume_mm3"]
+    # where it enters and leaves it is known to the instants of a step
+    assert volume.sum() == pytest.approx(30.0 * area, rel=2e-3 if name == "lens" else 4e-3)
+    k = int(np.flatnonzero(np.abs(found.columns["x_mm"] - 15.0) < 1.1)[0])
+    step = float(found.columns["x_mm"][k] - found.columns["x_mm"][k - 1])
+    assert volume[k] == pytest.approx(step * area, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_forces_are_those_of_a_fine_stack_of_discs(name: str) -> None:
+    found, deep = along(name, feed=1.0).columns, TOPS[name]
+    k = int(np.flatnonzero(np.abs(found["x_mm"] - 15.0) < 1.1)[0])
+    expected = mean_loads_of_discs(radii(name, np.linspace(0.0, deep, 8001)), deep, REST, CUTTERS[name], 1.0, PLAIN)
+    for key, value in expected.items():
+        assert abs(value) > 0.01
+        assert found[key][k] == pytest.approx(value, rel=6e-3), key
+
+
+def test_the_neck_of_an_undercut_cutter_must_be_free() -> None:
+    """It goes 4 mm beside the edge; a neck of 5 mm does not touch, one that goes through the stock does."""
+    assert along("lollipop", rest=4.0, above=3.0).findings == ()
+    with pytest.raises(InputError, match="material stands above the flutes of tool 1"):
+        along("lollipop", rest=2.0, above=3.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"diameter": 11.0}, "cutter.diameter_mm = 11: must be 12, as of its shape"),
+        ({"flute_length": 4.0}, "cutter.flute_length_mm = 4: must be 5, as of its shape"),
+        ({"shank_diameter": 6.0}, r"cutter.shank_diameter_mm = 6: must be above 0 and at most 4.99792, as wide as"),
+        ({"taper": 0.1}, "cutter.shape: it has its own corner"),
+    ],
+)
+def test_numbers_beside_a_shape_must_agree_with_it(given: dict[str, float], says: str) -> None:
+    own = {"diameter": D, "flute_length": 5.0, "shank_diameter": 4.0} | given
+    with pytest.raises(InputError, match=says):
+        Cutter(flutes=3, helix=0.5, overhang=50.0, modulus=6e5, shape=SHAPES["dovetail"], **own)
+
+
+@pytest.mark.parametrize("name", ["lens", "dovetail"])
+def test_a_stock_keeps_the_shape_of_the_cutter_that_cut_it(name: str) -> None:
+    """The same pass again finds nothing, also from a saved stock."""
+    deep = TOPS[name]
+    points = [-10.0, REST, -deep], [40.0, REST, -deep]
+    program = Program.join([rapid(points[0], 300.0, 1, "link"), plunge(points[1], 20.0, 300.0, 1, "cut")])
+    stock = LayeredStock.block((0.0, -20.0, -deep), (30.0, 0.0, 0.0), 0.5, 30.0)
+    remove(program, stock, {1: CUTTERS[name]}, PLAIN, FINE, accuracy=False)
+    assert stock.earlier is not None
+    arrays = {k: v.copy() for k, v in stock.earlier.arrays().items()}
+    stock.earlier = EarlierMoves.from_arrays(arrays)
+    again = remove(program, stock, {1: CUTTERS[name]}, PLAIN, FINE, accuracy=False)
+    assert float(again.columns["chip_volume_mm3"].sum()) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [
+        ("lens", {"shape": "lens", "tip_radius_mm": TIP, "corner_radius_mm": CORNER, "flute_length_mm": 10.0}),
+        ("lollipop", {"shape": "lollipop", "shank_diameter_mm": NECK}),
+        ("dovetail", {"shape": "dovetail", "flank_deg": 55.0, "flute_length_mm": 5.0, "shank_diameter_mm": 4.0}),
+    ],
+)
+def test_a_job_states_a_shape_by_its_numbers(name: str, keys: dict[str, object]) -> None:
+    plain = {"number": 1, "diameter_mm": D, "flutes": 3, "helix_deg": 30.0, "overhang_mm": 50.0, "modulus_gpa": 600.0}
+    assert cutter_from_table(plain | keys).shape == SHAPES[name]
+    missing = {"lens": "tip_radius_mm", "lollipop": "shank_diameter_mm", "dovetail": "flank_deg"}[name]
+    with pytest.raises(InputError, match=f"cutter.{missing} is missing"):
+        cutter_from_table({"flute_length_mm": 5.0} | plain | {k: v for k, v in keys.items() if k != missing})
