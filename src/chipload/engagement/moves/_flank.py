@@ -95,7 +95,6 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
     # the flank is the last line of the profile
     line = c.count - 1
     along = c.s[line]
-    near = BESIDE * c.wide
     made = 0
     used = 0
     searches = 0
@@ -104,7 +103,8 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
     k = first
     low = scratch[first, 3]
     high = 2.0 * scratch[last - 1, 6] - scratch[last - 1, 3]
-    # near the ends of the flank
+    # near the ends of the flank, within it where it is thinner
+    near = min(BESIDE * c.wide, 0.25 * (high - low))
     ask = low + near if askew else math.inf
     at_top = askew
     below = -1.0
