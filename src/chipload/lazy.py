@@ -16,6 +16,7 @@ from chipload.errors import InputError
 EXTRAS: Mapping[str, tuple[str, str]] = {
     "cad": ("OCP", "reading STEP files"),
     "mcp": ("mcp", "the server of the Model Context Protocol"),
+    "opcua": ("asyncua", "a log from an OPC UA server"),
     "web": ("nicegui", "the page in the browser"),
     "notebook": ("pandas", "a table of pandas or a dataset of xarray"),
     "cluster": ("distributed", "a sweep on a Dask cluster"),

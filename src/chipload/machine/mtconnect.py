@@ -12,9 +12,7 @@ machine's file holds such keys as comments, and it is refused until they are fil
 
 from __future__ import annotations
 
-import csv
 import http.client
-import io
 import math
 import time
 import urllib.error
@@ -27,6 +25,7 @@ from xml.etree import ElementTree
 
 from chipload.errors import Finding, InputError
 from chipload.files import read_regular
+from chipload.machine.spindle_samples import Sample, log_text
 
 Element = ElementTree.Element
 
@@ -229,36 +228,20 @@ def samples(source: str, device: str | None = None, component: str | None = None
     A row is written where the current (or the power) is reported; the other columns have their last value. Rows with
     a column that is not yet known or is unavailable are omitted, with a finding ``mtconnect-unavailable``.
     """
-    found = sorted(_events(source, device, component))
+    found = list(_events(source, device, component))
     if not found:
         raise InputError(f"MTConnect {source}: no sample of a spindle: its speed and its current or power are needed")
-    known = [c for c in COLUMNS if any(e[2] == c and e[3] is not None for e in found)]
+    known = {column for _, _, column, value in found if value is not None}
     load = next((c for c in ("current_a", "power_w") if c in known), None)
     if load is None or "speed_rpm" not in known:
         missing = "speed (RotaryVelocity)" if load is not None else "current (Amperage) or power (Wattage)"
         raise InputError(f"MTConnect {source}: no sample of the spindle's {missing}: add it to the agent's device file")
-    out = io.StringIO()
-    rows = csv.writer(out, lineterminator="\n")
-    rows.writerow(["time_s", *known])
-    last: dict[str, float | None] = {}
-    first, omitted, written = found[0][0], 0, -math.inf
-    for at, _, column, value in found:
-        last[column] = value
-        if column != load:
-            continue
-        values = [last.get(c) for c in known]
-        if any(v is None for v in values) or at <= written:
-            omitted += 1
-            continue
-        written = at
-        rows.writerow([f"{at - first:.6f}", *(f"{v:.9g}" for v in values if v is not None)])
-    if written == -math.inf:
-        raise InputError(f"MTConnect {source}: at no time are {', '.join(known)} known together")
+    log, omitted = log_text(found, COLUMNS, f"MTConnect {source}")
     text = f"{omitted} samples are left out: a column is not yet known or unavailable, or time does not rise"
-    return out.getvalue(), [Finding("mtconnect-unavailable", 0, text)] if omitted else []
+    return log, [Finding("mtconnect-unavailable", 0, text)] if omitted else []
 
 
-def _events(source: str, device: str | None, component: str | None) -> Iterator[tuple[float, int, str, float | None]]:
+def _events(source: str, device: str | None, component: str | None) -> Iterator[Sample]:
     """Time [s], sequence, column and value of each sample of the spindle and of the path."""
     spindles: set[str] = set()
     for root in _answers(source):
