@@ -39,7 +39,7 @@ def plans(impeller, cutters, stated, tables=(55.0,), share=0.9):
 
 def test_nothing_above_the_cutting_part_touches_the_uncut_blank(impeller):
     (plan,) = plans(impeller, (SHORT,), SHORT)
-    blank = TriDexel.of_mesh(blank_of(impeller, 0, HOW, 0.0), 2.5)
+    blank = TriDexel.of_mesh(blank_of(impeller, [0], HOW, 0.0), 2.5)
     volume = blank.volume()
     # as laid out beside the walls the holder meets what earlier rows left: such rows are left out
     assert taken_from(copy.deepcopy(blank), plan.program, SHORT, 2.5).above.max() > 20.0
@@ -48,7 +48,7 @@ def test_nothing_above_the_cutting_part_touches_the_uncut_blank(impeller):
     assert len(safe.stopped) + len(safe.tracks.tracks) == len(plan.tracks.tracks)
     assert len(safe.machined) > 4
     # counted again, on a blank of its own
-    again = taken_from(blank_of(impeller, 0, HOW, 0.0), safe.program, SHORT, 2.5)
+    again = taken_from(blank_of(impeller, [0], HOW, 0.0), safe.program, SHORT, 2.5)
     assert again.above.max() <= 1.0
     assert again.rapid.max() == 0.0
     # but for the pieces in which the text turns an axis

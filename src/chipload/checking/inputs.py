@@ -84,6 +84,8 @@ class CheckInputs:
     surroundings : part and fixtures
     elasticity : what bends or vibrates
     speeds_rpm : least and greatest spindle speed that is searched for quiet speeds; None: that of the machine
+    loads : whether the teeth and the material are those of the job; False: they stand for ones that are not stated, and
+        only the removal and what it depends on is calculated
     """
 
     cutters: Mapping[int, Cutter]
@@ -96,6 +98,7 @@ class CheckInputs:
     surroundings: Surroundings = field(default_factory=Surroundings)
     elasticity: Elasticity = field(default_factory=Elasticity)
     speeds_rpm: tuple[float | None, float | None] = (None, None)
+    loads: bool = True
 
     def __post_init__(self) -> None:
         """Refuse values of another kind, and values that contradict one another."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from chipload.checking.clamped import require_clamped
 from chipload.checking.default_checks import DefaultChecks, default_checks
 from chipload.checking.inputs import CheckInputs
+from chipload.checking.program_sequence import ProgramSequence
 from chipload.checking.settings import SimulationSettings
 from chipload.checking.stiffness import Stiffness, stiffness_of
 from chipload.checking.workpiece import default_spacing, stock_points
@@ -60,7 +61,7 @@ class Bodies:
     steps: int
 
 
-def bodies_of(inputs: CheckInputs, reading: ProgramReading, stock: LayeredStock) -> Bodies:
+def bodies_of(inputs: CheckInputs, reading: ProgramReading | ProgramSequence, stock: LayeredStock) -> Bodies:
     """Prepare the inputs of a simulation and refuse those that it cannot use; check and run begin with it.
 
     Raises
@@ -117,7 +118,7 @@ def resolution_of(op: SimulationSettings, cutters: Mapping[int, Cutter], program
 
 
 def time_rows(
-    reading: ProgramReading,
+    reading: ProgramReading | ProgramSequence,
     cutters: Mapping[int, Cutter],
     machine: Machine,
     interpolation: Literal["slerp", "lerp"] = "slerp",
@@ -125,6 +126,8 @@ def time_rows(
     """Return the program from its first tool on and the time of each row; omitted rows count with the first row. Where
     its axis turns along straight lines, its rows are divided.
     """
+    if isinstance(reading, ProgramSequence):
+        return reading.program, reading.times
     program, times = with_tool(reading.program, cutters), times_of(reading, machine)
     first = len(times) - len(program)
     times = np.concatenate([[times[: first + 1].sum()], times[first + 1 :]])

@@ -17,6 +17,7 @@ from chipload.checking.leaning_stock import check_leaning_stock
 from chipload.checking.limits import GOUGE
 from chipload.checking.outcome import CollisionCheck, SimulationResult, StockCheck
 from chipload.checking.preparation import Bodies, bodies_of, resolution_of, time_rows
+from chipload.checking.program_sequence import ProgramSequence
 from chipload.checking.stability import stability_of, watch_of
 from chipload.checking.stiffness import deflection_watch, stiffness_of, watched_columns, with_columns
 from chipload.checking.stock_check import check_stock
@@ -47,8 +48,9 @@ from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.loads import Cuts
 from chipload.simulation.moves import leans
 from chipload.simulation.program_findings import ProgramSurroundings, program_findings
+from chipload.simulation.ramp import ramp_angle
 from chipload.simulation.remaining_stock import Inside
-from chipload.simulation.removal import Columns
+from chipload.simulation.removal import Columns, Watch
 from chipload.simulation.steps import StepBlocks
 from chipload.simulation.surface import Difference, collisions, difference, in_stock
 from chipload.stock.layers import LayeredStock
@@ -82,7 +84,7 @@ def _step_times(inputs: CheckInputs, program: Program, stock: LayeredStock) -> t
 
 def simulate_program(
     inputs: CheckInputs,
-    reading: ProgramReading,
+    reading: ProgramReading | ProgramSequence,
     stock: LayeredStock,
     *,
     compliance: WorkpieceCompliance | None = None,
@@ -94,7 +96,7 @@ def simulate_program(
 
     Parameters
     ----------
-    reading : the program on its machine
+    reading : the program on its machine, or programs that run one after the other
     stock : before the program; changes
     compliance : of the workpiece; None: not known yet
     checkpoint : folder with finished work, from which a stopped run continues; None: all stays in memory
@@ -118,7 +120,9 @@ def simulate_program(
     kept = KeptPasses(checkpoint, passes_key(inputs, bodies.program) if checkpoint is not None else "")
     steps = StepBlocks(program, op.step_mm, op.tolerance_mm)
     stock_check = replace(check_stock(inputs, bodies.program, stock, steps, kept, progress), blank=blank)
-    watches = [with_checks(inputs.checks, material, deflection_watch(gives, material))]
+    watches: list[Watch] = [with_checks(inputs.checks, material, deflection_watch(gives, material))]
+    if not inputs.loads:
+        watches = [lambda cuts: {"ramp_deg": ramp_angle(cuts)}]
 
     def pass_progress(share: float, what: str) -> Counted:
         return lambda done: progress(share + SHARE * done / bodies.steps, what)
@@ -131,7 +135,8 @@ def simulate_program(
     if made is not None:
         watches.append(form_error_watch(made, gives, material))
     stability_watch, recorder = watch_of(inputs, compliance), EngagementRecorder(material)
-    watches += [recorder] if stability_watch is None else [stability_watch, recorder]
+    watches += [] if stability_watch is None else [stability_watch]
+    watches += [recorder] if inputs.loads else []
 
     def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
         return {name: values for each in watches for name, values in each(cuts).items()}
@@ -140,7 +145,7 @@ def simulate_program(
     if checkpoint is None:
         removal = remove(
             program, stock, cutters, material, fine, watch=watch, times=times,
-            engine=op.engine, processes=workers or op.workers, progress=removing,
+            engine=op.engine, loads=inputs.loads, processes=workers or op.workers, progress=removing,
         )  # fmt: skip
     else:
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
@@ -153,7 +158,8 @@ def simulate_program(
                 None if stability_watch is None else stability_watch.dynamics,
             ),
         )  # fmt: skip
-    removal = with_columns(removal, (*watched_columns(gives, formed=made is not None), *PROGRAM_COLUMNS))
+    loads = (*watched_columns(gives, formed=made is not None), *PROGRAM_COLUMNS)
+    removal = with_columns(removal, loads if inputs.loads else ("ramp_deg",))
     if inputs.limits.thrust_n is not None or any(is_pointed(c) for c in cutters.values()):
         removal = with_drilling(removal, cutters, material)
     if inputs.limits.force_axial_n is not None:
@@ -202,7 +208,10 @@ def _findings_of(
 
 
 def program_surroundings(
-    inputs: CheckInputs, reading: ProgramReading, inside: Inside, box: tuple[NDArray[np.float64], NDArray[np.float64]]
+    inputs: CheckInputs,
+    reading: ProgramReading | ProgramSequence,
+    inside: Inside,
+    box: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> ProgramSurroundings:
     """Return what a program is run in; ``inside`` and ``box`` are of the initial stock."""
     bottom, meshes = float(box[0][2]), inputs.surroundings.fixture_meshes(inputs.machine)
@@ -264,7 +273,7 @@ def passes_key(inputs: CheckInputs, program: Program) -> str:
 
 
 def compliance_of_workpiece(
-    inputs: CheckInputs, reading: ProgramReading, stock: LayeredStock, progress: Progress = silent
+    inputs: CheckInputs, reading: ProgramReading | ProgramSequence, stock: LayeredStock, progress: Progress = silent
 ) -> WorkpieceCompliance | None:
     """Return the compliance of the workpiece where the program cuts it; None if no workpiece is stated."""
     workpiece, cutters, op = inputs.elasticity.workpiece, inputs.cutters, inputs.settings

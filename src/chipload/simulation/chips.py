@@ -49,7 +49,15 @@ from chipload.simulation.loads import (
     loads_of_steps,
     over_turn,
 )
-from chipload.simulation.moves import Engine, HandOver, MoveRun, remove_by_moves, run_by_moves, with_contact
+from chipload.simulation.moves import (
+    Engine,
+    HandOver,
+    MoveRun,
+    NotSimulated,
+    remove_by_moves,
+    run_by_moves,
+    with_contact,
+)
 from chipload.simulation.removal import (
     ChipAreas,
     Columns,
@@ -91,6 +99,7 @@ def remove(
     workers: int = 2,
     processes: int | Workers = 1,
     engine: Engine = "auto",
+    loads: bool = True,
     progress: Progress = silent,
 ) -> Removal:
     """Remove the cuts of a program from ``stock``, which changes, and calculate the loads of every step.
@@ -113,6 +122,7 @@ def remove(
         :class:`chipload.workers.Workers`, also of a cluster; the result does not depend on threads and processes
     engine : ``layers`` or ``moves``; ``auto``: by moves what goes by moves, see :mod:`chipload.simulation.moves`, and
         else the whole program by layers, with a finding ``handed-over``
+    loads : False: only what is removed is needed; moves then leave the loads 0
 
     Returns
     -------
@@ -141,7 +151,7 @@ def remove(
     count = count_steps(program, cutters, resolution)
     progress(0.0, "removing")
     setting = setting_of(cutters, material, resolution, watch, workers, processes)
-    setting, handed = with_engine(engine, setting, program, stock)
+    setting, handed = with_engine(engine, replace(setting, loads=loads), program, stock)
     before = stock.copied() if accuracy else None
     while True:
         begun = sums = RunningSums(stock.volume(), handed=handed)
@@ -227,7 +237,7 @@ def by_layers(
     try:
         require_upright(program, fine.step_mm, fine.tolerance, stock, setting.cutters)
     except InputError as err:
-        raise InputError(f"{place}: {found.why}, which is simulated by layers only, and {err}") from None
+        raise NotSimulated(f"{place}: {found.why}, which is simulated by layers only, and {err}", found) from None
     return replace(setting, moves=None), (found.line, found.why)
 
 
@@ -376,7 +386,7 @@ def _moved_block(
 ) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
     """:func:`remove_block` by moves."""
     found = remove_by_moves(
-        steps, run, sums.steps, setting.cutters, setting.material, setting.resolution.rotation, contact
+        steps, run, sums.steps, setting.cutters, setting.material, setting.resolution.rotation, contact, setting.loads
     )
     watched: dict[str, Floats] = dict(found.bands)
     if setting.watch is not None:

@@ -66,11 +66,22 @@ FILM = 4.0
 
 
 class HandOver(Exception):
-    """Error: the engine ``moves`` cannot simulate the program; with its line and the reason."""
+    """Error: the engine ``moves`` cannot simulate the program; with its line and the reason.
 
-    def __init__(self, line: int, why: str) -> None:
+    ``tool`` is the one above whose flutes material stands, where that is the reason; else 0.
+    """
+
+    def __init__(self, line: int, why: str, tool: int = 0) -> None:
         super().__init__(why)
-        self.line, self.why = line, why
+        self.line, self.why, self.tool = line, why, tool
+
+
+class NotSimulated(InputError):
+    """Error: neither moves nor layers can simulate the program; ``found`` is why moves cannot."""
+
+    def __init__(self, text: str, found: HandOver) -> None:
+        super().__init__(text)
+        self.found = found
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,8 +239,11 @@ def remove_by_moves(
     material: Material,
     rotation: float,
     found: Engaged | None = None,
+    with_loads: bool = True,
 ) -> Moved:
     """Return the removal of some steps; ``first`` is the number of the first, ``found`` their engagement if known.
+
+    Without loads those are 0.
 
     Raises
     ------
@@ -246,9 +260,10 @@ def remove_by_moves(
         raise HandOver(
             int(steps.line[k]),
             f"material stands above the flutes of tool {tool} ({cutters[tool].flute_length:g} mm)",
+            tool,
         )
     removed, loads, basis, cuts = np.zeros((n, 4)), np.zeros((n, len(LOADS))), np.zeros((4, 6)), list[Cuts]()
-    bands = {name: np.zeros(n) for name in BANDS} if material.has_band else {}
+    bands = {name: np.zeros(n) for name in BANDS} if material.has_band and with_loads else {}
     removed[:, 0] = np.bincount(found.step, found.volume / found.instants, n)
     np.maximum.at(removed[:, 1], found.step, found.areas)
     removed[:, 2] = _layers(found, run.layers, n)
@@ -261,6 +276,9 @@ def remove_by_moves(
         entries = feeding[steps.tool[found.step[feeding]] == number]
         cutter = cutters[number]
         plain = engagement_of(found, entries, steps, cutter)
+        if not with_loads:
+            cuts.append(_cuts(number, cutter, first, steps, found, entries, plain, np.zeros(len(entries))))
+            continue
         engagement = chips_of_teeth(plain, cutter)
         step = found.step[entries]
         left, spindle = _normals_left(found, entries), np.abs(steps.spindle[step])

@@ -180,7 +180,8 @@ def removal_between(whole: Removal, first: int, end: int) -> Removal:
 @dataclass(frozen=True, eq=False)
 class RunSettings:
     """What a run keeps to, step after step: see :func:`remove`; ``profiles`` are slices of the cutters;
-    ``moves`` the run by moves, None where it goes by layers; ``workers`` threads; ``processes`` have strips of layers.
+    ``moves`` the run by moves, None where it goes by layers; ``workers`` threads; ``processes`` have strips of layers;
+    ``loads`` False: moves leave the loads 0.
     """
 
     cutters: Mapping[int, Cutter]
@@ -191,6 +192,7 @@ class RunSettings:
     workers: int
     moves: MoveRun | None = None
     processes: Workers = field(default_factory=Workers)
+    loads: bool = True
 
 
 @dataclass(frozen=True, eq=False)

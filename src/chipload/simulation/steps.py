@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.program.motions import is_arc, lengths, radii, spans, straighten_arcs
+from chipload.program.path_mode import PathControl
 from chipload.program.program import DWELL, RAPID, Program
 
 Floats = NDArray[np.float64]
@@ -193,8 +194,9 @@ def _on_moves(program: Program, times: Floats) -> Floats:
 
 
 def moving_rows(program: Program) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the rows of a program that have steps."""
+    """Return a mask (n,) of the rows of a program that have steps; one from an unknown place has none."""
     moving = (program.motion != DWELL) & ((lengths(program) > 0.0) | (_angles(program) > 0.0))
+    moving &= np.asarray(program.path_mode)[:, 0] != PathControl.UNPLACED
     moving[:1] = False
     return np.asarray(moving)
 

@@ -120,6 +120,7 @@ def _program(name: str, p: Checked) -> dict[str, Any]:
         "path_mm": p.setting.length,
         "time_min": p.seconds / 60.0,
         "loads": _loads(p),
+        "removal": None if p.removal is None else p.removal.numbers(),
         "missed_mm": p.missed,
         "refused_lines": len(p.setting.linked.refused),
         "direct_links": p.setting.linked.direct,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints, NoFiveAxisPath
 from chipload.jobs.impeller.machine_check import MachineCheck
+from chipload.jobs.impeller.program_removal import ProgramRemoval
 from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.machine.machine import Machine
@@ -169,6 +170,7 @@ class Checked:
     read : the program as its text was read, which was checked
     between : from the end of one channel to the beginning of the next [s]
     repeat : how the text goes through all channels; None: it is of one channel
+    removal : from the stock that the programs before it leave; None: not simulated
     """
 
     setting: CutterSetting
@@ -179,6 +181,7 @@ class Checked:
     read: ReadProgram
     between: float
     repeat: Repeat | None
+    removal: ProgramRemoval | None = None
 
     @property
     def seconds(self) -> float:

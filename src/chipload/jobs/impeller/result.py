@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -28,6 +28,7 @@ from chipload.jobs.impeller.outcome import (
     unreached_text,
 )
 from chipload.jobs.impeller.paths import walls_of
+from chipload.jobs.impeller.program_removal import ProgramRemoval
 from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.jobs.impeller.tool_clearance import clearance_blocks
@@ -114,6 +115,7 @@ def _roughing(milled: ImpellerResult, walls: Walls) -> list[Track]:
             r.repeat is not None,
             r.rough.cutter,
             walls,
+            removal=r.removal,
         )
         for name, r in zip(names, milled.roughs or (), strict=True)
     ]
@@ -137,6 +139,7 @@ def _finishing(milled: ImpellerResult, walls: Walls) -> list[Track]:
                 p.setting.cutter,
                 walls,
                 in_use,
+                p.removal,
             )
         )
     return out
@@ -170,12 +173,23 @@ def _track(
     cutter: CatalogueCutter,
     walls: Walls,
     in_use: bool = True,
+    removal: ProgramRemoval | None = None,
 ) -> Track:
     ending = ENDINGS[milled.machine.dialect]
     files = () if empty else (f"{name}.{ending}", f"{name}.apt", *((f"{name}{ALL}.{ending}",) if repeats else ()))
-    blocks = clearance_blocks(read.program, read.times, cutter, walls)
     limits = _with_lines(limits, read)
-    return Track(name, TrackKind.PROGRAM, in_use, read.seconds, limits, findings, files, blocks=blocks)
+    rows = motion_columns(read.program, read.times) if len(read.program) else {}
+    balance: Mapping[int, float] = {}
+    if removal is not None:
+        if removal.columns:
+            rows = removal.columns
+            limits = tuple(c if c.row is None else replace(c, row=int(removal.step[c.row])) for c in limits)
+        limits, findings = (*limits, *removal.limits), (*findings, *removal.findings)
+        balance = removal.energy_balance
+    blocks = clearance_blocks(rows, cutter, walls)
+    return Track(
+        name, TrackKind.PROGRAM, in_use, read.seconds, limits, findings, files, blocks=blocks, energy_balance=balance
+    )
 
 
 def _with_lines(limits: Sequence[LimitCheck], read: ReadProgram) -> tuple[LimitCheck, ...]:
@@ -214,9 +228,9 @@ def _scallops(track: str, p: Checked) -> tuple[LimitCheck, ...]:
 
 
 def _loads(track: str, p: Checked) -> tuple[LimitCheck, ...]:
-    """The places of the passes with the greatest deflection and stress of the cutter."""
+    """The places of the passes with the greatest deflection and stress of the cutter, where its stock is not stated."""
     loads = p.setting.loads
-    if loads is None or not len(loads.feed):
+    if loads is None or not len(loads.feed) or (p.removal is not None and p.removal.loads):
         return ()
     out = []
     for name, (_, values, limit, _) in zip(("deflection_cutter_um", "cutter_stress_mpa"), loads.columns, strict=True):
@@ -247,10 +261,13 @@ def _left(c: Covered) -> tuple[Finding, ...]:
 
 def _unchecked(milled: ImpellerResult) -> tuple[str, ...]:
     fed = any(p.setting.loads is not None for p in milled.programs or ())
+    removals = [*(r.removal for r in milled.roughs or ()), *(p.removal for p in milled.programs or ())]
+    found = [r for r in removals if r is not None]
     out = [
-        "chatter; forces of roughing; deflection of the blades: not calculated"
+        f"chatter; {'' if found else 'forces of roughing; '}deflection of the blades: not calculated"
         if fed
         else "forces, torque, deflection and chatter: not calculated",
+        *(_unchecked_removal(found) if milled.programs is not None else ()),
         *(_unchecked_machine(milled) if milled.programs is not None else ()),
     ]
     out += milled.not_on_five_axes
@@ -258,6 +275,24 @@ def _unchecked(milled: ImpellerResult) -> tuple[str, ...]:
         out.append("programs: the job states no [operation.paths]")
         out += [f"{name}: without a program nothing is held against it" for name in milled.stated.around]
     return tuple(out)
+
+
+def _unchecked_removal(found: Sequence[ProgramRemoval]) -> Iterator[str]:
+    """What the removal step by step does not show."""
+    if not found:
+        yield (
+            "removal step by step, rapids and shank in material: the stock before finishing is not stated: state "
+            "[operation.rough]"
+        )
+        return
+    ramps = [float(np.max(r.columns["ramp_deg"], initial=0.0)) for r in found if r.columns]
+    if max(ramps, default=0.0) > 0.0:
+        yield (
+            f"plunges and ramps into material, of up to {number_text(max(ramps), 3)} deg: how steep the cutters may "
+            "ramp is not stated"
+        )
+    yield "removal in the other channels: the first is simulated, with roughing of the one before it"
+    yield "programs that are not in use, flank passes, point milling on five axes: not simulated in the blank"
 
 
 def _unchecked_machine(milled: ImpellerResult) -> Iterator[str]:

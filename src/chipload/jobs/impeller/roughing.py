@@ -60,12 +60,7 @@ def checked_roughing(
     stated : the cutter; None: the largest that fits
     walls : points of the finished surfaces
     """
-    motion = LineMotion(
-        paths.chord_mm * rough.coarser, mm_s_from_mm_min(rough.feed_mm_min), pallet_rate(machine), op.clearance_mm
-    )
-    how = RoughingSettings(
-        rough.depth_mm, rough.step_mm, rough.blades_mm, rough.hub_mm, motion, rough.check_mm, op.around, rough.over_mm
-    )
+    how = roughing_settings(machine, op, paths, rough)
     link = Link(
         paths.lift_mm, paths.margin_mm, paths.touch_mm, 0.0, mm_s_from_mm_min(paths.link_feed_mm_min), paths.above_mm,
         paths.lift_mm,
@@ -79,7 +74,7 @@ def checked_roughing(
     blanks: dict[int, trimesh.Trimesh] = {}
     for k, plan in enumerate(plans):
         if plan.index not in stock:
-            blanks[plan.index] = blank_of(impeller, plan.index, how, ahead)
+            blanks[plan.index] = blank_of(impeller, [plan.index], how, ahead)
             stock[plan.index] = TriDexel.of_mesh(blanks[plan.index], rough.grid_mm)
         safe, removal, left = without_touch(plan, stock[plan.index], rough.grid_mm, rough.touch_mm3, machine)
         first = not any(r.rough.index == plan.index for r in out)
@@ -95,6 +90,18 @@ def checked_roughing(
             )  # fmt: skip
         progress(0.6 + 0.4 * (k + 1) / len(plans), f"check of {k + 1} roughing programs")
     return tuple(out)
+
+
+def roughing_settings(
+    machine: Machine, op: ImpellerOperationTable, paths: PathsTable, rough: RoughTable
+) -> RoughingSettings:
+    """Settings of the roughing of a job."""
+    motion = LineMotion(
+        paths.chord_mm * rough.coarser, mm_s_from_mm_min(rough.feed_mm_min), pallet_rate(machine), op.clearance_mm
+    )
+    return RoughingSettings(
+        rough.depth_mm, rough.step_mm, rough.blades_mm, rough.hub_mm, motion, rough.check_mm, op.around, rough.over_mm
+    )
 
 
 def without_touch(
@@ -146,16 +153,19 @@ def _checked(
     )  # fmt: skip
 
 
-def blank_of(impeller: Impeller, index: int, how: RoughingSettings, ahead: float) -> trimesh.Trimesh:
-    """The blank of a channel with a part of its neighbours: from under the hub to above the shroud."""
+def blank_of(impeller: Impeller, channels: Sequence[int], how: RoughingSettings, ahead: float) -> trimesh.Trimesh:
+    """The blank of channels that lie side by side, with a part of their neighbours: from under the hub to above the
+    shroud.
+    """
     where = hub_range(impeller, ahead)
     s = np.linspace(*where, _MERIDIAN)
     n = impeller.hub.normal(s, np.zeros(len(s)))[:, [0, 2]]
     inner = impeller.hub.curve(s) - _UNDER * n
     low, high = (meridian(impeller, s, w, how.hub, where) for w in (0.0, 1.0))
     outer = high + how.over * (high - low) / np.linalg.norm(high - low, axis=1)[:, None]
-    top = uncut(impeller, index, how, ahead, whole=True)
-    first, last = _between(np.arctan2(top[:, 1], top[:, 0]))
+    tops = [uncut(impeller, index, how, ahead, whole=True) for index in channels]
+    angle = np.concatenate([np.arctan2(top[:, 1], top[:, 0]) for top in tops])
+    first, last = _between(angle)
     edge = (1.0 - _BESIDE) * impeller.pitch
     return sector(inner, outer, first + edge, last - edge)
 

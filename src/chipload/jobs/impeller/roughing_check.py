@@ -11,6 +11,7 @@ import numpy as np
 import trimesh
 
 from chipload.jobs.impeller.machine_check import MachineCheck, check_cell
+from chipload.jobs.impeller.program_removal import ProgramRemoval
 from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.planning.impeller.rough_settings import RoughingSetting
 from chipload.program.gcode.writer import Repeat
@@ -37,6 +38,7 @@ class CheckedRough:
     between : from the end of one channel to the beginning of the next [s]
     repeat : how the text goes through all channels; None: it is of one channel
     blank : what its channel begins with, before any program
+    removal : from the stock that the programs before it leave; None: not simulated
     """
 
     rough: RoughingSetting
@@ -50,6 +52,7 @@ class CheckedRough:
     between: float
     repeat: Repeat | None
     blank: trimesh.Trimesh
+    removal: ProgramRemoval | None = None
 
     @property
     def name(self) -> str:
@@ -114,6 +117,7 @@ class CheckedRough:
             "gouge_bound_mm": self.gouge.bound if math.isfinite(self.gouge.bound) else None,
             "stands_on_blades_mm": self.stands[0],
             "stands_on_hub_mm": self.stands[1],
+            "removal": None if self.removal is None else self.removal.numbers(),
             "taken_mm3": self.taken.before - self.taken.after,
             "rapids_take_mm3": float(self.taken.rapid.max(initial=0.0)),
             "above_takes_mm3": float(self.taken.above.max(initial=0.0)),

@@ -27,7 +27,8 @@ from chipload.jobs.impeller.partition_programs import checked_partitions
 from chipload.jobs.impeller.paths import EDGE, finish_settings, walls_of
 from chipload.jobs.impeller.point_milling import checked_points
 from chipload.jobs.impeller.ray_depth import ray_depth
-from chipload.jobs.impeller.roughing import checked_roughing
+from chipload.jobs.impeller.removal import with_removal
+from chipload.jobs.impeller.roughing import checked_roughing, roughing_settings
 from chipload.jobs.impeller.surface_search import WORKERS, SearchInputs, SurfaceSearch, searched_surfaces
 from chipload.jobs.impeller.tables import ImpellerOperationTable
 from chipload.jobs.impeller.written_programs import with_texts_read_back
@@ -49,8 +50,8 @@ from chipload.result.provenance import provenance_of, sources, title_of, version
 from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.workers import Team, Workers
 
-#: shares of the time of a run: search, division, roughing and finishing, with paths and without
-_WITH_PATHS, _SEARCH_ALONE = (5.0, 10.0, 10.0, 75.0), (50.0, 50.0, 0.0, 0.0)
+#: shares of the time of a run: search, division, roughing, finishing and removal, with paths and without
+_WITH_PATHS, _SEARCH_ALONE = (4.0, 8.0, 8.0, 55.0, 25.0), (50.0, 50.0, 0.0, 0.0, 0.0)
 #: of the tolerance, by how much tapered cutters may stand out of the cylinders that are planned with
 _OUTSIDE = 0.5
 
@@ -97,7 +98,7 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     surfaces = _surfaces(job, impeller, covering)
     if checkpoint is not None:
         checkpoint.notice(_estimate(job, surfaces, catalogue))
-    first, second, third, last = _stages(op, progress)
+    first, second, third, last, simulating = _stages(op, progress)
     inputs = SearchInputs(surfaces, table, catalogue, op.clearance_mm)
     keep.share(inputs)
     found = searched_surfaces(inputs, keep, team is not None, first)
@@ -137,7 +138,9 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     milled = replace(milled, flanks=flanks, points=points)
     partitions = tuple(chosen.get(p.name, p) for p in partitions)
     milled = replace(milled, checked=checked, roughs=roughs, partitions=partitions)
-    return with_texts_read_back(milled, surroundings, op.clearance_mm)
+    how_roughed = None if op.rough is None else roughing_settings(machine, op, op.paths, op.rough)
+    read = with_texts_read_back(milled, surroundings, op.clearance_mm)
+    return with_removal(read, how_roughed, forces, simulating)
 
 
 def surroundings_of(job: ImpellerJob) -> Surroundings:
@@ -225,7 +228,7 @@ def _estimate(job: ImpellerJob, surfaces: Sequence[ContactSurface], catalogue: C
 
 
 def _stages(op: ImpellerOperationTable, progress: Progress) -> list[Progress]:
-    """Progress of the search, the division, roughing and finishing, by the share of the time that each takes."""
+    """Progress of search, division, roughing, finishing and removal, by the share of the time that each takes."""
     shares = _WITH_PATHS if op.paths is not None else _SEARCH_ALONE
     edges = np.concatenate([[0.0], np.cumsum(shares)]) / sum(shares)
     return [part_of(progress, float(a), float(b)) for a, b in itertools.pairwise(edges)]

@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.planning.impeller.clearance import nearest
 from chipload.planning.impeller.tree import tree_of
-from chipload.program.program import Program
 from chipload.result.limits import Columns
-from chipload.result.motions import motion_columns
 from chipload.simulation.channel.channel import SurfacePoints
 
 Floats = NDArray[np.float64]
@@ -31,24 +29,28 @@ CUT = ("finish", "lead")
 
 
 def clearance_blocks(
-    program: Program, times: Floats, cutter: CatalogueCutter, walls: Callable[[], Sequence[SurfacePoints]]
+    rows: Columns, cutter: CatalogueCutter, walls: Callable[[], Sequence[SurfacePoints]]
 ) -> Callable[[], Iterator[Columns]]:
-    """History of a program with its clearance, calculated once, at its first use."""
+    """History of a program with its clearance, calculated once, at its first use.
+
+    Parameters
+    ----------
+    rows : of its motions, or of the steps of its simulation; none: it has no motion
+    """
 
     @cache
     def columns() -> Columns:
-        motions = motion_columns(program, times)
-        axis = np.column_stack([motions[f"axis_{x}"] for x in "xyz"]).astype(np.float64)
-        tip = np.column_stack([motions[f"{x}_mm"] for x in "xyz"]).astype(np.float64)
-        cuts = np.isin(np.asarray(motions["pass"]).astype(str), CUT)
+        axis = np.column_stack([rows[f"axis_{x}"] for x in "xyz"]).astype(np.float64)
+        tip = np.column_stack([rows[f"{x}_mm"] for x in "xyz"]).astype(np.float64)
+        cuts = np.isin(np.asarray(rows["pass"]).astype(str), CUT)
         return {
-            **motions,
+            **rows,
             "table_deg": np.degrees(np.arccos(np.clip(axis[:, 2], -1.0, 1.0))),
             "pallet_deg": np.degrees(np.unwrap(np.arctan2(axis[:, 1], axis[:, 0]))),
             "tool_clearance_mm": tool_clearance(walls(), cutter, tip, axis, cuts),
         }
 
-    return lambda: iter([columns()] if len(program) else [])
+    return lambda: iter([columns()] if rows else [])
 
 
 def tool_clearance(
