@@ -133,7 +133,7 @@ def test_accuracy_of_a_run_with_a_turning_axis() -> None:
     for one in (removal, plain):
         assert abs(one.energy_balance[2]) < 1e-6
     error = plain.resolution_error["force_n"]
-    assert LEANING_MOVES_FLOOR["force_n"] <= error < 0.2
+    assert LEANING_MOVES_FLOOR["force_n"] <= error < 0.3
     more = removal.resolution_error["force_n"] - error
     x = 0.01 / BALL.diameter
     assert more == pytest.approx(UNLIKE + TIP * x + BEYOND * x * x, abs=0.01)

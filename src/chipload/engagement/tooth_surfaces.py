@@ -43,10 +43,10 @@ SHARE = 0.01
 #: parts of :func:`chip_error`: at any cut, with runout, of the square of feed over radius, of the runout over the
 #: radial depth
 LEAST, UNLIKE, SECOND, RUNOUT = 0.0025, 0.002, 0.75, 0.04
-#: the same where the surface leans, as that of a ball nose or a cone: at any cut, of the feed over the radius, of the
-#: runout over the greatest radial depth of the step, and of its square: a longer tooth also cuts on parts of the edge
-#: that no circle reaches
-LEANS, NARROW, TIP, BEYOND = 0.002, 0.15, 0.07, 4.0
+#: the same where the surface leans, as that of a ball nose or a cone: at any cut, of the feed over the radius and of
+#: its square, which counts near a tip; of the runout over the greatest radial depth of the step and of its square: a
+#: longer tooth also cuts on parts of the edge that no circle reaches
+LEANS, NARROW, POINT, TIP, BEYOND = 0.002, 0.1, 10.0, 0.07, 4.0
 
 
 def tooth_radii(cutter: Cutter, lag: ArrayLike = 0.0) -> Floats:
@@ -156,8 +156,8 @@ def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
     leave out: 0.0025 + 0.75 (f / R)^2 / phi_w + 0.04 e / max(ae, e), phi_w the engaged arc, ae its radial depth.
 
     With runout 0.002 is added. Where a range moves along the axis and leans, its chip is of first order in that motion:
-    f / R is added. A surface that leans has 0.002 + 0.15 f / R more, and with runout 0.07 x + 4 x^2, x = e / ae at most
-    1, ae the greatest radial depth of the step.
+    f / R is added. A surface that leans has 0.002 + 0.1 f / R + 10 (f / R)^2 more, at most f / R; with
+    runout 0.07 x + 4 x^2, x = e / ae at most 1, ae the greatest radial depth of the step.
     Ranges count by their share of the chip. 0 where nothing is cut.
 
     The constants are those within which random cuts by all kinds of mills lie (benchmarks/truth.py).
@@ -180,7 +180,7 @@ def chip_error(front: ToothEngagement, cutter: Cutter) -> Floats:
     share = np.minimum(np.divide(feed, rho, out=np.zeros(len(low)), where=turned), _tooth_chips.LARGE)
     e = cutter.runout[0] if cutter.flutes > 1 else 0.0
     leans = np.abs(cosine) > _tooth_chips.LEVEL
-    each = LEAST + np.where(leans, LEANS + NARROW * share, 0.0)
+    each = LEAST + np.where(leans, LEANS + np.minimum(NARROW * share + POINT * share**2, share), 0.0)
     each[turned] += SECOND * share[turned] ** 2 / (high - low)[turned]
     each += np.where(np.abs(offset) > _tooth_chips.LEVEL * swing, share, 0.0)
     if e > 0.0:
