@@ -96,7 +96,7 @@ def _cutters_of(earlier: EarlierMoves) -> list[Cutter]:
     out = []
     for values in earlier.cutters:
         fields: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
-        rows = ([tuple(v) if isinstance(v, (list, tuple)) else v for v in row] for row in fields.pop("shape", ()))
+        rows: Any = ([tuple(v) if isinstance(v, (list, tuple)) else v for v in row] for row in fields.pop("shape", ()))
         out.append(Cutter(**fields, shape=tuple(ProfileSegment(*row) for row in rows)))
     return out
 
