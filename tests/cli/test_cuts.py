@@ -56,7 +56,7 @@ def test_proposed_filled_in_and_read_back(job: Path) -> None:
     code, said, _ = call("check", job)
     assert code == 3
     assert "threshold of the finished side k-, calibrated" in said
-    assert "the limit cannot be kept at 69 of 130 places" in said
+    assert "the limit cannot be kept at 56 of 130 places" in said
 
 
 def test_only_a_wall_is_calibrated(tmp_path: Path) -> None:

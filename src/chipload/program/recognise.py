@@ -23,6 +23,7 @@ ENDINGS = {".ngc": "linuxcnc"}
 SEARCHED = 200_000
 #: patterns that are named in a reason
 NAMED = 2
+_QUOTED = re.compile(r'(^|[=\s])"([^"\n]*)"')
 _COMMENT = re.compile(r"\(([^()\n]*)\)|;([^\n]*)")
 _FLAGS = re.IGNORECASE | re.MULTILINE
 _DISTANCE = re.compile(r"(?<![A-Z])G9[01](?![0-9.])", re.IGNORECASE)
@@ -130,6 +131,8 @@ def guess_unit(text: str) -> tuple[str, str]:
     """
     text = text[:SEARCHED]
     comments = " ".join(hit[1] or hit[2] or "" for hit in _COMMENT.finditer(text))
+    # the second mark of a quoted name is not that of inches
+    comments = _QUOTED.sub(r"\1\2", comments)
     plain = _COMMENT.sub(" ", text)
     inch, reasons = 0, []
     for pattern, unit, points in ((_INCH, "inches", 2), (_MM, "mm", -2)):
