@@ -21,7 +21,7 @@ from impeller_job import impeller_job, impeller_outcome
 def test_programs_made_by_processes_are_those_of_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = impeller_job(tmp_path)
     made: list[str] = []
-    for module, name in ((settings, "finishing"), (checks, "left_on"), (checks, "deepest_gouge")):
+    for module, name in ((settings, "finish_tracks"), (checks, "left_on"), (checks, "deepest_gouge")):
         here = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *a, name=name, here=here, **k: (made.append(name), here(*a, **k))[1])
     alone = impeller_outcome(run_job(load_job(file)))
