@@ -142,7 +142,7 @@ def test_deflection_is_force_over_threshold_times_the_limit(done):
         some = cut & (c["force_n"] > 0.25 * c["force_n"].max())
         assert some.sum() > 0.5 * cut.sum()
         over = ((c["force_normal_n"] - greatest / slope)[some] / c["force_n"][some]).max()
-        assert over <= 0.05
+        assert over <= 0.06
 
 
 def finished_plate():

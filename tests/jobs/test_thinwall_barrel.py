@@ -26,7 +26,7 @@ SMALL = (
     "operation.0.reserve=0.1",
     "operation.0.least_error=false",
     "operation.0.compensate_um=0.0",
-    "limits.deflection_workpiece_um=60.0",
+    "limits.deflection_workpiece_um=80.0",
 )
 BARREL = ("cutter.0.corner_radius_mm=1.5", "cutter.0.barrel_radius_mm=40.0", "operation.0.lean_deg=78.5")
 
@@ -57,5 +57,5 @@ def test_the_simulation_confirms_the_plan(finished) -> None:
         assert one["gouge_um"] <= 8.0, name
         assert one["left_um"] < 8.0 + 2.0, name  # scallop, and tolerance of the edges of layers
         assert 0.8 < one["force_over_planned"]["median"] < 1.05, name
-        assert one["deflection_workpiece_um_max"] < 60.0, name
+        assert one["deflection_workpiece_um_max"] < 80.0, name
         assert done.result.verdict is Verdict.HOLDS, name

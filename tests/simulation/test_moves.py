@@ -239,8 +239,10 @@ def test_what_a_watch_gets_gives_the_same_loads() -> None:
     for cuts in removal.cuts:
         loads = greatest_loads(cuts, ALLOY, FINE.rotation, bands=True)
         assert set(BANDS) < set(loads)
+        columns = dict(removal.columns)
+        columns["force_axial_n"] = np.maximum(columns["force_z_max_n"], -columns["force_z_min_n"])
         for name, values in loads.items():
-            np.testing.assert_allclose(values, removal.columns[name][cuts.step], rtol=1e-6, atol=1e-9, err_msg=name)
+            np.testing.assert_allclose(values, columns[name][cuts.step], rtol=1e-6, atol=1e-9, err_msg=name)
 
 
 @pytest.mark.usefixtures("one_instant")
