@@ -23,8 +23,8 @@ PI = math.pi
 SHARE, ANGLE = 0.1, 1e-3
 #: half the height within which a change of the contact is found, over the radius of the cutter
 BESIDE = 2.5e-4
-#: greatest number of heights that are searched at one instant
-SEARCHES = 40
+#: greatest number of heights that are searched at one instant: between two circles in contact, and between any
+BETWEEN, SEARCHES = 40, 60
 #: columns of a sample of the flank: height, first range and number of ranges, slice
 HEIGHT, FIRST, RANGES, SLICE = range(4)
 #: columns of a piece of the flank, beside those of a slice: first range, number of ranges
@@ -161,7 +161,7 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
                 top += 1
                 continue
             border = scratch[at, 3]
-        elif z - below <= 2.1 * near or searches == SEARCHES:
+        elif z - below <= 2.1 * near or searches >= (BETWEEN if found > 0 and many > 0 else SEARCHES):
             border = 0.5 * (below + z)
             if at != own and not z - below <= 2.1 * near:
                 border = scratch[at, 3]
