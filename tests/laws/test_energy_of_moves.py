@@ -93,7 +93,7 @@ def test_the_stated_error_holds_the_true_one(cutter: Cutter, depth: float, apart
         true = float(many[name].max())
         assert abs(float(one.columns[name].max()) - true) <= one.resolution_error[name] * true, name
         # near the tip of a ball the model of the chip alone states up to the feed per tooth over the radius there
-        assert one.resolution_error[name] < 0.3
+        assert one.resolution_error[name] < 0.35
     assert abs(one.energy_balance[1]) < 0.01
 
 

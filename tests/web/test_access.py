@@ -202,13 +202,11 @@ def test_a_port_that_is_taken(served, tmp_path) -> None:
     ("make", "message"),
     [
         (lambda f: f / "none", "cannot be opened: No such file or directory"),
-        (
-            lambda f: f / "square.ngc",
-            "is not a job: name a job file (TOML), a result folder or a folder that holds them",
-        ),
+        (lambda f: f / "notes.md", "notes.md: no motion: nothing to check"),
     ],
 )
 def test_what_cannot_be_opened_is_said_in_one_line(folder, make, message) -> None:
+    (folder / "notes.md").write_text("these are notes\n")
     code, out, err = call(str(make(folder)), "--no-open")
     assert (code, out) == (2, "")
     assert message in err
