@@ -339,10 +339,15 @@ def _cut(path: Path) -> int:
 def _npz() -> list[bytes]:
     import shapely
 
+    from chipload.cutter.cutter import Cutter
+    from chipload.stock.earlier_moves import EarlierMoves, cutter_fields
     from chipload.stock.layers import LayeredStock
 
     stock = LayeredStock.block((0, 0, 0), (20, 10, 4), 2.0, 5.0)
     stock.remove(1, shapely.box(4, 4, 6, 30))
+    rows = np.array([[0.0, 5.0, 2.0, 20.0, 0.0, 0.0], [0.0, 3.0, 3.0, 20.0, 0.0, 0.0]])
+    mill = Cutter(2.0, 2, 0.5, 6.0, 20.0, 6e5, number=1, corner_radius=0.5)
+    stock.earlier = EarlierMoves(rows, np.zeros(2, dtype=np.int64), (cutter_fields(mill),))
     data = stock.to_bytes()
     plain = io.BytesIO()
     with np.load(io.BytesIO(data)) as held:
@@ -351,10 +356,13 @@ def _npz() -> list[bytes]:
 
 
 def _stock(path: Path) -> int:
+    from chipload.simulation.initial_stock import cutters_of_moves
     from chipload.stock.layers import LayeredStock
 
     stock = LayeredStock.load(path)
     finite(stock.volume(), stock.bounds)
+    if stock.earlier is not None:
+        finite(stock.earlier.rows, *(c.radius for c in cutters_of_moves(stock.earlier)))
     return 0
 
 

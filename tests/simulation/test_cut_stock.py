@@ -19,7 +19,9 @@ from chipload.errors import InputError
 from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, RAPID, Program
 from chipload.simulation.chips import remove
+from chipload.simulation.initial_stock import initial_stock
 from chipload.simulation.removal import Removal, Resolution
+from chipload.stock.earlier_moves import EarlierMoves, no_moves
 from chipload.stock.layers import LayeredStock
 from chipload.stock.solid import stepped_body
 from chipload.stock.turned import turn_matrix, turned_stock
@@ -179,3 +181,39 @@ def test_moves_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     stock.save(tmp_path / "stock.npz")
     with pytest.raises(InputError, match=r"stock.npz: damaged: its moves do not fit each other"):
         LayeredStock.load(tmp_path / "stock.npz")
+
+
+DAMAGES = {
+    "a field that no cutter has": lambda c: {**c, "teeth": 3},
+    "a text for a number": lambda c: {**c, "diameter": "wide"},
+    "not finite": lambda c: {**c, "diameter": math.nan},
+    "nothing": lambda _: {},
+    "a shape without numbers": lambda c: {**c, "shape": [[1], [2]]},
+    "no table": lambda _: 3,
+    "nested": lambda c: {**c, "pitch": [[[[0.0]]]]},
+}
+
+
+@pytest.mark.parametrize("change", DAMAGES)
+def test_a_saved_stock_with_a_damaged_cutter_is_refused(tmp_path: Path, change: str) -> None:
+    """When it is read, or when a program begins in it; nothing but a clear error."""
+    cut = block()
+    remove(path([[-6.0, 5.0, -1.0], [46.0, 5.0, -1.0]]), cut, CUTTERS, ALLOY, FINE)
+    assert cut.earlier is not None
+    good = cut.earlier
+    cut.earlier = replace(good, cutters=(DAMAGES[change](dict(good.cutters[0])),))  # type: ignore[arg-type]
+    cut.save(tmp_path / "stock.npz")
+    with pytest.raises(InputError, match=r"stock|cutter"):
+        initial_stock(LayeredStock.load(tmp_path / "stock.npz"), CUTTERS, upright=True)
+
+
+def test_a_saved_stock_whose_cutters_are_nested_without_end_is_refused(tmp_path: Path) -> None:
+    cut = block()
+    arrays = no_moves() | {
+        "moves": np.zeros((1, 6)), "move_cutter": np.zeros(1, np.int64),
+        "cutters": np.frombuffer(b"[" * 100_000, dtype=np.uint8),
+    }  # fmt: skip
+    with pytest.raises(ValueError, match="cutters"):
+        EarlierMoves.from_arrays(arrays)
+    cut.save(tmp_path / "stock.npz")
+    assert LayeredStock.load(tmp_path / "stock.npz").earlier is None

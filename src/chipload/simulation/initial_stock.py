@@ -16,6 +16,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.profile import ProfileSegment
 from chipload.engagement.bricks.stock import BrickStock
 from chipload.engagement.moves.stock import MoveStock
+from chipload.errors import InputError
 from chipload.stock.earlier_moves import EarlierMoves, cutter_fields
 from chipload.stock.layers import LayeredStock
 
@@ -40,7 +41,7 @@ def initial_stock(stock: LayeredStock, cutters: Mapping[int, Cutter], *, upright
     table = dict(cutters)
     if earlier is not None:
         upright = upright and earlier.upright
-        table |= {-1 - k: c for k, c in enumerate(_cutters_of(earlier))}
+        table |= {-1 - k: c for k, c in enumerate(cutters_of_moves(earlier))}
     made: StockOfMoves = (MoveStock if upright else BrickStock)(low, high, table, body)
     if earlier is not None:
         make_earlier(made, earlier, low, high)
@@ -49,7 +50,7 @@ def initial_stock(stock: LayeredStock, cutters: Mapping[int, Cutter], *, upright
 
 def make_earlier(stock: StockOfMoves, earlier: EarlierMoves, low: Floats, high: Floats) -> None:
     """Make those earlier moves that come into a box between the corners ``low`` and ``high`` (3,) [mm]."""
-    near = _near(earlier.rows, earlier.cutter, _cutters_of(earlier), low, high)
+    near = _near(earlier.rows, earlier.cutter, cutters_of_moves(earlier), low, high)
     rows, cutter = earlier.rows[near], earlier.cutter[near]
     up = np.tile([0.0, 0.0, 1.0], (len(rows), 1))
     a0, a1 = (up, up) if earlier.upright else (rows[:, 6:9], rows[:, 9:12])
@@ -92,12 +93,28 @@ def _near(rows: Floats, cutter: Ints, cutters: Sequence[Cutter], low: Floats, hi
     return np.asarray((near & (ends.max(axis=0) + above[cutter] > low)).all(axis=1))
 
 
-def _cutters_of(earlier: EarlierMoves) -> list[Cutter]:
+def cutters_of_moves(earlier: EarlierMoves) -> list[Cutter]:
+    """Return the cutters of the moves that cut a stock before.
+
+    Raises
+    ------
+    InputError
+        The file of the stock is damaged: its cutters are none.
+    """
     out = []
     for values in earlier.cutters:
         fields: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
-        rows: Any = ([tuple(v) if isinstance(v, (list, tuple)) else v for v in row] for row in fields.pop("shape", ()))
-        out.append(Cutter(**fields, shape=tuple(ProfileSegment(*row) for row in rows)))
+        rows: Any = fields.pop("shape", ())
+        try:
+            segments = (ProfileSegment(*(tuple(v) if isinstance(v, list) else v for v in row)) for row in rows)
+            cutter = Cutter(**fields, shape=tuple(segments))
+            # what the moves need of it
+            sizes = (cutter.radius, cutter.flute_length, *cutter.radius_at([0.0, cutter.flute_length]))
+        except (TypeError, ValueError, AttributeError, LookupError, ArithmeticError) as err:
+            raise InputError(f"stock: a cutter that cut it before cannot be read ({err}): run the job again") from None
+        if not all(math.isfinite(x) for x in sizes):
+            raise InputError("stock: a cutter that cut it before has no finite size: run the job again")
+        out.append(cutter)
     return out
 
 

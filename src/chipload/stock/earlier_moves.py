@@ -66,7 +66,10 @@ class EarlierMoves:
         """
         rows = np.ascontiguousarray(arrays["moves"], dtype=np.float64)
         cutter = arrays["move_cutter"].astype(np.int64)
-        cutters = tuple(json.loads(arrays["cutters"].astype(np.uint8).tobytes() or b"[]"))
+        try:
+            cutters = tuple(json.loads(arrays["cutters"].astype(np.uint8).tobytes() or b"[]"))
+        except (TypeError, RecursionError) as err:
+            raise ValueError("cutters") from err
         if len(rows) == 0:
             return None
         if (
