@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chipload.checking.default_checks import DIRECTED, default_limits, with_budget
-from chipload.checking.load_budget import AXIAL
 from chipload.checking.outcome import SimulationResult
 from chipload.checking.stability import STABILITY_LIMITS, StabilityResult, stability_limits
 from chipload.machine.machine import Machine
 from chipload.number_text import number_text
 from chipload.result import LimitCheck, Verdict, check_limit, column_of, error_of, state_of
 from chipload.result.limits import Columns
+from chipload.simulation.accuracy import AXIAL
 from chipload.simulation.surface import Difference
 
 #: greatest gouge [mm] of a part whose job states no limit on it: the least medium deviation, ISO 2768-1 m

@@ -14,13 +14,12 @@ from chipload.cutting.load_parts import CHIP, MEANS, LoadParts, bounded_parts, b
 from chipload.cutting.material import Material
 from chipload.result.budget import ErrorBudget, ErrorPart, factor_at
 from chipload.result.limits import Columns, LimitCheck
+from chipload.simulation.accuracy import AXIAL
 
 Floats = NDArray[np.float64]
 
 #: standard deviation of the peak of a turn over its mean, of the measured turns of slots (0.5 to 1.7 %)
 TURNS = 0.015
-#: load whose parts have upper bounds: what of the spread of the coefficients acts along the axis is not calculated
-AXIAL = "force_axial_n"
 #: loads that follow the force of one rotation
 WITH_FORCE = (
     "force_n", "force_xy_n", "force_normal_n", "deflection_um", "deflection_workpiece_um", "form_error_um",
@@ -29,6 +28,7 @@ WITH_FORCE = (
 #: columns that have a budget, and the load whose parts theirs are
 BUDGETED = {
     **dict.fromkeys(WITH_FORCE, "force_n"), "torque_nm": "torque_nm", "torque_mean_nm": "torque_mean_nm",
+    # upper bounds: what of the spread of the coefficients acts along the axis is not calculated
     "power_w": "power_w", CHIP: CHIP, THRUST: "torque_mean_nm", AXIAL: AXIAL,
 }  # fmt: skip
 

@@ -84,6 +84,7 @@ class ProgramReading:
     skipped : the program with block delete on, where it moves otherwise then; ``violations`` and ``findings`` are of
         both
     recognition : the control that the text was read for; None: of no NC text
+    unit : of lengths before the text states one
     """
 
     commands: Commands
@@ -95,6 +96,7 @@ class ProgramReading:
     of_text: bool = False
     skipped: ProgramReading | None = None
     recognition: Recognition | None = None
+    unit: str = "mm"
 
     @property
     def axes(self) -> Floats:
@@ -214,7 +216,8 @@ def read_program(
     breaks = tuple(f for f in taps if f.severity is Severity.EXCEEDS)
     findings += tuple(f for f in taps if f.severity is not Severity.EXCEEDS)
     reading = _check_program(commands, program, machine, (*said, *agreed, *findings), more, placed)
-    reading = replace(reading, violations=(*reading.violations, *breaks), of_text=True, recognition=recognition)
+    violations = (*reading.violations, *breaks)
+    reading = replace(reading, violations=violations, of_text=True, recognition=recognition, unit=unit)
     other = text if is_cl_data(kind) else without_deleted_blocks(text)
     if other == text:
         return reading

@@ -111,7 +111,7 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
     kind = chosen.dialect or ENDINGS.get(path.suffix.lower())
     apt = kind is not None and is_cl_data(kind)
     text = known.text if known.text is not None else _text(path, apt)
-    header = read_header(text, apt, unit_mm(text, _unit(chosen.reading)))
+    header = read_header(text, apt, unit_mm(text, chosen.reading.unit))
     if any(f.code == "nc-diameter-unknown" for f in chosen.reading.findings):
         chosen = _read(path, known, _cutters(chosen.reading.program, known, header))
     program = chosen.reading.program
@@ -151,11 +151,6 @@ def draft_program(path: Path, folder: Path, known: Known | None = None) -> Draft
         tuple(tables),
         tuple(notes),
     )
-
-
-def _unit(reading: ProgramReading) -> str:
-    """The unit that a text which states none is read in."""
-    return next(("inch" if "read as inch" in f.text else "mm" for f in reading.findings if f.code == "nc-unit"), "mm")
 
 
 def _stated_values(number: int, known: Known, header: Header) -> list[Stated]:
@@ -396,7 +391,7 @@ def _work_offsets(reading: ProgramReading, setups: bool) -> Entry:
 def _guesses(reading: ProgramReading) -> list[Entry]:
     """What the reader guessed about unit, tool table and compensation: the keys that confirm it."""
     guesses: dict[str, tuple[str, Callable[[str], str], str]] = {
-        "nc-unit": ("unit", lambda _: _unit(reading), "the program states none"),
+        "nc-unit": ("unit", lambda _: reading.unit, "the program states none"),
         "nc-tools-unit": ("tools_unit", lambda _: "inch", "its diameters agree with the program as inches"),
         "nc-compensation-wear": ("compensation", lambda _: "wear", "the cutter does not fit beside the contour"),
         "nc-compensation-unstated": ("compensation", lambda _: "control", "the offset of D holds the cutter's radius"),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from chipload.checking.default_checks import DefaultChecks, peak_excess
 from chipload.checking.drilling import with_drill_loads
-from chipload.checking.load_budget import AXIAL, BUDGETED, factors_of_steps
+from chipload.checking.load_budget import BUDGETED, factors_of_steps
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
 from chipload.cutting.load_parts import LoadParts, bounded_parts, load_parts
@@ -50,6 +50,7 @@ from chipload.program.read import ProgramReading
 from chipload.program.tapping import tapping_motions
 from chipload.program.time import peak_speed, program_time
 from chipload.result import column_of, error_of
+from chipload.simulation.accuracy import AXIAL
 from chipload.simulation.loads import Cuts, at_feeds, greatest_loads
 from chipload.simulation.removal import Removal, Watch
 from chipload.simulation.steps import Steps
