@@ -79,21 +79,24 @@ def test_peaks_are_those_of_many_slices(cutter: Cutter, depth: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("cutter", "depth", "apart"),
+    ("cutter", "depth", "apart", "most"),
     [
-        (BALL12, 1.874, 0.5), (BALL10, 1.0, 0.1), (BALL10, 0.3, 1.0), (BALL10, 0.02, 0.5), (BALL10, 5.0, 3.0),
-        (BULL, 0.5, 0.5), (TAPER, 0.5, 0.5),
+        (BALL12, 1.874, 0.5, 0.09), (BALL10, 1.0, 0.1, 0.14), (BALL10, 0.3, 1.0, 0.22), (BALL10, 0.02, 0.5, 0.29),
+        (BALL10, 5.0, 3.0, 0.065), (BULL, 0.5, 0.5, 0.065), (TAPER, 0.5, 0.5, 0.14),
     ],
 )  # fmt: skip
-def test_the_stated_error_holds_the_true_one(cutter: Cutter, depth: float, apart: float) -> None:
-    """Worst loads against those with 100 slices of a corner; the balance against 0."""
+def test_the_stated_error_holds_the_true_one(cutter: Cutter, depth: float, apart: float, most: float) -> None:
+    """Worst loads against those with 100 slices of a corner; the balance against 0.
+
+    Nearly all of what is stated is for the chip between the paths of the teeth, which both leave out: it grows towards
+    the tip of a ball, where the feed is not small beside the radius. The thickest chip states 5 % more at most.
+    """
     one = run(slot(depth, apart), cutter, accuracy=True)
     many = run(slot(depth, min(apart, 0.5)), cutter, corner=100).columns
     for name in COMPARED:
         true = float(many[name].max())
         assert abs(float(one.columns[name].max()) - true) <= one.resolution_error[name] * true, name
-        # near the tip of a ball the model of the chip alone states up to the feed per tooth over the radius there
-        assert one.resolution_error[name] < 0.35
+        assert one.resolution_error[name] < most + (0.05 if name == "chip_max_mm" else 0.0)
     assert abs(one.energy_balance[1]) < 0.01
 
 

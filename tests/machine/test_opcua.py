@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -78,6 +81,19 @@ def test_a_log_has_what_the_server_wrote(server, tmp_path) -> None:
     assert (np.diff(steps) >= 1.0 - 1e-9).all()
     # the source's own clock: 0.05 s a step and some
     assert (np.diff(log.time) > 0.04 * np.diff(steps)).all()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_ctrl_c_keeps_what_was_recorded(server, tmp_path) -> None:
+    out = tmp_path / "spindle.csv"
+    words = [sys.executable, "-m", "chipload", "opcua", server, "--node", "power_w=ns=2;s=power", "--out", str(out)]
+    recording = subprocess.Popen([*words, "--interval-s", "0.01"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    time.sleep(4.0)
+    recording.send_signal(signal.SIGINT)
+    said, errors = recording.communicate(timeout=20.0)
+    assert (recording.returncode, errors) == (0, b"")
+    assert said.decode().strip().endswith("rows: time_s,power_w")
+    assert len(read_log(out)[0].time) >= 5
 
 
 @pytest.mark.parametrize(

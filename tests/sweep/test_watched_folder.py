@@ -76,6 +76,11 @@ def test_a_program_is_simulated_again_only_if_it_or_the_settings_change(posted) 
     folder, _ = posted
     once = {"once": True, "settle_s": 0.0, "wait": unfinished}
     assert list(watch_folder(folder, FolderSettings(), **once)) == []
+    part = folder / "lathe side" / "part 1.nc"
+    part.write_text(NONSENSE)
+    assert [(one.program, one.code) for one in watch_folder(folder, FolderSettings(), **once)] == [(part, 2)]
+    # the report of the program that was there before would be read as that of this one
+    assert not result_folder(part).exists()
     bad = folder / "bad.tap"
     bad.write_text(NONSENSE * 2)
     assert [one.program for one in watch_folder(folder, FolderSettings(), **once)] == [bad]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import Annotated
 
@@ -47,6 +48,8 @@ def opcua(
         from chipload.machine.opcua import OpcUaSource, record_spindle
 
         require_extra("opcua")
+        # what the library notices of the server is no message of this command
+        logging.getLogger("asyncua").addHandler(logging.NullHandler())
         if out.suffix.lower() != ".csv":
             raise InputError(f"--out {out}: must end with .csv (a log of the spindle)")
         named = dict(text.partition("=")[::2] for text in nodes)

@@ -40,7 +40,7 @@ def watch_folder(
     """
 
     def work() -> int:
-        from chipload.sweep.watched_folder import FolderSettings, result_folder, worst_code
+        from chipload.sweep.watched_folder import FINISHED, FolderSettings, result_folder, worst_code
         from chipload.sweep.watched_folder import watch_folder as checked_programs
 
         settings = FolderSettings(job, machine, tools, tuple(sets or ()), limit_s)
@@ -49,9 +49,8 @@ def watch_folder(
             for one in checked_programs(folder, settings, once=once, settle_s=settle_s):
                 codes.append(one.code)
                 show(f"{one.program.relative_to(folder)}: {one.line} ({number_text(one.time_s, 3)} s)")
-                report = result_folder(one.program) / "report.html"
-                if one.code in (0, 3) and report.exists():
-                    show(f"report: {report}")
+                if one.code in FINISHED:
+                    show(f"report: {result_folder(one.program) / 'report.html'}")
         except KeyboardInterrupt:
             raise Cancelled(f"{len(codes)} programs have a new verdict; the same command continues") from None
         return worst_code(codes)

@@ -106,8 +106,8 @@ def cutters_of_moves(earlier: EarlierMoves) -> list[Cutter]:
         fields: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
         rows: Any = fields.pop("shape", ())
         try:
-            segments = (ProfileSegment(*(tuple(v) if isinstance(v, list) else v for v in row)) for row in rows)
-            cutter = Cutter(**fields, shape=tuple(segments))
+            ends: Any = [[tuple(v) if isinstance(v, list) else v for v in row] for row in rows]
+            cutter = Cutter(**fields, shape=tuple(ProfileSegment(*row) for row in ends))
             # what the moves need of it
             sizes = (cutter.radius, cutter.flute_length, *cutter.radius_at([0.0, cutter.flute_length]))
         except (TypeError, ValueError, AttributeError, LookupError, ArithmeticError) as err:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 import subprocess
 import sys
 import time
@@ -11,16 +12,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from chipload.errors import InputError
-from chipload.files import hash_of, is_file, write_whole
+from chipload.files import cannot_write, hash_of, is_file, write_whole
 from chipload.processes import own_group, stop_group
 from chipload.program.read import ENDINGS
+from chipload.result.load import SUMMARY, load_result
 
 #: what is added to the name of a program for its result folder and for its verdict
 RESULT, VERDICT = "-chipload", ".verdict.txt"
 #: last line of a verdict: of which bytes it is
 OF_INPUT = "input: sha256 "
-#: code of a program that did not end in time; those of the command line are 0 to 4
-LATE = 5
+#: codes of a run that has a result; code of a program that did not end in time; those of the command line are 0 to 4
+FINISHED, LATE = (0, 3), 5
 #: [s] a stopped process may take so long to end by itself
 PATIENCE_S = 10.0
 
@@ -137,18 +139,18 @@ def recorded_hash(program: Path) -> str | None:
     return lines[-1].removeprefix(OF_INPUT) if lines and lines[-1].startswith(OF_INPUT) else None
 
 
-def check_program(program: Path, settings: FolderSettings) -> ProgramChecked:
+def simulate_posted(program: Path, settings: FolderSettings) -> ProgramChecked:
     """Simulate a program in a process of its own and write its verdict; the verdict is written last, and whole.
 
     What ends that process, an error in it or the end of its memory, is the verdict of the program, not the end of the
-    watch.
+    watch. A result of other bytes does not stay beside a program that has none.
 
     Raises
     ------
     InputError
         The program or the job cannot be read.
     OutputError
-        The verdict cannot be written.
+        The verdict cannot be written, or an earlier result cannot be removed.
     """
     of_input, begin = settings.hash(program), time.monotonic()
     command = [sys.executable, "-m", "chipload", *settings.words(program)]
@@ -166,8 +168,18 @@ def check_program(program: Path, settings: FolderSettings) -> ProgramChecked:
         _end(process)
     if code < 0 or not lines:
         lines.append(f"chipload: the run ended without a verdict (code {code})")
+    result = result_folder(program)
+    if code in FINISHED:
+        first = load_result(result).first_lines[0]
+    else:
+        first = next((line for line in reversed(lines) if line.strip()), "")
+        if (result / SUMMARY).is_file():
+            try:
+                shutil.rmtree(result)
+            except OSError as err:
+                raise cannot_write(result, err) from None
     write_whole(verdict_file(program), "\n".join([*lines, OF_INPUT + of_input, ""]).encode())
-    return ProgramChecked(program, code, _first_line(lines, code), time.monotonic() - begin)
+    return ProgramChecked(program, code, first, time.monotonic() - begin)
 
 
 def watch_folder(
@@ -215,7 +227,7 @@ def watch_folder(
                 continue
             try:
                 known = recorded_hash(program) == settings.hash(program)
-                checked = None if known else check_program(program, settings)
+                checked = None if known else simulate_posted(program, settings)
             except InputError as err:
                 if not program.exists():
                     continue  # it was taken away
@@ -267,10 +279,3 @@ def _end(process: subprocess.Popen[bytes]) -> None:
         except subprocess.TimeoutExpired:
             stop_group(process.pid, kill=True)
             process.communicate()
-
-
-def _first_line(lines: Sequence[str], code: int) -> str:
-    """The line of a run that states its verdict, or its first error."""
-    states = ("holds", "exceeds", "unproven")
-    wanted = [line for line in lines if line.lower().startswith(states if code in (0, 3, LATE) else "chipload: ")]
-    return (wanted or [line for line in lines if line.strip()] or [""])[0]
