@@ -7,6 +7,7 @@ from html import escape
 
 from nicegui import ui
 
+from chipload.number_text import number_text
 from chipload.web.comparison import Side, key_numbers, knots
 from chipload.web.panels.limits import CLASSES
 
@@ -42,10 +43,12 @@ def comparison_table(sides: Sequence[Side], against: str) -> str:
     for number in key_numbers(sides):
         cells = []
         for k, value in enumerate(number.values):
-            cells.append(f"<td class=n>{'-' if value is None else f'{value:.4g}'}</td>")
+            cells.append(f"<td class=n>{'-' if value is None else number_text(value)}</td>")
             if k:
                 more, percent = number.difference(k)
-                text = "" if more is None else f"{more:+.3g}" + ("" if percent is None else f" ({percent:+.1f} %)")
+                sign = "+" if more is not None and more > 0.0 else ""
+                share = "" if percent is None else f" ({percent:+.1f} %)"
+                text = "" if more is None else f"{sign}{number_text(more, 3)}{share}"
                 cells.append(f"<td class=n>{text}</td>")
         unit = f" [{number.unit}]" if number.unit else ""
         body.append(f"<tr><td>{escape(number.label + unit)}</td>{''.join(cells)}</tr>")

@@ -121,8 +121,9 @@ def tool_table(
         tool = f"T{use.tool}" if use.tool else "cutter"
         label = f"{track.own.name}, {tool}" if names else tool
         bars = "".join(
-            f'<b data-track="{number}" data-row="{p.first}" title="{escape(label)}: {starts[number] + p.begin:.4g} to '
-            f'{number_text(starts[number] + p.end)} s" style="left:{100.0 * (starts[number] + p.begin) / whole:.3f}%;'
+            f'<b data-track="{number}" data-row="{p.first}" title="{escape(label)}: '
+            f'{number_text(starts[number] + p.begin)} to {number_text(starts[number] + p.end)} s" '
+            f'style="left:{100.0 * (starts[number] + p.begin) / whole:.3f}%;'
             f'width:{max(100.0 * (p.end - p.begin) / whole, THIN):.3f}%;background:{COLOURS[k % len(COLOURS)]}"></b>'
             for p in use.periods
         )
@@ -136,16 +137,16 @@ def tool_table(
         tool = f"T{use.tool}" if use.tool else "cutter"
         cells = "".join(
             f'<td class="n cl-go" data-track="{number}" data-row="{use.worst[c][1]}" title="go there">'
-            f"{use.worst[c][0]:.4g}</td>" if c in use.worst else "<td class=n></td>"
+            f"{number_text(use.worst[c][0])}</td>" if c in use.worst else "<td class=n></td>"
             for c in loads
         )  # fmt: skip
-        cut = "" if use.cut_s is None else f"{use.cut_s:.4g}"
+        cut = "" if use.cut_s is None else number_text(use.cut_s)
         share = "" if use.cut_s is None or use.time_s <= 0.0 else f"{100.0 * use.cut_s / use.time_s:.0f}"
-        length = "" if use.cut_mm is None else f"{use.cut_mm:.4g}"
+        length = "" if use.cut_mm is None else number_text(use.cut_mm)
         name = f"<td>{escape(track.own.name)}</td>" if names else ""
         body.append(
-            f"<tr>{name}<td>{tool}</td><td class=n>{use.time_s:.4g}</td><td class=n>{cut}</td><td class=n>{share}</td>"
-            f"<td class=n>{length}</td>{cells}</tr>"
+            f"<tr>{name}<td>{tool}</td><td class=n>{number_text(use.time_s)}</td><td class=n>{cut}</td>"
+            f"<td class=n>{share}</td><td class=n>{length}</td>{cells}</tr>"
         )
     first = "<th>program</th>" if names else ""
     return (
@@ -167,11 +168,11 @@ def line_table(lines: Sequence[LineLoad], by: str) -> str:
     body = []
     for line in lines:
         share = 100.0 * line.worst[by] / most
-        cells = "".join(f"<td class=n>{line.worst[c]:.4g}</td>" for c in columns)
+        cells = "".join(f"<td class=n>{number_text(line.worst[c])}</td>" for c in columns)
         bar = f'<div class="cl-share"><div class="cl-plain-bar" style="width:{share:.0f}%"></div></div>'
         body.append(
             f'<tr data-row="{line.row}" class="cl-go" title="go there"><td class=n>{line.line}</td><td>{bar}</td>'
-            f"{cells}<td class=n>{line.time_s:.4g}</td></tr>"
+            f"{cells}<td class=n>{number_text(line.time_s)}</td></tr>"
         )
     return (
         f'<table class="cl-limits"><thead><tr><th class=n>line</th><th></th>{head}<th class=n>time [s]</th></tr>'
