@@ -37,8 +37,8 @@ def main() -> int:
     begin = time.process_time()
     ranks, error, left, refused = [], [], [], 0
     for seed in range(given.cells):
-        logs, signal, truth = cell(1000 + seed, given.logs)
         try:
+            logs, signal, truth = cell(1000 + seed, given.logs)
             found = learn_material(logs, signal, PRIOR)
         except InputError as err:
             refused += 1

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
+from hashlib import sha256
 
 import numpy as np
 import pytest
 
 from chipload import jobs
+from chipload.cutting.learned import LearnedRecord, LogEvidence
+from chipload.cutting.material import knowledge_text, material_named, material_text, read_material
+from chipload.errors import Severity
+from chipload.jobs.next_measurement import next_measurement
 from command import call
 from spindle_logs import IDLE, KT, spindle_log
 
@@ -32,15 +38,20 @@ modulus_gpa = 580.0
 runout_mm = 0.0
 [[operation]]
 kind = "simulate"
-step_mm = 1.0
+step_mm = 2.0
 [limits]
 force_n = 5000.0
+torque_nm = {torque}
 """
 #: passes of unlike width, depth and feed, with air between them
 PASSES = [(2.0, 6.0, 900), (1.0, 3.0, 1500), (6.0, 4.0, 700), (9.0, 2.0, 500), (0.5, 8.0, 2000), (4.0, 5.0, 1000)]
 TRUE = {"ktc_mpa": 950.0, "kte_n_mm": 22.0}
 #: of the spindle [rad/s], 8000 rpm
 SPEED = 837.76
+
+
+def job_text(material: str, torque: float = 20.0) -> str:
+    return JOB.format(material=material, torque=torque)
 
 
 def program_text() -> str:
@@ -56,11 +67,11 @@ def program_text() -> str:
 def cell(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cell")
     (folder / "part.nc").write_text(program_text())
-    (folder / "job.toml").write_text(JOB.format(material='name = "al7075-t6"'))
+    (folder / "job.toml").write_text(job_text('name = "al7075-t6"'))
     true = "\n".join(f"{key} = {value}" for key, value in TRUE.items())
     rest = "krc_mpa = 168.8\nkac_mpa = 222.0\nkre_n_mm = 26.6\nkae_n_mm = 0.7\nspread = 0.1\n"
     (folder / "true.toml").write_text(f'name = "true"\nsource = "drawn for this test"\n{true}\n{rest}')
-    (folder / "true_job.toml").write_text(JOB.format(material='file = "true.toml"'))
+    (folder / "true_job.toml").write_text(job_text('file = "true.toml"'))
     history = jobs.run_job(jobs.load_job(folder / "true_job.toml")).result.in_use[0].columns
     end = history["t_s"]
     rng = np.random.default_rng(1)
@@ -78,8 +89,12 @@ def cell(tmp_path_factory):
     return folder
 
 
-def test_coefficients_are_found(cell):
-    """Both within two standard deviations, each known to 5 %; the material is one that a job takes."""
+def test_coefficients_are_found(cell, monkeypatch):
+    """Both within two standard deviations, each known to 5 %; the material is one that a job takes. What is said of its
+    worth and of what to measure next is that of the runs with the material before and after.
+    """
+    runs, run = [], jobs.run_job
+    monkeypatch.setattr(jobs, "run_job", lambda *given, **named: runs.append(run(*given, **named)) or runs[-1])
     code, out, err = call(
         "learn", cell / "log0.csv", cell / "log1.csv", "--job", cell / "job.toml", "--out", cell / "learned.toml",
         "--efficiency", "0.85",
@@ -93,8 +108,23 @@ def test_coefficients_are_found(cell):
     assert found["krc_mpa"] == 168.8
     assert "log0.csv (sha256" in found["source"]
     assert "power and current tell the tangential force alone" in out
-    (cell / "next.toml").write_text(JOB.format(material='file = "learned.toml"'))
-    assert jobs.check_job(jobs.load_job(cell / "next.toml"))[1]
+    before, after = (done.result for done in runs)
+    record = found["learned"]
+    assert record["prior_ktc_mpa"] == 767.01
+    assert record["log"][0]["sha256"] == sha256((cell / "log0.csv").read_bytes()).hexdigest()
+    worth = record["worth"][0]
+    held = [next(c for c in r.limits if c.name == worth["limit"]) for r in (before, after)]
+    assert worth["of_limit"] == pytest.approx([c.value_at_confidence / c.limit for c in held], rel=1e-9)
+    assert held[1].budget.value(1.0) < held[0].budget.value(1.0) - 0.2
+    notes = [f for f in (*after.findings, *after.in_use[0].findings) if f.code == "learned-material"]
+    assert [f.severity for f in notes] == [Severity.NOTE]
+    assert "log1.csv (rows " in notes[0].text
+    learned = read_material(cell / "learned.toml")
+    assert f"worth: {learned.learned.worth[0].text}\n" in out
+    assert knowledge_text(learned).startswith(notes[0].text.removeprefix("al7075-t6-learned: "))
+    following = next_measurement(runs[1].outcome, after, 0.05)
+    assert "\n".join(following.texts) in out
+    assert following.deviation == pytest.approx(held[1].budget.parts[0].deviation, rel=0.02)
 
 
 def test_current_of_an_identified_spindle(cell, tmp_path):
@@ -104,7 +134,7 @@ def test_current_of_an_identified_spindle(cell, tmp_path):
     assert call("spindle", *logs, "--out", tmp_path / "spindle.toml")[0] == 0
     code, _, err = call(
         "learn", cell / "current.csv", "--job", cell / "job.toml", "--out", tmp_path / "m.toml", "--spindle",
-        tmp_path / "spindle.toml",
+        tmp_path / "spindle.toml", "--no-worth",
     )  # fmt: skip
     assert (code, err) == (0, "")
     found = tomllib.loads((tmp_path / "m.toml").read_text())
@@ -114,12 +144,40 @@ def test_current_of_an_identified_spindle(cell, tmp_path):
         assert abs(found[key] - value) < 2.5 * deviation
 
 
+def test_what_to_measure_next_without_a_log(cell):
+    code, out, _ = call("next-measurement", cell / "job.toml", "--efficiency-error", "0.0")
+    assert code == 0
+    lines = out.splitlines()
+    assert lines[0].startswith("deciding load: spindle_power_w at confidence ")
+    assert lines[1].startswith("share of that variance: Ktc ")
+    assert "Krc" not in lines[1]
+    code, _, err = call("next-measurement", cell / "job.toml", "--efficiency-error", "1.5")
+    assert code == 2
+    assert "--efficiency-error = 1.5: must be from 0 to below 1" in err
+
+
 def test_refusals(cell, tmp_path):
     job, out = cell / "job.toml", tmp_path / "m.toml"
     (tmp_path / "current.csv").write_text("time_s,current_a\n0,1\n1,2\n2,1\n")
     code, _, err = call("learn", tmp_path / "current.csv", "--job", job, "--out", out)
     assert code == 2
     assert "no column of power or torque that all logs have; of current, state the spindle" in err
+    (tmp_path / "torque.csv").write_text("time_s,torque_nm\n0,1\n1,2\n2,1\n")
+    code, _, err = call("learn", tmp_path / "torque.csv", "--job", job, "--out", out, "--efficiency", "0.9")
+    assert code == 2
+    assert "efficiency: not used: the logs state the torque: leave it out" in err
+    learned = replace(material_named("al7075-t6"), name="learned", learned=LearnedRecord(
+        "al7075-t6", (767.0, 0.25), (27.7, 0.25),
+        (LogEvidence("x.csv", sha256((cell / "log0.csv").read_bytes()).hexdigest(), (1, 9), 9, 0),),
+    ))  # fmt: skip
+    (tmp_path / "learned.toml").write_text(material_text(learned))
+    assert read_material(tmp_path / "learned.toml") == learned
+    again = tmp_path / "again.toml"
+    again.write_text(job_text('file = "learned.toml"'))
+    (tmp_path / "part.nc").write_text(program_text())
+    code, _, err = call("learn", cell / "log0.csv", "--job", again, "--out", out, "--no-worth")
+    assert code == 2
+    assert "log0.csv: learned was learned from it: a log counts once" in err
     code, _, err = call("learn", cell / "log0.csv", "--job", job, "--out", out, "--efficiency", "1.5")
     assert code == 2
     assert "efficiency = 1.5: must be above 0 and at most 1" in err

@@ -55,7 +55,7 @@ def test_a_time_of_a_row_and_a_file_of_columns(path, tmp_path):
 @pytest.mark.parametrize(
     ("columns", "text"),
     [
-        ({}, "log columns: current is missing: the column of the spindle current must be named, or power"),
+        ({}, "log columns: current is missing: the column of the spindle current must be named, or power or torque"),
         ({"current": {"column": "I", "unit": "A"}}, "log columns: must give either time or sample_s"),
         ({**COLUMNS, "sample_s": 0.1}, "log columns: must give either time or sample_s"),
         ({"curent": {}}, "log columns: unknown quantity curent: the nearest known one is current"),

@@ -50,6 +50,22 @@ def test_a_load_that_is_one_coefficient_times_the_chip_has_the_quantile_of_that_
     assert at_95(own, "force_n", mill, alone, own.load) == pytest.approx(expected, rel=1e-6)
 
 
+def test_elasticities_are_the_changes_by_each_coefficient() -> None:
+    """Loads are linear in the coefficients, so that the elasticities add up to 1; each against a load with 0.1 % more
+    of its coefficient, at the rotation of its own peak.
+    """
+    mill = Cutter(10.0, 2, 0.5, 20.0, 30.0, 6e5, runout_size=0.0)
+    cut = up(mill, 4.0, 0.08, 3.0)
+    base = load_parts(cut, mill, metal())
+    for name in ("force_n", "torque_nm", "torque_mean_nm"):
+        own = base[name][0]
+        assert sum(own.elasticity) == pytest.approx(1.0, abs=1e-12)
+        for k in range(6):
+            more = tuple(v * (1.001 if i == k else 1.0) for i, v in enumerate(K))
+            raised = load_parts(cut, mill, metal(coefficients=more))[name][0]
+            assert (raised.load / own.load - 1.0) / 1e-3 == pytest.approx(own.elasticity[k], abs=1e-3)
+
+
 def test_parts_of_a_budget_by_hand() -> None:
     """100 N, bounds 1 and 4 %, rise 20 % with its scatter, deviations 3 and 4 %: the root of the squares is 0.0764."""
     parts = (

@@ -17,6 +17,7 @@ from chipload.checking.rows import motion_rows, step_rows
 from chipload.checking.stability import StabilityResult
 from chipload.checking.workpiece import stock_box
 from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import knowledge_text
 from chipload.errors import Finding, Severity
 from chipload.program.block_delete import with_block_delete
 from chipload.program.read import line_times
@@ -186,6 +187,8 @@ def simulation_findings(simulation: SimulationResult) -> tuple[Finding, ...]:
     out += _bodies(simulation)
     columns = simulation.removal.columns
     out += [*ramp_findings(simulation.checks, columns), *range_findings(simulation.checks, columns)]
+    if knowledge := knowledge_text(simulation.checks.material):
+        out.append(Finding("learned-material", 0, f"{simulation.checks.material.name}: {knowledge}", Severity.NOTE))
     if simulation.skipped is not None:
         out += _skipped_findings(simulation.skipped, out)
     return tuple(out)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from chipload.control.learning import LearnedMaterial, Signal
     from chipload.control.log_alignment import PredictedTorque
     from chipload.cutting.material import Material
+    from chipload.jobs import FinishedJob
 
 
 @app.command()
@@ -39,46 +42,68 @@ def learn(
     efficiency_error: Annotated[
         float | None, typer.Option("--efficiency-error", help="its relative standard deviation; default 0.05")
     ] = None,
+    following: Annotated[
+        Path | None,
+        typer.Option(
+            "--next", metavar="JOB", help="the job that runs next: what the knowledge is worth to it; default: --job"
+        ),
+    ] = None,
+    worth: Annotated[
+        bool,
+        typer.Option(
+            "--worth/--no-worth", help="run the next job with the material before and after, and compare the two"
+        ),
+    ] = True,
     columns: Annotated[
         Path | None,
         typer.Option("--columns", metavar="FILE", help="names and units of the columns (TOML), if the log states none"),
     ] = None,
-    sets: Sets = None,
+    overrides: Sets = None,
     debug: Debug = False,
 ) -> None:
     """Learn the force coefficients of a material from logs of the spindle while the program of a job ran.
 
     The job is simulated, each log aligned with it, and Ktc and Kte are updated: the spread of the job's material is
-    what was known before. Logs have the columns time_s, and power_w, torque_nm or current_a (with --spindle); with
-    line or override they are aligned more surely. Exit code 3: the logs show something that the job does not have.
+    what was known before. Then the job is run with the material before and after: the limits, and the time saved by new
+    feeds, that the knowledge gives. Logs have the columns time_s, and power_w, torque_nm or current_a (with --spindle);
+    with line or override they are aligned more surely. Exit code 3: the logs show something that the job does not have.
     """
 
     def work() -> int:
-        from chipload.control.learning import SignalKind, learn_from_logs, signal_of_logs
+        from chipload.api.mechanics.learning import torque_of_result
+        from chipload.control.learning import SignalKind, learn_from_logs, refuse_known_logs, signal_of_logs
         from chipload.control.logs import read_log
-        from chipload.cutting.material import material_text
+        from chipload.cutting.material import material_text, with_worth
         from chipload.files import write_whole
+        from chipload.jobs.knowledge_worth import worth_of_knowledge
 
-        read, hashes = {}, []
+        if following is not None and not worth:
+            raise InputError("--next, --no-worth: the next job is run only for the worth: state one of them")
+        read, hashes = {}, {}
         for path in logs:
             log, findings = read_log(path, columns)
             for f in findings:
                 show(f"{path.name}: {f}")
             read[path.name] = log
-            hashes.append(f"{path.name} (sha256 {sha256(path.read_bytes()).hexdigest()[:16]})")
+            hashes[path.name] = sha256(path.read_bytes()).hexdigest()
         if len(read) < len(logs):
             raise InputError("LOG: two logs have one name: name each once, and rename one of two")
-        predicted, prior = _prediction(job, sets or ())
+        sets = tuple(overrides or ())
+        material, prior = _program_job(job, sets)
+        # what can be refused without a simulation
+        refuse_known_logs(prior, hashes)
+        if spindle is not None and (efficiency is not None or efficiency_error is not None):
+            raise InputError("--spindle, --efficiency: state only one of them")
         if spindle is None:
             signal, lag = signal_of_logs(read.values(), efficiency, efficiency_error), 0.0
-        elif efficiency is None and efficiency_error is None:
+        done = _run(job, sets)
+        predicted = torque_of_result(done.result, str(job))
+        if spindle is not None:
             signal, lag = _signal_of_spindle(spindle, predicted)
-        else:
-            raise InputError("--spindle, --efficiency: state only one of them")
         if signal.kind is SignalKind.POWER:
             spread = number_text(100.0 * signal.gain_error, 2)
             show(f"efficiency of the spindle: {number_text(1.0 / signal.gain)} +- {spread} %")
-        found, aligned = learn_from_logs(read, predicted, signal, prior, lag, name, ", ".join(hashes))
+        found, aligned = learn_from_logs(read, predicted, signal, prior, lag, name, hashes)
         for one in aligned:
             stated_line = read[one.name].line is not None
             clock = (
@@ -88,16 +113,24 @@ def learn(
         write_whole(out, material_text(found.material).encode("utf-8"))
         for line in lines_of(found):
             show(line)
+        if worth:
+            own = following or job
+            before = done if following is None else _run(own, _stating(sets, material))
+            after = _run(own, _stating(sets, out.absolute()))
+            gain = worth_of_knowledge(own, before.result, after.result)
+            write_whole(out, material_text(with_worth(found.material, gain)).encode("utf-8"))
+            show(f"worth: {gain.text}")
+            for line in _next_lines(after, signal):
+                show(line)
         show(f'written: {out}; name it in the job: [material] file = "{out.name}"')
         return EXCEEDED if any(f.severity is not Severity.NOTE for f in found.findings) else 0
 
     run_guarded(work, debug)
 
 
-def _prediction(job: Path, sets: Any) -> tuple[PredictedTorque, Material]:
-    """Return the torque of the program of a job, simulated now, and the material of the job."""
+def _program_job(job: Path, sets: Sequence[str]) -> tuple[Path | str, Material]:
+    """Return the file or the name of the material of a job of a program, and the material."""
     from chipload import jobs
-    from chipload.api.mechanics.learning import torque_of_result
     from chipload.jobs.simulation.job import ProgramJob
     from chipload.jobs.simulation.run import material_of
 
@@ -105,9 +138,36 @@ def _prediction(job: Path, sets: Any) -> tuple[PredictedTorque, Material]:
     if not isinstance(loaded.job, ProgramJob):
         raise InputError(f"{job}: a job of {loaded.capability.name}: state one that simulates the program that ran")
     material = material_of(loaded.job)
+    return loaded.job.material or material.name, material
+
+
+def _run(job: Path, sets: Sequence[str]) -> FinishedJob:
+    """Run a job."""
+    from chipload import jobs
+
     with bar() as progress:
-        result = jobs.run_job(loaded, progress, accept=True).result
-    return torque_of_result(result, str(job)), material
+        return jobs.run_job(jobs.load_job(job, sets), progress, accept=True)
+
+
+def _next_lines(done: FinishedJob, signal: Signal) -> list[str]:
+    """Return what to measure next for a job that was run, a line each; none where it is no job of a program."""
+    from chipload.checking.outcome import ProgramResult
+    from chipload.control.learning import SignalKind
+    from chipload.jobs.next_measurement import next_measurement
+
+    if not isinstance(done.outcome, ProgramResult):
+        return []
+    try:
+        return next_measurement(done.outcome, done.result, signal.gain_error, signal.kind is SignalKind.POWER).texts
+    except InputError as err:
+        # no load has a limit: what was learned stays
+        return [f"what to measure next: {err}"]
+
+
+def _stating(sets: Sequence[str], material: Path | str) -> tuple[str, ...]:
+    """Return the keys that are set, with another material."""
+    key = "name" if isinstance(material, str) else "file"
+    return (*sets, f"material.{key}={json.dumps(str(material))}")
 
 
 def _signal_of_spindle(file: Path, predicted: PredictedTorque) -> tuple[Signal, float]:

@@ -23,6 +23,7 @@ import enum
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from scipy.optimize import least_squares
 from chipload.control.log_alignment import AlignedLog, PredictedTorque, align_log
 from chipload.control.log_blocks import LogBlocks, blocks_of
 from chipload.control.logs import SpindleLog
+from chipload.cutting.learned import LearnedRecord, LogEvidence
 from chipload.cutting.material import Material
 from chipload.errors import Finding, InputError, Severity
 from chipload.number_text import number_text
@@ -136,7 +138,7 @@ class LearnedMaterial:
     material, prior : after and before
     wear : tool number -> growth of Kte an hour of cutting, relative, and its standard deviation
     fit_error : log -> signal of its cut over what the new coefficients predict, less 1
-    used, left_out : blocks
+    blocks : log -> (used, left out)
     findings : what contradicts the model, by line
     """
 
@@ -144,9 +146,18 @@ class LearnedMaterial:
     prior: Material
     wear: dict[int, tuple[float, float]]
     fit_error: dict[str, float]
-    used: int
-    left_out: int
+    blocks: dict[str, tuple[int, int]]
     findings: tuple[Finding, ...]
+
+    @property
+    def used(self) -> int:
+        """Blocks that were used."""
+        return sum(used for used, _ in self.blocks.values())
+
+    @property
+    def left_out(self) -> int:
+        """Blocks that were left out."""
+        return sum(out for _, out in self.blocks.values())
 
     @property
     def deviations(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -268,11 +279,11 @@ def learn_material(
                 "of cutting: the edge wears"
             )
             findings.append(Finding("log-wear", 0, text, Severity.NOTE))
-    used = sum(int(own.sum()) for own in kept)
+    counts = [(int(own.sum()), int((~own).sum())) for own in kept]
     return LearnedMaterial(
         _material_after(prior, x[:2], covariance[:2, :2], name, evidence), prior, wear,
         {log.name: _fit_error(model, x, k, kept[k]) for k, log in enumerate(logs)},
-        used, sum(len(log.time) for log in logs) - used, tuple(findings),
+        {log.name: count for log, count in zip(logs, counts, strict=True)}, tuple(findings),
     )  # fmt: skip
 
 
@@ -318,7 +329,7 @@ def learn_from_logs(
     prior: Material,
     sensor_lag: float = 0.0,
     name: str = "",
-    evidence: str = "",
+    hashes: Mapping[str, str] = MappingProxyType({}),
 ) -> tuple[LearnedMaterial, list[AlignedLog]]:
     """Align logs of one program with its simulation and learn from them.
 
@@ -326,14 +337,17 @@ def learn_from_logs(
     ----------
     logs : by name, in the order in which they ran with the same tools
     predicted : of the program, with the prior material
-    signal, prior, name, evidence : as :func:`learn_material`
+    signal, prior, name : as :func:`learn_material`
     sensor_lag : time constant of the sensor [s]
+    hashes : log -> SHA-256 of its bytes, for the record of the material
 
     Raises
     ------
     InputError
-        As :func:`chipload.control.log_alignment.align_log` and :func:`learn_material`; a log lacks the signal.
+        As :func:`chipload.control.log_alignment.align_log` and :func:`learn_material`; a log lacks the signal, or the
+        prior was learned from it.
     """
+    refuse_known_logs(prior, hashes)
     aligned, blocks, before = [], [], 0.0
     for key, log in logs.items():
         columns = {SignalKind.POWER: log.power, SignalKind.CURRENT: log.current, SignalKind.TORQUE: log.torque}
@@ -343,9 +357,45 @@ def learn_from_logs(
         aligned.append(align_log(key, log, values, predicted, sensor_lag))
         blocks.append(blocks_of(aligned[-1], predicted, before, sensor_lag))
         before += predicted.cut_seconds
+    evidence = ", ".join(f"{key} (sha256 {hashes[key][:16]})" if key in hashes else key for key in logs)
     found = learn_material(blocks, signal, prior, name, evidence)
+    material = replace(found.material, learned=_record(found, aligned, hashes))
     gaps = tuple(f for one in aligned for f in one.findings)
-    return replace(found, findings=(*gaps, *found.findings)), aligned
+    return replace(found, material=material, findings=(*gaps, *found.findings)), aligned
+
+
+def refuse_known_logs(prior: Material, hashes: Mapping[str, str]) -> None:
+    """Refuse logs that a material was learned from.
+
+    Parameters
+    ----------
+    hashes : log -> SHA-256 of its bytes
+
+    Raises
+    ------
+    InputError
+        One of them is.
+    """
+    known = {log.sha256 for log in prior.learned.logs} if prior.learned is not None else set()
+    for key, value in hashes.items():
+        if value in known:
+            raise InputError(
+                f"{key}: {prior.name} was learned from it: a log counts once, or its interval would be too narrow; "
+                "leave it out, or start from the material before"
+            )
+
+
+def _record(found: LearnedMaterial, aligned: Iterable[AlignedLog], hashes: Mapping[str, str]) -> LearnedRecord:
+    """Return what the material was before the first log, and all its logs."""
+    own, prior = [], found.prior
+    for log in aligned:
+        inside = np.flatnonzero(log.row >= 0)
+        rows = (int(inside[0]) + 1, int(inside[-1]) + 1)
+        own.append(LogEvidence(log.name, hashes.get(log.name, ""), rows, *found.blocks[log.name]))
+    if prior.learned is not None:
+        return replace(prior.learned, logs=(*prior.learned.logs, *own), worth=())
+    before = found.deviations[0]
+    return LearnedRecord(prior.name, (prior.Ktc, before[0]), (prior.Kte, before[1]), tuple(own))
 
 
 def _check_unit(log: LogBlocks, signal: Signal) -> None:

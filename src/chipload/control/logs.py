@@ -49,6 +49,8 @@ UNITS: dict[str, dict[str, float]] = {
     "line": {"": 1.0},
     "override": {"": 1.0, "%": 1e-2},
 }
+#: quantities that tell the load
+LOADS = frozenset({"current", "power", "torque"})
 _QUANTITIES = (*UNITS, "label")
 #: columns that are known by their names: name -> quantity, unit
 KNOWN = {
@@ -175,10 +177,10 @@ def _by_name(label: str, names: list[str]) -> _Columns:
         quantity, unit = KNOWN.get(name, ("", ""))
         if quantity and quantity not in wanted:
             wanted[quantity] = (name, unit)
-    if "time" not in wanted or not {"current", "power"} & set(wanted):
+    if "time" not in wanted or not LOADS & set(wanted):
         raise InputError(
-            f"{label}: no column of time and of current or power by a known name, as time_s and current_a: state "
-            "--columns, a TOML file that names them"
+            f"{label}: no column of time and of current, power or torque by a known name, as time_s and current_a: "
+            "state --columns, a TOML file that names them"
         )
     return _Columns(wanted, None, (), True)
 
@@ -243,8 +245,10 @@ def _check_columns(columns: dict[str, Any] | str | Path) -> _Columns:
                 raise InputError(f"{label}: label.cutting = {texts!r}: must be a list of texts")
             cutting = tuple(texts)
         out[key] = (str(column), unit)
-    if not {"current", "power"} & set(out):
-        raise InputError(f"{label}: current is missing: the column of the spindle current must be named, or power")
+    if not LOADS & set(out):
+        raise InputError(
+            f"{label}: current is missing: the column of the spindle current must be named, or power or torque"
+        )
     if ("time" in out) == (sample is not None):
         raise InputError(f"{label}: must give either time or sample_s")
     return _Columns(out, sample, cutting, head)

@@ -144,16 +144,26 @@ def force_deviation(engagement: ToothEngagement, cutter: Cutter, material: Mater
     """Return the standard deviation (n,) [N] of the size of the force of each step at its rotation, see
     :func:`peak_band`.
     """
+    return _deviation(force_factors(engagement, cutter, material, theta), material)
+
+
+def force_factors(engagement: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
+    """Return dF/dK (n, 6) of the size F of the force of each step at its rotation, by coefficient."""
     loads = _bases_at(engagement, cutter, material, theta)
     force = loads[:, :3] @ np.array(material.coefficients)
     size = np.linalg.norm(force, axis=1)
     along = np.divide(force, size[:, None], out=np.zeros_like(force), where=size[:, None] > 0.0)
-    return _deviation(np.einsum("ni,nik->nk", along, loads[:, :3]), material)
+    return np.asarray(np.einsum("ni,nik->nk", along, loads[:, :3]))
 
 
 def torque_deviation(engagement: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
     """Return the standard deviation (n,) [N mm] of the torque of each step at its rotation, see :func:`peak_band`."""
-    return _deviation(_bases_at(engagement, cutter, material, theta)[:, 3], material)
+    return _deviation(torque_factors(engagement, cutter, material, theta), material)
+
+
+def torque_factors(engagement: ToothEngagement, cutter: Cutter, material: Material, theta: ArrayLike) -> Floats:
+    """Return dT/dK (n, 6) of the torque of each step at its rotation, by coefficient."""
+    return np.asarray(_bases_at(engagement, cutter, material, theta)[:, 3])
 
 
 def _deviation(factors: Floats, material: Material) -> Floats:

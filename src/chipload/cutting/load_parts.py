@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.band import deviations, peak_band
+from chipload.cutting.band import force_factors, torque_factors
 from chipload.cutting.material import Material
 from chipload.cutting.revolution import loads_over_turn
 from chipload.engagement.extent import radial_depth
@@ -63,6 +63,8 @@ class LoadParts:
     assumed_runout : whether the runout is not stated: its rise has a standard deviation of :data:`SCATTER` of it
     assumed_spread : whether the material does not state the spread of its coefficients
     radial_depth : of the cut [mm]; inf: a full slot, whose width no deflection changes
+    elasticity : (6,) relative change of the load with that of each coefficient, K dL/dK / L, whose sum is 1; empty: not
+        known
 
     Raises
     ------
@@ -77,6 +79,7 @@ class LoadParts:
     assumed_runout: bool = False
     assumed_spread: bool = False
     radial_depth: float = math.inf
+    elasticity: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         numbers = (self.load, self.rise, self.coefficients, self.thin_chips)
@@ -189,21 +192,28 @@ def load_parts(plain: ToothEngagement, cutter: Cutter, material: Material) -> di
     engagement = chips_of_teeth(plain, cutter)
     loads, turned = _loads(engagement, cutter, material)
     at = (turned[:, 0], turned[:, 1])
-    force_sd, torque_sd = peak_band(engagement, cutter, known, *at)
-    mean_sd = deviations(loads_over_turn(engagement, cutter, known, ROTATION, np.zeros((n, 3)))[2], known)[:, 3] / 1e3
-    deviation = {
-        "force_n": force_sd, "torque_nm": torque_sd / 1e3, "torque_mean_nm": mean_sd, CHIP: np.zeros(n),
-    }  # fmt: skip
+    factors = {
+        "force_n": force_factors(engagement, cutter, known, at[0]),
+        "torque_nm": torque_factors(engagement, cutter, known, at[1]) / 1e3,
+        "torque_mean_nm": loads_over_turn(engagement, cutter, known, ROTATION, np.zeros((n, 3)))[2][:, 3] / 1e3,
+        CHIP: np.zeros((n, 6)),
+    }
     e, assumed = runout_of(cutter)
     rise = _rises(plain, cutter, material, loads, e, greatest=not assumed)
     edge, depth = _thin_chips(engagement, cutter, material, loads), radial_depth(plain)
     depth = np.where(depth < SLOT * cutter.resolved_diameter, depth, math.inf)
     out = {}
-    for name, deviates in deviation.items():
+    for name, factor in factors.items():
         base, up, thin = loads[name], rise.get(name, np.zeros(n)), edge.get(name, np.zeros(n))
+        deviates = np.sqrt(np.clip(np.einsum("nk,kl,nl->n", factor, known.variances, factor), 0.0, None))
         spread = np.divide(deviates, base, out=np.zeros(n), where=base > 0.0)
+        own = factor * np.array(known.coefficients)
+        each = np.divide(own, base[:, None], out=np.zeros((n, 6)), where=base[:, None] > 0.0).tolist()
         numbers = np.column_stack([base, up, spread, thin, depth]).tolist()
-        out[name] = tuple(LoadParts(x, r, k, t, assumed, not material.has_band, wide) for x, r, k, t, wide in numbers)
+        out[name] = tuple(
+            LoadParts(x, r, k, t, assumed, not material.has_band, wide, () if name == CHIP else tuple(e))
+            for (x, r, k, t, wide), e in zip(numbers, each, strict=True)
+        )
     out["force_normal_n"], out["power_w"] = out["force_n"], out["torque_mean_nm"]
     return out
 

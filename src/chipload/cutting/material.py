@@ -12,14 +12,16 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.cutting.learned import KnowledgeWorth, LearnedRecord, learned_of, learned_text
 from chipload.errors import InputError
+from chipload.number_text import number_text
 from chipload.tables import nearest, read_table, shipped_names, shipped_table
 from chipload.units import mm_min_from_mm_s, mm_s_from_mm_min
 
@@ -40,7 +42,7 @@ _RANGES = {"chip": ("chip_min_mm", "chip_max_mm"), "speed": ("speed_min_m_min", 
 _SPREADS = ("spread_radial", "spread_axial")
 _KEYS = (
     *_TEXTS, *_NUMBERS, *_EXPONENTS, *_RANGES["chip"], *_RANGES["speed"], "spread", *_SPREADS, "covariance",
-    "peak_excess", "tap_kc_mpa",
+    "peak_excess", "tap_kc_mpa", "learned",
 )  # fmt: skip
 
 #: correlation of the errors of two coefficients whose material states a spread: between independent errors and one
@@ -77,6 +79,7 @@ class Material:
     tap_kc : specific cutting force of tapping [MPa], > 0; None: not known
     covariance : (6, 6), of (Ktc, Krc, Kac, Kte, Kre, Kae) in products of MPa and N/mm, from a fit; instead of
         ``spread``; None: not known
+    learned : what it was before, and the logs that changed it (``chipload learn``); None: it was not learned
 
     Raises
     ------
@@ -104,6 +107,7 @@ class Material:
     peak_excess: float = 0.0
     spread_directions: tuple[float, float] | None = None
     tap_kc: float | None = None
+    learned: LearnedRecord | None = None
 
     def __post_init__(self) -> None:
         for key, (name, low, high) in _NUMBERS.items():
@@ -251,8 +255,11 @@ def _from_table(label: str, table: dict[str, Any]) -> Material:
     exponents: Any = tuple(_number(label, key, table.get(key, 0.0)) for key in _EXPONENTS)
     covariance: Any = _matrix(label, table["covariance"]) if "covariance" in table else None
     texts: dict[str, Any] = {key: table.get(key, "") for key in _TEXTS}
+    learned = learned_of(label, table["learned"]) if "learned" in table else None
     try:
-        return Material(**numbers, **texts, **ranges, spread=spread, exponents=exponents, covariance=covariance)
+        return Material(
+            **numbers, **texts, **ranges, spread=spread, exponents=exponents, covariance=covariance, learned=learned
+        )
     except InputError as err:
         raise InputError(f"{label}: {err}") from None
 
@@ -264,7 +271,8 @@ def read_material(path: str | Path) -> Material:
     depth), ``source``; without all four radial and axial ones only the tangential force is known; optional
     ``workpiece``, ``conditions``, ``cutter``, ``chip_min_mm`` with ``chip_max_mm``, ``speed_min_m_min`` with
     ``speed_max_m_min``, ``exponent_t``, ``exponent_r``, ``exponent_a``, ``spread`` (with ``spread_radial`` and
-    ``spread_axial`` where these differ) or ``covariance`` (6 rows of 6), ``peak_excess``, and ``tap_kc_mpa``.
+    ``spread_axial`` where these differ) or ``covariance`` (6 rows of 6), ``peak_excess``, ``tap_kc_mpa``, and
+    ``[learned]`` of ``chipload learn``.
 
     Raises
     ------
@@ -294,7 +302,35 @@ def material_text(material: Material) -> str:
         values |= dict(zip(_SPREADS, material.spread_directions or (), strict=False))
     if material.covariance is not None:
         values["covariance"] = [list(row) for row in material.covariance]
-    return "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in values.items())
+    text = "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in values.items())
+    return text + (learned_text(material.learned) if material.learned is not None else "")
+
+
+def knowledge_text(material: Material) -> str:
+    """Return what a learned material was before and is now, by which logs, and what that is worth; empty: not learned.
+
+    >>> knowledge_text(material_named("al7075-t6"))
+    ''
+    """
+    own = material.learned
+    if own is None:
+        return ""
+    deviation = np.sqrt(np.diagonal(material.variances))
+    out = []
+    for name, k, unit, (before, share) in (("Ktc", 0, "MPa", own.ktc), ("Kte", 3, "N/mm", own.kte)):
+        value = material.coefficients[k]
+        now = number_text(200.0 * deviation[k] / value, 2) if value else "0"
+        was = f"{number_text(before)} +- {number_text(200.0 * share, 2)} %"
+        out.append(f"{name} {number_text(value)} {unit} +- {now} % (two standard deviations), {was} in {own.prior}")
+    return "; ".join([*out, f"learned from {own.logs_text}", *(worth.text for worth in own.worth)])
+
+
+def with_worth(material: Material, worth: KnowledgeWorth) -> Material:
+    """Return a learned material with the worth of its knowledge to one more job, in place of an earlier one of it."""
+    if material.learned is None:
+        raise InputError(f"material {material.name}: was not learned from logs")
+    others = tuple(w for w in material.learned.worth if w.job != worth.job)
+    return replace(material, learned=replace(material.learned, worth=(*others, worth)))
 
 
 def texts_beyond_range(material: Material, chip_max_mm: float, speed_mm_s: float) -> tuple[str, ...]:

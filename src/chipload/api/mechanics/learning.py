@@ -104,7 +104,7 @@ def learn(
     if not logs:
         raise InputError("logs: none is given")
     signal = signal_of_logs(logs.values(), efficiency, efficiency_error)
-    return learn_from_logs(logs, torque_of_result(result, "result"), signal, material, 0.0, name, ", ".join(logs))[0]
+    return learn_from_logs(logs, torque_of_result(result, "result"), signal, material, 0.0, name)[0]
 
 
 def torque_of_result(result: Result, name: str) -> PredictedTorque:
