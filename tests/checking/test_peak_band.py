@@ -17,8 +17,10 @@ from chipload.checking.load_budget import TURNS
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.load_parts import LoadParts
 from chipload.cutting.material import material_named, material_text, read_material
+from chipload.cutting.turns import MeasuredCut, peaks_in_band, turns_of
 from chipload.errors import InputError
 from chipload.jobs import load_job, run_job
+from chipload.jobs.fit.outcome import ComparedPeaks
 from chipload.jobs.fit.run import peak_excess
 from chipload.result import COLUMNS, LimitCheck, Verdict
 
@@ -136,27 +138,53 @@ def test_the_stress_of_a_workpiece_has_the_band_of_the_force() -> None:
     assert stress(2.0).state is Verdict.UNPROVEN
 
 
-def cut(use: str, seen: float, *, axis: bool = True) -> SimpleNamespace:
-    """100 turns with peaks from 0.9 to 1.1 times ``seen`` along the feed; predicted are 100 N in every direction."""
-    turns = np.linspace(0.9, 1.1, 101)[:, None] * np.array([seen, -50.0, 5.0])
-    high, low = np.maximum(turns, 0.0), np.minimum(turns, 0.0)
-    said = SimpleNamespace(high=np.array([100.0, 20.0, 1.0]), low=np.array([0.0, -100.0, 0.0]), resultant=100.0)
-    return SimpleNamespace(
-        use=use, predicted=said, turns=SimpleNamespace(high=high, low=low, plane=np.full(101, 80.0)),
-        cut=SimpleNamespace(measured=np.array([True, True, axis])),
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize(("one", "other"), [("fit", "predict"), ("predict", "fit")])
-def test_the_excess_of_all_runs(one: str, other: str) -> None:
-    """90 % of peaks spread evenly from 0.9 to 1.1 times 120 N are at most 1.08 times 120 N: 29.6 % above 100 N.
-
-    The axis, predicted with a hundredth of the force in the plane, is left out. A run that was fitted counts too: the
-    law may miss its peaks.
+def peaks(seen: float, across: float = 50.0) -> ComparedPeaks:
+    """100 turns with peaks from 0.9 to 1.1 times ``seen`` in the plane; predicted are 100 N along the feed, across it
+    and in the plane, and 20 N along the axis, where 30 N are measured.
     """
-    assert peak_excess([cut(one, 120.0), cut(other, 90.0)]) == pytest.approx(0.296)
-    assert peak_excess([cut(one, 60.0)]) == 0.0
-    assert peak_excess([]) is None
+    turns = np.linspace(0.9, 1.1, 101)[:, None] * np.array([500.0, across, 30.0, seen])
+    return ComparedPeaks(np.array([100.0, 100.0, 20.0, 100.0]), turns)
+
+
+def test_the_excess_of_all_runs() -> None:
+    """90 % of peaks spread evenly from 0.9 to 1.1 times 120 N are at most 1.08 times 120 N: 29.6 % above 100 N. A force
+    along the feed alone is no limit's; the axis has an excess of its own, unless the force in the plane hides it.
+    """
+    assert peak_excess([peaks(120.0), peaks(90.0)]) == pytest.approx((0.296, 0.62))
+    assert peak_excess([peaks(90.0), peaks(60.0, 120.0)]) == pytest.approx((0.296, 0.62))
+    assert peak_excess([peaks(60.0)])[0] == 0.0
+    hidden = peaks(120.0)
+    assert peak_excess([replace(hidden, predicted=np.array([100.0, 100.0, 1.0, 100.0]))])[1] is None
+    assert peak_excess([]) == (None, None)
+
+
+def test_peaks_of_a_dynamometer_that_rings_are_those_of_its_band() -> None:
+    """Two teeth at 10 Hz, 100 and 40 N at the spindle's first harmonics and 300 N at its 20th, which the dynamometer
+    adds: 140 N in the band of 5 harmonics, whatever the phase; by every sample 440 N.
+    """
+    t = np.arange(4000) / 2000.0 + 0.013
+    low = 100.0 * np.cos(math.tau * 10.0 * t) + 40.0 * np.cos(math.tau * 20.0 * t)
+    force = np.column_stack([0.0 * t, low + 300.0 * np.cos(math.tau * 200.0 * t), np.nan * t])
+    measured = MeasuredCut("ringing", 2000.0, force, 10.0, math.tau * 10.0, (0.0, math.pi), 1.0)
+    turns = turns_of(measured, 40)
+    found = peaks_in_band(measured, turns, 5)
+    assert len(found) == 20
+    assert found[:, 1] == pytest.approx(140.0, rel=1e-3)
+    assert found[:, 3] == pytest.approx(140.0, rel=1e-3)
+    assert np.isnan(found[:, 2]).all()
+    assert turns.high[:, 1] == pytest.approx(440.0, rel=0.05)
+
+
+def test_a_limit_on_the_axial_force_has_the_excess_along_the_axis(job: Path) -> None:
+    text = material_text(material_named("al7075-t6")) + "peak_excess = 0.4\npeak_excess_axial = 0.9\n"
+    (job.parent / "own.toml").write_text(text)
+    found = run_job(load_job(job, ["limits.force_axial_n=1e5"])).result.limits
+    force = next(check for check in found if check.name == "force_axial_n")
+    assert force.state is Verdict.HOLDS
+    high = force.worst * (1.0 + force.resolution_error)
+    for times, state in ((1.8, Verdict.UNPROVEN), (2.0, Verdict.HOLDS)):
+        found = run_job(load_job(job, [f"limits.force_axial_n={times * high}"])).result.limits
+        assert next(check for check in found if check.name == "force_axial_n").state is state
 
 
 def test_a_material_file_states_it(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from chipload.machine.machine import Machine
 from chipload.number_text import number_text, percent_text
 from chipload.result import CoveredRows, LimitCheck, Verdict, check_limit, error_of
 from chipload.result.limits import Columns, hold_at_confidence
+from chipload.simulation.accuracy import AXIAL
 from chipload.simulation.chip_space import flute_fill
 from chipload.simulation.loads import Cuts, Floats, Ints
 from chipload.simulation.ramp import ramp_angle
@@ -55,6 +56,7 @@ DIRECTED = (
 #: columns that follow the greatest force of a turn, not its mean
 PEAKS = (
     *DIRECTED, "force_xy_n", "force_normal_n", "force_over_allowable", "stress_mpa", "strength_share", "torque_nm",
+    AXIAL,
 )  # fmt: skip
 
 
@@ -383,6 +385,8 @@ def peak_excess(material: Material, column: str) -> float:
     >>> peak_excess(own, "force_n"), peak_excess(own, "torque_mean_nm")
     (0.4, 0.0)
     """
+    if column == AXIAL:
+        return material.peak_excess_axial
     return material.peak_excess if column in PEAKS else 0.0
 
 

@@ -144,7 +144,7 @@ class Prediction:
 
     ``mean``; ``high`` and ``low`` greatest and least over the turn as the dynamometer shows them; ``band_high`` and
     ``band_low`` of the harmonics that were fitted alone; ``half`` (5, 3) the half widths of their 95 % bands, in this
-    order; ``resultant`` greatest in-plane force.
+    order; ``resultant`` greatest in-plane force, ``band_resultant`` of those harmonics alone.
     """
 
     mean: Floats
@@ -154,6 +154,7 @@ class Prediction:
     band_low: Floats
     half: Floats
     resultant: float
+    band_resultant: float
 
 
 # -- the model --------------------------------------------------------------------------------------------------
@@ -382,10 +383,9 @@ def predict(fit: Fit, cut: MeasuredCut) -> Prediction:
         return np.stack([_mean(fit, cut, p), whole.max(axis=0), whole.min(axis=0), band.max(axis=0), band.min(axis=0)])
 
     values, half = _band_of_numbers(fit, numbers)
-    whole = predict_forces(fit, cut, theta)
-    return Prediction(
-        values[0], values[1], values[2], values[3], values[4], half, float(np.hypot(whole[:, 0], whole[:, 1]).max())
-    )
+    few = _predict_turn(fit, cut, fit.search.parameters, theta, max(fit.search.harmonics, 1), fit.channels.resonance)
+    both = (float(np.hypot(force[:, 0], force[:, 1]).max()) for force in (predict_forces(fit, cut, theta), few))
+    return Prediction(values[0], values[1], values[2], values[3], values[4], half, *both)
 
 
 def align_turn(fit: Fit, cut: MeasuredCut, turns: Turns, parts: int = 720) -> float:

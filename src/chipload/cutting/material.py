@@ -40,9 +40,10 @@ _TEXTS = ("name", "source", "conditions", "workpiece", "cutter")
 _EXPONENTS = ("exponent_t", "exponent_r", "exponent_a")
 _RANGES = {"chip": ("chip_min_mm", "chip_max_mm"), "speed": ("speed_min_m_min", "speed_max_m_min")}
 _SPREADS = ("spread_radial", "spread_axial")
+_EXCESSES = ("peak_excess", "peak_excess_axial")
 _KEYS = (
     *_TEXTS, *_NUMBERS, *_EXPONENTS, *_RANGES["chip"], *_RANGES["speed"], "spread", *_SPREADS, "covariance",
-    "peak_excess", "tap_kc_mpa", "learned",
+    *_EXCESSES, "tap_kc_mpa", "learned",
 )  # fmt: skip
 
 #: correlation of the errors of two coefficients whose material states a spread: between independent errors and one
@@ -70,8 +71,8 @@ class Material:
     exponents : (m_t, m_r, m_a) of the size effect, from 0 to below 1; 0: none, the linear law
     cutter : what they were measured with: form, diameter, teeth, helix, rake, substrate
     speed : (lowest, highest) cutting speed they hold for [mm/s]; None: the source does not state it
-    peak_excess : how far above what these coefficients predict the peaks of a force were measured, relative, in the
-        worst of the runs; 0: not measured, or not above
+    peak_excess, peak_excess_axial : how far above what these coefficients predict the peaks of a force were measured,
+        in the plane and along the axis, relative, in the worst of the runs; 0: not measured, or not above
     tangential : only the tangential force is known; the other coefficients are 0 and mean nothing: torque and power can
         be proved, directions and sizes of forces, deflections and stability cannot
     spread_directions : relative standard deviations of the radial and of the axial coefficients, where they are less
@@ -105,6 +106,7 @@ class Material:
     covariance: Covariance | None = None
     tangential: bool = False
     peak_excess: float = 0.0
+    peak_excess_axial: float = 0.0
     spread_directions: tuple[float, float] | None = None
     tap_kc: float | None = None
     learned: LearnedRecord | None = None
@@ -139,8 +141,9 @@ class Material:
                 f"material.speed_max_m_min = {high:g}: must be above speed_min_m_min = {low:g}, which must be at "
                 "least 0"
             )
-        if not 0.0 <= self.peak_excess <= 10.0:
-            raise InputError(f"material.peak_excess = {self.peak_excess:g}: must be from 0 to 10 (0.4 is 40 %)")
+        for key in _EXCESSES:
+            if not 0.0 <= (excess := getattr(self, key)) <= 10.0:
+                raise InputError(f"material.{key} = {excess:g}: must be from 0 to 10 (0.4 is 40 %)")
         if self.tap_kc is not None and not 10.0 <= self.tap_kc <= 2e4:
             raise InputError(f"material.tap_kc_mpa = {self.tap_kc:g}: must be from 10 to 20000 MPa")
         if self.covariance is not None:
@@ -243,7 +246,7 @@ def _from_table(label: str, table: dict[str, Any]) -> Material:
             raise InputError(f"{label}: {key} = {table[key]!r}: must be a text")
     numbers: dict[str, Any] = {n: _number(label, key, table.get(key, 0.0)) for key, (n, _, _) in _NUMBERS.items()}
     numbers["tangential"] = tangential
-    numbers["peak_excess"] = _number(label, "peak_excess", table.get("peak_excess", 0.0))
+    numbers |= {key: _number(label, key, table.get(key, 0.0)) for key in _EXCESSES}
     ranges: dict[str, Any] = {name: _range(label, table, *keys) for name, keys in _RANGES.items()}
     if (speed := ranges["speed"]) is not None:
         ranges["speed"] = (mm_s_from_mm_min(1000.0 * speed[0]), mm_s_from_mm_min(1000.0 * speed[1]))
@@ -271,8 +274,8 @@ def read_material(path: str | Path) -> Material:
     depth), ``source``; without all four radial and axial ones only the tangential force is known; optional
     ``workpiece``, ``conditions``, ``cutter``, ``chip_min_mm`` with ``chip_max_mm``, ``speed_min_m_min`` with
     ``speed_max_m_min``, ``exponent_t``, ``exponent_r``, ``exponent_a``, ``spread`` (with ``spread_radial`` and
-    ``spread_axial`` where these differ) or ``covariance`` (6 rows of 6), ``peak_excess``, ``tap_kc_mpa``, and
-    ``[learned]`` of ``chipload learn``.
+    ``spread_axial`` where these differ) or ``covariance`` (6 rows of 6), ``peak_excess``, ``peak_excess_axial``,
+    ``tap_kc_mpa``, and ``[learned]`` of ``chipload learn``.
 
     Raises
     ------
@@ -293,8 +296,7 @@ def material_text(material: Material) -> str:
     for name, limits in (("chip", material.chip), ("speed", speed)):
         if limits is not None:
             values |= dict(zip(_RANGES[name], limits, strict=True))
-    if material.peak_excess:
-        values["peak_excess"] = material.peak_excess
+    values |= {key: excess for key in _EXCESSES if (excess := getattr(material, key))}
     if material.tap_kc is not None:
         values["tap_kc_mpa"] = material.tap_kc
     if material.spread is not None:

@@ -23,6 +23,8 @@ Complexes = NDArray[np.complex128]
 
 #: blocks of whole turns of a cut, whose harmonics are compared
 BLOCKS = 12
+#: rotations at which the peak of some harmonics is sought
+PEAK_SAMPLES = 360
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +158,31 @@ def turns_of(cut: MeasuredCut, harmonics: int, search: float = 0.01, seek: int =
     for i, (a, b) in enumerate(pairwise(ends)):
         blocks[i, :, given] = (turned[a:b].T @ left[a:b] / (b - a)).T
     return Turns(speed, amplitude, mean, high, low, plane, scatter, blocks)
+
+
+def peaks_in_band(cut: MeasuredCut, turns: Turns, harmonics: int) -> Floats:
+    """Return the greatest size (r, 4) [N] of the first ``harmonics`` of each whole turn: along T, n and the axis, and
+    in the plane of T and n; NaN: not measured.
+    """
+    turn = math.tau * cut.rate / turns.speed
+    edges = np.round(np.arange(len(turns.mean) + 1) * turn).astype(int)
+    theta = np.linspace(0.0, math.tau, PEAK_SAMPLES, endpoint=False)
+    shown = _waves(theta, harmonics)
+    out = np.full((len(turns.mean), 4), np.nan)
+    for i, (a, b) in enumerate(pairwise(edges)):
+        design = _waves(turns.speed / cut.rate * np.arange(b - a), harmonics)
+        given = np.flatnonzero(cut.measured)
+        force = np.full((PEAK_SAMPLES, 3), np.nan)
+        force[:, given] = shown @ np.linalg.lstsq(design, cut.force[a:b, given], rcond=None)[0]
+        out[i, :3] = np.abs(force).max(axis=0)
+        out[i, 3] = np.hypot(force[:, 0], force[:, 1]).max()
+    return out
+
+
+def _waves(theta: Floats, harmonics: int) -> Floats:
+    """Return 1, cosines and sines (m, 2 H + 1) of the harmonics at rotations (m,)."""
+    turned = np.outer(theta, np.arange(1, harmonics + 1))
+    return np.column_stack([np.ones(len(theta)), np.cos(turned), np.sin(turned)])
 
 
 def _speed(force: Floats, rate: float, nominal: float, search: float, top: int) -> float:

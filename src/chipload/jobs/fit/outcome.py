@@ -34,11 +34,22 @@ class MeasuredForces:
 
 
 @dataclass(frozen=True, eq=False)
+class ComparedPeaks:
+    """Greatest sizes of the force [N], along the feed, across it, along the axis and in the plane: ``predicted`` (4,),
+    and ``measured`` (r, 4) of each turn; NaN where a channel was not measured or is not predicted.
+    """
+
+    predicted: Floats
+    measured: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """A measured cut with its prediction.
 
     Errors in percent of the measured, (3,): ``mean_percent``, and ``peak_percent`` of the larger peak; ``phase``
-    rotation of tooth 0 at the first sample [rad].
+    rotation of tooth 0 at the first sample [rad]; ``peaks`` within the band of the fit if the dynamometer rings above
+    it, else of every sample.
     """
 
     cut: MeasuredCut
@@ -49,6 +60,7 @@ class Comparison:
     phase: float
     mean_percent: Floats
     peak_percent: Floats
+    peaks: ComparedPeaks
 
     def measured(self, theta: Floats) -> Floats:
         """(m, 3) float [N] mean turn of the measured forces, within the harmonics, at rotations (m,) of tooth 0."""

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.cutting.fit import NAMES, TURN, Fit, align_turn, fit_average, predict
+from chipload.cutting.fit import NAMES, TURN, Fit, Prediction, align_turn, fit_average, predict
 from chipload.cutting.fit_turns import fit_instantaneous, turns_in_band
 from chipload.cutting.material import Material
 from chipload.cutting.measured import read_forces
-from chipload.cutting.turns import MeasuredCut, turns_of
+from chipload.cutting.turns import MeasuredCut, Turns, peaks_in_band, turns_of
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs.fit.job import CHANNELS, FitJob
-from chipload.jobs.fit.outcome import Comparison, FitResult, MeasuredForces
+from chipload.jobs.fit.outcome import ComparedPeaks, Comparison, FitResult, MeasuredForces
 from chipload.number_text import number_text
 from chipload.progress import Progress, silent
 from chipload.result import Provenance
@@ -131,6 +131,7 @@ def _compare_cut(fit: Fit, cut: MeasuredCut, use: str) -> Comparison:
         MeasuredForces(mean, high, low, band.max(axis=0), band.min(axis=0), float(turns.plane.mean())),
         align_turn(fit, cut, turns), _percent(predicted.mean, mean),
         _percent(np.where(larger, predicted.high, predicted.low), np.where(larger, high, low)),
+        peaks_of_turns(fit, cut, turns, predicted),
     )  # fmt: skip
 
 
@@ -140,24 +141,39 @@ def _percent(predicted: Floats, measured: Floats) -> Floats:
     return np.asarray((predicted - measured) / size * 100.0)
 
 
-def peak_excess(comparisons: Sequence[Comparison]) -> float | None:
-    """Return the peak excess: the relative amount by which measured peaks exceed predicted ones; None without runs.
+def peaks_of_turns(fit: Fit, cut: MeasuredCut, turns: Turns, predicted: Prediction) -> ComparedPeaks:
+    """Return the peaks of a cut that are compared: see :class:`ComparedPeaks`.
 
-    Of each run, fitted or kept back, and each direction (feed, across, axis, and the greatest force in the plane) the
-    larger peak of each turn over the predicted one: :data:`COVERED` of the turns are below, and the worst of these
-    counts, to 4 digits. A direction whose prediction is below :data:`SMALL` of the force in the plane is left out.
+    What a dynamometer shows at and above the frequencies at which it rings is not the force.
     """
-    worst: list[float] = []
-    for one in comparisons:
-        prediction = one.predicted
-        predicted = np.append(np.maximum(np.abs(prediction.high), np.abs(prediction.low)), prediction.resultant)
-        turns = one.turns
-        seen = np.column_stack([np.maximum(np.abs(turns.high), np.abs(turns.low)), turns.plane])
-        measured = np.append(one.cut.measured, one.cut.measured[:2].all())
-        counts = measured & np.isfinite(predicted) & (predicted > SMALL * prediction.resultant)
-        if counts.any():
-            worst.append(float((np.quantile(seen[:, counts], COVERED, axis=0) / predicted[counts]).max() - 1.0))
-    return float(f"{max(0.0, *worst):.4g}") if worst else None
+    if fit.search.harmonics and np.isfinite(fit.channels.resonance[:, 0]).any():
+        sizes = np.maximum(np.abs(predicted.band_high), np.abs(predicted.band_low))
+        return ComparedPeaks(
+            np.append(sizes, predicted.band_resultant), peaks_in_band(cut, turns, fit.search.harmonics)
+        )
+    sizes = np.maximum(np.abs(predicted.high), np.abs(predicted.low))
+    measured = np.column_stack([np.maximum(np.abs(turns.high), np.abs(turns.low)), turns.plane])
+    return ComparedPeaks(np.append(sizes, predicted.resultant), measured)
+
+
+def peak_excess(all_peaks: Sequence[ComparedPeaks]) -> tuple[float | None, float | None]:
+    """Return the peak excess in the plane and along the axis: the relative amount by which measured peaks exceed
+    predicted ones; None where nothing is compared.
+
+    Of each run, fitted or kept back, the peak of each turn over the predicted one: :data:`COVERED` of the turns are
+    below, and the run with the greatest counts, to 4 digits. In the plane it is the greater of the force across the
+    feed and the greatest in the plane, which limits hold; a direction whose prediction is below :data:`SMALL` of the
+    force in the plane is left out.
+    """
+    plane, axis = list[float](), list[float]()
+    for peaks in all_peaks:
+        known = np.isfinite(peaks.measured).all(axis=0) & np.isfinite(peaks.predicted)
+        known &= peaks.predicted > SMALL * peaks.predicted[3]
+        for worst, direction in ((plane, 1), (axis, 2), (plane, 3)):
+            if known[direction]:
+                most = np.quantile(peaks.measured[:, direction], COVERED)
+                worst.append(float(most / peaks.predicted[direction] - 1.0))
+    return tuple(float(f"{max(0.0, *worst):.4g}") if worst else None for worst in (plane, axis))  # type: ignore[return-value]
 
 
 def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple[Material | None, tuple[Finding, ...]]:
@@ -187,11 +203,15 @@ def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple
     else:
         text = "the uncertainty of the coefficients is not written: the covariance of all six is unknown"
         found = (Finding("fit-covariance", 0, text),)
-    excess = peak_excess(comparisons)
-    if excess is not None:
-        above = number_text(100.0 * excess, 3)
-        text = f"90 % of the peaks of each run are at most {above} % above the prediction: limits on peaks"
-        found = (*found, Finding("fit-peaks", 0, f"{text} allow for that"))
+    excess, axial = peak_excess([one.peaks for one in comparisons])
+    for where, more in (("in the plane", excess), ("along the axis", axial)):
+        if more is not None:
+            text = f"90 % of the peaks {where} of each run are at most {number_text(100.0 * more, 3)} % above the"
+            found = (*found, Finding("fit-peaks", 0, f"{text} prediction: limits on peaks allow for that"))
+    if np.isfinite(fit.channels.resonance[:, 0]).any() and fit.search.harmonics:
+        band = number_text(table.band_hz or 0.0, 4)
+        text = f"peaks are compared up to {band} Hz: above it the dynamometer rings, and the force is not known there"
+        found = (*found, Finding("fit-peaks", 0, text))
     if all(one.use == "fit" for one in comparisons):
         text = 'no run has use = "predict": the error of the prediction of other cuts is unknown'
         found = (*found, Finding("fit-peaks", 0, text))
@@ -199,7 +219,8 @@ def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple
         made = Material(
             name=table.name, source=f"{source}; {table.method} fit", workpiece=table.workpiece, cutter=cutter_text,
             conditions="; ".join(x for x in (table.conditions, cuts) if x), chip=(0.0, float(f"{chip:.6g}")),
-            covariance=covariance, peak_excess=excess or 0.0, **numbers,
+            covariance=covariance, peak_excess=excess or 0.0,
+            peak_excess_axial=axial or 0.0, **numbers,
         )  # fmt: skip
     except InputError as err:
         return None, (_no_material(f"no material is written: {err}"),)
