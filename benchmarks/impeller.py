@@ -1,12 +1,14 @@
 """The largest cutters of the paper's problem, certified, against its own sampled test; and cost against both numbers.
 
-    python benchmarks/impeller.py [--patches] [--programs RESULT] [--large [--out FOLDER]] [--tasks]
+    python benchmarks/impeller.py [--patches] [--programs RESULT] [--large [--out FOLDER]] [--tasks] [--removal [JOB]]
 
 `--patches`: instead, one, two, three cutters against one picked by hand, on that impeller and on NASA's HECC.
 `--programs`: the table of every way by its programs, of the result folder of the example.
 `--large`: cost against both numbers; a picture of it in the folder.
 `--tasks`: the search of the surfaces of the example in tasks of blocks of contact points: processor time of each task,
 both times on one process and on two with their start, on Dask with two workers, and whether the bytes are the same.
+`--removal`: the example, or another job of one process: processor time of the simulation of its programs in the blank,
+and of the rest of the run; steps, and loads where the job states forces.
 
 Reference: [Wu2019]: 100 contact points, 2900 check points, 15 table angles, 36 diameters. The impeller is the one by
 formula. Its method, compiled the same way on the same two threads: for every table angle, diameter, contact point and
@@ -34,11 +36,12 @@ from chipload import examples
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.sections import check_sections, loft, read_meridian, read_sections
-from chipload.jobs import load_job
+from chipload.jobs import load_job, run_job
 from chipload.jobs.impeller import run as impeller_run
 from chipload.jobs.impeller import surface_search
 from chipload.jobs.impeller.checkpoint import KeptParts, part_bytes
 from chipload.jobs.impeller.part import read_part
+from chipload.jobs.impeller.programs import five_axis_programs, table_programs
 from chipload.jobs.impeller.surface_search import SearchInputs
 from chipload.machine.machine import machine_named
 from chipload.planning.impeller.answer import largest_cutters
@@ -355,7 +358,39 @@ def tasks() -> None:
           f"load {os.getloadavg()[0]:.0f} on {os.cpu_count()} cores")  # fmt: skip
 
 
+def removal(path: Path) -> None:
+    """Processor time of the simulation of the programs in the blank beside that of the rest of a run."""
+    spent: list[float] = []
+    simulated = impeller_run.with_removal
+
+    def timed_removal(*given, **named):
+        begin = time.process_time()
+        found = simulated(*given, **named)
+        spent.append(time.process_time() - begin)
+        return found
+
+    impeller_run.with_removal = timed_removal
+    begin = time.process_time()
+    done = run_job(load_job(path))
+    whole = time.process_time() - begin
+    outcome = done.outcome
+    found = [(name, one.removal) for name, one in table_programs(outcome) if one.removal is not None]
+    found += [(name, one.removal) for name, one in five_axis_programs(outcome) if one.removal is not None]
+    print("| program | steps | removed [mm3] | greatest force [N] | verdict |\n|---|---:|---:|---:|---|")
+    for name, one in found:
+        n = one.numbers()
+        force = f"{n['force_n']:.0f}" if "force_n" in n else ""
+        print(f"| {name} | {n['steps']} | {n.get('removed_mm3', 0.0):.0f} | {force} | {one.verdict.value} |")
+    steps, inside = sum(one.numbers()["steps"] for _, one in found), sum(spent)
+    print(f"{steps} steps: {inside:.1f} s of processor time in the blank, {whole - inside:.1f} s for the rest; "
+          f"load {os.getloadavg()[0]:.0f} on {os.cpu_count()} cores")  # fmt: skip
+
+
 if __name__ == "__main__":
+    if "--removal" in sys.argv:
+        after = sys.argv[sys.argv.index("--removal") + 1 :]
+        removal(Path(after[0]) if after else Path(examples.__file__).parent / "impeller" / "job.toml")
+        sys.exit()
     if "--tasks" in sys.argv:
         tasks()
     elif "--patches" in sys.argv:

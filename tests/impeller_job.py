@@ -18,11 +18,18 @@ SIDES = "".join(
     for side in ("plus", "minus")
 )
 
+#: material that stands on both pieces, the blade between them
+STOCK = """[stock]
+low_mm = [70.0, -4.5, 30.0]
+high_mm = [74.5, -0.7, 34.0]
+
+"""
+
 
 def impeller_job(folder: Path) -> Path:
     """Pieces of two sides, with programs."""
     text = (Path(examples.__file__).parent / "impeller" / "job.toml").read_text()
-    text = text[: text.index("[[surface]]")] + SIDES + text[text.index("[[operation]]") :]
+    text = text[: text.index("[[surface]]")] + STOCK + SIDES + text[text.index("[[operation]]") :]
     text = text[: text.index("[operation.rough]")] + text[text.index("[operation.paths]") :]
     text = re.sub(r"^hand_picked.*\n", "", text, flags=re.MULTILINE)
     # with changes for nothing each side has its own cutter and table angle

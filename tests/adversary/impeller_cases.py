@@ -22,6 +22,8 @@ holder_diameter_mm = 63.0
 """
 #: a pallet 30 mm below the hub
 PALLET = {"low_mm": (-150.0, -150.0, -80.0), "high_mm": (150.0, 150.0, -30.0)}
+#: a piece of material that stands on the milled piece of the side, up to 2 mm above it
+STOCK = {"low_mm": (70.0, -4.0, 30.0), "high_mm": (74.5, -0.4, 34.0)}
 
 
 @cache
@@ -46,6 +48,7 @@ def impeller_job() -> Job:
         "catalogue": {"file": "cutters.toml"},
         "machine": {"file": "m.toml"},
         "machine_table": dict(PALLET),
+        "stock": dict(STOCK),
         "operation": [operation],
     }
     machine = (Path(chipload.__file__).parent / "data" / "machines" / "horizontal-b.toml").read_text()
@@ -74,6 +77,11 @@ def clamp(job: Job) -> None:
 def without_pallet(job: Job) -> None:
     """Nothing that lies below the part is stated."""
     del job.tables["machine_table"]
+
+
+def without_stock(job: Job) -> None:
+    """Neither roughing nor the stock before finishing is stated."""
+    del job.tables["stock"]
 
 
 def case(name: str, wrong: str, change: Change, state, found: str = "") -> Case:
@@ -105,6 +113,20 @@ CASES = (
         "below-stock",
     ),
     case("impeller-clamp-in-the-way", "a clamp in the way in another channel", clamp, "exceeds", "collision"),
+    case(
+        "impeller-stock-not-stated",
+        "finishing programs whose stock before them is not stated",
+        without_stock,
+        "unproven",
+        "not-simulated",
+    ),
+    case(
+        "impeller-neck-in-the-stock",
+        "material in the way of the shank, which no roughing has taken",
+        stated("stock", low_mm=(98.0, 4.0, 30.0), high_mm=(104.0, 12.0, 33.0)),
+        "exceeds",
+        "above-flutes",
+    ),
     case(
         "impeller-clamp-not-stated", "no clamps are stated", lambda job: None, "unchecked", "fixtures: none is stated"
     ),

@@ -228,6 +228,22 @@ def test_flank_passes_need_five_axes_links_and_a_side(formula):
     assert refused(formula) == "job.toml: operation.0.flank: takes its links from [operation.paths]: state that too"
 
 
+def test_a_stock_is_stated_once_and_for_programs(formula):
+    stated = "[stock]\nlow_mm = [0.0, 0.0, 0.0]\nhigh_mm = [10.0, 10.0, 10.0]\n\n"
+    text = formula.read_text()
+    finishing = text[: text.index("[operation.rough]")]
+    for job, why in (
+        (text, "leave it out: the programs begin with the blank of [operation.rough]"),
+        (finishing, "there are no programs to simulate in it: state [operation.paths] or leave it out"),
+    ):
+        formula.write_text(job.replace("[[surface]]", stated + "[[surface]]", 1))
+        assert refused(formula) == f"job.toml: stock: {why}"
+    missing = '[stock]\nfile = "none.stl"\nunits = "mm"\n\n'
+    paths = text[text.index("[operation.paths]") :]
+    formula.write_text((finishing + paths).replace("[[surface]]", missing + "[[surface]]", 1))
+    assert "none.stl" in refused(formula)
+
+
 def test_point_milling_needs_five_axes_and_links(formula):
     stated = '[operation.point_milling]\nmachine = { name = "horizontal-b" }\n\n'
     text = formula.read_text()

@@ -63,7 +63,9 @@ def test_the_surface_is_milled_by_points_and_verified(milled):
     (points,) = summary["operations"][0]["point_milling"]
     assert (points["program"], points["verdict"]) == (NAMES[kind], "holds")
     (track,) = (t for t in summary["tracks"] if t["name"] == points["program"])
-    assert {x["name"]: x["state"] for x in track["limits"]} == {"gouge_mm": "holds", "scallop_mm": "holds"}
+    states = {x["name"]: x["state"] for x in track["limits"]}
+    assert states == dict.fromkeys(("gouge_mm", "scallop_mm", "axial_overrun_mm"), "holds")
+    assert points["removal"]["removed_mm3"] > 100.0
     text = (root / "out" / f"{points['program']}.ngc").read_text()
     said = {"tapered": "T1: taper 4 deg D 3.73 r 2 mm, tool", "barrel": "T1: barrel 85 D 12 r 2 mm, tool"}[kind]
     assert said in text

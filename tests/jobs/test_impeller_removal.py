@@ -16,6 +16,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.cutting.material import material_named
 from chipload.errors import Severity
 from chipload.jobs.impeller import read_program
+from chipload.jobs.impeller.channels import turned
 from chipload.jobs.impeller.read_program import read_program_of
 from chipload.jobs.impeller.removal import ImpellerProgram, removal_of_programs, tool_with_teeth
 from chipload.machine.machine import machine_named
@@ -127,6 +128,21 @@ def test_loads_are_those_of_the_text_as_a_program_job(tmp_path) -> None:
     states = {c.name for c in one.limits}
     assert {"cutter_stress_mpa", "deflection_cutter_um", "deflection_share"} <= states
     assert one.numbers()["force_n"] == own["force_n"].max()
+
+
+def test_another_channel_is_the_first_one_turned() -> None:
+    """The block is the same after half a turn: so is what a turned program removes, less what was cut before it."""
+    for depth, share in ((DEEP, 1.0), (24.0, 16.0 / 24.0)):
+        one, on = slot(1, True, depth), turned(slot(2, True, depth), math.pi)
+        (alone,), (first, second) = removed(written(on)), removed(written(one), written(on))
+        np.testing.assert_allclose(
+            alone.columns["chip_volume_mm3"], first.columns["chip_volume_mm3"], rtol=1e-6, atol=1e-6
+        )  # fmt: skip
+        steps = second.columns["chip_volume_mm3"] - alone.columns["chip_volume_mm3"]
+        assert steps.max() < 1e-3 * WIDE * depth
+        # two slots 24 mm deep of 40 mm meet: the second takes 16 of 24
+        taken = [x.columns["chip_volume_mm3"].sum() for x in (second, alone)]
+        assert taken[0] / taken[1] == pytest.approx(share, rel=5e-3)
 
 
 CHANGES = {

@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints, NoFiveAxisPath
-from chipload.jobs.impeller.machine_check import check_cell
+from chipload.jobs.impeller.machine_check import check_cell, program_verdict
 from chipload.jobs.impeller.mesh import grid_faces
 from chipload.jobs.impeller.names import flank_names, points_names, program_name, rough_names
 from chipload.jobs.impeller.outcome import Covered, ImpellerResult
@@ -46,7 +46,7 @@ def program_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
             f"{p.setting.length:.1f}", f"{p.seconds / 60.0:.2f}", f"{p.gouge.found:.4f} to {p.gouge.bound:.4f}",
             f"{p.missed:.1f}", str(sum(len(r.tracks) for r in p.setting.rests)),
             f"{p.setting.linked.direct} + {p.setting.linked.retracts}",
-            check_cell(p.fails, p.machine_check.doubts),
+            check_cell(program_verdict(p.fails, p.machine_check.doubts, p.removal)),
         ]
         for k, p in enumerate(milled.programs, 1)
     ]  # fmt: skip
@@ -152,7 +152,7 @@ def _five_axis_cells(p: CheckedFlank | CheckedPoints) -> list[str]:
         f"{p.seconds / 60.0:.2f}",
         f"{p.excess:.4f}",
         f"{p.gouge.found:.4f} to {p.gouge.bound:.4f}",
-        check_cell(p.fails, p.machine_check.doubts),
+        check_cell(p.verdict),
     ]
 
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.jobs.impeller.machine_check import MachineCheck, verdict_of
+from chipload.jobs.impeller.machine_check import MachineCheck, program_verdict
+from chipload.jobs.impeller.program_removal import ProgramRemoval
 from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.flank import FlankPass
 from chipload.planning.impeller.point_milling import PointPath
 from chipload.program.gcode.writer import Repeat
 from chipload.program.program import Program
+from chipload.result import Verdict
 from chipload.simulation.channel.channel import Remainder
 from chipload.simulation.channel.gouges import Gouge
 
@@ -45,8 +47,8 @@ class FiveAxisProgram:
     allowed, most : gouge, and what may be left [mm]
     machine_check : what it does on the machine, and what its text shows
     read : the program as its text was read, which was checked
-    channels : how many there are
     every : of all channels; a text why there is none
+    removal : from the stock that roughing leaves; None: not simulated
     """
 
     name: str
@@ -59,8 +61,8 @@ class FiveAxisProgram:
     most: float
     machine_check: MachineCheck
     read: ReadProgram
-    channels: int
     every: AllChannels | str
+    removal: ProgramRemoval | None = field(default=None, kw_only=True)
 
     #: key of the limit on what is left
     limit = "excess_mm"
@@ -91,6 +93,11 @@ class FiveAxisProgram:
         nothing that is wrong or unproven.
         """
         return not (self.fails or self.machine_check.doubts)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of all its checks, with what it removes."""
+        return program_verdict(self.fails, self.machine_check.doubts, self.removal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,15 +150,15 @@ class NoFiveAxisPath:
     reason: str
 
 
-def flank_numbers(one: CheckedFlank | NoFiveAxisPath, file: str) -> dict[str, Any]:
-    """Flank passes of one channel in summary.json; ``file`` the name of its program."""
+def flank_numbers(one: CheckedFlank | NoFiveAxisPath, file: str, channels: int) -> dict[str, Any]:
+    """Flank passes of one channel of several in summary.json; ``file`` the name of its program."""
     if isinstance(one, NoFiveAxisPath):
         return _none(one)
     return {
         **_head(one, file),
         "passes": len(one.passes),
         "path_mm": one.length,
-        **_times(one),
+        **_times(one, channels),
         "deviation_mm": one.deviation,
         "above_least_mm": max(p.unimproved for p in one.passes),
         "excess_mm": one.excess,
@@ -159,8 +166,8 @@ def flank_numbers(one: CheckedFlank | NoFiveAxisPath, file: str) -> dict[str, An
     }
 
 
-def points_numbers(one: CheckedPoints | NoFiveAxisPath, file: str) -> dict[str, Any]:
-    """Point milling of one channel in summary.json; ``file`` the name of its program."""
+def points_numbers(one: CheckedPoints | NoFiveAxisPath, file: str, channels: int) -> dict[str, Any]:
+    """Point milling of one channel of several in summary.json; ``file`` the name of its program."""
     if isinstance(one, NoFiveAxisPath):
         return _none(one)
     return {
@@ -168,7 +175,7 @@ def points_numbers(one: CheckedPoints | NoFiveAxisPath, file: str) -> dict[str, 
         "lines": one.path.lines,
         "lines_along": one.along,
         "path_mm": one.length,
-        **_times(one),
+        **_times(one, channels),
         "axis_turn_deg_mm": math.degrees(one.path.turn),
         "slowed_share": one.slowed,
         "scallop_greatest_mm": one.excess,
@@ -194,11 +201,11 @@ def _head(one: FiveAxisProgram, file: str) -> dict[str, Any]:
     }
 
 
-def _times(one: FiveAxisProgram) -> dict[str, Any]:
+def _times(one: FiveAxisProgram, channels: int) -> dict[str, Any]:
     return {
         "time_min": one.seconds / 60.0,
-        "channels": one.channels,
-        "time_all_channels_min": one.channels * one.seconds / 60.0,
+        "channels": channels,
+        "time_all_channels_min": channels * one.seconds / 60.0,
         "all_channels": one.every if isinstance(one.every, str) else ("loop" if one.every.repeat else "expanded"),
     }
 
@@ -207,6 +214,7 @@ def _found(one: FiveAxisProgram) -> dict[str, Any]:
     return {
         "gouge_mm": one.gouge.found,
         "gouge_bound_mm": one.gouge.bound if math.isfinite(one.gouge.bound) else None,
-        "verdict": verdict_of(one.fails, one.machine_check.doubts).value,
+        "verdict": one.verdict.value,
         "reason": None,
+        "removal": None if one.removal is None else one.removal.numbers(),
     }

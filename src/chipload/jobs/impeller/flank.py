@@ -71,7 +71,7 @@ def checked_flanks(
             own = tuple(one.path for one in passes if isinstance(one.path, FlankPass))
             out.append(CheckedFlank(
                 f"{side.body} {side.side}", machine, cutter, program, got.gouge, got.left, paths.gouge_mm,
-                table.excess_mm, got.machine_check, got.read, impeller.blades,
+                table.excess_mm, got.machine_check, got.read,
                 all_channels(program, machine, impeller.blades), own,
             ))  # fmt: skip
         progress((k + 1) / len(sides), f"flank passes of {k + 1} sides")

@@ -17,6 +17,7 @@ from chipload.jobs.impeller.tables import (
 )
 from chipload.jobs.messages import Errors
 from chipload.jobs.simulation.fixtures import fixture_errors
+from chipload.jobs.simulation.job import stock_errors
 from chipload.jobs.simulation.values import machine_table_errors
 from chipload.jobs.sources import source, sources_of
 
@@ -98,6 +99,7 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
         if any((s.body, s.side) == (surface.body, surface.side) for s in table.surface[:k]):
             errors.add(f"surface.{k}: {surface.body} {surface.side} appears twice: list each surface once")
     errors.texts += [*_wrong_paths(table.operation[0]), *machine_table_errors(table.machine_table)]
+    errors.texts += _wrong_stock(table)
     errors.texts += [text for k, f in enumerate(table.fixture) for text in fixture_errors(f, f"fixture.{k}")]
     if part.sections is not None:
         errors.texts += _wrong_sections(part.sections)
@@ -152,6 +154,16 @@ def _wrong_paths(op: ImpellerOperationTable) -> Iterator[str]:
         yield "operation.0.rough: takes its links from [operation.paths]: state that too"
     if rough is not None and (rough.diameter_mm is None) != (rough.corner_radius_mm is None):
         yield "operation.0.rough: state both diameter_mm and corner_radius_mm, or neither for the largest that fits"
+
+
+def _wrong_stock(table: ImpellerJobTable) -> Iterator[str]:
+    if table.stock is None:
+        return
+    yield from stock_errors(table.stock)
+    if table.operation[0].rough is not None:
+        yield "stock: leave it out: the programs begin with the blank of [operation.rough]"
+    if table.operation[0].paths is None:
+        yield "stock: there are no programs to simulate in it: state [operation.paths] or leave it out"
 
 
 def _wrong_flank(table: ImpellerJobTable) -> Iterator[str]:

@@ -22,6 +22,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs.impeller.channels import turned
+from chipload.jobs.impeller.program_removal import ProgramRemoval
 from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.impeller import Impeller
@@ -96,13 +97,18 @@ class MachineCheck:
 
 
 def verdict_of(fails: tuple[str, ...], doubts: tuple[str, ...]) -> Verdict:
-    """Return the verdict of a program or partition from what fails and what is not proven."""
+    """Return the verdict of a partition from what fails and what is not proven."""
     return Verdict.EXCEEDS if fails else Verdict.UNPROVEN if doubts else Verdict.HOLDS
 
 
-def check_cell(fails: tuple[str, ...], doubts: tuple[str, ...]) -> str:
+def program_verdict(fails: tuple[str, ...], doubts: tuple[str, ...], removal: ProgramRemoval | None) -> Verdict:
+    """Return the verdict of a program; one whose removal is not simulated is unproven at best."""
+    of_removal = Verdict.UNPROVEN if removal is None else removal.verdict
+    return Verdict.worst([verdict_of(fails, doubts), of_removal])
+
+
+def check_cell(verdict: Verdict) -> str:
     """Return the verdict as a cell of a table of the report."""
-    verdict = verdict_of(fails, doubts)
     if verdict is Verdict.HOLDS:
         return '<span class="ok">holds</span>'
     return f'<span class="no">{"does not hold" if verdict is Verdict.EXCEEDS else "unproven"}</span>'

@@ -167,12 +167,12 @@ def _program(name: str, p: Checked) -> dict[str, Any]:
 
 def _flanks(milled: ImpellerResult) -> list[dict[str, Any]]:
     names = {id(p): name for name, p in flank_names(milled)}
-    return [flank_numbers(p, names.get(id(p), "")) for p in milled.flanks or ()]
+    return [flank_numbers(p, names.get(id(p), ""), milled.impeller.blades) for p in milled.flanks or ()]
 
 
 def _points(milled: ImpellerResult) -> list[dict[str, Any]]:
     names = {id(p): name for name, p in points_names(milled)}
-    return [points_numbers(p, names.get(id(p), "")) for p in milled.points or ()]
+    return [points_numbers(p, names.get(id(p), ""), milled.impeller.blades) for p in milled.points or ()]
 
 
 def _loads(p: Checked) -> dict[str, float] | None:

@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from chipload.jobs.impeller.machine_check import check_cell
+from chipload.jobs.impeller.machine_check import check_cell, verdict_of
 from chipload.jobs.impeller.outcome import PICKED, ImpellerResult, Searched
 from chipload.jobs.impeller.surface_figures import styled
 from chipload.planning.impeller.compare import Partition
@@ -102,7 +102,7 @@ def _programmed(milled: ImpellerResult) -> str:
             escape(w.name), ", ".join(f"{c.label}" for c in w.cutters), f"{w.path:.0f}",
             *(f"{x / 60.0:.1f}" for x in (w.cutting, w.links, w.changes, w.seconds, w.predicted)),
             "" if w.scallop is None else f"{100.0 * w.scallop:.0f}",
-            check_cell(w.fails, w.doubts),
+            check_cell(verdict_of(w.fails, w.doubts)),
         ]
         for w in milled.checked or ()
     ]  # fmt: skip

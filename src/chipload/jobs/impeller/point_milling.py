@@ -89,7 +89,7 @@ def checked_points(
             )
             out.append(CheckedPoints(
                 f"{side.body} {side.side}", machine, found.cutter, program, got.gouge, got.left, paths.gouge_mm,
-                op.scallop_mm, got.machine_check, got.read, impeller.blades,
+                op.scallop_mm, got.machine_check, got.read,
                 all_channels(program, machine, impeller.blades), found.points, found.along,
                 _slowed(program, machine, feed), _scallop(found, got.left),
             ))  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding
-from chipload.result import LimitCheck
+from chipload.result import LimitCheck, Verdict
 from chipload.result.limits import Columns
 
 
@@ -35,6 +35,11 @@ class ProgramRemoval:
     energy_balance: Mapping[int, float] = field(default_factory=dict)
     loads: bool = False
     stock: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of its limits and findings."""
+        return Verdict.worst([*(c.state for c in self.limits), *(Verdict.of_finding(f) for f in self.findings)])
 
     def numbers(self) -> dict[str, Any]:
         """Numbers for summary.json."""

@@ -1,8 +1,4 @@
-"""Removal of the written programs of an impeller from its blank, step by step, by the engine of program jobs.
-
-The programs that are in use, roughing first, run one after the other as their texts were read: each begins with the
-stock that the one before leaves. The blank is that of roughing. All channels are roughed before one is finished, and
-the minus sides are finished in the channel before the first one: its roughing is simulated too, the others are uncut.
+"""Removal of the written programs of an impeller from a stock, step by step, by the engine of program jobs.
 
 Without `forces` of the job neither the teeth nor the material are stated: others stand for them, and only the removal
 is kept: volume of each step, rapids and shank in material, material above the flutes. With `forces` every load, limit
@@ -32,17 +28,11 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import Finding, InputError, Severity
-from chipload.jobs.impeller.channels import turned
 from chipload.jobs.impeller.machine_check import LONGEST
-from chipload.jobs.impeller.outcome import Checked, ImpellerResult
 from chipload.jobs.impeller.program_removal import ProgramRemoval
-from chipload.jobs.impeller.programs import cutter_of, table_programs
 from chipload.jobs.impeller.read_program import ReadProgram
-from chipload.jobs.impeller.roughing import blank_of
-from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.feeds import ForceTerms
-from chipload.planning.impeller.roughing import RoughingSettings
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.result import check_limit, error_of
@@ -69,56 +59,6 @@ OF_REMOVAL = (
 OF_MACHINE = ("tool-change-in-stock", "below-stock", "cutter-speed")
 
 
-def with_removal(
-    outcome: ImpellerResult, how: RoughingSettings | None, terms: ForceTerms | None, progress: Progress = silent
-) -> ImpellerResult:
-    """Return a result whose programs in use have what they remove of the blank; without roughing none is stated.
-
-    Parameters
-    ----------
-    how : roughing, which states the blank; None: there is none
-    terms : teeth, material and limits of `forces`; None: not stated
-    """
-    used = {id(p) for p in outcome.programs or ()} | {id(r) for r in outcome.roughs or ()}
-    named: dict[int, tuple[str, Checked | CheckedRough]] = {}
-    for name, one in table_programs(outcome):
-        if id(one) in used:
-            named.setdefault(id(one), (name, one))
-    programs = list(named.values())
-    if how is None or not outcome.roughs or not programs:
-        return outcome
-    # minus sides are finished in the channel before the first
-    channels = sorted({-1, *(r.rough.index for r in outcome.roughs)})
-    blank = Stock(blank_of(outcome.impeller, channels, how, outcome.stated.ahead))
-    touch = max(r.touch for r in outcome.roughs)
-    parts = [ImpellerProgram(name, checked.read, cutter_of(checked)) for name, checked in programs]
-    before = _channel_before(outcome)
-    found = removal_of_programs([*before, *parts], blank, outcome.machine, terms, touch, progress)[len(before) :]
-    of = {id(checked): removal for (_, checked), removal in zip(programs, found, strict=True)}
-    used_checked = outcome.used_checked
-    roughs = tuple(replace(r, removal=of.get(id(r))) for r in outcome.roughs or ())
-    checked = tuple(
-        replace(one, programs=tuple(replace(p, removal=of.get(id(p))) for p in one.programs))
-        if one is used_checked else one
-        for one in outcome.checked or ()
-    )  # fmt: skip
-    return replace(outcome, roughs=roughs, checked=checked)
-
-
-def _channel_before(outcome: ImpellerResult) -> list[ImpellerProgram]:
-    """Roughing of the channel before the first one, in which the minus sides are finished: all channels are roughed
-    before one is finished.
-    """
-    roughs = [r for r in outcome.roughs or () if r.rough.machined]
-    last = max((r.rough.index for r in roughs), default=0)
-    pitch = outcome.impeller.pitch
-    return [
-        ImpellerProgram("", replace(r.read, program=turned(r.read.program, -pitch)), r.rough.cutter)
-        for r in roughs
-        if r.rough.index == last
-    ]
-
-
 @dataclass(frozen=True, eq=False)
 class ImpellerProgram:
     """A program as its text was read, the name of its track, and its cutter."""
@@ -126,6 +66,11 @@ class ImpellerProgram:
     name: str
     read: ReadProgram
     cutter: CatalogueCutter
+
+    def numbered_from(self, number: int) -> ImpellerProgram:
+        """Return the program with its tool number raised by ``number``, so that others keep theirs."""
+        program = self.read.program
+        return replace(self, read=replace(self.read, program=replace(program, tool=program.tool + number)))
 
 
 def removal_of_programs(

@@ -156,9 +156,16 @@ def _five_axis(milled: ImpellerResult) -> list[Track]:
         ending = ENDINGS[p.machine.dialect]
         every = () if isinstance(p.every, str) else (f"{name}{ALL}.{ending}",)
         files = (f"{name}.{ending}", f"{name}.apt", *every)
-        blocks = in_memory(motion_columns(p.read.program, p.read.times))
-        lined = _with_lines(limits, p.read)
-        out.append(Track(name, TrackKind.PROGRAM, False, p.seconds, lined, findings, files, blocks=blocks))
+        rows, lined, removal = motion_columns(p.read.program, p.read.times), _with_lines(limits, p.read), p.removal
+        if removal is None:
+            findings = (*findings, _not_simulated(milled))
+        else:
+            rows, lined = removal.columns or rows, _with_steps(lined, removal)
+            findings = (*findings, *removal.findings)
+        out.append(Track(
+            name, TrackKind.PROGRAM, False, p.seconds, lined, findings, files, blocks=in_memory(rows),
+            energy_balance={} if removal is None else removal.energy_balance,
+        ))  # fmt: skip
     return out
 
 
@@ -183,13 +190,30 @@ def _track(
     if removal is not None:
         if removal.columns:
             rows = removal.columns
-            limits = tuple(c if c.row is None else replace(c, row=int(removal.step[c.row])) for c in limits)
-        limits, findings = (*limits, *removal.limits), (*findings, *removal.findings)
-        balance = removal.energy_balance
+        limits = _with_steps(limits, removal)
+        findings, balance = (*findings, *removal.findings), removal.energy_balance
+    elif in_use and not empty:
+        findings = (*findings, _not_simulated(milled))
     blocks = clearance_blocks(rows, cutter, walls)
     return Track(
         name, TrackKind.PROGRAM, in_use, read.seconds, limits, findings, files, blocks=blocks, energy_balance=balance
     )
+
+
+def _with_steps(limits: tuple[LimitCheck, ...], removal: ProgramRemoval) -> tuple[LimitCheck, ...]:
+    """Return limits on the rows of the history of the removal, with its own."""
+    if removal.columns:
+        limits = tuple(c if c.row is None else replace(c, row=int(removal.step[c.row])) for c in limits)
+    return (*limits, *removal.limits)
+
+
+def _not_simulated(milled: ImpellerResult) -> Finding:
+    """What is not proven of a program whose stock is not known."""
+    why = "is not stated: state [operation.rough], or that stock as [stock]"
+    if milled.roughs is not None:
+        why = "is not known: roughing has no program"
+    text = f"what it removes, and rapids, neck and holder in material, are not simulated: the stock before it {why}"
+    return Finding("not-simulated", 0, text, Severity.UNPROVEN)
 
 
 def _with_lines(limits: Sequence[LimitCheck], read: ReadProgram) -> tuple[LimitCheck, ...]:
@@ -280,10 +304,6 @@ def _unchecked(milled: ImpellerResult) -> tuple[str, ...]:
 def _unchecked_removal(found: Sequence[ProgramRemoval]) -> Iterator[str]:
     """What the removal step by step does not show."""
     if not found:
-        yield (
-            "removal step by step, rapids and shank in material: the stock before finishing is not stated: state "
-            "[operation.rough]"
-        )
         return
     ramps = [float(np.max(r.columns["ramp_deg"], initial=0.0)) for r in found if r.columns]
     if max(ramps, default=0.0) > 0.0:
@@ -291,8 +311,11 @@ def _unchecked_removal(found: Sequence[ProgramRemoval]) -> Iterator[str]:
             f"plunges and ramps into material, of up to {number_text(max(ramps), 3)} deg: how steep the cutters may "
             "ramp is not stated"
         )
-    yield "removal in the other channels: the first is simulated, with roughing of the one before it"
-    yield "programs that are not in use, flank passes, point milling on five axes: not simulated in the blank"
+    yield (
+        "removal in the other channels: the first is simulated, with roughing of the one before it; the others have "
+        "the same motions in the same stock, turned, less what was cut before"
+    )
+    yield "programs that are not in use: not simulated in the stock"
 
 
 def _unchecked_machine(milled: ImpellerResult) -> Iterator[str]:

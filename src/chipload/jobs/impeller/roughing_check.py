@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from chipload.jobs.impeller.machine_check import MachineCheck, check_cell
+from chipload.jobs.impeller.machine_check import MachineCheck, check_cell, program_verdict
 from chipload.jobs.impeller.program_removal import ProgramRemoval
 from chipload.jobs.impeller.read_program import ReadProgram
 from chipload.planning.impeller.rough_settings import RoughingSetting
 from chipload.program.gcode.writer import Repeat
 from chipload.report.sheet import table
+from chipload.result import Verdict
 from chipload.simulation.channel.channel import PARTS
 from chipload.simulation.channel.gouges import Gouge
 from chipload.simulation.channel.stock import ChannelRemoval
@@ -104,7 +105,7 @@ class CheckedRough:
             "diameter_mm": c.diameter,
             "corner_radius_mm": c.corner_radius,
             "table_deg": round(float(np.degrees(rough.table)), 9),
-            "verified": self.verified,
+            "verified": self.verified and self.removal is not None and self.removal.verdict is Verdict.HOLDS,
             "fails": [*self.fails, *self.machine_check.doubts],
             "layers": rough.layers,
             "rows": len(rough.program),
@@ -140,7 +141,7 @@ def rough_sections(roughs: tuple[CheckedRough, ...] | None, names: list[str]) ->
                 f"<code>{escape(name)}</code>", str(v["layers"]), str(v["rows"]), f"{v['path_mm']:.0f}",
                 f"{v['time_min']:.2f}", f"{v['taken_mm3'] / 1e3:.2f}", stands, f"{v['gouge_mm']:.3f}",
                 f"{v['rapids_take_mm3']:.2f}, {v['above_takes_mm3']:.2f}", f"{v['missed_mm']:.0f}",
-                check_cell(r.fails, r.machine_check.doubts),
+                check_cell(program_verdict(r.fails, r.machine_check.doubts, r.removal)),
             ]
         )  # fmt: skip
     return [

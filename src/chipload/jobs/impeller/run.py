@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from chipload.checking.workpiece import Surroundings
+from chipload.checking.workpiece import Stock, Surroundings
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
 from chipload.jobs.impeller.channel_depth import reach_line
@@ -27,13 +27,13 @@ from chipload.jobs.impeller.partition_programs import checked_partitions
 from chipload.jobs.impeller.paths import EDGE, finish_settings, walls_of
 from chipload.jobs.impeller.point_milling import checked_points
 from chipload.jobs.impeller.ray_depth import ray_depth
-from chipload.jobs.impeller.removal import with_removal
 from chipload.jobs.impeller.roughing import checked_roughing, roughing_settings
+from chipload.jobs.impeller.simulated_programs import blank_of_roughing, with_removal
 from chipload.jobs.impeller.surface_search import WORKERS, SearchInputs, SurfaceSearch, searched_surfaces
 from chipload.jobs.impeller.tables import ImpellerOperationTable
 from chipload.jobs.impeller.written_programs import with_texts_read_back
 from chipload.jobs.simulation.fixtures import fixtures_of
-from chipload.jobs.simulation.values import machine_table_of
+from chipload.jobs.simulation.values import machine_table_of, stock_of
 from chipload.jobs.tables import Table
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.planning.impeller.answer import Answer, one_cutter_of
@@ -87,7 +87,7 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     _checkable(job, impeller)
     forces = force_terms(job, catalogue)
     _five_axis_machines(job)
-    surroundings = surroundings_of(job)
+    surroundings, stated_stock = surroundings_of(job), _stated_stock(job)
     surroundings.fixture_points(machine)
     op = job.operation
     provenance = _provenance(job, machine, catalogue, part)
@@ -138,9 +138,17 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     milled = replace(milled, flanks=flanks, points=points)
     partitions = tuple(chosen.get(p.name, p) for p in partitions)
     milled = replace(milled, checked=checked, roughs=roughs, partitions=partitions)
-    how_roughed = None if op.rough is None else roughing_settings(machine, op, op.paths, op.rough)
     read = with_texts_read_back(milled, surroundings, op.clearance_mm)
-    return with_removal(read, how_roughed, forces, simulating)
+    stock = stated_stock
+    if op.rough is not None and roughs:
+        stock = blank_of_roughing(milled, roughing_settings(machine, op, op.paths, op.rough))
+    return read if stock is None else with_removal(read, stock, forces, simulating)
+
+
+def _stated_stock(job: ImpellerJob) -> Stock | None:
+    """Stock before finishing, where the job states it; its file is read."""
+    table = job.table.stock
+    return None if table is None else stock_of(table, job.path.parent)
 
 
 def surroundings_of(job: ImpellerJob) -> Surroundings:
@@ -168,6 +176,8 @@ def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: 
     files = dict(job.files)
     files |= {key: p for key, p in _named(job) if not isinstance(p, str)}
     files |= {f"fixture {k}": job.path.parent / f.file for k, f in enumerate(job.table.fixture) if f.file is not None}
+    if job.table.stock is not None and job.table.stock.file is not None:
+        files["stock"] = job.path.parent / job.table.stock.file
     own = provenance_of(files, job.overrides, machine)
     cutters = f"{catalogue.name}: {catalogue.note}" if catalogue.note else catalogue.name
     faces = {f"face {k}": line for k, line in enumerate(part.faces)}
@@ -195,6 +205,7 @@ def check(job: ImpellerJob) -> tuple[list[str], bool]:
     force_terms(job, catalogue)
     _five_axis_machines(job)
     around = surroundings_of(job).fixture_points(machine)
+    _stated_stock(job)
     lines = [f"impeller: {impeller.blades} blades{' and as many splitters' if impeller.splitter else ''}", *part.faces]
     table = _tables(machine, job.operation)
     angles = np.degrees(table.angle)

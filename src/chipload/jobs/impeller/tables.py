@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from chipload.jobs.simulation.tables import MachineTableTable, WorkholdingTable
+from chipload.jobs.simulation.tables import MachineTableTable, SolidTable, WorkholdingTable
 from chipload.jobs.tables import (
     Count,
     FaceName,
@@ -285,6 +285,11 @@ class ImpellerJobTable(Table):
     surface: tuple[SurfaceTable, ...] = Field(min_length=1)
     catalogue: SourceTable
     machine: SourceTable
+    stock: SolidTable | None = Field(
+        None,
+        description="stock before finishing, where the job states no roughing: all programs are simulated in it; none "
+        "of both: what they remove is unproven",
+    )
     fixture: tuple[WorkholdingTable, ...] = ()
     machine_table: MachineTableTable | None = None
     operation: tuple[ImpellerOperationTable, ...] = Field(min_length=1, max_length=1)
