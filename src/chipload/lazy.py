@@ -1,5 +1,5 @@
-"""Late imports: names of a package on first access (PEP 562), compiled functions when the first of them is called,
-and libraries that an extra installs.
+"""Late imports: names of a package on first access (PEP 562), compiled functions and heavy libraries when the first of
+their names is used, and libraries that an extra installs.
 """
 
 from __future__ import annotations
@@ -8,9 +8,11 @@ import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from chipload.errors import InputError
+
+__all__ = ["EXTRAS", "LateModule", "attach", "pa", "pq", "require_extra", "scipy", "trimesh"]
 
 #: extra of the package -> the module that it installs, and what needs it
 EXTRAS: Mapping[str, tuple[str, str]] = {
@@ -71,10 +73,10 @@ def attach(package: str, places: Mapping[str, str]) -> tuple[Callable[[str], Any
 
 
 class LateModule:
-    """A module of compiled functions that is imported on first access to one of its names.
+    """A module that is imported on first access to one of its names: a library, or compiled functions.
 
     Functions with stated types are compiled when their module is imported: on a new machine that takes seconds, which
-    a job that does not call them saves.
+    a job that does not call them saves. A library takes tenths of a second.
 
     Parameters
     ----------
@@ -94,3 +96,14 @@ class LateModule:
         value = getattr(import_module(self._module), name)
         setattr(self, name, value)
         return value
+
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+    import scipy as scipy
+    import trimesh as trimesh
+else:
+    # half of what a check of a job takes, where it reads no mesh and solves nothing
+    scipy, trimesh = LateModule("scipy"), LateModule("trimesh")
+    pa, pq = LateModule("pyarrow"), LateModule("pyarrow.parquet")

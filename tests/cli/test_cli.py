@@ -226,6 +226,17 @@ def test_help_comes_without_the_heavy_imports() -> None:
     assert done.stdout == "[]\n"
 
 
+def test_a_check_of_a_program_imports_no_library_that_it_does_not_use() -> None:
+    heavy = "numba", "scipy.spatial", "scipy.sparse", "plotly", "trimesh", "pyarrow", "ezdxf", "OCP"
+    job = Path(__file__).parents[2] / "examples/feeds/job.toml"
+    code = (
+        "import sys; from pathlib import Path; from chipload.jobs.inspection import inspect_file; "
+        f"print(inspect_file(Path({str(job)!r}))[1], [m for m in sys.argv[1:] if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *heavy], capture_output=True, text=True, check=True)
+    assert done.stdout == "True []\n"
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stopped_run_leaves_no_half_file(job_dir: Path, tmp_path: Path, number: signal.Signals) -> None:
     """The run is stopped when its temporary folder has appeared."""

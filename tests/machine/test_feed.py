@@ -8,7 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chipload.errors import InputError
-from chipload.machine.feed import corner_speed, curvature_speed, limited_speed, move_time, row_time_limited
+from chipload.machine._acceleration import limit_change
+from chipload.machine.feed import (
+    _limit_change,
+    corner_speed,
+    curvature_speed,
+    limited_speed,
+    move_time,
+    row_time_limited,
+)
 from chipload.machine.machine import machine_named
 
 
@@ -18,6 +26,14 @@ def brute(s, wanted, a, v0, v1):
     w[0], w[-1] = min(w[0], v0**2), min(w[-1], v1**2)
     climb = np.concatenate([[0.0], np.cumsum(2.0 * np.broadcast_to(a, len(s) - 1) * np.diff(s))])
     return np.sqrt(np.min(w[None, :] + np.abs(climb[:, None] - climb[None, :]), axis=1))
+
+
+def test_speeds_have_the_same_bits_with_and_without_compiled_loops():
+    rng = np.random.default_rng(3)
+    change, w = rng.uniform(0.0, 9.0, 5000), rng.uniform(0.0, 4000.0, 5001)
+    interpreted = _limit_change(change, w)
+    limit_change(change, w)
+    assert interpreted.tobytes() == w.tobytes()
 
 
 @settings(max_examples=50, deadline=None, derandomize=True)

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import trimesh
 
 from chipload.api.values import AnyCutter, cutter_of, material_of
 from chipload.checking.clamped import Workpiece
@@ -22,6 +21,7 @@ from chipload.checking.workpiece import FinishedPart, Fixture, Stock, Surroundin
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.errors import InputError
+from chipload.lazy import trimesh
 from chipload.machine.ini import read_ini
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.machine.table import MachineTable

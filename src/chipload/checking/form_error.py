@@ -19,11 +19,11 @@ import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.checking.stiffness import Stiffness
 from chipload.cutting.material import Material
+from chipload.lazy import trimesh
 from chipload.simulation.deflection import FormError, form_error
 from chipload.simulation.loads import Cuts
 from chipload.simulation.surface import Difference

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.checking.default_checks import DefaultChecks
@@ -16,6 +15,7 @@ from chipload.checking.stability import StabilityResult
 from chipload.checking.workpiece_compliance import WorkpieceCompliance
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding
+from chipload.lazy import trimesh
 from chipload.machine.machine import Machine
 from chipload.program.read import ProgramReading
 from chipload.result import Provenance

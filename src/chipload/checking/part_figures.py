@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.checking import part_numbers
+from chipload.lazy import trimesh
 from chipload.number_text import number_text
 from chipload.report.scene import legend
 from chipload.report.sheet import table

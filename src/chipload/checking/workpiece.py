@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.geometry.mesh import read_mesh
+from chipload.lazy import trimesh
 from chipload.machine.machine import Machine
 from chipload.machine.table import MachineTable
 from chipload.number_text import number_text
@@ -61,7 +61,8 @@ class Stock:
 
     def __post_init__(self) -> None:
         """Refuse what is no body, a thickness out of range, and one for layers that there are."""
-        if not isinstance(self.body, (tuple, trimesh.Trimesh, LayeredStock)):
+        known = isinstance(self.body, (tuple, LayeredStock))
+        if not known and not isinstance(self.body, trimesh.Trimesh):
             raise InputError(f"stock: {type(self.body).__name__}: must be a Stock, a closed mesh or a layered stock")
         require_ranges(self, "stock.")
         if self.layer_mm is not None and isinstance(self.body, LayeredStock):

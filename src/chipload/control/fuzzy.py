@@ -27,9 +27,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipload.control import _fuzzy
 from chipload.errors import InputError
+from chipload.lazy import LateModule
 from chipload.tables import nearest, read_table
+
+_fuzzy = LateModule("chipload.control._fuzzy")
 
 Floats = NDArray[np.float64]
 

@@ -19,12 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
-from scipy.special import gammaincinv
 
 from chipload.control.logs import SpindleLog
 from chipload.control.spindle import Run, SpindleMap, estimate, first_order, identify_runs, known_rows
 from chipload.errors import InputError
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 
@@ -276,12 +275,12 @@ def _lag(runs: Sequence[Run], constant: float | None, changes: bool) -> tuple[fl
     best, least = tried[k], found[k]
     if len(tried) > 1:
         ends = tried[max(k - 1, 0)], tried[min(k + 1, len(tried) - 1)]
-        finer = minimize_scalar(misfit, bounds=ends, method="bounded", options={"xatol": 1e-4})
+        finer = scipy.optimize.minimize_scalar(misfit, bounds=ends, method="bounded", options={"xatol": 1e-4})
         if finer.fun < least:
             best, least = float(finer.x), float(finer.fun)
     count = sum(int(known_rows(run, tried[-1]).sum()) for run in runs)
     # of chi^2 with one degree of freedom, 95 %
-    allowed = least + 2.0 * float(gammaincinv(0.5, 0.95)) / count
+    allowed = least + 2.0 * float(scipy.special.gammaincinv(0.5, 0.95)) / count
     low = _edge(misfit, best, tried[0], allowed)
     return best, (max(low - 0.5 * period, 0.0), _edge(misfit, best, tried[-1], allowed) + 0.5 * period)
 

@@ -28,7 +28,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from chipload.control.log_alignment import AlignedLog, PredictedTorque, align_log
 from chipload.control.log_blocks import LogBlocks, blocks_of
@@ -36,6 +35,7 @@ from chipload.control.logs import SpindleLog
 from chipload.cutting.learned import LearnedRecord, LogEvidence
 from chipload.cutting.material import Material
 from chipload.errors import Finding, InputError, Severity
+from chipload.lazy import scipy
 from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
@@ -426,7 +426,7 @@ def _greatest(
         parts = [r[own] for r, own in zip(residuals(x), kept, strict=True)]
         return np.concatenate([*parts, model.root @ (x - model.mean)])
 
-    found = least_squares(misfit, model.start(), x_scale="jac")
+    found = scipy.optimize.least_squares(misfit, model.start(), x_scale="jac")
     return found.x, np.linalg.inv(found.jac.T @ found.jac), residuals(found.x)
 
 

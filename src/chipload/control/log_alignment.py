@@ -16,12 +16,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
-from scipy.signal import correlate
 
 from chipload.control.logs import SpindleLog
 from chipload.control.spindle import first_order
 from chipload.errors import Finding, InputError, Severity
+from chipload.lazy import scipy
 from chipload.number_text import number_text
 
 Floats = NDArray[np.float64]
@@ -247,10 +246,10 @@ def _lag_and_rate(
         wanted = np.diff(np.interp(own / rate, times, work)) / step * rate
         if sensor_lag > 0.0:
             wanted = first_order(wanted, own[1:], sensor_lag)
-        product = correlate(seen, wanted, "full", "fft")
+        product = scipy.signal.correlate(seen, wanted, "full", "fft")
         # the prediction is 0 outside of the program, so that its mean over the log is that of what lies within
-        total = correlate(ones, wanted, "full", "fft")
-        square = correlate(ones, wanted * wanted, "full", "fft")
+        total = scipy.signal.correlate(ones, wanted, "full", "fft")
+        square = scipy.signal.correlate(ones, wanted * wanted, "full", "fft")
         variance = square - total * total / len(seen)
         enough = square > 0.5 * float(wanted @ wanted)
         value = np.where(enough & (variance > 0.0), product / np.sqrt(np.maximum(variance, 1e-300)), -np.inf) / size
@@ -267,7 +266,9 @@ def _lag_and_rate(
 
     _, lag, rate = best
     simplex = np.array([[lag, rate], [lag + 3.0 * step, rate], [lag, rate * 1.01]])
-    found = minimize(misfit, simplex[0], method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-4})
+    found = scipy.optimize.minimize(
+        misfit, simplex[0], method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-4}
+    )
     return float(found.x[0]), float(found.x[1])
 
 

@@ -25,10 +25,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import lfilter
-from scipy.special import stdtrit
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 
@@ -83,7 +82,7 @@ def first_order(values: ArrayLike, time: Floats, lag: float) -> Floats:
         a = float(step[0]) / lag
         decay = math.exp(-a)
         ramp = (1.0 - decay) / a
-        after, _ = lfilter([1.0 - ramp, ramp - decay], [1.0, -decay], x, zi=[x[0] * ramp])
+        after, _ = scipy.signal.lfilter([1.0 - ramp, ramp - decay], [1.0, -decay], x, zi=[x[0] * ramp])
         return np.asarray(after)
     out = np.empty_like(x)
     out[0] = y = x[0]
@@ -206,7 +205,7 @@ def identify_runs(
         torque_constant=constant,
         inertia=per_rate * constant,
         idle=found.values[2:] / scale_w ** np.arange(idle_terms),
-        half_width=float(stdtrit(found.freedom, 0.5 + 0.5 * level)) * spread,
+        half_width=float(scipy.special.stdtrit(found.freedom, 0.5 + 0.5 * level)) * spread,
         level=level,
         speeds=(min(float(run.speed.min()) for run in runs), max(float(run.speed.max()) for run in runs)),
         light=light,
@@ -308,7 +307,7 @@ def idle_map(
         torque_constant=torque_constant,
         inertia=0.0,
         idle=found / scale ** np.arange(idle_terms),
-        half_width=np.concatenate([np.zeros(2), float(stdtrit(freedom, 0.975)) * spread]),
+        half_width=np.concatenate([np.zeros(2), float(scipy.special.stdtrit(freedom, 0.975)) * spread]),
         level=0.95,
         speeds=(float(speed.min()), float(speed.max())),
         light=max(light, 2.0 * torque_constant * math.sqrt(variance)),

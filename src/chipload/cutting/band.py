@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting import _tooth_force
-from chipload.cutting import _unit_loads as bases
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.lazy import LateModule
+
+_tooth_force = LateModule("chipload.cutting._tooth_force")
+bases = LateModule("chipload.cutting._unit_loads")
 
 Floats = NDArray[np.float64]
 

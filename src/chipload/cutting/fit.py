@@ -24,14 +24,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting import _unit_loads
 from chipload.cutting.turns import MeasuredCut, Turns, turns_of
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
 from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
+from chipload.lazy import LateModule, scipy
+
+_unit_loads = LateModule("chipload.cutting._unit_loads")
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -319,7 +320,7 @@ def conclude_fit(
 
 def _student(freedom: int) -> float:
     """Return the half width of a two-sided 95 % interval in standard deviations."""
-    return float(stdtrit(freedom, 0.975)) if freedom > 0 else math.nan
+    return float(scipy.special.stdtrit(freedom, 0.975)) if freedom > 0 else math.nan
 
 
 def predict_forces(fit: Fit, cut: MeasuredCut, theta: Floats, resonance: Floats | None = None) -> Floats:

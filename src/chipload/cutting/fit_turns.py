@@ -33,7 +33,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.fit import (
@@ -52,6 +51,7 @@ from chipload.cutting.fit import (
 )
 from chipload.cutting.turns import MeasuredCut, Turns, turns_of
 from chipload.errors import InputError
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -232,7 +232,7 @@ def _refine_unknowns(problem: _Problem, q: Floats) -> tuple[Floats, bool]:
     """Refine the unknowns by least squares from one start."""
     least = min(cut.feed_per_tooth(problem.cutter.flutes) for cut in problem.cuts)
     scale = np.concatenate([np.full(len(problem.cuts), 0.1), np.full(problem.unknowns, 0.2 * least)])
-    done = least_squares(problem.left, q, x_scale=scale, xtol=1e-10, ftol=1e-12, max_nfev=200)
+    done = scipy.optimize.least_squares(problem.left, q, x_scale=scale, xtol=1e-10, ftol=1e-12, max_nfev=200)
     return np.asarray(done.x), bool(done.status > 0)
 
 
@@ -253,7 +253,7 @@ def _channel_modes(problem: _Problem, q: Floats) -> Floats:
         left = partial(_ringing_left, parts=parts)
         low, high = np.log([0.7 * out[c, 0], 0.003]), np.log([1.4 * out[c, 0], 0.5])
         first = [np.log([g * out[c, 0], 0.05]) for g in (0.9, 1.0, 1.1)]
-        found = [least_squares(left, s, bounds=(low, high)) for s in first]
+        found = [scipy.optimize.least_squares(left, s, bounds=(low, high)) for s in first]
         out[c] = np.exp(min(found, key=lambda d: float(d.cost)).x)
     return out
 

@@ -34,11 +34,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting import _tooth_force
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
 from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
+from chipload.lazy import LateModule
+
+_tooth_force = LateModule("chipload.cutting._tooth_force")
 
 Floats = NDArray[np.float64]
 Spindle = Literal["cw", "ccw"]

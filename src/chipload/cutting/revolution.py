@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutting import _revolution
 from chipload.cutting.band import mean_basis
 from chipload.cutting.force import forces_over_turn, in_work, mean_forces
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.lazy import LateModule
+
+_revolution = LateModule("chipload.cutting._revolution")
 
 Floats = NDArray[np.float64]
 

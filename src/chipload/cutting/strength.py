@@ -33,11 +33,13 @@ from numpy.typing import ArrayLike, NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.profile import UPRIGHT
 from chipload.cutter.strength import ToolMaterial
-from chipload.cutting import _strength
 from chipload.cutting.levers import greatest_height, has_lever_loads, lever_loads_in_blocks
 from chipload.cutting.material import Material
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
+from chipload.lazy import LateModule
+
+_strength = LateModule("chipload.cutting._strength")
 
 Floats = NDArray[np.float64]
 

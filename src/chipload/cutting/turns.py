@@ -13,9 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -209,7 +209,7 @@ def _speed(force: Floats, rate: float, nominal: float, search: float, top: int) 
             turned = turned * one
         return -total
 
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         negative_power, bounds=(best - line, best + line), method="bounded", options={"xatol": 1e-8 * nominal}
     )
     return float(found.x)

@@ -15,8 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipload.engagement import _contact
 from chipload.errors import InputError
+from chipload.lazy import LateModule
+
+_contact = LateModule("chipload.engagement._contact")
 
 Floats = NDArray[np.float64]
 

@@ -32,8 +32,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.engagement import _tooth_chips
 from chipload.engagement.tooth_engagement import ToothEngagement
+from chipload.lazy import LateModule
+
+_tooth_chips = LateModule("chipload.engagement._tooth_chips")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

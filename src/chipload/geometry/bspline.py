@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import make_interp_spline
 
 from chipload.errors import InputError
-from chipload.geometry import _bspline
+from chipload.lazy import LateModule, scipy
+
+_bspline = LateModule("chipload.geometry._bspline")
 
 Floats = NDArray[np.float64]
 
@@ -222,7 +223,7 @@ def patch_through(
         if not ok:
             raise InputError(f"patch.{name}: must ascend from 0 to 1, one for each of {size} points, at least two")
     p, q = min(degrees[0], len(a) - 1), min(degrees[1], len(b) - 1)
-    first = make_interp_spline(a, grid, k=p, axis=0)
-    second = make_interp_spline(b, first.c, k=q, axis=1)
+    first = scipy.interpolate.make_interp_spline(a, grid, k=p, axis=0)
+    second = scipy.interpolate.make_interp_spline(b, first.c, k=q, axis=1)
     # the first axis of the coefficients is that of v
     return BSplinePatch(first.t, second.t, np.swapaxes(second.c, 0, 1), side)

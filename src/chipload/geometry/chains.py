@@ -13,14 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from chipload.errors import Finding, InputError
 from chipload.geometry.contour import JOIN_MM, Contour, Floats
 from chipload.geometry.offset import true_centres
 from chipload.geometry.split import swept
+from chipload.lazy import scipy
 
 #: greatest gap [mm] that counts as rounding and is not reported
 SILENT_MM = 1e-6
@@ -133,7 +131,7 @@ def _is_first(rows: list[Floats], where: str, findings: list[Finding]) -> NDArra
     mids = np.array([_middle(r) for r in rows])
     size = np.array([_length(r) for r in rows])
     texts = []
-    pairs = cKDTree(mids).query_pairs(10.0 * SILENT_MM, output_type="ndarray")
+    pairs = scipy.spatial.cKDTree(mids).query_pairs(10.0 * SILENT_MM, output_type="ndarray")
     for i, j in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))] if len(pairs) else []:
         a, b = np.concatenate([rows[i][0, 0:2], rows[i][-1, 2:4]]), np.concatenate([rows[j][0, 0:2], rows[j][-1, 2:4]])
         apart = min(np.abs(a - b).max(), np.abs(a - np.roll(b, 2)).max())
@@ -171,9 +169,9 @@ def _mates(rows: list[Floats], join_mm: float, where: str, findings: list[Findin
         free = np.flatnonzero((mate < 0) & ~branched)
         if len(free) < 2:
             break
-        pairs = cKDTree(ends[free]).query_pairs(gap, output_type="ndarray")
-        graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(free), len(free)))
-        label = connected_components(graph, directed=False)[1]
+        pairs = scipy.spatial.cKDTree(ends[free]).query_pairs(gap, output_type="ndarray")
+        graph = scipy.sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(free), len(free)))
+        label = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
         order = np.argsort(label, kind="stable")
         for group in np.split(free[order], np.flatnonzero(np.diff(label[order])) + 1):
             if len(group) == 2:

@@ -10,8 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chipload.geometry import _segments
 from chipload.geometry.contour import Floats
+from chipload.lazy import LateModule
+
+_segments = LateModule("chipload.geometry._segments")
 
 
 def distance(segments: ArrayLike, points: ArrayLike) -> Floats:

@@ -14,16 +14,14 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from shapely import MultiPolygon, Polygon
 
 from chipload.errors import InputError
 from chipload.files import is_file
 from chipload.geometry.step import step_triangles
 from chipload.geometry.stl import read_stl
+from chipload.lazy import scipy, trimesh
 from chipload.units import MM_PER
 
 #: greatest absolute value of a coordinate [mm]
@@ -125,8 +123,8 @@ def sections(mesh: trimesh.Trimesh, heights: Sequence[float] | Floats) -> list[M
 def _bodies(vertices: Floats, faces: Ints) -> Ints:
     """(f,) number of the body of each face; -1: of a shell around a cavity, whose volume is below 0."""
     edges = np.vstack([faces[:, :2], faces[:, 1:]])
-    graph = coo_array((np.ones(len(edges)), edges.T), shape=(len(vertices), len(vertices)))
-    shell = connected_components(graph, directed=False)[1][faces[:, 0]]
+    graph = scipy.sparse.coo_array((np.ones(len(edges)), edges.T), shape=(len(vertices), len(vertices)))
+    shell = scipy.sparse.csgraph.connected_components(graph, directed=False)[1][faces[:, 0]]
     a, b, c = (vertices[faces[:, i]] - vertices.mean(axis=0) for i in range(3))
     volume = np.bincount(shell, (a * np.cross(b, c)).sum(axis=1))
     return np.where(volume[shell] < 0.0, -1, shell)

@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import ChiploadError, InputError
-from chipload.geometry import _segments
 from chipload.geometry.contour import Contour, Floats, Region
 from chipload.geometry.distance import boxes
 from chipload.geometry.split import (
@@ -36,6 +35,9 @@ from chipload.geometry.split import (
     split_segments,
     swept,
 )
+from chipload.lazy import LateModule
+
+_segments = LateModule("chipload.geometry._segments")
 
 #: an arc whose parallel has a smaller radius [mm] than this becomes a point
 POINT_MM = 1e-9

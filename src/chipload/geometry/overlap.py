@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import LinearNDInterpolator
 
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
 from chipload.geometry.sections import Blade
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 
@@ -111,5 +111,5 @@ def _theta(side: BSplinePatch, where: Floats) -> Floats:
     p = np.concatenate([foot[:, None], p, tip[:, None]], axis=1)
     theta = np.unwrap(np.unwrap(np.arctan2(p[..., 1], p[..., 0]), axis=1), axis=0)
     rz = np.stack([np.hypot(p[..., 0], p[..., 1]), p[..., 2]], axis=-1)
-    out: Floats = LinearNDInterpolator(rz.reshape(-1, 2), theta.ravel())(where)
+    out: Floats = scipy.interpolate.LinearNDInterpolator(rz.reshape(-1, 2), theta.ravel())(where)
     return out

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline, make_interp_spline
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class Revolved:
 
     meridian: Floats
     side: int
-    _curve: BSpline = field(init=False, repr=False)
+    _curve: scipy.interpolate.BSpline = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         m = np.array(self.meridian, dtype=np.float64)
@@ -50,7 +50,7 @@ class Revolved:
         s = np.concatenate([[0.0], np.cumsum(chord)])
         m.flags.writeable = False
         object.__setattr__(self, "meridian", m)
-        object.__setattr__(self, "_curve", make_interp_spline(s / s[-1], m, k=min(3, len(m) - 1)))
+        object.__setattr__(self, "_curve", scipy.interpolate.make_interp_spline(s / s[-1], m, k=min(3, len(m) - 1)))
 
     @property
     def knots(self) -> Floats:

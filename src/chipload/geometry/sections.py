@@ -20,18 +20,17 @@ from pathlib import Path
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_interp_spline
-from scipy.optimize import minimize_scalar
 
 from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.geometry.bspline import BSplinePatch, patch_through
 from chipload.geometry.section_table import meridian_of_table, sections_of_table
+from chipload.lazy import scipy
 from chipload.units import MM_PER
 
 Floats = NDArray[np.float64]
 
-_Half = tuple[BSpline, float, float]
+_Half = tuple["scipy.interpolate.BSpline", float, float]
 
 _LARGEST_FILE = 20_000_000
 #: greatest absolute value of a coordinate [mm]
@@ -208,9 +207,9 @@ def _halves(p: Floats) -> tuple[_Half, _Half]:
     if not (np.diff(s) > 0.0).all():
         row = int((np.diff(s) <= 0.0).argmax()) + 1
         raise InputError(f"sections: point {row} of a section is repeated: remove one")
-    curve = make_interp_spline(s, ring, k=3)
+    curve = scipy.interpolate.make_interp_spline(s, ring, k=3)
     last = len(s) - 2
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         lambda x: -float(((curve(x) - ring[0]) ** 2).sum()), method="bounded",
         bounds=(s[max(j - 1, 1)], s[min(j + 1, last)]),
         options={"xatol": 1e-9 * s[-1]},

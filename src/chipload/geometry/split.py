@@ -11,13 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from chipload.geometry import _segments
 from chipload.geometry.contour import Contour, Floats
 from chipload.geometry.distance import boxes
+from chipload.lazy import LateModule, scipy
+
+_segments = LateModule("chipload.geometry._segments")
 
 Ints = NDArray[np.int64]
 
@@ -84,9 +83,9 @@ def split_segments(raw: RawSegments, tol: float, snap: float) -> tuple[SplitSegm
     owner = np.concatenate([np.arange(n), np.arange(n), who[:, 0]])
     t = np.concatenate([np.zeros(n), np.ones(n), np.clip(at, 0.0, 1.0)])
 
-    pairs = cKDTree(points).query_pairs(snap, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
-    label = connected_components(graph, directed=False)[1].astype(np.int64)
+    pairs = scipy.spatial.cKDTree(points).query_pairs(snap, output_type="ndarray")
+    graph = scipy.sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+    label = scipy.sparse.csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
     first = np.full(label.max() + 1, len(points))
     np.minimum.at(first, label, np.arange(len(points)))
     place = points[first]

@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline, make_interp_spline
 
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch, basis, patch_through
 from chipload.geometry.step import Part
 from chipload.geometry.step_faces import Face, KernelFace, kernel_face
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 
@@ -283,8 +283,8 @@ def _even_u(face_patch: ReadFace, face: KernelFace, key: str, fit: float) -> Rea
     step = np.linalg.norm(np.diff(grid, axis=0), axis=2).mean(axis=1)
     if step.max() <= UNEVEN * step.min():
         return face_patch
-    u_of = CubicSpline(np.concatenate([[0.0], step.cumsum()]) / step.sum(), x)
-    s_of = CubicSpline(x, np.concatenate([[0.0], step.cumsum()]) / step.sum())
+    u_of = scipy.interpolate.CubicSpline(np.concatenate([[0.0], step.cumsum()]) / step.sum(), x)
+    s_of = scipy.interpolate.CubicSpline(x, np.concatenate([[0.0], step.cumsum()]) / step.sum())
     ends = np.clip(s_of(np.unique(patch.knots_u)), 0.0, 1.0)
     degree = patch.degrees[0]
     off = np.inf
@@ -292,7 +292,7 @@ def _even_u(face_patch: ReadFace, face: KernelFace, key: str, fit: float) -> Rea
         s = np.concatenate([np.linspace(a, b, count, endpoint=False) for a, b in pairwise(ends)] + [[1.0]])
         first, N = basis(patch.knots_u, degree, np.clip(u_of(s), 0.0, 1.0))
         curves = np.einsum("ki,kijd->kjd", N, patch.control[first[:, None] + np.arange(degree + 1)])
-        spline = make_interp_spline(s, curves, k=3)
+        spline = scipy.interpolate.make_interp_spline(s, curves, k=3)
         made = BSplinePatch(spline.t, patch.knots_v, spline.c, patch.side)
         S, V = _mesh(np.sort(np.concatenate([s, 0.5 * (s[1:] + s[:-1])])), few)
         off = float(np.linalg.norm(made.at(S, V) - patch.at(np.clip(u_of(S), 0.0, 1.0), V), axis=1).max())
@@ -349,7 +349,7 @@ def _corners(loop: list[_Piece]) -> NDArray[np.int64]:
 def _side(pieces: list[_Piece]) -> Callable[[Floats], Floats]:
     """The function from shares (n,) of the length of a side to its (u, v) (n, 2)."""
     ends = np.concatenate([[0.0], np.cumsum([p.length[-1] for p in pieces])])
-    inverse = [CubicSpline(p.length, p.t) for p in pieces]
+    inverse = [scipy.interpolate.CubicSpline(p.length, p.t) for p in pieces]
 
     def surface_point(shares: Floats) -> Floats:
         x = shares * ends[-1]

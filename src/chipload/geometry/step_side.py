@@ -19,13 +19,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch, patch_through
 from chipload.geometry.revolve import Revolved
 from chipload.geometry.step import Part
 from chipload.geometry.step_faces import Face, kernel_face
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ class _Trimmed:
     patch: BSplinePatch
     outline: Any
     uv: Floats
-    tree: cKDTree
+    tree: scipy.spatial.cKDTree
 
 
 def side_of(faces: Sequence[Face], key: str, fit: float, R: Floats, hub: Revolved, shroud: Revolved) -> SampledSide:
@@ -136,7 +136,7 @@ def _trim_patch(patch: BSplinePatch, loop: Floats) -> _Trimmed:
     U, V = (q.ravel() for q in np.meshgrid(x, x, indexing="ij"))
     within = shapely.contains_xy(outline.buffer(1e-9), U, V)
     uv = np.concatenate([np.stack([U, V], axis=-1)[within], np.clip(loop, 0.0, 1.0)])
-    return _Trimmed(patch, outline, uv, cKDTree(_meridional(patch.at(*uv.T))))
+    return _Trimmed(patch, outline, uv, scipy.spatial.cKDTree(_meridional(patch.at(*uv.T))))
 
 
 def _meridional(p: Floats) -> Floats:

@@ -19,11 +19,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
 from chipload.geometry.sections import Blade
+from chipload.lazy import trimesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -11,15 +11,21 @@ One forward and one backward pass find it.
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
-from chipload.machine._acceleration import limit_acceleration
+from chipload.lazy import LateModule
 from chipload.machine.machine import Machine
 
+_acceleration = LateModule("chipload.machine._acceleration")
+
 Floats = NDArray[np.float64]
+
+#: places of a path up to which its speeds are found in 20 ms without the compiler, whose start takes 200 ms
+INTERPRETED = 50_000
 
 #: change of direction [rad] below which a corner does not limit the speed: a jump of 0.1 mm/s at 100 mm/s
 TANGENT = 1e-3
@@ -90,7 +96,11 @@ def limited_speed(
     w = wanted**2
     w[0] = min(w[0], start_speed**2)
     w[-1] = min(w[-1], end_speed**2)
-    limit_acceleration(step, np.ascontiguousarray(a), w)
+    change = 2.0 * a * step
+    if n > INTERPRETED or "numba" in sys.modules:
+        _acceleration.limit_change(change, w)
+    else:
+        w = _limit_change(change, w)
     v: Floats = np.sqrt(w)
     total = v[:-1] + v[1:]
     moving = step > 0.0
@@ -194,3 +204,15 @@ def row_time_limited(machine: Machine, axes: ArrayLike, time: ArrayLike = 0.0) -
     for axis in machine.chain.axes:
         out = np.maximum(out, np.abs(np.diff(q[:, axis.column])) / axis.rate)
     return out
+
+
+def _limit_change(change: Floats, w: Floats) -> Floats:
+    """As :func:`chipload.machine._acceleration.limit_change`, to the same bits, and not in place."""
+    squares, most = w.tolist(), change.tolist()
+    for k, step in enumerate(most):
+        if squares[k + 1] > (reached := squares[k] + step):
+            squares[k + 1] = reached
+    for k in range(len(most) - 1, -1, -1):
+        if squares[k] > (reached := squares[k + 1] + most[k]):
+            squares[k] = reached
+    return np.array(squares)

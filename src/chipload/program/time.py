@@ -32,16 +32,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chipload.lazy import LateModule
 from chipload.machine.feed import corner_speed, limited_speed, move_time, row_time_limited
 from chipload.machine.machine import Machine
 from chipload.machine.trajectory import TrajectoryPlanner
-from chipload.program._jerk_limited import jerk_limited
 from chipload.program.commands import ARC, PLANE_AXES, Commands, spirals
 from chipload.program.motions import bases, directions, is_arc, lengths, radii, sweeps
 from chipload.program.path_mode import PathControl, resolve_tolerance
 from chipload.program.program import ARC_CCW, ARC_CW, ARC_SKEW_MM, DWELL, LINE, RAPID, Program
 from chipload.program.to_work import turning_times
 from chipload.program.trajectory import planned_times
+
+_jerk_limited = LateModule("chipload.program._jerk_limited")
 
 #: what the jerk along the path of a milling machine is at least [mm/s^3], where nothing is stated: half of what
 #: controls are delivered with. Reference: HEIDENHAIN, Technical Manual MANUALplus 620, 2012, p. 829: default 40 m/s^3;
@@ -106,7 +108,7 @@ def program_time(program: Program, machine: Machine) -> Floats:
         if machine.jerk is None:
             out[row] = move_time(length, most, a, v[:-1], v[1:])
         else:
-            out[row] = jerk_limited(length, most, a, joints, v, machine.jerk)[0]
+            out[row] = _jerk_limited.jerk_limited(length, most, a, joints, v, machine.jerk)[0]
     return np.where(unplaced, 0.0, out)
 
 
@@ -212,7 +214,7 @@ def peak_speed(program: Program, machine: Machine) -> Floats:
     if (lengths(program) > 0.0).any():
         row, length, most, a, joints, v = _speeds(program, machine)
         if machine.jerk is not None:
-            out[row] = jerk_limited(length, most, a, joints, v, machine.jerk)[1]
+            out[row] = _jerk_limited.jerk_limited(length, most, a, joints, v, machine.jerk)[1]
             return out
         peak = np.minimum(most, np.sqrt(a * length + 0.5 * (v[:-1] ** 2 + v[1:] ** 2)))
         out[row] = np.maximum(peak, np.maximum(v[:-1], v[1:]))

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
+from chipload.lazy import trimesh
 from chipload.report.gltf import node_names, select_nodes
 
 Floats = NDArray[np.float64]

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
+from chipload.lazy import trimesh
 from chipload.report.scene import engagement_colours, engagement_legend
 from chipload.result import COLUMNS
 from chipload.result.limits import Columns

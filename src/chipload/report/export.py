@@ -11,12 +11,10 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv
-import pyarrow.parquet as pq
 
 from chipload.errors import InputError
 from chipload.files import cannot_write, fresh_folder
+from chipload.lazy import pa, pq
 from chipload.report.chip_bodies import chip_bodies, chips_scene
 from chipload.report.load_monitor import MONITORS, UNPUBLISHED, afc_table, load_csv, sections_of
 from chipload.report.presentation import Content
@@ -97,6 +95,8 @@ def _load_monitor(result: Result, monitor: str, spindle: Path | None) -> dict[st
 
 def _csv(history: Path, file: IO[bytes]) -> None:
     """history.parquet as text, some rows at a time."""
+    from pyarrow import csv
+
     try:
         with pq.ParquetFile(history) as source:
             writer = None
@@ -104,7 +104,7 @@ def _csv(history: Path, file: IO[bytes]) -> None:
                 table = pa.Table.from_batches([batch])
                 plain = [f.with_type(pa.string()) if pa.types.is_dictionary(f.type) else f for f in table.schema]
                 table = table.cast(pa.schema([f.remove_metadata() for f in plain]))
-                writer = writer or pyarrow.csv.CSVWriter(file, table.schema)
+                writer = writer or csv.CSVWriter(file, table.schema)
                 writer.write_table(table)
             if writer is None:
                 file.write((",".join(f'"{name}"' for name in source.schema_arrow.names) + "\n").encode())

@@ -8,10 +8,10 @@ from typing import IO
 
 import numpy as np
 import plotly.graph_objects as go
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
+from chipload.lazy import trimesh
 from chipload.result import Result
 from chipload.simulation.engagement_samples import EngagementSamples
 

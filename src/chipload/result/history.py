@@ -12,9 +12,8 @@ from collections.abc import Mapping
 from typing import IO, Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
+from chipload.lazy import pa, pq
 from chipload.result.columns import COLUMNS
 from chipload.result.limits import Columns
 from chipload.result.result import Result

@@ -7,13 +7,12 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from pydantic import ValidationError
 
 from chipload.arrays import read_arrays
 from chipload.errors import InputError
 from chipload.files import hash_of
+from chipload.lazy import pa, pq
 from chipload.result.limits import Columns
 from chipload.result.result import Result, SurfaceMap
 from chipload.result.summary import SCHEMA_VERSION, Summary, TrackModel, finding_from, limit_from, provenance_from

@@ -20,9 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
 from chipload.geometry.contour import Region
+from chipload.lazy import LateModule
 from chipload.program.program import ARC_CCW, ARC_CW, Program
-from chipload.simulation import _centre_path
 from chipload.simulation.material import strips
+
+_centre_path = LateModule("chipload.simulation._centre_path")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -22,13 +22,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 import shapely
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.files import FRESH, cannot_write, sweep, write_whole
+from chipload.lazy import pa, pq
 from chipload.processes import lock_file
 
 #: seconds of work between two states

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
 from chipload.cutting.force import forces_over_turn, in_work
 from chipload.cutting.material import Material
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.simulation.loads import Cuts
 
 Floats = NDArray[np.float64]
@@ -73,7 +73,7 @@ def floor_error(
     q, C = np.asarray(points, dtype=np.float64), np.asarray(motion, dtype=np.float64)
     deepest, left = np.zeros(len(q)), np.zeros(len(q))
     made = np.zeros(len(q), dtype=np.bool_)
-    tree = cKDTree(q[:, :2])
+    tree = scipy.spatial.cKDTree(q[:, :2])
     for cuts in all_cuts:
         flat = cuts.cutter.flat_radius
         if not flat > 0.0 or float(cuts.ends[:, [8, 11]].min()) < 1.0 - 1e-9:

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.geometry.contour import Region
+from chipload.lazy import LateModule
 from chipload.program.program import Program
-from chipload.simulation import _centre_path
 from chipload.simulation.centre_path import LEVEL_MM, flat_motions, motion_rows, rim_engagement
 from chipload.simulation.verify import heights_of, levels_of
+
+_centre_path = LateModule("chipload.simulation._centre_path")
 
 Floats = NDArray[np.float64]
 

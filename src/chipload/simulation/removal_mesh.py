@@ -13,10 +13,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
+from chipload.lazy import trimesh
 from chipload.stock.dexel import TriDexel
 from chipload.stock.surface_net import STEPS, SurfaceNet
 

@@ -18,13 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
 from chipload.cutter.cutter import Cutter
 from chipload.engagement.chips.section import distance as profile_distance
 from chipload.geometry.mesh import sections
+from chipload.lazy import scipy, trimesh
 from chipload.program.program import Program
 from chipload.stock.layers import LayeredStock
 
@@ -66,7 +65,7 @@ def nearest(program: Program, cutter: Cutter, points: ArrayLike) -> WallClearanc
     points : (p, 3) float [mm] of the body's surface
     """
     cloud = np.asarray(points, dtype=np.float64).reshape(-1, 3)
-    tree = cKDTree(cloud)
+    tree = scipy.spatial.cKDTree(cloud)
     p, A = np.asarray(program.p_work), np.asarray(program.axis)
     middle = A[1:] + A[:-1]
     middle /= np.linalg.norm(middle, axis=1, keepdims=True)
@@ -110,7 +109,7 @@ def nearest(program: Program, cutter: Cutter, points: ArrayLike) -> WallClearanc
 
 
 def _barrel_distances(
-    cutter: Cutter, tip: Floats, axis: Floats, cloud: Floats, tree: cKDTree
+    cutter: Cutter, tip: Floats, axis: Floats, cloud: Floats, tree: scipy.spatial.cKDTree
 ) -> tuple[Floats, NDArray[np.int64]]:
     """Least distance (n,) of a barrel from a body in each place, as far as it is near, and the point (n,)."""
     half = 0.5 * cutter.flute_length

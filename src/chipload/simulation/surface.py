@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
+from chipload.lazy import trimesh
 from chipload.simulation.clearance.body import above_cutting, cutting_part
 from chipload.simulation.clearance.clearance import NEVER, LeastDistance
 from chipload.simulation.kept_pass import KeptPasses

@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from chipload.errors import Cancelled, InputError
 from chipload.geometry.contour import Contour, Region
+from chipload.lazy import LateModule
 from chipload.number_text import number_text
 from chipload.program.program import ARC_CCW, ARC_CW, LINE, RAPID, Program
 from chipload.progress import Progress, silent
-from chipload.simulation import _centre_path
 from chipload.simulation.centre_path import LEVEL_MM, CentrePath, flat_motions, motion_rows, rim_engagement
 from chipload.simulation.wall_distance import GreatestDistance, excess, gouge
+
+_centre_path = LateModule("chipload.simulation._centre_path")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.geometry.contour import Contour
-from chipload.simulation import _centre_path
+from chipload.lazy import LateModule
 from chipload.simulation.centre_path import CentrePath, motion_rows
+
+_centre_path = LateModule("chipload.simulation._centre_path")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtri
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.stability.cuts import DynamicCuts
 from chipload.stability.margin import PER_WAVE, largest_multipliers
 
@@ -73,7 +73,7 @@ def stable_probability(
     count, root = len(cuts.damping), _root(coefficients)
     points = qmc.Sobol(3 * count + 2, scramble=True, rng=0).random(samples)
     stable = np.zeros(len(cuts))
-    for n in ndtri(np.clip(points, 1e-9, 1.0 - 1e-9)):
+    for n in scipy.special.ndtri(np.clip(points, 1e-9, 1.0 - 1e-9)):
         some = _sample(cuts, spread, root, n)
         found = largest_multipliers(some, per_wave=PER_WAVE, most=2 * count + SPARE, still=STILL)
         stable += np.abs(found) < 1.0

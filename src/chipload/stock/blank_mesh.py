@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-import trimesh
 
+from chipload.lazy import trimesh
 from chipload.stock.layers import LayeredStock
 from chipload.stock.solid import prisms
 from chipload.stock.tile_grid import polygons

@@ -18,15 +18,17 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
-from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from chipload.errors import InputError
 from chipload.geometry.mesh import require_closed
-from chipload.lazy import LateModule
+from chipload.lazy import LateModule, trimesh
+
+if TYPE_CHECKING:
+    from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 _dexels = LateModule("chipload.stock._dexels")
 
@@ -118,6 +120,8 @@ class TriDexel:
         if len(mesh.faces) == 0:
             raise InputError("stock: the mesh has no triangles")
         require_closed(mesh, "stock")
+        from trimesh.ray.ray_pyembree import RayMeshIntersector
+
         caster = RayMeshIntersector(mesh)
         low, high = (np.asarray(b, dtype=np.float64) for b in mesh.bounds)
         return cls([_rays_of_mesh(mesh, caster, k, grid) for k, grid in _grids(low, high, pitch, directions)])

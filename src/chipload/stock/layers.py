@@ -16,14 +16,13 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 from shapely import MultiPolygon, Polygon
 
 from chipload.errors import InputError
 from chipload.files import write_whole
 from chipload.geometry.mesh import require_closed
-from chipload.stock._ring_edges import ring_edges
+from chipload.lazy import LateModule, trimesh
 from chipload.stock.earlier_moves import SAVED_MOVES, EarlierMoves, no_moves
 from chipload.stock.shapes import read_shapes, shape_bytes
 from chipload.stock.simpler import simplify_tiles
@@ -41,6 +40,8 @@ from chipload.stock.tile_grid import (
     span,
     turns_of,
 )
+
+_ring_edges = LateModule("chipload.stock._ring_edges")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -221,7 +222,7 @@ class LayeredStock:
         rings, part = shapely.get_rings(parts, return_index=True)
         points, ring = shapely.get_coordinates(rings, return_index=True)
         edges, start = np.empty((len(points), 4)), np.zeros(len(layers) + 1, dtype=np.int64)
-        count = ring_edges(points, ring, tile[part] // width, x0, y0, y1, edges, start)
+        count = _ring_edges.ring_edges(points, ring, tile[part] // width, x0, y0, y1, edges, start)
         return self.bounds[layers.start : layers.stop + 1], start, edges[:count].copy()
 
     def volumes(self) -> Floats:

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
-from chipload.stock import _planar
+from chipload.lazy import LateModule
+
+_planar = LateModule("chipload.stock._planar")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,8 +30,6 @@ CELLS = 8
 CELL_LIMIT = 8_000_000
 #: least depth of a contact of rim and material, as a share of R
 TOUCH = 1e-9
-#: status of a cell that is wholly cleared
-EMPTY = _planar.EMPTY
 
 
 class PlanarStock:
@@ -97,6 +97,10 @@ class PlanarStock:
     def restore(self, state: tuple[Ints, Ints, int, int]) -> None:
         """Restore the stock to a state: chain entries never change, so that the heads of the cells suffice."""
         self.head[:], self.count[:], self.capsules, self.used = state
+
+    def cleared(self) -> NDArray[np.bool_]:
+        """Which cells (ny * nx,) are wholly cleared."""
+        return np.asarray(self.head == _planar.EMPTY)
 
     def remove(self, axes: ArrayLike) -> None:
         """Remove the capsules about ``axes`` (n, 4) [mm], rows ``ax, ay, bx, by``."""

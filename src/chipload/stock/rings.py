@@ -14,10 +14,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
+from chipload.lazy import trimesh
 from chipload.stock.layers import LayeredStock
 from chipload.stock.tile_grid import polygons
 

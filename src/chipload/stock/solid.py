@@ -14,11 +14,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from shapely import Polygon
+
+from chipload.lazy import scipy, trimesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -108,14 +107,14 @@ def _prism(part: Polygon, z0: float, z1: float) -> tuple[Floats, Ints]:
     found = np.minimum(np.searchsorted(key[order], back), len(key) - 1)
     inner = key[order][found] == back
     twin = order[found]
-    joined = coo_array(
+    joined = scipy.sparse.coo_array(
         (
             np.ones(2 * int(inner.sum()), dtype=np.int8),
             (np.concatenate([at[inner], to[inner]]), np.concatenate([to[twin[inner]], at[twin[inner]]])),
         ),
         shape=(tri.size, tri.size),
     )
-    size, group = connected_components(joined, directed=False)
+    size, group = scipy.sparse.csgraph.connected_components(joined, directed=False)
     flat = np.empty((size, 2))
     flat[group] = places[tri.ravel()]
     base = group[corner]

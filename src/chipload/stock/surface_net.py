@@ -14,8 +14,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from chipload.stock import _surface_net
+from chipload.lazy import LateModule
 from chipload.stock.dexel import Rays, TriDexel
+
+_surface_net = LateModule("chipload.stock._surface_net")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 from shapely import MultiPolygon, Polygon
 
 from chipload.errors import InputError
 from chipload.geometry.mesh import sections
+from chipload.lazy import trimesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

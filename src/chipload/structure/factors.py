@@ -16,11 +16,9 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import SuperLU, splu
 
 from chipload.errors import InputError
-from chipload.lazy import LateModule
+from chipload.lazy import LateModule, scipy
 
 _triangular = LateModule("chipload.structure._triangular")
 
@@ -40,7 +38,7 @@ class Factors:
     lu : as SuperLU holds them
     """
 
-    lu: SuperLU
+    lu: scipy.sparse.linalg.SuperLU
 
     @cached_property
     def _lower(self) -> tuple[Indices, Indices, Array, Array]:
@@ -87,7 +85,7 @@ class Factors:
 SMALLEST_PIVOT = 1e-11
 
 
-def factor(matrix: csc_array, smallest: float = SMALLEST_PIVOT) -> Factors:
+def factor(matrix: scipy.sparse.csc_array, smallest: float = SMALLEST_PIVOT) -> Factors:
     """Factors of a symmetric positive definite matrix, O(f^1.5) for a plate, O(f^2) for a block.
 
     ``smallest`` is the pivot, over the diagonal entry that it came from, below which the matrix counts as singular.
@@ -104,7 +102,7 @@ def factor(matrix: csc_array, smallest: float = SMALLEST_PIVOT) -> Factors:
     """
     options = {"SymmetricMode": True}
     try:
-        lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        lu = scipy.sparse.linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     except RuntimeError as error:
         raise InputError(f"stiffness: {error}: a part of the workpiece is not held") from None
     came_from = np.empty(matrix.shape[0])

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.number_text import number_text
 from chipload.structure.hexa import Array
 from chipload.structure.receptance import Receptance
@@ -169,7 +169,9 @@ def _search(f: Array, H: NDArray[np.complex128], start: Array) -> Array:
 
     low = np.tile([np.log(0.5 * f[0]), np.log(1e-4)], len(start) // 2)
     high = np.tile([np.log(2.0 * f[-1]), np.log(0.9)], len(start) // 2)
-    found = least_squares(residual, np.clip(start, low + 1e-6, high - 1e-6), bounds=(low, high), x_scale=0.02)
+    found = scipy.optimize.least_squares(
+        residual, np.clip(start, low + 1e-6, high - 1e-6), bounds=(low, high), x_scale=0.02
+    )
     return np.asarray(found.x, dtype=np.float64)
 
 

@@ -9,9 +9,9 @@ six rigid modes of frequency 0, and needs s > 0.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.structure.factors import factor
 from chipload.structure.hexa import Array
 from chipload.structure.solid import Factored, SolidWorkpiece, assemble, assemble_mass, free_dofs
@@ -53,9 +53,9 @@ def modes(part: SolidWorkpiece | Factored, count: int, shift: float = 0.0) -> tu
         K = assemble(solid)[free][:, free].tocsc()
     if shift > 0.0:
         factors = factor(K + shift * M)
-    inverse = LinearOperator(K.shape, matvec=factors.solve, dtype=np.float64)
+    inverse = scipy.sparse.linalg.LinearOperator(K.shape, matvec=factors.solve, dtype=np.float64)
     begin = np.random.default_rng(0).standard_normal(len(free))
-    values, vectors = eigsh(K, k=count, M=M, sigma=-shift, OPinv=inverse, v0=begin)
+    values, vectors = scipy.sparse.linalg.eigsh(K, k=count, M=M, sigma=-shift, OPinv=inverse, v0=begin)
     order = np.argsort(values)
     shapes = np.zeros((count, 3 * len(solid.grid.nodes)))
     shapes[:, free] = vectors[:, order].T

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.structure.grid import Grid, Indices, side_axis
 from chipload.structure.hexa import NODES, Array, shape, shape_gradient
 
@@ -93,7 +92,7 @@ def locate(grid: Grid, side: str, points: ArrayLike, tolerance: float) -> MeshPl
     seeds = grid.nodes[grid.elements[np.ix_(numbers, np.flatnonzero(face))]]
     owner = np.repeat(np.arange(len(numbers)), seeds.shape[1])
     start = np.tile(NODES[face], (len(numbers), 1))
-    tree = cKDTree(seeds.reshape(-1, 3))
+    tree = scipy.spatial.cKDTree(seeds.reshape(-1, 3))
     near = np.asarray(tree.query(x, k=min(12, len(owner)))[1]).reshape(len(x), -1)
     best = np.full(len(x), np.inf)
     element = np.zeros(len(x), dtype=np.int64)
@@ -163,12 +162,14 @@ def normals_of(grid: Grid, places: MeshPlaces, side: str) -> Array:
     return np.asarray(n / np.linalg.norm(n, axis=1)[:, None])
 
 
-def weights(grid: Grid, places: MeshPlaces) -> csr_array:
+def weights(grid: Grid, places: MeshPlaces) -> scipy.sparse.csr_array:
     """Shape functions at the places, sparse (p, n): they distribute a force at a place to nodes and interpolate the
     motion of the nodes at the place.
     """
     N = shape(places.local)
     rows = np.repeat(np.arange(len(places)), 20)
-    out = csr_array((N.ravel(), (rows, grid.elements[places.element].ravel())), shape=(len(places), len(grid.nodes)))
+    out = scipy.sparse.csr_array(
+        (N.ravel(), (rows, grid.elements[places.element].ravel())), shape=(len(places), len(grid.nodes))
+    )
     out.eliminate_zeros()
     return out

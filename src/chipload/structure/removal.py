@@ -33,10 +33,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import lu_factor, lu_solve
-from scipy.sparse import coo_array, csc_array
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.progress import Progress, silent
 from chipload.structure.factors import Factors, factor
 from chipload.structure.grid import Indices
@@ -84,7 +83,7 @@ class CutElements:
     A: Indices
     gone: Indices
     elements: Indices
-    K_BA: csc_array
+    K_BA: scipy.sparse.csc_array
     factors: Factors | None
 
     def solve(self, force: Array) -> Array:
@@ -123,7 +122,7 @@ class StructureRemoval:
 
     def correction(self, U: Array) -> Array:
         """M U (b, q) [N/mm] of displacements (b, q) of B in the base."""
-        return np.asarray(lu_solve(self.lu, self.D @ U, check_finite=False)) if len(self.B) else U
+        return np.asarray(scipy.linalg.lu_solve(self.lu, self.D @ U, check_finite=False)) if len(self.B) else U
 
     @property
     def rank(self) -> int:
@@ -161,7 +160,7 @@ def _fresh(base: Factored, region: Indices, limit: int, factorisations: int) -> 
     rows = _rows(base, region)
     columns = SolvedColumns(rows, np.zeros(0, np.int64), np.full(len(rows), -1), np.zeros((0, len(rows))))
     none = np.zeros(0, dtype=np.int64)
-    interior = CutElements(none, none, none, csc_array((0, 0)), None)
+    interior = CutElements(none, none, none, scipy.sparse.csc_array((0, 0)), None)
     return StructureRemoval(
         base.solid,
         base,
@@ -269,7 +268,7 @@ def cut(
     D = 0.5 * (D + D.T)
     within = D @ G
     within[np.diag_indices(len(B))] += 1.0
-    lu = lu_factor(within, overwrite_a=True, check_finite=False) if len(B) else state.lu
+    lu = scipy.linalg.lu_factor(within, overwrite_a=True, check_finite=False) if len(B) else state.lu
     pivot = float(abs(lu[0].diagonal()).min()) if len(B) else 1.0
     if not pivot > SMALLEST_PIVOT:
         raise InputError(
@@ -279,7 +278,9 @@ def cut(
     return replace(state, solid=solid, columns=columns, B=at, D=D, lu=lu, interior=interior)
 
 
-def _cut_elements(base: Factored, solid: SolidWorkpiece) -> tuple[Indices, NDArray[np.bool_], csc_array, csc_array]:
+def _cut_elements(
+    base: Factored, solid: SolidWorkpiece
+) -> tuple[Indices, NDArray[np.bool_], scipy.sparse.csc_array, scipy.sparse.csc_array]:
     """Cut elements: their free degrees of freedom, which other elements share, stiffness before and after."""
     differs = (base.solid.kept != solid.kept).any(axis=1)
     e = np.flatnonzero(differs)
@@ -292,12 +293,12 @@ def _cut_elements(base: Factored, solid: SolidWorkpiece) -> tuple[Indices, NDArr
     free = (rows >= 0) & (columns >= 0)
     xyz = solid.grid.nodes[elements]
 
-    def sum_kept(kept: Array) -> csc_array:
+    def sum_kept(kept: Array) -> scipy.sparse.csc_array:
         K = np.zeros((len(e), 60, 60))
         part = kept[:, 1] > kept[:, 0]
         K[part] = stiffness(xyz[part], solid.modulus, solid.poisson, solid.rule, kept[part], e[part])
         size = (len(touched), len(touched))
-        return coo_array((K.ravel()[free], (rows[free], columns[free])), shape=size).tocsc()
+        return scipy.sparse.coo_array((K.ravel()[free], (rows[free], columns[free])), shape=size).tocsc()
 
     other = np.zeros(len(solid.grid.nodes), dtype=np.bool_)
     other[solid.grid.elements[~differs & (solid.kept[:, 1] > solid.kept[:, 0])]] = True

@@ -31,9 +31,9 @@ from typing import Literal
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import solve_triangular
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 
@@ -158,7 +158,7 @@ def ritz(shell: Shell, harmonics: int = 80, terms: int = 40, repeat: int = 1) ->
         stiffness[rigid, rigid] = 1.0
         scale = 1.0 / np.sqrt(np.diag(stiffness))
         lower = np.linalg.cholesky(stiffness * scale[:, None] * scale)
-        inverse[i] = solve_triangular(lower, np.diag(scale), lower=True)
+        inverse[i] = scipy.linalg.solve_triangular(lower, np.diag(scale), lower=True)
         inverse[i][:, rigid] = 0.0
     for array in (orders, inverse):
         array.setflags(write=False)

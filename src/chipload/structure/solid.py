@@ -16,10 +16,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array, csc_array, csr_array
-from scipy.sparse.csgraph import connected_components
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.progress import Progress, silent
 from chipload.structure.factors import Factors, factor
 from chipload.structure.grid import Grid, Indices
@@ -116,13 +115,13 @@ def element_dofs(elements: Indices) -> Indices:
     return (3 * elements[:, :, None] + np.arange(3)).reshape(len(elements), 60)
 
 
-def _sum(blocks: Array, dofs: Indices, size: int) -> csc_array:
+def _sum(blocks: Array, dofs: Indices, size: int) -> scipy.sparse.csc_array:
     rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
     columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
-    return coo_array((blocks.ravel(), (rows, columns)), shape=(size, size)).tocsc()
+    return scipy.sparse.coo_array((blocks.ravel(), (rows, columns)), shape=(size, size)).tocsc()
 
 
-def assemble(solid: SolidWorkpiece) -> csc_array:
+def assemble(solid: SolidWorkpiece) -> scipy.sparse.csc_array:
     """Stiffness (3 n, 3 n) [N/mm] of the workpiece without its supports."""
     e = solid.there
     elements = solid.grid.elements[e]
@@ -130,7 +129,7 @@ def assemble(solid: SolidWorkpiece) -> csc_array:
     return _sum(K, element_dofs(elements), 3 * len(solid.grid.nodes))
 
 
-def assemble_mass(solid: SolidWorkpiece) -> csc_array:
+def assemble_mass(solid: SolidWorkpiece) -> scipy.sparse.csc_array:
     """Consistent mass (3 n, 3 n) [tonne]."""
     e = solid.there
     elements = solid.grid.elements[e]
@@ -140,7 +139,7 @@ def assemble_mass(solid: SolidWorkpiece) -> csc_array:
     columns = np.tile(dofs, (1, 20, 1)).reshape(len(e), 20, 20, 3)
     values = np.broadcast_to(M[..., None], rows.shape)
     size = 3 * len(solid.grid.nodes)
-    return coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsc()
+    return scipy.sparse.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsc()
 
 
 def free_dofs(solid: SolidWorkpiece) -> Indices:
@@ -164,10 +163,10 @@ def check_clamped(solid: SolidWorkpiece) -> None:
         raise InputError("workpiece: no element is left")
     elements = solid.grid.elements[e]
     n = len(solid.grid.nodes)
-    incidence = csr_array(
+    incidence = scipy.sparse.csr_array(
         (np.ones(elements.size), elements.ravel(), np.arange(0, elements.size + 1, 20)), shape=(len(e), n)
     )
-    count, piece = connected_components(incidence @ incidence.T, directed=False)
+    count, piece = scipy.sparse.csgraph.connected_components(incidence @ incidence.T, directed=False)
     for number in range(count):
         mine = np.unique(elements[piece == number])
         x = solid.grid.nodes[mine] - solid.grid.nodes[mine].mean(axis=0)
@@ -217,7 +216,7 @@ class Factored:
 
     solid: SolidWorkpiece
     free: Indices
-    stiffness: csc_array
+    stiffness: scipy.sparse.csc_array
     factors: Factors
 
     def solve(self, force: Array, rows: Indices | None = None) -> Array:
@@ -239,7 +238,7 @@ def factorise(solid: SolidWorkpiece) -> Factored:
     return Factored(solid, free, K, factor(K))
 
 
-def loads(factored: Factored, places: MeshPlaces, directions: Array) -> csc_array:
+def loads(factored: Factored, places: MeshPlaces, directions: Array) -> scipy.sparse.csc_array:
     """Unit forces at places as columns (f, p) over the free degrees of freedom.
 
     ``directions`` is (p, 3) float.
@@ -249,7 +248,9 @@ def loads(factored: Factored, places: MeshPlaces, directions: Array) -> csc_arra
     values = N.data[:, None] * directions[rows]
     at = (3 * nodes[:, None] + np.arange(3)).ravel()
     shape = (3 * len(factored.solid.grid.nodes), len(places))
-    return coo_array((values.ravel(), (at, np.repeat(rows, 3))), shape=shape).tocsr()[factored.free].tocsc()
+    return (
+        scipy.sparse.coo_array((values.ravel(), (at, np.repeat(rows, 3))), shape=shape).tocsr()[factored.free].tocsc()
+    )
 
 
 def displacement(factored: Factored, force: ArrayLike) -> Array:

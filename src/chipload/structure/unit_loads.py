@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csc_array
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.progress import Progress, silent
 from chipload.structure.hexa import Array
 from chipload.structure.places import MeshPlaces
@@ -33,12 +33,12 @@ class UnitLoads:
     """
 
     base: Factored
-    F: csc_array
+    F: scipy.sparse.csc_array
     U: Array
     own: Array
 
 
-def _forces(base: Factored, places: MeshPlaces, normals: ArrayLike | None) -> tuple[csc_array, int]:
+def _forces(base: Factored, places: MeshPlaces, normals: ArrayLike | None) -> tuple[scipy.sparse.csc_array, int]:
     """Unit forces along the normals, or along x, y, z; and their number at each place."""
     if normals is not None:
         return loads(base, places, checked_normals(places, normals)), 1
@@ -78,7 +78,7 @@ def alive(state: StructureRemoval, watched: UnitLoads) -> NDArray[np.bool_]:
     return _alive(state, watched.F, watched.own.shape[1])
 
 
-def _alive(state: StructureRemoval, F: csc_array, d: int) -> NDArray[np.bool_]:
+def _alive(state: StructureRemoval, F: scipy.sparse.csc_array, d: int) -> NDArray[np.bool_]:
     weight = np.asarray(abs(F.tocsr()[state.interior.gone]).sum(axis=0))
     return np.asarray(weight.reshape(-1, d).max(axis=1) <= 1e-12)
 
@@ -136,7 +136,7 @@ def _refuse_dead(living: NDArray[np.bool_]) -> None:
         raise InputError(f"compliance: place {dead[0]} is on material that is gone: leave it out (see alive)")
 
 
-def _on_cut(state: StructureRemoval, F: csc_array, d: int) -> Array:
+def _on_cut(state: StructureRemoval, F: scipy.sparse.csc_array, d: int) -> Array:
     """Forces on the cut elements, by way of B; (p, d, d)."""
     rows = F.tocsr()
     f_A = rows[state.interior.A].toarray()

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from chipload.cutting.material import Material
 from chipload.errors import InputError
+from chipload.lazy import scipy
 
 #: most cases of one sweep
 MOST = 100_000
@@ -91,7 +91,7 @@ class Samples:
             return []
         factor = _root(material.variances)
         if normal is None:
-            normal = ndtri(np.clip(self.points(6), 1e-9, 1.0 - 1e-9))
+            normal = scipy.special.ndtri(np.clip(self.points(6), 1e-9, 1.0 - 1e-9))
         drawn = normal @ factor.T + np.array(material.coefficients)
         drawn[:, 0], drawn[:, 3] = np.clip(drawn[:, 0], 10.0, 2e4), np.clip(drawn[:, 3], 0.0, 1e3)
         drawn[:, 1] = np.clip(drawn[:, 1], 0.0, 2e4)

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from chipload.cutting.material import Material, material_named, material_text, read_material
 from chipload.errors import InputError
@@ -20,6 +19,7 @@ from chipload.files import hash_of, write_whole
 from chipload.jobs import LoadedJob, load_job
 from chipload.jobs.simulation.dynamics_tables import DynamicsTable, ModeTable
 from chipload.jobs.simulation.modes_file import read_modes
+from chipload.lazy import scipy
 from chipload.stability.probability import LEAST, MOST_DAMPED
 from chipload.sweep.cases import Case, Samples
 
@@ -84,7 +84,7 @@ def _files(
 ) -> list[SampleFiles]:
     material, modes = _material(loaded), _modes(loaded, folder)
     table = getattr(loaded.job.table, "dynamics", None)
-    normal = ndtri(np.clip(samples.points(COEFFICIENTS + OF_MODE * len(modes)), 1e-9, 1.0 - 1e-9))
+    normal = scipy.special.ndtri(np.clip(samples.points(COEFFICIENTS + OF_MODE * len(modes)), 1e-9, 1.0 - 1e-9))
     drawn = samples.of(material, normal[:, :COEFFICIENTS])
     materials = _write_files(out / MATERIALS, [material_text(one) for one in drawn], written)
     if table is None or not modes:

@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
+from chipload.lazy import pa, pq
 from chipload.result import Result, Track, load_result, read_summary
 from chipload.result.load import HISTORY
 from chipload.result.summary import TimesModel

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike
 
 from chipload.api.mechanics.cut import Floats, read_only, straight_cutter
@@ -15,6 +14,7 @@ from chipload.checking.workpiece import Stock
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.table import CutterTable
 from chipload.errors import InputError
+from chipload.lazy import trimesh
 from chipload.ranges import number_field, require_ranges
 from chipload.stock.layers import LayeredStock
 from chipload.structure import beam

@@ -12,10 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from chipload.control import _estimator
 from chipload.control.plant import belief_of
 from chipload.control.spindle_model import Spindle
 from chipload.errors import InputError
+from chipload.lazy import LateModule
+
+_estimator = LateModule("chipload.control._estimator")
 
 
 @dataclass(frozen=True)

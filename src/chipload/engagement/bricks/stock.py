@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from shapely import MultiPolygon
 
@@ -21,7 +20,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.record import MOST, cutter_record
 from chipload.engagement.moves.net import area_of, nodes_of, rings
 from chipload.engagement.moves.stock import INSTANT, Engaged, corner_parts, faces_of, side_radii, walls_of
-from chipload.lazy import LateModule
+from chipload.lazy import LateModule, trimesh
 
 _sweep = LateModule("chipload.engagement.bricks._sweep")
 front = LateModule("chipload.engagement.bricks._contact")

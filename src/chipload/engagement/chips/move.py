@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import jv
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.machine.kinematics import forward
 from chipload.machine.machine import Machine
 
@@ -115,7 +115,7 @@ class Move:
             return Move.lerp(p0, a0, p1, a1)
         middle, across = middle / np.linalg.norm(middle), across / np.linalg.norm(across)
         # cos and sin of u angle / 2 in Chebyshev polynomials (Jacobi and Anger)
-        size = jv(_ORDER, 0.5 * angle) * _JACOBI_ANGER
+        size = scipy.special.jv(_ORDER, 0.5 * angle) * _JACOBI_ANGER
         axis = size[:, None] * np.where(_ORDER[:, None] % 2 == 0, middle, across)
         return Move(np.array([p0 + p1, p1 - p0]) / 2.0, _short(axis))
 

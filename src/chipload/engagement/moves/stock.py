@@ -15,14 +15,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from shapely import MultiPolygon
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.record import cutter_record
 from chipload.engagement.moves.net import area_of, nodes_of, rings
-from chipload.lazy import LateModule
+from chipload.lazy import LateModule, trimesh
 
 _sweep = LateModule("chipload.engagement.moves._sweep")
 circle = LateModule("chipload.engagement.moves._circle")

@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.jobs.contour.outcome import ContourResult, Operation
 from chipload.jobs.contour.result import track_name
+from chipload.lazy import trimesh
 from chipload.report.presentation import Blank
 from chipload.report.scene import ROWS, STOCK, TOOL, WALL, engagement_colours
 from chipload.report.shape import merge_meshes, ribbon, slab, stretches

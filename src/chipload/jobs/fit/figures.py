@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import plotly.graph_objects as go
-import trimesh
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
@@ -17,6 +16,7 @@ from chipload.cutting.material import material_text
 from chipload.jobs.fit.job import CHANNELS
 from chipload.jobs.fit.outcome import FitResult
 from chipload.jobs.fit.result import MATERIAL, UNITS
+from chipload.lazy import trimesh
 from chipload.number_text import number_text
 from chipload.report.presentation import Content, Presentation
 from chipload.report.scene import TOOL

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.cutter.cutter import Cutter
 from chipload.jobs.impeller.names import finish_names, flank_names, rough_names
 from chipload.jobs.impeller.outcome import ImpellerResult
+from chipload.lazy import trimesh
 from chipload.report.presentation import Blank
 
 Floats = NDArray[np.float64]

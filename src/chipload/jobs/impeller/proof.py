@@ -9,10 +9,9 @@ import zipfile
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from chipload.jobs.impeller.outcome import ImpellerResult
+from chipload.lazy import pa, pq
 
 
 def contact_points_bytes(milled: ImpellerResult) -> bytes:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
+from chipload.lazy import scipy
 from chipload.planning.impeller.impeller import Impeller
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,7 @@ def thickness(impeller: Impeller, index: int, edge: float) -> float:
         U, V = _grid(_OTHER, 0.0)
         u, v = _grid(_POINTS, edge)
         points = own.at(u, v)
-        _, k = cKDTree(other.at(U, V)).query(points)
+        _, k = scipy.spatial.cKDTree(other.at(U, V)).query(points)
         out = min(out, float(_distance(other, points, U[k], V[k]).min()))
     return out
 

@@ -8,7 +8,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
@@ -17,6 +16,7 @@ from chipload.jobs.impeller.machine_check import axes_check
 from chipload.jobs.impeller.read_program import read_program_of
 from chipload.jobs.impeller.roughing_check import CheckedRough
 from chipload.jobs.impeller.tables import ImpellerOperationTable, PathsTable, RoughTable
+from chipload.lazy import trimesh
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.floor import meridian
 from chipload.planning.impeller.impeller import Impeller

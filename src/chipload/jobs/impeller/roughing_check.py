@@ -8,11 +8,11 @@ from html import escape
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from chipload.jobs.impeller.machine_check import MachineCheck, check_cell, program_verdict
 from chipload.jobs.impeller.program_removal import ProgramRemoval
 from chipload.jobs.impeller.read_program import ReadProgram
+from chipload.lazy import trimesh
 from chipload.planning.impeller.rough_settings import RoughingSetting
 from chipload.program.gcode.writer import Repeat
 from chipload.report.sheet import table

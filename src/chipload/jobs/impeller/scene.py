@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.jobs.impeller.mesh import OFF, body_meshes, surface_mesh
 from chipload.jobs.impeller.outcome import ImpellerResult, Searched
 from chipload.jobs.impeller.partitions import patch_grid, shade_of
+from chipload.lazy import trimesh
 from chipload.planning.impeller.compare import Partition
 from chipload.report.scene import engagement_colours, engagement_legend, legend
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
 
+from chipload.lazy import scipy
 from chipload.planning.thinwall.blank import SIDES
 from chipload.planning.thinwall.chatter import WallCutting, WallMotion, quietest_speed, stable_depths
 from chipload.planning.thinwall.passes import ThresholdOf, WallPass
@@ -156,7 +156,9 @@ class WallChatter:
             for state in (left, before, full):
                 whole = self.motion(places.coarse(state), p.side)
                 grid = whole.shapes.reshape(*shape, 3, -1)
-                shapes = RegularGridInterpolator(self.inputs.body.places, grid)(np.column_stack([u, v]))
+                shapes = scipy.interpolate.RegularGridInterpolator(self.inputs.body.places, grid)(
+                    np.column_stack([u, v])
+                )
                 wall = WallMotion(whole.frequency, shapes, np.zeros((len(step), 3, 3)))
                 found = stability_margins(self.cutting.vibrating(bare, wall, frames))
                 if state is full:

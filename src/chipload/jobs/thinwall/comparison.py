@@ -19,10 +19,10 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
 
 from chipload.jobs.thinwall.outcome import Finish, Variant
 from chipload.jobs.thinwall.places import Places
+from chipload.lazy import scipy
 from chipload.planning.thinwall.passes import NOTHING, planned_pass
 from chipload.planning.thinwall.threshold import Threshold
 from chipload.planning.thinwall.variants import DepthOperation, PlannedVariant, limited_to
@@ -99,7 +99,7 @@ def compensated(
 def _between(at: tuple[Floats, Floats], values: Floats, to: tuple[Floats, Floats]) -> Floats:
     """Bilinear values at other parameters; beyond the outermost ones theirs."""
     inner = [np.clip(x, own[0], own[-1]) for x, own in zip(to, at, strict=True)]
-    found = RegularGridInterpolator(at, values)(np.stack(np.meshgrid(*inner, indexing="ij"), axis=-1))
+    found = scipy.interpolate.RegularGridInterpolator(at, values)(np.stack(np.meshgrid(*inner, indexing="ij"), axis=-1))
     return np.asarray(found, dtype=np.float64)
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 
-import trimesh
-
 from chipload.jobs.thinwall.outcome import ThinWallResult
 from chipload.jobs.thinwall.program_text import program_file, program_text, program_title
 from chipload.jobs.thinwall.scene import scene_bytes
 from chipload.jobs.thinwall.sections import sections_of
+from chipload.lazy import trimesh
 from chipload.program.apt.writer import write_apt
 from chipload.program.release import NOT_SIMULATED, release_of_text
 from chipload.report.presentation import Blank, Presentation

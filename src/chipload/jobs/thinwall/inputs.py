@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutting.material import material_named, need_directions, read_material
@@ -27,6 +26,7 @@ from chipload.jobs.thinwall.part_shape import PartShape, part_of_faces
 from chipload.jobs.thinwall.program_rows import program_rows
 from chipload.jobs.thinwall.tables import SHAPES
 from chipload.jobs.thinwall.wall_operation import DepthRules, WallCut, WallOperation, wall_operation
+from chipload.lazy import trimesh
 from chipload.machine.machine import machine_named, read_machine
 from chipload.planning.thinwall.blank import SIDES, ContactLine, FinishSurface, WallBlank
 from chipload.planning.thinwall.finish_rows import FinishSide

@@ -19,11 +19,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
-from scipy.sparse import csc_array
 
 from chipload.geometry.thin_wall import ThinWall
 from chipload.jobs.thinwall.inputs import WallInputs
+from chipload.lazy import scipy
 from chipload.planning.thinwall.blank import SIDES, line_nodes
 from chipload.structure.grid import from_map
 from chipload.structure.places import MeshPlaces, normals_of, points_of
@@ -84,7 +83,9 @@ def error_at(places: tuple[Floats, Floats], error: Floats, u: Floats, v: Floats)
     """Errors (k,) at parameters, linear between places."""
     low, high = places[1][0], places[1][-1]
     return np.asarray(
-        RegularGridInterpolator(places, error)(np.column_stack([np.clip(u, 0.0, 1.0), np.clip(v, low, high)]))
+        scipy.interpolate.RegularGridInterpolator(places, error)(
+            np.column_stack([np.clip(u, 0.0, 1.0), np.clip(v, low, high)])
+        )
     )
 
 
@@ -157,7 +158,7 @@ def spread_compliance(solid: SolidWorkpiece, a: Floats, b: Floats, side: int, li
     return out
 
 
-def _through(factored: Factored, a: Floats, b: Floats, side: int) -> csc_array:
+def _through(factored: Factored, a: Floats, b: Floats, side: int) -> scipy.sparse.csc_array:
     """Unit forces along the normal of a side, spread through the thickness, as columns (f, k) over the free degrees of
     freedom.
     """

@@ -19,7 +19,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RegularGridInterpolator
 
 from chipload.checking.clamped import Workpiece, clamped_volumes, elastic_of, placed_clamps
 from chipload.checking.workpiece_compliance import COARSER, CORNER, FLOOR
@@ -28,6 +27,7 @@ from chipload.jobs.tables import require_stated
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_floor import PartFloor
 from chipload.jobs.thinwall.part_shape import PartShape
+from chipload.lazy import scipy
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import Clamp
 from chipload.structure.cells.grid import CellGrid
@@ -151,7 +151,7 @@ class PartBlank:
         """Lines across the contact squares of places (p, 2) of a floor, within its outline, and the normals there."""
         half = 0.5 * self.contact
         xy = floor.on(uv * floor.box, half)
-        D = RegularGridInterpolator(self.places, left)(np.clip(xy / floor.box, 0.0, 1.0))
+        D = scipy.interpolate.RegularGridInterpolator(self.places, left)(np.clip(xy / floor.box, 0.0, 1.0))
         z = D[:, None] * np.array([0.0, 0.0, 1.0])
         lines = []
         for t in ACROSS:

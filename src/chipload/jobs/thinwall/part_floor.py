@@ -18,15 +18,14 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import RegularGridInterpolator
 from shapely import MultiLineString, MultiPolygon, Polygon
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.geometry.mesh import sections
 from chipload.geometry.step_faces import Face
+from chipload.lazy import scipy, trimesh
 from chipload.planning.thinwall.floor_rows import FloorArea
 from chipload.stock.solid import prisms
 
@@ -144,7 +143,7 @@ class PartFloor:
             return self._prisms([self._within], np.full(1, float(left.flat[0])), z0)
         pieces = [p for p, _ in self._grid_prisms]
         middle = np.array([c for _, c in self._grid_prisms])
-        return self._prisms(pieces, np.asarray(RegularGridInterpolator(places, left)(middle)), z0)
+        return self._prisms(pieces, np.asarray(scipy.interpolate.RegularGridInterpolator(places, left)(middle)), z0)
 
     @cached_property
     def _within(self) -> Polygon:

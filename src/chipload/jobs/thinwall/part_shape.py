@@ -14,9 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import RegularGridInterpolator
 
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
@@ -28,6 +26,7 @@ from chipload.jobs.tables import FaceName, require_stated
 from chipload.jobs.thinwall.job import ThinWallJob
 from chipload.jobs.thinwall.part_floor import PartFloor, floor_of
 from chipload.jobs.thinwall.tables import FaceWallTable
+from chipload.lazy import scipy, trimesh
 
 Floats = NDArray[np.float64]
 
@@ -89,7 +88,7 @@ class PartSide:
             np.unique(np.concatenate([np.linspace(0.0, 1.0, k + 1), p])) for k, p in zip(PIECES, places, strict=True)
         )
         w = np.concatenate([[0.0, self.foot * (1.0 - STEP)], self.foot + v * (1.0 - self.foot)])
-        D = np.asarray(RegularGridInterpolator(places, left)(tuple(np.meshgrid(u, v, indexing="ij"))))
+        D = np.asarray(scipy.interpolate.RegularGridInterpolator(places, left)(tuple(np.meshgrid(u, v, indexing="ij"))))
         D = np.hstack([np.full((len(u), 2), self.allowance), D])
         a, b = (x.ravel() for x in np.meshgrid(u, w, indexing="ij"))
         p, N = self.patch.at(a, b), self.patch.normal(a, b)

@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 
 from chipload.jobs.kept_parts import KeptRecords
 from chipload.jobs.tables import require_stated
@@ -23,6 +22,7 @@ from chipload.jobs.thinwall.inputs import WallInputs
 from chipload.jobs.thinwall.mesh_error import error_at, mesh_error
 from chipload.jobs.thinwall.part_floor import PartFloor
 from chipload.jobs.thinwall.part_shape import PartShape
+from chipload.lazy import scipy
 from chipload.planning.thinwall.blank import ContactLine, FinishSurface
 from chipload.planning.thinwall.floor_rows import points_under
 from chipload.planning.thinwall.passes import ThresholdOf
@@ -116,7 +116,7 @@ class Places:
         under = points_under(radius) / floor.box
         at = np.stack(np.meshgrid(*self.inputs.body.places, indexing="ij"), axis=-1)
         near = np.clip(at[:, :, None] + under, 0.0, 1.0)
-        return np.asarray(RegularGridInterpolator(self.grid, left)(near).min(axis=2))
+        return np.asarray(scipy.interpolate.RegularGridInterpolator(self.grid, left)(near).min(axis=2))
 
     def compliance(self, left: Sequence[Floats], side: int, *, of_surface: bool = False) -> Floats:
         """C_nn at the elements' places of a side with stock ``left`` at these places on all sides.
@@ -160,7 +160,7 @@ class Places:
         known, places = self.motion(left, side), self.inputs.body.places
         flat = np.clip(uv.reshape(-1, 2), 0.0, 1.0)
         C = between(places, known[..., 2], *flat.T)
-        share = RegularGridInterpolator(places, known / known[..., 2:])(flat)
+        share = scipy.interpolate.RegularGridInterpolator(places, known / known[..., 2:])(flat)
         return np.asarray((C[:, None] * share).reshape(*uv.shape[:-1], 3))
 
     def error(self, side: int) -> Floats:
@@ -234,5 +234,5 @@ def places_of(inputs: WallInputs, keep: KeptRecords | None = None) -> Places:
 def between(places: tuple[Floats, Floats], values: Floats, u: Floats, v: Floats) -> Floats:
     """Values above 0 of places (n, m) at parameters (k,), by cubics of their logarithm."""
     n, m = values.shape
-    spline = RectBivariateSpline(*places, np.log(values), kx=min(3, n - 1), ky=min(3, m - 1))
+    spline = scipy.interpolate.RectBivariateSpline(*places, np.log(values), kx=min(3, n - 1), ky=min(3, m - 1))
     return np.asarray(np.exp(spline.ev(u, v)))

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import RegularGridInterpolator
 
 from chipload.checking.default_checks import check_columns
 from chipload.checking.settings import CheckSettings
@@ -29,6 +28,7 @@ from chipload.jobs.thinwall.neighbours import part_collisions, wall_collisions
 from chipload.jobs.thinwall.outcome import Finish, Shape
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.places import Places, between
+from chipload.lazy import scipy
 from chipload.planning.thinwall.blank import SIDES
 from chipload.planning.thinwall.pass_program import PassProgram
 from chipload.planning.thinwall.passes import Plan
@@ -139,7 +139,7 @@ def prove(
         loads = floor_loads(places, removal, left, p.side, error) if floor and removal.cuts else None
         columns = _columns(places, removal, pass_program, C, F_th, error, bars, loads)
         u, v = np.clip(columns["u"], 0.0, 1.0), np.clip(columns["v"], inputs.body.foot, 1.0)
-        share = RegularGridInterpolator(places.grid, p.correction)(np.column_stack([u, v]))
+        share = scipy.interpolate.RegularGridInterpolator(places.grid, p.correction)(np.column_stack([u, v]))
         law = rules.even_law if plan.name in EVEN else rules.law
         columns["force_normal_planned_n"] = share * law.force(columns["depth_mm"])
         if places.chatter is not None:

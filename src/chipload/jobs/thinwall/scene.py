@@ -7,10 +7,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.jobs.thinwall.outcome import USED, ThinWallResult, Variant
+from chipload.lazy import trimesh
 from chipload.report.scene import FIXTURE, ROWS, STOCK, TOOL, WALL, engagement_colours
 
 Floats = NDArray[np.float64]

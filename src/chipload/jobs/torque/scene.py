@@ -5,9 +5,9 @@ allowable.
 from __future__ import annotations
 
 import numpy as np
-import trimesh
 
 from chipload.jobs.torque.outcome import HELD, TorqueResult
+from chipload.lazy import trimesh
 from chipload.report.scene import engagement_colours
 
 #: rows of the path in the scene

@@ -18,10 +18,10 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from chipload.cutting.force import forces_along
 from chipload.engagement.contact import PIECES, Engagement
+from chipload.lazy import scipy
 from chipload.machine.feed import limited_speed
 from chipload.planning.cost import CutConditions
 from chipload.planning.feeds import greatest_factor
@@ -91,7 +91,11 @@ def within_machine(s: Floats, wanted: Floats, acceleration: float, jerk: float |
     half = fastest * acceleration / jerk
     while True:
         width = 2 * max(1, round(half / ds)) + 1
-        smooth = np.sqrt(uniform_filter1d(minimum_filter1d(least, width, mode="nearest"), width, mode="nearest"))
+        smooth = np.sqrt(
+            scipy.ndimage.uniform_filter1d(
+                scipy.ndimage.minimum_filter1d(least, width, mode="nearest"), width, mode="nearest"
+            )
+        )
         if width >= PLACES or _jerk(smooth, ds) <= jerk:
             return np.asarray(np.minimum(np.interp(s, even, smooth), wanted))
         half *= GROWTH

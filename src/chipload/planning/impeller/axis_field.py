@@ -22,10 +22,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import RectBivariateSpline
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch
+from chipload.lazy import scipy
 from chipload.machine.kinematics import inverse
 from chipload.machine.machine import Machine
 from chipload.number_text import number_text
@@ -90,7 +90,9 @@ class AxisField:
         """Unit axes (k, 3) at places (k,)."""
         degree = [min(3, len(x) - 1) for x in (self.u, self.v)]
         parts = [
-            RectBivariateSpline(self.u, self.v, self.nodes[..., k], kx=degree[0], ky=degree[1], s=0).ev(u, v)
+            scipy.interpolate.RectBivariateSpline(
+                self.u, self.v, self.nodes[..., k], kx=degree[0], ky=degree[1], s=0
+            ).ev(u, v)
             for k in range(3)
         ]
         T = np.stack(parts, axis=-1)

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.planning.impeller import _clearance
+from chipload.lazy import LateModule
 from chipload.planning.impeller.profile import profile_numbers
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.tree import Tree
+
+_clearance = LateModule("chipload.planning.impeller._clearance")
 
 #: number of times that a move is halved before it counts as not clear
 _DEPTH = 14

@@ -19,15 +19,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import slices
 from chipload.engagement.immersion.immersion import tool_frame
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
-from chipload.planning.impeller import _engagement
+from chipload.lazy import LateModule, scipy
 from chipload.planning.impeller.scene import Floats
+
+_engagement = LateModule("chipload.planning.impeller._engagement")
 
 #: distance of the points of a slice [rad]
 ANGLE = math.radians(1.0)
@@ -123,7 +124,7 @@ def engagement_at(
     known = np.full(len(places), len(earlier.tip)) if first is None else np.asarray(first, dtype=np.int64)
     mask = np.empty((len(profile.rho), len(angles)), dtype=np.bool_)
     start, rows, owner, frames = [0], [], [], []
-    tree = cKDTree(earlier.tip) if len(earlier.tip) else None
+    tree = scipy.spatial.cKDTree(earlier.tip) if len(earlier.tip) else None
     widest = float(earlier.shape.sum(axis=1).max(initial=0.0))
     for k in range(len(places)):
         frame = tool_frame(places.axis[k], places.feed[k])

@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 from typing import Protocol, Self
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from chipload.cutter.catalogue import CatalogueCutter
+from chipload.lazy import scipy
 from chipload.machine.machine import Machine
 from chipload.planning.impeller.clearance import clearance, interpolated_axes
 from chipload.planning.impeller.links import Link, Moves
@@ -65,12 +65,12 @@ def outline_of(scene: Scene, blades: int) -> Floats:
     >>> len(outline_of(scene, 4))
     8
     """
-    points = scene.check[ConvexHull(scene.check).vertices]
+    points = scene.check[scipy.spatial.ConvexHull(scene.check).vertices]
     a = math.tau * np.arange(blades) / blades
     c, s = np.cos(a)[:, None], np.sin(a)[:, None]
     x, y, z = points.T
     turned = np.stack([c * x - s * y, s * x + c * y, np.broadcast_to(z, (blades, len(z)))], axis=-1).reshape(-1, 3)
-    out: Floats = turned[ConvexHull(turned).vertices]
+    out: Floats = turned[scipy.spatial.ConvexHull(turned).vertices]
     return out
 
 

@@ -22,11 +22,11 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.optimize import linprog
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
+from chipload.lazy import scipy
 from chipload.planning.impeller.scene import Floats
 
 #: number of heights of d, number of places u' on either side of u, and their range in radii of the cutter
@@ -208,7 +208,7 @@ class _Side:
         for _ in range(_ROUNDS):
             J = np.column_stack([-(1.0 - at) * (direction @ N[0]), -at * (direction @ N[1]), -at * (direction @ D)])
             d, one = distance - self.radius, np.ones((len(distance), 1))
-            found = linprog(
+            found = scipy.optimize.linprog(
                 [0.0, 0.0, 0.0, 1.0], np.vstack([np.hstack([J, -one]), np.hstack([-J, -one])]), np.concatenate([-d, d]),
                 bounds=[(-step, step)] * 3 + [(0.0, None)], method="highs",
             )  # fmt: skip

@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
+from chipload.lazy import scipy
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.pallet import Turned, pallet_angles
 from chipload.planning.impeller.pallet_ranges import valid_ranges
@@ -242,7 +242,10 @@ class Lines:
         if not some.any():
             return np.full(len(self.p), Q[0])
         f = np.interp(self.p, self.p[knots[known]], high[known])
-        f = np.minimum(np.maximum(gaussian_filter1d(maximum_filter1d(f, 3), 1.0, mode="nearest"), f), 1.0)
+        f = np.minimum(
+            np.maximum(scipy.ndimage.gaussian_filter1d(scipy.ndimage.maximum_filter1d(f, 3), 1.0, mode="nearest"), f),
+            1.0,
+        )
         out: Floats = Q[0] + f * (Q[1] - Q[0])
         return out
 

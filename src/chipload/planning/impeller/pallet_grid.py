@@ -8,11 +8,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chipload.planning.impeller import _pallet_grid
+from chipload.lazy import LateModule
 from chipload.planning.impeller.blocks import BLOCK, in_blocks
 from chipload.planning.impeller.scene import Floats, Scene
 from chipload.planning.impeller.search import SearchLimits
 from chipload.progress import silent
+
+_pallet_grid = LateModule("chipload.planning.impeller._pallet_grid")
 
 
 def largest_on_grid(

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.planning.impeller import _pallet_ranges
+from chipload.lazy import LateModule
 from chipload.planning.impeller.blocks import BLOCK, in_blocks
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.progress import Progress, silent
+
+_pallet_ranges = LateModule("chipload.planning.impeller._pallet_ranges")
 
 #: all pallet angles [rad]
 FULL = ((0.0, 2.0 * math.pi),)

@@ -19,11 +19,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import binary_dilation, minimum_filter1d
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
+from chipload.lazy import scipy
 from chipload.planning.impeller.closed_form import axis_at
 from chipload.planning.impeller.lines import Line, LineMotion, Lines, Tracks, UnreachedSpan, stations, stretch_stations
 from chipload.planning.impeller.pallet_ranges import FULL
@@ -180,7 +180,7 @@ class _March:
             if not open_[need].any():
                 return Tracks(tuple(tracks), tuple(missed), k)
             # where the pass of the line before has reached the border there is nothing left
-            use = binary_dilation(open_)
+            use = scipy.ndimage.binary_dilation(open_)
             line = self.step.next(line, reach, high, use & need)
             new, refused = self.step.lines.tracks(line, use, number + k, need)
             tracks += new
@@ -270,7 +270,7 @@ class _Stepper:
             if over > 1.0:
                 # the new line has other angles than the step was laid out for
                 there = np.sqrt(most / np.where(scallop > most, scallop, most))
-                less *= np.clip(minimum_filter1d(there, 3), _LESS, 1.0)
+                less *= np.clip(scipy.ndimage.minimum_filter1d(there, 3), _LESS, 1.0)
             B = out.pallet
         return line if best is None else best[1]
 

@@ -22,11 +22,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, gaussian_filter1d, minimum_filter1d
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
+from chipload.lazy import scipy
 from chipload.planning.impeller.axis_field import AxisField, pose
 from chipload.planning.impeller.clearance import interpolated_axes
 from chipload.planning.impeller.pass_order import pass_order
@@ -146,7 +146,7 @@ def point_path(
     low, high = job.border(Q[0], 1.0), job.border(Q[1], -1.0)
     inner = box[0] if along == "u" else box[1]
     # also between the last station inside and the next one
-    need = binary_dilation((job.p >= inner[0] - 1e-9) & (job.p <= inner[1] + 1e-9))
+    need = scipy.ndimage.binary_dilation((job.p >= inner[0] - 1e-9) & (job.p <= inner[1] + 1e-9))
     paths = [_join_lines(job, laid, chord) for laid in job.laid_out(low, high, need)]
     return min(paths, key=lambda path: path.length)
 
@@ -223,7 +223,7 @@ class _Lines:
         out = line
         for _ in range(3):
             ahead, behind = self.reach(out)
-            w = _INSIDE * gaussian_filter1d(behind if sign > 0.0 else ahead, self.smooth, mode="nearest")
+            w = _INSIDE * scipy.ndimage.gaussian_filter1d(behind if sign > 0.0 else ahead, self.smooth, mode="nearest")
             out = self.moved(line, sign * w)
         return out
 
@@ -278,7 +278,7 @@ class _Lines:
                 if len(lines) == len(out) + 1 and all(len(piece.p) == len(line) for piece in out):
                     out = [_LinePiece(k, self.p, q) for k, q in enumerate(_spread(lines, whole)[1:], 1)]
                 return out
-            on = binary_dilation(on, iterations=round(_BEYOND / _SPACING))
+            on = scipy.ndimage.binary_dilation(on, iterations=round(_BEYOND / _SPACING))
             w = self.step(line, high, on, need, w)
             full = self.after(line, w)
             new = np.minimum(full, high)
@@ -318,8 +318,8 @@ class _Lines:
 
     def even(self, w: Floats, size: Floats, use: Flags) -> Floats:
         """Steps without jumps along the line, of those in ``use``."""
-        least = minimum_filter1d(np.where(use, w, np.inf), _NEAR)
-        out: Floats = gaussian_filter1d(even_steps(least, size, self.smooth), self.smooth, mode="nearest")
+        least = scipy.ndimage.minimum_filter1d(np.where(use, w, np.inf), _NEAR)
+        out: Floats = scipy.ndimage.gaussian_filter1d(even_steps(least, size, self.smooth), self.smooth, mode="nearest")
         return out
 
     def after(self, line: Floats, w: Floats) -> Floats:

@@ -16,17 +16,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, gaussian_filter1d, label
 
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter
 from chipload.geometry.bspline import BSplinePatch
-from chipload.planning.impeller import _scallop
+from chipload.lazy import LateModule, scipy
 from chipload.planning.impeller.kept import Keep, anew
 from chipload.planning.impeller.lines import LineMotion, Lines, stretch_stations
 from chipload.planning.impeller.pallet_ranges import valid_ranges
 from chipload.planning.impeller.scallop_height import pose_distance
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.planning.impeller.track import ToolTrack
+
+_scallop = LateModule("chipload.planning.impeller._scallop")
 
 #: points of a region that are tried
 _SAMPLE = 10
@@ -155,7 +156,7 @@ def _poses(tracks: Sequence[ToolTrack], fine: float) -> tuple[Floats, Floats, Fl
 def regions(left: Floats, scallop: float, hopeless: Flags) -> list[Flags]:
     """Connected points (a, b) where the excess is more than the scallop, the largest region first."""
     over = (left > scallop) & ~hopeless
-    joined, count = label(binary_dilation(over), structure=np.ones((3, 3)))
+    joined, count = scipy.ndimage.label(scipy.ndimage.binary_dilation(over), structure=np.ones((3, 3)))
     out = [over & (joined == k) for k in range(1, count + 1)]
     return sorted((x for x in out if x.any()), key=lambda x: -int(x.sum()))
 
@@ -281,6 +282,6 @@ class RestSettings:
 
 def _draw_smooth(q: Floats, sign: float) -> Floats:
     """A border drawn smooth, nowhere inside the given one."""
-    soft = gaussian_filter1d(q, 1.0, mode="nearest")
+    soft = scipy.ndimage.gaussian_filter1d(q, 1.0, mode="nearest")
     out: Floats = np.clip(np.maximum(soft, q) if sign > 0.0 else np.minimum(soft, q), 0.0, 1.0)
     return out

@@ -13,11 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
+from chipload.lazy import scipy
 from chipload.planning.impeller.floor import layer_of, meridian
 from chipload.planning.impeller.impeller import ARC, SUNK, Impeller
 from chipload.planning.impeller.lines import LineMotion, Lines, Tracks, UnreachedSpan
@@ -98,7 +98,7 @@ def roughing_tracks(
         neighbour, there is no row
     """
     scene = thicken_walls(impeller, index, how, ahead)
-    done = cKDTree(np.concatenate([_places(t) for t in before])) if before else None
+    done = scipy.spatial.cKDTree(np.concatenate([_places(t) for t in before])) if before else None
     tracks: list[ToolTrack] = []
     missed: list[UnreachedSpan] = []
     number = 0

@@ -13,9 +13,12 @@ import math
 import numpy as np
 
 from chipload.cutter.catalogue import CatalogueCutter
-from chipload.planning.impeller import _profile, _scallop
+from chipload.lazy import LateModule
 from chipload.planning.impeller.profile import profile_numbers
 from chipload.planning.impeller.scene import Floats
+
+_profile = LateModule("chipload.planning.impeller._profile")
+_scallop = LateModule("chipload.planning.impeller._scallop")
 
 _SHARES = (np.arange(15) + 0.5) / 15
 #: steps of the ternary search for the top of the scallop between two shares

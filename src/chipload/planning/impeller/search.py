@@ -20,10 +20,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipload.errors import InputError
-from chipload.planning.impeller import _largest_cutter
+from chipload.lazy import LateModule
 from chipload.planning.impeller.blocks import BLOCK, in_blocks
 from chipload.planning.impeller.scene import Floats, Ints, Scene
 from chipload.progress import Progress, silent
+
+_largest_cutter = LateModule("chipload.planning.impeller._largest_cutter")
 
 #: all pallet angles [rad]
 FULL = ((0.0, 2.0 * math.pi),)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
+from chipload.lazy import scipy
 from chipload.planning.impeller.scene import Floats
 
 #: tangent of the angle by which a line may run askew to the parameter lines; least share of a step that it keeps there
@@ -32,7 +32,7 @@ def even_steps(w: Floats, size: Floats, over: float = 1.0) -> Floats:
     near = known[np.abs(known[None] - np.arange(len(w))[:, None]).argmin(axis=1)]
     far = np.concatenate([[0.0], np.cumsum(_GROWTH * size)])
     limited = (w[near][None] + np.abs(far[:, None] - far[None])).min(axis=1)
-    out: Floats = np.minimum(gaussian_filter1d(limited, over, mode="nearest"), limited)
+    out: Floats = np.minimum(scipy.ndimage.gaussian_filter1d(limited, over, mode="nearest"), limited)
     return out
 
 
@@ -44,7 +44,7 @@ def straighten_line(q: Floats, before: Floats, across: Floats, size: Floats, ove
     """
     ahead = np.maximum(np.abs(across), 1e-12)
     far = np.concatenate([[0.0], np.cumsum(_SKEW * size / np.minimum(ahead[1:], ahead[:-1]))])
-    soft = np.minimum(gaussian_filter1d(q, over, mode="nearest"), q)
+    soft = np.minimum(scipy.ndimage.gaussian_filter1d(q, over, mode="nearest"), q)
     limited = (soft[None] + np.abs(far[:, None] - far[None])).min(axis=1)
     out: Floats = np.maximum(limited, before + _HELD * (q - before))
     return out

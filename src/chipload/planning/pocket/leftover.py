@@ -16,7 +16,7 @@ import shapely
 from numpy.typing import NDArray
 
 from chipload.geometry.contour import Contour, Region
-from chipload.stock.planar import EMPTY, PlanarStock
+from chipload.stock.planar import PlanarStock
 
 Floats = NDArray[np.float64]
 Place = tuple[float, float, float]
@@ -58,7 +58,7 @@ def cleared_squares(stock: PlanarStock) -> shapely.Geometry:
     x0, y0, h = stock.grid[:3].tolist()
     nx, ny = int(stock.grid[3]), int(stock.grid[4])
     empty = np.zeros((ny, nx + 2), dtype=np.int8)
-    empty[:, 1:-1] = (stock.head == EMPTY).reshape(ny, nx)
+    empty[:, 1:-1] = stock.cleared().reshape(ny, nx)
     change = np.diff(empty, axis=1)
     (row, begin), (_, end) = np.nonzero(change == 1), np.nonzero(change == -1)
     boxes = shapely.box(x0 + begin * h, y0 + row * h, x0 + end * h, y0 + (row + 1) * h)

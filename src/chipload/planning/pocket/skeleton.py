@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Voronoi
 
 from chipload.geometry.contour import Region
 from chipload.geometry.distance import distance
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -85,7 +85,7 @@ def skeleton_of(region: Region, least: float, spacing: float) -> Skeleton:
         s = np.linspace(0.0, contour.length, max(16, math.ceil(contour.length / spacing)), endpoint=False)
         places.append(contour.at(s)[0])
     walls = np.vstack(places)
-    diagram = Voronoi(walls)
+    diagram = scipy.spatial.Voronoi(walls)
     pairs = np.array(diagram.ridge_vertices, dtype=np.int64)
     between = np.asarray(diagram.ridge_points, dtype=np.int64)
     bounded = (pairs >= 0).all(axis=1)

@@ -20,9 +20,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.planning.thinwall.threshold import Threshold, modelled
 from chipload.structure.modes import modes
 from chipload.structure.places import MeshPlaces, normals_of, on_cut, on_side, points_of, weights
@@ -240,7 +240,7 @@ class WallBlank:
         )
         top, bottom = line.ends(share.ravel())
 
-        def force(at: Floats) -> csc_array:
+        def force(at: Floats) -> scipy.sparse.csc_array:
             up = (self.foot + np.maximum(at, ABOVE) * (j - self.foot)) / j
             places = on_cut(on_side(solid.grid, side, along.ravel(), np.minimum(up, 1.0)), solid.kept, side)
             return loads(factored, places, normals_of(solid.grid, places, side))

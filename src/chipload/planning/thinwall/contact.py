@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from chipload.cutter.cutter import Cutter
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 #: points (n, 3) [mm] and unit normals (n, 3) of a side at u (n,) and v (n,)
@@ -60,7 +60,7 @@ class ContactFinder:
         self.lowest = foot - ALONG * (1.0 - foot) / height
         self.u, self.v = (x.ravel() for x in np.meshgrid(*(np.linspace(0.0, 1.0, n) for n in GRID), indexing="ij"))
         points = side(self.u, self.v)[0]
-        self.tree = cKDTree(points)
+        self.tree = scipy.spatial.cKDTree(points)
         own = points.reshape(*GRID, 3)
         self.mesh = max(float(np.linalg.norm(np.diff(own, axis=k), axis=-1).max()) for k in (0, 1))
 

@@ -29,9 +29,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull, Delaunay, QhullError, cKDTree
 
 from chipload.errors import Finding, InputError
+from chipload.lazy import scipy
 from chipload.number_text import number_text
 from chipload.planning.thinwall.force_table import ForceTable
 from chipload.progress import Progress, silent
@@ -97,7 +97,7 @@ def expected_misses(sites: ArrayLike, places: ArrayLike, y: ArrayLike) -> tuple[
     x, value = np.asarray(places, dtype=np.float64), np.asarray(y, dtype=np.float64)
     S = np.asarray(sites, dtype=np.int64)
     S = S[np.lexsort((x[S, 1], x[S, 0]))]
-    triangles = Delaunay(x[S])
+    triangles = scipy.spatial.Delaunay(x[S])
     where = triangles.find_simplex(x)
     T = triangles.transform[where]
     two = np.einsum("pij,pj->pi", T[:, :2], x - T[:, 2])
@@ -135,7 +135,7 @@ def propose_sites(
     def cost(S: Sequence[int]) -> float:
         try:
             bias, weight = expected_misses(S, x, y)
-        except QhullError:
+        except scipy.spatial.QhullError:
             return math.inf
         return float(np.mean(bias**2) + scatter**2 * np.mean(weight))
 
@@ -146,7 +146,7 @@ def propose_sites(
         best = min(rest, key=lambda c: (cost([*chosen, c]), c))
         chosen.append(best)
         rest.remove(best)
-    now, coarse, near = cost(chosen), len(rest) + len(chosen) < len(allowed), cKDTree(x[allowed])
+    now, coarse, near = cost(chosen), len(rest) + len(chosen) < len(allowed), scipy.spatial.cKDTree(x[allowed])
     while True:
         before = now
         for k in range(fixed, count):
@@ -169,7 +169,7 @@ def _spread(x: Floats, allowed: Ints, chosen: list[int]) -> list[int]:
         return [int(i) for i in allowed]
     size = np.ptp(x[allowed], axis=0)
     scaled = x[allowed] / size
-    far = cKDTree(x[chosen] / size).query(scaled)[0]
+    far = scipy.spatial.cKDTree(x[chosen] / size).query(scaled)[0]
     out: list[int] = []
     while len(out) < COARSE:
         k = int(np.argmax(far))
@@ -199,8 +199,8 @@ def _outermost(x: Floats, allowed: Ints, count: int) -> tuple[list[int], int]:
     the three that span the greatest triangle, of which none must stay.
     """
     try:
-        hull = np.sort(allowed[ConvexHull(x[allowed]).vertices])
-    except QhullError as error:
+        hull = np.sort(allowed[scipy.spatial.ConvexHull(x[allowed]).vertices])
+    except scipy.spatial.QhullError as error:
         raise InputError("experiments: all candidates lie on a line: add a candidate off it") from error
     if len(hull) <= count:
         return [int(i) for i in hull], len(hull)
@@ -296,7 +296,7 @@ def propose_cuts(
 
 def _influence(sites: Ints, x: Floats) -> Floats:
     """Number of places that each site represents, (m,) float: the sum of its weights."""
-    ahead = Delaunay(x[sites])
+    ahead = scipy.spatial.Delaunay(x[sites])
     where = ahead.find_simplex(x)
     inside = np.flatnonzero(where >= 0)
     T = ahead.transform[where[inside]]

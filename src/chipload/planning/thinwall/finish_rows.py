@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
+from chipload.lazy import scipy
 from chipload.planning.thinwall.contact import SideAt
 from chipload.planning.thinwall.flank_stock import Pose
 from chipload.planning.thinwall.passes import NOTHING, WallPass
@@ -108,7 +108,9 @@ def depth_at(values: Floats, places: tuple[Floats, Floats], u: Floats, v: Floats
     [1.25]
     """
     each, which = np.unique(u, return_inverse=True)
-    cubics = PchipInterpolator(places[1], PchipInterpolator(places[0], values, axis=0)(each), axis=1)
+    cubics = scipy.interpolate.PchipInterpolator(
+        places[1], scipy.interpolate.PchipInterpolator(places[0], values, axis=0)(each), axis=1
+    )
     piece = np.clip(np.searchsorted(places[1], v, side="right") - 1, 0, len(places[1]) - 2)
     x = v - places[1][piece]
     c = cubics.c[:, piece, which]

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
+from chipload.lazy import scipy
 from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.flank_stock import Pose
 from chipload.planning.thinwall.passes import NOTHING, WallPass
@@ -61,7 +61,7 @@ class FlankSide:
 
     def _steps(self, stock: Floats, v: Floats) -> Floats:
         """Stock (n, m) at the places of this side, of that at places v, which is one along each row."""
-        return np.tile(PchipInterpolator(v, stock[0])(self.v), (len(self.u), 1))
+        return np.tile(scipy.interpolate.PchipInterpolator(v, stock[0])(self.v), (len(self.u), 1))
 
 
 def _unit(v: Floats) -> Floats:

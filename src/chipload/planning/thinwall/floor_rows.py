@@ -26,10 +26,10 @@ from itertools import pairwise
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import RegularGridInterpolator
 from shapely import MultiLineString, MultiPolygon, Polygon
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.pass_program import Margins, PassPath, PassProgram
 from chipload.planning.thinwall.passes import NOTHING, WallPass
@@ -115,7 +115,9 @@ class _Heights:
     def __init__(self, p: WallPass, places: tuple[Floats, Floats], area: FloorArea, radius: float) -> None:
         self.size, self.radius, self.outline = np.array(area.size), radius, area.outline
         shapely.prepare(self.outline)
-        self._low, self._depth = (RegularGridInterpolator(places, values) for values in (p.low, p.depth))
+        self._low, self._depth = (
+            scipy.interpolate.RegularGridInterpolator(places, values) for values in (p.low, p.depth)
+        )
         self.under = points_under(radius)
 
     def place(self, xy: Floats) -> Floats:

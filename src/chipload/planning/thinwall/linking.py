@@ -20,9 +20,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.finish_rows import FinishSide
 from chipload.planning.thinwall.flank_rows import FlankSide
@@ -81,8 +81,8 @@ def refined(values: Floats, at: tuple[Floats, Floats], to: tuple[Floats, Floats]
 
     Monotone cubics along u, then along v.
     """
-    first = PchipInterpolator(at[0], values, axis=0)(to[0])
-    return np.asarray(PchipInterpolator(at[1], first, axis=1)(to[1]))
+    first = scipy.interpolate.PchipInterpolator(at[0], values, axis=0)(to[0])
+    return np.asarray(scipy.interpolate.PchipInterpolator(at[1], first, axis=1)(to[1]))
 
 
 def beyond_edges(rows: Rows, distance: float) -> Rows:

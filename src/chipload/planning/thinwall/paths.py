@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.planning.thinwall.blank import FinishSurface
 from chipload.planning.thinwall.contact import across
 from chipload.planning.thinwall.flank_stock import Pose
@@ -213,7 +213,7 @@ def gouges(rows: Rows, surface: FinishSurface, low: Floats, posture: Pose, toler
     r, e = posture.cutter.finishing_arc[:2]
     # a barrel's arc lies beside the middle of its centres' circle, along the axis
     reach = e + r if e >= 0.0 else posture.cutter.flute_length + posture.cutter.diameter
-    near = cKDTree(q).query_ball_point(C.reshape(-1, 3), reach)
+    near = scipy.spatial.cKDTree(q).query_ball_point(C.reshape(-1, 3), reach)
     bad = []
     for k, (c, A, some) in enumerate(zip(C.reshape(-1, 3), axis.reshape(-1, 3), near, strict=True)):
         v = q[some] - c

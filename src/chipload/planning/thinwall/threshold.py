@@ -25,10 +25,9 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import LinearNDInterpolator
-from scipy.spatial import Delaunay, QhullError
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.number_text import number_text
 from chipload.structure.removal import StructureRemoval
 from chipload.structure.unit_loads import UnitLoads, compliance
@@ -185,8 +184,8 @@ def scatter(experiments: Experiments) -> tuple[float, str]:
     for i in range(len(place)):
         rest = np.arange(len(place)) != i
         try:
-            guess = float(LinearNDInterpolator(place[rest], y[rest])(place[i : i + 1])[0])
-        except (QhullError, ValueError):
+            guess = float(scipy.interpolate.LinearNDInterpolator(place[rest], y[rest])(place[i : i + 1])[0])
+        except (scipy.spatial.QhullError, ValueError):
             continue
         if math.isfinite(guess):
             misses.append(guess - y[i])
@@ -233,11 +232,11 @@ def calibrated(experiments: Experiments, places: ArrayLike, deviations: float) -
     at = np.atleast_2d(np.asarray(places, dtype=np.float64))
     place, y, _ = _means(experiments)
     try:
-        triangles = Delaunay(place)
-    except QhullError as error:
+        triangles = scipy.spatial.Delaunay(place)
+    except scipy.spatial.QhullError as error:
         raise InputError("experiments: all places lie on a line: add a place off it") from error
     s, how = scatter(experiments)
-    value = LinearNDInterpolator(triangles, y)(at)
+    value = scipy.interpolate.LinearNDInterpolator(triangles, y)(at)
     outside = ~np.isfinite(value)
     factor = math.exp(-deviations * s)
     force = factor * np.exp(np.where(outside, y.min(), value))

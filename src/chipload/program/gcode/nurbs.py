@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def spline_points(points: Floats, weights: Floats, order: int, tolerance: float 
         )
     inner = n - order + 2
     knots = np.concatenate([np.zeros(order), np.arange(1.0, inner), np.full(order, float(inner))])
-    curve = BSpline(knots, np.column_stack([points * weights[:, None], weights]), order - 1)
+    curve = scipy.interpolate.BSpline(knots, np.column_stack([points * weights[:, None], weights]), order - 1)
 
     def curve_point(u: Floats) -> Floats:
         h = curve(np.minimum(u, inner))

@@ -20,16 +20,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
 from chipload.geometry.bspline import BSplinePatch
+from chipload.lazy import LateModule, scipy
 from chipload.program.motions import is_arc
 from chipload.program.program import LINE, Program
 from chipload.progress import Progress, silent
-from chipload.simulation.channel import _ray_cuts
 from chipload.stock.dexel import cutter_shape
+
+_ray_cuts = LateModule("chipload.simulation.channel._ray_cuts")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -140,7 +141,7 @@ class Remainder:
         heights = [
             row[peaks[ok[peaks]]]
             for row, ok in zip(rest, use, strict=True)
-            for peaks in [find_peaks(row, prominence=prominence)[0]]
+            for peaks in [scipy.signal.find_peaks(row, prominence=prominence)[0]]
         ]
         out: Floats = np.concatenate(heights) if heights else np.zeros(0)
         return out

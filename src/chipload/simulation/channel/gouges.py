@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
+from chipload.lazy import LateModule
 from chipload.program.motions import is_arc
 from chipload.program.program import Program
-from chipload.simulation.channel import _ray_cuts
 from chipload.simulation.channel.channel import (
     GROUP,
     PARTS,
@@ -37,6 +37,8 @@ from chipload.simulation.channel.channel import (
     parted_moves,
     tool_parts,
 )
+
+_ray_cuts = LateModule("chipload.simulation.channel._ray_cuts")
 
 Floats = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
+from chipload.lazy import trimesh
 from chipload.program.motions import is_arc
 from chipload.program.program import RAPID, Program
 from chipload.progress import Progress, silent

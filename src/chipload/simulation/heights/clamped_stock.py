@@ -16,9 +16,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import NDArray
 
+from chipload.lazy import trimesh
 from chipload.simulation.heights.height_map import HeightMap
 from chipload.structure.cells.clamp import Clamp
 

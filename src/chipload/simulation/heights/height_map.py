@@ -18,12 +18,11 @@ from typing import Any
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
-from chipload.lazy import LateModule
+from chipload.lazy import LateModule, trimesh
 from chipload.number_text import number_text
 from chipload.simulation.clearance.body import above_cutting, cutting_part
 from chipload.simulation.kept_pass import KeptPasses

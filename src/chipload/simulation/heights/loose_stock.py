@@ -17,10 +17,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
-from chipload.lazy import LateModule
+from chipload.lazy import LateModule, trimesh
 from chipload.simulation.heights.clamped_stock import find_clamped_stock
 from chipload.simulation.heights.height_map import NEVER, HeightMap
 from chipload.structure.cells.clamp import Clamp

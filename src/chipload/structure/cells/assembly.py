@@ -18,10 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, binary_opening
-from scipy.sparse import bsr_array, coo_array, csr_array
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.structure.cells.grid import Array, CellGrid, Indices, product_tensors
 
 #: stiffness of the empty part of a cut cell over that of the material
@@ -79,9 +78,9 @@ def modes_of(grid: CellGrid, share: Array, bulk: int = BULK, *, limited: bool = 
     numbers = grid.modes_of(cells)
     used = np.ones(numbers.shape, dtype=np.bool_)
     if bulk > 0 and grid.order > 1:
-        deep = binary_opening(share >= FULL, np.ones((bulk,) * 3, dtype=np.bool_))
+        deep = scipy.ndimage.binary_opening(share >= FULL, np.ones((bulk,) * 3, dtype=np.bool_))
         # what stands on it bends its surface
-        deep &= ~binary_dilation(active & ~deep, np.ones((3, 3, 3), dtype=np.bool_))
+        deep &= ~scipy.ndimage.binary_dilation(active & ~deep, np.ones((3, 3, 3), dtype=np.bool_))
         used = ~deep[active][:, None] | _corners(grid.order)
     kept = np.unique(numbers[used])
     if limited and len(kept) > MOST_MODES:
@@ -103,7 +102,7 @@ def _corners(order: int) -> NDArray[np.bool_]:
 
 def stiffness(
     grid: CellGrid, modes: CellModes, moments: Array, modulus: float, poisson: float, alpha: float = ALPHA
-) -> csr_array:
+) -> scipy.sparse.csr_array:
     """(3 u, 3 u) sparse stiffness [N/mm], all three directions of a mode side by side.
 
     Parameters
@@ -131,7 +130,7 @@ def stiffness(
     return _assemble_cells(modes, M, gradients, law)
 
 
-def springs(grid: CellGrid, modes: CellModes, moments: Array, per_volume: Array) -> csr_array:
+def springs(grid: CellGrid, modes: CellModes, moments: Array, per_volume: Array) -> scipy.sparse.csr_array:
     """(3 u, 3 u) sparse stiffness [N/mm] of springs in the material.
 
     Parameters
@@ -144,7 +143,7 @@ def springs(grid: CellGrid, modes: CellModes, moments: Array, per_volume: Array)
     return _assemble_cells(modes, M, values, lambda N, own: N[..., None, None] * per_volume)
 
 
-def mass(grid: CellGrid, modes: CellModes, moments: Array, density: float) -> csr_array:
+def mass(grid: CellGrid, modes: CellModes, moments: Array, density: float) -> scipy.sparse.csr_array:
     """(3 u, 3 u) sparse mass [t]; ``density`` [t/mm^3]."""
     return springs(grid, modes, moments, density * np.eye(3))
 
@@ -160,7 +159,9 @@ def _volumes(grid: CellGrid, modes: CellModes) -> Array:
     return np.asarray(grid.volumes[tuple(modes.cells.T)])
 
 
-def _assemble_cells(modes: CellModes, M: Array, tensors: Array, law: Callable[[Array, Indices], Array]) -> csr_array:
+def _assemble_cells(
+    modes: CellModes, M: Array, tensors: Array, law: Callable[[Array, Indices], Array]
+) -> scipy.sparse.csr_array:
     """The sum over cells of blocks (e, m, 3, 3) that ``law`` makes of M (e, n^3) times ``tensors`` (n^3, m, m, ...).
 
     Parameters
@@ -190,9 +191,11 @@ def _assemble_cells(modes: CellModes, M: Array, tensors: Array, law: Callable[[A
     row, column = keys // u, keys % u
     off = row != column
     both = (np.append(row, column[off]), np.append(column, row[off]))
-    at = coo_array((np.arange(1, len(both[0]) + 1), both), shape=(u, u)).tocsr()
+    at = scipy.sparse.coo_array((np.arange(1, len(both[0]) + 1), both), shape=(u, u)).tocsr()
     every = np.concatenate([data, data[off].swapaxes(1, 2)])
-    return csr_array(bsr_array((every[at.data - 1], at.indices, at.indptr), shape=(3 * u, 3 * u)))
+    return scipy.sparse.csr_array(
+        scipy.sparse.bsr_array((every[at.data - 1], at.indices, at.indptr), shape=(3 * u, 3 * u))
+    )
 
 
 def _keys(number: Indices, a: int, b: int, u: int) -> Indices:

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
+from chipload.lazy import scipy
 from chipload.progress import Progress, silent
 from chipload.structure.cells.grid import Array, Indices
 from chipload.structure.cells.states import RemovalState, StepLines, between_rows, spaced_rows
@@ -131,7 +131,7 @@ class ModesOfStates:
     def _change(self, a: int, b: int) -> float:
         """Greatest relative change of a frequency from state a to b."""
         first, last = self.known[a][0], self.known[b][0]
-        _, column = linear_sum_assignment(-np.abs(overlap(first, last)))
+        _, column = scipy.optimize.linear_sum_assignment(-np.abs(overlap(first, last)))
         return float(np.abs(np.log(last.frequency[column] / first.frequency)).max())
 
     def _join_states(self, states: Sequence[RemovalState], error: float) -> FollowedModes:
@@ -142,7 +142,7 @@ class ModesOfStates:
         for a, b in pairwise(order):
             # modes of a in their columns; those of b follow
             near = overlap(self.known[a][0], self.known[b][0])[column] * sign[:, None]
-            _, column = linear_sum_assignment(-np.abs(near))
+            _, column = scipy.optimize.linear_sum_assignment(-np.abs(near))
             own = near[np.arange(self.count), column]
             sign = np.where(own < 0.0, -1.0, 1.0)
             alike = min(alike, float(np.abs(own).min()))

@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.structure.cells.grid import Array, Indices
 from chipload.structure.cells.workpiece import CellWorkpiece, line_means
 
@@ -54,15 +54,15 @@ def vibration_modes(work: CellWorkpiece, count: int) -> VibrationModes:
     u = len(work.modes)
     if not 1 <= count < 3 * u - 1:
         raise InputError(f"workpiece: {count} modes of {3 * u} unknowns: must be from 1 to {3 * u - 2}")
-    inverse = LinearOperator(
+    inverse = scipy.sparse.linalg.LinearOperator(
         work.stiffness.shape, matvec=lambda x: work.solve(np.asarray(x).reshape(-1, 1))[:, 0], dtype=np.float64
     )
     begin = np.random.default_rng(0).standard_normal(3 * u)
     try:
-        values, vectors = eigsh(
+        values, vectors = scipy.sparse.linalg.eigsh(
             work.stiffness, k=count, M=work.mass, sigma=0.0, OPinv=inverse, v0=begin, tol=TOLERANCE, maxiter=ITERATIONS
         )
-    except ArpackNoConvergence:
+    except scipy.sparse.linalg.ArpackNoConvergence:
         raise InputError("workpiece: its modes were not found: state a larger workpiece.cell_mm") from None
     rising = np.argsort(values)
     values, vectors = values[rising], vectors[:, rising]

@@ -19,12 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import label
-from scipy.sparse import csc_array, csr_array
-from scipy.sparse.linalg import splu
-from scipy.spatial import cKDTree
 
 from chipload.errors import InputError
+from chipload.lazy import scipy
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.assembly import LEAST_SHARE, CellModes, mass, modes_of, shares, stiffness
 from chipload.structure.cells.clamp import Clamp, clamp_stiffness
@@ -90,7 +87,7 @@ class CellWorkpiece:
     grid: CellGrid
     modes: CellModes
     share: Array
-    stiffness: csr_array
+    stiffness: scipy.sparse.csr_array
     factors: Factors
     order: Indices
     place: Indices
@@ -98,7 +95,7 @@ class CellWorkpiece:
     loose: float
     clamped: Array
     sections: StockSections
-    mass: csr_array | None = None
+    mass: scipy.sparse.csr_array | None = None
 
     def solve(self, right: Array) -> Array:
         """(3 u, q) displacements of the modes under forces (3 u, q)."""
@@ -124,7 +121,7 @@ def cell_workpiece(
     modes = modes_of(grid, share)
     first = None if held is None else np.asarray(held, dtype=np.float64).tolist()
     springs = clamp_stiffness(clamps, stock, grid, modes, elastic.modulus, first)
-    pieces, count = label(share > LEAST_SHARE)
+    pieces, count = scipy.ndimage.label(share > LEAST_SHARE)
     if count > 1:
         kept = np.isin(pieces, np.unique(pieces[springs.cells & (pieces > 0)]))
         loose = float((share * grid.volumes)[~kept].sum())
@@ -137,10 +134,12 @@ def cell_workpiece(
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
     options = {"SymmetricMode": True}
-    lu = splu(csc_array(K[order][:, order]), permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
+    lu = scipy.sparse.linalg.splu(
+        scipy.sparse.csc_array(K[order][:, order]), permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options
+    )
     volume = float((share * grid.volumes).sum())
     return CellWorkpiece(
-        grid, modes, share, csr_array(K), Factors(lu), order, place, volume, loose, springs.volumes,
+        grid, modes, share, scipy.sparse.csr_array(K), Factors(lu), order, place, volume, loose, springs.volumes,
         StockSections(stock), None if elastic.density is None else mass(grid, modes, moments, elastic.density),
     )  # fmt: skip
 
@@ -181,7 +180,7 @@ def _separator(at: Indices, p: int) -> tuple[int, int] | None:
     return None if best is None else best[1:]
 
 
-def mode_weights(work: CellWorkpiece, points: Array) -> csr_array:
+def mode_weights(work: CellWorkpiece, points: Array) -> scipy.sparse.csr_array:
     """Values of the modes at points (n, 3), or at the nearest material to them: (n, u) sparse."""
     at = work.sections.nearest(points)
     cell, local = work.grid.cell_of(at)
@@ -194,7 +193,7 @@ def mode_weights(work: CellWorkpiece, points: Array) -> csr_array:
     values = shape_values(work.grid, local)
     n, some = len(points), number >= 0
     at = np.broadcast_to(np.arange(n)[:, None], number.shape)
-    return csr_array((values[some], (at[some], number[some])), shape=(n, len(work.modes)))
+    return scipy.sparse.csr_array((values[some], (at[some], number[some])), shape=(n, len(work.modes)))
 
 
 def _nearest_cells(work: CellWorkpiece, points: Array, cells: Indices) -> tuple[Indices, Array]:
@@ -203,7 +202,7 @@ def _nearest_cells(work: CellWorkpiece, points: Array, cells: Indices) -> tuple[
     A point on a face of the material may lie on a plane between a full cell and an empty one.
     """
     active = work.modes.cells
-    near = active[cKDTree(active).query(cells, k=min(AROUND, len(active)))[1].reshape(len(cells), -1)]
+    near = active[scipy.spatial.cKDTree(active).query(cells, k=min(AROUND, len(active)))[1].reshape(len(cells), -1)]
     low, high = (np.stack([v[near[..., d] + e] for d, v in enumerate(work.grid.planes)], axis=-1) for e in (0, 1))
     off = np.linalg.norm(np.maximum(np.maximum(low - points[:, None], points[:, None] - high), 0.0), axis=2)
     best = np.arange(len(cells)), off.argmin(axis=1)
@@ -232,16 +231,16 @@ def line_compliances(work: CellWorkpiece, lines: ArrayLike) -> Array:
     near = np.lexsort(cell.T)
     for at in range(0, c, ABREAST):
         some = near[at : at + ABREAST]
-        out[some] = _solve_lines(work, csr_array(loads[some]), stations, some)
+        out[some] = _solve_lines(work, scipy.sparse.csr_array(loads[some]), stations, some)
     return out
 
 
-def line_means(work: CellWorkpiece, lines: Array) -> csr_array:
+def line_means(work: CellWorkpiece, lines: Array) -> scipy.sparse.csr_array:
     """Mean of the modes along contact lines (c, 2, 3) [mm]: (c, u) sparse, a force of 1 that is spread evenly."""
     t = _spread(work, lines)
     c, count = len(lines), len(t)
-    mean = csr_array((np.full(c * count, 1.0 / count), np.arange(c * count), np.arange(c + 1) * count))
-    return csr_array(mean @ _modes_along(work, lines, t))
+    mean = scipy.sparse.csr_array((np.full(c * count, 1.0 / count), np.arange(c * count), np.arange(c + 1) * count))
+    return scipy.sparse.csr_array(mean @ _modes_along(work, lines, t))
 
 
 def displacements(work: CellWorkpiece, line: ArrayLike, points: ArrayLike) -> Array:
@@ -263,13 +262,15 @@ def _spread(work: CellWorkpiece, ends: Array) -> Array:
     return np.asarray((np.arange(count) + 0.5) / count)
 
 
-def _modes_along(work: CellWorkpiece, ends: Array, t: Array) -> csr_array:
+def _modes_along(work: CellWorkpiece, ends: Array, t: Array) -> scipy.sparse.csr_array:
     """(c t, u) values of the modes at shares ``t`` of lines."""
     points = ends[:, None, 0] + t[:, None] * (ends[:, None, 1] - ends[:, None, 0])
     return mode_weights(work, points.reshape(-1, 3))
 
 
-def _solve_lines(work: CellWorkpiece, loads: csr_array, stations: csr_array, some: NDArray[np.int64]) -> Array:
+def _solve_lines(
+    work: CellWorkpiece, loads: scipy.sparse.csr_array, stations: scipy.sparse.csr_array, some: NDArray[np.int64]
+) -> Array:
     """(c, s, 3, 3) compliance of a few lines."""
     c, s, u = len(some), len(STATIONS), len(work.modes)
     dense = np.zeros((u, 3, c, 3))

@@ -26,15 +26,17 @@ from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
+from chipload.lazy import LateModule
 from chipload.number_text import number_text
 from chipload.planning.impeller.blocks import BLOCK, in_blocks
 from chipload.planning.impeller.clearance import nearest
-from chipload.planning.impeller.covering import _clear_parts
 from chipload.planning.impeller.covering.nodes import Nodes, grid_of, hub_nodes, patch_nodes, turn_nodes
 from chipload.planning.impeller.impeller import Impeller
 from chipload.planning.impeller.scene import Scene
 from chipload.planning.impeller.tree import Tree, tree_of
 from chipload.progress import silent
+
+_clear_parts = LateModule("chipload.planning.impeller.covering._clear_parts")
 
 Floats = NDArray[np.float64]
 
