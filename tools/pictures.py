@@ -51,8 +51,7 @@ PAGES = {"page": ("bracket", ""), "page_compare": ("feeds", "original"), "page_i
 #: what the 3D view of a picture does: where it stands, from where it is looked at, from how far
 POSED = {
     "page_impeller": f"{{ const v = {VIEW}, c = v.camera.position; "
-    "v.lookFrom(c.clone().set(0.85, -0.45, 0.75).normalize()); c.lerp(v.path.tip(v.place, c.clone()), 0.35);"
-    "v.controls.update(); v.dirty = true; }"
+    "v.lookFrom(c.clone().set(0.85, -0.45, 0.75).normalize()); v.closer(0.35); }"
 }
 #: moves figures into a sheet of their own, above the page
 SHEET = """(wanted) => {

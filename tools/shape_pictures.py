@@ -33,10 +33,7 @@ LOOK = f"""([beside, high, near]) => {{
     const v = {VIEW}, c = v.camera.position, tip = v.path.tip(v.place, c.clone());
     const round = Math.atan2(tip.y, tip.x) + beside * Math.PI / 180, up = high * Math.PI / 180;
     v.lookFrom(c.clone().set(Math.cos(round) * Math.cos(up), Math.sin(round) * Math.cos(up), Math.sin(up)));
-    c.lerp(tip, near);
-    v.controls.target.lerp(tip, near);
-    v.controls.update();
-    v.dirty = true;
+    v.closer(near);
 }}"""
 #: the part of the page with the 3D view and its scales
 BOX = """() => {
@@ -48,7 +45,7 @@ BOX = """() => {
 @dataclass(frozen=True)
 class Pose:
     """How a result is looked at: at which share of the time, from how far round beside the tip and from how high [deg],
-    and how near to the tip the camera comes (0 to 1).
+    and how near to the tip the picture is (0 to 1).
     """
 
     time: float

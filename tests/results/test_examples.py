@@ -76,7 +76,8 @@ def test_one_state_everywhere(example, name):
     assert max(parts, key=RANK.__getitem__) == state
     assert summary["verdict"] == state
     assert done.exit_code == (0 if state == "holds" else 3)
-    first = re.search(r'<div class="verdict (good|open|bad)"><b>(.*?)</b><span>(.*?)</span>', report)
+    answer = '(?:<div class="answer">.*?</div>)?'
+    first = re.search(rf'<div class="verdict (good|open|bad)"><b>(.*?)</b>{answer}<span>(.*?)</span>', report)
     assert (first[1], first[2]) == ({"holds": "good", "unproven": "open", "exceeds": "bad"}[state], state)
     assert unescape(first[3]) == summary["message"] == done.result.message
     assert re.search(r"<title>(.*?)</title>", report)[1].endswith(f": {state}")

@@ -139,7 +139,9 @@ def test_exit_code_summary_result_report_and_page_state_one_verdict(opened, page
     assert (result.verdict, result.message) == (verdict, summary["message"])
     report = report_of(folder)
     assert f": {verdict.value}</title>" in report
-    found = re.search(r'<div class="verdict (\w+)"><b>([^<]*)</b><span>(.*?)</span>', report)
+    found = re.search(
+        r'<div class="verdict (\w+)"><b>([^<]*)</b>(?:<div class="answer">.*?</div>)?<span>(.*?)</span>', report
+    )
     assert found is not None
     assert (found[2], html.unescape(found[3])) == (verdict.value, summary["message"])
     assert (found[1] == "good") == (verdict is Verdict.HOLDS)

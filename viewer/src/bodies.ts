@@ -5,6 +5,8 @@ import { Body, CutterPart, Document } from "./document";
 
 const PARTS: Record<CutterPart["kind"], number> = { flutes: 0x5f7186, shank: 0x9aa5b1, holder: 0x6d5f86, pointer: 0x3c4654 };
 const EDGE = 20;
+/** opacity of a cutter: what it cuts is seen through it */
+const CLEAR = 0.42;
 export const HIT = new THREE.Color(0xd01414);
 
 export class Solid {
@@ -34,7 +36,7 @@ export class Solid {
     const material = new THREE.MeshStandardMaterial({
       color: this.colour, vertexColors: this.painted, roughness: 0.8, flatShading: true, side: THREE.DoubleSide,
       // where a part ends in the same plane as the stock the stock is seen: a gouge lays the part bare
-      polygonOffset: true, polygonOffsetFactor: body.kind === "stock" ? 0 : 1.5, polygonOffsetUnits: body.kind === "stock" ? 0 : 2,
+      polygonOffset: true, polygonOffsetFactor: body.kind === "stock" ? 0 : 1.5, polygonOffsetUnits: body.kind === "stock" ? 0 : 8,
     });
     material.onBeforeCompile = (shader) => {
       Object.assign(shader.uniforms, this.uniforms);
@@ -89,7 +91,7 @@ export class Tool {
       geometry.rotateX(Math.PI / 2);
       const material = new THREE.MeshStandardMaterial({
         color: PARTS[part.kind], roughness: 0.45, metalness: 0.1, side: THREE.DoubleSide,
-        transparent: part.kind !== "pointer", opacity: part.kind === "pointer" ? 1 : 0.8,
+        transparent: part.kind !== "pointer", opacity: part.kind === "pointer" ? 1 : CLEAR, depthWrite: part.kind === "pointer",
       });
       const mesh = new THREE.Mesh(geometry, material);
       mesh.renderOrder = 4;
@@ -102,7 +104,7 @@ export class Tool {
   hit(what: string): void {
     for (const [kind, materials] of this.parts) {
       const own = what !== "" && (what.includes("cutting") ? kind === "flutes" : kind !== "flutes");
-      for (const m of materials) { m.color.set(own ? HIT : PARTS[kind as CutterPart["kind"]]); m.opacity = own ? 1 : 0.8; }
+      for (const m of materials) { m.color.set(own ? HIT : PARTS[kind as CutterPart["kind"]]); m.opacity = own ? 1 : CLEAR; }
     }
   }
 }

@@ -28,7 +28,7 @@ export interface Path {
   line: Buffer | null;
 }
 export interface CutterPart { kind: "flutes" | "shank" | "holder" | "pointer"; profile: [number, number][] }
-export interface Mark { row: number; at: Triple; text: string; kind: "limit" | "collision"; bodies: string[]; depth: number }
+export interface Mark { row: number; at: Triple; text: string; kind: "limit" | "collision" | "critical"; bodies: string[]; depth: number }
 export interface Colouring {
   label: string;
   unit: string;

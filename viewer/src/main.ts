@@ -27,7 +27,16 @@ export function cut(id: string, leader: string): CutPanel {
 }
 
 /** Show the document of an address in an element. */
-export async function open(id: string, url: string, keep = false): Promise<void> { of(id).load(await fetched(url), keep); }
+export async function open(id: string, url: string, keep = false): Promise<void> {
+  const view = of(id);
+  view.overlay.message("loading the picture \u2026", true);
+  try {
+    view.load(await fetched(url), keep);
+  } catch (e) {
+    view.overlay.message(`The picture cannot be shown: ${e instanceof Error ? e.message : e}`);
+    throw e;
+  }
+}
 
 /** Show the document of an address beside a view that leads it. */
 export async function beside(id: string, url: string, leader: string, against: Abscissa, here: number[], there: number[]): Promise<void> {

@@ -24,6 +24,7 @@ const STYLE = `
 .cv-tip { display: none; white-space: pre; font-size: 11.5px; font-variant-numeric: tabular-nums; z-index: 3; }
 .cv-note { left: 6px; top: 6px; color: #b01818; font-weight: 600; max-width: 70%; }
 .cv-note:empty { display: none; }
+.cv-plain { color: #1f2933; }
 .cv-box { height: 520px; border: 1px solid #d9dde2; }
 .cv-controls { display: flex; flex-wrap: wrap; gap: 4px 12px; align-items: center; padding: 4px 0; font-size: 13px; }
 .cv-controls button, .cv-controls select { font: inherit; padding: 3px 10px; }
@@ -165,8 +166,10 @@ export class Overlay {
     this.tip.style.top = `${Math.max(0, Math.min(y + 12, this.stage.clientHeight - 90))}px`;
   }
 
-  message(text: string): void {
+  /** A message at the edge; `plain`: it tells of nothing that is wrong. */
+  message(text: string, plain = false): void {
     this.note.textContent = text;
+    this.note.classList.toggle("cv-plain", plain);
   }
 
   private part(cls: string): HTMLElement {

@@ -78,6 +78,18 @@ export class ToolPath {
     return Math.min(a, a - 1 + Math.max(0, (value - column[a - 1]) / (column[a] - column[a - 1])));
   }
 
+  /** Place, among the kept rows from one row to another, at which the tool's axis is nearest to a point. */
+  nearest(point: THREE.Vector3, first: number, last: number): number {
+    const tip = new THREE.Vector3(), axis = new THREE.Vector3();
+    let best = this.place(first), closest = Infinity;
+    for (let k = best; k <= this.place(last); k++) {
+      const from = point.clone().sub(this.tip(k, tip)), along = Math.max(0, from.dot(this.axis(k, axis)));
+      const far = from.addScaledVector(axis, -along).length();
+      if (far < closest) { closest = far; best = k; }
+    }
+    return best;
+  }
+
   tip(place: number, out: THREE.Vector3): THREE.Vector3 {
     const k = Math.floor(place), f = place - k, n = Math.min(k + 1, this.rows.length - 1);
     const p = this.points;

@@ -3,7 +3,7 @@
 import * as THREE from "three";
 import { Document, Removal, Rgb } from "./document";
 
-const RAW = new THREE.Color(0xb98a4e), CUT = new THREE.Color(0xc3cad3), CAP = new THREE.Color(0x8d6a3b);
+const RAW = new THREE.Color(0xb98a4e), CUT = new THREE.Color(0x9fadbd), CAP = new THREE.Color(0x8d6a3b);
 
 /** Corners (q, 4, 3) from vertices and quads, which are held column by column as differences from the row before. */
 function unrolled(doc: Document, removal: Removal): Uint16Array {
@@ -29,7 +29,7 @@ export class Stock {
   private readonly low: THREE.Vector3;
   private readonly uniforms = {
     frame: { value: 0 }, raw: { value: RAW }, cap: { value: CAP }, shades: { value: null as THREE.Texture | null },
-    size: { value: 1 }, glass: { value: 0 },
+    size: { value: 1 }, glass: { value: 0 }, cut: { value: 0 },
   };
 
   constructor(doc: Document, removal: Removal) {
@@ -101,6 +101,18 @@ export class Stock {
     return this.seen[2 * q] <= this.frame && (this.frame < this.seen[2 * q + 1] || this.seen[2 * q + 1] === 65535);
   }
 
+  /** First and last row in which the face of a triangle was made; null: it is a face of the raw stock. */
+  cutBy(face: number): [number, number] | null {
+    const frame = this.seen[2 * (face >> 1)];
+    return frame === 0 ? null : [frame > 1 ? this.rows[frame - 2] + 1 : 0, this.rows[frame - 1]];
+  }
+
+  /** Cut away what lies beyond planes; what is then seen of the inside is its section. */
+  clip(planes: THREE.Plane[]): void {
+    (this.mesh.material as THREE.Material).clippingPlanes = planes;
+    this.uniforms.cut.value = planes.length;
+  }
+
   /** Volume within what is drawn, and number of its triangles. */
   measured(): { volume: number; triangles: number } {
     const p = this.mesh.geometry.getAttribute("position"), i = this.mesh.geometry.getIndex()!;
@@ -124,7 +136,7 @@ export class Stock {
         if (frame < seen.x || frame >= seen.y) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);`);
     shader.fragmentShader = shader.fragmentShader
       .replace("#include <common>", `#include <common>
-        uniform vec3 raw; uniform vec3 cap; uniform sampler2D shades; uniform float size; uniform float glass;
+        uniform vec3 raw; uniform vec3 cap; uniform sampler2D shades; uniform float size; uniform float glass; uniform float cut;
         varying float born;`)
       .replace("#include <color_fragment>", `#include <color_fragment>
         diffuseColor.rgb = born < 0.5 ? raw : texture2D(shades, vec2((born - 0.5) / size, 0.5)).rgb;`)
@@ -132,7 +144,7 @@ export class Stock {
         if (glass > 0.5) {
           float edge = 1.0 - abs(dot(normalize(normal), normalize(vViewPosition)));
           diffuseColor.a = gl_FrontFacing ? 0.10 + 0.45 * edge * edge : 0.05;
-        } else if (!gl_FrontFacing) outgoingLight = cap;
+        } else if (cut > 0.5 && !gl_FrontFacing) outgoingLight = cap;
         #include <opaque_fragment>`);
   }
 }

@@ -1,18 +1,23 @@
 /** A surface map: values as colours, the limit as red lines, bent by a factor. */
 
 import * as THREE from "three";
+import { LineMaterial } from "three/examples/jsm/lines/LineMaterial.js";
+import { LineSegments2 } from "three/examples/jsm/lines/LineSegments2.js";
+import { LineSegmentsGeometry } from "three/examples/jsm/lines/LineSegmentsGeometry.js";
 import { Document, Header, MapLegend, SurfaceMap } from "./document";
 import { shade } from "./path";
 
 /** the greatest displacement is drawn as at most this share of the size of the surface */
 const BENT = 0.12;
 const STOPS = 5;
+/** width of the lines of the limit [pixels] */
+const WIDTH = 2.2;
 
 export class MapBody {
   readonly group = new THREE.Group();
   readonly mesh: THREE.Mesh;
-  readonly lines: THREE.LineSegments;
-  private readonly places: [THREE.BufferAttribute, Float32Array, Float32Array | null][];
+  readonly lines: LineSegments2;
+  private readonly places: [(to: Float32Array) => void, Float32Array, Float32Array | null][];
   factor = 0;
 
   constructor(doc: Document, readonly map: SurfaceMap, private readonly header: Header) {
@@ -21,23 +26,24 @@ export class MapBody {
       const [r, g, b] = Number.isFinite(v) ? this.colour(v) : [150, 156, 165];
       c.setRGB(r / 255, g / 255, b / 255, THREE.SRGBColorSpace).toArray(colours, 3 * k);
     });
-    const geometry = new THREE.BufferGeometry(), line = new THREE.BufferGeometry();
+    const geometry = new THREE.BufferGeometry(), line = new LineSegmentsGeometry();
     const flat = doc.f4(map.positions), ends = doc.f4(map.lines);
     geometry.setAttribute("position", new THREE.BufferAttribute(flat.slice(), 3));
     geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
     geometry.setIndex(new THREE.BufferAttribute(doc.u4(map.index), 1));
-    line.setAttribute("position", new THREE.BufferAttribute(ends.slice(), 3));
+    line.setPositions(ends.length ? ends.slice() : new Float32Array(6));
     this.mesh = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({
       vertexColors: true, roughness: 0.85, flatShading: true, side: THREE.DoubleSide,
-      polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
+      polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 8,
     }));
-    this.lines = new THREE.LineSegments(line, new THREE.LineBasicMaterial({ color: 0xd01414 }));
+    this.lines = new LineSegments2(line, new LineMaterial({ color: 0xd01414, linewidth: WIDTH, toneMapped: false }));
+    this.lines.visible = ends.length > 0;
     this.mesh.frustumCulled = this.lines.frustumCulled = false;
     this.lines.renderOrder = 3;
     this.group.add(this.mesh, this.lines);
     this.places = [
-      [geometry.getAttribute("position") as THREE.BufferAttribute, flat, map.moved ? doc.f4(map.moved) : null],
-      [line.getAttribute("position") as THREE.BufferAttribute, ends, map.lines_moved ? doc.f4(map.lines_moved) : null],
+      [(to) => { geometry.setAttribute("position", new THREE.BufferAttribute(to, 3)); }, flat, map.moved ? doc.f4(map.moved) : null],
+      [(to) => { line.setPositions(to); }, ends, map.lines_moved ? doc.f4(map.lines_moved) : null],
     ];
   }
 
@@ -54,18 +60,13 @@ export class MapBody {
   /** Draw the displacement `factor` times as large. */
   bend(factor: number): void {
     this.factor = factor;
-    for (const [place, flat, moved] of this.places) {
-      if (!moved) continue;
-      const to = place.array as Float32Array;
-      for (let k = 0; k < to.length; k++) to[k] = flat[k] + factor * moved[k];
-      place.needsUpdate = true;
-    }
+    for (const [put, flat, moved] of this.places) if (moved?.length) put(flat.map((x, k) => x + factor * moved[k]));
   }
 
   legend(): MapLegend {
     const { label, unit, low, high, limit } = this.map, hex = (v: number) => "#" + this.colour(v).map((x) => x.toString(16).padStart(2, "0")).join("");
     const stops = Array.from({ length: STOPS }, (_, k) => low + (high - low) * k / (STOPS - 1)).map((v) => [v, hex(v)] as [number, string]);
-    const words: [string, string][] = limit !== null && this.lines.geometry.getAttribute("position").count ? [[`limit ${Number(limit.toPrecision(4))}`, "#d01414"]] : [];
+    const words: [string, string][] = limit !== null && this.map.lines.n ? [[`limit ${Number(limit.toPrecision(4))}`, "#d01414"]] : [];
     return { title: unit ? `${label} [${unit}]` : label, stops, words };
   }
 

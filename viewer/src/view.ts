@@ -2,8 +2,8 @@
 
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { HIT, Solid, Tool } from "./bodies";
-import { frame, uprighting } from "./camera";
+import { Solid, Tool } from "./bodies";
+import { cutterSide, frame, sidesOf, uprighting } from "./camera";
 import { SIZE, ViewCube } from "./cube";
 import { Colouring, Document, Header, Mark, Rgb } from "./document";
 import { EngagedCutter } from "./engaged";
@@ -12,11 +12,14 @@ import { Measure } from "./measure";
 import { Overlay, number } from "./overlay";
 import { Abscissa, Pair, between } from "./pair";
 import { ToolPath, coloured } from "./path";
+import { RING, Ring } from "./ring";
 import { recorded, saved } from "./save";
 import { Stock } from "./stock";
 import { MapBody } from "./surface";
 
-const BACKGROUND = 0xeef1f5, FOV = 36, NEAR = 14;
+const BACKGROUND = 0xeef1f5, NEAR = 14;
+/** distance of the camera, and half the height of a picture of a mark, in sizes of what is shown */
+const AWAY = 6, CLOSE = 0.24;
 const VIEWS: Record<string, [number, number, number]> = {
   iso: [0.62, -1, 0.78], top: [0, -0.001, 1], front: [0, -1, 0.02], side: [1, 0, 0.02], below: [0, -0.001, -1],
 };
@@ -37,7 +40,9 @@ export class View {
   private readonly scene = new THREE.Scene();
   /** all that belongs to the work; it turns where the tool stands upright */
   private readonly work = new THREE.Group();
-  private readonly camera = new THREE.PerspectiveCamera(FOV, 1, 0.1, 1000);
+  private readonly camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 0, 1000);
+  /** half the height of the picture at zoom 1 [mm] */
+  private half = 1;
   private readonly controls: OrbitControls;
   private readonly cube = new ViewCube();
   private tools = new Map<number, Tool>();
@@ -58,7 +63,7 @@ export class View {
   private place = 0;
   private rate = 0;
   private wanted = 0;
-  private pending = -1;
+  private pending: [number, boolean] | null = null;
   private told = 0;
   private before = 0;
   private recorder: MediaRecorder | null = null;
@@ -122,19 +127,16 @@ export class View {
     this.work.add(...this.solids.map((s) => s.group), this.path.group, ...[...this.tools.values()].map((t) => t.group));
     if (this.stock) this.work.add(this.stock.group);
     this.marks.clear();
-    const size = this.size();
     for (const m of h.marks) {
-      const ball = new THREE.Mesh(new THREE.SphereGeometry(size * 0.008, 16, 12), new THREE.MeshBasicMaterial({ color: HIT }));
-      ball.position.set(...m.at);
-      ball.renderOrder = 5;
-      this.marks.add(ball);
+      this.marks.add(new Ring(m));
     }
     this.colour(doc, h.colouring);
     this.row = -1;
     this.go(this.wanted);
     this.layers();
-    if (!keep) this.look("iso");
-    if (this.pending >= 0) { this.show(this.pending); this.pending = -1; }
+    if (!keep) this.lookFrom(this.firstSide());
+    this.overlay.message("");
+    if (this.pending) { this.show(...this.pending); this.pending = null; }
   }
 
   /** Colour the path, and what was cut, by a column. */
@@ -244,7 +246,7 @@ export class View {
     const planes = this.plane ? [this.plane] : [];
     for (const s of this.solids) s.clip(planes);
     this.shownMap?.clip(planes);
-    if (this.stock) (this.stock.mesh.material as THREE.Material).clippingPlanes = planes;
+    this.stock?.clip(planes);
     this.path.clip(planes);
     this.dirty = true;
   }
@@ -255,9 +257,19 @@ export class View {
     this.lookFrom(away);
   }
 
+  /** Look nearer at the tip, by a share of the way there. */
+  closer(share: number): void {
+    const to = this.work.localToWorld(this.path.tip(this.place, new THREE.Vector3())), shift = to.sub(this.controls.target).multiplyScalar(share);
+    this.controls.target.add(shift);
+    this.camera.position.add(shift);
+    this.camera.zoom /= 1 - share;
+    this.controls.update();
+    this.dirty = true;
+  }
+
   /** Show a mark: the tool stands there, what touches is red, the camera comes near. */
   show(k: number, near = true): void {
-    if (!this.header) { this.pending = k; return; }
+    if (!this.header) { this.pending = [k, near]; return; }
     const mark = this.header.marks[k];
     if (!mark) return;
     this.go(mark.row);
@@ -265,7 +277,8 @@ export class View {
     if (!near) return;
     const to = this.work.localToWorld(new THREE.Vector3(...mark.at)), away = this.camera.position.clone().sub(this.controls.target).normalize();
     this.controls.target.copy(to);
-    this.camera.position.copy(to).addScaledVector(away, 0.75 * this.size());
+    this.camera.position.copy(to).addScaledVector(away, AWAY * this.size());
+    this.camera.zoom = this.half / (CLOSE * this.size());
     this.controls.update();
     this.dirty = true;
   }
@@ -332,12 +345,27 @@ export class View {
 
   private lookFrom(away: THREE.Vector3): void {
     const box = new THREE.Box3(new THREE.Vector3(...this.header.low), new THREE.Vector3(...this.header.high));
-    const size = this.size();
-    this.camera.near = size * 2e-3;
-    this.camera.far = size * 40;
-    this.controls.target.copy(frame(this.camera, box, this.work.matrixWorld, away, Math.max(this.aspect(), 0.2)));
+    const found = frame(box, this.work.matrixWorld, away, Math.max(this.aspect(), 0.2)), far = AWAY * this.size();
+    this.half = found.half;
+    this.camera.zoom = 1;
+    this.camera.far = 2 * far;
+    this.camera.position.copy(found.middle).addScaledVector(away, far);
+    if (Math.abs(away.z) > 0.999) this.camera.position.y -= 1e-3 * far;
+    this.controls.target.copy(found.middle);
     this.controls.update();
     this.dirty = true;
+  }
+
+  /** Direction of the first picture: from which the place of the first mark is seen, if it can be from the cutter's side. */
+  private firstSide(): THREE.Vector3 {
+    const usual = new THREE.Vector3(...VIEWS.iso).normalize(), mark = this.header.marks[0];
+    if (!mark) return usual;
+    const box = new THREE.Box3(new THREE.Vector3(...this.header.low), new THREE.Vector3(...this.header.high));
+    const place = this.path.place(mark.row), axis = this.path.axis(place, new THREE.Vector3());
+    const sides = sidesOf(cutterSide(box, this.path.tip(place, new THREE.Vector3()), axis, usual));
+    this.stock?.at(mark.row);
+    const from = new THREE.Vector3(...mark.at).addScaledVector(axis, 0.02 * this.size());
+    return sides.find((side) => !this.first(new THREE.Ray(from, side))) ?? sides[0];
   }
 
   /** Turn the work so that the tool's axis stands upright, as on a machine whose tables carry the work; or leave it. */
@@ -401,7 +429,7 @@ export class View {
   private touch(mark: Mark | null): void {
     for (const s of this.solids) s.hit(mark !== null && mark.bodies.includes(s.body.name));
     for (const t of this.tools.values()) t.hit(mark && mark.kind === "collision" ? mark.bodies[0] : "");
-    this.overlay.message(mark ? mark.text : this.measure.wanted);
+    this.overlay.message(mark ? mark.text : this.measure.wanted, mark?.kind === "critical");
     this.dirty = true;
   }
 
@@ -425,7 +453,8 @@ export class View {
     const p = this.pair?.other;
     if (!p) return;
     p.camera.position.copy(this.camera.position);
-    p.camera.near = this.camera.near;
+    p.half = this.half;
+    p.camera.zoom = this.camera.zoom;
     p.camera.far = this.camera.far;
     p.controls.target.copy(this.controls.target);
     p.camera.lookAt(p.controls.target);
@@ -440,15 +469,16 @@ export class View {
     const size = this.renderer.getSize(new THREE.Vector2());
     if (size.x !== w || size.y !== h) {
       this.renderer.setSize(w, h, false);
-      this.camera.aspect = w / h;
-      this.camera.updateProjectionMatrix();
     }
+    Object.assign(this.camera, { top: this.half, bottom: -this.half, left: -this.half * w / h, right: this.half * w / h });
     this.camera.updateProjectionMatrix();
+    const pixel = 2 * this.half / this.camera.zoom / h;
+    for (const ring of this.marks.children) ring.scale.setScalar(RING * pixel);
     this.renderer.setViewport(0, 0, w, h);
     this.renderer.render(this.scene, this.camera);
     const away = this.camera.position.clone().sub(this.controls.target);
     this.cube.draw(this.renderer, away, this.camera.up, w, 4);
-    this.overlay.ruler((2 * away.length() * Math.tan(THREE.MathUtils.degToRad(FOV / 2))) / h);
+    this.overlay.ruler(pixel);
   }
 
   /** Drawn point of the path within some pixels of the pointer, the nearest to the camera. */
@@ -487,15 +517,49 @@ export class View {
     if (this.measure.on) { this.pick(x, y); return; }
     const k = this.hidden.has("path") ? -1 : this.near(x, y);
     if (k >= 0) this.tellRow(this.path.drawnRows[k], "clicked");
+    else this.ask(x, y);
+  }
+
+  /** Say which step cut the face of the stock at a pixel, and go there. */
+  private ask(x: number, y: number): void {
+    const hit = this.stock?.group.visible ? this.hit(x, y) : undefined;
+    if (!this.stock || hit?.object !== this.stock.mesh) return;
+    const rows = this.stock.cutBy(hit.faceIndex!);
+    if (!rows) { this.overlay.message("this face is not cut: raw stock", true); return; }
+    const place = this.path.nearest(this.work.worldToLocal(hit.point), ...rows), row = this.path.rows[place];
+    this.go(row);
+    const c = this.colouring, v = this.path.values, said = [`cut in step ${row + 1}`];
+    if (this.path.line) said.push(`line ${this.path.line[place]}`);
+    if (this.path.tool[place]) said.push(`T${this.path.tool[place]}`);
+    said.push(`${number(this.path.t[place])} s`);
+    let d = 0;
+    while (d < this.path.drawnRows.length - 1 && this.path.drawnRows[d] < row) d++;
+    if (c && v) said.push(c.words.length ? c.words[v[d]]?.[0] ?? "" : `${c.label} ${number(v[d])} ${c.unit}`);
+    this.overlay.message(said.join(" \u00b7 "), true);
+    this.tellRow(row, "clicked");
+  }
+
+  /** What is drawn at a pixel, of bodies and stock. */
+  private hit(x: number, y: number): THREE.Intersection | undefined {
+    const ray = new THREE.Raycaster();
+    ray.setFromCamera(new THREE.Vector2(2 * x / this.overlay.stage.clientWidth - 1, 1 - 2 * y / this.overlay.stage.clientHeight), this.camera);
+    return this.first(ray.ray);
+  }
+
+  /** What a ray meets first, of bodies and stock as they are shown. */
+  private first(along: THREE.Ray): THREE.Intersection | undefined {
+    const ray = new THREE.Raycaster(along.origin, along.direction);
+    const meshes = this.solids.filter((s) => s.group.visible).map((s) => s.mesh as THREE.Object3D);
+    if (this.stock?.group.visible) meshes.push(this.stock.mesh);
+    const hits = ray.intersectObjects(meshes, false).filter((i) =>
+      (i.object !== this.stock?.mesh || this.stock.shows(i.faceIndex!)) && (!this.plane || this.plane.distanceToPoint(i.point) >= 0));
+    // where a part ends in the plane of the stock the stock is what is seen
+    const same = hits.find((i) => i.object === this.stock?.mesh && i.distance - hits[0].distance < 1e-3 * this.size());
+    return same ?? hits[0];
   }
 
   private pick(x: number, y: number): void {
-    const ray = new THREE.Raycaster();
-    ray.setFromCamera(new THREE.Vector2(2 * x / this.overlay.stage.clientWidth - 1, 1 - 2 * y / this.overlay.stage.clientHeight), this.camera);
-    const meshes = this.solids.filter((s) => s.group.visible).map((s) => s.mesh as THREE.Object3D);
-    if (this.stock?.group.visible) meshes.push(this.stock.mesh);
-    const hit = ray.intersectObjects(meshes, false).find((i) =>
-      (i.object !== this.stock?.mesh || this.stock.shows(i.faceIndex!)) && (!this.plane || this.plane.distanceToPoint(i.point) >= 0));
+    const hit = this.hit(x, y);
     if (!hit) return;
     const said = this.measure.add(this.work.worldToLocal(hit.point), this.size() * 0.005);
     if (said) this.overlay.message(said);

@@ -71,12 +71,14 @@ def colouring_of(
     removal: RemovalMesh | None,
     points: int = POINTS,
 ) -> Colouring:
-    """The colours of a column of numbers; the path is drawn through about ``points`` rows at most."""
+    """The colours of a column of numbers; the path is drawn through about ``points`` rows at most.
+
+    The worse end of their scale is the worst value of the rows that the limit of the column covers.
+    """
     known = COLUMNS.get(column)
     label, unit = (known.label, known.unit) if known is not None else (column.replace("_", " "), "")
     rows = drawn_rows(path, values, points)
-    finite = values[np.isfinite(values)]
-    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
+    low, high = _scale(values, check)
     above = rows_beyond(values, check) if check is not None else np.zeros(len(values), dtype=np.bool_)
     least = known is not None and known.least
     return Colouring(
@@ -84,6 +86,25 @@ def colouring_of(
         None if removal is None else frame_values(values, removal, least=least),
         None if removal is None else frame_values(above.astype(np.float64), removal) > 0.5,
     )  # fmt: skip
+
+
+def _scale(values: Floats, check: LimitCheck | None) -> tuple[float, float]:
+    """Ends of the scale. Its worse end is that of the rows that the limit covers: an entry, which it leaves out, would
+    hide their differences.
+    """
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return 0.0, 0.0
+    low, high = float(finite.min()), float(finite.max())
+    counts = values if check is None else values[check.coverage.mask(len(values))]
+    counts = counts[np.isfinite(counts)]
+    if check is None or not len(counts):
+        return low, high
+    if check.column.signed or check.column.least:
+        low = float(counts.min())
+    if check.column.signed or not check.column.least:
+        high = float(counts.max())
+    return low, high
 
 
 def colouring_of_words(column: str, codes: Ints, words: Sequence[str], path: ViewPath) -> Colouring:

@@ -1,4 +1,4 @@
-"""Places that the 3D view marks: limits that are exceeded, collisions with the bodies that touch."""
+"""Places that the 3D view marks: limits that are exceeded, collisions, else the limit with the least margin."""
 
 from __future__ import annotations
 
@@ -11,17 +11,21 @@ from chipload.errors import Finding
 from chipload.number_text import number_text
 from chipload.report.view import ViewMark
 from chipload.result import LimitCheck, Result, Track, Verdict
+from chipload.result.first_lines import critical_check
 
 #: collisions that are marked at most
 MARKED = 200
 #: code of the finding of a collision
 COLLISION = "collision"
+#: kind of the mark of the limit with the least margin
+CRITICAL = "critical"
 
 
 def marks_of(
     result: Result, track: Track, row: Callable[[LimitCheck | Finding], int | None], place: NDArray[np.float64]
 ) -> tuple[ViewMark, ...]:
-    """The marks of a track: collisions, the deepest first, then limits, the worst first.
+    """The marks of a track: collisions, the deepest first, then limits, the worst first; where there is none, the place
+    of the limit with the least margin.
 
     Parameters
     ----------
@@ -42,6 +46,11 @@ def marks_of(
         if k is not None:
             touched.append(_collision(result, track, f, k, place))
     touched.sort(key=lambda m: -m.depth_mm)
+    if not touched and not out:
+        critical = critical_check(track.limits)
+        k = None if critical is None else row(critical)
+        if critical is not None and k is not None:
+            out.append(ViewMark(k, _place_of(place[k]), _critical_text(critical), CRITICAL))
     return (*touched[:MARKED], *out)
 
 
@@ -54,6 +63,11 @@ def _collision(result: Result, track: Track, f: Finding, k: int, place: NDArray[
         if one.get("line") == f.line and np.allclose(one.get("place"), at, atol=1e-6):
             return ViewMark(k, at, text, COLLISION, (str(one["what"]), str(one["into"])), float(one["depth_mm"]))
     return ViewMark(k, at, text, COLLISION)
+
+
+def _critical_text(check: LimitCheck) -> str:
+    """The critical limit in a few words."""
+    return ", ".join(filter(None, (check.value_text, f"line {check.line}" if check.line else "")))
 
 
 def _share(c: LimitCheck) -> float:

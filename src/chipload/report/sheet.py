@@ -34,6 +34,16 @@ p { margin: 4px 0 8px; max-width: 92ch; }
 .open { color: var(--may); border-color: #d19a1f; background: #fdf3dc; }
 .verdict span { color: var(--ink); display: block; }
 .verdict .more { font-size: 13px; color: var(--soft); }
+.answer { display: flex; flex-wrap: wrap; gap: 2px 14px; align-items: center; color: var(--ink); }
+.answer .value { font-weight: 650; }
+.limit-bar { position: relative; display: inline-block; flex: 0 1 220px; min-width: 90px; height: 12px;
+  background: #dfe4ea; border-radius: 3px; -webkit-print-color-adjust: exact; print-color-adjust: exact; }
+.limit-bar b, .limit-bar i, .limit-bar u { position: absolute; top: 0; bottom: 0; display: block; left: 0; }
+.limit-bar u { top: -3px; bottom: -3px; width: 0; border-left: 2.5px solid #1f2933; margin-left: -2px; }
+.limit-bar.ok b { background: #3f936f; } .limit-bar.ok i { background: #a3d0bb; }
+.limit-bar.no b { background: #b3261e; } .limit-bar.no i { background: #e3a8a3; }
+.limit-bar.may b { background: #d19a1f; } .limit-bar.may i { background: #ecd39a; }
+.verdict .answer span { display: inline-block; } .verdict .answer { font-size: 15px; }
 .note { color: var(--soft); font-size: 13px; }
 td code { white-space: nowrap; }
 table { border-collapse: collapse; width: 100%; margin: 6px 0 12px; font-variant-numeric: tabular-nums; }
@@ -137,13 +147,15 @@ def _shown_view(view: tuple[str, str, str] | None) -> str:
     return _library("viewer", script) + f'<script>library("viewer").then(() => {call});</script>\n'
 
 
-def heading_lines(title: str, banner: str, word: str, lines: Sequence[str]) -> list[str]:
-    """The first lines of a page: what it is about, and the verdict; ``banner`` is `good`, `open` or `bad`."""
+def heading_lines(title: str, banner: str, word: str, lines: Sequence[str], answer: str = "") -> list[str]:
+    """The first lines of a page: what it is about, and the verdict; ``banner`` is `good`, `open` or `bad`, ``answer``
+    HTML between the verdict and its lines.
+    """
     message, *more = lines
     texts = [f"<span>{escape(message)}</span>", *(f'<span class="more">{escape(line)}</span>' for line in more)]
     return [
         f"<h1>chipload &middot; {escape(title)}</h1>",
-        f'<div class="verdict {banner}"><b>{word}</b>{"".join(texts)}</div>',
+        f'<div class="verdict {banner}"><b>{word}</b>{answer}{"".join(texts)}</div>',
     ]
 
 

@@ -86,7 +86,9 @@ class Colouring:
 
 @dataclass(frozen=True)
 class ViewMark:
-    """A place that is marked: a ``limit`` that is exceeded, or a ``collision`` of ``bodies`` by ``depth_mm``."""
+    """A place that is marked: a ``limit`` that is exceeded, a ``collision`` of ``bodies`` by ``depth_mm``, or the
+    ``critical`` limit, which is not exceeded.
+    """
 
     row: int
     at: tuple[float, float, float]

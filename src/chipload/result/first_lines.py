@@ -33,21 +33,38 @@ def headline(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Tra
     tracks : those in use
     """
     checks = [(_track_prefix(track, tracks), check) for track in tracks for check in track.limits]
-    critical = min(
-        ((of, check) for of, check in checks if check.margin is not None),
-        key=lambda one: (one[1].margin or 0.0, one[1].name),
-        default=None,
-    )
+    least = critical_check(check for _, check in checks)
+    critical = next(((of, check) for of, check in checks if check is least), None)
     if verdict is Verdict.HOLDS:
-        held = _critical_text(*critical) if critical else ", ".join(of + check.text for of, check in checks)
+        held = (
+            critical[0] + critical_text(critical[1]) if critical else ", ".join(of + check.text for of, check in checks)
+        )
         levels = {c.budget.confidence for _, c in checks if c.budget is not None and c.by_confidence}
         return f"Holds at {level_text(min(levels))}: {held}." if levels else f"Holds: {held}."
     found = list(dict.fromkeys(_texts(verdict, findings, tracks))) or ["no limit was checked"]
-    more = f"; and {len(found) - 1} more" if len(found) > 1 else ""
-    line = f"{verdict.value.capitalize()}: {found[0]}{more}."
+    line = f"{verdict.value.capitalize()}: {_found_text(found)}."
     if critical is not None and not found[0].startswith(critical[0] + critical[1].text):
-        line += f" Critical limit: {_critical_text(*critical)}."
+        line += f" Critical limit: {critical[0]}{critical_text(critical[1])}."
     return line
+
+
+def reason_line(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Track]) -> str:
+    """Return what exceeds or is not proven, the worst first and how many more there are; empty: everything holds."""
+    if verdict is Verdict.HOLDS:
+        return ""
+    found = _found_text(list(dict.fromkeys(_texts(verdict, findings, tracks))) or ["no limit was checked"])
+    return f"{found[0].upper()}{found[1:]}."
+
+
+def critical_check(checks: Iterable[LimitCheck]) -> LimitCheck | None:
+    """Return the check with the least margin; None: none has a margin.
+
+    >>> checks = [LimitCheck("force_n", 500.0, f, Verdict.HOLDS, resolution_error=0.0) for f in (100.0, 400.0)]
+    >>> critical_check(checks).text
+    'force 400 of 500 N'
+    """
+    known = (check for check in checks if check.margin is not None)
+    return min(known, key=lambda check: (check.margin or 0.0, check.name), default=None)
 
 
 def coverage_line(tracks: Sequence[Track]) -> str:
@@ -117,14 +134,18 @@ def _texts(verdict: Verdict, findings: Sequence[Finding], tracks: Sequence[Track
         yield f"{guesses} values of the job are guesses" if guesses > 1 else "1 value of the job is a guess"
 
 
-def _critical_text(of: str, check: LimitCheck) -> str:
-    """A limit with its margin, its line and its place."""
+def critical_text(check: LimitCheck) -> str:
+    """Return a limit with its margin, its line and its place.
+
+    >>> critical_text(LimitCheck("force_n", 500.0, 400.0, Verdict.HOLDS, line=7, resolution_error=0.0))
+    'force 400 of 500 N, margin 20 %, in line 7'
+    """
     if check.state is Verdict.EXCEEDS:
-        return f"{of}{check.text}, {check.margin_text}"
+        return f"{check.text}, {check.margin_text}"
     parts = [check.value_text, check.margin_text if (check.margin or 0.0) >= 0.0 else "", check.where]
     if check.state is Verdict.UNPROVEN:
         parts.append(f"unproven: {check.reason}")
-    return of + ", ".join(filter(None, parts))
+    return ", ".join(filter(None, parts))
 
 
 def located_text(finding: Finding) -> str:
@@ -136,6 +157,11 @@ def located_text(finding: Finding) -> str:
     if not finding.line:
         return finding.text
     return f"line {finding.line}{' ' if finding.text.startswith('would ') else ': '}{finding.text}"
+
+
+def _found_text(found: Sequence[str]) -> str:
+    """The first of several texts, and how many more there are."""
+    return f"{found[0]}; and {len(found) - 1} more" if len(found) > 1 else found[0]
 
 
 def _track_prefix(track: Track, tracks: Sequence[Track]) -> str:

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from chipload.errors import Finding, InputError
 from chipload.result.columns import COLUMNS
 from chipload.result.display import result_html
-from chipload.result.first_lines import confidence_line, coverage_line, headline, unchecked_line
+from chipload.result.first_lines import (
+    confidence_line,
+    coverage_line,
+    critical_check,
+    headline,
+    reason_line,
+    unchecked_line,
+)
 from chipload.result.limits import Columns, LimitCheck
 from chipload.result.tabular import pandas_of, xarray_of
 from chipload.result.track import Track
@@ -144,6 +151,19 @@ class Result:
     def headline(self) -> str:
         """The first line of the verdict: state, critical limit with its margin and place, and what is not proven."""
         return headline(self.verdict, self.findings, self.in_use)
+
+    @cached_property
+    def critical(self) -> LimitCheck | None:
+        """The check of a track in use with the least margin; None: none has a margin."""
+        return critical_check(self.limits)
+
+    @cached_property
+    def open_lines(self) -> tuple[str, ...]:
+        """What the verdict leaves open: what exceeds or is not proven, what the limits do not cover, what is not
+        checked.
+        """
+        reason = reason_line(self.verdict, self.findings, self.in_use)
+        return tuple(filter(None, (reason, coverage_line(self.in_use), unchecked_line(self.unchecked))))
 
     @cached_property
     def message(self) -> str:

@@ -13,13 +13,15 @@ import numpy as np
 from nicegui import ui
 
 from chipload.number_text import number_text
+from chipload.report.answer import answer_html
 from chipload.result import Verdict
 from chipload.web.asset_cache import AssetCache
+from chipload.web.checks import row_of
 from chipload.web.comparison import COLOURS, MOST, Side
 from chipload.web.panels import RELEASE
 from chipload.web.panels.comparison import ComparisonPanel
 from chipload.web.panels.cut import CutPanel
-from chipload.web.panels.limits import LimitPanel
+from chipload.web.panels.limits import CLICK, LimitPanel
 from chipload.web.panels.loads import LinePanel, ToolPanel, sequence
 from chipload.web.panels.plots import PlotPanel, nearest
 from chipload.web.panels.scene import ScenePanel, Standing
@@ -33,6 +35,8 @@ WHOLE = 30.0
 SPEEDS = {0: "30 s", 1: "\u00d71", 10: "\u00d710", 100: "\u00d7100"}
 #: classes of a verdict
 VERDICTS = {Verdict.HOLDS: "ok", Verdict.UNPROVEN: "may", Verdict.EXCEEDS: "no"}
+#: what is said where nothing is left open
+ALL_CHECKED = "Every limit and check that is stated holds for all cuts."
 #: steps of the slider
 STEPS = 4000
 #: tables and pictures next to the 3D view
@@ -51,13 +55,23 @@ class ResultView:
         self.stopping = False
         self.turn = asyncio.Lock()
         self.sides: tuple[Side, ...] = ()
+        #: track and row of the limit with the least margin
+        self.critical: tuple[PageTrack, int | None] | None = None
         #: called when another program of the sequence is shown
         self.moved_on: Callable[[int], None] = lambda _: None
         with ui.element("div").classes("cl-verdict") as self.verdict:
-            self.word = ui.label("").classes("cl-word").mark("verdict")
+            with ui.element("div").classes("cl-answer"):
+                self.word = ui.label("").classes("cl-word").mark("verdict")
+                self.answer = ui.html("", sanitize=True).mark("answer")
+                self.answer.on("click", self._go_to_critical, js_handler=CLICK)
+            with ui.element("div").classes("cl-rest"):
+                self.more = ui.label("").classes("cl-more").mark("more")
+                self.fold = ui.button("all", on_click=self._unfold).props(
+                    'flat dense no-caps aria-label="the whole message" aria-expanded=false'
+                ).classes("cl-fold").mark("fold")  # fmt: skip
+                self.fold.on("mousedown.prevent")
             self.message = ui.label("").classes("cl-message").props("role=status")
-            with self.message:
-                self.tip = ui.tooltip("").classes("cl-tip")
+            self.lines_below = ui.label("").classes("cl-lines")
         with ui.element("div").classes("cl-body"):
             with ui.element("div").classes("cl-left"):
                 self.scene = ScenePanel(assets, self._row_reported)
@@ -144,7 +158,7 @@ class ResultView:
         """Stand at the worst that was found, or at the beginning."""
         self.go(self.row)
         if self.scene.marks:
-            self.scene.show(0)
+            self.scene.show(0, near=bool(self.scene.marks[0].bodies))
 
     def find(self, row: int) -> None:
         """A limit or a finding requests its row; the bodies that touch there are shown."""
@@ -212,8 +226,13 @@ class ResultView:
             self.verdict.classes(remove=f"cl-{state}")
         self.verdict.classes(f"cl-{VERDICTS[verdict]}")
         self.word.set_text(verdict.value)
+        critical = result.result.critical
+        own = next((t for t in result.tracks if critical is not None and critical in t.own.limits), None)
+        self.critical = None if own is None or critical is None else (own, row_of(own, critical))
+        self.answer.set_content(answer_html(critical, None if self.critical is None else self.critical[1]))
+        self.more.set_text(" ".join(result.result.open_lines) or ALL_CHECKED)
         self.message.set_text(message)
-        self.tip.set_text("\n".join(result.result.first_lines))
+        self.lines_below.set_text("\n".join(result.result.first_lines[1:]))
         await self.scene.open(result, track)
         await self._show_track(result, track)
 
@@ -228,6 +247,18 @@ class ResultView:
         await self.source.open(result, track)
         self.lines.open(result, track, self.source.text)
         self.first()
+
+    async def _go_to_critical(self, event: Any) -> None:
+        """The place of the critical limit is clicked."""
+        if self.result is not None and self.critical is not None and isinstance(event.args, int):
+            await self._go_to_row(self.result.tracks.index(self.critical[0]), event.args)
+
+    def _unfold(self) -> None:
+        """Show the whole message, or its most important part."""
+        unfolds = "cl-open" not in self.verdict.classes
+        self.verdict.classes(**{"add" if unfolds else "remove": "cl-open"})
+        self.fold.set_text("less" if unfolds else "all")
+        self.fold.props(f"aria-expanded={'true' if unfolds else 'false'}")
 
     def _change_slider(self) -> None:
         """The slider counts as the plots do."""

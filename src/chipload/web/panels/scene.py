@@ -196,9 +196,9 @@ class ScenePanel:
         if self.track is not None:
             self._first(f"go({int(row)})")
 
-    def show(self, mark: int) -> None:
-        """Show what touches at a mark."""
-        self._first(f"show({int(mark)})")
+    def show(self, mark: int, *, near: bool = True) -> None:
+        """Show what touches at a mark; ``near``: the picture shows its place alone."""
+        self._first(f"show({int(mark)}, {json.dumps(near)})")
 
     def play(self, rate: float) -> None:
         """Play, in seconds of the machine in a second; 0 stops."""
