@@ -288,28 +288,12 @@ def test_texts_whose_feeds_cannot_be_changed(tmp_path: Path, text: str, said: st
         done(tmp_path, text, "force_n = 620.0\n")
 
 
-@pytest.mark.parametrize(
-    ("name", "kind", "text"),
-    [
-        (
-            "a.cls",
-            "apt",
-            "PARTNO/x\nUNITS/MM\nLOADTL/1\nSPINDL/3000,CLW\nRAPID\nGOTO/-8,0,5\nFEDRAT/600\nGOTO/34,0,-3\nFINI\n",
-        ),
-        (
-            "a.h",
-            "heidenhain",
-            "0 BEGIN PGM a MM\n1 TOOL CALL 1 Z S3000\n2 L X-8 Y+0 Z-3 R0 FMAX M3\n3 L X+34 F600\n4 END PGM a MM\n",
-        ),
-    ],
-)
-def test_other_texts_are_to_be_converted_first(tmp_path: Path, name: str, kind: str, text: str) -> None:
-    (tmp_path / name).write_text(text)
-    said = (
-        f"operation.0.feeds: {name} is {kind}: feeds are changed in NC texts of LinuxCNC, Fanuc or Sinumerik: convert"
-    )
+def test_cl_data_are_to_be_converted_first(tmp_path: Path) -> None:
+    text = "PARTNO/x\nUNITS/MM\nLOADTL/1\nSPINDL/3000,CLW\nRAPID\nGOTO/-8,0,5\nFEDRAT/600\nGOTO/34,0,-3\nFINI\n"
+    (tmp_path / "a.cls").write_text(text)
+    said = "operation.0.feeds: a.cls is apt: feeds are changed in NC texts of LinuxCNC, Fanuc or Sinumerik: convert"
     with pytest.raises(InputError, match=re.escape(said)):
-        done(tmp_path, SLOT, "force_n = 620.0\n", job=JOB.replace("a.ngc", name))
+        done(tmp_path, SLOT, "force_n = 620.0\n", job=JOB.replace("a.ngc", "a.cls"))
 
 
 def test_the_thickest_chip_of_a_ramp_is_not_that_of_its_greatest_force(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +13,16 @@ from chipload.checking.outcome import ChangedText
 from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.machine.machine import Machine
+from chipload.program import heidenhain
 from chipload.program.control import control_named, is_cl_data
 from chipload.program.gcode.feed_words import with_feeds
 from chipload.program.gcode.reader import LARGEST_FILE
 from chipload.program.program import Program
 from chipload.program.read import dialect_of
 from chipload.program.release import Release
+
+#: blocks that take no comment: the head of a conversational program, and a block that goes on
+_NO_COMMENT = re.compile(r"^\s*\d*\s*(?:BEGIN PGM|BLK FORM)\b|~$", re.IGNORECASE)
 
 
 def changeable(path: Path, machine: Machine, dialect: str | None, key: str) -> tuple[str, str]:
@@ -33,7 +39,7 @@ def changeable(path: Path, machine: Machine, dialect: str | None, key: str) -> t
     """
     words = key.split(".")[-1]
     kind = dialect_of(path, machine, dialect)
-    if is_cl_data(kind) or control_named(kind).lines.form != "blocks":
+    if is_cl_data(kind) or (words != "feeds" and not has_blocks(kind)):
         raise InputError(
             f"{key}: {path.name} is {kind}: {words} are changed in NC texts of LinuxCNC, Fanuc or Sinumerik: "
             "convert it first (chipload convert)"
@@ -42,8 +48,18 @@ def changeable(path: Path, machine: Machine, dialect: str | None, key: str) -> t
     lone = text.replace("\r\n", "\n").find("\r")
     if lone >= 0:
         raise InputError(f"{path.name}: a line ends with CR alone: write LF or CR LF to change its {words}")
-    with_feeds(text, {})
+    text_with_feeds(text, kind, {})
     return text, kind
+
+
+def has_blocks(dialect: str) -> bool:
+    """Whether the lines of a text are blocks of words with G codes; else they are conversational."""
+    return control_named(dialect).lines.form == "blocks"
+
+
+def text_with_feeds(text: str, dialect: str, lines: Mapping[int, float]) -> str:
+    """Return the text with other feeds, as :func:`chipload.program.gcode.with_feeds` and that of Heidenhain do."""
+    return (with_feeds if has_blocks(dialect) else heidenhain.with_feeds)(text, lines)
 
 
 def read_as(text: str) -> str:
@@ -80,7 +96,7 @@ def rows_that_differ(old: Program, new: Program, *names: str) -> NDArray[np.bool
 def program_text(changed: ChangedText, release: Release) -> str:
     """Return the text of a program; if it is not verified, a comment on its first line states why.
 
-    A line of ``%`` alone and Sinumerik's paths do not count as the first line.
+    A line of ``%`` alone, Sinumerik's paths and the head of a conversational program do not count as the first line.
     """
     if release.verified:
         return changed.text
@@ -89,7 +105,7 @@ def program_text(changed: ChangedText, release: Release) -> str:
     lines = changed.text.split("\n")
     for k, line in enumerate(lines):
         body = line.rstrip()
-        if body and not body.startswith(("%", ";$")):
+        if body and not body.startswith(("%", ";$")) and not _NO_COMMENT.search(body):
             lines[k] = f"{body} {comment}{line[len(body) :]}"
             break
     return "\n".join(lines)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from chipload.checking.default_checks import DefaultChecks, peak_excess
 from chipload.checking.drilling import with_drill_loads
 from chipload.checking.load_budget import BUDGETED, factors_of_steps
+from chipload.checking.program_text import has_blocks, text_with_feeds
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import edge_lag
 from chipload.cutting.load_parts import LoadParts, bounded_parts, load_parts
@@ -44,7 +45,8 @@ from chipload.planning.feeds import (
     line_feeds,
     steady_feeds,
 )
-from chipload.program.gcode.feed_words import DIGITS, with_feeds
+from chipload.program.gcode.feed_words import DIGITS
+from chipload.program.heidenhain import kept_feeds
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import ProgramReading
 from chipload.program.tapping import tapping_motions
@@ -287,16 +289,17 @@ def with_new_feeds(
     of_steps = Allowed(touch, least, most, by)
     if request.table.divide:
         air = np.where(feeds, _air_factor(speeds_of(steps), request.table, machine), 1.0)
-        divided = divide_lines(text, reading, steps, of_steps, air, machine, read)
+        divided = divide_lines(text, dialect, reading, steps, of_steps, air, machine, read)
     else:
         divided = undivided_program(text, reading, steps, of_steps)
     of_steps, at = divided.allowed, divided.step
     lines = line_feeds(divided.line, of_steps.touch[at], of_steps.least[at], of_steps.most[at], of_steps.by[at])
     lines = _in_air(lines, divided, speeds_of(steps), request.table, machine)
-    lines = _with_kept_feeds(lines, divided.reading.program, cutters)
+    fixed = frozenset[int]() if has_blocks(dialect) else kept_feeds(divided.text)
+    lines = _with_kept_feeds(lines, divided.reading.program, cutters, fixed)
     segments = np.isin(lines.line, [line for lines_of in divided.segments.values() for line in lines_of])
     factor, useful = _feed_factors(lines, divided.reading, machine, request.table, segments)
-    new = with_feeds(divided.text, dict(zip(lines.line.tolist(), factor.tolist(), strict=True)))
+    new = text_with_feeds(divided.text, dialect, dict(zip(lines.line.tolist(), factor.tolist(), strict=True)))
     after = read(new)
     require_same(divided.reading.program, after.program, lines.line, factor)
     names = {FASTEST: "fastest", MACHINE: "machine", AIR: "air", SLOWEST: "slowest", KEPT: "programmed"}
@@ -359,12 +362,16 @@ def _in_air(lines: LineFeeds, divided: DividedProgram, speed: Floats, table: Fee
     return replace(lines, least=np.where(air, 1.0, lines.least), allowed=allowed, by=by)
 
 
-def _with_kept_feeds(lines: LineFeeds, program: Program, cutters: Mapping[int, Cutter]) -> LineFeeds:
-    """Keep the feed of lines on which a tool without chips moves (its load is not known) or taps (F is the pitch)."""
+def _with_kept_feeds(
+    lines: LineFeeds, program: Program, cutters: Mapping[int, Cutter], fixed: frozenset[int]
+) -> LineFeeds:
+    """Keep the feed of ``fixed`` lines, and of those on which a tool without chips moves (its load is not known) or
+    taps (F is the pitch).
+    """
     bodies = [number for number, cutter in cutters.items() if cutter.body]
     kept = np.isin(program.tool, bodies)
     kept[tapping_motions(program).rows] = True
-    own = np.isin(lines.line, program.line[kept])
+    own = np.isin(lines.line, program.line[kept]) | np.isin(lines.line, list(fixed))
     return replace(
         lines, least=np.where(own, 1.0, lines.least), allowed=np.where(own, 1.0, lines.allowed),
         by=np.where(own, KEPT, lines.by),

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.program_text import has_blocks
 from chipload.errors import InputError
 from chipload.jobs.feeds.same_path import lines_off_path
 from chipload.machine.machine import Machine
@@ -133,6 +134,7 @@ def undivided_program(text: str, reading: ProgramReading, steps: Steps, allowed:
 
 def divide_lines(
     text: str,
+    dialect: str,
     reading: ProgramReading,
     steps: Steps,
     allowed: Allowed,
@@ -152,7 +154,7 @@ def divide_lines(
     """
     passed = _passed_factors(steps, allowed, air)
     motions = _motions(reading, machine, steps, passed)
-    forms, cuts, kept = line_forms(text), dict[int, _Cuts](), Counter[str]()
+    forms, cuts, kept = _forms(text, dialect), dict[int, _Cuts](), Counter[str]()
     decimals, jerk = min(machine.decimals, MOST_DECIMALS), machine.jerk or machine.jerk_low
     block_s = machine.block_time or (BLOCK_S if machine.planner is None else machine.planner.cycle)
     for line, own, several in _cutting_lines(reading, steps, allowed):
@@ -185,6 +187,13 @@ def divide_lines(
             del cuts[line]
     kept[OTHER_PATH] += len(cuts)
     return replace(undivided_program(text, reading, steps, allowed), kept=+kept)
+
+
+def _forms(text: str, dialect: str) -> dict[int, LineForm]:
+    """Return the form of each line, from 1; conversational blocks keep one feed."""
+    if has_blocks(dialect):
+        return line_forms(text)
+    return dict.fromkeys(range(1, text.count("\n") + 2), LineForm("conversational block", True, 1.0, False, ()))
 
 
 #: why a line is not divided whose segments were read as another path

@@ -67,7 +67,7 @@ def with_feeds(text: str, lines: Mapping[int, float]) -> str:
             continue
         if math.isnan(old):
             raise InputError(f"line {number}: moves at a feed that no line above it states: state one")
-        new = now if factor == 1.0 and word is not None else _feed(old, factor, pointed)
+        new = now if factor == 1.0 and word is not None else written_feed(old, factor, pointed)
         if word is not None:
             raw, now = raw[: word.start(1)] + new + raw[word.end(1) :], new
         elif float(new) != float(now):
@@ -107,10 +107,10 @@ def _feed_word(open_text: str, number: int) -> re.Match[str] | None:
     return found
 
 
-def _feed(old: float, factor: float, pointed: bool) -> str:
+def written_feed(old: float, factor: float, pointed: bool) -> str:
     """The new feed in digits, never above it; with a decimal point where ``pointed``.
 
-    >>> _feed(1200.0, 1 / 3, False), _feed(0.25, 0.5, False), _feed(15.0, 2.0, True)
+    >>> written_feed(1200.0, 1 / 3, False), written_feed(0.25, 0.5, False), written_feed(15.0, 2.0, True)
     ('400', '0.125', '30.')
     """
     value = old * factor * (1.0 + 1e-12)
