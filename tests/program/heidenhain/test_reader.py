@@ -27,7 +27,7 @@ def test_lines_are_modal_and_incremental():
 def test_inch_and_rotary():
     c, _ = read("L X+1 Y+0 Z+2 A+90 FMAX", "L X+2 F10", unit="INCH")
     np.testing.assert_allclose(c.position[1, :4], [50.8, 0, 50.8, math.pi / 2])
-    assert c.feed[1] == pytest.approx(254.0 / 60.0)
+    assert c.feed[1] == pytest.approx(25.4 / 60.0)  # F in tenths of an inch
 
 
 def test_arcs_about_the_pole():

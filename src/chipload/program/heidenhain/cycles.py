@@ -91,7 +91,8 @@ class Cycles:
                 self.number, self.values = 1, {}
             else:
                 value = self._value(number, body)
-                self.values[part] = value if part == 4 else value * s.scale
+                unit = words.feed_unit(s.scale) if part == 5 else s.scale
+                self.values[part] = value if part == 4 else value * unit
         elif number == WORKING_PLANE:
             if part > 0:
                 self._tilt(text, body)
@@ -111,7 +112,7 @@ class Cycles:
             return q_cycles.MAX
         if text.endswith("AUTO"):
             # the feed that lasts, in units of the text
-            return self.s.cutting_feed() * 60.0 / self.s.scale
+            return self.s.cutting_feed() * 60.0 / words.feed_unit(self.s.scale)
         return self.s.q.formula(text)
 
     def _value(self, number: int, body: str) -> float:

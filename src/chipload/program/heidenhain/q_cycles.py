@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from chipload.errors import InputError
+from chipload.program.heidenhain.words import feed_unit
 from chipload.program.commands import DWELL, LINE, RAPID
 from chipload.program.heidenhain.formula import NotKnownError
 from chipload.units import mm_s_from_mm_min
@@ -105,7 +106,7 @@ class HoleValues:
 
     def feed(self, key: int) -> float:
         """A feed that must be above 0."""
-        value = self.scale * self.q(key, None)
+        value = feed_unit(self.scale) * self.q(key, None)
         if not value > 0.0:
             raise InputError(f"CYCL DEF {self.number}: Q{key} = {value:g}: a feed must be above 0")
         return mm_s_from_mm_min(value)

@@ -16,7 +16,7 @@ from chipload.program.commands import ARC, DWELL, LINE, PLANE_AXES, RAPID, XY, Y
 from chipload.program.compensation import CentreMove, Compensation
 from chipload.program.corners import Corner, Piece, join_corner
 from chipload.program.heidenhain.formula import NotKnownError, QParameters, q_number
-from chipload.program.heidenhain.words import AXIS, FEED, RETRACT, SETTINGS, TURN_FEED, number, rest_of
+from chipload.program.heidenhain.words import AXIS, FEED, RETRACT, SETTINGS, TURN_FEED, feed_unit, number, rest_of
 from chipload.program.swivel import Swivel
 from chipload.program.tilt import Tilt
 from chipload.units import mm_s_from_mm_min
@@ -78,6 +78,8 @@ class ConversationalState:
         #: programmed X Y Z become factor * value + origin: mirrored and scaled coordinates
         self.factor, self.origin = [1.0] * 3, [0.0] * 3
         self.feed = feed
+        #: feed of the last TOOL CALL, which F AUTO takes [mm/s]; None: it states none
+        self.called_feed: float | None = None
         self.feed_of_turn = False
         self.speed, self.sense = 0.0, 0.0
         self.tool, self.lengths = 0, dict[int, float]()
@@ -161,7 +163,9 @@ class ConversationalState:
         if turned is not None:
             self._take(self.amount(turned[1]), True)
         found = FEED.search(text)
-        if found is not None and found[1] == "AUTO":
+        if found is not None and found[1] == "AUTO" and self.called_feed is not None:
+            self.feed = self.called_feed
+        elif found is not None and found[1] == "AUTO":
             if self.feed is None:
                 raise InputError("F AUTO: the feed of a tool table is not known: give a number")
             self.unproven(
@@ -172,7 +176,7 @@ class ConversationalState:
         return found is not None and found[1] == "MAX"
 
     def _take(self, value: float, of_turn: bool) -> None:
-        value *= self.scale
+        value *= self.scale if of_turn or self.feed_of_turn else feed_unit(self.scale)
         if not 0.0 < value < FARTHEST:
             raise InputError(f"F{value:g}: must be above 0 and below {FARTHEST:g}")
         of_turn = of_turn or self.feed_of_turn
@@ -241,6 +245,9 @@ class ConversationalState:
     def straight(self, motion: int, end: list[float]) -> None:
         """RAPID or LINE to the programmed ``end``."""
         feed = 0.0 if motion == RAPID else self.cutting_feed()
+        if feed > 0.0 and end[:3] == self.at[:3] and end[3:] != self.at[3:]:
+            # rotary axes alone turn at F degrees a minute, in inches too
+            feed /= feed_unit(self.scale)
         self._turn_to(complex(end[0] - self.at[0], end[1] - self.at[1]))
         self._piece(Piece(motion, self.at, end, (0.0, 0.0), 0, feed, self.tail()))
         self.at = end

@@ -133,6 +133,8 @@ class Tools:
         if spindle:
             s.speed = rad_s_from_rpm(s.amount(spindle[1]))
         s.feed_of(rest)
+        if words.FEED.search(rest) is not None or number is not None:
+            s.called_feed = s.feed if words.FEED.search(rest) is not None else None
         if number is None:
             return
         if re.search(r"\b[XY]\b", rest):

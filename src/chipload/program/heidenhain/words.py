@@ -30,6 +30,15 @@ LABEL = re.compile(r'LBL\s*(\d+|"[^"]*")$')
 Q_VALUE = re.compile(r"(Q[LR]?)\s*(\d+)\s*=\s*(F?MAX|F?AUTO|[-+]?\s*(?:Q[LR]?\s*\d+|\d+\.?\d*|\.\d+))")
 
 
+def feed_unit(scale: float) -> float:
+    """Unit of F [mm/min] in a text whose unit of length is ``scale`` [mm]: a tenth of an inch in one of inches.
+
+    >>> feed_unit(1.0), round(feed_unit(25.4), 9)
+    (1.0, 2.54)
+    """
+    return scale if scale == 1.0 else 0.1 * scale
+
+
 def bare(raw: str) -> str:
     """A block without number, comment and needless blanks, in capitals.
 
