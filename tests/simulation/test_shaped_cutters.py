@@ -1,4 +1,4 @@
-"""Lens, lollipop and dovetail cutters by moves: volumes and forces against profiles in closed form."""
+"""Lens, lollipop, dovetail cutters, thread mills and reamers by moves: volumes and forces against closed forms."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
-from chipload.cutter.shapes import dovetail, lens, lollipop
+from chipload.cutter.shapes import dovetail, lens, lollipop, reamer, thread_mill
 from chipload.cutter.table import cutter_from_table
+from chipload.cutting.drilling import drill_loads
 from chipload.cutting.material import Material
 from chipload.errors import InputError
 from chipload.program.build import plunge, rapid
@@ -26,19 +27,23 @@ Floats = NDArray[np.float64]
 PLAIN = Material("plain", 800.0, 250.0, 150.0, 12.0, 9.0, 4.0, source="made up")
 FINE = Resolution(step_mm=2.0, tolerance=1e-4, corner_slices=40, flank_mm=0.25)
 D, NECK, TIP, CORNER, ANGLE = 12.0, 5.0, 30.0, 1.5, math.radians(55.0)
-TOPS = {"lens": 10.0, "lollipop": 6.0 + math.sqrt(6.0**2 - 2.5**2), "dovetail": 5.0}
+PITCH, WIDTH = 3.0, 0.375
+TOPS = {"lens": 10.0, "lollipop": 6.0 + math.sqrt(6.0**2 - 2.5**2), "dovetail": 5.0, "thread mill": PITCH}
 SHAPES = {
     "lens": lens(D, TIP, CORNER, TOPS["lens"]),
     "lollipop": lollipop(D, NECK),
     "dovetail": dovetail(D, ANGLE, 0.0, TOPS["dovetail"]),
+    "thread mill": thread_mill(D, PITCH, math.radians(30.0), WIDTH, 5.0),
 }
-SHANKS = {"lens": D, "lollipop": NECK, "dovetail": 4.0}
+SHANKS = {"lens": D, "lollipop": NECK, "dovetail": 4.0, "thread mill": 5.0}
 CUTTERS = {n: Cutter(D, 3, 0.5, TOPS[n], 50.0, 6e5, shape=s, shank_diameter=SHANKS[n]) for n, s in SHAPES.items()}
 REST = 4.0  # distance of the stock's edge from the cutter's axis [mm]
 
 
 def radii(name: str, z: Floats) -> Floats:
     """Closed forms of the profiles, without their pieces."""
+    if name == "thread mill":
+        return 0.5 * D - np.maximum(np.abs(z - 0.5 * PITCH) - 0.5 * WIDTH, 0.0) * math.sqrt(3.0)
     if name == "dovetail":
         return 0.5 * D - z / math.tan(ANGLE)
     if name == "lollipop":
@@ -86,6 +91,35 @@ def test_forces_are_those_of_a_fine_stack_of_discs(name: str) -> None:
         assert found[key][k] == pytest.approx(value, rel=6e-3), key
 
 
+def test_a_reamer_takes_the_ring_that_the_drill_left() -> None:
+    """Each lip cuts h = f / N cos(lead) over its length of the ring: torque and thrust as of the lips of a drill."""
+    drill = Cutter(9.7, 2, 0.5, 40.0, 60.0, 6e5, bottom=math.radians(31.0))
+    own = Cutter(10.0, 6, 0.0, 40.0, 60.0, 6e5, shape=reamer(10.0, 0.5, math.radians(45.0), 40.0), number=2)
+    feed, speed, parts = 5.0, 300.0, list[Program]()
+    for number, deep in ((1, -24.0), (2, -16.0)):
+        parts += [
+            rapid((0.0, 0.0, 5.0), speed, number, "link"),
+            plunge((0.0, 0.0, deep), feed, speed, number, "cut"),
+            rapid((0.0, 0.0, 5.0), speed, number, "link"),
+        ]
+    program = Program.join(parts)
+    stock = LayeredStock.block((-20.0, -20.0, -20.0), (20.0, 20.0, 0.0), 0.5, 20.0)
+    coarse = Resolution(step_mm=2.0, tolerance=1e-3, corner_slices=8, flank_mm=0.5)
+    found = remove(program, stock, {1: drill, 2: own}, PLAIN, coarse, accuracy=False)
+    mine = found.columns["tool"] == 2
+    turn = math.tau * feed / speed
+    k = 6 * (PLAIN.Ktc * turn / 6 * math.cos(math.radians(45.0)) + PLAIN.Kte) / math.cos(math.radians(45.0))
+    row = int(np.flatnonzero(mine & (np.abs(found.columns["z_mm"] + 8.0) < 1.1))[0])
+    step = found.columns["z_mm"][row - 1] - found.columns["z_mm"][row]
+    ring = math.pi * (5.0**2 - 4.85**2) * step
+    assert found.columns["chip_volume_mm3"][row] == pytest.approx(ring, rel=1e-3)
+    torque = found.columns["torque_mean_nm"][row]
+    assert 1e3 * torque == pytest.approx(0.5 * k * (5.0**2 - 4.85**2), rel=1e-3)
+    loads = drill_loads(own, PLAIN, [turn], [1e3 * torque], [True])
+    assert loads.thrust[0] == pytest.approx(0.5 * k * 0.15, rel=2e-3)
+    assert loads.chisel_torque[0] == 0.0
+
+
 def test_the_neck_of_an_undercut_cutter_must_be_free() -> None:
     """It goes 4 mm beside the edge; a neck of 5 mm does not touch, one that goes through the stock does."""
     assert along("lollipop", rest=4.0, above=3.0).findings == ()
@@ -128,12 +162,16 @@ def test_a_stock_keeps_the_shape_of_the_cutter_that_cut_it(name: str) -> None:
     [
         ("lens", {"shape": "lens", "tip_radius_mm": TIP, "corner_radius_mm": CORNER, "flute_length_mm": 10.0}),
         ("lollipop", {"shape": "lollipop", "shank_diameter_mm": NECK}),
+        ("thread mill", {"shape": "thread mill", "thread_pitch_mm": PITCH, "shank_diameter_mm": 5.0}),
         ("dovetail", {"shape": "dovetail", "flank_deg": 55.0, "flute_length_mm": 5.0, "shank_diameter_mm": 4.0}),
     ],
 )
 def test_a_job_states_a_shape_by_its_numbers(name: str, keys: dict[str, object]) -> None:
     plain = {"number": 1, "diameter_mm": D, "flutes": 3, "helix_deg": 30.0, "overhang_mm": 50.0, "modulus_gpa": 600.0}
     assert cutter_from_table(plain | keys).shape == SHAPES[name]
-    missing = {"lens": "tip_radius_mm", "lollipop": "shank_diameter_mm", "dovetail": "flank_deg"}[name]
+    missing = {
+        "lens": "tip_radius_mm", "lollipop": "shank_diameter_mm", "dovetail": "flank_deg",
+        "thread mill": "thread_pitch_mm",
+    }[name]  # fmt: skip
     with pytest.raises(InputError, match=f"cutter.{missing} is missing"):
         cutter_from_table({"flute_length_mm": 5.0} | plain | {k: v for k, v in keys.items() if k != missing})

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from chipload.checking.rubbing import spindle_speed
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.drilling import drill_loads, is_pointed
+from chipload.cutting.drilling import drill_loads, has_lips, lip_angle
 from chipload.cutting.material import Material
 from chipload.simulation.holes import AXIAL, AXIAL_DEG, AXIS, down_axis
 from chipload.simulation.loads import Cuts
@@ -47,7 +47,7 @@ def with_drilling(removal: Removal, cutters: Mapping[int, Cutter], material: Mat
     out: dict[str, NDArray[Any]] = {}
     down = down_axis(columns) & (np.asarray(columns["torque_mean_nm"]) > 0.0) if len(thrust) else thrust > 0.0
     for number, cutter in cutters.items():
-        rows = np.flatnonzero(down & (np.asarray(columns["tool"]) == number) & is_pointed(cutter))
+        rows = np.flatnonzero(down & (np.asarray(columns["tool"]) == number) & has_lips(cutter))
         if len(rows):
             _put_in(columns, out, thrust, rows.astype(np.int64), cutter, material)
     return replace(removal, columns={**columns, **out, THRUST: thrust})
@@ -95,11 +95,11 @@ def with_drill_loads(loads: Mapping[str, Floats], cuts: Cuts, material: Material
     cutter, axis = cuts.cutter, cuts.plain.frames[:, 2]
     d = cuts.ends[:, 3:6] - cuts.ends[:, 0:3]
     down = -(d * axis).sum(axis=1) >= AXIAL * np.linalg.norm(d, axis=1)
-    rows = np.flatnonzero(down & (loads["torque_mean_nm"] > 0.0) & is_pointed(cutter))
+    rows = np.flatnonzero(down & (loads["torque_mean_nm"] > 0.0) & has_lips(cutter))
     out = dict(loads)
     if not len(rows):
         return out
-    feed = cuts.plain.chip_max()[rows] * cutter.flutes / math.cos(cutter.bottom)
+    feed = cuts.plain.chip_max()[rows] * cutter.flutes / math.cos(lip_angle(cutter))
     own = drill_loads(cutter, material, feed, 1e3 * loads["torque_mean_nm"][rows], ramp_angle(cuts)[rows] >= AXIAL_DEG)
     more = 1e-3 * own.chisel_torque
     turns = np.abs(cuts.spindle[rows])

@@ -29,7 +29,7 @@ from chipload.checking.workpiece_compliance import (
     workpiece_compliance,
 )
 from chipload.cutter.cutter import Cutter
-from chipload.cutting.drilling import is_pointed
+from chipload.cutting.drilling import has_lips
 from chipload.errors import Finding
 from chipload.program.motions import lengths
 from chipload.program.program import Program
@@ -160,7 +160,7 @@ def simulate_program(
         )  # fmt: skip
     loads = (*watched_columns(gives, formed=made is not None), *PROGRAM_COLUMNS)
     removal = with_columns(removal, loads if inputs.loads else ("ramp_deg",))
-    if inputs.limits.thrust_n is not None or any(is_pointed(c) for c in cutters.values()):
+    if inputs.limits.thrust_n is not None or any(has_lips(c) for c in cutters.values()):
         removal = with_drilling(removal, cutters, material)
     if inputs.limits.force_axial_n is not None:
         removal = replace(removal, columns={**removal.columns, AXIAL: axial_force(removal.columns)})

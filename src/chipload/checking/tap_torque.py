@@ -33,7 +33,7 @@ def tap_torques(
     for row in found.rows.tolist():
         number = int(program.tool[row])
         cutter = cutters.get(number)
-        if number in out or cutter is None or cutter.thread_pitch is None or material.tap_kc is None:
+        if number in out or cutter is None or cutter.thread_pitch is None or cutter.shape or material.tap_kc is None:
             continue
         available = float(machine.torque_at(np.array([program.spindle[row]]))[0]) / 1e3
         if not math.isfinite(available):

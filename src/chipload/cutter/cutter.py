@@ -79,7 +79,7 @@ class Cutter:
     ramp_angle : greatest angle [rad] at which it may descend into solid material, up to pi/2; None: not known
     left_hand : cuts while the spindle turns counter-clockwise (M4); its helix is left-handed then
     max_speed : greatest spindle speed [rad/s], > 0; None: not known
-    thread_pitch : of the thread that a tap cuts [mm], > 0; None: not known, or no tap
+    thread_pitch : of the thread that a tap, or a thread mill by its ``shape``, cuts [mm], > 0; None: not known, or none
     hole_depth : greatest depth [mm] that it drills without a retraction, > 0; None: not known
     web : thickness [mm] of the web of a drill at its point, > 0; None: of standard design
 

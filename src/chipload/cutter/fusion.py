@@ -2,10 +2,11 @@
 
 A tool's ``geometry`` has the symbols of ISO 13399 in the tool's own unit: DC diameter, RE corner radius, LCF flute
 length, LB length below the holder, SFDM shank, NOF flutes, SIG point, TA taper, HA helix angle [deg], TP pitch.
-Read are end mills (flat, ball, bull nose, tapered), face mills, slot mills (T-slot), chamfer mills and drills, and
-circle segment barrels that do not cut above their widest place: lower-radius corner, profile-radius flank, both
-tangent, axial-distance height of the widest place. Taps, thread mills, reamers, dovetail, lollipop and other circle
-segment mills (lens, oval, taper) are bodies, whose chips are not simulated. Other shapes are refused.
+Read are end mills (flat, ball, bull nose, tapered), face mills, slot mills (T-slot), chamfer mills, drills, reamers as
+flat cutters, thread mills with one row of teeth (NT = 1) on a neck (shoulder-diameter), and circle segment barrels that
+do not cut above their widest place: lower-radius corner, profile-radius flank, both tangent, axial-distance height of
+the widest place. Taps, other thread mills, dovetail, lollipop and other circle segment mills (lens, oval, taper) are
+bodies, whose chips are not simulated. Other shapes are refused.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ SHAPES = {
     "flat end mill": "flat", "ball end mill": "ball", "bull nose end mill": "bull", "face mill": "bull",
     "chamfer mill": "cone", "spot drill": "point", "drill": "point", "center drill": "point", "counter sink": "point",
     "tapered mill": "taper", "slot mill": "slot", "tap right hand": "tap", "tap left hand": "tap",
-    "thread mill": "body", "reamer": "body", "dovetail mill": "body", "lollipop mill": "body",
+    "thread mill": "thread", "reamer": "flat", "dovetail mill": "body", "lollipop mill": "body",
     "circle segment barrel": "barrel", "circle segment lens": "body", "circle segment oval": "body",
     "circle segment taper": "body",
 }  # fmt: skip
@@ -179,7 +180,9 @@ def _tip(shape: str, geometry: dict[str, Any], out: dict[str, Any], mm: float, l
         return {"taper_deg": angle or 0.0} | ({"corner_radius_mm": corner * mm} if corner else {})
     if shape == "barrel" and d is not None and (barrel := _barrel(geometry, d, out, mm, label)):
         return barrel
-    if shape in ("tap", "body", "barrel") and d is not None:
+    if shape == "thread" and (own := _thread_mill(geometry, mm, label)):
+        return own
+    if shape in ("tap", "thread", "body", "barrel") and d is not None:
         high = out.get("flute_length_mm", out.get("overhang_mm"))
         if high is None:
             raise InputError(f"{label}: LCF, the flute length: must be given and above 0")
@@ -193,6 +196,20 @@ def _tip(shape: str, geometry: dict[str, Any], out: dict[str, Any], mm: float, l
             raise InputError(f"{label}: TA, the taper angle: must be above 0 and below 90 deg")
         return {"diameter_mm": max(tip * mm, 0.01), "taper_deg": angle, "shank_diameter_mm": d}
     return {}
+
+
+def _thread_mill(geometry: dict[str, Any], mm: float, label: str) -> dict[str, Any]:
+    """Pitch, neck and angle of a thread mill with one row of teeth; nothing of one with several, or with no neck."""
+    rows, pitch, neck, angle = (
+        _number(geometry, key, label) for key in ("NT", "TP", "shoulder-diameter", "thread-profile-angle")
+    )
+    if rows != 1.0 or not pitch or not neck:
+        return {}
+    flank = {} if angle is None else {"flank_deg": 0.5 * angle}
+    return {
+        "shape": "thread mill", "thread_pitch_mm": pitch * mm, "shank_diameter_mm": neck * mm,
+        "flute_length_mm": pitch * mm, **flank,
+    }  # fmt: skip
 
 
 def _barrel(geometry: dict[str, Any], d: float, out: dict[str, Any], mm: float, label: str) -> dict[str, Any]:

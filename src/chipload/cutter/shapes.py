@@ -80,3 +80,69 @@ def dovetail(diameter: float, angle: float, corner_radius: float, height: float)
     corner = [arc((e, corner_radius), corner_radius, 0.0, last)] if corner_radius > 0.0 else []
     flank = line(foot, (top, height), last)
     return joined([line((0.0, 0.0), (e, 0.0), 0.0), *corner, flank], 1e-9 * diameter)
+
+
+def thread_mill(diameter: float, pitch: float, flank: float, width: float, neck: float) -> tuple[ProfileSegment, ...]:
+    """Return a thread mill with one row of teeth: a tooth of trapezoidal profile, as wide at its root as a pitch.
+
+    Parameters
+    ----------
+    flank : angle of each flank with the plane normal to the axis [rad]: half the angle of the thread
+    width : width of the tooth at the diameter [mm]
+    neck : diameter above the tooth [mm]
+
+    >>> [(round(p.rho[1], 3), round(p.z[1], 4)) for p in thread_mill(10.0, 1.5, math.radians(30.0), 0.1875, 6.0)[::2]]
+    [(3.863, 0.0), (5.0, 0.6562), (5.0, 0.8438), (3.863, 1.5)]
+    """
+    if not math.radians(5.0) <= flank <= math.radians(60.0):
+        raise InputError(
+            f"cutter.flank_deg = {math.degrees(flank):g}: must be from 5 to 60, half the angle of the thread"
+        )
+    if not pitch > 0.0:
+        raise InputError(f"cutter.thread_pitch_mm = {pitch:g}: must be above 0")
+    if not 0.0 <= width < pitch:
+        raise InputError(f"cutter.tooth_width_mm = {width:g}: must be from 0 to below thread_pitch_mm = {pitch:g}")
+    low = 0.5 * (pitch - width)
+    wide, root = 0.5 * diameter, 0.5 * diameter - low / math.tan(flank)
+    if not 0.0 < neck <= 2.0 * root:
+        raise InputError(
+            f"cutter.shank_diameter_mm = {neck:g}: must be above 0 and at most {2.0 * root:.6g}, the root of its "
+            "tooth: diameter_mm - (thread_pitch_mm - tooth_width_mm) / tan(flank_deg)"
+        )
+    tooth = [
+        line((0.0, 0.0), (root, 0.0), 0.0),
+        line((root, 0.0), (wide, low), flank),
+        line((wide, low), (wide, low + width), 0.5 * math.pi),
+        line((wide, low + width), (root, pitch), math.pi - flank),
+    ]
+    return joined(tooth, 1e-9 * diameter)
+
+
+def reamer(diameter: float, lead: float, angle: float, height: float) -> tuple[ProfileSegment, ...]:
+    """Return a reamer: a flat end, a lead that cuts, an upright flank.
+
+    Parameters
+    ----------
+    lead : length of the lead along the axis [mm]
+    angle : of the lead with the axis [rad]
+
+    >>> [(round(p.rho[1], 3), round(p.z[1], 3)) for p in reamer(10.0, 1.0, math.radians(45.0), 30.0)[::2]]
+    [(4.0, 0.0), (5.0, 1.0), (5.0, 30.0)]
+    """
+    if not math.radians(1.0) <= angle <= math.radians(80.0):
+        raise InputError(f"cutter.lead_deg = {math.degrees(angle):g}: must be from 1 to 80, with the axis")
+    root = 0.5 * diameter - lead * math.tan(angle)
+    if not (lead > 0.0 and root > 0.0):
+        most = 0.5 * diameter / math.tan(angle)
+        raise InputError(f"cutter.lead_mm = {lead:g}: must be above 0 and below {most:.6g}, where it reaches the axis")
+    if not height > lead:
+        raise InputError(f"cutter.flute_length_mm = {height:g}: must be above lead_mm = {lead:g}")
+    wide = 0.5 * diameter
+    return joined(
+        [
+            line((0.0, 0.0), (root, 0.0), 0.0),
+            line((root, 0.0), (wide, lead), 0.5 * math.pi - angle),
+            line((wide, lead), (wide, height), 0.5 * math.pi),
+        ],
+        1e-9 * diameter,
+    )

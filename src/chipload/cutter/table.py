@@ -27,7 +27,7 @@ from chipload.cutter.fctb import read_fctb
 from chipload.cutter.fusion import read_fusion_tool
 from chipload.cutter.iso13399 import read_iso13399
 from chipload.cutter.profile import ProfileSegment
-from chipload.cutter.shapes import dovetail, lens, lollipop
+from chipload.cutter.shapes import dovetail, lens, lollipop, reamer, thread_mill
 from chipload.cutter.strength import ToolMaterial, ToolStrength
 from chipload.cutter.tooltable import read_tool_table
 from chipload.errors import InputError, InputErrors
@@ -103,13 +103,23 @@ class CutterTable(BaseModel):
         description="barrel cutter: radius of the arc between corner and flank, tangent to both; with it "
         "corner_e_mm is free, default 0, a round tip",
     )
-    shape: Literal["lens", "lollipop", "dovetail"] | None = Field(
+    shape: Literal["lens", "lollipop", "dovetail", "thread mill", "reamer"] | None = Field(
         None,
         description="shape of its own: `lens` with tip_radius_mm, `lollipop`, a ball on a neck of shank_diameter_mm, "
-        "`dovetail` with flank_deg and a neck; default: that of the corner, flank and bottom",
+        "`dovetail` with flank_deg and a neck, `thread mill` with thread_pitch_mm and a neck, `reamer` with lead_mm; "
+        "default: that of the corner, flank and bottom",
     )
     tip_radius_mm: float | None = Field(None, description="lens: radius of the arc at the tip")
-    flank_deg: float | None = Field(None, description="dovetail: angle between flank and bottom, from 10 to below 90")
+    flank_deg: float | None = Field(
+        None,
+        description="angle between flank and bottom: dovetail from 10 to below 90; thread mill from 5 to 60, default "
+        "30, as of ISO and inch threads",
+    )
+    tooth_width_mm: float | None = Field(
+        None, description="thread mill: width of the tooth at its diameter; default: an eighth of the pitch, ISO 68-1"
+    )
+    lead_mm: float | None = Field(None, description="reamer: length along the axis of the lead that cuts")
+    lead_deg: float | None = Field(None, description="reamer: angle of its lead with the axis; default 45")
     bottom_deg: float | None = Field(None, description="angle of the bottom, APT parameter alpha; default 0")
     taper_deg: float | None = Field(None, description="half angle of a tapered flank, APT parameter beta; default 0")
     runout_mm: float | None = Field(
@@ -168,6 +178,8 @@ class CutterTable(BaseModel):
                 "flute_length_mm": lollipop(values["diameter_mm"], values["shank_diameter_mm"])[-1].z[1],
                 **values,
             }
+        if values.get("shape") == "thread mill" and "thread_pitch_mm" in values:
+            values = {"flute_length_mm": values["thread_pitch_mm"], **values}
         where = f": {self.file} does not state it" if self.file else ""
         missing = [
             f"cutter.{key} is missing{where}: state it; dimensions of a cutter are never guessed"
@@ -252,14 +264,26 @@ class CutterTable(BaseModel):
         return {key: _rows(value) for key, value in values.items()}
 
 
+#: keys of shapes: those that need it, and those that may have it; none: every cutter
+_OF_SHAPES = (
+    ("tip_radius_mm", ("lens",), ("lens",)),
+    ("flank_deg", ("dovetail",), ("dovetail", "thread mill")),
+    ("shank_diameter_mm", ("lollipop", "thread mill"), ()),
+    ("thread_pitch_mm", ("thread mill",), ()),
+    ("tooth_width_mm", (), ("thread mill",)),
+    ("lead_mm", ("reamer",), ("reamer",)),
+    ("lead_deg", (), ("reamer",)),
+)
+
+
 def _shape(values: Mapping[str, Any]) -> tuple[ProfileSegment, ...]:
     """The segments of a shape of its own; empty: it has none."""
     kind = values.get("shape")
-    for key, own in (("tip_radius_mm", "lens"), ("flank_deg", "dovetail"), ("shank_diameter_mm", "lollipop")):
-        if kind == own and key not in values:
-            raise InputError(f"cutter.{key} is missing: state it with shape = {own!r}")
-        if key in values and kind != own and key != "shank_diameter_mm":
-            raise InputError(f"cutter.{key} is stated without shape = {own!r}: state the shape, or leave it out")
+    for key, needed, allowed in _OF_SHAPES:
+        if kind in needed and key not in values:
+            raise InputError(f"cutter.{key} is missing: state it with shape = {kind!r}")
+        if key in values and allowed and kind not in allowed:
+            raise InputError(f"cutter.{key} is stated without shape = {allowed[0]!r}: state the shape, or leave it out")
     d, r, height = values["diameter_mm"], values.get("corner_radius_mm", 0.0), values["flute_length_mm"]
     if kind == "lens":
         return lens(d, values["tip_radius_mm"], r, height)
@@ -269,6 +293,14 @@ def _shape(values: Mapping[str, Any]) -> tuple[ProfileSegment, ...]:
         if r not in (0.0, 0.5 * d):
             raise InputError(f"cutter.corner_radius_mm = {r:g}: must be {0.5 * d:g} with shape = 'lollipop'")
         return lollipop(d, values["shank_diameter_mm"])
+    if kind is not None and r:
+        raise InputError(f"cutter.corner_radius_mm = {r:g}: must be 0 with shape = {kind!r}; leave it out")
+    if kind == "thread mill":
+        pitch = values["thread_pitch_mm"]
+        flank, width = math.radians(values.get("flank_deg", 30.0)), values.get("tooth_width_mm", 0.125 * pitch)
+        return thread_mill(d, pitch, flank, width, values["shank_diameter_mm"])
+    if kind == "reamer":
+        return reamer(d, values["lead_mm"], math.radians(values.get("lead_deg", 45.0)), height)
     return ()
 
 

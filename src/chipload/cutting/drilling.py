@@ -11,6 +11,9 @@ adds (A - 1) M0 to the torque, and to the thrust (B - 1) k D / 4 for its cutting
 M0 = k D^2 / 8 the torque of full lips, Kd = 5 kc (f D)^0.2 the handbook's material factor with kc = 8 M0 / (D^2 f). A,
 B and J depend on w / D.
 
+A reamer cuts by its lead, a lip of the angle kappa from the wall of the hole outwards: k and the thrust of a rim are
+those of a drill. It has no chisel edge.
+
 Reference: [Machinery2020] p. 1152, tables 7 to 9: M = 0.000025 Kd Ff FM A, T = 0.05 Kd Ff FT B + 0.007 Kd D^2 J with
 Ff = f^0.8, FM = D^1.8, FT = D^0.8. Differs from source: the torque of the lips is that of the coefficients of the
 material, for which the handbook has a table of Kd; its wear factor is 1, a sharp drill.
@@ -75,6 +78,29 @@ def is_pointed(cutter: Cutter) -> bool:
     )
 
 
+def is_reamer(cutter: Cutter) -> bool:
+    """Return whether a cutter is a reamer: a flat end, a lead, an upright flank.
+
+    >>> from chipload.cutter.shapes import reamer
+    >>> own = reamer(10.0, 0.5, math.radians(45.0), 30.0)
+    >>> is_reamer(Cutter(10.0, 6, 0.0, 30.0, 60.0, 6e5, shape=own)), is_reamer(Cutter(10.0, 6, 0.0, 30.0, 60.0, 6e5))
+    (True, False)
+    """
+    lines = [segment.kappa[0] for segment in cutter.shape if segment.straight]
+    upright = len(lines) == 3 and abs(lines[2] - 0.5 * math.pi) < 1e-9
+    return upright and lines[0] == 0.0 < lines[1] < 0.5 * math.pi
+
+
+def has_lips(cutter: Cutter) -> bool:
+    """Return whether the loads along its axis are those of a drill: of a point, or of the lead of a reamer."""
+    return is_pointed(cutter) or is_reamer(cutter)
+
+
+def lip_angle(cutter: Cutter) -> float:
+    """Return the angle of the lips with the plane normal to the axis [rad]: of the point, or of the lead."""
+    return cutter.shape[2].kappa[0] if is_reamer(cutter) else cutter.bottom
+
+
 def chisel_factors(cutter: Cutter) -> tuple[float, float, float]:
     """Return A, B, J of a drill; of standard design where its web thickness is not stated.
 
@@ -97,7 +123,7 @@ def point_length(cutter: Cutter) -> float:
 
 def force_per_radius(cutter: Cutter, material: Material, feed: ArrayLike) -> Floats:
     """Return k (n,) [N/mm]: tangential force of all lips per mm of radius, at feeds per revolution (n,) [mm]."""
-    sin = math.cos(cutter.bottom)
+    sin = math.cos(lip_angle(cutter))
     h = np.asarray(feed, dtype=np.float64) / cutter.flutes * sin
     return np.asarray(cutter.flutes * (material.Ktc * h ** (1.0 - material.exponents[0]) + material.Kte) / sin)
 
@@ -109,7 +135,7 @@ def drill_loads(
 
     Parameters
     ----------
-    cutter : with a point, see :func:`is_pointed`
+    cutter : with a point, see :func:`is_pointed`, or a reamer
     feed : (n,) float [mm] per revolution, above 0
     torque : (n,) float [N mm], of the lips alone; it states how much of them cuts: from the axis outwards where
         material is under it, else from the rim inwards
@@ -126,7 +152,7 @@ def drill_loads(
     ([554.0, 200.0], [0.0, 0.0])
     """
     f, lips = np.asarray(feed, dtype=np.float64), np.asarray(torque, dtype=np.float64)
-    under, diameter = np.asarray(under_axis, dtype=np.bool_), cutter.diameter
+    under, diameter = np.asarray(under_axis, dtype=np.bool_) & is_pointed(cutter), cutter.diameter
     k, (a, b, j) = force_per_radius(cutter, material, f), chisel_factors(cutter)
     radius, full = 0.5 * diameter, k * diameter**2 / 8.0
     within = np.sqrt(np.clip(2.0 * lips / k, 0.0, radius**2))

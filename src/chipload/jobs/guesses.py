@@ -23,6 +23,7 @@ FINDINGS = {
     "tool-change-in-stock": PLACE,
     "plunge": PLACE,
     "tap-pitch": ("program",),
+    "thread-pitch": ("cutter", "program"),
     "tap-cutter": ("cutter", "program"),
 }
 #: tables that a limit depends on besides :data:`LOAD`, by its name

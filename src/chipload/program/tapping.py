@@ -88,10 +88,10 @@ def tapping_findings(
         number, line = int(program.tool[row]), int(program.line[row])
         cutter = cutters.get(number)
         own, where = pitches.get(number, (None, ""))
-        if cutter is not None and cutter.thread_pitch is not None:
+        if cutter is not None and not cutter.shape and cutter.thread_pitch is not None:
             own, where = cutter.thread_pitch, "thread_pitch_mm of its [[cutter]]"
         text, code, severity = "", "", Severity.EXCEEDS
-        if cutter is not None and not cutter.body and cutter.thread_pitch is None:
+        if cutter is not None and not cutter.body and (cutter.thread_pitch is None or cutter.shape):
             code = "tap-cutter"
             text = (
                 f"tool {number} taps, and its [[cutter]] is no tap but a cutter with {cutter.flutes} teeth: state "

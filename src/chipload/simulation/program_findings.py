@@ -17,6 +17,7 @@ from chipload.errors import Finding, Severity
 from chipload.program.motions import bounds
 from chipload.program.program import DWELL, Program
 from chipload.program.tapping import tapping_findings
+from chipload.program.thread_milling import thread_milling_findings
 from chipload.simulation.approach import approach_findings
 from chipload.simulation.drill_depth import drill_depths
 from chipload.simulation.holes import deep_holes
@@ -86,6 +87,7 @@ def program_findings(
             around.text is not None,
         ),
         *(tapping_findings(program, cutters) if around.text is None else ()),
+        *thread_milling_findings(program, cutters),
         *deep_holes(columns, cutters),
         *drill_depths(columns, cutters, float(around.low[2])),
         *speed_findings(program, cutters),

@@ -27,6 +27,8 @@ LEVELS = 32
 #: greatest relative change of the volume per length between two steps that cut alike, and least change of one that
 #: enters or leaves the material
 STEADY, JUMP = 0.03, 0.3
+#: halvings of the distance between two slices for the border of a hole under a tool that goes down its axis
+HALVINGS = 12
 #: cosine of the least angle between two moves that make a corner
 CORNER = 0.985
 
@@ -120,6 +122,40 @@ def add_ranges(table, k, spans, begin, found, place, end, p, u, T, slices, rows,
     return True
 
 
+@njit(cache=True, nogil=True, inline="always")
+def on_line(table, k):
+    """Whether slice k is of a line that widens: its middle lies on the line of its angle through its lower end."""
+    return (
+        table[k, 5] > 0.0
+        and abs((table[k, 6] - table[k, 3]) * table[k, 5] - (table[k, 2] - table[k, 7]) * table[k, 4]) < 1e-9
+    )
+
+
+@njit(cache=True, nogil=True)
+def begin_at_border(p, T, table, k, inner, low, high, end, apart, index, spans):
+    """Let slice k of a line begin where its contact does, from ``inner`` on to its middle: the number of its ranges. In
+    a motion along the axis the contact ends at the wall of a hole.
+    """
+    outer = table[k, 2]
+    rise = (table[k, 6] - table[k, 3]) / (outer - table[k, 7])
+    run = (table[k, 1] - table[k, 0]) / (table[k, 8] - table[k, 7])
+    for _ in range(HALVINGS):
+        mid = 0.5 * (inner + outer)
+        z = p[2] + table[k, 6] + (mid - table[k, 2]) * rise
+        if intervals(p, T, mid, z, low, high, end, min(apart / mid, APART), index, spans, 0) == 0:
+            inner = mid
+        else:
+            outer = mid
+    widest = table[k, 8]
+    table[k, 0] += (outer - table[k, 7]) * run
+    table[k, 3] += (outer - table[k, 7]) * rise
+    table[k, 7] = outer
+    rho = 0.5 * (outer + widest)
+    table[k, 6] += (rho - table[k, 2]) * rise
+    table[k, 2] = rho
+    return intervals(p, T, rho, p[2] + table[k, 6], low, high, end, min(apart / rho, APART), index, spans, 0)
+
+
 @njit(cache=True, nogil=True)
 def engaged(
     p, u, c, T, parts, flank, index, near, levels, scratch, spans, mine, room, held, slices, rows, owner, at, out
@@ -158,6 +194,7 @@ def engaged(
     flank_from = number
     while flank_from > 0 and scratch[flank_from - 1, FLANK] >= 0.0:
         flank_from -= 1
+    free = -1
     for n in range(flank_from + 1):
         # last above the flutes
         k = n if n < flank_from else number
@@ -169,7 +206,13 @@ def engaged(
             continue
         found = intervals(p, T, rho, p[2] + scratch[k, 6], low, high, end, min(apart / rho, APART), index, spans, 0)
         if found == 0:
+            free = k
             continue
+        if hu == 0.0 and k < number and scratch[k, 7] > 0.0 and on_line(scratch, k):
+            alike = k > 0 and scratch[k - 1, 1] == scratch[k, 0] and scratch[k - 1, 4] == scratch[k, 4]
+            if not alike or free == k - 1:
+                inner = scratch[k - 1, 2] if alike else scratch[k, 7]
+                found = begin_at_border(p, T, scratch, k, inner, low, high, end, apart, index, spans)
         if k == number:
             out[8] = 1.0
         elif not add_ranges(

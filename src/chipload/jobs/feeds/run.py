@@ -15,7 +15,7 @@ from chipload.checking.program_text import read_as
 from chipload.checking.run import compliance_of_workpiece, simulate_program
 from chipload.checking.stiffness import deflection_watch, stiffness_of, watched_columns, with_columns
 from chipload.checking.workpiece_compliance import WorkpieceCompliance, with_compliance_error
-from chipload.cutting.drilling import is_pointed
+from chipload.cutting.drilling import has_lips
 from chipload.jobs.feeds.allowed import FeedRequest, allowed_feed_watch, with_new_feeds
 from chipload.jobs.feeds.job import FeedsJob
 from chipload.jobs.feeds.outcome import FeedResult, FeedsProgram
@@ -109,7 +109,7 @@ def _new_feeds(
         engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.0, 0.5),
     )  # fmt: skip
     before = with_columns(before, (*watched_columns(gives), *PROGRAM_COLUMNS))
-    if any(is_pointed(c) for c in cutters.values()):
+    if any(has_lips(c) for c in cutters.values()):
         before = with_drilling(before, cutters, material)
     if AXIAL in limits:
         before = replace(before, columns={**before.columns, AXIAL: axial_force(before.columns)})

@@ -25,9 +25,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from chipload.errors import InputError
-from chipload.program.heidenhain.words import feed_unit
 from chipload.program.commands import DWELL, LINE, RAPID
 from chipload.program.heidenhain.formula import NotKnownError
+from chipload.program.heidenhain.words import feed_unit
 from chipload.units import mm_s_from_mm_min
 
 SPIN = -1
