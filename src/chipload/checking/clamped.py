@@ -117,7 +117,7 @@ def wrong_clamps(clamps: Sequence[WorkpieceClamp]) -> Iterator[str]:
 
 def placed_clamps(workpiece: Workpiece, stock: LayeredStock) -> tuple[Clamp, ...]:
     """Return the clamps on a stock before its first cut."""
-    return tuple(_clamp(clamp, f"workpiece.clamp.{k}", stock) for k, clamp in enumerate(workpiece.clamps))
+    return tuple(place_clamp(clamp, f"workpiece.clamp.{k}", stock) for k, clamp in enumerate(workpiece.clamps))
 
 
 def elastic_of(workpiece: Workpiece) -> Elastic:
@@ -126,7 +126,8 @@ def elastic_of(workpiece: Workpiece) -> Elastic:
     return Elastic(PER * workpiece.modulus_gpa, workpiece.poisson, density)
 
 
-def _clamp(stated: WorkpieceClamp, name: str, stock: LayeredStock) -> Clamp:
+def place_clamp(stated: WorkpieceClamp, name: str, stock: LayeredStock) -> Clamp:
+    """Return a clamp on a stock; ``name`` is its key in messages."""
     low, high = (np.array([stock.xs[k], stock.ys[k], stock.bounds[k]], dtype=np.float64) for k in (0, -1))
     if stated.face is not None and stated.face[0] != "z":
         # the outermost material: tiles may end beyond it

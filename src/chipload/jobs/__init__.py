@@ -74,6 +74,7 @@ CAPABILITIES = (
     Capability("impeller", "impeller", "ImpellerJobTable", resumes=True, spreads=True),
     Capability("thinwall", "wall", "ThinWallJobTable", resumes=True),
     Capability("fit", "measurement", "FitJobTable"),
+    Capability("distortion", "residual_stress", "DistortionJobTable"),
     Capability("contour", "part", "ContourJobTable"),
 )
 

@@ -70,9 +70,12 @@ KINDS = {
     "impeller": "Jobs that plan an impeller",
     "torque": "Jobs that limit the torque on a thin tube, a cone or a workpiece",
     "fit": "Jobs that fit force coefficients to measured forces",
+    "distortion": "Jobs that predict how a part springs when it is released",
 }
 #: how a value is written, by the key or by the table and the key
 EXAMPLES = {
+    "residual_stress.file": '"plate.csv"', "points_mpa": "[[0.0, -12.0, -8.0], [10.0, 9.0, 6.0], [40.0, -12.0, -8.0]]",
+    "offset_mm": "[2.5, 5.0, 7.5]", "choices.stock_mm": "[0.5, 1.0]", "setup.stock_mm": "1.0",
     "window_s": "[0.5, 1.5]", "measurement.file": '"slot-900.csv"',
     "program.file": '"part.ngc"', "part.file": '"part.dxf"', "stock.file": '"stock.stl"',
     "fixture.file": '"vice.stl"', "cutter.file": '"tools.tbl"', "machine.file": '"mine.toml"',

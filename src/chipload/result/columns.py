@@ -178,6 +178,9 @@ _ROWS = (
      DEFLECTION),
     ("form_error_um", "\u00b5m", "form error", "material left on the surface by deflection; negative: removed",
      STATED, True),
+    ("flatness_um", "\u00b5m", "flatness", "width of the underside of the released part about its mean plane", STATED),
+    ("distortion_um", "\u00b5m", "distortion", "deviation of the released part from where its surface was milled, over "
+     "the best place of the part", STATED, True),
     ("form_points", "", "finished points", "number of points of the part's surface that the step finishes", STATED),
     ("ramp_deg", "deg", "ramp angle", "angle of descent into material under the cutter's centre; 90: a plunge", PATH),
     ("axial_overrun_mm", "mm", "cut above the flutes", "engaged length of the cutter above its flutes", STATED),

@@ -130,6 +130,16 @@ def cell_workpiece(
             modes = modes_of(grid, share)
             springs = clamp_stiffness(clamps, stock, grid, modes, elastic.modulus, first)
     K = stiffness(grid, modes, moments, elastic.modulus, elastic.poisson) + springs.matrix
+    factors, order, place = factor_modes(grid, modes, K)
+    volume = float((share * grid.volumes).sum())
+    return CellWorkpiece(
+        grid, modes, share, scipy.sparse.csr_array(K), factors, order, place, volume, loose, springs.volumes,
+        StockSections(stock), None if elastic.density is None else mass(grid, modes, moments, elastic.density),
+    )  # fmt: skip
+
+
+def factor_modes(grid: CellGrid, modes: CellModes, K: scipy.sparse.csr_array) -> tuple[Factors, Indices, Indices]:
+    """Factors of a stiffness (3 u, 3 u) in an order of nested dissection, that order (3 u,), and its inverse."""
     order = (3 * dissect_modes(modes.lattice, grid.order)[:, None] + np.arange(3)).ravel()
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
@@ -137,11 +147,7 @@ def cell_workpiece(
     lu = scipy.sparse.linalg.splu(
         scipy.sparse.csc_array(K[order][:, order]), permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options
     )
-    volume = float((share * grid.volumes).sum())
-    return CellWorkpiece(
-        grid, modes, share, scipy.sparse.csr_array(K), Factors(lu), order, place, volume, loose, springs.volumes,
-        StockSections(stock), None if elastic.density is None else mass(grid, modes, moments, elastic.density),
-    )  # fmt: skip
+    return Factors(lu), order, place
 
 
 def dissect_modes(lattice: Indices, p: int) -> Indices:
