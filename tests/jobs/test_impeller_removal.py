@@ -18,7 +18,7 @@ from chipload.errors import Severity
 from chipload.jobs.impeller import read_program
 from chipload.jobs.impeller.channels import turned
 from chipload.jobs.impeller.read_program import read_program_of
-from chipload.jobs.impeller.removal import ImpellerProgram, removal_of_programs, tool_with_teeth
+from chipload.jobs.impeller.removal import ImpellerProgram, inputs_of, removal_of_programs, tool_with_teeth
 from chipload.machine.machine import machine_named
 from chipload.planning.impeller.feeds import ForceTerms
 from chipload.program.gcode.writer import write_gcode
@@ -81,12 +81,17 @@ def test_each_program_begins_with_what_the_one_before_leaves(side_and_top) -> No
         assert {c.name for c in one.limits} == {"axial_overrun_mm"}
         assert all(c.state is chipload.Verdict.HOLDS for c in one.limits)
     assert side.stock[0] == pytest.approx(40.0 * 30.0 * 30.0)
-    # by the layers of what is left, 1 mm thick
-    assert side.stock[0] - side.stock[1] == pytest.approx((DEEP + 12.0) * WIDE * LONG, rel=0.02)
+    assert side.stock[0] - side.stock[1] == pytest.approx((DEEP + 12.0) * WIDE * LONG, rel=2e-3)
     (again,) = removed(written(slot(2, True)))[:1]
     twice = removed(written(slot(1, True)), written(slot(2, True)))
     assert again.columns["chip_volume_mm3"].sum() == pytest.approx(DEEP * WIDE * LONG, rel=2e-3)
     assert twice[1].columns["chip_volume_mm3"].sum() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_what_needs_outlines_is_refused_without_them() -> None:
+    given = inputs_of({1: tool_with_teeth(CUTTER, slot(1, True), None)}, BLOCK, MACHINE, None)
+    with pytest.raises(chipload.InputError, match=r"outlines: without them checks\.loose_stock"):
+        replace(given, checks=replace(given.checks, loose_stock=True))
 
 
 def test_a_history_has_the_lines_and_the_time_of_its_own_text(side_and_top) -> None:

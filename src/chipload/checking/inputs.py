@@ -86,6 +86,8 @@ class CheckInputs:
     speeds_rpm : least and greatest spindle speed that is searched for quiet speeds; None: that of the machine
     loads : whether the teeth and the material are those of the job; False: they stand for ones that are not stated, and
         only the removal and what it depends on is calculated
+    outlines : whether the outlines of the stock that is left are made; False: of it only the volume is known, and it is
+        not searched for loose pieces and slender walls
     """
 
     cutters: Mapping[int, Cutter]
@@ -99,6 +101,7 @@ class CheckInputs:
     elasticity: Elasticity = field(default_factory=Elasticity)
     speeds_rpm: tuple[float | None, float | None] = (None, None)
     loads: bool = True
+    outlines: bool = True
 
     def __post_init__(self) -> None:
         """Refuse values of another kind, and values that contradict one another."""
@@ -116,5 +119,7 @@ class CheckInputs:
                 own = kind if isinstance(kind, type) else get_args(kind)[0]
                 raise InputError(f"{name}: {type(value).__name__}: must be a {own.__name__}")
         texts = list(contradictions(self.limits, self.elasticity, self.surroundings.part is not None))
+        if not self.outlines and (self.checks.loose_stock or self.checks.slender_walls):
+            texts.append("outlines: without them checks.loose_stock and checks.slender_walls must be off")
         if texts:
             raise InputErrors(*texts) if len(texts) > 1 else InputError(texts[0])

@@ -145,7 +145,8 @@ def simulate_program(
     if checkpoint is None:
         removal = remove(
             program, stock, cutters, material, fine, watch=watch, times=times,
-            engine=op.engine, loads=inputs.loads, processes=workers or op.workers, progress=removing,
+            engine=op.engine, loads=inputs.loads, outlines=inputs.outlines, processes=workers or op.workers,
+            progress=removing,
         )  # fmt: skip
     else:
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
@@ -164,7 +165,7 @@ def simulate_program(
         removal = with_drilling(removal, cutters, material)
     if inputs.limits.force_axial_n is not None:
         removal = replace(removal, columns={**removal.columns, AXIAL: axial_force(removal.columns)})
-    if leans(program).any():
+    if inputs.outlines and leans(program).any():
         found, unchecked = check_leaning_stock(inputs, program, before, stock)
         stock_check = replace(
             stock_check, findings=(*stock_check.findings, *found), unchecked=(*stock_check.unchecked, *unchecked)

@@ -100,6 +100,7 @@ def remove(
     processes: int | Workers = 1,
     engine: Engine = "auto",
     loads: bool = True,
+    outlines: bool = True,
     progress: Progress = silent,
 ) -> Removal:
     """Remove the cuts of a program from ``stock``, which changes, and calculate the loads of every step.
@@ -123,6 +124,8 @@ def remove(
     engine : ``layers`` or ``moves``; ``auto``: by moves what goes by moves, see :mod:`chipload.simulation.moves`, and
         else the whole program by layers, with a finding ``handed-over``
     loads : False: only what is removed is needed; moves then leave the loads 0
+    outlines : False: of what is left only the volume is needed: moves then leave ``stock`` as it was, and its volume
+        after them is that before less the chips
 
     Returns
     -------
@@ -167,11 +170,13 @@ def remove(
             setting, handed = by_layers(engine, setting, why, program, stock)
     progress(1.0, "removed")
     cut = tuple(join_cuts(kept[number]) for number in sorted(kept))
-    if setting.moves is not None:
+    if setting.moves is not None and outlines:
         setting.moves.finish(stock, setting.workers)
-    return with_accuracy(
-        removal_of(program, stock, material, sums, stack_blocks(columns), cut), program, before, setting
-    )
+    removal = removal_of(program, stock, material, sums, stack_blocks(columns), cut)
+    if setting.moves is not None and not outlines:
+        chips = float(removal.columns["chip_volume_mm3"].sum())
+        removal = replace(removal, volume_after=removal.volume_before - chips)
+    return with_accuracy(removal, program, before, setting)
 
 
 def _blocks_removed(
@@ -208,6 +213,7 @@ def with_engine(
     try:
         run = run_by_moves(
             program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm,
+            setting.loads,
         )  # fmt: skip
     except HandOver as found:
         return by_layers(engine, setting, found, program, stock)

@@ -141,7 +141,7 @@ def inputs_of(tools: Mapping[int, Cutter], stock: Stock, machine: Machine, terms
     if not loads:
         settings = SimulationSettings(STEP_MM, resolution_error=False, corner_slices=SLICES, flank_mm=FLANK_MM)
     material = MATERIAL if terms is None else terms.material
-    return CheckInputs(tools, material, machine, stock, settings, checks=checks, loads=loads)
+    return CheckInputs(tools, material, machine, stock, settings, checks=checks, loads=loads, outlines=False)
 
 
 def tool_with_teeth(size: CatalogueCutter, program: Program, terms: ForceTerms | None) -> Cutter:
