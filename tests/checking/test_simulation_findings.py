@@ -10,10 +10,10 @@ from chipload.checking.result import simulation_findings
 from chipload.errors import Finding, Severity
 
 
-def test_a_rapid_that_cuts_exceeds_and_a_program_that_was_handed_over_is_noted() -> None:
-    findings = (Finding("rapid-cuts", 3, "a rapid goes through material"), Finding("handed-over", 6, "by layers"))
+def test_a_rapid_that_cuts_exceeds_and_is_listed_once() -> None:
+    findings = (Finding("rapid-cuts", 3, "a rapid goes through material"), Finding("comment", 6, "a note"))
     removal = SimpleNamespace(findings=findings, columns={"chip_max_mm": []})
-    checks = SimpleNamespace(material=SimpleNamespace(chip=None, speed=None), off=(), cutters={})
+    checks = SimpleNamespace(material=SimpleNamespace(chip=None, speed=None, learned=None), off=(), cutters={})
     # the columns of the stock have found the same rapid and one more
     again = tuple(Finding("rapid-cuts", line, "a rapid goes through material", Severity.EXCEEDS) for line in (3, 9))
     simulation: Any = SimpleNamespace(
@@ -25,4 +25,4 @@ def test_a_rapid_that_cuts_exceeds_and_a_program_that_was_handed_over_is_noted()
     )
     found = [(f.code, f.line, f.severity) for f in simulation_findings(simulation)]
     rapids = [("rapid-cuts", line, Severity.EXCEEDS) for line in (3, 9)]
-    assert found == [rapids[0], ("handed-over", 6, Severity.NOTE), rapids[1]]
+    assert found == [rapids[0], ("comment", 6, Severity.NOTE), rapids[1]]

@@ -137,9 +137,10 @@ def test_loads_are_those_of_the_text_as_a_program_job(tmp_path) -> None:
 
 def test_another_channel_is_the_first_one_turned() -> None:
     """The block is the same after half a turn: so is what a turned program removes, less what was cut before it."""
+    long = replace(CUTTER, cutting_length=30.0)
     for depth, share in ((DEEP, 1.0), (24.0, 16.0 / 24.0)):
         one, on = slot(1, True, depth), turned(slot(2, True, depth), math.pi)
-        (alone,), (first, second) = removed(written(on)), removed(written(one), written(on))
+        (alone,), (first, second) = removed(written(on, long)), removed(written(one, long), written(on, long))
         np.testing.assert_allclose(
             alone.columns["chip_volume_mm3"], first.columns["chip_volume_mm3"], rtol=1e-6, atol=1e-6
         )  # fmt: skip
@@ -181,19 +182,21 @@ def test_a_changed_text_is_seen(change, monkeypatch) -> None:
             assert [f.code for f in one.findings] == codes
 
 
-def test_material_above_the_flutes_exceeds_and_the_rest_is_simulated() -> None:
+def test_a_shank_in_material_exceeds_and_the_next_program_cuts_what_the_flutes_left() -> None:
+    """Flutes of 2 mm in a slot that is deeper: the shank stands in the rest, which the second program cuts."""
     short = replace(CUTTER, cutting_length=2.0, shank_diameter=WIDE)
     one, two = removed(written(slot(1, True), short), written(slot(2, True)))
-    assert [f.code for f in one.findings if f.severity is Severity.EXCEEDS][:1] == ["above-flutes"]
-    assert one.findings[0].line in written(slot(1, True), short).read.program.line
-    assert one.columns["chip_volume_mm3"].sum() == pytest.approx(DEEP * WIDE * LONG, rel=2e-3)
+    (shank,) = (c for c in one.limits if c.name == "axial_overrun_mm")
+    assert (shank.state, shank.worst) == (chipload.Verdict.EXCEEDS, pytest.approx(DEEP - 2.0, abs=1e-6))
+    assert one.columns["chip_volume_mm3"].sum() == pytest.approx(2.0 * WIDE * LONG, rel=2e-3)
+    assert two.columns["chip_volume_mm3"].sum() == pytest.approx((DEEP - 2.0) * WIDE * LONG, rel=2e-3)
     assert not two.findings
 
 
 def test_a_holder_in_the_stock_is_a_collision_and_what_is_not_simulated_is_unproven() -> None:
     stubby = replace(CUTTER, cutting_length=4.0, shank_diameter=WIDE, reach=5.0, holder_diameter=40.0)
     (one,) = removed(written(slot(1, True, 9.0), replace(stubby, cutting_length=4.5)))
-    assert any(f.code in ("above-flutes", "collision") and f.severity is Severity.EXCEEDS for f in one.findings)
+    assert any(f.code == "collision" and f.severity is Severity.EXCEEDS for f in one.findings)
     still = slot(1, True)
     still = replace(still, spindle=np.zeros(len(still)))
     (one,) = removed(written(still))

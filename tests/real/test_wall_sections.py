@@ -11,7 +11,7 @@ from chipload.jobs import load_job
 from chipload.jobs.thinwall.inputs import read_wall
 from chipload.jobs.thinwall.wall_program import linked, on_machine
 from chipload.planning.thinwall.passes import constant
-from chipload.simulation.section_deviation import nearest
+from chipload.simulation.shape_deviation import nearest
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2].parent / "shared" / "data"))
 PROFILE = DATA / "blades" / "turbogrid_rotor37" / "profile.curve"

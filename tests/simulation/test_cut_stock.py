@@ -20,6 +20,7 @@ from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, RAPID, Program
 from chipload.simulation.chips import remove
 from chipload.simulation.initial_stock import initial_stock
+from chipload.simulation.moves import stock_before
 from chipload.simulation.removal import Removal, Resolution
 from chipload.stock.earlier_moves import EarlierMoves, no_moves
 from chipload.stock.layers import LayeredStock
@@ -217,3 +218,22 @@ def test_a_saved_stock_whose_cutters_are_nested_without_end_is_refused(tmp_path:
         EarlierMoves.from_arrays(arrays)
     cut.save(tmp_path / "stock.npz")
     assert LayeredStock.load(tmp_path / "stock.npz").earlier is None
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.1])
+def test_the_stock_before_a_step_is_that_of_the_program_up_to_it(lean: float) -> None:
+    """A slot from x = 0 on: its length by the steps before; the stock before the program is as it was."""
+    program = path([[-8.0, 10.0, -2.0], [20.0, 10.0, -2.0]])
+    axis = np.tile([math.sin(lean), 0.0, math.cos(lean)], (len(program), 1))
+    program, first = replace(program, axis=axis), block()
+    after = first.copied()
+    known = remove(program, after, CUTTERS, ALLOY, FINE, accuracy=False)
+    for step in (0, 14, 20, len(known.columns["x_mm"])):
+        left = stock_before(step, program, first, CUTTERS, FINE, after)
+        removed = first.volume() - left.volume()
+        # the layers of 0.5 mm cut a bottom that leans into steps
+        off = 5e-3 if lean == 0.0 else 0.02
+        assert removed == pytest.approx(known.columns["chip_volume_mm3"][:step].sum(), rel=off, abs=0.3)
+        if step == 20 and lean == 0.0:  # the tip is at x = 12
+            assert removed == pytest.approx(2.0 * (10.0 * 12.0 + 0.5 * math.pi * 25.0), rel=1e-4)
+    assert not first.cut.any()

@@ -1,4 +1,4 @@
-"""Programs simulated by moves: loads in closed form, streaming, resume, what is handed over, the stock that is left."""
+"""Programs simulated by moves: loads in closed form, streaming, resume, the shank, the stock that is left."""
 
 from __future__ import annotations
 
@@ -144,16 +144,35 @@ def test_auto_takes_moves_where_the_axis_leans() -> None:
         np.testing.assert_array_equal(one.columns[name], two.columns[name])
 
 
-def test_material_above_the_flutes_goes_by_layers() -> None:
+def test_a_shank_stands_in_what_is_above_the_flutes() -> None:
+    """Flutes of 2 mm, 3 mm deep: they cut 2 mm of the height as if the stock began there, and the shank 1 mm rubs."""
     short = replace(MILL, flute_length=2.0)
     program = path([[-8.0, 15.0, -3.0], [30.0, 15.0, -3.0]])
     stock = block()
-    found = remove(program, stock, {1: short}, ALLOY, FINE, engine="auto")
-    assert "above the flutes of tool 1 (2 mm)" in found.findings[0].text
-    other = block()
-    known = remove(program, other, {1: short}, ALLOY, FINE, engine="layers")
-    np.testing.assert_array_equal(found.columns["force_n"], known.columns["force_n"])
-    assert stock.to_bytes() == other.to_bytes()
+    found = remove(program, stock, {1: short}, ALLOY, FINE).columns
+    low = LayeredStock.block(LOW, (*HIGH[:2], -1.0), 0.5, 20.0)
+    known = remove(program, low, {1: short}, ALLOY, FINE).columns
+    cutting, whole = known["chip_volume_mm3"] > 0.0, known["x_mm"] > 6.0
+    np.testing.assert_allclose(found["chip_volume_mm3"][whole], 2.0 * 10.0 * 1.0, rtol=1e-6)
+    for name in ("force_n", "torque_nm"):
+        np.testing.assert_allclose(found[name][whole], known[name][whole], rtol=2e-3, err_msg=name)
+    assert (known["axial_overrun_mm"] == 0.0).all()
+    # a step that ends with its front in the block has its shank there
+    np.testing.assert_allclose(found["axial_overrun_mm"][cutting], 1.0, atol=1e-6)
+    assert stock.volume() == pytest.approx(stock.volumes().sum(), rel=1e-12)
+    # what stands above the flutes stays
+    assert stock.volumes()[-2:] == pytest.approx([40.0 * 30.0 * 0.5] * 2)
+
+
+def test_a_neck_has_room_where_material_stands_above_the_flutes() -> None:
+    """A neck that is narrower by more than the cut is wide does not rub; one that is not stands in the wall by 1 mm."""
+    side = path([[-8.0, HIGH[1] + 4.0, -3.0], [45.0, HIGH[1] + 4.0, -3.0]])  # 1 mm wide
+    for neck, overrun in ((7.0, 0.0), (9.0, 1.0)):
+        short = replace(MILL, flute_length=2.0, shank_diameter=neck)
+        found = remove(side, block(), {1: short}, ALLOY, FINE).columns
+        assert found["axial_overrun_mm"].max() == pytest.approx(overrun, abs=1e-6)
+        whole = (found["x_mm"] > 1.0) & (found["x_mm"] < 36.0)
+        np.testing.assert_allclose(found["chip_volume_mm3"][whole], 2.0 * 1.0 * 1.0, rtol=1e-3)
 
 
 def test_a_mesh_is_cut_as_its_box() -> None:

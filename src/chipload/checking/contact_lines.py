@@ -1,14 +1,14 @@
 """The contact lines of the steps of a program, and the stock before some of them.
 
-Additional runs of the program, before the simulation, find them: contact and remaining stock of a step do not depend on
-the feed. The stock is that of layers, the lines are those of the engine of the simulation.
+An additional run of the program, before the simulation, finds them: contact and remaining stock of a step do not depend
+on the feed. The stock before a step is made when it is asked for, from the moves before it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,20 +17,21 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
-from chipload.simulation.chips import block_of, count_steps, remove_block, setting_of, with_engine
+from chipload.simulation.chips import remove
 from chipload.simulation.loads import GRAZES, Cuts
-from chipload.simulation.moves import Engine, HandOver
-from chipload.simulation.removal import Resolution, RunningSums, RunSettings
-from chipload.simulation.steps import steps_in_blocks
+from chipload.simulation.moves import stock_before
+from chipload.simulation.removal import Resolution
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.states import StepLines
 
 Floats = NDArray[np.float64]
-#: steps (c,), their contact lines (c, 2, 3) [mm], greatest force (c,) [N] and mean force (c, 3) [N]
-_Lines = tuple[NDArray[np.int64], Floats, Floats, Floats]
 
-#: steps between two stocks that are kept
+#: steps between two stocks that can be asked for
 TOGETHER = 24
+#: stocks that are kept
+KEPT = 32
+#: columns of a removal with the ends of the contact line [mm]
+LINE = tuple(f"contact_{end}_{x}_mm" for end in ("low", "high") for x in "xyz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +41,16 @@ class CutAhead:
     Attributes
     ----------
     lines : where the steps that cut touch the workpiece
-    stocks : (step, removed volume [mm^3], stock before that step), rising; the last is what is left
+    states : (step, removed volume [mm^3] before it), rising, of steps before which the stock can be asked for; the last
+        is what is left
     mean : (c, 3) float [N], mean force on the cutter of the steps that cut
+    before : makes the stock before a step
     """
 
     lines: StepLines
-    stocks: tuple[tuple[int, float, LayeredStock], ...]
+    states: tuple[tuple[int, float], ...]
     mean: Floats
+    before: Callable[[int], LayeredStock]
 
 
 def cut_ahead(
@@ -55,67 +59,34 @@ def cut_ahead(
     cutters: Mapping[int, Cutter],
     material: Material,
     resolution: Resolution,
-    engine: Engine,
     progress: Progress = silent,
 ) -> CutAhead:
-    """Run a program through a stock, which changes; store its contact lines, and the stock every few steps.
+    """Run a program through a stock, which stays; return its contact lines, and the stock before every few steps."""
+    left = stock.copied()
+    removal = remove(
+        program, left, cutters, material, resolution, accuracy=False,
+        watch=lambda cuts: dict(zip(LINE, contact_lines(cuts).reshape(-1, 6).T, strict=True)),
+        progress=lambda done, _: progress(done, "where it cuts"),
+    )  # fmt: skip
+    c = removal.columns
+    removed = np.concatenate([[0.0], np.cumsum(c["chip_volume_mm3"])])
+    count = len(removed) - 1
+    ends = np.append(np.arange(0, count, TOGETHER), count)
+    rises = np.flatnonzero(np.diff(removed[ends]) > 0.0) + 1
+    states = [(int(k), float(removed[k])) for k in (0, *ends[rises].tolist())]
+    if states[-1][0] < count:
+        states.append((count, float(removed[count])))
 
-    Parameters
-    ----------
-    engine : of the simulation that will use the lines: it must find its contacts where these are. A step that meets a
-        wall at its end cuts by moves, and does not by layers, which look at its middle
-    """
-    count = count_steps(program, cutters, resolution)
-    setting = setting_of(cutters, material, resolution, None, 2)
-    found = _lines_by_moves(program, stock, with_engine(engine, setting, program, stock)[0])
-    sums, own = RunningSums(stock.volume()), list[_Lines]()
-    stocks, before = [(0, 0.0, stock.copied())], [np.zeros(1)]
-    for steps in steps_in_blocks(program, resolution.step_mm, resolution.tolerance, size=TOGETHER):
-        progress(sums.steps / count, "where it cuts")
-        volume, first = float(before[-1][-1]), sums.steps
-        sums, columns, cuts = remove_block(steps, stock, sums, setting)
-        before.append(volume + np.cumsum(columns["chip_volume_mm3"]))
-        own += _lines_of(cuts, columns, first)
-        if before[-1][-1] > volume:
-            stocks.append((sums.steps, float(before[-1][-1]), stock.copied()))
-    removed = np.concatenate(before)
-    stocks.append((count, float(removed[-1]), stocks[-1][2]))
-    known = own if found is None else found
-    if not known:
-        none = np.zeros(0)
-        return CutAhead(
-            StepLines(np.zeros(0, np.int64), np.zeros((0, 2, 3)), none, none), tuple(stocks), np.zeros((0, 3))
-        )
-    step, lines, force, means = (np.concatenate([some[k] for some in known]) for k in range(4))
-    order = np.argsort(step, kind="stable")
-    step = step[order]
-    return CutAhead(StepLines(step, lines[order], force[order], removed[step]), tuple(stocks), means[order])
+    @lru_cache(KEPT)
+    def before(step: int) -> LayeredStock:
+        if step == count:
+            return left
+        return stock_before(step, program, stock, cutters, resolution, left)
 
-
-def _lines_by_moves(program: Program, stock: LayeredStock, setting: RunSettings) -> list[_Lines] | None:
-    """Return the contact lines of a program by moves; None where it is simulated by layers. The stock stays."""
-    if setting.moves is None:
-        return None
-    fine, sums, out = setting.resolution, RunningSums(stock.volume()), list[_Lines]()
-    try:
-        for steps in steps_in_blocks(program, fine.step_mm, fine.tolerance, size=block_of(setting)):
-            first = sums.steps
-            sums, columns, cuts = remove_block(steps, stock, sums, setting)
-            out += _lines_of(cuts, columns, first)
-    except HandOver:
-        return None
-    return out
-
-
-def _lines_of(cuts: Sequence[Cuts], columns: Mapping[str, NDArray[Any]], first: int) -> list[_Lines]:
-    """Return steps, contact lines, greatest force and mean force of some steps that have a force."""
-    out = []
-    for c in cuts:
-        row = c.step - first
-        some = columns["force_n"][row] > 0.0
-        mean = np.column_stack([columns[f"force_{x}_mean_n"][row] for x in "xyz"])
-        out.append((c.step[some], contact_lines(c)[some], columns["force_n"][row][some], mean[some]))
-    return out
+    step = np.flatnonzero(c["force_n"] > 0.0)
+    lines = np.column_stack([c[name] if name in c else np.zeros(count) for name in LINE])[step].reshape(-1, 2, 3)
+    mean = np.column_stack([c[f"force_{x}_mean_n"] for x in "xyz"])[step]
+    return CutAhead(StepLines(step, lines, c["force_n"][step], removed[step]), tuple(states), mean, before)
 
 
 def contact_lines(cuts: Cuts) -> Floats:

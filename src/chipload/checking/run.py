@@ -282,4 +282,4 @@ def compliance_of_workpiece(
         return None
     program, _ = time_rows(reading, cutters, inputs.machine, op.interpolation)
     fine = resolution_of(op, cutters, program)
-    return workpiece_compliance(workpiece, program, stock, cutters, inputs.material, fine, op.engine, progress)
+    return workpiece_compliance(workpiece, program, stock, cutters, inputs.material, fine, progress)

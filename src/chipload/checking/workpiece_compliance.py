@@ -1,17 +1,16 @@
 """The compliance of the workpiece of a job in the state of each step, and its error.
 
-An additional run of the program stores the stock every few steps, and the compliance is solved in a few of these
-states. The error by the cells is found at the worst places: the same states are solved there in cells of
-:data:`COARSER` times the side, between the same faces of the part. At an inner corner of 90 degrees the error of a
-deflection falls with the power 1.09 of the side: the error of the finer cells is then 1 / (COARSER^1.09 - 1) = 1.8 of
-the difference, :data:`CORNER`. Elsewhere it falls faster.
+The compliance is solved in a few states, the stock before some steps of the program. The error by the cells is found at
+the worst places: the same states are solved there in cells of :data:`COARSER` times the side, between the same faces of
+the part. At an inner corner of 90 degrees the error of a deflection falls with the power 1.09 of the side: the error of
+the finer cells is then 1 / (COARSER^1.09 - 1) = 1.8 of the difference, :data:`CORNER`. Elsewhere it falls faster.
 
 Reference: [Szabo1991] for the power, twice 0.544.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,7 +27,6 @@ from chipload.number_text import number_text
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.simulation.deflection_jumps import jump_findings
-from chipload.simulation.moves import Engine
 from chipload.simulation.removal import Columns, Resolution
 from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.followed import FollowedModes, ModesOfStates
@@ -154,7 +152,6 @@ def workpiece_compliance(
     cutters: Mapping[int, Cutter],
     material: Material,
     resolution: Resolution,
-    engine: Engine,
     progress: Progress = silent,
 ) -> WorkpieceCompliance:
     """Return the compliance of the workpiece where its program cuts.
@@ -162,7 +159,6 @@ def workpiece_compliance(
     Parameters
     ----------
     stock : before the program; it does not change
-    engine : of the simulation that will use the compliance
 
     Raises
     ------
@@ -172,10 +168,9 @@ def workpiece_compliance(
     elastic, clamps = elastic_of(workpiece), placed_clamps(workpiece, stock)
     clamped_parts = clamped_volumes(workpiece, stock)
     ahead = cut_ahead(
-        program, stock.copied(), cutters, material, resolution, engine,
-        lambda done, what: progress(0.4 * done, what),
+        program, stock, cutters, material, resolution, lambda done, what: progress(0.4 * done, what),
     )  # fmt: skip
-    grid, wall = cells_over(stock, ahead.stocks[-1][2], workpiece.cell_mm, workpiece.order)
+    grid, wall = cells_over(stock, ahead.before(ahead.states[-1][0]), workpiece.cell_mm, workpiece.order)
     most = [0]
 
     def build(then: LayeredStock, cells: CellGrid) -> CellWorkpiece:
@@ -183,7 +178,7 @@ def workpiece_compliance(
         most[0] = max(most[0], 3 * len(made.modes))
         return made
 
-    states = [RemovalState(k, v, lambda then=then: build(then, grid)) for k, v, then in ahead.stocks]  # type: ignore[misc]
+    states = [RemovalState(k, v, lambda k=k: build(ahead.before(k), grid)) for k, v in ahead.states]  # type: ignore[misc]
     share = workpiece.state_change_percent / 100.0
     spacing = SPACING * grid.widest
     watch = None if workpiece.density_kg_m3 is None else ModesOfStates(ahead.lines, workpiece.modes, spacing)
@@ -195,7 +190,7 @@ def workpiece_compliance(
     upper = float((deflection * (1.0 + found.uncertainty)).max(initial=0.0))
     change = upper / float(deflection.max()) - 1.0 if upper > 0.0 else 0.0
     progress(0.9, "error of the cells")
-    error = _cell_error(found, [then for _, _, then in ahead.stocks], grid, build)
+    error = _cell_error(found, ahead, grid, build)
     modes = None
     if watch is not None:
         modes = watch.followed(
@@ -236,12 +231,12 @@ def _stress_of_steps(
     lines = ahead.lines
     order = np.argsort(-size_of(found.compliance) * lines.force, kind="stable")
     rows = np.unique(np.concatenate([order[:STRAINED], np.argsort(-lines.force, kind="stable")[:STRAINED]]))
-    first = np.array([step for step, _, _ in ahead.stocks])
+    first = np.array([step for step, _ in ahead.states])
     after = np.minimum(np.searchsorted(first, lines.step[rows], side="right"), len(first) - 1)
     away = grid.widest
     per_force, place = np.zeros(len(rows)), np.zeros((len(rows), 3))
     for state in np.unique(after).tolist():
-        work = build(ahead.stocks[state][2], grid)
+        work = build(ahead.before(ahead.states[state][0]), grid)
         for k in np.flatnonzero(after == state).tolist():
             force = _force(ahead, int(rows[k]))
             found_one = greatest_stress(work, elastic, lines.lines[rows[k]], force, away)
@@ -265,7 +260,7 @@ def _bend_workpiece(
     cutters: Mapping[int, Cutter],
 ) -> BentWorkpiece:
     """Return the deformed workpiece in the state after its worst step, under the force of that step."""
-    row, stock = int(found.worst[0]), ahead.stocks[int(found.after[0])][2]
+    row, stock = int(found.worst[0]), ahead.before(ahead.states[int(found.after[0])][0])
     force = _force(ahead, row)
     away = max(cutter.diameter for cutter in cutters.values())
     return bent_workpiece(build(stock, grid), stock, int(found.step[row]), found.lines[row], force, away)
@@ -273,7 +268,7 @@ def _bend_workpiece(
 
 def _cell_error(
     found: StepCompliances,
-    stocks: Sequence[LayeredStock],
+    ahead: CutAhead,
     grid: CellGrid,
     build: Callable[[LayeredStock, CellGrid], CellWorkpiece],
 ) -> float:
@@ -281,7 +276,8 @@ def _cell_error(
     wide, error = grid.wider(COARSER), 0.0
     for state in np.unique(found.after).tolist():
         own = np.flatnonzero(found.after == state)
-        other = size_of(line_compliances(build(stocks[state], wide), found.lines[found.worst[own]]))
+        work = build(ahead.before(ahead.states[state][0]), wide)
+        other = size_of(line_compliances(work, found.lines[found.worst[own]]))
         size = size_of(found.after_compliance[own])
         error = max(error, float(np.abs(other / size - 1.0).max(initial=0.0)))
     return CORNER * error

@@ -445,10 +445,10 @@ def moves_again(setting: RunSettings, run: MoveRun, columns: Columns) -> Again:
         if stock is None:
             return dict.fromkeys((*COMPARABLE, AXIAL, CHIP), 0.0), 0.0, []
         stock.more = stock.more if more is None else more
-        finer = replace(run, stock=stock, corner_slices=MORE * run.corner_slices, flank_mm=flank)
+        finer = replace(run, stock=stock, shank=None, corner_slices=MORE * run.corner_slices, flank_mm=flank)
         for some in window.earlier:
             finer.make(some, len(some))
-        found = remove_by_moves(own, finer, 0, setting.cutters, setting.material, rotation)
+        found = remove_by_moves(own, finer, 0, setting.cutters, setting.material, rotation, asks_shank=False)
         loads = dict(zip(LOADS, found.loads.T, strict=True))
         worst = {name: float(loads[name].max()) for name in COMPARABLE} | {AXIAL: float(axial_force(loads).max())}
         worst[CHIP] = max((float(chip_error(c.plain, c.cutter).max(initial=0.0)) for c in found.cuts), default=0.0)

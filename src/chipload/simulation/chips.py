@@ -51,9 +51,8 @@ from chipload.simulation.loads import (
 )
 from chipload.simulation.moves import (
     Engine,
-    HandOver,
+    MaterialAboveFlutes,
     MoveRun,
-    NotSimulated,
     remove_by_moves,
     run_by_moves,
     with_contact,
@@ -70,7 +69,6 @@ from chipload.simulation.removal import (
 )
 from chipload.simulation.steps import BLOCK, StepBlocks, Steps, moving_rows, number_of_steps, steps_in_blocks
 from chipload.simulation.strips import strips_for
-from chipload.simulation.swept_area import require_upright
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_min_from_mm_s
 from chipload.workers import Workers
@@ -121,8 +119,7 @@ def remove(
     workers : threads that find areas ahead of the removal
     processes : of layers, each with a strip of the stock (:mod:`chipload.simulation.strips`), as a number or as
         :class:`chipload.workers.Workers`, also of a cluster; the result does not depend on threads and processes
-    engine : ``layers`` or ``moves``; ``auto``: by moves what goes by moves, see :mod:`chipload.simulation.moves`, and
-        else the whole program by layers, with a finding ``handed-over``
+    engine : ``moves`` (``auto`` is the same), see :mod:`chipload.simulation.moves`, or ``layers``
     loads : False: only what is removed is needed; moves then leave the loads 0
     outlines : False: of what is left only the volume is needed: moves then leave ``stock`` as it was, and its volume
         after them is that before less the chips
@@ -154,10 +151,10 @@ def remove(
     count = count_steps(program, cutters, resolution)
     progress(0.0, "removing")
     setting = setting_of(cutters, material, resolution, watch, workers, processes)
-    setting, handed = with_engine(engine, replace(setting, loads=loads), program, stock)
+    setting = with_engine(engine, replace(setting, loads=loads), program, stock)
     before = stock.copied() if accuracy else None
     while True:
-        begun = sums = RunningSums(stock.volume(), handed=handed)
+        begun = sums = RunningSums(stock.volume(), shank=setting.asks_shank)
         kept, columns = dict[int, list[Cuts]](), list[Columns]()
         try:
             for sums, some, cuts in _blocks_removed(program, stock, begun, setting, times):
@@ -166,8 +163,8 @@ def remove(
                 for engaged in cuts if keep else ():
                     kept.setdefault(engaged.tool, []).append(engaged)
             break
-        except HandOver as why:
-            setting, handed = by_layers(engine, setting, why, program, stock)
+        except MaterialAboveFlutes:
+            setting = with_engine(engine, setting, program, stock, shank=True)
     progress(1.0, "removed")
     cut = tuple(join_cuts(kept[number]) for number in sorted(kept))
     if setting.moves is not None and outlines:
@@ -198,53 +195,17 @@ def block_of(setting: RunSettings) -> int:
 
 
 def with_engine(
-    engine: Engine, setting: RunSettings, program: Program, stock: LayeredStock
-) -> tuple[RunSettings, tuple[int, str] | None]:
-    """Return the settings with the engine, and why the program was handed over to the layers.
-
-    Raises
-    ------
-    InputError
-        The moves were asked for and cannot simulate the program.
-    """
+    engine: Engine, setting: RunSettings, program: Program, stock: LayeredStock, *, shank: bool = False
+) -> RunSettings:
+    """Return the settings with the engine; ``shank``: material stands above the flutes, and the shank is looked for."""
     if engine == "layers":
-        return setting, None
+        return setting
     fine = setting.resolution
-    try:
-        run = run_by_moves(
-            program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm,
-            setting.loads,
-        )  # fmt: skip
-    except HandOver as found:
-        return by_layers(engine, setting, found, program, stock)
-    return replace(setting, moves=run), None
-
-
-def by_layers(
-    engine: Engine, setting: RunSettings, found: HandOver, program: Program, stock: LayeredStock
-) -> tuple[RunSettings, tuple[int, str]]:
-    """Return the settings of the run from its start by layers.
-
-    Raises
-    ------
-    InputError
-        The moves were asked for, or the axis of the tool lies or looks up somewhere, which layers cannot simulate.
-    """
-    place = f"line {found.line}" if found.line else "stock"
-    if engine == "moves":
-        raise InputError(f'{place}: {found.why}: state engine = "layers" or "auto"')
-    shaped = sorted(n for n in np.unique(program.tool).tolist() if n in setting.cutters and setting.cutters[n].shape)
-    if shaped:
-        raise InputError(
-            f"{place}: {found.why}, which is simulated by layers only, and layers do not know the shape of tool "
-            f"{shaped[0]}: change the program, or choose another cutter"
-        )
-    fine = setting.resolution
-    try:
-        require_upright(program, fine.step_mm, fine.tolerance, stock, setting.cutters)
-    except InputError as err:
-        raise NotSimulated(f"{place}: {found.why}, which is simulated by layers only, and {err}", found) from None
-    return replace(setting, moves=None), (found.line, found.why)
+    run = run_by_moves(
+        program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm,
+        setting.loads, shank=shank,
+    )  # fmt: skip
+    return replace(setting, moves=run)
 
 
 def with_accuracy(removal: Removal, program: Program, before: LayeredStock | None, setting: RunSettings) -> Removal:
@@ -442,9 +403,6 @@ def removal_of(
         band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
     # rapids that cut more than films
     found = tuple(Finding("rapid-cuts", line, "a rapid goes through material") for line in sums.rapids)
-    if sums.handed is not None:
-        line, why = sums.handed
-        found += (Finding("handed-over", line, f"the whole program is simulated by layers: {why}"),)
     return Removal(columns, sums.before, stock.volume(), band, sums.piece, found, program.labels, cuts)
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
@@ -29,7 +28,6 @@ from chipload.progress import Progress, silent
 from chipload.simulation.checkpoint import Checkpoint, digest
 from chipload.simulation.chips import (
     block_of,
-    by_layers,
     count_steps,
     removal_of,
     remove_block,
@@ -38,7 +36,7 @@ from chipload.simulation.chips import (
     with_accuracy,
     with_engine,
 )
-from chipload.simulation.moves import Engine, HandOver, with_contact
+from chipload.simulation.moves import Engine, MaterialAboveFlutes, with_contact
 from chipload.simulation.removal import ChipAreas, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.steps import BLOCK, steps_in_blocks
 from chipload.simulation.strips import strips_for
@@ -53,8 +51,8 @@ MOST = 32 * BLOCK
 #: writing a state takes at most this share of the time
 SHARE = 0.05
 #: what a file of sums says of itself, and its arrays with their numbers of dimensions
-SUMS = "chipload sums of a simulation 1"
-ARRAYS = {"handed": 1, "numbers": 1, "basis": 2, "rapids": 1, "of": 1, "height": 1, "tip": 2, "axis": 2}
+SUMS = "chipload sums of a simulation 2"
+ARRAYS = {"numbers": 1, "basis": 2, "rapids": 1, "of": 1, "height": 1, "tip": 2, "axis": 2}
 
 
 class WatchState(Protocol):
@@ -112,12 +110,11 @@ def remove_in_chunks(
     part = None if stock.part is None else (np.asarray(stock.part.vertices), np.asarray(stock.part.faces))
     depends = (program, cutters, material, resolution, shape, part, watch is not None, BLOCK, times)
     kept = unfinished.begin(digest(*depends, engine, also))
-    setting, handed = with_engine(engine, setting, program, stock)
-    sums, before, state = RunningSums(stock.volume(), handed=handed), stock.copied(), None
+    sums, before, state = RunningSums(stock.volume()), stock.copied(), None
     if kept is not None:
         try:
             found_sums = _read_sums(kept["sums"], cutters)
-            if setting.moves is None or "stock" in kept:
+            if engine == "layers":
                 state = LayeredStock.load(kept["stock"]).state()
             for name, state_of in keeps.items():
                 state_of.restore(kept[name])
@@ -127,20 +124,20 @@ def remove_in_chunks(
                 state_of.clear()
             kept = None
     sums = sums if kept is None else found_sums
+    setting = with_engine(engine, setting, program, stock, shank=sums.shank)
     progress(sums.steps / count, "removing")
     if kept is not None:
         if state is not None:
             stock.restore(state)
-            setting = replace(setting, moves=None)
         elif setting.moves is not None:
             setting.moves.skip(program, resolution.step_mm, sums.steps)
         unfinished.notice(f"continues after step {sums.steps} of {count}, kept in {unfinished.folder}")
     try:
         sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, progress)
-    except HandOver as found:
-        setting, handed = by_layers(engine, setting, found, program, stock)
-        unfinished.again(f"starts from the beginning with the engine layers: line {found.line}: {found.why}")
-        sums = RunningSums(stock.volume(), handed=handed)
+    except MaterialAboveFlutes as found:
+        unfinished.again(f"starts from the beginning, and asks for the shank in material: line {found.line}: {found}")
+        setting = with_engine(engine, setting, program, stock, shank=True)
+        sums = RunningSums(stock.volume(), shank=True)
         for state_of in keeps.values():
             state_of.clear()
         sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, progress)
@@ -207,10 +204,8 @@ def _sums_bytes(sums: RunningSums, cutters: Mapping[int, Cutter]) -> bytes:
     piece = sums.piece
     tool = [n for n, c in cutters.items() if piece is not None and c is piece.cutter]
     none = np.zeros((0, 3))
-    handed = f"{sums.handed[0]} {sums.handed[1]}" if sums.handed is not None else ""
     arrays = {
-        "handed": np.frombuffer(handed.encode(), dtype=np.uint8),
-        "numbers": np.array([sums.before, sums.steps, sums.s_mm, sums.t_s, sums.cut_s]),
+        "numbers": np.array([sums.before, sums.steps, sums.s_mm, sums.t_s, sums.cut_s, sums.shank]),
         "basis": sums.basis,
         "rapids": np.array(sums.rapids, dtype=np.int64),
         "of": np.array([piece.step, *tool] if piece is not None else [], dtype=np.int64),
@@ -225,15 +220,14 @@ def _sums_bytes(sums: RunningSums, cutters: Mapping[int, Cutter]) -> bytes:
 
 def _read_sums(path: Path, cutters: Mapping[int, Cutter]) -> RunningSums:
     a, shapes = read_shapes(path, SUMS, ARRAYS)
-    if a["numbers"].shape != (5,) or a["basis"].shape != (4, 6) or (len(a["of"]) == 0) != (len(shapes) == 0):
+    if a["numbers"].shape != (6,) or a["basis"].shape != (4, 6) or (len(a["of"]) == 0) != (len(shapes) == 0):
         raise InputError(f"{path}: damaged: remove its folder")
-    before, steps, s_mm, t_s, cut_s = a["numbers"].tolist()
+    before, steps, s_mm, t_s, cut_s, shank = a["numbers"].tolist()
     piece = None
     if len(shapes):
         step, tool = a["of"].tolist()
         chips = tuple(p for p in shapes[1:] if isinstance(p, Polygon))
         assert isinstance(shapes[0], MultiPolygon)
         piece = ChipAreas(step, Move(a["tip"], a["axis"]), cutters[tool], float(a["height"][0]), shapes[0], chips)
-    line, _, why = bytes(a["handed"].astype(np.uint8)).decode().partition(" ")
-    handed = (int(line), why) if line else None
-    return RunningSums(before, int(steps), s_mm, t_s, cut_s, a["basis"], tuple(a["rapids"].tolist()), piece, handed)
+    rapids = tuple(a["rapids"].tolist())
+    return RunningSums(before, int(steps), s_mm, t_s, cut_s, a["basis"], rapids, piece, bool(shank))

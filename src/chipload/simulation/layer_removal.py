@@ -18,7 +18,7 @@ from chipload.engagement.chips.move import Move
 from chipload.engagement.immersion.immersion import Section
 from chipload.simulation.loads import StepEngagement, engagement_of_step
 from chipload.simulation.removal import ChipAreas, RunSettings, TakenByLayers
-from chipload.simulation.shank import axial_overrun
+from chipload.simulation.shank import AROUND
 from chipload.simulation.steps import Steps
 from chipload.simulation.swept_area import TOGETHER, Plan, Swept, swept_ahead
 from chipload.stock.layers import LayeredStock
@@ -85,7 +85,7 @@ def removed_by_layers(
                 found = _most_parts(tiles, removal, swept, rank, first + k, cutter, FILM * tolerance)
                 if found is not None:
                     best, rank = found, rank_of(found.chips)
-                removed[k, 3] = axial_overrun(tiles, cutter, steps.p1[k], steps.a1[k], FILM * tolerance)
+                removed[k, 3] = _axial_overrun(tiles, cutter, steps.p1[k], steps.a1[k], FILM * tolerance)
             # what is thinner than the tolerance can tell is no cut
             if most and not steps.rapid[k]:
                 cutting.append((k, swept.move, there))
@@ -121,3 +121,37 @@ def _most_parts(
             z = float(tiles.stock.heights[i])
             best = ChipAreas(step, swept.move, cutter, z, MultiPolygon(near), tuple(whole))
     return best
+
+
+def _axial_overrun(
+    tiles: TileRings, cutter: Cutter, tip: NDArray[np.float64], axis: NDArray[np.float64], margin: float
+) -> float:
+    """Return the length of the shank in material, from the end of the flutes upwards [mm]; 0 if none.
+
+    Parameters
+    ----------
+    tiles : of the stock, as they are
+    tip, axis : (3,) where the cutter is [mm], and its axis, unit
+    margin : what the shank may touch [mm]
+    """
+    stock = tiles.stock
+    shank = cutter.diameter if cutter.shank_diameter is None else cutter.shank_diameter
+    radius = 0.5 * shank - margin
+    low = float(tip[2] + cutter.flute_length * axis[2])
+    lean = radius * math.sqrt(max(1.0 - float(axis[2]) ** 2, 0.0))
+    first = int(np.searchsorted(stock.heights, low - lean))
+    if radius <= 0.0 or first >= stock.layers:
+        return 0.0
+    turn = np.arange(AROUND) * (math.tau / AROUND)
+    across = np.cross(axis, (1.0, 0.0, 0.0) if abs(axis[0]) < 0.9 else (0.0, 1.0, 0.0))
+    across /= np.linalg.norm(across)
+    ring = radius * (np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * np.cross(axis, across))
+    ring = np.vstack([np.zeros(3), 0.5 * ring, ring])
+    height, step = cutter.flute_length, float(stock.thickness[first])
+    # the lowest section above the flutes decides where an upright cutter begins
+    offset = float(stock.heights[first] - low) if lean < 1e-9 else 0.5 * step
+    found = 0.0
+    while height + offset < cutter.overhang and tiles.holds(tip + (height + offset) * axis + ring):
+        height += step
+        found = height - cutter.flute_length
+    return found

@@ -6,8 +6,11 @@ volume and mean loads are the means over the instants, its greatest loads the gr
 tooth engagement at the instant of the greatest force; of several equal ones, that nearest to the middle.
 
 The initial body is a block, a mesh, or what was left before: the body of a stock less the moves that cut it, where they
-are known (:mod:`chipload.stock.earlier_moves`), else its layers. Tools that are bodies without chips make no move. A
-program that this engine cannot simulate is handed over: :class:`HandOver` names the line and the reason.
+are known (:mod:`chipload.stock.earlier_moves`), else its layers. Tools that are bodies without chips make no move.
+
+A cutter of an upright axis is open above until material stands above its flutes, which :class:`MaterialAboveFlutes`
+names. The run then begins again with cutters that end where their flutes end, and asks where the shank is in material
+(:mod:`chipload.simulation.shank`).
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,9 +39,13 @@ from chipload.lazy import LateModule
 from chipload.program.program import Program
 from chipload.simulation.initial_stock import initial_stock, make_earlier, moves_of, skip_moves
 from chipload.simulation.loads import BANDS, LOADS, ONE_SIDE, Cuts, engaged_work
+from chipload.simulation.shank import ShankContact
 from chipload.simulation.steps import ROWS, Steps, steps_in_blocks
 from chipload.stock.earlier_moves import EarlierMoves
 from chipload.stock.layers import LayeredStock
+
+if TYPE_CHECKING:
+    from chipload.simulation.removal import Resolution
 
 skew = LateModule("chipload.engagement.moves._skew_slices")
 
@@ -68,23 +75,12 @@ ALIKE = 1e-3
 FILM = 4.0
 
 
-class HandOver(Exception):
-    """Error: the engine ``moves`` cannot simulate the program; with its line and the reason.
+class MaterialAboveFlutes(Exception):
+    """Error: material stands above the flutes of a tool, in a run that does not ask for its shank; with the line."""
 
-    ``tool`` is the one above whose flutes material stands, where that is the reason; else 0.
-    """
-
-    def __init__(self, line: int, why: str, tool: int = 0) -> None:
-        super().__init__(why)
-        self.line, self.why, self.tool = line, why, tool
-
-
-class NotSimulated(InputError):
-    """Error: neither moves nor layers can simulate the program; ``found`` is why moves cannot."""
-
-    def __init__(self, text: str, found: HandOver) -> None:
-        super().__init__(text)
-        self.found = found
+    def __init__(self, line: int, tool: int) -> None:
+        super().__init__(f"material stands above the flutes of tool {tool}")
+        self.line, self.tool = line, tool
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +89,7 @@ class Moved:
 
     Parameters
     ----------
-    removed : (n, 4) volume [mm^3], pieces and layers of each chip, contact of the shank: 0, for that is handed over
+    removed : (n, 4) volume [mm^3], pieces and layers of each chip, length of the shank in material [mm]
     loads : (n, len(LOADS))
     bands : (n,) each, columns of :data:`chipload.simulation.loads.BANDS`; none where the material has no band
     basis : (4, 6) integral over the time in cut of the factors of the coefficients
@@ -119,6 +115,7 @@ class MoveRun:
     tolerance : of outlines [mm]
     bodies : numbers of tools that are bodies without chips
     earlier : moves that cut the body before the run; they are in ``stock``
+    shank : is asked where material stands above the flutes; None: a run that meets some ends
     """
 
     stock: MoveStock | BrickStock
@@ -128,6 +125,7 @@ class MoveRun:
     tolerance: float
     bodies: tuple[int, ...] = ()
     earlier: EarlierMoves | None = None
+    shank: ShankContact | None = None
 
     @property
     def upright(self) -> bool:
@@ -146,7 +144,10 @@ class MoveRun:
         """Make the first ``count`` of some steps without calculating them."""
         own = self._moving(steps)[:count]
         p0, p1, tool = steps.p0[:count][own], steps.p1[:count][own], steps.tool[:count][own]
-        skip_moves(self.stock, p0, p1, steps.a0[:count][own], steps.a1[:count][own], tool)
+        poses = (p0, p1, steps.a0[:count][own], steps.a1[:count][own])
+        skip_moves(self.stock, *poses, tool)
+        if self.shank is not None:
+            self.shank.overrun(poses, tool, np.zeros(0, dtype=np.int64), np.zeros(0))
 
     def cropped(self, low: Floats, high: Floats) -> MoveStock | BrickStock | None:
         """Return the stock before the run in a box (3,), (3,) [mm]; None where it does not reach into it."""
@@ -159,11 +160,16 @@ class MoveRun:
         """Make some steps and return their engagement."""
         pieces, flank, own = self.corner_slices, self.flank_mm, self._moving(steps)
         p0, p1, tool = steps.p0[own], steps.p1[own], steps.tool[own]
+        poses = (p0, p1, steps.a0[own], steps.a1[own])
         if isinstance(self.stock, BrickStock):
-            poses = (p0, p1, steps.a0[own], steps.a1[own])
             found = self.stock.take(*poses, tool, corner_slices=pieces, flank_mm=flank)
         else:
             found = self.stock.take(p0, p1, tool, corner_slices=pieces, flank_mm=flank)
+        if self.shank is not None:
+            at = np.flatnonzero(found.above)
+            time = (found.instant[at] + 0.5) / found.instants[at]
+            overrun = self.shank.overrun(poses, tool, found.step[at], time)
+            found = replace(found, overrun=overrun[found.step])
         return found if own.all() else replace(found, step=np.flatnonzero(own)[found.step])
 
     def finish(self, stock: LayeredStock, workers: int) -> None:
@@ -192,15 +198,21 @@ def run_by_moves(
     corner_slices: int,
     flank_mm: float,
     loads: bool = True,
+    *,
+    shank: bool = False,
 ) -> MoveRun:
     """Return the run of a program by moves: by heights over the plan if the axis is always upright and no cutter is
     undercut, else by bricks; without ``loads`` at fewer instants.
+
+    Parameters
+    ----------
+    shank : material stands above the flutes: cutters end with them, and the shank is looked for in material
     """
     used = {n: c for n, c in cutters.items() if bool((program.tool == n).any())}
     bodies = tuple(n for n, c in used.items() if c.body)
     cutting = {n: c for n, c in used.items() if n not in bodies} or used
     # heights over the plan know no undercut
-    upright = not leans(program).any() and not any(c.undercut for c in cutting.values())
+    upright = not shank and not leans(program).any() and not any(c.undercut for c in cutting.values())
     made = initial_stock(stock, cutting, upright=upright)
     if not loads:
         made.more = OF_VOLUME
@@ -209,7 +221,39 @@ def run_by_moves(
         flank_mm = min(flank_mm, LAYERED_FLANK * min(c.radius for c in cutting.values()))
     flank = dict.fromkeys(made.table, flank_mm)
     slices = math.ceil(ENGAGED * corner_slices)
-    return MoveRun(made, np.asarray(stock.bounds), slices, flank, tolerance, bodies, stock.earlier)
+    follows = initial_stock(stock, cutting, upright=False) if shank else None
+    asked = ShankContact(follows, FILM * tolerance) if isinstance(follows, BrickStock) else None
+    return MoveRun(made, np.asarray(stock.bounds), slices, flank, tolerance, bodies, stock.earlier, asked)
+
+
+def stock_before(
+    step: int,
+    program: Program,
+    stock: LayeredStock,
+    cutters: Mapping[int, Cutter],
+    resolution: Resolution,
+    after: LayeredStock,
+    workers: int = 2,
+) -> LayeredStock:
+    """Return the stock before a step of a program.
+
+    Parameters
+    ----------
+    stock : before the program; it stays
+    after : the stock after the program
+    workers : threads
+    """
+    out, fine = stock.copied(), resolution
+    if step > 0:
+        # of moves that are kept with their axes the cutters end where their flutes end
+        ends = after.earlier is None or not after.earlier.upright
+        run = run_by_moves(
+            program, out, cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm, shank=ends
+        )
+        run = replace(run, shank=None)
+        run.skip(program, fine.step_mm, step)
+        run.finish(out, workers)
+    return out
 
 
 def leans(program: Program) -> NDArray[np.bool_]:
@@ -246,33 +290,31 @@ def remove_by_moves(
     rotation: float,
     found: Engaged | None = None,
     with_loads: bool = True,
+    asks_shank: bool = True,
 ) -> Moved:
     """Return the removal of some steps; ``first`` is the number of the first, ``found`` their engagement if known.
 
-    Without loads those are 0.
+    Without loads those are 0. Material above the flutes is ignored unless ``asks_shank``.
 
     Raises
     ------
-    HandOver
-        There is material above the flutes.
+    MaterialAboveFlutes
+        There is material above the flutes, and the run does not ask for the shank.
     InputError
         A cut is made with the spindle at rest.
     """
     n = len(steps)
     found = run.contact(steps) if found is None else found
-    if found.above.any():
+    if asks_shank and found.overrun is None and found.above.any():
         k = int(found.step[int(np.argmax(found.above))])
-        tool = int(steps.tool[k])
-        raise HandOver(
-            int(steps.line[k]),
-            f"material stands above the flutes of tool {tool} ({cutters[tool].flute_length:g} mm)",
-            tool,
-        )
+        raise MaterialAboveFlutes(int(steps.line[k]), int(steps.tool[k]))
     removed, loads, basis, cuts = np.zeros((n, 4)), np.zeros((n, len(LOADS))), np.zeros((4, 6)), list[Cuts]()
     bands = {name: np.zeros(n) for name in BANDS} if material.has_band and with_loads else {}
     removed[:, 0] = np.bincount(found.step, found.volume / found.instants, n)
     np.maximum.at(removed[:, 1], found.step, found.areas)
     removed[:, 2] = _layers(found, run.layers, n)
+    if found.overrun is not None:
+        np.maximum.at(removed[:, 3], found.step, found.overrun)
     rapid = steps.rapid[found.step]
     length = np.linalg.norm(steps.p1 - steps.p0, axis=1)[found.step]
     film = rapid & (found.volume <= FILM * run.tolerance * length * found.edge_mm)

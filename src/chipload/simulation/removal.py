@@ -117,7 +117,7 @@ class Removal:
     mean_band : (4,) standard deviation of the mean force x, y, z [N] and torque [N m] over the time in cut, from that
         of the coefficients; None: the material does not state their uncertainty
     piece : the chip with most pieces that are most alike; None where nothing was cut
-    findings : rapids that cut, and whether the run was handed over to the layers
+    findings : rapids that cut
     labels : of the program, `label` of the columns counts in them
     cuts : tooth engagement, one for each cutter that cuts; empty unless requested
     energy_balance : work over the specific energy of the volume removed, less 1, by tool number; empty where nothing
@@ -140,11 +140,6 @@ class Removal:
     resolution_error: Mapping[str, float] = field(default_factory=dict)
     load_parts: Mapping[tuple[int, str], LoadParts] = field(default_factory=dict)
     samples: EngagementSamples | None = None
-
-    @property
-    def handed_over(self) -> bool:
-        """Whether the run was handed over from moves to layers."""
-        return any(f.code == "handed-over" for f in self.findings)
 
     @property
     def band_error(self) -> dict[str, float]:
@@ -194,6 +189,11 @@ class RunSettings:
     processes: Workers = field(default_factory=Workers)
     loads: bool = True
 
+    @property
+    def asks_shank(self) -> bool:
+        """Whether the run asks for the shank in material."""
+        return self.moves is not None and self.moves.shank is not None
+
 
 @dataclass(frozen=True, eq=False)
 class RunningSums:
@@ -207,7 +207,7 @@ class RunningSums:
     basis : (4, 6) integral over the time in cut of the factors of the coefficients
     rapids : lines with rapids that cut
     piece : as in :class:`Removal`
-    handed : line and reason for which the run was handed over from moves to layers
+    shank : the run asks for the shank in material
     """
 
     before: float
@@ -218,4 +218,4 @@ class RunningSums:
     basis: Floats = field(default_factory=lambda: np.zeros((4, 6)))
     rapids: tuple[int, ...] = ()
     piece: ChipAreas | None = None
-    handed: tuple[int, str] | None = None
+    shank: bool = False

@@ -26,6 +26,7 @@ _sweep = LateModule("chipload.engagement.bricks._sweep")
 front = LateModule("chipload.engagement.bricks._contact")
 index = LateModule("chipload.engagement.bricks._index")
 outline = LateModule("chipload.engagement.bricks._outline")
+points_in = LateModule("chipload.engagement.bricks._points")
 moves_circle = LateModule("chipload.engagement.moves._circle")
 initial = LateModule("chipload.engagement.moves._initial_faces")
 
@@ -262,6 +263,14 @@ class BrickStock:
             slices[:k], out[:, 0], out[:, 1].astype(np.int64), out[:, 2:4], out[:, 4:7], out[:, 7], out[:, 9],
             out[:, 8] > 0.0, out[:, 10:19].reshape(-1, 3, 3),
         )  # fmt: skip
+
+    def contains(self, points: Floats) -> NDArray[np.bool_]:
+        """Return which points (n, 3) [mm] are in material: in the initial body, and in no volume that a move swept."""
+        at = np.ascontiguousarray(points, dtype=np.float64)
+        inside = np.empty(len(at), dtype=np.bool_)
+        points_in.marked(at, self._index(), inside)
+        # of a stock thinner than a cell the one cell reaches beyond it
+        return inside & (at >= self.low).all(axis=1) & (at <= self.high).all(axis=1)
 
     def lowest(self) -> float:
         """Return a height [mm] below which nothing was cut."""

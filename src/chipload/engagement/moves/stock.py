@@ -30,6 +30,7 @@ flanks = LateModule("chipload.engagement.moves._flank")
 front = LateModule("chipload.engagement.moves._contact")
 initial = LateModule("chipload.engagement.moves._initial_faces")
 outline = LateModule("chipload.engagement.moves._outline")
+points_in = LateModule("chipload.engagement.moves._points")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -126,6 +127,7 @@ class Engaged:
     above : (m,) bool, material above the flutes
     frames : (m, 3, 3) float, rows T, N = A x T and A of an axis that leans or turns: psi is then counted from T, and
         ``slices`` have three more columns, of the motion along T, along N and along the axis; None: the axis is z
+    overrun : (m,) float [mm], greatest length of the shank in material in the step; None: not asked
     """
 
     step: Ints
@@ -143,6 +145,7 @@ class Engaged:
     edge_mm: Floats
     above: NDArray[np.bool_]
     frames: Floats | None = None
+    overrun: Floats | None = None
 
 
 def faces_of(body: trimesh.Trimesh) -> Floats:
@@ -361,6 +364,14 @@ class MoveStock:
             slices[:k], out[:, 0], out[:, 1].astype(np.int64), out[:, 2:4], out[:, 4:7], out[:, 7], out[:, 9],
             out[:, 8] > 0.0,
         )  # fmt: skip
+
+    def contains(self, points: Floats) -> NDArray[np.bool_]:
+        """Return which points (n, 3) [mm] are in material: in the initial body, and in no volume that a move swept."""
+        at = np.ascontiguousarray(points, dtype=np.float64)
+        inside = np.empty(len(at), dtype=np.bool_)
+        points_in.marked(at, self._index(), inside)
+        # of a stock thinner than a cell the one cell reaches beyond it
+        return inside & (at >= self.low).all(axis=1) & (at <= self.high).all(axis=1)
 
     def lowest(self) -> float:
         """Return a height [mm] below which nothing was cut."""

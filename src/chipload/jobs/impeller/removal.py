@@ -36,7 +36,6 @@ from chipload.planning.impeller.feeds import ForceTerms
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.result import check_limit, error_of
-from chipload.simulation.moves import NotSimulated
 
 Floats = NDArray[np.float64]
 
@@ -89,31 +88,19 @@ def removal_of_programs(
     """
     sequence = ProgramSequence.of([(p.read.program, p.read.times) for p in programs])
     tools = {int(p.read.program.tool[0]): tool_with_teeth(p.cutter, p.read.program, terms) for p in programs}
-    above = list[Finding]()
-    while True:
-        inputs = inputs_of(tools, stock, machine, terms)
-        try:
-            body = stock.layered(sequence.program, tools)
-            simulation = simulate_program(inputs, sequence, body, progress=progress)
-            break
-        except NotSimulated as err:
-            tool = tools.get(err.found.tool)
-            if tool is None or tool.flute_length >= tool.overhang:
-                return _not_simulated(programs, sequence, above, err)
-            above.append(Finding("above-flutes", err.found.line, err.found.why, Severity.EXCEEDS))
-            # what the flutes cannot cut is cut, so that the rest of the programs is seen
-            tools[tool.number] = replace(tool, flute_length=tool.overhang)
-        except InputError as err:
-            return _not_simulated(programs, sequence, above, err)
+    inputs = inputs_of(tools, stock, machine, terms)
+    try:
+        body = stock.layered(sequence.program, tools)
+        simulation = simulate_program(inputs, sequence, body, progress=progress)
+    except InputError as err:
+        found = Finding("not-simulated", 0, f"the programs are not simulated in the blank: {err}", Severity.UNPROVEN)
+        return [ProgramRemoval(findings=(found,)) for _ in programs]
     taken = _taken_by_rapids(simulation)
-    findings = (
-        *above,
-        *(
-            f
-            for f in simulation_findings(simulation)
-            if f.code not in OF_MACHINE and not (f.code == "rapid-cuts" and taken.get(f.line, math.inf) <= touch)
-        ),
-    )
+    findings = [
+        f
+        for f in simulation_findings(simulation)
+        if f.code not in OF_MACHINE and not (f.code == "rapid-cuts" and taken.get(f.line, math.inf) <= touch)
+    ]
     return [_of_program(k, p, sequence, simulation, findings, terms) for k, p in enumerate(programs)]
 
 
@@ -152,15 +139,6 @@ def tool_with_teeth(size: CatalogueCutter, program: Program, terms: ForceTerms |
     if terms is None:
         return replace(tool, flutes=FLUTES, helix=HELIX)
     return replace(tool, flutes=terms.flutes, helix=terms.helix, modulus=terms.modulus, strength=terms.strength)
-
-
-def _not_simulated(
-    programs: Sequence[ImpellerProgram], sequence: ProgramSequence, above: Sequence[Finding], err: InputError
-) -> list[ProgramRemoval]:
-    found = Finding("not-simulated", 0, f"the programs are not simulated in the blank: {err}", Severity.UNPROVEN)
-    return [
-        ProgramRemoval(findings=(*_findings_of(k, p.read, sequence, above, 0), found)) for k, p in enumerate(programs)
-    ]
 
 
 def _findings_of(

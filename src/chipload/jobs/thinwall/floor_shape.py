@@ -18,7 +18,8 @@ from chipload.jobs.thinwall.neighbours import part_collisions
 from chipload.jobs.thinwall.outcome import Shape
 from chipload.jobs.thinwall.places import Places
 from chipload.planning.thinwall.pass_program import PassProgram
-from chipload.simulation.section_deviation import section_deviation
+from chipload.simulation.initial_stock import initial_stock
+from chipload.simulation.shape_deviation import mesh_points, shape_deviation
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
@@ -32,7 +33,9 @@ def floor_shape(places: Places, stock: LayeredStock, pass_programs: Sequence[Pas
     inputs = places.inputs
     gap, at = _nearest(inputs, pass_programs)
     corner = max(o.cut.cutter.corner_radius for o in inputs.operations)
-    found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + corner)
+    cutters = {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
+    left = initial_stock(stock, cutters, upright=True)
+    found = shape_deviation(left, *mesh_points(inputs.finished_mesh()), inputs.foot_height + corner)
     return Shape(
         found.gouge,
         found.left,

@@ -29,7 +29,6 @@ def load_error(
     resolution: Resolution,
     *,
     floors: bool = False,
-    layers: bool = False,
 ) -> dict[str, float]:
     """Relative error of the worst value of each column of loads of a removal.
 
@@ -38,7 +37,6 @@ def load_error(
     before : the stock before the whole program
     floors : floors are cut, so that the force along the axis is compared too, and that along the normal of a surface
         next to the cutter is not
-    layers : the removal was by layers, not by moves
 
     Returns
     -------
@@ -47,7 +45,7 @@ def load_error(
     names = (*COMPARED, AXIAL) if floors else COMPARABLE
     columns = {**removal.columns, AXIAL: axial_force(removal.columns)}
     setting = setting_of(cutters, material, resolution, None, 1)
-    setting, _ = with_engine("layers" if layers else "moves", setting, program, before)
+    setting = with_engine("moves", setting, program, before)
     found = resolution_error_of(program, before, columns, setting, names)[0]
     out = {name: found[name] for name in names}
     if floors:  # a floor moves under the lateral force as well

@@ -37,8 +37,9 @@ from chipload.progress import Progress
 from chipload.simulation.chips import remove, stack_blocks
 from chipload.simulation.contact_points import touch_points
 from chipload.simulation.deflection import Contacts, form_error, step_deflections
+from chipload.simulation.initial_stock import initial_stock
 from chipload.simulation.removal import Removal, Resolution, removal_between
-from chipload.simulation.section_deviation import nearest, section_deviation
+from chipload.simulation.shape_deviation import mesh_points, nearest, shape_deviation
 from chipload.stock.layers import LayeredStock
 from chipload.structure.places import normals_of, on_cut, on_side, weights
 from chipload.structure.solid import displacement, factorise
@@ -59,8 +60,10 @@ EVEN = ("constant", "unconstrained")
 POINTS = (33, 25)
 #: the highest points lie so much of v below the free edge, at which the contact of a row ends
 EDGE = 0.002
-#: spacing [mm] of the points of the finished wall with which the path is compared
+#: spacing [mm] of the points of the finished wall with which the path is compared, and the stock up the wall
 CLOUD = 0.2
+#: points along the wall with which the stock is compared
+SHAPE_POINTS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,10 +157,7 @@ def prove(
                 else _finish(inputs, removal, number, places.compliance(left, p.side, of_surface=True), error, bars)
             )
     floors = any(inputs.floor(number) is not None for number in inputs.body.side_numbers)
-    by_layers = whole.handed_over
-    find = partial(
-        load_error, program, places.uncut, whole, cutters, inputs.cut.material, fine, floors=floors, layers=by_layers
-    )
+    find = partial(load_error, program, places.uncut, whole, cutters, inputs.cut.material, fine, floors=floors)
     return Proof(
         stack_blocks(parts),
         tuple(thresholds),
@@ -365,12 +365,11 @@ def _shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProg
         indexing="ij",
     )
     cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.body.shape.sides(u, v)])
-    gaps = [
-        nearest(_rows_of_tool(program, number), cutter, cloud)
-        for number, cutter in {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}.items()
-    ]
+    cutters = {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
+    gaps = [nearest(_rows_of_tool(program, number), cutter, cloud) for number, cutter in cutters.items()]
     gap = min(gaps, key=lambda one: one.distance)
-    found = section_deviation(stock, inputs.finished_mesh(), inputs.foot_height + inputs.below)
+    left = initial_stock(stock, cutters, upright=True)
+    found = shape_deviation(left, *_surface_points(inputs), inputs.foot_height + inputs.below)
     at = found.at if found.gouge > -gap.distance else gap.at
     touched = (
         wall_collisions(inputs, pass_programs)
@@ -378,6 +377,18 @@ def _shape(places: Places, stock: LayeredStock, pass_programs: Sequence[PassProg
         else part_collisions(inputs, places.uncut, pass_programs)
     )
     return Shape(found.gouge, found.left, at, found.points, gap.distance, touched)
+
+
+def _surface_points(inputs: WallInputs) -> tuple[Floats, Floats]:
+    """Points (p, 3) [mm] of the sides that are cut, and of the part, none on an edge, and normals out of the metal."""
+    shape = inputs.body.shape
+    along, up = ((np.arange(n) + 0.5) / n for n in (SHAPE_POINTS, round(shape.size()[1] / CLOUD) + 1))
+    u, v = np.meshgrid(along, up, indexing="ij")
+    points, normals = shape.sides(u, v), shape.normals(u, v)
+    out = [(points[k].reshape(-1, 3), normals[k].reshape(-1, 3)) for k in inputs.body.side_numbers]
+    if inputs.body.part is not None:
+        out.append(mesh_points(inputs.finished_mesh()))
+    return np.vstack([p for p, _ in out]), np.vstack([n for _, n in out])
 
 
 def _rows_of_tool(program: Program, number: int) -> Program:

@@ -162,7 +162,7 @@ def workpiece_cut(
     stock = stock_of_workpiece(job, solid).layered(program, job.cutters)
     fine, elastic = resolution_in_stock(job, program), workpiece_of(require_stated(job.workpiece, "workpiece"))
     known = workpiece_compliance(
-        elastic, program, stock, job.cutters, material, fine, "auto", progress=part_of(progress, 0.0, 0.5)
+        elastic, program, stock, job.cutters, material, fine, progress=part_of(progress, 0.0, 0.5)
     )
     if known.strained is None:
         raise InputError("stock: the program cuts nothing from the workpiece: check its corners and the work offset")

@@ -104,7 +104,8 @@ def _choose_planes(ends: Array, places: Array, cell_mm: float) -> Array:
     planes = ends
     most = MORE * int(cells_between(ends, cell_mm).sum()) + FEW
     for x in places.tolist():
-        if not ends[0] < x < ends[1] or np.abs(planes - x).min() < NEAREST * cell_mm:
+        # a face is known to the tolerance of the outlines only
+        if not ends[0] < x < ends[1] or np.abs(planes - x).min() < NEAREST * cell_mm - ONE:
             continue
         more = np.sort(np.append(planes, x))
         if int(cells_between(more, cell_mm).sum()) <= most:

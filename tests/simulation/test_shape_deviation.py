@@ -5,14 +5,16 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from shapely import box
 
 from chipload.cutter.cutter import Cutter
 from chipload.program.program import LINE, RAPID, Program
-from chipload.simulation.section_deviation import nearest, section_deviation
+from chipload.simulation.initial_stock import initial_stock, skip_moves
+from chipload.simulation.shape_deviation import mesh_points, nearest, shape_deviation
 from chipload.stock.layers import LayeredStock
 
 BALL = Cutter(8.0, 2, 0.5, 10.0, 30.0, 6e5, corner_radius=4.0)
+ALONG = np.array([40.0, 0.0, 0.0])
+FLAT = Cutter(4.0, 2, 0.5, 20.0, 30.0, 6e5)
 BULL = Cutter(10.0, 4, 0.5, 10.0, 30.0, 6e5, corner_radius=1.5)
 
 
@@ -65,13 +67,36 @@ def test_bull_nose_stands_in_a_floor():
 
 
 def test_stock_beside_a_block():
-    """A block of 10 mm in a stock of 12: 1 mm left at the sides; a slot 0.25 mm into it is a gouge of 0.25."""
-    stock = LayeredStock.block((-6.0, -6.0, 0.0), (6.0, 6.0, 4.0), 1.0, 20.0)
-    body = trimesh.creation.box(bounds=[[-5.0, -5.0, 0.0], [5.0, 5.0, 4.0]]).subdivide().subdivide()
-    found = section_deviation(stock, body, 0.0)
-    assert found.gouge == 0.0
-    assert found.left == pytest.approx(1.0)
-    stock.remove(2, box(-1.0, 4.75, 1.0, 7.0))
-    cut = section_deviation(stock, body, 3.0)
-    assert cut.gouge == pytest.approx(0.25)
-    assert cut.at[2] == pytest.approx(2.5)
+    """A block of 10 mm in a stock of 12: 1 mm left at the sides and none at the ends; a slot 0.25 mm into it is a gouge
+    of 0.25 there, and leaves nothing.
+    """
+    layers = LayeredStock.block((-6.0, -6.0, 0.0), (6.0, 6.0, 4.0), 1.0, 20.0)
+    points, normals = mesh_points(trimesh.creation.box(bounds=[[-5.0, -5.0, 0.0], [5.0, 5.0, 4.0]]), 2000)
+    for lean in (0.0, 0.2):
+        stock = initial_stock(layers, {1: FLAT}, upright=lean == 0.0)
+        found = shape_deviation(stock, points, normals, 0.0)
+        assert (found.gouge, found.left, found.points) == (0.0, pytest.approx(1.0, abs=1e-6), len(points))
+        # the flank goes along y = 4.75, at the lower height with an axis that leans along its way
+        axis = np.array([[math.sin(lean), 0.0, math.cos(lean)]])
+        tip = np.array([[-20.0, 4.75 + FLAT.radius, 2.0]])
+        skip_moves(stock, tip, tip + ALONG, axis, axis, np.array([1]))
+        cut = shape_deviation(stock, points, normals, 2.5)
+        assert cut.gouge == pytest.approx(0.25, abs=1e-6)
+        assert 4.75 < cut.at[1] <= 5.0 + 1e-9
+        side = points[:, 1] > 4.9
+        cut = shape_deviation(stock, points[side], normals[side], 2.5)
+        assert cut.left == 0.0
+
+
+def test_a_scallop_is_as_high_as_two_balls_leave_it():
+    """Rows of a ball 2 mm apart over a level face leave 4 - sqrt(16 - 1) mm between them."""
+    layers = LayeredStock.block((-6.0, -6.0, -2.0), (6.0, 6.0, 1.0), 1.0, 20.0)
+    stock = initial_stock(layers, {1: BALL}, upright=True)
+    y = np.arange(-4.0, 5.0, 2.0)
+    tip = np.column_stack([np.full(5, -20.0), y, np.zeros(5)])
+    up = np.tile([0.0, 0.0, 1.0], (5, 1))
+    skip_moves(stock, tip, tip + ALONG, up, up, np.ones(5, dtype=np.int64))
+    at = np.column_stack([np.zeros(97), np.linspace(-3.0, 3.0, 97), np.zeros(97)])
+    found = shape_deviation(stock, at, np.tile([0.0, 0.0, 1.0], (97, 1)), -9.0)
+    assert found.gouge < 1e-6
+    assert found.left == pytest.approx(4.0 - math.sqrt(15.0), rel=2e-3)
