@@ -14,6 +14,8 @@ from chipload.cutting.material import material_named
 
 PRIOR = material_named("al7075-t6")
 RADIUS, TEETH, EFFICIENCY, GAIN_ERROR = 5.0, 4, 0.85, 0.05
+#: power of a spindle whose efficiency is known to GAIN_ERROR
+SIGNAL = Signal(SignalKind.POWER, 1.0 / EFFICIENCY, GAIN_ERROR)
 
 
 @dataclass(frozen=True)
@@ -82,4 +84,4 @@ def cell(seed: int, logs: int = 3) -> tuple[list[LogBlocks], Signal, Truth]:
         assert log.power is not None
         out.append(blocks_of(align_log(f"log {k}", log, log.power, program), program, before))
         before += program.cut_seconds
-    return out, Signal(SignalKind.POWER, 1.0 / EFFICIENCY, GAIN_ERROR), truth
+    return out, SIGNAL, truth

@@ -144,9 +144,29 @@ def test_current_of_an_identified_spindle(cell, tmp_path):
         assert abs(found[key] - value) < 2.5 * deviation
 
 
-def test_what_to_measure_next_without_a_log(cell):
+def test_what_to_measure_next_without_a_log(cell, monkeypatch):
+    """And a watch of the same job: its run is used for both."""
+    runs, run = [], jobs.run_job
+    monkeypatch.setattr(jobs, "run_job", lambda *given, **named: runs.append(run(*given, **named)) or runs[-1])
     code, out, _ = call("next-measurement", cell / "job.toml", "--efficiency-error", "0.0")
     assert code == 0
+    monkeypatch.setattr(jobs, "run_job", lambda *_, **__: runs[0])
+    history = runs[0].result.in_use[0].columns
+    t = np.arange(0.0, history["t_s"][-1], 0.05)
+    row = np.searchsorted(history["t_s"], t)
+    cut = history["power_w"][row] / 0.85
+    lines, seen = history["line"][row], {}
+    for name, keep in (("whole", np.ones(len(t))), ("missing", lines != lines[np.argmax(cut)])):
+        rows = zip(t, 300.0 + cut * keep, lines, strict=True)
+        text = "".join(f"{a:.3f},{p:.2f},{line}\n" for a, p, line in rows)
+        (cell / f"{name}.csv").write_text("time_s,power_w,line\n" + "0,300,0\n" + text)
+        seen[name] = call("watch", cell / f"{name}.csv", "--job", cell / "job.toml", "--once", "--efficiency", "0.85")
+    assert seen["whole"][0] == 0, seen["whole"]
+    assert seen["whole"][1].endswith("; 0 alarms\n")
+    assert seen["missing"][0] == 3
+    alarms = [x for x in seen["missing"][1].splitlines() if x.startswith("line ")]
+    assert [x.split(":")[0] for x in alarms] == [f"line {lines[np.argmax(cut)]}"]
+    assert "tool 1 cuts air where the program cuts material: missing stock, or it broke before" in alarms[0]
     lines = out.splitlines()
     assert lines[0].startswith("deciding load: spindle_power_w at confidence ")
     assert lines[1].startswith("share of that variance: Ktc ")

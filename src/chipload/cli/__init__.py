@@ -17,6 +17,7 @@ from chipload.cli import drafts, jobs, mcp, mtconnect, program_filter, programs,
 from chipload.cli import learn as learn
 from chipload.cli import next_measurement as next_measurement
 from chipload.cli import opcua as opcua
+from chipload.cli import watch as watch
 from chipload.cli import watch_folder as watch_folder
 from chipload.cli.app import app
 from chipload.terminal import STOPPED
@@ -26,8 +27,8 @@ __all__ = ["app", "main"]
 #: the commands in the order of the help
 ORDER = (
     "init", "run", "simulate", "check", "watch-folder", "sweep", "convert", "filter", "fit", "spindle", "learn",
-    "next-measurement", "mtconnect", "opcua", "tap", "chatter", "cuts", "demo", "example", "examples", "machines",
-    "materials", "cutters", "view", "mcp", "export", "hal",
+    "next-measurement", "watch", "mtconnect", "opcua", "tap", "chatter", "cuts", "demo", "example", "examples",
+    "machines", "materials", "cutters", "view", "mcp", "export", "hal",
 )  # fmt: skip
 app.registered_commands.sort(key=lambda c: ORDER.index(c.name or getattr(c.callback, "__name__", "")))
 

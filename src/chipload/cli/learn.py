@@ -89,17 +89,17 @@ def learn(
         if len(read) < len(logs):
             raise InputError("LOG: two logs have one name: name each once, and rename one of two")
         sets = tuple(overrides or ())
-        material, prior = _program_job(job, sets)
+        material, prior = program_job(job, sets)
         # what can be refused without a simulation
         refuse_known_logs(prior, hashes)
         if spindle is not None and (efficiency is not None or efficiency_error is not None):
             raise InputError("--spindle, --efficiency: state only one of them")
         if spindle is None:
             signal, lag = signal_of_logs(read.values(), efficiency, efficiency_error), 0.0
-        done = _run(job, sets)
+        done = run_job_now(job, sets)
         predicted = torque_of_result(done.result, str(job))
         if spindle is not None:
-            signal, lag = _signal_of_spindle(spindle, predicted)
+            signal, lag = signal_of_spindle(spindle, predicted)
         if signal.kind is SignalKind.POWER:
             spread = number_text(100.0 * signal.gain_error, 2)
             show(f"efficiency of the spindle: {number_text(1.0 / signal.gain)} +- {spread} %")
@@ -115,8 +115,8 @@ def learn(
             show(line)
         if worth:
             own = following or job
-            before = done if following is None else _run(own, _stating(sets, material))
-            after = _run(own, _stating(sets, out.absolute()))
+            before = done if following is None else run_job_now(own, _stating(sets, material))
+            after = run_job_now(own, _stating(sets, out.absolute()))
             gain = worth_of_knowledge(own, before.result, after.result)
             write_whole(out, material_text(with_worth(found.material, gain)).encode("utf-8"))
             show(f"worth: {gain.text}")
@@ -128,7 +128,7 @@ def learn(
     run_guarded(work, debug)
 
 
-def _program_job(job: Path, sets: Sequence[str]) -> tuple[Path | str, Material]:
+def program_job(job: Path, sets: Sequence[str]) -> tuple[Path | str, Material]:
     """Return the file or the name of the material of a job of a program, and the material."""
     from chipload import jobs
     from chipload.jobs.simulation.job import ProgramJob
@@ -141,7 +141,7 @@ def _program_job(job: Path, sets: Sequence[str]) -> tuple[Path | str, Material]:
     return loaded.job.material or material.name, material
 
 
-def _run(job: Path, sets: Sequence[str]) -> FinishedJob:
+def run_job_now(job: Path, sets: Sequence[str]) -> FinishedJob:
     """Run a job."""
     from chipload import jobs
 
@@ -170,7 +170,7 @@ def _stating(sets: Sequence[str], material: Path | str) -> tuple[str, ...]:
     return (*sets, f"material.{key}={json.dumps(str(material))}")
 
 
-def _signal_of_spindle(file: Path, predicted: PredictedTorque) -> tuple[Signal, float]:
+def signal_of_spindle(file: Path, predicted: PredictedTorque) -> tuple[Signal, float]:
     """Return the signal that a spindle was identified from, and the time constant of its sensor [s]."""
     from chipload.control.learning import Signal, SignalKind
     from chipload.control.spindle_file import read_spindle

@@ -118,6 +118,15 @@ def signal_of_logs(
         return Signal(SignalKind.TORQUE, 1.0, 0.0)
     if not all(log.power is not None for log in read):
         raise InputError("no column of power or torque that all logs have; of current, state the spindle")
+    return power_signal(efficiency, efficiency_error)
+
+
+def power_signal(efficiency: float | None = None, efficiency_error: float | None = None) -> Signal:
+    """Return the signal of the power of a spindle; parameters and errors as :func:`signal_of_logs`.
+
+    >>> power_signal(), power_signal(0.5).gain_error
+    (Signal(kind=<SignalKind.POWER: 'power'>, gain=1.25, gain_error=0.1), 0.05)
+    """
     own = EFFICIENCY if efficiency is None else efficiency
     error = efficiency_error
     if error is None:

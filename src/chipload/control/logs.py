@@ -161,6 +161,53 @@ def read_log(path: str | Path, columns: dict[str, Any] | str | Path | None = Non
     return SpindleLog(**made), findings
 
 
+@dataclass(frozen=True)
+class LogLayout:
+    """Where the quantities of a log stand in a row.
+
+    Parameters
+    ----------
+    places : quantity -> (place of its column, factor to the unit inside)
+    sample_s : time of a row where the log has no column of time [s]; None: it has one
+    head : whether the first row names the columns; rows without it are separated by spaces
+    """
+
+    places: dict[str, tuple[int, float]]
+    sample_s: float | None
+    head: bool
+
+
+def log_columns(
+    label: str, first: str, columns: dict[str, Any] | str | Path | None, needed: tuple[str, ...]
+) -> LogLayout:
+    """Return the layout of a log by its first row.
+
+    Parameters
+    ----------
+    label : of the log, for messages
+    columns : as in :func:`read_log`
+    needed : quantities that it must have
+
+    Raises
+    ------
+    InputError
+        A column is not there.
+    """
+    stated = _check_columns(columns) if columns is not None else None
+    names, _ = _table(first, stated is None or stated.head)
+    layout = stated or _by_name(label, names)
+    for quantity in needed:
+        if quantity not in layout.wanted:
+            raise InputError(f"{label}: no column of {quantity}, which is needed: log it, or name it with --columns")
+    places = {}
+    for quantity, (name, unit) in layout.wanted.items():
+        if name not in names:
+            raise InputError(f"{label}: no column {name} for {quantity}: the nearest is {nearest(name, names)}")
+        if quantity in UNITS:
+            places[quantity] = (names.index(name), UNITS[quantity][unit])
+    return LogLayout(places, layout.sample, layout.head)
+
+
 def _table(text: str, head: bool) -> tuple[list[str], Any]:
     """Return column names and rows; without a head the names are numbers and the separators spaces."""
     if head:

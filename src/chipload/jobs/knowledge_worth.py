@@ -18,12 +18,12 @@ def worth_of_knowledge(job: Path, before: Result, after: Result) -> KnowledgeWor
     job : its file
     before, after : of the job with the material before and after
     """
-    held = deciding_load(before.limits)
+    nearest = deciding_load(before.limits)
     name, shares = "", (0.0, 0.0)
-    if held is not None:
-        name = held.name
+    if nearest is not None:
+        name = nearest.name
         now = [x for c in after.limits if c.name == name and (x := share_of_limit(c)) is not None]
-        shares = (share_of_limit(held) or 0.0, max(now, default=0.0))
+        shares = (share_of_limit(nearest) or 0.0, max(now, default=0.0))
     saving = (_saving(before), _saving(after))
     return KnowledgeWorth(
         job.name, hash_of(job), (str(before.verdict), str(after.verdict)), name, shares,

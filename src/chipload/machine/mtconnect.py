@@ -44,8 +44,12 @@ TYPES = {
     "Torque": ("torque_nm", 1.0),
     "PathFeedrate": ("feed_mm_min", 60.0),
 }
+#: types of events of the path -> column of the log; an event without a value: no line
+EVENTS = {"Line": "line", "LineNumber": "line", "PathFeedrateOverride": "override_percent"}
+#: subtypes of events that are used
+USED = (None, "ABSOLUTE", "PROGRAMMED")
 #: the columns in their order
-COLUMNS = ("speed_rpm", "current_a", "power_w", "torque_nm", "feed_mm_min")
+COLUMNS = ("speed_rpm", "current_a", "power_w", "torque_nm", "feed_mm_min", "line", "override_percent")
 #: subtypes of values that are commanded, not measured
 WANTED = ("COMMANDED", "PROGRAMMED", "OVERRIDE", "TARGET", "JOG", "RAPID")
 #: components that may be the spindle
@@ -244,26 +248,49 @@ def samples(source: str, device: str | None = None, component: str | None = None
 def _events(source: str, device: str | None, component: str | None) -> Iterator[Sample]:
     """Time [s], sequence, column and value of each sample of the spindle and of the path."""
     spindles: set[str] = set()
+    first = True
     for root in _answers(source):
-        for stream in (e for e in root.iter() if _kind(e) == "DeviceStream"):
-            if device is not None and stream.get("name") != device:
+        found = list(events_of(root, source, device, component, spindles))
+        if first and any(column == "line" for _, _, column, _ in found):
+            # before its first event no line runs
+            yield min(at for at, *_ in found), -1, "line", 0.0
+            first = False
+        yield from found
+
+
+def events_of(
+    root: Element, source: str, device: str | None, component: str | None, spindles: set[str]
+) -> Iterator[Sample]:
+    """Time [s], sequence, column and value of each sample of the spindle and of the path in a document.
+
+    Parameters
+    ----------
+    source, device, component : as :func:`samples`
+    spindles : names of those that were found, which grows
+    """
+    for stream in (e for e in root.iter() if _kind(e) == "DeviceStream"):
+        if device is not None and stream.get("name") != device:
+            continue
+        for part in (e for e in stream if _kind(e) == "ComponentStream"):
+            names = {part.get("name"), part.get("componentId"), part.get("component")} - {None}
+            items = [i for group in part if _kind(group) == "Samples" for i in group if _kind(i) in TYPES]
+            items = [i for i in items if i.get("subType") not in WANTED]
+            turning = part.get("component") in TURNING
+            if turning and component is not None and component not in names:
                 continue
-            for part in (e for e in stream if _kind(e) == "ComponentStream"):
-                names = {part.get("name"), part.get("componentId"), part.get("component")} - {None}
-                items = [i for group in part if _kind(group) == "Samples" for i in group if _kind(i) in TYPES]
-                items = [i for i in items if i.get("subType") not in WANTED]
-                turning = part.get("component") in TURNING
-                if turning and component is not None and component not in names:
-                    continue
-                if turning and any(TYPES[_kind(i)][0] == "speed_rpm" for i in items):
-                    spindles.add(str(part.get("name") or part.get("componentId")))
-                    if component is None and len(spindles) > 1:
-                        names_of = ", ".join(sorted(spindles))
-                        raise InputError(f"MTConnect {source}: spindles {names_of}: state --component, one of them")
-                for item in items:
-                    column, factor = TYPES[_kind(item)]
-                    if turning or part.get("component") == "Path":
-                        yield _time(item, source), _whole(item, "sequence"), column, _value(item, factor)
+            if turning and any(TYPES[_kind(i)][0] == "speed_rpm" for i in items):
+                spindles.add(str(part.get("name") or part.get("componentId")))
+                if component is None and len(spindles) > 1:
+                    names_of = ", ".join(sorted(spindles))
+                    raise InputError(f"MTConnect {source}: spindles {names_of}: state --component, one of them")
+            for item in items:
+                column, factor = TYPES[_kind(item)]
+                if turning or part.get("component") == "Path":
+                    yield _time(item, source), _whole(item, "sequence"), column, _value(item, factor)
+            for item in (i for group in part if _kind(group) == "Events" for i in group if _kind(i) in EVENTS):
+                column, value = EVENTS[_kind(item)], _value(item, 1.0)
+                if item.get("subType") in USED and (column == "line" or value is not None):
+                    yield _time(item, source), _whole(item, "sequence"), column, value or 0.0
 
 
 def _answers(source: str) -> Iterator[Element]:
@@ -276,6 +303,14 @@ def _answers(source: str) -> Iterator[Element]:
         if not source.startswith("http") or following > last:
             return
         root = document(source, "sample", f"?from={following}&count={COUNT}")
+
+
+def header_of(root: Element) -> tuple[int, int]:
+    """Return the instance of the agent of a document with streams, and the number of its next sample."""
+    header = next((e for e in root if _kind(e) == "Header"), None)
+    if header is None:
+        raise InputError("MTConnect: the answer has no Header: not a document with streams")
+    return _whole(header, "instanceId"), _whole(header, "nextSequence")
 
 
 def _whole(element: Element, key: str) -> int:

@@ -1,0 +1,377 @@
+"""Sequential tests of a running spindle against its simulated program: no cut, more load, metal in the air, wrong tool.
+
+Notation: a block of samples has the mean signal y above the idle signal; h = (C, E) are its parts by the cutting and
+the edge coefficients of the material (gain times torque, times speed for power), x the scales of both for one tool, so
+that m = h x is the prediction; S the variance of y about m. Before, x is (1, 1) with the covariance of the
+coefficients and of the gain; the first LEARN_BLOCKS blocks of each tool in the cut, and later those of another mix of
+C and E, update it. With d the deviation of m, a test of the means a (nothing is wrong) and b (a fault) sums
+
+    l = [(y - a)^2 - (y - b)^2] / (2 S),    c = max(0, c + min(l, t / 3)),    alarm where c >= t
+
+a is the end of the interval of m on the side of the fault, m exp(-3 d / m) or m exp(3 d / m). Where the mean is a, or
+further from b than that, E[exp(l)] <= 1, so that the mean number of blocks between two false alarms is at least exp(t)
+[Lorden1971]; a greatest l only makes it longer. t follows from the false alarms that are allowed in an hour.
+
+The mean load does not tell a single broken tooth: the next one takes its chip.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipload.control.learning import Signal, tangential_shares
+from chipload.control.log_alignment import PredictedTorque
+from chipload.cutting.load_parts import with_spread
+from chipload.cutting.material import Material
+from chipload.errors import Finding, InputError, Severity
+from chipload.number_text import number_text
+
+Floats = NDArray[np.float64]
+
+#: deviations between the scale of a tool and the end of its interval
+INTERVAL = 3.0
+#: error of the predicted torque of a block, relative, and how well a scale is known at best
+MODEL_ERROR, SCALE_ERROR = 0.05, 0.03
+#: blocks that tell a wrong tool, that update the scales of a tool, and of air that tell the idle signal
+TOOL_BLOCKS, LEARN_BLOCKS, AIR_BLOCKS = 10, 120, 3
+#: a prediction above so many deviations of the noise is one that can be tested
+SEEN = 5.0
+#: metal in the air: share of the greatest prediction that is looked for
+METAL = 0.2
+METAL_TEXT = (
+    "a cut where the program cuts air: stock that should not be there, a wrong offset or length, or a collision"
+)
+#: blocks of the idle signal that count, so that it may drift
+IDLE_MEMORY = 120
+#: tests that share the false alarms of an hour
+TESTS = 3
+#: deviations of the scale of a tool that are believed: of right tools 1 of 1,000 is further away
+BELIEVED = 3.29
+#: feed override below which the feed counts as held
+LEAST_OVERRIDE = 0.05
+#: rate at which a line may run faster or slower than calculated
+PACE = 0.1
+
+
+@dataclass(frozen=True)
+class WatchSettings:
+    """What an alarm is.
+
+    Parameters
+    ----------
+    false_alarms : that are allowed in an hour in the cut, above 0
+    wear : load over that of the sharp tool, above 1.1
+    block_s : length of a block [s]
+    lag_s : how far the line of a sample may be wrong in time [s]
+
+    Raises
+    ------
+    InputError
+        A number is out of range.
+    """
+
+    false_alarms: float = 0.1
+    wear: float = 1.3
+    block_s: float = 0.5
+    lag_s: float = 0.2
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.false_alarms <= 100.0:
+            raise InputError(f"false_alarms = {self.false_alarms:g}: must be above 0 and at most 100 an hour")
+        if not 1.1 < self.wear <= 5.0:
+            raise InputError(f"wear = {self.wear:g}: must be above 1.1 and at most 5 times the load of the sharp tool")
+        for name, value in (("block_s", self.block_s), ("lag_s", self.lag_s)):
+            if not 0.0 < value <= 60.0:
+                raise InputError(f"{name} = {value:g}: must be above 0 and at most 60 s")
+
+    @property
+    def threshold(self) -> float:
+        """H of each test.
+
+        >>> round(WatchSettings(false_alarms=3.0, block_s=1.0).threshold, 3), round(math.log(3600.0), 3)
+        (8.189, 8.189)
+        """
+        return math.log(TESTS * 3600.0 / (self.block_s * self.false_alarms))
+
+
+@dataclass(eq=False)
+class SequentialTest:
+    """The sum c of a test, and the block with which it left 0."""
+
+    threshold: float
+    sum: float = 0.0
+    begin: int = -1
+
+    def add(self, ratio: float, block: int) -> bool:
+        """Add the log-likelihood ratio of a block; whether it raises the alarm, after which the sum is 0."""
+        if self.sum == 0.0:
+            self.begin = block
+        self.sum = max(0.0, self.sum + min(ratio, self.threshold / 3.0))
+        if self.sum < self.threshold * (1.0 - 1e-12):
+            return False
+        self.sum = 0.0
+        return True
+
+
+@dataclass(eq=False)
+class _Mean:
+    """Mean and variance of values, of the last ones most where there are many."""
+
+    count: int = 0
+    mean: float = 0.0
+    variance: float = 0.0
+
+    def add(self, value: float, memory: int) -> None:
+        self.count += 1
+        weight = 1.0 / min(self.count, memory)
+        step = value - self.mean
+        self.mean += weight * step
+        self.variance = (1.0 - weight) * (self.variance + weight * step * step)
+
+    @property
+    def scatter(self) -> float:
+        """Variance of a value, by the usual n - 1."""
+        return self.variance * self.count / max(self.count - 1, 1) if self.count <= IDLE_MEMORY else self.variance
+
+
+@dataclass(eq=False)
+class _ToolScale:
+    """What is known of the scales of a tool: x and its covariance P, and sums over its first blocks."""
+
+    x: Floats
+    covariance: Floats
+    blocks: int = 0
+    top: float = 0.0
+    bottom: float = 0.0
+    recent: _Mean = field(default_factory=_Mean)
+
+    def interval(self, parts: Floats) -> tuple[float, float, float]:
+        """Return m, and the ends of its interval."""
+        mean = float(parts @ self.x)
+        floor = SCALE_ERROR * mean
+        ratio = INTERVAL * math.hypot(math.sqrt(float(parts @ self.covariance @ parts)), floor) / mean
+        return mean, mean * math.exp(-ratio), mean * math.exp(ratio)
+
+    def update(self, parts: Floats, y: float, variance: float) -> None:
+        """Take a block in which nothing is wrong, by the update of Kalman."""
+        across = self.covariance @ parts
+        gain = across / (float(parts @ across) + variance)
+        self.x = np.maximum(self.x + gain * (y - float(parts @ self.x)), 0.05)
+        self.covariance = self.covariance - np.outer(gain, across)
+
+
+class LoadWatch:
+    """The tests of one run of a program; samples are added as they come.
+
+    Parameters
+    ----------
+    predicted : torque of the program
+    signal : what is measured
+    material : whose spread says how far a right tool may be from the prediction
+    settings : what an alarm is
+    """
+
+    def __init__(
+        self, predicted: PredictedTorque, signal: Signal, material: Material, settings: WatchSettings | None = None
+    ) -> None:
+        self._settings = settings or WatchSettings()
+        self._program = predicted
+        self._start = np.concatenate([[0.0], predicted.time[:-1]])
+        factor = signal.gain * signal.of_torque(predicted.speed)
+        self._parts = np.column_stack([factor * predicted.cutting, factor * predicted.edge])
+        self._load = self._parts.sum(axis=1)
+        self._greatest = float(self._load.max())
+        if self._greatest <= 0.0:
+            raise InputError("the program cuts nothing: there is nothing to watch")
+        self._before = tangential_shares(with_spread(material)) + signal.gain_error**2
+        self._tests = {name: SequentialTest(self._settings.threshold) for name in ("none", "more", "metal")}
+        self._idle: dict[int, _Mean] = {}
+        self._tools: dict[int, _ToolScale] = {}
+        # row, line, and since when [s], time of the program in it, time of the last sample
+        self._row, self._line, self._since, self._done, self._last = 0, -1, 0.0, 0.0, 0.0
+        # time, value, place, override
+        self._block: list[tuple[float, float, float, float]] = []
+        self._blocks, self._told = 0, {"none": 0, "more": 0, "metal": 0}
+        # blocks with which the cut, and the line, began
+        self._cut_since = self._line_since = 0
+        self._begin: float | None = None
+        self.seconds = self.cut_seconds = self.judged_seconds = 0.0
+        self.finished = self._is_last = False
+
+    def add(self, time: float, value: float, line: int, override: float = 1.0) -> list[Finding]:
+        """Take a sample and return the alarms that it raises.
+
+        Parameters
+        ----------
+        time : [s], rising; an earlier sample is left out
+        value : of the signal
+        line : of the program that runs
+        override : of the feed
+        """
+        self._begin = time if self._begin is None else self._begin
+        place = self._place(time, line, override)
+        out: list[Finding] = []
+        if self._block and not 0.0 < time - self._block[0][0] < self._settings.block_s:
+            if time <= self._block[-1][0]:
+                return out
+            out = self._judge()
+        self._block.append((time, value, place, override))
+        return out
+
+    def end(self) -> list[Finding]:
+        """Return the alarms of the last samples."""
+        return self._judge() if len(self._block) > 1 else []
+
+    def _place(self, time: float, line: int, override: float) -> float:
+        """Return the time of the program at a sample; -1: its line is not of the program."""
+        if line != self._line:
+            # the last line is left
+            self.finished |= self._row >= 0 and self._is_last
+            rows = np.flatnonzero(self._program.line == line)
+            if not len(rows):
+                self._line, self._since = line, time
+                self._row = -1
+                return -1.0
+            # a line that runs again, as in a subprogram: its next run
+            later = rows[rows >= max(self._row, 0)]
+            self._row = int(later[0] if len(later) else rows[0])
+            self._line, self._since, self._line_since = line, time, self._blocks
+            self._done, self._last = 0.0, time
+        if self._row < 0:
+            return -1.0
+        self._done += max(time - self._last, 0.0) * override
+        self._last = time
+        place = float(self._start[self._row]) + self._done
+        # the last row of this run of the line
+        other = np.flatnonzero(self._program.line[self._row :] != line)
+        last = self._row + int(other[0]) - 1 if len(other) else len(self._start) - 1
+        self._is_last = last == len(self._start) - 1
+        self.finished |= self._is_last and place >= float(self._program.time[-1])
+        return min(place, float(self._program.time[last]))
+
+    def _judge(self) -> list[Finding]:
+        """Test the block that is complete."""
+        times, values, places, overrides = (np.array(x) for x in zip(*self._block, strict=True))
+        self._block = []
+        self._blocks += 1
+        seconds = min(self._settings.block_s, float(times[-1] - times[0]) * len(times) / max(len(times) - 1, 1))
+        self.seconds += seconds
+        if len(times) < 2 or (places < 0.0).any() or (overrides < LEAST_OVERRIDE).any():
+            return []
+        rows = np.minimum(np.searchsorted(self._program.time, places), len(self._load) - 1)
+        # the chip follows the feed, the edge force does not
+        parts = self._parts[rows].mean(axis=0) * np.array([overrides.mean(), 1.0])
+        lag = self._settings.lag_s + PACE * float(times[-1] - self._since if times[-1] > self._since else 0.0)
+        first = int(np.searchsorted(self._program.time, places[0] - lag))
+        last = int(np.searchsorted(self._program.time, places[-1] + lag)) + 1
+        near = self._load[first:last]
+        near = near if len(near) else self._load[-1:]
+        # beyond the end of its line a sample is not: the line tells where it is
+        misfit = float(near.max() - near.min()) * min(lag / self._settings.block_s, 1.0)
+        row = int(rows[len(rows) // 2])
+        return self._tested(float(values.mean()), parts, misfit, row, seconds, float(times[-1]))
+
+    def _tested(
+        self, value: float, parts: Floats, misfit: float, row: int, seconds: float, time: float
+    ) -> list[Finding]:
+        """Return the alarms of a block by its mean signal and prediction."""
+        idle = self._idle.setdefault(round(float(self._program.speed[row])), _Mean())
+        is_air = not parts.any()
+        self.cut_seconds += 0.0 if is_air else seconds
+        if is_air:
+            self._cut_since = self._blocks
+        if idle.count < AIR_BLOCKS:
+            if is_air and misfit == 0.0:
+                idle.add(value, IDLE_MEMORY)
+            return []
+        y = value - idle.mean
+        noise = idle.scatter * (1.0 + 1.0 / idle.count)
+        if is_air:
+            return self._in_air(value, y, noise, idle, row, time) if misfit == 0.0 else []
+        number = int(self._program.tool[row])
+        tool = self._tools.setdefault(number, _ToolScale(np.ones(2), self._before))
+        mean = float(parts @ tool.x)
+        misfit *= max(mean / float(parts.sum()), 1.0)
+        if mean < SEEN * math.sqrt(noise + misfit**2):
+            return []
+        self.judged_seconds += seconds
+        return self._in_cut(tool, y, parts, noise + (MODEL_ERROR * mean) ** 2 + misfit**2, row, time)
+
+    def _in_air(self, value: float, y: float, noise: float, idle: _Mean, row: int, time: float) -> list[Finding]:
+        fault = METAL * self._greatest
+        variance = noise + (0.01 * self._greatest) ** 2
+        if self._tests["metal"].add((y * y - (y - fault) ** 2) / (2.0 * variance), self._blocks):
+            return self._alarm("metal", row, time, METAL_TEXT)
+        # a cut in the air is no idle load
+        if y * y < BELIEVED**2 * variance:
+            idle.add(value, IDLE_MEMORY)
+        return []
+
+    def _in_cut(
+        self, tool: _ToolScale, y: float, parts: Floats, variance: float, row: int, time: float
+    ) -> list[Finding]:
+        out: list[Finding] = []
+        number, none, more = int(self._program.tool[row]), self._tests["none"], self._tests["more"]
+        mean, low, high = tool.interval(parts)
+        if none.add(((y - low) ** 2 - y * y) / (2.0 * variance), self._blocks):
+            out += self._alarm("none", row, time, self._missing(number))
+        worn, before = max(self._settings.wear * mean, 1.1 * high), tool.recent.mean
+        if more.add(((y - high) ** 2 - (y - worn) ** 2) / (2.0 * variance), self._blocks):
+            rises = before > 1.0 + (self._settings.wear - 1.0) / 3.0
+            cause = "it grew: the edge is worn" if rises else "at once: more stock, a harder place, or a chipped edge"
+            share = number_text(100.0 * (y / mean - 1.0), 2)
+            out += self._alarm("more", row, time, f"tool {number} takes {share} % more than it did, or than is "
+                               f"predicted; {cause}")  # fmt: skip
+        if none.sum > 0.0 or out:
+            # what cuts nothing tells nothing of the tool
+            return out
+        if tool.blocks < LEARN_BLOCKS:
+            tool.top, tool.bottom = tool.top + y, tool.bottom + float(parts.sum())
+            if tool.blocks + 1 == TOOL_BLOCKS:
+                out += self._right_tool(tool, number, parts, row, time)
+        if more.sum == 0.0 or y < worn:
+            tool.recent.add(y / mean, 2 * TOOL_BLOCKS)
+        if more.sum == 0.0 and (tool.blocks < LEARN_BLOCKS or (high / mean) > math.exp(2.0 * INTERVAL * SCALE_ERROR)):
+            tool.update(parts, y, variance)
+        tool.blocks += 1
+        return out
+
+    def _right_tool(self, tool: _ToolScale, number: int, parts: Floats, row: int, time: float) -> list[Finding]:
+        """Return an alarm where no right tool takes what the first blocks of this one did."""
+        scale = tool.top / tool.bottom
+        share = parts / parts.sum()
+        known = math.hypot(math.sqrt(float(share @ self._before @ share)), MODEL_ERROR)
+        # as wide as a normal and a lognormal spread of the coefficients
+        low, high = min(1.0 - BELIEVED * known, math.exp(-BELIEVED * known)), math.exp(BELIEVED * known)
+        if low <= scale <= high:
+            return []
+        text = (
+            f"tool {number} takes {number_text(scale, 2)} times what is predicted, {number_text(max(low, 0.0), 2)} to "
+            f"{number_text(high, 2)} times is believed: a wrong tool or material, or the efficiency"
+        )
+        line = int(self._program.line[row])
+        return [Finding("watch-tool", line, f"{self._at(time)}: {text}", Severity.UNPROVEN)]
+
+    def _missing(self, number: int) -> str:
+        begin = self._tests["none"].begin
+        # in one line, blocks of which were cut
+        if begin - max(self._cut_since, self._line_since) > 2:
+            return f"tool {number} stopped to cut in the cut: it is broken, or out of its holder"
+        return f"tool {number} cuts air where the program cuts material: missing stock, or it broke before"
+
+    def _at(self, time: float) -> str:
+        """The time since the first sample."""
+        return f"{number_text(time - (self._begin or 0.0))} s"
+
+    def _alarm(self, name: str, row: int, time: float, text: str) -> list[Finding]:
+        """Return the alarm of a test, once a line."""
+        line = int(self._program.line[row])
+        if self._told[name] == line:
+            return []
+        self._told[name] = line
+        code = {"none": "watch-air", "more": "watch-more", "metal": "watch-metal"}[name]
+        return [Finding(code, line, f"{self._at(time)}: {text}", Severity.UNPROVEN)]
