@@ -6,18 +6,24 @@ Prints the table of docs/design/control.md. First a mill in wax: for each condit
 current and power in the cut of one run predict those of another run; the error of a mean over a second; and the share
 of pairs of a second in the cut and one in the air of which the first is estimated greater, by the idle map of the air
 of the run that was learned from (50 %: not told apart). Then an industrial spindle, whose idle current is that of the
-air before its first passes.
+air before its first passes. Last, three cutters that were worn out in 315 cuts each (PHM 2010): the cut at which the
+test of `chipload watch` states that the force has grown by 30 %, learned from cuts 11 to 30, and the wear there and at
+the end.
 """
 
+import csv
+import math
 import os
 from pathlib import Path
 
 import numpy as np
 
+from chipload.control.load_watch import MODEL_ERROR, SequentialTest, WatchSettings
 from chipload.control.logs import read_log
 from chipload.control.spindle import estimate, idle_map
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[2] / "shared" / "data")) / "measured"
+PHM, LEARNED = DATA / "nasa_phm_tables" / "phm2010", slice(10, 30)
 MILL, TRACE = DATA / "umich_smart_cnc", DATA / "nasa_uc_milling" / "tool54_example.csv"
 COLUMNS = {
     "sample_s": 0.1,
@@ -90,6 +96,25 @@ def industrial():
     return apart(found.torque[~cut][::TURN], found.torque[cut][::TURN]), found.trusted[cut], found.trusted[~cut]
 
 
+def wear_found(case):
+    """Cut of the alarm, greatest wear of a tooth there, at the end, and at the end of the learned cuts [um]."""
+    with (PHM / "feature_vector.csv").open() as file:
+        rows = [r for r in csv.DictReader(file) if r["case"] == case]
+    force = [math.hypot(float(r["force_x__rms"]), float(r["force_y__rms"])) for r in rows]
+    with (PHM / "process_info.csv").open() as file:
+        wear = [max(float(r[f"VB_flute_{k}"]) for k in (1, 2, 3)) for r in csv.DictReader(file) if r["case"] == case]
+    own = np.array(force[LEARNED])
+    mean = float(own.mean())
+    # a: the end of the interval of the mean, b: 30 % above the mean, or above that end
+    high = mean + 3.0 * float(own.std(ddof=1)) / math.sqrt(len(own))
+    fault, variance = max(1.3 * mean, 1.1 * high), float(own.var(ddof=1)) + (MODEL_ERROR * mean) ** 2
+    test = SequentialTest(WatchSettings().threshold)
+    for k in range(LEARNED.stop, len(force)):
+        if test.add(((force[k] - high) ** 2 - (force[k] - fault) ** 2) / (2.0 * variance), k):
+            return k + 1, wear[k], wear[-1], wear[LEARNED.stop - 1]
+    return None, math.nan, wear[-1], wear[LEARNED.stop - 1]
+
+
 def main():
     names = [name for name, _ in SOURCES]
     head = [f"{x}: mean % | over a second rms % | material from air, pairs %" for x in names]
@@ -110,6 +135,12 @@ def main():
         f"\nindustrial spindle: {100 * told:.0f} % of pairs in order; trusted {100 * cut.mean():.0f} % of the rows in "
         f"the cut, {100 * air.mean():.1f} % of those in the air"
     )
+
+    print("\n| cutter of PHM 2010 | wear learned at um | alarm in cut | wear there um | wear at the end um |")
+    print("|---" * 5 + "|")
+    for case in ("1", "4", "6"):
+        cut, there, last, first = wear_found(case)
+        print(f"| {case} | {first:.0f} | {cut} | {there:.0f} | {last:.0f} |")
 
 
 if __name__ == "__main__":

@@ -96,6 +96,13 @@ def test_lines_align_what_a_lag_cannot(program):
     assert found.Ktc == pytest.approx(1.2 * PRIOR.Ktc, rel=0.06)
 
 
+def test_a_clock_that_jumps_is_named(log, program):
+    """40 s are added in the middle of a program: without its lines it is refused, and the jump is said."""
+    time = np.where(np.arange(len(log.time)) > len(log.time) // 2, log.time + 40.0, log.time)
+    with pytest.raises(InputError, match=r"another program.*its clock: 1 gap in time, the first of 40\.1 s at"):
+        align_log("log", replace(log, time=time), log.power, program)
+
+
 def test_missing_stock_is_named(log, program):
     """Air in five lines where the program cuts: the lines are named and do not enter the coefficients."""
     aligned = align_log("log", log, log.power, program)

@@ -176,9 +176,11 @@ def align_log(
     expected = first_order(np.where(running, load[row], 0.0), log.time, sensor_lag)
     correlation = _correlation(signal, expected)
     if not correlation >= LEAST_CORRELATION:
+        jumps = "".join(f"; {f.text}" for f in _gaps("its clock", log.time))
         raise InputError(
             f"{name}: its signal follows the program with a correlation of {correlation:.2f}, at least "
             f"{LEAST_CORRELATION:g} is needed: it is the log of another program, or the spindle does not feel the cut"
+            f"{jumps}{': log the line of the program, or cut the log there' if jumps and log.line is None else ''}"
         )
     return AlignedLog(name, log.time, signal, row, lag, rate, correlation, tuple(_gaps(name, log.time)))
 
@@ -195,7 +197,7 @@ def _gaps(name: str, time: Floats) -> list[Finding]:
     far = np.flatnonzero(step > max(GAP_STEPS * float(np.median(step)), GAP_S)) if len(step) else np.empty(0, np.int64)
     if not len(far):
         return []
-    text = f"{name}: {len(far)} gaps in time, the first of {number_text(step[far[0]], 3)} s"
+    text = f"{name}: {len(far)} gap{'s' if len(far) > 1 else ''} in time, the first of {number_text(step[far[0]], 3)} s"
     text += f" at {number_text(time[far[0]])} s"
     return [Finding("log-gap", 0, text, Severity.NOTE)]
 
