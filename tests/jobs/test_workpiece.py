@@ -11,6 +11,7 @@ import trimesh
 
 from chipload import jobs
 from chipload.errors import InputError
+from chipload.jobs.coarse import coarser
 from chipload.jobs.program.result import result_of
 from chipload.jobs.program.run import check, run
 
@@ -110,7 +111,12 @@ def test_a_floor_gives_way_along_the_axis(job_file):
     (path.parent / "wall.nc").write_text(
         "%\nG21 G90 G17 G54\nT1 M6\nS6000 M3\nG0 X-16. Y0. Z10.\nG0 Z-0.5\nG1 X66. F600.\nG0 Z10.\nM30\n%\n"
     )
-    c = run(loaded(path)).simulated.removal.columns
+    path = changed(path, "[limits]", "[checks]\nstress_wall_mm = 3.0\n[limits]")
+    simulated = run(loaded(path)).simulated
+    c = simulated.removal.columns
+    said = [text for text in simulated.collisions.stock.unchecked if text.startswith("distortion by residual stress")]
+    assert len(said) == 1
+    assert "below checks.stress_wall_mm = 3" in said[0]
     middle = np.abs(c["x_mm"] - 24.0) < 2.5
     beam = 40.0**3 / (192.0 * 70e3 * 16.0 * 2.5**3 / 12.0)
     assert 1e-3 * c["deflection_workpiece_um"][middle] / -c["force_z_min_n"][middle] == pytest.approx(beam, rel=0.1)
@@ -190,6 +196,14 @@ def test_a_limit_needs_a_workpiece(job_file):
     job_file.write_text(re.sub(r"\[workpiece\].*?\[\[operation", "[[operation", text, flags=re.DOTALL))
     with pytest.raises(InputError, match=r"limits.deflection_workpiece_um: needs the workpiece and its clamps"):
         loaded(job_file)
+
+
+def test_coarse_leaves_cells_that_are_as_wide_as_the_wall_allows(job_file):
+    """6 mm is within 2.5 times the wall of 2.49 mm, twice that is not."""
+    path = changed(job_file, "states = 4", "states = 4\ncell_mm = 6.0")
+    overrides = coarser(jobs.load_job(path))
+    assert "workpiece.states=1" in overrides
+    assert jobs.load_job(path, overrides).job.table.workpiece.cell_mm == 6.0
 
 
 def test_cells_wider_than_the_wall_allows_are_refused(job_file):

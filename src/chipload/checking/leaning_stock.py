@@ -10,6 +10,7 @@ Bound: what is thinner than the distance of the points may be missed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -24,7 +25,12 @@ from chipload.program.motions import lengths
 from chipload.program.program import RAPID, Program
 from chipload.simulation.heights.clamped_stock import find_clamped_stock
 from chipload.simulation.heights.height_map import NEVER, HeightMap
-from chipload.simulation.heights.slender_walls import SlenderWall, slender_wall_findings, slender_walls_of
+from chipload.simulation.heights.slender_walls import (
+    SlenderWall,
+    distortion_not_checked,
+    slender_wall_findings,
+    slender_walls_of,
+)
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
@@ -99,6 +105,8 @@ def check_leaning_stock(
             after, initial = (grid_along(points, low, high, frame, pitch) for points in (inside, before))
             found += _walls(after, initial, checks.wall_slenderness)
         findings += slender_wall_findings(_distinct(found), checks.wall_slenderness)
+        thinnest = min((wall.thickness_mm for wall in found), default=math.inf)
+        unchecked += distortion_not_checked(thinnest, checks.stress_wall_mm)
         unchecked.append(f"deflection of slender walls: one thinner than {pitch:.2g} mm may be missed{left}")
     return tuple(findings), tuple(unchecked)
 

@@ -44,6 +44,7 @@ from chipload.simulation.engagement_samples import EngagementRecorder
 from chipload.simulation.estimate import LEANING, QUICK, SLOW, UPRIGHT, estimate, slowest_step
 from chipload.simulation.gouge_refinement import refine_gouges
 from chipload.simulation.hand import reversed_cuts
+from chipload.simulation.heights.slender_walls import distortion_not_checked
 from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.loads import Cuts
 from chipload.simulation.moves import leans
@@ -170,6 +171,9 @@ def simulate_program(
         stock_check = replace(
             stock_check, findings=(*stock_check.findings, *found), unchecked=(*stock_check.unchecked, *unchecked)
         )
+    if compliance is not None:
+        more = distortion_not_checked(compliance.wall, inputs.checks.stress_wall_mm)
+        stock_check = replace(stock_check, unchecked=(*stock_check.unchecked, *more))
     errors = with_compliance_error(removal.resolution_error, removal.columns, compliance)
     around = program_surroundings(inputs, reading, before, stock_box(stock))
     findings = (

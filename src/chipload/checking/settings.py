@@ -146,6 +146,7 @@ class CheckSettings:
     slender_walls : no wall is left more slender than ``wall_slenderness``, where no workpiece states how it deflects
     wall_slenderness : height over thickness up to which a wall counts as rigid; 5 of aluminium 2 mm thick, clamped at
         its foot: 0.33 um/N at its edge (:mod:`chipload.simulation.heights.slender_walls`)
+    stress_wall_mm : thickness of walls below which the result says that distortion by residual stress is not checked
     """
 
     confidence: float = number_field(0.95, least=0.5, below=1.0)
@@ -163,6 +164,7 @@ class CheckSettings:
     loose_stock: bool = True
     slender_walls: bool = True
     wall_slenderness: float = number_field(5.0, least=1.0)
+    stress_wall_mm: float = number_field(2.0, least=0.0)
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""

@@ -25,7 +25,7 @@ from chipload.program.program import Program
 from chipload.progress import Progress
 from chipload.simulation.heights.height_map import HeightMap, bands_of, follow_heights, pitch_of
 from chipload.simulation.heights.loose_stock import find_loose_stock
-from chipload.simulation.heights.slender_walls import find_slender_walls, slender_wall_findings
+from chipload.simulation.heights.slender_walls import distortion_not_checked, find_slender_walls, slender_wall_findings
 from chipload.simulation.kept_pass import KeptPasses
 from chipload.simulation.moves import leans
 from chipload.simulation.steps import StepBlocks
@@ -67,6 +67,8 @@ def check_stock(
     if checks.slender_walls and inputs.elasticity.workpiece is None:
         walls = find_slender_walls(found, checks.wall_slenderness)
         findings += slender_wall_findings(walls, checks.wall_slenderness)
+        thinnest = min((wall.thickness_mm for wall in walls), default=math.inf)
+        unchecked += distortion_not_checked(thinnest, checks.stress_wall_mm)
     return StockCheck((*placed, *findings), touched, hidden, tuple(unchecked))
 
 

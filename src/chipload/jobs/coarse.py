@@ -14,7 +14,8 @@ from typing import Any
 from chipload.errors import Finding, InputError, Severity
 from chipload.jobs import FinishedJob, LoadedJob
 
-#: of jobs that simulate a program: dotted key of the job -> factor, and the greatest value
+#: of jobs that simulate a program: dotted key of the job -> factor, and the greatest value; cells of the
+#: workpiece stay: wider ones than the job states may not resolve its thinnest wall, which is refused
 SIMULATION: Mapping[str, tuple[float, float]] = {
     "operation.step_mm": (8.0, 100.0),
     "operation.tolerance_mm": (20.0, 0.1),
@@ -24,7 +25,6 @@ SIMULATION: Mapping[str, tuple[float, float]] = {
     "fixture.spacing_mm": (3.0, 1e3),
     "machine_table.spacing_mm": (3.0, 1e3),
     "workpiece.states": (0.25, 200.0),
-    "workpiece.cell_mm": (2.0, 1e3),
 }
 #: the same by capability
 FACTORS: Mapping[str, Mapping[str, tuple[float, float]]] = {

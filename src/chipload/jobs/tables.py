@@ -228,6 +228,11 @@ class WallChecksTable(ProgramChecksTable):
         "height over thickness up to which a wall counts as rigid; 5 of aluminium 2 mm thick, clamped at its foot: "
         "0.33 um/N at its edge",
     )
+    stress_wall_mm: Number = setting_field(
+        CheckSettings,
+        "stress_wall_mm",
+        "thickness of walls below which the result lists distortion by residual stress as not checked",
+    )
 
 
 class StockChecksTable(WallChecksTable):

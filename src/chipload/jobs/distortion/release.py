@@ -30,17 +30,11 @@ from chipload.jobs.distortion.plans import Clamping, MillingPlan
 from chipload.jobs.distortion.shapes import PartLayers, SideCut, part_layers
 from chipload.jobs.distortion.surface import UNDERSIDE, PartSurface
 from chipload.number_text import number_text
-from chipload.stock.layers import LayeredStock
 from chipload.structure.cells.clamp import clamp_stiffness, rigid_motions
 from chipload.structure.cells.faces import flat_faces, grid_on_faces
 from chipload.structure.cells.grid import CellGrid
-from chipload.structure.cells.initial_stress import (
-    displacements_of_modes,
-    free_workpiece,
-    layer_sections,
-    stress_forces,
-)
-from chipload.structure.cells.workpiece import CellWorkpiece, Elastic, cell_workpiece, mode_weights
+from chipload.structure.cells.initial_stress import FreeBody, displacements_of_modes, free_body
+from chipload.structure.cells.workpiece import CellBody, CellWorkpiece, Elastic, cell_workpiece, mode_weights
 from chipload.structure.stress_profile import StressProfile
 
 Floats = NDArray[np.float64]
@@ -52,16 +46,6 @@ Left = frozenset[tuple[str, float]]
 
 #: cells along the longest side of the blank
 CELLS = 15
-
-
-@dataclass(frozen=True, eq=False)
-class FreeState:
-    """A state of removal: what is left, factored as it lies free, and its displacement (3 u, q) under each stress."""
-
-    stock: LayeredStock
-    work: CellWorkpiece
-    forces: Floats
-    moved: Floats
 
 
 @dataclass(eq=False)
@@ -79,7 +63,7 @@ class PlateRelease:
     grid: CellGrid
     elastic: Elastic
     profiles: tuple[StressProfile, ...]
-    _states: dict[Left, FreeState] = field(default_factory=dict)
+    _states: dict[Left, FreeBody] = field(default_factory=dict)
 
     def shapes(self, left: Left) -> list[shapely.Geometry]:
         """Sections of what is left when each side has been milled to some stock."""
@@ -88,7 +72,7 @@ class PlateRelease:
             out = self.layers.after(out, SideCut(side, stock))
         return out
 
-    def state(self, cuts: Sequence[SideCut]) -> FreeState:
+    def state(self, cuts: Sequence[SideCut]) -> FreeBody:
         """What is left after cuts, lying free: whatever their order, the least stock of each side counts."""
         least: dict[str, float] = {}
         for cut in cuts:
@@ -96,22 +80,20 @@ class PlateRelease:
         left = frozenset(least.items())
         if left not in self._states:
             stock = self.layers.stock(self.shapes(left))
-            work = free_workpiece(stock, self.grid, self.elastic)
             under = float(self.layers.low[2])
-            forces = stress_forces(layer_sections(stock, self.grid), self.grid, work.modes, self.profiles, under)
-            self._states[left] = FreeState(stock, work, forces, work.solve(forces))
+            self._states[left] = free_body(stock, self.grid, self.elastic, self.profiles, under)
         return self._states[left]
 
-    def clamped(self, before: FreeState, after: FreeState, setup: Clamping) -> tuple[CellWorkpiece, Floats, Floats]:
+    def clamped(self, before: FreeBody, after: FreeBody, setup: Clamping) -> tuple[CellWorkpiece, Floats, Floats]:
         """The body in its clamps when a setup ends: its cells, its displacement (3 u, q), its force (q,)."""
         clamps = tuple(place_clamp(c, f"setup.clamp.{k}", before.stock) for k, c in enumerate(setup.clamps))
         work = cell_workpiece(after.stock, self.grid, self.elastic, clamps)
         springs = clamp_stiffness(clamps, after.stock, self.grid, work.modes, self.elastic.modulus).matrix
-        g = displacements_of_modes(before.work, work, before.moved)
+        g = displacements_of_modes(before, work, before.moved)
         if setup.flat:
             R = rigid_motions(self.grid, work.modes, 0.5 * (self.grid.low + self.grid.high))
             g = R @ np.linalg.solve(R.T @ (springs @ R), R.T @ (springs @ g))
-        forces = displacements_of_modes(after.work, work, after.forces)
+        forces = displacements_of_modes(after, work, after.forces)
         u = work.solve(forces + springs @ g)
         press = springs @ (g - u)
         return work, u, np.asarray(np.abs(press.reshape(-1, 3, press.shape[1])).sum(axis=(0, 1)) / 2.0)
@@ -134,12 +116,13 @@ class PlateRelease:
         self._require_made(plan, surface, made)
         columns = np.array([2, 3] if plan.flipped else [0, 1])
         every = np.arange(len(surface.points))
-        e = _surface_motion(states[-1].work, states[-1].moved[:, columns], surface, every)
+        e = _surface_motion(states[-1], states[-1].moved[:, columns], surface, every)
         force, corner = np.zeros(len(cuts)), np.repeat(made, 3)
-        unknowns = max(3 * len(s.work.modes) for s in states)
+        unknowns = max(3 * len(s.modes) for s in states)
         for k, setup in enumerate(plan.setups, start=1):
             rows = np.flatnonzero(corner == k)
-            work, u = states[k - 1].work, states[k - 1].moved
+            work: CellBody = states[k - 1]
+            u = states[k - 1].moved
             if setup.clamps:
                 work, u, press = self.clamped(states[k - 1], states[k], setup)
                 force[k - 1] = press[columns[0]]
@@ -159,7 +142,7 @@ class PlateRelease:
             )
 
 
-def _surface_motion(work: CellWorkpiece, u: Floats, surface: PartSurface, rows: NDArray[np.int64]) -> Floats:
+def _surface_motion(work: CellBody, u: Floats, surface: PartSurface, rows: NDArray[np.int64]) -> Floats:
     """Displacements (r, 3, q) [mm] of corners of the surface, of those (3 u, q) of the modes."""
     _, first, same = np.unique(surface.corner[rows], return_index=True, return_inverse=True)
     weights = mode_weights(work, surface.points[rows[first]])

@@ -49,6 +49,20 @@ class SlenderWall:
         return self.height_mm / self.thickness_mm
 
 
+def distortion_not_checked(thickness: float, least: float) -> tuple[str, ...]:
+    """Return the sentence on the distortion of walls [mm] that are thinner than ``least``; none: they are not.
+
+    >>> distortion_not_checked(1.5, 2.0)[0][:56]
+    'distortion by residual stress: a wall of 1.5 mm is left,'
+    """
+    if thickness >= least:
+        return ()
+    return (
+        f"distortion by residual stress: a wall of {number_text(thickness, 3)} mm is left, below "
+        f"checks.stress_wall_mm = {least:g}: predict it in a job with [residual_stress]",
+    )
+
+
 def slender_wall_findings(walls: Sequence[SlenderWall], slenderness: float) -> list[Finding]:
     """Return a finding for each of the most slender walls, whose deflection is not calculated.
 

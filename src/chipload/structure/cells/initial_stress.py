@@ -27,7 +27,7 @@ from chipload.structure.cells.clamp import rigid_motions
 from chipload.structure.cells.grid import Array, CellGrid, Indices, mode_values
 from chipload.structure.cells.moments import alike, section_moments, stock_moments
 from chipload.structure.cells.nearest import StockSections
-from chipload.structure.cells.workpiece import CellWorkpiece, Elastic, factor_modes
+from chipload.structure.cells.workpiece import CellBody, CellWorkpiece, Elastic, factor_modes
 from chipload.structure.stress_profile import StressProfile
 
 
@@ -125,6 +125,44 @@ def _height_integrals(
     return first, out
 
 
+@dataclass(frozen=True, eq=False)
+class FreeBody:
+    """What is left of a plate, lying free.
+
+    Attributes
+    ----------
+    stock : what is left
+    grid, modes, share, sections : see :class:`chipload.structure.cells.workpiece.CellWorkpiece`
+    forces : (3 u, q) float [N] of q stress profiles in its modes
+    moved : (3 u, q) float [mm] displacement of its modes
+    """
+
+    stock: LayeredStock
+    grid: CellGrid
+    modes: CellModes
+    share: Array
+    sections: StockSections
+    forces: Array
+    moved: Array
+
+
+def free_body(
+    stock: LayeredStock, grid: CellGrid, elastic: Elastic, profiles: Sequence[StressProfile], underside: float
+) -> FreeBody:
+    """What is left of a plate, in equilibrium; its factors are not kept.
+
+    Raises
+    ------
+    InputError
+        It is in several pieces.
+    """
+    work = free_workpiece(stock, grid, elastic)
+    forces = stress_forces(layer_sections(stock, grid), grid, work.modes, profiles, underside)
+    # few right-hand sides: SuperLU's own solution needs no copy of its factors
+    moved = np.column_stack([work.solve(f) for f in forces.T])
+    return FreeBody(stock, grid, work.modes, work.share, work.sections, forces, moved)
+
+
 def free_workpiece(stock: LayeredStock, grid: CellGrid, elastic: Elastic) -> CellWorkpiece:
     """A stock that lies free, factored; forces on it must be in equilibrium.
 
@@ -168,7 +206,7 @@ def _six_of(grid: CellGrid, modes: CellModes, share: Array) -> Indices:
     return np.asarray(candidates[pivot[:6]])
 
 
-def displacements_of_modes(work: CellWorkpiece, other: CellWorkpiece, u: Array) -> Array:
+def displacements_of_modes(work: CellBody, other: CellBody, u: Array) -> Array:
     """Displacements (3 u, q) of the modes of a body taken over to those of another in the same grid.
 
     A mode that the first does not have is 0: a corner that it does not have moves with nothing.

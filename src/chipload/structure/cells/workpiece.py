@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,6 +64,26 @@ class Elastic:
             raise InputError(f"workpiece: modulus {self.modulus:g} MPa: above 0; Poisson {self.poisson:g}: 0 to 0.5")
         if self.density is not None and not 0.0 < self.density < np.inf:
             raise InputError(f"workpiece: density {self.density:g} t/mm3: must be above 0")
+
+
+class CellBody(Protocol):
+    """What is left of a stock in cells, without its factors; see :class:`CellWorkpiece`."""
+
+    @property
+    def grid(self) -> CellGrid:
+        """Its cells."""
+
+    @property
+    def modes(self) -> CellModes:
+        """Their modes."""
+
+    @property
+    def share(self) -> Array:
+        """(nx, ny, nz) of each cell that is material."""
+
+    @property
+    def sections(self) -> StockSections:
+        """Sections of the stock."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +207,7 @@ def _separator(at: Indices, p: int) -> tuple[int, int] | None:
     return None if best is None else best[1:]
 
 
-def mode_weights(work: CellWorkpiece, points: Array) -> scipy.sparse.csr_array:
+def mode_weights(work: CellBody, points: Array) -> scipy.sparse.csr_array:
     """Values of the modes at points (n, 3), or at the nearest material to them: (n, u) sparse."""
     at = work.sections.nearest(points)
     cell, local = work.grid.cell_of(at)
@@ -202,7 +223,7 @@ def mode_weights(work: CellWorkpiece, points: Array) -> scipy.sparse.csr_array:
     return scipy.sparse.csr_array((values[some], (at[some], number[some])), shape=(n, len(work.modes)))
 
 
-def _nearest_cells(work: CellWorkpiece, points: Array, cells: Indices) -> tuple[Indices, Array]:
+def _nearest_cells(work: CellBody, points: Array, cells: Indices) -> tuple[Indices, Array]:
     """The nearest of the active cells about empty ones (n, 3), and local coordinates of points (n, 3) clipped to it.
 
     A point on a face of the material may lie on a plane between a full cell and an empty one.

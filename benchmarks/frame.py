@@ -1,0 +1,97 @@
+"""Processor time and memory of the distortion of a frame: 120 x 60 x 30 mm, two pockets, walls and rib 1.5 mm, floor 2.
+
+    python benchmarks/frame.py [CELL_MM ...]      8 and 12, if none are stated
+
+Measured for each size of cells: a plan with a release before finishing, its flatness and distortion. Then the whole
+search of a job: the part at three heights in a plate of 40 mm, either side first, either way up, with and without a
+release before its faces are finished. The stress is the M of stretched plate, 20 MPa.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+import tempfile
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+import trimesh
+
+from chipload.jobs import job_of, run_job
+from chipload.jobs.distortion.plans import Clamping, MillingPlan
+from chipload.jobs.distortion.release import plate_release
+from chipload.jobs.distortion.shapes import SideCut
+from chipload.jobs.distortion.surface import part_surface
+from chipload.structure.cells.workpiece import Elastic
+from chipload.structure.stress_profile import m_shape, odd_shape
+
+SIZE, WALL, FLOOR = (120.0, 60.0, 30.0), 1.5, 2.0
+
+
+def box(low: tuple[float, ...], high: tuple[float, ...]) -> trimesh.Trimesh:
+    """A box between two corners [mm]."""
+    out = trimesh.creation.box(np.subtract(high, low))
+    out.apply_translation(np.add(low, high) / 2.0)
+    return out
+
+
+def frame() -> trimesh.Trimesh:
+    """The part, with sharp corners."""
+    middle, top = SIZE[0] / 2.0, SIZE[2] + 1.0
+    left = box((WALL, WALL, FLOOR), (middle - WALL / 2.0, SIZE[1] - WALL, top))
+    right = box((middle + WALL / 2.0, WALL, FLOOR), (SIZE[0] - WALL, SIZE[1] - WALL, top))
+    return trimesh.boolean.difference([box((0, 0, 0), SIZE), left, right], engine="manifold")
+
+
+def print_plan(part: trimesh.Trimesh, cell: float) -> None:
+    """One plan in cells of one size: roughed to 1 mm, released, finished."""
+    began = process_time()
+    profiles = m_shape(SIZE[2], 20.0, 0.6), odd_shape(SIZE[2], 5.0, 0.6)
+    release = plate_release(part, *part.bounds, [1.0], profiles, Elastic(71_700.0, 0.33), cell)
+    cuts = SideCut("z+", 1.0), SideCut("z+", 0.0)
+    plan = MillingPlan(0.0, False, tuple(map(Clamping, cuts)))
+    done = release.outcome(plan, part_surface(part, 8.0), 0.5)
+    flat, moved = 1e3 * done.flatness.value, 1e3 * done.distortion.value
+    print(
+        f"cells of {cell:g} mm: {done.unknowns} unknowns at most, {process_time() - began:.1f} s; flatness {flat:.2f} "
+        f"um, distortion {moved:.2f} um",
+        flush=True,
+    )
+
+
+def print_search(part: trimesh.Trimesh) -> None:
+    """The search of a job."""
+    with tempfile.TemporaryDirectory() as folder:
+        part.export(Path(folder) / "frame.stl")
+        stress = {"shape": "m", "amplitude_mpa": 20.0, "across_share": 0.6, "rolling": "x", "source": "example"}
+        values = {
+            "residual_stress": stress,
+            "part": {"file": "frame.stl", "units": "mm"},
+            "stock": {"low_mm": [0.0, 0.0, -2.5], "high_mm": [*SIZE[:2], 37.5]},
+            "workpiece": {"modulus_gpa": 71.7, "poisson": 0.33},
+            "setup": [{"side": "z+"}, {"side": "z-"}],
+            "choices": {"offset_mm": [2.5, 5.0, 7.5], "stock_mm": [1.0]},
+            "limits": {"flatness_um": 20.0},
+        }
+        loaded = job_of(values, folder)
+        began = process_time()
+        done = run_job(loaded).outcome
+    print(f"search: {len(done.others)} plans, {process_time() - began:.1f} s")
+    for name, one in (("stated", done.stated), ("used", done.used)):
+        value, low, high = (1e3 * x for x in (one.flatness.value, one.flatness.low, one.flatness.high))
+        print(f"{name}: {one.plan.name}: flatness {value:.2f} um, {low:.2f} to {high:.2f}")
+    print(f"of the cells: {100.0 * done.cell_error:.2f} %")
+
+
+def main() -> None:
+    """Print all measurements."""
+    part = frame()
+    for cell in [float(a) for a in sys.argv[1:]] or [8.0, 12.0]:
+        print_plan(part, cell)
+    print_search(part)
+    print(f"memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0:.0f} MiB")
+
+
+if __name__ == "__main__":
+    main()
