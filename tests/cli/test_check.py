@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,9 +11,12 @@ from typer.testing import CliRunner
 
 from chipload import examples
 from chipload.cli import app
+from chipload.cutting.learned import LearnedRecord, LogEvidence
+from chipload.cutting.material import material_text, read_material
 from chipload.errors import InputError
 from chipload.jobs import check_job, load_job, run_job
 from chipload.jobs.inspection import inspect_file
+from command import call
 
 #: an example, what is changed in it, how both refuse it
 REFUSED = [
@@ -124,6 +129,38 @@ def test_files_that_a_job_names_are_checked_alone(file: str, said: str) -> None:
     lines, holds = inspect_file(Path(examples.__file__).parent / file) or ([], False)
     assert holds
     assert any(line.startswith(said) for line in lines)
+
+
+def test_a_folder_is_the_cell_that_its_files_state(tmp_path: Path) -> None:
+    """A job and its material, what was learned of it, a spindle, modes, and a file that is refused."""
+    shutil.copytree(Path(examples.__file__).parent / "feeds", tmp_path / "cell")
+    folder = tmp_path / "cell"
+    learned = replace(read_material(folder / "al7075-t6.toml"), name="shop", learned=LearnedRecord(
+        "al7075-t6", (767.0, 0.25), (27.7, 0.25), (LogEvidence("monday.csv", "ab" * 32, (1, 900), 80, 2),)
+    ))  # fmt: skip
+    (folder / "shop.toml").write_text(material_text(learned))
+    (folder / "spindle.toml").write_text(
+        'input = "power"\nefficiency = 0.81\ntorque_constant_error_share = 0.04\nidle_w = [50.0, 0.1]\n'
+        "idle_error_share = 0.1\n[range]\ntorque_nm = [0.5, 20.0]\nspeed_rpm = [2000, 8000]\n"
+    )
+    (folder / "modes.toml").write_text(
+        '[[mode]]\ndirection = "x"\nfrequency_hz = 1200.0\ndamping_ratio = 0.03\nstiffness_n_um = 20.0\n'
+    )
+    (folder / "wrong.toml").write_text('name = "wrong"\nktc_mpa = 700.0\n')
+    code, out, err = call("check", folder)
+    assert (code, err) == (3, "")
+    lines = out.splitlines()
+    for said in (
+        "shop.toml: material shop: Ktc 767.01, ",
+        "learned: Ktc 767 MPa +- 6 % (two standard deviations), 767 +- 50 % in al7075-t6; ",
+        "spindle.toml: spindle identified by its power, efficiency 0.81 +- 4 %",
+        "modes.toml: 1 mode of a hammer test, 1200 Hz",
+        "wrong.toml: refused: ",
+        "job.toml: names al7075-t6, which was learned further: shop.toml (shop) knows it better",
+    ):
+        assert any(line.startswith(said) for line in lines), (said, lines)
+    (tmp_path / "none").mkdir()
+    assert call("check", tmp_path / "none")[0] == 2
 
 
 def test_a_program_is_checked_without_a_machine() -> None:

@@ -36,7 +36,7 @@ HARMLESS = ("machine-singular", "machine-rewind", "machine-offset")
 def check(
     file: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="a job, or any file that a job names"),
+        typer.Argument(metavar="FILE", help="a job, any file that a job names, or a folder"),
     ],
     machine: MachineName = None,
     tools: Tools = None,
@@ -56,12 +56,20 @@ def check(
 
     FILE is one of these: a job, read with all files that it names; a program, read as its controller reads it (the
     default machine is vmc, or one with the rotary axes that the program needs); a fit; a STEP file, whose faces are
-    listed; a drawing, mesh, machine, material or tool table.
+    listed; a drawing, mesh, machine, spindle, material, tool table or modes; or a folder, whose TOML files are listed
+    each: the machines, tools, materials and jobs of a cell.
     """
 
     def work() -> int:
-        from chipload.jobs.inspection import BY_ENDING, inspect_file
+        from chipload.jobs.inspection import BY_ENDING, inspect_file, inspect_folder
 
+        if file.is_dir():
+            if sets:
+                raise InputError("--set: applies to a job: leave it out for a folder")
+            lines, holds = inspect_folder(file)
+            for text in lines:
+                show(text)
+            return 0 if holds else EXCEEDED
         job = file.suffix.lower() == ".toml"
         if sets and not job:
             raise InputError("--set: applies to a job: leave it out for other files")

@@ -95,8 +95,8 @@ def write_spindle(found: IdentifiedSpindle, logs: dict[str, str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def read_spindle(path: str | Path, speed: float) -> SpindleData:
-    """Read the spindle of a file for a speed [rad/s].
+def read_spindle(path: str | Path, speed: float | None) -> SpindleData:
+    """Read the spindle of a file for a speed [rad/s]; None: the middle of its range.
 
     Raises
     ------
@@ -114,6 +114,7 @@ def read_spindle(path: str | Path, speed: float) -> SpindleData:
     ranges = table.get("range", {})
     torque, speeds = (_pair(label, ranges, name) for name in ("torque_nm", "speed_rpm"))
     low, high = (rad_s_from_rpm(x) for x in speeds)
+    speed = 0.5 * (low + high) if speed is None else speed
     slack = 0.02 * high
     if not low - slack <= speed <= high + slack:
         raise InputError(

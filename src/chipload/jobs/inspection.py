@@ -6,11 +6,13 @@ The kind of a TOML file follows from the tables and keys that only it has, that 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from chipload.errors import InputError
 from chipload.files import read_regular
 from chipload.jobs import CAPABILITIES, check_job, load_job
 from chipload.number_text import number_text
@@ -48,13 +50,84 @@ def _toml_kind(path: Path) -> Callable[[Path], list[str]] | None:
     return next((reader for keys, reader in BY_KEYS if keys <= set(values)), None)
 
 
-def _material(path: Path) -> list[str]:
+def inspect_folder(folder: Path) -> Inspected:
+    """What the TOML files of a folder hold, as the machines, spindles, materials, cutters, modes and jobs of a cell; a
+    file that would be refused, and a job that names a material of which the folder has a learned one.
+
+    Raises
+    ------
+    InputError
+        It has no TOML file.
+    """
+    files = sorted(folder.glob("*.toml"))
+    if not files:
+        raise InputError(f"{folder}: no TOML file: name a folder with the files of a cell, or a file")
+    lines, holds = [], True
+    for path in files:
+        try:
+            found = inspect_file(path)
+        except InputError as err:
+            lines.append(f"{path.name}: refused: {err}")
+            holds = False
+            continue
+        if found is not None:
+            lines += found[0]
+            holds &= found[1]
+    return [*lines, *_superseded(files)], holds
+
+
+def _superseded(files: Sequence[Path]) -> list[str]:
+    """Lines on jobs whose material was learned further in another file."""
     from chipload.cutting.material import read_material
+
+    learned, jobs = {}, {}
+    for path in files:
+        with suppress(InputError):
+            if _toml_kind(path) is _material:
+                made = read_material(path)
+                if made.learned is not None:
+                    learned[made.learned.prior] = f"{path.name} ({made.name})"
+            elif (named := getattr(load_job(path).job, "material", None)) is not None:
+                jobs[path.name] = read_material(named).name if isinstance(named, Path) else str(named)
+    return [
+        f"{job}: names {name}, which was learned further: {learned[name]} knows it better"
+        for job, name in jobs.items()
+        if name in learned
+    ]
+
+
+def _material(path: Path) -> list[str]:
+    from chipload.cutting.material import knowledge_text, read_material
 
     made = read_material(path)
     names = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
     values = ", ".join(f"{name} {v:g}" for name, v in zip(names, made.coefficients, strict=True))
-    return [f"{path.name}: material {made.name}: {values} (MPa, N/mm)", f"source: {made.source}"]
+    knowledge = knowledge_text(made)
+    return [
+        f"{path.name}: material {made.name}: {values} (MPa, N/mm)",
+        f"source: {made.source}",
+        *([f"learned: {knowledge}"] if knowledge else []),
+    ]
+
+
+def _spindle(path: Path) -> list[str]:
+    from chipload.control.spindle_file import read_spindle
+
+    made = read_spindle(path, None)
+    constant = made.values.get("torque_constant_nm_a")
+    name, unit = ("efficiency", "") if made.source == "power" else ("torque constant", " N m/A")
+    error = number_text(100.0 * float(made.values.get("torque_constant_error_share", 0.0)), 2)
+    known = "unknown" if constant is None else f"{number_text(float(constant))}{unit} +- {error} %"
+    return [f"{path.name}: spindle identified by its {made.source}, {name} {known}"]
+
+
+def _modes(path: Path) -> list[str]:
+    from chipload.jobs.simulation.modes_file import read_modes
+
+    modes = read_modes(path)
+    low, high = (number_text(f(m.frequency_hz for m in modes)) for f in (min, max))
+    span = low if low == high else f"{low} to {high}"
+    return [f"{path.name}: {len(modes)} mode{'s' if len(modes) > 1 else ''} of a hammer test, {span} Hz"]
 
 
 def _machine(path: Path) -> list[str]:
@@ -150,6 +223,8 @@ BY_KEYS: tuple[tuple[set[str], Callable[[Path], list[str]]], ...] = (
     ({"override", "path"}, _hal),
     ({"rules", "error"}, _fuzzy),
     ({"ktc_mpa"}, _material),
+    ({"input", "idle_error_share"}, _spindle),
+    ({"mode"}, _modes),
     ({"axis", "rapid_mm_min"}, _machine),
     ({"name", "cutter"}, _catalogue),
 )
