@@ -244,6 +244,22 @@ def test_a_stock_is_stated_once_and_for_programs(formula):
     assert "none.stl" in refused(formula)
 
 
+def test_elastic_blades_need_forces_and_a_stock(formula):
+    stated = "[operation.blades]\nmodulus_gpa = 70.0\ndeflection_um = 20.0\n\n"
+    text = formula.read_text()
+    formula.write_text(text.replace("[operation.paths]", stated + "[operation.paths]"))
+    assert refused(formula) == (
+        "job.toml: operation.0.blades: there are no forces that bend the blades: state [operation.forces]"
+    )
+    text = text[: text.index("[operation.rough]")] + text[text.index("[operation.paths]") :]
+    forces = FORCES.replace("deflection_um", "allowance_mm = 0.5\ndeflection_um", 1)
+    formula.write_text(text.replace("[operation.paths]", stated + forces + "[operation.paths]"))
+    assert refused(formula) == (
+        "job.toml: operation.0.blades: forces are those of the simulation in the stock: state [operation.rough] or "
+        "[stock]"
+    )
+
+
 def test_point_milling_needs_five_axes_and_links(formula):
     stated = '[operation.point_milling]\nmachine = { name = "horizontal-b" }\n\n'
     text = formula.read_text()

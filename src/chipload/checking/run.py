@@ -91,6 +91,7 @@ def simulate_program(
     compliance: WorkpieceCompliance | None = None,
     checkpoint: Checkpoint | None = None,
     workers: Workers | None = None,
+    watch: Watch | None = None,
     progress: Progress = silent,
 ) -> SimulationResult:
     """Simulate a program in its stock and check it.
@@ -102,6 +103,7 @@ def simulate_program(
     compliance : of the workpiece; None: not known yet
     checkpoint : folder with finished work, from which a stopped run continues; None: all stays in memory
     workers : processes or a cluster that remove strips of a layered stock; None: as the settings state
+    watch : called with what each cutter cuts, besides the watches of the checks; without a checkpoint; None: none
 
     Raises
     ------
@@ -138,21 +140,22 @@ def simulate_program(
     stability_watch, recorder = watch_of(inputs, compliance), EngagementRecorder(material)
     watches += [] if stability_watch is None else [stability_watch]
     watches += [recorder] if inputs.loads else []
+    watches += [] if watch is None else [watch]
 
-    def watch(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
+    def watch_all(cuts: Cuts) -> dict[str, NDArray[np.float64]]:
         return {name: values for each in watches for name, values in each(cuts).items()}
 
     removing = part_of(progress, SHARE, SHARE + 0.8)
     if checkpoint is None:
         removal = remove(
-            program, stock, cutters, material, fine, watch=watch, times=times,
+            program, stock, cutters, material, fine, watch=watch_all, times=times,
             engine=op.engine, loads=inputs.loads, outlines=inputs.outlines, processes=workers or op.workers,
             progress=removing,
         )  # fmt: skip
     else:
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
         removal = remove_in_chunks(
-            program, stock, cutters, material, fine, checkpoint, watch=watch,
+            program, stock, cutters, material, fine, checkpoint, watch=watch_all,
             keeps={"engagement": recorder} | ({} if stability_watch is None else {"watch": stability_watch}),
             times=times, engine=op.engine, processes=workers or op.workers, progress=removing,
             also=(

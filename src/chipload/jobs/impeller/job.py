@@ -90,6 +90,8 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
             point_machine = source("operation.0.point_milling.machine", points.machine, folder)
         if table.operation[0].paths is None:
             errors.add("operation.0.point_milling: takes its links from [operation.paths]: state that too")
+    if table.operation[0].blades is not None:
+        errors.texts += _wrong_blades(table)
     if forces is not None and flank is not None and flank.feed_mm_min is None:
         errors.add(_NO_FORCES.format("flank"))
     if forces is not None and points is not None and points.feed_mm_min is None:
@@ -164,6 +166,14 @@ def _wrong_stock(table: ImpellerJobTable) -> Iterator[str]:
         yield "stock: leave it out: the programs begin with the blank of [operation.rough]"
     if table.operation[0].paths is None:
         yield "stock: there are no programs to simulate in it: state [operation.paths] or leave it out"
+
+
+def _wrong_blades(table: ImpellerJobTable) -> Iterator[str]:
+    op, at = table.operation[0], "operation.0.blades"
+    if op.forces is None:
+        yield f"{at}: there are no forces that bend the blades: state [operation.forces]"
+    if op.rough is None and table.stock is None:
+        yield f"{at}: forces are those of the simulation in the stock: state [operation.rough] or [stock]"
 
 
 def _wrong_flank(table: ImpellerJobTable) -> Iterator[str]:

@@ -26,6 +26,7 @@ class ProgramRemoval:
     energy_balance : as of a track
     loads : whether teeth and material are stated
     stock : volume [mm^3] before all programs, and after them
+    contact : (n, 2, 3) float [mm], ends of the contact line of each row, nan where nothing is cut; None: not kept
     """
 
     columns: Columns = field(default_factory=dict)
@@ -35,6 +36,7 @@ class ProgramRemoval:
     energy_balance: Mapping[int, float] = field(default_factory=dict)
     loads: bool = False
     stock: tuple[float, float] = (0.0, 0.0)
+    contact: NDArray[np.float64] | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -47,7 +49,11 @@ class ProgramRemoval:
         if not c:
             return {"steps": 0}
         volume, rapid = np.asarray(c["chip_volume_mm3"]), np.asarray(c["rapid"])
-        loads = ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_cutter_um") if self.loads else ()
+        loads = (
+            ("force_n", "torque_nm", "power_w", "chip_max_mm", "deflection_cutter_um", "deflection_workpiece_um")
+            if self.loads
+            else ()
+        )
         return {
             "steps": len(volume),
             "removed_mm3": float(volume.sum()),
@@ -55,5 +61,5 @@ class ProgramRemoval:
             "cutting_s": float(np.asarray(c["duration_s"])[(volume > 0.0) & ~rapid].sum()),
             "stock_before_mm3": self.stock[0],
             "stock_after_mm3": self.stock[1],
-            **{name: float(np.max(c[name], initial=0.0)) for name in loads},
+            **{name: float(np.max(c[name], initial=0.0)) for name in loads if name in c},
         }

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.checking.contact_lines import contact_lines
 from chipload.checking.inputs import CheckInputs
 from chipload.checking.limits import program_limits
 from chipload.checking.outcome import SimulationResult
@@ -36,6 +37,7 @@ from chipload.planning.impeller.feeds import ForceTerms
 from chipload.program.program import Program
 from chipload.progress import Progress, silent
 from chipload.result import check_limit, error_of
+from chipload.simulation.loads import Cuts
 
 Floats = NDArray[np.float64]
 
@@ -79,19 +81,23 @@ def removal_of_programs(
     terms: ForceTerms | None,
     touch: float = 0.0,
     progress: Progress = silent,
+    *,
+    contacts: bool = False,
 ) -> list[ProgramRemoval]:
     """Return what each program removes, in the order in which they run; a tool number is of one cutter.
 
     Parameters
     ----------
     touch : volume that a rapid may remove in one row [mm^3]
+    contacts : whether the contact lines of the steps are kept
     """
     sequence = ProgramSequence.of([(p.read.program, p.read.times) for p in programs])
     tools = {int(p.read.program.tool[0]): tool_with_teeth(p.cutter, p.read.program, terms) for p in programs}
     inputs = inputs_of(tools, stock, machine, terms)
     try:
         body = stock.layered(sequence.program, tools)
-        simulation = simulate_program(inputs, sequence, body, progress=progress)
+        lines = ContactLines() if contacts else None
+        simulation = simulate_program(inputs, sequence, body, watch=lines, progress=progress)
     except InputError as err:
         found = Finding("not-simulated", 0, f"the programs are not simulated in the blank: {err}", Severity.UNPROVEN)
         return [ProgramRemoval(findings=(found,)) for _ in programs]
@@ -101,7 +107,37 @@ def removal_of_programs(
         for f in simulation_findings(simulation)
         if f.code not in OF_MACHINE and not (f.code == "rapid-cuts" and taken.get(f.line, math.inf) <= touch)
     ]
-    return [_of_program(k, p, sequence, simulation, findings, terms) for k, p in enumerate(programs)]
+    parts = [_of_program(k, p, sequence, simulation, findings, terms) for k, p in enumerate(programs)]
+    return parts if lines is None else _keep_contact(parts, lines, sequence, simulation)
+
+
+class ContactLines:
+    """The contact line of each step that cuts, kept while a simulation runs."""
+
+    def __init__(self) -> None:
+        self._parts: list[tuple[NDArray[np.int64], Floats]] = []
+
+    def __call__(self, cuts: Cuts) -> Mapping[str, Floats]:
+        """Keep the lines of some steps; there are no columns of them."""
+        self._parts.append((cuts.step, contact_lines(cuts)))
+        return {}
+
+    def of_rows(self, count: int) -> Floats:
+        """Ends of the lines of all rows, (n, 2, 3) [mm]; nan where nothing is cut."""
+        out = np.full((count, 2, 3), np.nan)
+        for step, lines in self._parts:
+            out[step] = lines
+        return out
+
+
+def _keep_contact(
+    found: Sequence[ProgramRemoval], lines: ContactLines, sequence: ProgramSequence, simulation: SimulationResult
+) -> list[ProgramRemoval]:
+    """What each program removes, with the contact lines of its rows."""
+    row = np.asarray(simulation.removal.columns["line"]) - 1
+    of = np.searchsorted(sequence.first, row, "right") - 1
+    every = lines.of_rows(len(row))
+    return [replace(one, contact=every[of == k]) if one.columns else one for k, one in enumerate(found)]
 
 
 def _taken_by_rapids(simulation: SimulationResult) -> dict[int, float]:

@@ -287,8 +287,10 @@ def _unchecked(milled: ImpellerResult) -> tuple[str, ...]:
     fed = any(p.setting.loads is not None for p in milled.programs or ())
     removals = [*(r.removal for r in milled.roughs or ()), *(p.removal for p in milled.programs or ())]
     found = [r for r in removals if r is not None]
+    bent = any("deflection_workpiece_um" in r.columns for r in found)
+    blades = "deflection of the blades in roughing, of the hub under them" if bent else "deflection of the blades"
     out = [
-        f"chatter; {'' if found else 'forces of roughing; '}deflection of the blades: not calculated"
+        f"chatter; {'' if found else 'forces of roughing; '}{blades}: not calculated"
         if fed
         else "forces, torque, deflection and chatter: not calculated",
         *(_unchecked_removal(found) if milled.programs is not None else ()),

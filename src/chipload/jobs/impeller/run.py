@@ -14,6 +14,7 @@ import numpy as np
 from chipload.checking.workpiece import Stock, Surroundings
 from chipload.cutter.catalogue import Catalogue, CatalogueCutter, catalogue_named, read_catalogue
 from chipload.errors import InputError
+from chipload.jobs.impeller.blade_deflection import elastic_blades, with_blade_deflection
 from chipload.jobs.impeller.channel_depth import reach_line
 from chipload.jobs.impeller.checkpoint import KeptParts
 from chipload.jobs.impeller.estimate import estimate
@@ -142,7 +143,10 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     stock = stated_stock
     if op.rough is not None and roughs:
         stock = blank_of_roughing(milled, roughing_settings(machine, op, op.paths, op.rough))
-    return read if stock is None else with_removal(read, stock, forces, simulating)
+    if stock is None:
+        return read
+    simulated = with_removal(read, stock, forces, simulating, contacts=op.blades is not None)
+    return simulated if op.blades is None else with_blade_deflection(simulated, elastic_blades(impeller, op.blades))
 
 
 def _stated_stock(job: ImpellerJob) -> Stock | None:

@@ -30,7 +30,12 @@ from chipload.progress import Progress, part_of, silent
 
 
 def with_removal(
-    outcome: ImpellerResult, stock: Stock, terms: ForceTerms | None, progress: Progress = silent
+    outcome: ImpellerResult,
+    stock: Stock,
+    terms: ForceTerms | None,
+    progress: Progress = silent,
+    *,
+    contacts: bool = False,
 ) -> ImpellerResult:
     """Return a result whose programs in use, and those on five axes, have what they remove of the stock.
 
@@ -38,6 +43,7 @@ def with_removal(
     ----------
     stock : before the first program
     terms : teeth, material and limits of `forces`; None: not stated
+    contacts : whether the contact lines of the steps are kept
     """
     used = {id(p) for p in outcome.programs or ()} | {id(r) for r in outcome.roughs or ()}
     named: dict[int, tuple[str, Checked | CheckedRough]] = {}
@@ -53,16 +59,20 @@ def with_removal(
     of: dict[int, ProgramRemoval] = {}
     if parts:
         own = part_of(progress, 0.0, 1.0 / (1 + len(kinds)))
-        found = removal_of_programs([*before, *parts], stock, outcome.machine, terms, touch, own)[len(before) :]
+        found = removal_of_programs([*before, *parts], stock, outcome.machine, terms, touch, own, contacts=contacts)[
+            len(before) :
+        ]
         of |= {id(checked): removal for (_, checked), removal in zip(named.values(), found, strict=True)}
     roughing = [p for p, (_, checked) in zip(parts, named.values(), strict=True) if isinstance(checked, CheckedRough)]
     for k, kind in enumerate(kinds, 1):
         own = part_of(progress, k / (1 + len(kinds)), (k + 1) / (1 + len(kinds)))
         first = [*(one.numbered_from(len(kind)) for one in (*before, *roughing))]
         finishing = [ImpellerProgram(name, p.read, p.cutter) for name, p in kind]
-        found = removal_of_programs([*first, *finishing], stock, kind[0][1].machine, terms, touch, own)[len(first) :]
+        found = removal_of_programs(
+            [*first, *finishing], stock, kind[0][1].machine, terms, touch, own, contacts=contacts
+        )[len(first) :]
         of |= {id(p): removal for (_, p), removal in zip(kind, found, strict=True)}
-    return _with_found(outcome, of)
+    return replace_removals(outcome, of)
 
 
 def blank_of_roughing(outcome: ImpellerResult, how: RoughingSettings) -> Stock:
@@ -71,7 +81,7 @@ def blank_of_roughing(outcome: ImpellerResult, how: RoughingSettings) -> Stock:
     return Stock(blank_of(outcome.impeller, channels, how, outcome.stated.ahead))
 
 
-def _with_found(outcome: ImpellerResult, of: Mapping[int, ProgramRemoval]) -> ImpellerResult:
+def replace_removals(outcome: ImpellerResult, of: Mapping[int, ProgramRemoval]) -> ImpellerResult:
     """Return a result whose programs have the removal that was found for each."""
     used_checked = outcome.used_checked
     roughs = None if outcome.roughs is None else tuple(replace(r, removal=of.get(id(r))) for r in outcome.roughs)

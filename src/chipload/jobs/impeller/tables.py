@@ -211,6 +211,14 @@ class ForcesTable(Table):
     )
 
 
+class BladesTable(Table):
+    """Finished blades as elastic bodies on a rigid hub, which the forces of the finishing programs bend."""
+
+    modulus_gpa: Annotated[Number, Field(ge=1.0, le=1000.0)] = Field(description="Young's modulus of the part")
+    poisson: Annotated[Number, Field(ge=0.0, lt=0.5)] = Field(0.3, description="Poisson's ratio of the part")
+    deflection_um: Positive = Field(description="greatest deflection of a blade across its sides, where it is cut")
+
+
 class FlankTable(Table):
     """Flank passes (swarf milling) of the sides on a machine with five simultaneous axes, as further programs."""
 
@@ -274,6 +282,9 @@ class ImpellerOperationTable(Table):
     point_milling: PointMillingTable | None = Field(None, description="point milling on five axes; none: not planned")
     forces: ForcesTable | None = Field(
         None, description="feeds from the cutting force; none: every pass has the same feed"
+    )
+    blades: BladesTable | None = Field(
+        None, description="deflection of the blades under the forces of `forces`; none: not checked"
     )
     hand_picked: PickedTable | None = Field(None, description="cutter of a programmer, with which the plan is compared")
 
