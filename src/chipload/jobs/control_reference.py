@@ -12,6 +12,8 @@ from chipload.program.gcode.modal import GROUPS, M_GROUPS, code_text
 from chipload.program.gcode.sinumerik import NO_MEANING, PLAIN, SAME, SYNCHRONISED
 from chipload.program.gcode.sinumerik_cycles import CYCLES as NAMED_CYCLES
 from chipload.program.gcode.sinumerik_flow import CLOSES
+from chipload.program.gcode.sinumerik_patterns import PATTERNS
+from chipload.program.gcode.sinumerik_points import POINT_WORDS, POLES
 from chipload.program.gcode.sinumerik_words import CORNERS, CURVES, IDLE, PLACED
 from chipload.program.gcode.sinumerik_words import UNREAD as UNREAD_WORDS
 from chipload.program.heidenhain import bore_cycles, cycles, q_cycles, switches
@@ -196,6 +198,9 @@ def _sinumerik(control: Control) -> list[str]:
         ("G codes", _codes(codes)),
         ("cycles", " ".join((*NAMED_CYCLES, "CYCLE800", "MCALL"))),
         ("coordinates", " ".join((*PLACED, "MIRROR", "AMIRROR", "SCALE", "ASCALE", "TRAORI", "TRAFOOF"))),
+        ("points and arcs", f"{_codes(10 * g for g in POLES)} {' '.join(sorted(POINT_WORDS))} CR TURN CIP"),
+        ("patterns of holes", " ".join(PATTERNS)),
+        ("subprograms", "L100 P3, NAME P2, NAME(1, 2), CALL, EXTCALL: %_N_NAME_SPF or PROC in the text, NAME.SPF"),
         ("corners", " ".join(CORNERS)),
         (
             "jumps and loops",

@@ -169,7 +169,7 @@ def test_sinumerik_tapping():
 
 
 def test_what_sinumerik_programs_ask_for_and_is_not_read_is_left_out():
-    commands, findings = sinumerik("G0 X1\nCIP X5 Y5 I1=3\nX6\nPOCKET4(1,2)\nG1 X7 F60\nM30")
+    commands, findings = sinumerik("G0 X1\nCT X5 Y5\nX6\nPOCKET4(1,2)\nG1 X7 F60\nM30")
     assert commands.position[:, 0].tolist() == [1.0, 7.0]
     assert [f.line for f in findings if f.severity is Severity.UNPROVEN] == [2, 3, 4]
 

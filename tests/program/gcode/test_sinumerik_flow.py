@@ -68,7 +68,7 @@ def test_a_loop_over_holes_is_the_same_as_holes_written_out():
         (("R1=1", "IF R1>0 AND R1<2", "G1 X1", "ENDIF", "X2"), [2], 3, "need brackets"),
         (("G1 X1", "GOTOS"), [1], 3, "starts the program again"),
         (("G1 X1 GOTOF E", "E: X2"), [2], 2, "GOTOF: is not read here"),
-        (('CALL "SUB"', "G1 X2"), [2], 2, "CALL: is not read here"),
+        (('CALL "SUB"', "G1 X2"), [2], 2, "SUB: calls a program that is neither"),
     ],
 )
 def test_what_is_not_known_is_a_gap_on_its_line(lines, xs, line, text):

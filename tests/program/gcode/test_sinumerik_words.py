@@ -34,8 +34,8 @@ def read(block: str) -> tuple[int, list[str]]:
         ("$P_PFRAME=CTRANS(X,10)", 0),
         ("$TC_DP6[1,1]=5", 0),
         # the end of these is not known: they do not move
-        ("G2 AR=180 I10 J0", 0),
-        ("G1 X50 ANG=30", 0),
+        ("G2 AR=180", 0),
+        ("G1 ANG=30", 0),
         ("G0 POS[Z]=50", 0),
         ("G0 Z1=50", 0),
         ("G1 X50 FOO", 1),

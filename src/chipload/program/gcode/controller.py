@@ -19,7 +19,7 @@ from chipload.program.corners import turns as turns_at
 from chipload.program.gcode import arcs
 from chipload.program.gcode.expression import integer_of
 from chipload.program.gcode.parameters import Parameters
-from chipload.program.gcode.state import AXES, LINEAR, NO_MOTION, ZERO, Datum, Nine, State, nine
+from chipload.program.gcode.state import AXES, LINEAR, NO_MOTION, ZERO, Datum, Nine, PointMemory, State, nine
 from chipload.program.gcode.tilted_plane import machine_of, position_of
 from chipload.program.gcode.tool_rows import ToolRows
 from chipload.program.gcode.tools import Tool, ToolTable
@@ -121,6 +121,8 @@ class Controller:
         self.returns_to_level = False
         #: Sinumerik: the drilling cycle behind each block (MCALL), its name and its arguments
         self.modal_hole: tuple[str, list[float | None]] | None = None
+        #: Sinumerik: the pole, the last polar point, and whether CIP lasts
+        self.points = PointMemory()
         #: Sinumerik: whether the spindle of the tapping block that is read turns against K; None: no such block
         self.reversed: bool | None = None
         self.named_tools: dict[str, int] = {}

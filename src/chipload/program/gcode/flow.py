@@ -21,6 +21,7 @@ from chipload.program.gcode.macros import block_number, call_macro
 from chipload.program.gcode.modal import COVET, has_axes
 from chipload.program.gcode.parameters import LOCAL
 from chipload.program.gcode.plain import run_plain
+from chipload.program.gcode.sinumerik_calls import call_program
 from chipload.program.gcode.source import KEYWORDS, OWord, Source, read_source
 from chipload.program.gcode.track import BoundError
 from chipload.program.gcode.words import Block, MacroCall, bare
@@ -210,6 +211,8 @@ class Flow:
             self._macro(self.c.modal_macro[0])
         elif block.block_call:
             self._call_block(block.block_call)
+        elif block.program_call is not None:
+            self._program(*block.program_call, block.arguments)
         elif 98 in block.m:
             self._call_number(block.words)
         elif 99 in block.m:
@@ -221,6 +224,14 @@ class Flow:
             call_macro(self, call)
         except NotReadError as error:
             self.c.leave_out("nc-not-read", f"{error}: the block is left out")
+
+    def _program(self, name: str, times: int, arguments: list[float | None]) -> None:
+        try:
+            call_program(self, name, times, arguments)
+        except NotReadError as error:
+            if self.dialect.strict:
+                raise
+            self.c.leave_out("nc-call", f"{error}: the call is left out")
 
     def _moves_axis(self, block: Block) -> bool:
         """Whether a block moves an axis, so that a modal macro is called behind it."""
@@ -388,13 +399,18 @@ class Flow:
         raise InputError(f"o{label} call: there is no o{label} sub in {where}")
 
     def _file(self, label: str) -> Source | None:
+        return self.subprogram_source(label, (".ngc",))
+
+    def subprogram_source(self, label: str, endings: tuple[str, ...]) -> Source | None:
+        """The file of a subprogram beside the text; None: there is none."""
         if self.folder is None or not label.replace("_", "").replace("-", "").isalnum():
             return None
         if label not in self._files:
             if len(self._files) >= MOST_FILES:
                 raise BoundError(f"more than {MOST_FILES} files are called")
             root = self.folder.resolve()
-            path = (root / f"{label}.ngc").resolve()
+            paths = [(root / f"{name}{ending}").resolve() for ending in endings for name in (label, label.lower())]
+            path = next((p for p in paths if p.parent == root and is_file(p)), paths[0])
             found = path.parent == root and is_file(path)
             data = read_regular(path, path.name, LARGEST_FILE) if found else b""
             text = data.decode("utf-8", "replace").replace("\r\n", "\n")
@@ -429,6 +445,10 @@ class Flow:
                 self.c.parameters.assign(key, value)
             for some in (block, *block.after):
                 self.i.execute(some)
+
+    def enter_program(self, source: Source, line: int, name: str, times: int) -> None:
+        """Begin a subprogram behind a line of a text."""
+        self._enter(source, line, name, False, times)
 
     def enter_macro(self, line: int, label: str, times: int) -> None:
         """Begin a subroutine of the main text with parameters of its own (G65)."""

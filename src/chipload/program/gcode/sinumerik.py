@@ -10,10 +10,12 @@ TRANS, ATRANS, ROT and AROT about Z are carried out (:mod:`~chipload.program.gco
 additive forms (:mod:`~chipload.program.gcode.coordinates`), and CYCLE800
 (:mod:`~chipload.program.gcode.sinumerik_swivel`).
 
-Jumps and loops are in :mod:`~chipload.program.gcode.sinumerik_flow`. Left out, so that the result is unproven: motions
-in coordinates that change within mirrored or scaled ones, tool vectors (A3 B3 C3), cycles that are not drilling,
-calls of other programs, curves (CIP, CT, splines), values of names that nothing defines. Noted and left out: what does
-not concern the path. G331 is read as G33, G332 as G33 with the spindle reversed.
+Points by a pole or an angle and arcs by three points are in :mod:`~chipload.program.gcode.sinumerik_points`, patterns
+of holes in :mod:`~chipload.program.gcode.sinumerik_patterns`, subprograms in
+:mod:`~chipload.program.gcode.sinumerik_calls`, jumps and loops in :mod:`~chipload.program.gcode.sinumerik_flow`. Left
+out, so that the result is unproven: motions in coordinates that change within mirrored or scaled ones, tool vectors (A3
+B3 C3), cycles that are not drilling, curves (CT, splines), values of names that nothing defines. Noted and left out:
+what does not concern the path. G331 is read as G33, G332 as G33 with the spindle reversed.
 """
 
 from __future__ import annotations
@@ -32,6 +34,8 @@ from chipload.program.gcode.frames import further, remove
 from chipload.program.gcode.offsets import choose
 from chipload.program.gcode.sinumerik_cycles import CYCLES, NORMAL, hole_blocks
 from chipload.program.gcode.sinumerik_flow import flow_step
+from chipload.program.gcode.sinumerik_patterns import PATTERNS, hole_positions
+from chipload.program.gcode.sinumerik_points import PLANES, POINT_WORDS, POLES, place_points
 from chipload.program.gcode.sinumerik_swivel import swivel
 from chipload.program.gcode.sinumerik_words import (
     ALONG_TOOL,
@@ -68,6 +72,8 @@ _DIMENSION = re.compile(r"(AC|IC|DC|ACP|ACN)\((.*)\)\Z", re.DOTALL)
 _R = re.compile(r"R([0-9]+)(?![0-9A-Z_])")
 _LABEL = re.compile(r"^(N[0-9]+\s*)?[A-Z_][A-Z0-9_]*\s*:(?!=)\s*")
 _NAMED = re.compile(r"[A-Z_$][A-Z0-9_$]*")
+_CALL = re.compile(r'(?:N[0-9]+\s*)?(?:EXT)?CALL\s*\(?\s*"([^"]+)"\s*\)?\s*\Z')
+_CYCLE = re.compile(r"(?:CYCLE|POCKET|SLOT|HOLES)[0-9]|LONGHOLE\Z")
 _DEFINITION = re.compile(r"DEF\s+(?:CHAN\s+|NCK\s+)?(REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b(.*)")
 #: codes of G as LinuxCNC has them, in tenths
 SAME = {60: 610, 64: 640, 641: 640, 642: 640, 643: 640, 644: 640, 645: 640, 70: 200, 700: 200, 71: 210, 710: 210,
@@ -95,13 +101,17 @@ class Sinumerik(Dialect):
         body, _, comment = _without_comment(raw)
         body = body.strip().upper()
         block = Block(comments=[comment] if comment else [])
-        if body.startswith("%") or (body.startswith("$") and "=" not in body):
+        if body.startswith(("%", "PROC ")) or (body.startswith("$") and "=" not in body):
             return None
         body = _LABEL.sub(r"\1", re.sub(r"^/[0-9]?\s*", "", body))
         definition = _DEFINITION.match(body)
         if definition:
             _define(definition[1], definition[2], c)
             return None
+        call = _CALL.match(body)
+        if call:
+            block.program_call = call[1].rsplit("/", 1)[-1].split(".")[0].removesuffix("_SPF"), 1
+            return block
         if len(body) > 4 * LONGEST:
             raise InputError(f"{len(body)} characters: a block has at most {4 * LONGEST}")
         at = 0
@@ -125,6 +135,7 @@ class Sinumerik(Dialect):
                 _keyword(block, c, found["word"], body)
         if block.frame:
             _frame(block, c)
+        place_points(block, c, values)
         if c.scaled is not None and values:
             raise NotReadError("AC and IC in mirrored or scaled coordinates")
         self._resolve(block, c, values)
@@ -136,7 +147,9 @@ class Sinumerik(Dialect):
     def _holes(self, block: Block, c: Controller) -> None:
         """A drilling cycle at the position of the tool or, with MCALL, after each block that moves in the plane."""
         moves = {"x", "y", "z"} - {NORMAL.get(c.state.plane, "z")}
-        if block.modal:
+        if block.pattern is not None:
+            block.after = _pattern_blocks(*block.pattern, c)
+        elif block.modal:
             c.modal_hole = block.hole
         elif (block.hole or c.modal_hole) and c.scaled is not None and c.scaled[0][2] != 1.0:
             raise NotReadError("a cycle in coordinates that are scaled or mirrored along Z")
@@ -218,13 +231,14 @@ def _letter(block: Block, c: Controller, letter: str, value: float, values: list
     elif letter == "M":
         m = integer_of(value, "code M")
         if m == 17:
-            c.note("nc-ignored", "M17: ends a subroutine: the text ends here")
-            m = 30
+            m = _end_of_program(c, "M17")
         block.m.append(m)
     elif letter == "N":
         block.number = int(min(value, 1e12))
     elif letter == "L":
-        raise NotReadError(f"L{value:g}: calls a subroutine that is not in this text")
+        block.program_call = f"L{integer_of(value, 'L')}", 1
+    elif letter == "P" and block.program_call is not None:
+        block.program_call = block.program_call[0], integer_of(value, "P")
     elif letter in _WORDS:
         _put(block, letter.lower(), value)
     else:
@@ -254,7 +268,9 @@ def _code(block: Block, c: Controller, code: int) -> None:
             c.reversed = SYNCHRONISED[code]
     elif code == 63:
         block.g.append(10)
-    elif code in (34, 35, 58, 59, 74, 75, 110, 111, 112, *range(140, 149), 247, 248, 347, 348):
+    elif code in POLES:
+        block.pole = code
+    elif code in (34, 35, 58, 59, 74, 75, *range(140, 149), 247, 248, 347, 348):
         raise NotReadError(f"G{code}: is not read")
     else:
         # the dialect's reader makes a finding of it
@@ -274,6 +290,28 @@ def _position_spindle(block: Block, c: Controller, index: str | None) -> None:
         )
 
 
+def _end_of_program(c: Controller, word: str) -> int:
+    """M function that ends a subprogram, or a text that is one."""
+    if c.level > 0:
+        return 99
+    c.note("nc-ignored", f"{word}: ends a subroutine: the text ends here")
+    return 30
+
+
+def _pattern_blocks(name: str, arguments: list[float | None], c: Controller) -> list[Block]:
+    """The drilling cycle of MCALL at each hole of a pattern."""
+    if c.modal_hole is None:
+        c.leave_out("nc-call", f"{name}: no cycle is active by MCALL: left out")
+        return []
+    if c.state.plane not in PLANES:
+        raise NotReadError(f"{name}: patterns lie in the planes of G17, G18 and G19")
+    u, v = PLANES[c.state.plane][:2]
+    out: list[Block] = []
+    for hole in hole_positions(name, arguments):
+        out += [Block(words={u: hole.real, v: hole.imag}, g=[900, 0]), *hole_blocks(*c.modal_hole, c)]
+    return out
+
+
 def _set_named(block: Block, c: Controller, name: str, text: str, values: list[tuple[str, str, float]]) -> None:
     if name in ("A3", "B3", "C3", "A2", "B2", "C2", "A4", "B4", "C4", "A5", "B5", "C5", "LEAD", "TILT"):
         raise NotReadError(
@@ -283,6 +321,14 @@ def _set_named(block: Block, c: Controller, name: str, text: str, values: list[t
         number = c.named_tools.setdefault(text, FIRST_NAMED + len(c.named_tools))
         c.once("nc-tool-unknown", f"tool {text}: has no number: it is taken as T{number} with length 0")
         _put(block, "t", float(number))
+        return
+    if name in POINT_WORDS:
+        dimension = _DIMENSION.match(text)
+        how = dimension[1] if dimension is not None else "AC"
+        block.point[name] = how, _value(dimension[2] if dimension is not None else text, c)
+        return
+    if name == "P" and block.program_call is not None:
+        block.program_call = block.program_call[0], integer_of(_value(text, c), "P")
         return
     if name in CURVES:
         _left_out(block, c, name)
@@ -354,12 +400,17 @@ def _call_named(block: Block, c: Controller, name: str, arguments: str) -> None:
         leave_out(c, f"{name}: changed coordinates")
     elif name in CYCLES:
         block.hole = (name, [_value(x, c) if x.strip() else None for x in arguments.split(",")])
+    elif name in PATTERNS:
+        block.pattern = name, [_value(x, c) if x.strip() else None for x in arguments.split(",")]
     elif name in JUMPS:
         _keyword(block, c, name)
     elif name in IDLE:
         c.once("nc-ignored", f"{name}: does not affect the path; it is ignored")
-    else:
+    elif _CYCLE.match(name) or '"' in arguments:
         c.leave_out("nc-call", f"{name}({arguments.strip()[:60]}): cycles and calls are not read: left out")
+    else:
+        block.program_call = name, 1
+        block.arguments = [_value(x, c) if x.strip() else None for x in arguments.split(",")]
 
 
 def _define(kind: str, names: str, c: Controller) -> None:
@@ -420,18 +471,19 @@ def _keyword(block: Block, c: Controller, word: str, body: str = "") -> None:
         c.machine_word = word
         block.g.append(530)
     elif word == "RET":
-        c.note("nc-ignored", "RET: ends a subroutine: the text ends here")
-        block.m.append(30)
+        block.m.append(_end_of_program(c, "RET"))
+    elif word == "CIP":
+        block.circle = True
     elif word in FRAMES:
         block.frame = word
     elif word in JUMPS:
         # sinumerik_flow reads the jumps that begin a block
         raise NotReadError(f"{word}: is not read here")
-    elif word in CURVES or word.startswith(("CYCLE", "POCKET", "SLOT", "HOLES")):
+    elif word in CURVES or _CYCLE.match(word):
         _left_out(block, c, word)
     elif word in IDLE:
         c.once("nc-ignored", f"{word}: does not affect the path; it is ignored")
-    elif re.fullmatch(rf"(?:N[0-9]+\s*)?{re.escape(word)}\s*", body):
-        c.leave_out("nc-call", f"{word[:40]}: calls a program that is not in this text: left out")
+    elif re.fullmatch(rf"(?:N[0-9]+\s*)?{re.escape(word)}\s*(?:P\s*=?\s*[0-9]+\s*)?", body):
+        block.program_call = word, 1
     else:
         c.leave_out("nc-unknown-word", f"{word[:40]}: is not known: its effect is left out")

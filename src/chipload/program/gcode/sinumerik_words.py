@@ -26,7 +26,7 @@ JUMPS = frozenset(
 )
 CURVES = frozenset(
     """
-    AP ASPLINE BSPLINE CIP CSPLINE CT INVCCW INVCW OMA POLY RP TCARR TRAANG TRACYL TRANSMIT
+    ASPLINE BSPLINE CSPLINE CT INVCCW INVCW OMA POLY TCARR TRAANG TRACYL TRANSMIT
     """.split()  # noqa: SIM905
 )
 IDLE = frozenset(
@@ -45,7 +45,7 @@ _TOOL, _TOUCH = "an offset of the tool is left out", "a probe signal may end the
 _LEFT_OUT = "the motion of its block is left out"
 UNREAD = {
     "DISC": "the corner stays sharp",
-    **dict.fromkeys(("AR", "ANG", "PO", "POS", "POSA", "POSP"), _LEFT_OUT),
+    **dict.fromkeys(("PO", "POS", "POSA", "POSP"), _LEFT_OUT),
     **dict.fromkeys(("TOFF", "TOFFL", "TOFFR"), _TOOL),
     **dict.fromkeys(("MEAS", "MEAW", "MEASA", "MEAWA"), _TOUCH),
     "OFFN": _ALLOWANCE,

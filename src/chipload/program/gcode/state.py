@@ -8,7 +8,7 @@ of the work offset, ``length`` of the tool.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -141,3 +141,19 @@ class State:
     flood: bool = False
     mist: bool = False
     compensation: int = 400
+
+
+@dataclass
+class PointMemory:
+    """What lasts from block to block.
+
+    Parameters
+    ----------
+    pole : in the axes of the plane [units of the text]
+    polar : radius and angle [deg] of the last polar point
+    circle : whether CIP is the motion
+    """
+
+    pole: complex = 0j
+    polar: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    circle: bool = False

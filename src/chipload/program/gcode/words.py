@@ -52,6 +52,10 @@ class Block:
     macro, block_call : call of a macro (G65, G66), and words of M97 of a Haas
     pointless : letters whose numbers are written without a decimal point
     frame : Sinumerik's word that sets the coordinates (TRANS, ROT ...)
+    point : Sinumerik's words of a point without coordinates (RP, AP, ANG, AR, I1 ...): how, and the value
+    pole : G110 to G112 of a Sinumerik; ``circle``: CIP
+    pattern : Sinumerik's pattern of holes, its name and its arguments
+    program_call, arguments : name of the subprogram that a Sinumerik calls and how often, and its arguments
     """
 
     words: dict[str, float] = field(default_factory=dict)
@@ -67,6 +71,12 @@ class Block:
     block_call: dict[str, float] = field(default_factory=dict)
     frame: str = ""
     pointless: set[str] = field(default_factory=set)
+    point: dict[str, tuple[str, float]] = field(default_factory=dict)
+    pole: int | None = None
+    circle: bool = False
+    pattern: tuple[str, list[float | None]] | None = None
+    program_call: tuple[str, int] | None = None
+    arguments: list[float | None] = field(default_factory=list)
 
 
 def bare(line: str) -> tuple[str, list[str]]:
