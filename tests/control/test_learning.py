@@ -117,6 +117,25 @@ def test_missing_stock_is_named(log, program):
     assert found.material.Ktc == pytest.approx(1.2 * PRIOR.Ktc, rel=3.0 * found.deviations[1][0])
 
 
+def test_a_block_alone_is_no_fault(log, program):
+    """A block of the air with the power of a cut, as where a line begins late, is left out without a finding; two are
+    one.
+    """
+    aligned = align_log("log", log, log.power, program)
+    air = np.flatnonzero((aligned.row >= 0) & (program.cutting[aligned.row] == 0.0))
+    long = np.split(air, np.flatnonzero(np.diff(air) > 1) + 1)
+    own = max(long, key=len)
+    length = (log.time[-1] - log.time[0]) / 240
+    place = ((log.time - log.time[0]) / length).astype(int)
+    middle = place[own[len(own) // 2]]
+    for blocks_wrong, codes in ((1, []), (2, ["log-metal"])):
+        changed = (place >= middle) & (place < middle + blocks_wrong)
+        power = np.where(changed, np.quantile(log.power, 0.9), log.power)
+        found = learn_material([blocks(replace(log, power=power), program)], SIGNAL, PRIOR)
+        assert [f.code for f in found.findings] == codes
+        assert found.left_out >= blocks_wrong
+
+
 @pytest.mark.parametrize("factor", [1e-3, 10.0, 1e3])
 def test_unit_of_the_power(log, program, factor):
     with pytest.raises(InputError, match=r"check its unit \(a factor of"):

@@ -480,7 +480,7 @@ def _findings_of(model: _SpindleModel, x: Floats, k: int, kept: NDArray[np.bool_
         "log-metal": ((cut <= 0.0) & (log.signal - idle > 5.0 * noise), "shows a cut where the program cuts air"),
     }
     for code, (wrong, text) in kinds.items():
-        wrong = wrong & ~kept
+        wrong = _with_neighbour(wrong & ~kept)
         if wrong.any():
             first = int(np.flatnonzero(wrong)[0])
             lines = sorted({int(v) for v in log.line[wrong]})
@@ -491,6 +491,12 @@ def _findings_of(model: _SpindleModel, x: Floats, k: int, kept: NDArray[np.bool_
             )
             out.append(Finding(code, lines[0], message, Severity.UNPROVEN))
     return out
+
+
+def _with_neighbour(wrong: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the blocks of which the one before or after is wrong too: one alone is where a line begins or ends."""
+    edge = np.concatenate([[False], wrong, [False]])
+    return np.asarray(wrong & (edge[:-2] | edge[2:]))
 
 
 def _fit_error(model: _SpindleModel, x: Floats, k: int, kept: NDArray[np.bool_]) -> float:
