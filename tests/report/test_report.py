@@ -148,7 +148,7 @@ def test_summary_states_the_verdict_first_and_every_strategy(outcome: Maker) -> 
             "name": "finish pass", "reason": "where the wall is made", "ranges": [[900, 1800]],
             "excluded_s": pytest.approx(4.5, abs=0.01), "excluded_worst": 25.0,
         },
-        "reason": "", "budget": None,
+        "reason": "", "budget": None, "feed_law": None,
     }  # fmt: skip
     assert plain["time_s"] == 9.0
     assert [(f["code"], f["severity"]) for f in plain["findings"]] == [("lead-none", "note")]

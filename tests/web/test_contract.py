@@ -148,6 +148,10 @@ def test_exit_code_summary_result_report_and_page_state_one_verdict(opened, page
     assert (page.inner_text(".cl-word"), page.inner_text(".cl-message")) == (verdict.value, summary["message"])
     colour = {"holds": "cl-ok", "unproven": "cl-may", "exceeds": "cl-no"}[verdict.value]
     assert colour in page.get_attribute(".cl-verdict", "class").split()
+    changes = [change.line_text for change in result.changes]
+    assert page.locator(".cl-change > :first-child").all_inner_texts() == changes
+    assert all(f"<li>{html.escape(text)}</li>" in report for text in changes)
+    assert changes or name != "overloaded"
 
 
 def test_the_runs_end_in_every_state(opened) -> None:

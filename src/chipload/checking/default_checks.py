@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chipload.checking.feed_law import feed_law_of
 from chipload.checking.load_budget import budget_of
 from chipload.checking.rubbing import over_feed, rubbing_text, spindle_speed
 from chipload.checking.settings import CheckSettings
@@ -400,7 +401,8 @@ def with_budget(check: LimitCheck, checks: DefaultChecks, columns: Columns) -> L
     """
     peaks = peak_excess(checks.material, check.column.name)
     budget = budget_of(check, checks.confidence, checks.cutters, checks.material, checks.parts, columns, peaks)
-    held = with_peaks(check, checks, columns)
+    law = feed_law_of(check, checks.cutters, checks.material, columns)
+    held = replace(with_peaks(check, checks, columns), feed_law=law)
     return held if budget is None else hold_at_confidence(held, budget)
 
 

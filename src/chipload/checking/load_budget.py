@@ -70,10 +70,11 @@ def budget_parts(
             rise=0.0 if mean else own.rise,
             deviation=0.0 if mean else own.rise_deviation,
             remedy=state if own.assumed_runout else "state runout_deg, the direction of the runout",
+            grows=True,
         ),
         ErrorPart(spread, deviation=0.0 if geometric else own.coefficients, remedy=fit if textbook else ""),
         ErrorPart("drill model", deviation=MODEL_SPREAD if drilling and not geometric else 0.0),
-        ErrorPart("thin chips", deviation=0.0 if geometric else own.thin_chips),
+        ErrorPart("thin chips", deviation=0.0 if geometric else own.thin_chips, grows=True),
         ErrorPart("turns", deviation=0.0 if mean or geometric else TURNS),
     )
 

@@ -81,6 +81,8 @@ def show_verdict(result: Result, *, worst: bool = False) -> None:
         show_limits(result)
     for line in more:
         show(line)
+    for change in result.changes:
+        show(f"change: {change.line_text}")
     show_time(result)
 
 

@@ -60,6 +60,7 @@ def page_bytes(result: Result, presentation: Presentation, view: Sequence[str] =
     ]
     body = [
         *heading_lines(result.title, BANNERS[verdict], verdict.value, result.first_lines, answer_html(result.critical)),
+        *changes_list(result),
         *findings_table("Findings", tuple(f for f in findings if f.severity is not Severity.NOTE)),
         "<h2>Not checked</h2>",
         items(result.unchecked) if result.unchecked else "<p>Every limit and check is stated.</p>",
@@ -67,6 +68,14 @@ def page_bytes(result: Result, presentation: Presentation, view: Sequence[str] =
     ]
     shown = (VIEW, DATA, viewer_script()) if view else None
     return frame_page(result.title, verdict.value, body, figures, shown)
+
+
+def changes_list(result: Result) -> list[str]:
+    """Changes that would settle what does not hold; nothing where there is none."""
+    if not result.changes:
+        return []
+    note = '<p class="note">Each is a prediction: run the job with the change to prove it.</p>'
+    return ["<h2>What to change</h2>", items([change.line_text for change in result.changes]), note]
 
 
 def limits_table(tracks: Iterable[Track]) -> list[str]:

@@ -12,7 +12,7 @@ exp, as coefficients are positive: at 3 % it is 1 + z u. At 0.5 what is not know
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 
 import numpy as np
@@ -35,6 +35,7 @@ class ErrorPart:
     rise : what it adds on average; it multiplies
     deviation : standard deviation
     remedy : what the user can state to make it less; empty: nothing
+    grows : whether it grows as chips become thinner, in the ratio in which the value falls
 
     Raises
     ------
@@ -47,6 +48,7 @@ class ErrorPart:
     rise: float = 0.0
     deviation: float = 0.0
     remedy: str = ""
+    grows: bool = False
 
     def __post_init__(self) -> None:
         if not all(math.isfinite(x) and x >= 0.0 for x in (self.bound, self.rise, self.deviation)):
@@ -99,6 +101,16 @@ class ErrorBudget:
         """
         factor = _factor(self.parts, self.confidence if confidence is None else confidence)
         return nominal / factor if least else nominal * factor
+
+    def at_feed(self, ratio: float) -> ErrorBudget:
+        """Return the budget at another feed, at which the nominal value is ``ratio`` times as great: parts that grow as
+        chips become thinner stay as great as they were.
+        """
+        parts = (
+            replace(part, rise=part.rise / ratio, deviation=part.deviation / ratio) if part.grows else part
+            for part in self.parts
+        )
+        return ErrorBudget(self.confidence, tuple(parts))
 
     def in_order(self, confidence: float | None = None) -> list[tuple[ErrorPart, float]]:
         """Return the parts that add something and what each adds alone, relative, the greatest first."""

@@ -20,6 +20,7 @@ from chipload.number_text import number_text, percent_text
 from chipload.result.budget import ErrorBudget, level_text
 from chipload.result.columns import Column, column_of, error_of
 from chipload.result.coverage import FAR_BEYOND, WHOLE, Coverage, CoveredRows, coverage_of
+from chipload.result.feed_law import FeedLaw
 from chipload.result.verdict import Verdict
 
 Columns = Mapping[str, NDArray[Any]]
@@ -45,6 +46,7 @@ class LimitCheck:
     absolute_error : how much worse a value between the points that are checked may be, in the unit of the column
     coverage : rows of the history that the limit covers
     budget : parts of the error of ``worst``, and the confidence at which the limit is held; None: it is no load
+    feed_law : how the column changes with the feed; None: it is not known, or it does not
 
     Raises
     ------
@@ -67,6 +69,7 @@ class LimitCheck:
     absolute_error: float = 0.0
     coverage: Coverage = WHOLE
     budget: ErrorBudget | None = None
+    feed_law: FeedLaw | None = None
 
     def __post_init__(self) -> None:
         """Refuse numbers that are not finite, a missing worst value without a reason, and an unknown error."""

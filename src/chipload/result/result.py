@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipload.errors import Finding, InputError
+from chipload.result.changes import MOST as MOST_CHANGES
+from chipload.result.changes import Change, propose_changes
 from chipload.result.columns import COLUMNS
 from chipload.result.display import result_html
 from chipload.result.first_lines import (
@@ -164,6 +166,14 @@ class Result:
         """
         reason = reason_line(self.verdict, self.findings, self.in_use)
         return tuple(filter(None, (reason, coverage_line(self.in_use), unchecked_line(self.unchecked))))
+
+    @cached_property
+    def changes(self) -> tuple[Change, ...]:
+        """Up to three changes that would settle a limit of a track in use that does not hold, the greatest margin
+        first.
+        """
+        found = [change for track in self.in_use for change in propose_changes(track)]
+        return tuple(sorted(found, key=lambda change: -change.margin)[:MOST_CHANGES])
 
     @cached_property
     def message(self) -> str:

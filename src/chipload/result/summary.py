@@ -13,6 +13,7 @@ from chipload.errors import Finding, Severity
 from chipload.result.budget import ErrorBudget, ErrorPart
 from chipload.result.columns import column_of
 from chipload.result.coverage import Coverage
+from chipload.result.feed_law import FeedLaw
 from chipload.result.limits import LimitCheck
 from chipload.result.result import Provenance, Result, SurfaceMap
 from chipload.result.track import Track, TrackKind
@@ -53,6 +54,7 @@ class ErrorPartModel(_SummaryPart):
     rise: float = Field(description="what it adds on average; it multiplies")
     deviation: float = Field(description="standard deviation; random parts add as the root of their squares")
     remedy: str = Field(description="what can be stated to make it less; empty: nothing")
+    grows: bool = Field(default=False, description="whether it grows as chips become thinner")
 
 
 class BudgetModel(_SummaryPart):
@@ -62,6 +64,15 @@ class BudgetModel(_SummaryPart):
     shown_at: float = Field(description="confidence of value")
     value: float = Field(description="value at that confidence, in the unit of the limit")
     parts: tuple[ErrorPartModel, ...] = Field(description="parts of the error, the greatest first")
+
+
+class FeedLawModel(_SummaryPart):
+    """How the column of a limit changes with the feed: edge forces do not depend on it, chips and their forces do."""
+
+    edge_low: float = Field(description="least edge force over the cutting force of a chip of 1 mm")
+    edge_high: float = Field(description="greatest of these ratios")
+    exponent: float = Field(description="exponent of the size effect")
+    runout_mm: float = Field(description="part of the chip that runout makes, at most")
 
 
 class LimitModel(_SummaryPart):
@@ -86,6 +97,9 @@ class LimitModel(_SummaryPart):
     coverage: CoverageModel = Field(description="rows that the limit covers")
     reason: str = Field(description="why the limit is unproven")
     budget: BudgetModel | None = Field(description="parts of the error of worst; null: it is not that of a load")
+    feed_law: FeedLawModel | None = Field(
+        default=None, description="how the column changes with the feed; null: not known, or it does not"
+    )
 
 
 class FindingModel(_SummaryPart):
@@ -246,8 +260,10 @@ def limit_from(model: LimitModel) -> LimitCheck:
         Its numbers do not agree.
     """
     column_of(model.name)
-    own = model.model_dump(exclude={"column", "unit", "margin", "coverage", "budget"})
-    return LimitCheck(**own, coverage=Coverage(**model.coverage.model_dump()), budget=_budget_from(model.budget))
+    own = model.model_dump(exclude={"column", "unit", "margin", "coverage", "budget", "feed_law"})
+    law = None if model.feed_law is None else FeedLaw(**model.feed_law.model_dump())
+    coverage = Coverage(**model.coverage.model_dump())
+    return LimitCheck(**own, coverage=coverage, budget=_budget_from(model.budget), feed_law=law)
 
 
 def _budget_from(model: BudgetModel | None) -> ErrorBudget | None:
@@ -268,7 +284,9 @@ def provenance_from(model: ProvenanceModel) -> Provenance:
 
 
 def _limit(check: LimitCheck) -> LimitModel:
-    own = {**vars(check), "coverage": CoverageModel(**vars(check.coverage)), "budget": _budget(check)}
+    law = None if check.feed_law is None else FeedLawModel(**vars(check.feed_law))
+    coverage = CoverageModel(**vars(check.coverage))
+    own = {**vars(check), "coverage": coverage, "budget": _budget(check), "feed_law": law}
     return LimitModel(**own, column=check.column.name, unit=check.column.unit, margin=check.margin)
 
 

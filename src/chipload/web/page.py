@@ -15,6 +15,7 @@ from nicegui import background_tasks, ui
 from chipload.errors import InputError, OutputError
 from chipload.report.folder import check_target
 from chipload.result import Verdict
+from chipload.result.changes import Change
 from chipload.web.asset_cache import AssetCache
 from chipload.web.comparison import MOST
 from chipload.web.folder_access import (
@@ -79,6 +80,8 @@ class Page:
             with ui.element("div").classes("cl-view") as self.stage:
                 self.view = ResultView(assets)
         self.view.moved_on = self._moved_on
+        self.view.can_run = lambda: self._job_of_result() is not None
+        self.view.run_change = self._try_change
         self.opening, self.list = self._dialog("Open")
         self.running, self.ask = self._dialog("Run")
         self._help()
@@ -295,6 +298,33 @@ class Page:
         self.seen, self.own = None, now
         self.bar.set_visibility(True)
         background_tasks.create(now.work(path, target))
+
+    def _job_of_result(self) -> str | None:
+        """The job of the program that is shown; None: it is not in the folder, or its feeds are not changed."""
+        if self.result is None or self.result.result.capability != "program":
+            return None
+        name = PurePosixPath(self.result.name)
+        stem = "job" if name.name == "result" else name.name.removeprefix("result-")
+        job = (name.parent / f"{stem}.toml").as_posix()
+        try:
+            return job if is_job(resolve_name(self.opened.root, job)) else None
+        except InputError:
+            return None
+
+    def _try_change(self, change: Change) -> None:
+        """Run the job with new feeds of the lines that load too much, and compare the result with the one shown."""
+        job, result = self._job_of_result(), self.result
+        if job is None or result is None:
+            return
+        slowest = min(20.0, 50.0 * change.factor)
+        overrides = [f"operation.0.feeds.{key}={value:g}" for key, value in (
+            ("slowest_percent", slowest), ("fastest_percent", 100.0),
+        )]  # fmt: skip
+        message = ui.label("").classes("cl-no")
+        self._run(job, f"{result.name}-changed", message, overrides, result.name)
+        if message.text:
+            ui.notify(message.text, type="negative")
+        message.delete()
 
     async def _poll(self) -> None:
         now = self.runs.now

@@ -15,6 +15,7 @@ from nicegui import ui
 from chipload.number_text import number_text
 from chipload.report.answer import answer_html
 from chipload.result import Verdict
+from chipload.result.changes import Change, ChangeKind
 from chipload.web.asset_cache import AssetCache
 from chipload.web.checks import row_of
 from chipload.web.comparison import COLOURS, MOST, Side
@@ -57,6 +58,9 @@ class ResultView:
         self.sides: tuple[Side, ...] = ()
         #: track and row of the limit with the least margin
         self.critical: tuple[PageTrack, int | None] | None = None
+        #: whether the job of the result can be run with lower feeds, and what runs it
+        self.can_run: Callable[[], bool] = lambda: False
+        self.run_change: Callable[[Change], None] = lambda _: None
         #: called when another program of the sequence is shown
         self.moved_on: Callable[[int], None] = lambda _: None
         with ui.element("div").classes("cl-verdict") as self.verdict:
@@ -70,6 +74,7 @@ class ResultView:
                     'flat dense no-caps aria-label="the whole message" aria-expanded=false'
                 ).classes("cl-fold").mark("fold")  # fmt: skip
                 self.fold.on("mousedown.prevent")
+            self.changes = ui.element("div").classes("cl-changes").mark("changes")
             self.message = ui.label("").classes("cl-message").props("role=status")
             self.lines_below = ui.label("").classes("cl-lines")
         with ui.element("div").classes("cl-body"):
@@ -231,6 +236,7 @@ class ResultView:
         self.critical = None if own is None or critical is None else (own, row_of(own, critical))
         self.answer.set_content(answer_html(critical, None if self.critical is None else self.critical[1]))
         self.more.set_text(" ".join(result.result.open_lines) or ALL_CHECKED)
+        self._show_changes(await asyncio.to_thread(lambda: result.result.changes))
         self.message.set_text(message)
         self.lines_below.set_text("\n".join(result.result.first_lines[1:]))
         await self.scene.open(result, track)
@@ -247,6 +253,21 @@ class ResultView:
         await self.source.open(result, track)
         self.lines.open(result, track, self.source.text)
         self.first()
+
+    def _show_changes(self, changes: Sequence[Change]) -> None:
+        """Show what would settle the limits that do not hold; a lower feed can be run where the job is known."""
+        self.changes.clear()
+        self.changes.set_visibility(bool(changes))
+        with self.changes:
+            if changes:
+                ui.label("What to change").classes("cl-changes-title")
+            for change in changes:
+                with ui.element("div").classes("cl-change"):
+                    ui.label(change.line_text)
+                    if change.kind is ChangeKind.FEED and self.can_run():
+                        ui.button("Try", on_click=lambda c=change: self.run_change(c)).props(
+                            'flat dense no-caps aria-label="run the job with feeds within the limits and compare"'
+                        ).mark("try")  # fmt: skip
 
     async def _go_to_critical(self, event: Any) -> None:
         """The place of the critical limit is clicked."""
