@@ -127,3 +127,17 @@ def test_probing_at_rest_is_no_cut(tmp_path: Path):
     assert gaps == ["nc-probe"]
     reading, _ = read(tmp_path, text.replace("G38.2", "G1"), ending=".ngc")
     assert [f.code for f in reading.violations] == ["machine-spindle-off"]
+
+
+@pytest.mark.parametrize(
+    "head", ["<COVER-PLATE>", "<COVER-PLATE> (OP 10)", "O0028(TEST ; NO COMMENT (WITHIN ONE)", "O28 (A (B (C)"]
+)
+def test_names_and_comments_of_a_program_are_no_gaps(tmp_path, head):
+    """A name in <> instead of O, and a comment that ends at its first ): nothing is left out."""
+    path = tmp_path / "a.nc"
+    path.write_text(f"%\n{head}\nG21 G90 G17 G54\nT1 M6\nS1000 M3\nG0 X0. Y0.\nG43 H1 Z5.\nG1 Z-1. F100.\nM30\n%\n")
+    reading = read_program(path, VMC)
+    assert [f.text for f in reading.findings if f.severity is not Severity.NOTE] == []
+    assert reading.program.p_work[-1].tolist() == [0.0, 0.0, -1.0]
+    if head.startswith("<"):
+        assert reading.recognition.control.name == "fanuc"

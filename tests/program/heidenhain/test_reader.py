@@ -30,6 +30,13 @@ def test_inch_and_rotary():
     assert c.feed[1] == pytest.approx(25.4 / 60.0)  # F in tenths of an inch
 
 
+def test_feeds_in_inches_and_of_the_tool_call():
+    """F in tenths of an inch, of rotary axes alone in degrees a minute; F AUTO is the feed of TOOL CALL."""
+    c, found = read("TOOL CALL 1 Z S1000 F60", "L X+0 F30", "L X+1 FAUTO", "L A+90 F60", unit="INCH")
+    assert c.feed[-3:].tolist() == pytest.approx([1.27, 2.54, 1.0])
+    assert not [f for f in found if f.code == "heidenhain-feed-auto"]
+
+
 def test_arcs_about_the_pole():
     """A quarter each way, a whole turn, two turns of a helix."""
     c, _ = read(

@@ -45,6 +45,9 @@ from chipload.program.tilt import tilt_of, turn_matrix
 if TYPE_CHECKING:
     from chipload.program.gcode.flow import Flow
 
+#: name of a program instead of its number, and a comment that holds another (
+_NAME = re.compile(r"^[ \t]*<([A-Za-z0-9_+.-]{1,32})>(?=[ \t]*(?:\(|$))", re.MULTILINE)
+_NESTED = re.compile(r"\([^()\n]*\([^)\n]*\)")
 _COLON = re.compile(r"^([ \t]*):(?=[0-9])", re.MULTILINE)
 _FILE = re.compile(r"^\$[^\n%]*%[ \t]*$", re.MULTILINE)
 _SKIP = re.compile(r"^/[1-9]")
@@ -108,8 +111,11 @@ class Fanuc(Dialect):
     """See above."""
 
     def prepare(self, text: str) -> str:
-        """A program number may begin with : instead of O; the name of a file may stand in the first line ($A.MIN%)."""
-        return _FILE.sub("%", _COLON.sub(r"\1O", text))
+        """A program number may begin with : instead of O; the first line may hold the name of a file ($A.MIN%), that
+        of the program in <>. A comment ends at its first ), whatever it holds.
+        """
+        text = _NAME.sub(r"(\1)", _FILE.sub("%", _COLON.sub(r"\1O", text)))
+        return _NESTED.sub(lambda found: f"({found[0][1:].replace('(', '[')}", text)
 
     def begin(self, c: Controller, text: str) -> None:
         """System variables, and numbers without a decimal point."""
