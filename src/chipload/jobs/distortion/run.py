@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from chipload.checking.clamped import PER
 from chipload.errors import Finding, InputError, Severity
 from chipload.geometry.mesh import read_mesh
+from chipload.geometry.pocketed_part import level_faces
 from chipload.jobs.distortion.job import DistortionJob
 from chipload.jobs.distortion.outcome import Banded, DistortionResult, PlanOutcome
 from chipload.jobs.distortion.plans import MillingPlan, plans_of
 from chipload.jobs.distortion.release import PlateRelease, in_wider_cells, plate_release
-from chipload.jobs.distortion.shapes import PartLayers, level_faces, part_layers
+from chipload.jobs.distortion.shapes import PartLayers, part_layers
 from chipload.jobs.distortion.surface import part_surface
 from chipload.number_text import number_text, percent_text
 from chipload.progress import Progress, silent

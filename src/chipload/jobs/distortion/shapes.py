@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.geometry.mesh import sections
+from chipload.geometry.pocketed_part import distinct_levels, level_faces
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]
@@ -26,8 +27,8 @@ Floats = NDArray[np.float64]
 LAYERS = 60
 #: share of a section that may differ between the ends of one layer
 ALIKE = 1e-4
-#: greatest slope of a face that counts as level, and distance of two levels that are one [mm]
-LEVEL, ONE = 1e-6, 1e-4
+#: distance of two levels that are one [mm]
+ONE = 1e-4
 #: distance [mm] off a face at which is asked whether it is cut free
 OFF = 0.02
 
@@ -136,7 +137,7 @@ def part_layers(mesh: trimesh.Trimesh, low: Floats, high: Floats, stocks: Sequen
             )
     levels = level_faces(mesh)
     cuts = [low[2], high[2], *(z + s for z in levels for a in (0.0, *stocks) for s in (a, -a))]
-    bounds = _distinct(np.clip(np.array(cuts, dtype=np.float64), low[2], high[2]))
+    bounds = distinct_levels(np.clip(np.array(cuts, dtype=np.float64), low[2], high[2]))
     thickest = float(np.ptp(mesh.bounds, axis=0).max()) / LAYERS
     out = [bounds[0]]
     for a, b in pairwise(bounds.tolist()):
@@ -147,15 +148,3 @@ def part_layers(mesh: trimesh.Trimesh, low: Floats, high: Floats, stocks: Sequen
     edges = np.array(out)
     shapes = tuple(s.simplify(ONE) for s in sections(mesh, 0.5 * (edges[1:] + edges[:-1])))
     return PartLayers(np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64), edges, shapes)
-
-
-def level_faces(mesh: trimesh.Trimesh) -> Floats:
-    """Heights [mm] of the level faces of a mesh."""
-    level = np.abs(mesh.face_normals[:, 2]) > 1.0 - LEVEL
-    return _distinct(np.asarray(mesh.triangles[level][:, 0, 2], dtype=np.float64))
-
-
-def _distinct(values: Floats) -> Floats:
-    """Values in their order, those nearer than :data:`ONE` once."""
-    v = np.sort(values)
-    return v[np.concatenate([[True], np.diff(v) > ONE])] if len(v) else v

@@ -13,7 +13,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from chipload.jobs.distortion.shapes import LEVEL, OFF
+from chipload.geometry.pocketed_part import LEVEL
+from chipload.jobs.distortion.shapes import OFF
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

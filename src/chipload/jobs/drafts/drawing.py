@@ -20,6 +20,7 @@ from chipload.geometry.step import read_step_face
 from chipload.geometry.step_faces import Face, read_faces
 from chipload.jobs.drafts.cutters import cutter_table
 from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, relative
+from chipload.jobs.drafts.found import found_lines
 from chipload.machine.machine import Machine, machine_named, read_machine
 from chipload.number_text import number_text
 from chipload.planning.contour.offsets import centre_paths, walls_of
@@ -209,7 +210,7 @@ def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
     stands = "the top of the model" if top > level + 1e-3 else "one depth of cut above the face"
     stock = DraftTable("stock", (Entry("top_mm", round(level + (depth or axial), 6), stands, True),))
     tables = (part, stock, *_rest(_machine(machine), machine, size, axial, "pocket", narrow=narrow, depth=depth))
-    notes = (*thin_rings(model.faces), *(str(f) for f in drawing.findings[:8]))
+    notes = (*thin_rings(model.faces), *found_lines(file, level, size), *(str(f) for f in drawing.findings[:8]))
     return Draft(f"Clear the face at z = {level:g} mm of {file.name}: {number_text(region)} mm2.", tables, notes)
 
 

@@ -39,12 +39,12 @@ WANTED_MODES = 8_000
 
 def thinnest(stock: LayeredStock, least: float, most: float) -> float:
     """Thickness [mm] of the thinnest wall or floor, between ``least`` and ``most``; ``most``: none is thinner."""
-    wall = _wall(stock, least, most)
-    return min(wall, _floor(stock, most))
+    wall = thinnest_wall(stock, least, most)
+    return min(wall, thinnest_floor(stock, most))
 
 
-def _wall(stock: LayeredStock, least: float, most: float) -> float:
-    """The least thickness at which a choice of sections loses a wall."""
+def thinnest_wall(stock: LayeredStock, least: float, most: float) -> float:
+    """The least thickness [mm] at which a choice of sections loses a wall."""
     firsts = [i for i in range(stock.layers) if not alike(stock, i)]
     at = np.linspace(0, len(firsts) - 1, min(SECTIONS, len(firsts))).astype(np.int64)
     sections = [stock.section(firsts[k]).simplify(0.02 * least) for k in np.unique(at).tolist()]
@@ -69,8 +69,8 @@ def _wall(stock: LayeredStock, least: float, most: float) -> float:
     return math.sqrt(low * high)
 
 
-def _floor(stock: LayeredStock, most: float) -> float:
-    """Least height of material above a grid of points over more than a patch."""
+def thinnest_floor(stock: LayeredStock, most: float) -> float:
+    """Least height [mm] of material above a grid of points over more than a patch."""
     low, high = (np.array([stock.xs[i], stock.ys[i]]) for i in (0, -1))
     pitch = float((high - low).max()) / POINTS
     x, y = (np.arange(a + 0.5 * pitch, b, pitch) for a, b in zip(low, high, strict=True))
