@@ -1,10 +1,14 @@
 """Impellers of others from file to verified programs: what was planned, time, verdict, or the line that refuses it.
 
-    CHIPLOAD_DATA=FOLDER python benchmarks/impeller_shapes.py [NAME ...] [--out FOLDER] [--workers N]
+    CHIPLOAD_DATA=FOLDER python benchmarks/impeller_shapes.py [NAME ...] [--loads] [--out FOLDER] [--workers N]
 
-prints a row for each shape: ``kj66`` (STEP), ``pyturbo`` (a table of all sections), ``rotor`` (STEP of T-Blade3), and
-``hecc`` where it is named: the example with fillets of 2.5 mm and programs for all ten surfaces, one cutter, scallop
-0.1 mm. Results with their report are written to ``--out``. FOLDER of CHIPLOAD_DATA holds the files of others. With
+prints a row for each shape: time on the machine of the job, with its rates and accelerations, scallop, gouge, greatest
+deflection of cutter and blade, verdict. Shapes: ``kj66`` (STEP), ``pyturbo`` (a table of all sections), ``rotor`` (STEP
+of T-Blade3), and ``hecc`` where it is named: the example with fillets of 2.5 mm and programs for all ten surfaces, one
+cutter, scallop 0.1 mm. Before finishing, :data:`ALLOWANCE` stands on the milled surfaces of all but ``hecc``, as a
+stated stock, in which the programs are simulated; the stock of ``hecc`` is not stated. With ``--loads`` the feeds are
+found by the forces in aluminium, and cutters and blades bend.
+Results with their report are written to ``--out``. FOLDER of CHIPLOAD_DATA holds the files of others. With
 ``--workers`` the time of their processes is counted too.
 """
 
@@ -16,14 +20,22 @@ import os
 import re
 import shutil
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
 
 from chipload.errors import ChiploadError
 from chipload.examples import copy_example
 from chipload.jobs import load_job, run_job
-from chipload.result import Verdict
+from chipload.jobs.impeller.part import read_part
+from chipload.result import Track, Verdict
 from chipload.workers import Workers
+
+Floats = NDArray[np.float64]
 
 DATA = Path(os.environ.get("CHIPLOAD_DATA", Path(__file__).parents[1].parent / "shared" / "data"))
 
@@ -66,6 +78,21 @@ above_mm = 5.0
 link_feed_mm_min = 1200.0
 gouge_mm = {gouge:g}
 """
+FORCES = """
+[operation.forces]
+material = {{ name = "al7075-t6" }}
+flutes = 2
+overhang_mm = 60.0
+allowance_mm = {allowance:g}
+deflection_um = 30.0
+
+[operation.blades]
+modulus_gpa = 71.0
+poisson = 0.33
+deflection_um = 50.0
+"""
+#: what stands on the milled surfaces before finishing, and how far the stock goes into the metal [mm]
+ALLOWANCE, INTO = 0.3, 0.2
 HECC_PATHS = """
 [operation.paths]
 check_mm = 1.0
@@ -124,7 +151,7 @@ SHAPES = {
 }  # fmt: skip
 
 
-def job_of(shape: Shape, folder: Path) -> Path:
+def job_of(shape: Shape, folder: Path, loads: bool) -> Path:
     """The job file of a shape, its file and its cutters beside it."""
     name = Path(shape.file).name
     shutil.copyfile(DATA / shape.file, folder / name)
@@ -146,7 +173,37 @@ def job_of(shape: Shape, folder: Path) -> Path:
         + "".join(surfaces)
         + OPERATION.format(gouge=shape.gouge, tolerance=shape.tolerance, small=0.2 * shape.gouge)
     )
-    return folder / "job.toml"
+    path = folder / "job.toml"
+    stock_body(path, shape).export(folder / "stock.stl")
+    text = path.read_text() + (FORCES.format(allowance=ALLOWANCE) if loads else "")
+    path.write_text(text + '\n[stock]\nfile = "stock.stl"\nunits = "mm"\n')
+    return path
+
+
+def stock_body(path: Path, shape: Shape) -> trimesh.Trimesh:
+    """What stands on the milled surfaces of a job: a shell over each."""
+    impeller = read_part(load_job(path).job).impeller
+    shells = []
+    for side, along, up in shape.surfaces:
+        patch = getattr(impeller.blade, side)
+        u, v = np.meshgrid(np.linspace(*along, 81), np.linspace(*up, 31), indexing="ij")
+        p, n = patch.at(u.ravel(), v.ravel()), patch.normal(u.ravel(), v.ravel())
+        shells.append(shell_between(p - INTO * n, p + ALLOWANCE * n, u.shape))
+    return trimesh.util.concatenate(shells)
+
+
+def shell_between(inner: Floats, outer: Floats, size: tuple[int, int]) -> trimesh.Trimesh:
+    """The closed body between two grids of points."""
+    at = np.arange(size[0] * size[1]).reshape(size)
+    a, b, c, d = (x.ravel() for x in (at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]))
+    rim = np.concatenate([at[:-1, 0], at[-1, :-1], at[:0:-1, -1], at[0, :0:-1]])
+    on, n = np.roll(rim, -1), len(inner)
+    top = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    edge = np.concatenate([np.column_stack([rim, on, n + on]), np.column_stack([rim, n + on, n + rim])])
+    body = trimesh.Trimesh(np.concatenate([inner, outer]), np.concatenate([top[:, ::-1], n + top, edge]))
+    if body.volume < 0.0:
+        body.invert()
+    return body
 
 
 def hecc_job(folder: Path) -> Path:
@@ -177,7 +234,7 @@ def cpu_s() -> float:
     return t.user + t.system + t.children_user + t.children_system
 
 
-def row(name: str, out: Path | None, workers: int) -> str:
+def row(name: str, out: Path | None, workers: int, loads: bool) -> str:
     """What became of a shape: a row of the table."""
     title, sides = "NASA's HECC, points of sections", "all sides, floors and fillets, fillet 2.5 mm"
     if name != "hecc":
@@ -187,22 +244,32 @@ def row(name: str, out: Path | None, workers: int) -> str:
     begin = cpu_s()
     with tempfile.TemporaryDirectory() as folder:
         try:
-            file = hecc_job(Path(folder)) if name == "hecc" else job_of(SHAPES[name], Path(folder))
+            file = hecc_job(Path(folder)) if name == "hecc" else job_of(SHAPES[name], Path(folder), loads)
             done = run_job(load_job(file), workers=Workers(workers))
         except ChiploadError as err:
-            return f"| {title} | {sides} | {cpu_s() - begin:.0f} s | | | | refused: {err} |"
+            return f"| {title} | {sides} | {cpu_s() - begin:.0f} s | | | | | | refused: {err} |"
         took = cpu_s() - begin
         if out is not None:
             done.save(out)
     used = done.outcome.used_checked
     if used is None:
-        return f"| {title} | {sides} | {took:.0f} s | | | | {done.result.message} |"
+        return f"| {title} | {sides} | {took:.0f} s | | | | | | {done.result.message} |"
     gouge = max(p.gouge.bound for p in used.programs)
     minutes = f"{used.seconds / 60.0:.1f} min, {done.outcome.impeller.blades} channels"
     scallop = "" if used.scallop is None else f"{100.0 * used.scallop:.0f} %"
     cutters = ", ".join(f"D {c.diameter:g} r {c.corner_radius:g}" for c in used.cutters)
+    names = ("deflection_cutter_um", "deflection_workpiece_um")
+    bent = " | ".join(" of ".join(greatest(done.result.in_use, name)) for name in names)
     verdict = "holds" if done.result.verdict is Verdict.HOLDS else done.result.message
-    return f"| {title} | {sides}; {cutters} | {took:.0f} s | {minutes} | {scallop} | {gouge:.3f} | {verdict} |"
+    head = f"| {title} | {sides}; {cutters} | {took:.0f} s | {minutes} | {scallop} | {gouge:.3f}"
+    return f"{head} | {bent} | {verdict} |"
+
+
+def greatest(tracks: Sequence[Track], name: str) -> list[str]:
+    """The worst value of a limit and the limit, as texts; nothing where no track has it."""
+    found = [c for track in tracks for c in track.limits if c.name == name and c.worst is not None]
+    worst = max(found, key=lambda c: c.worst or 0.0, default=None)
+    return [] if worst is None else [f"{worst.worst:.1f}", f"{worst.limit:g}"]
 
 
 def main() -> None:
@@ -210,14 +277,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*SHAPES, "hecc"]))
     parser.add_argument("--out", type=Path, help="folder for the results")
+    parser.add_argument("--loads", action="store_true", help="feeds and limits by the forces, blades that bend")
     parser.add_argument("--workers", type=int, default=1, help="processes")
     given = parser.parse_args()
-    print("| shape | what was planned | processor time | programs | mean scallop | gouge at most [mm] | verdict |")
-    print("|---|---|---:|---:|---:|---:|---|")
+    heads = (
+        "shape", "what was planned", "processor time", "programs", "mean scallop", "gouge at most [mm]",
+        "cutter bends [um]", "blade bends [um]", "verdict",
+    )  # fmt: skip
+    print(f"| {' | '.join(heads)} |")
+    print("|---|---|---:|---:|---:|---:|---:|---:|---|")
     for name in given.names or SHAPES:
         if name not in (*SHAPES, "hecc"):
             parser.error(f"{name}: must be one of {', '.join([*SHAPES, 'hecc'])}")
-        print(row(name, given.out and given.out / name, given.workers), flush=True)
+        print(row(name, given.out and given.out / name, given.workers, given.loads), flush=True)
 
 
 if __name__ == "__main__":
