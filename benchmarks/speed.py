@@ -1,0 +1,216 @@
+"""What jobs cost over their kernel, with goals: `python benchmarks/speed.py [--quick] [--check]`.
+
+Processor seconds, so that other work on the computer counts little; memory is the most that a process had.
+
+- `check` of an example, in a process of its own, its files compiled to byte code before;
+- jobs of a flat roughing and of a ball finishing program by the command line (reading, simulation, checks, report)
+  over their kernel, contact and loads of the same moves, and the shares of reading, contact, loads, outlines, checks
+  and files in the same job within this process;
+- the exponent of time over the number of moves, and the memory of the longest job.
+
+``--quick``: 1,000 and 5,000 moves, about a minute of processor time; start and report are then most of a job, and only
+the goals of `check` and of memory are compared. Else 10,000 and 100,000 moves, and ``--moves`` states others.
+``--check``: exit 1 where a goal is missed by more than 20 %.
+"""
+
+from __future__ import annotations
+
+import argparse
+import cProfile
+import math
+import os
+import pstats
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from engine_programs import made
+from engines import ALLOY
+
+from chipload import examples
+from chipload.jobs import load_job, run_job
+from chipload.simulation.chips import remove
+from chipload.stock.layers import LayeredStock
+from simulation import RESOLUTION
+
+#: goals: check [s], a job over its kernel, memory of the longest job [MB]; by how much a goal may be missed
+CHECK_S, OVER_KERNEL, MEMORY_MB, MISSED = 0.4, 2.0, 400.0, 1.2
+QUICK, WHOLE = (1_000, 5_000), (10_000, 100_000)
+#: moves below which start and report are most of a job, so that no goal of time is stated
+SHORT = 50_000
+WORDS = ("G21 G90 G17 G94", "T1 M6", "S9549 M3")
+JOB = """[program]
+file = "moves.ngc"
+[machine]
+name = "vmc"
+[stock]
+low_mm = {low}
+high_mm = {high}
+[material]
+name = "al7075-t6"
+[[cutter]]
+number = 1
+diameter_mm = {diameter}
+corner_radius_mm = {corner}
+flutes = {flutes}
+helix_deg = 30.0
+flute_length_mm = 25.0
+overhang_mm = 40.0
+modulus_gpa = 600.0
+[[operation]]
+kind = "simulate"
+step_mm = 1.0
+engine = "moves"
+[limits]
+force_n = 1500.0
+"""
+#: parts of a job: a name, and the functions whose whole time is theirs
+PARTS = {
+    "reading": ("read_for",),
+    # a thread of its own finds it; the generator waits for it
+    "contact": ("with_contact",),
+    "loads": ("remove_by_moves",),
+    "errors of loads": ("with_accuracy",),
+    "outlines": ("finish",),
+    "checks of the stock": ("check_stock", "_collision_check", "check_leaning_stock"),
+    "report": ("result_of", "presentation_of"),
+    "files": ("write_result",),
+}
+
+
+class Row(NamedTuple):
+    """A line of the table; without a goal it is nan."""
+
+    work: str
+    goal: float
+    found: float
+    unit: str
+
+    def missed(self) -> bool:
+        """Whether the goal is missed by more than 20 %."""
+        return self.found > MISSED * self.goal
+
+
+def command(words: Sequence[str], byte_code: str, codes: Sequence[int] = (0, 3)) -> tuple[float, float]:
+    """Processor seconds and greatest memory [MB] of a command of chipload, in a process of its own.
+
+    Parameters
+    ----------
+    byte_code : folder of the compiled files, which an earlier command has written
+    """
+    kept = {**os.environ, "PYTHONPYCACHEPREFIX": byte_code}
+    kept.pop("PYTHONDONTWRITEBYTECODE", None)
+    child = subprocess.Popen(
+        [sys.executable, "-m", "chipload", *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=kept
+    )
+    _, status, used = os.wait4(child.pid, 0)
+    if os.waitstatus_to_exitcode(status) not in codes:
+        raise RuntimeError(f"chipload {' '.join(words)}: exit code {os.waitstatus_to_exitcode(status)}")
+    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0
+
+
+def write_job(name: str, moves: int, folder: Path) -> Path:
+    """The job of a program of so many moves, with its text."""
+    case = made(name, moves)
+    p = case.program.p_work
+    begin = (f"G0 X{p[0, 0]:.3f} Y{p[0, 1]:.3f} Z20", "G0 Z5", f"G1 Z{p[0, 2]:.4f} F400", "F1200")
+    rows = [f"X{x:.3f} Y{y:.3f} Z{z:.4f}" for x, y, z in p[1:].tolist()]
+    (folder / "moves.ngc").write_text("\n".join([*WORDS, *begin, *rows, "G0 Z20", "M30", ""]))
+    c, (low, high) = case.cutters[1], ([*map(float, corner)] for corner in (case.low, case.high))
+    text = JOB.format(low=low, high=high, diameter=c.diameter, corner=c.corner_radius, flutes=c.flutes)
+    (folder / "job.toml").write_text(text)
+    return folder / "job.toml"
+
+
+def kernel(name: str, moves: int) -> float:
+    """Processor seconds of contact and loads of a program, without checks, errors and outlines."""
+    case = made(name, moves)
+    stock = LayeredStock.block(case.low, case.high, 4.0 * case.layer_mm, 40.0)
+    begun = time.process_time()
+    remove(
+        case.program, stock, case.cutters, ALLOY, RESOLUTION, engine="moves", accuracy=False, outlines=False, workers=1
+    )  # fmt: skip
+    return time.process_time() - begun
+
+
+def shares(job: Path) -> dict[str, float]:
+    """Share of each part in the processor time of a job within this process."""
+    profile = cProfile.Profile(timer=time.process_time)
+
+    def run() -> None:
+        run_job(load_job(job)).save(job.parent / "shares")
+
+    begun = time.process_time()
+    profile.runcall(run)
+    whole = time.process_time() - begun
+    took = dict[str, float]()
+    for (_, _, function), (_, _, _, cumulative, _) in pstats.Stats(profile).stats.items():
+        for part, functions in PARTS.items():
+            if function in functions:
+                took[part] = took.get(part, 0.0) + cumulative
+    return {part: seconds / whole for part, seconds in took.items()} | {"all [s]": whole}
+
+
+def measured(moves: Sequence[int], byte_code: str) -> list[Row]:
+    """Every row of the table; the shares are printed as they are found."""
+    check = ["check", str(Path(examples.__file__).parent / "feeds" / "job.toml")]
+    command(check, byte_code)
+    seconds, memory = command(check, byte_code)
+    table = [Row("check of the example feeds", CHECK_S, seconds, "s"), Row("its memory", math.nan, memory, "MB")]
+    for name in ("roughing", "finishing"):
+        kernel(name, 300)
+        times = list[float]()
+        for n in moves:
+            with tempfile.TemporaryDirectory() as folder:
+                job = write_job(name, n, Path(folder))
+                if n == moves[0]:
+                    # compiles what is not compiled yet
+                    found = shares(job)
+                    print(f"{name}, {n} moves:", ", ".join(f"{k} {v:.2f}" for k, v in found.items()), flush=True)
+                run = ["run", str(job), "--out", str(Path(folder) / "result")]
+                if name == "roughing" and n == moves[0]:
+                    # writes the byte code
+                    command(run, byte_code)
+                seconds, memory = command(run, byte_code)
+            own = kernel(name, n)
+            times.append(seconds)
+            work, goal = f"{name}, {n} moves", OVER_KERNEL if n >= SHORT else math.nan
+            table += [
+                Row(f"{work}: job", math.nan, seconds, "s"),
+                Row(f"{work}: kernel a move", math.nan, 1e6 * own / n, "us"),
+                Row(f"{work}: job over kernel", goal, seconds / own, "times"),
+                Row(f"{work}: memory", MEMORY_MB, memory, "MB"),
+            ]
+        if moves[-1] < SHORT:
+            continue
+        grows = math.log(times[-1] / times[0]) / math.log(moves[-1] / moves[0])
+        table.append(Row(f"{name}: exponent of the time of a job", math.nan, grows, ""))
+        added = 1e6 * (times[-1] - times[0]) / (moves[-1] - moves[0])
+        table.append(Row(f"{name}: time of a further move in a job", math.nan, added, "us"))
+    return table
+
+
+def main() -> None:
+    """Print the table."""
+    ask = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    ask.add_argument("--quick", action="store_true", help="few moves")
+    ask.add_argument("--check", action="store_true", help="exit 1 where a goal is missed by more than 20 %%")
+    ask.add_argument("--moves", type=int, nargs="+", default=None, help="lengths of the programs, ascending")
+    given = ask.parse_args()
+    with tempfile.TemporaryDirectory() as byte_code:
+        table = measured(given.moves or (QUICK if given.quick else WHOLE), byte_code)
+    print("| work | goal | measured | |\n|---|---|---|---|")
+    for row in table:
+        goal = "" if math.isnan(row.goal) else f"{row.goal:.4g} {row.unit}"
+        print(f"| {row.work} | {goal} | {row.found:.4g} {row.unit} | {'missed' if row.missed() else ''} |")
+    print(f"load {os.getloadavg()[0]:.0f} on {os.cpu_count()} cores")
+    if given.check and any(row.missed() for row in table):
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()
