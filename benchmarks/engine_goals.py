@@ -1,8 +1,8 @@
 """Goals of speed that other benchmarks measure, for the table of ``benchmarks/engines.py``.
 
 Pockets beside FreeCAD's Adaptive (``benchmarks/pockets.py``) and the feeds example in processor seconds, each the
-median of three; strips of a layered stock in two processes (``benchmarks/strips.py``) and a clone up to its first
-verdict (``benchmarks/first_verdict.py``) by the clock, on a computer that does nothing else.
+median of three; a clone up to its first verdict (``benchmarks/first_verdict.py``) by the clock, on a computer that does
+nothing else.
 """
 
 from __future__ import annotations
@@ -18,17 +18,16 @@ from typing import NamedTuple
 
 from first_verdict import VERDICT, events
 from pockets import POCKETS, adaptive_path, planned_path
-from strips import shared
 
 from chipload import examples
 from chipload.geometry.contour import Region
 from chipload.geometry.dxf import read_dxf
 from chipload.jobs import load_job, run_job
 
-#: planning of a pocket over that of Adaptive; both runs of the feeds example [s]; one process over two; clone [s]
-ADAPTIVE, FEEDS_S, STRIPS, FRESH_S = 1.0, 2.0, 1.7, 90.0
+#: planning of a pocket over that of Adaptive; both runs of the feeds example [s]; clone [s]
+ADAPTIVE, FEEDS_S, FRESH_S = 1.0, 2.0, 90.0
 #: runs of which the median counts; longest run of FreeCAD [s]; its tolerance, and lines of the wave, as by default
-RUNS, LONGEST_S, TOLERANCE, LINES = 3, 120.0, 0.1, 120
+RUNS, LONGEST_S, TOLERANCE = 3, 120.0, 0.1
 #: drawings that Adaptive does not clear, or no cutter
 LEFT_OUT = ("text",)
 
@@ -82,17 +81,15 @@ def goals(measured: bool, fresh: bool) -> list[Goal]:
 
     Parameters
     ----------
-    measured : pockets, feeds and strips
+    measured : pockets and feeds
     fresh : a clone, which downloads packages
     """
     pockets = [name for name in POCKETS if name not in LEFT_OUT]
     adaptive = beside_adaptive(pockets) if measured else math.nan
     feeds = feeds_example() if measured else math.nan
-    one, two, _ = shared(LINES, 2) if measured else (math.nan, math.nan, True)
     first = next((s for name, s in events() if VERDICT.match(name)), math.inf) if fresh else math.nan
     return [
         Goal("planning a pocket over Adaptive, median of the drawings", ADAPTIVE, adaptive, "times", False),
         Goal("feeds example, both simulations and report values", FEEDS_S, feeds, "s", False),
-        Goal("layers in one process over two, by the clock", STRIPS, one / two, "times", True),
         Goal("clone to first verdict, by the clock", FRESH_S, first, "s", False),
     ]

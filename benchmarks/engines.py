@@ -12,7 +12,7 @@ are those of a move's volume and loads against slices eight times as many, perce
 than a fifth of the median; of the programs of others, what layers differ by from moves, step by step.
 ``--job`` adds the finishing program as a job of the command line: reading, stress, deflection, report and all; goals
 are those of 10^6 moves by their number. ``--real`` takes so many rows of each other program, 0 leaves them out.
-``--others`` adds pockets beside Adaptive, the feeds example and strips in two processes, ``--fresh`` a clone up to its
+``--others`` adds pockets beside Adaptive and the feeds example, ``--fresh`` a clone up to its
 first verdict (``benchmarks/engine_goals.py``). The table has goal, value and share of the goal, and says which goals
 are missed and which were not measured; ``--check`` exits 1 where one is missed by more than 20 %, ``--write`` puts the
 tables into docs/design/engines.md.
@@ -220,7 +220,7 @@ def main() -> None:
     parser.add_argument("--job", type=int, default=0, help="moves of a job by the command line, as 1000000")
     parser.add_argument("--real", type=int, default=1500, help="rows of each program of others; 0: none")
     parser.add_argument("--planned", type=Path, help="folder of the planned examples; none: they are left out")
-    parser.add_argument("--others", action="store_true", help="pockets beside Adaptive, the feeds example, strips")
+    parser.add_argument("--others", action="store_true", help="pockets beside Adaptive, the feeds example")
     parser.add_argument("--fresh", action="store_true", help="a clone up to its first verdict")
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--write", action="store_true", help="put the tables into docs/design/engines.md")

@@ -1,10 +1,8 @@
-"""The same faults in the languages of several controls, and by layers: each slot of the base job, written once more."""
+"""The same faults in the languages of several controls: each slot of the base job, written once more."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from adversary.base import Case, Change, changes, program, replaced, stated
+from adversary.base import Case, Change, changes, program, stated
 
 FANUC = (
     "O1\nG21 G90 G17 G94\nG54\nT1 M6\nS6000 M3\nG0 X-10. Y20.\nG43 H1 Z10.\nZ-2.\nG1 X{x} F900.\n{then}M30\n",
@@ -29,12 +27,6 @@ FAULTS = {
     "dwell": (("dwell", "on", "up"), "a dwell of 3 s in the slot", "unproven", "dwell-in-cut"),
     "wait": (("wait", "on", "up"), "the program waits in the slot", "unproven", "stop-in-cut"),
 }
-LINUXCNC = {
-    "rapid": replaced("G1 X70 F900\n", "G1 X30 F900\nG0 X70\n"),
-    "end": replaced("G1 X70 F900\nG0 Z10\nM5\n", "G1 X30 F900\n"),
-    "dwell": replaced("G1 X70 F900", "G1 X30 F900\nG4 P3\nG1 X70"),
-    "wait": replaced("G1 X70 F900", "G1 X30 F900\nM0\nG1 X70"),
-}
 
 
 def written(language: str, x: str, *words: str) -> Change:
@@ -45,11 +37,6 @@ def written(language: str, x: str, *words: str) -> Change:
     )
 
 
-def by_layers(change: Callable[..., object]) -> Change:
-    """A change of the base job, simulated in layers."""
-    return changes(change, lambda job: job.tables["operation"][0].update(engine="layers"))
-
-
 CASES = (
     *(
         Case(f"{language}-{name}", f"{wrong} ({language})", written(language, x, *words), state, found)  # type: ignore[arg-type]
@@ -57,25 +44,7 @@ CASES = (
         for name, (words, wrong, state, found) in FAULTS.items()
     ),
     *(
-        Case(f"layers-{name}", f"{FAULTS[name][1]} (by layers)", by_layers(change), FAULTS[name][2], FAULTS[name][3])  # type: ignore[arg-type]
-        for name, change in LINUXCNC.items()
-    ),
-    *(
         Case(f"{language}-slot", f"nothing: the slot ({language})", written(language, x, "up"), "holds", "")
         for language, x in (("fanuc", "70."), ("sinumerik", "70"), ("heidenhain", "+70"))
-    ),
-    Case(
-        "layers-approach",
-        "the first rapid ends in the block (by layers)",
-        by_layers(replaced("G0 X-10 Y20 Z10\nG0 Z-2", "G0 X30 Y20 Z-2")),
-        "exceeds",
-        "approach-through-stock",
-    ),
-    Case(
-        "layers-below",
-        "an end mill cuts below the bottom of the block (by layers)",
-        by_layers(changes(replaced("Y20", "Y-4.5"), replaced("G0 Z-2", "G0 Z-21"))),
-        "unproven",
-        "below-stock",
     ),
 )

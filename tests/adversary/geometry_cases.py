@@ -29,11 +29,6 @@ def across(*depths: float, x: float = 30.0) -> list[str]:
     return [w for z in depths for w in (f"G0 X{x} Y-10 Z10", f"G0 Z{z}", "G1 Y50 F900", "G0 Z10")]
 
 
-def engine(name: str) -> Change:
-    """State the engine."""
-    return lambda job: job.tables["operation"][0].update(engine=name)
-
-
 def stock(**keys: Any) -> Change:
     """State keys of the stock."""
     return stated("stock", **keys)
@@ -69,14 +64,12 @@ def _switch(name: str) -> Change:
 AFTER = ["G0 X70 Y20 Z10", "G0 Z-5", "G1 X-10 F900"]
 #: a block 8 mm high, which is cut through at once
 PLATE = stock(low_mm=(0.0, 0.0, -8.0))
-LAYERS = changes(engine("layers"), stock(layer_mm=1.0))
 RAPID = "G1 X70 F900"
 
 CASES = (
     Case("shank-20", "a shank of 20 mm rubs 5 mm deep in both walls", shank(20.0), "exceeds", "collision"),
     Case("shank-12", "a shank of 12 mm rubs 1 mm deep", shank(12.0), "exceeds", "collision"),
     Case("shank-10.4", "a shank of 10.4 mm rubs 0.2 mm deep", shank(10.4), "exceeds", "collision"),
-    Case("shank-20-layers", "the same by layers", changes(shank(20.0), LAYERS), "exceeds", "collision"),
     Case("shank-neck", "nothing: a relieved neck of 9 mm", shank(9.0), "holds", ""),
     Case("shank-same", "nothing: a shank as wide as the cutter", shank(10.0), "holds", ""),
     Case("shank-long", "nothing: flutes above the block", shank(20.0, 16.0), "holds", ""),
@@ -98,29 +91,11 @@ CASES = (
         "rapid-0.49", "a rapid 0.49 mm deep", replaced("G0 Z-2\n" + RAPID, "G0 Z-0.49\nG0 X70"), "exceeds", "rapid-cuts"
     ),
     Case(
-        "rapid-0.49-layers", "the same with layers of 1 mm",
-        changes(replaced("G0 Z-2\n" + RAPID, "G0 Z-0.49\nG0 X70\nG0 Z-2\nG1 X-10 F900"), LAYERS), "exceeds",
-        "rapid-cuts",
-    ),
-    Case(
-        "rapid-0.05-layers", "a rapid 0.05 mm deep with layers of 1 mm",
-        changes(replaced("G0 Z-2\n" + RAPID, "G0 Z-0.05\nG0 X70\nG0 Z-2\nG1 X-10 F900"), LAYERS), "exceeds",
-        "rapid-cuts",
-    ),
-    Case(
         "rapid-back", "nothing: a rapid back through the slot", replaced(RAPID, RAPID + "\nG0 X-10"), "holds", ""
-    ),
-    Case(
-        "rapid-back-layers", "nothing: the same by layers", changes(replaced(RAPID, RAPID + "\nG0 X-10"), LAYERS),
-        "holds", "",
     ),
     Case(
         "part-off", "a half of the block is cut free and milled on", text(*across(-8.0, -16.0, -20.0), *AFTER),
         "unproven", "loose-stock",
-    ),
-    Case(
-        "part-off-layers", "the same by layers", changes(LAYERS, text(*across(-8.0, -16.0, -20.0), *AFTER)), "unproven",
-        "loose-stock",
     ),
     Case(
         "part-off-contour", "a square is cut out of the block, then milled on its top",

@@ -70,7 +70,6 @@ def feeds_job() -> Job:
     return job
 
 
-LAYERS: Change = lambda job: job.tables["operation"][0].update(engine="layers")  # noqa: E731
 FANUC: Change = lambda job: job.tables.update(machine={"name": "vmc-fanuc"})  # noqa: E731
 
 CASES = (
@@ -398,20 +397,6 @@ CASES = (
         "block-delete",
     ),
     Case("block-delete-coolant", "nothing: a block without motions", replaced("M5\n", "/M9\nM5\n"), "holds", ""),
-    Case(
-        "layers-stop-in-cut",
-        "the spindle is stopped in the material, by layers",
-        changes(LAYERS, replaced("G1 X70 F900\n", "G1 X30 F900\nM5\n")),
-        "exceeds",
-        "spindle-stopped-in-cut",
-    ),
-    Case(
-        "layers-deep-hole",
-        "a hole of 6 diameters in one motion, by layers",
-        changes(DRILLING, hole("G81 X30 Y20 Z-36 R2 F600", 6000), LAYERS),
-        "unproven",
-        "deep-hole",
-    ),
     Case(
         "feeds-end-in-cut",
         "a program that is given new feeds ends in the material",

@@ -194,7 +194,7 @@ def test_input_that_is_refused_before_the_work_begins_leaves_what_was_kept(tmp_p
 
 #: a small job of a capability that goes on where it was stopped, and of one that begins again
 SMALL = {
-    "slot": ('operation.0.engine="layers"',),
+    "slot": (),
     "contour": ('operation.0.strategies=["plain"]', 'operation.0.use="plain"', "operation.0.step_mm=0.5"),
 }
 

@@ -77,8 +77,10 @@ def test_a_value_refuses_what_its_table_refuses(value, table: type[Table], only_
 
 
 def test_a_table_becomes_a_value_by_the_names_of_its_keys():
-    table = SimulateTable.model_validate({"kind": "simulate", "step_mm": 0.5, "corner_slices": 7, "engine": "layers"})
-    assert value_of(SimulationSettings, table) == SimulationSettings(0.5, corner_slices=7, engine="layers")
+    table = SimulateTable.model_validate(
+        {"kind": "simulate", "step_mm": 0.5, "corner_slices": 7, "interpolation": "lerp"}
+    )
+    assert value_of(SimulationSettings, table) == SimulationSettings(0.5, corner_slices=7, interpolation="lerp")
     assert value_of(SimulationSettings, table, step_mm=2.0).step_mm == 2.0
     assert FinishedPart.excess_range_mm == TargetTable.model_fields["excess_range_mm"].default == 1.0
 

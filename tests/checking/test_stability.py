@@ -289,19 +289,6 @@ def test_a_mirrored_program_has_the_same_margins(tmp_path: Path) -> None:
     assert abs(wrong.min() - one.min()) > 0.05
 
 
-def test_by_moves_the_margins_are_the_same(tmp_path: Path) -> None:
-    (tmp_path / "m.toml").write_text(MATERIAL)
-    (tmp_path / "a.ngc").write_text(TEXT.replace("Z-1.5", "Z-3"))
-    job = JOB.replace("MODES", MODES).replace("LIMITS", "").replace("SPEEDS", "")
-    (tmp_path / "job.toml").write_text(job)
-    layers, moves = (
-        run_job(load_job(tmp_path / "job.toml", [f"operation.0.engine={engine}"])).result.in_use[0].columns
-        for engine in ("layers", "moves")
-    )
-    steady = (layers["x_mm"] > 8.0) & (layers["x_mm"] < 36.0)
-    assert moves["stability_margin"][steady] == pytest.approx(layers["stability_margin"][steady], rel=0.01)
-
-
 def test_plain_values_give_margins_too() -> None:
     import chipload
 

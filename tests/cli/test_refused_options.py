@@ -52,7 +52,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ),
         ("hal h.toml --current-pin a --power-pin b", "--current-pin, --power-pin: state only the one that the spindle"),
         ("filter slot.ngc", "--machine: missing: name the .ini of the machine, or run LinuxCNC, which sets INI_FILE"),
-        ("run read.toml --out r --workers 2", "--workers, --dask: the job reads its program and simulates nothing: "),
+        (
+            "run read.toml --out r --workers 2",
+            "--workers, --dask: a program job has no parts that other processes ",
+        ),
         ("run tube.toml --out r --workers 2", "--workers, --dask: a torque job has no parts that other processes can "),
         ("run read.toml --out r --keep-s -1", "--keep-s = -1: must be at least 0 s"),
         ("run read.toml --out r --keep-s nan", "--keep-s = nan: must be at least 0 s"),

@@ -99,17 +99,6 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
     same(folder, "killed")
 
 
-def test_a_run_by_layers_that_was_killed_goes_on_to_the_same_bytes(folder: Path) -> None:
-    engine = ("--set", 'operation.0.engine="layers"', "--set", "operation.0.step_mm=1.0")
-    assert ran(folder, "layers", *engine)[0] == 0
-    killed = stop(folder, "killed-layers", signal.SIGKILL, *engine)
-    assert killed.returncode == -signal.SIGKILL
-    code, said = ran(folder, "killed-layers", *engine)
-    assert code == 0
-    goes_on(said)
-    same(folder, "killed-layers", "layers")
-
-
 DYNAMICS = """[dynamics]
 frequency_percent = 2.0
 damping_percent = 20.0

@@ -52,12 +52,13 @@ def test_the_example_cuts_two_pieces_and_as_much_as_the_stock_loses(tmp_path: Pa
     folder = examples.copy_example("chips", tmp_path / "chips")
     code, out, _ = call("run", folder / "job.toml", "--out", tmp_path / "r")
     assert code == 0  # what errors prints is progress where kernels are compiled first
-    assert out.startswith("Holds at 95 %: torque 3.574 + 0.28 of 6 N m, margin 35.7 %, in line 11 at ")
+    assert out.startswith("Holds at 95 %: torque 3.596 + 0.39 of 6 N m, margin 33.6 %, in line 11 at ")
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
     op = summary["operations"][0]
     assert op["kind"] == "simulate"
-    assert op["chip_areas_max"] == 2
-    assert op["chip_volume_mm3"] == pytest.approx(op["removed_mm3"], rel=1e-6)
+    # at an instant; the chip on a layer has two pieces
+    assert op["chip_areas_max"] >= 2
+    assert op["chip_volume_mm3"] == pytest.approx(op["removed_mm3"], rel=1e-3)
     assert op["chip_volume_mm3"] > 100.0
     for x in "xyz":
         assert op["force_n"][x]["min"] <= op["force_n"][x]["mean"] <= op["force_n"][x]["max"]
@@ -65,25 +66,10 @@ def test_the_example_cuts_two_pieces_and_as_much_as_the_stock_loses(tmp_path: Pa
     assert op["power_w"]["mean"] > 0.0
     page = (tmp_path / "r" / "report.html").read_text()
     assert "Chips, force, torque, power" in page
+    assert "The chip with most pieces (2)" in page
     assert summary["verdict"] == "holds"
     assert summary["tracks"][0]["findings"] == []
     assert {x["severity"] for x in summary["findings"]} <= {"note"}
-
-
-def test_a_leaning_axis_goes_by_moves_where_no_engine_is_stated(tmp_path: Path) -> None:
-    """The five-axis example with and without its layers: greatest loads within 1 %, the sum of the chips in 0.1 %."""
-    folder = examples.copy_example("chips", tmp_path / "chips")
-    found = {}
-    for engine in ("auto", "layers"):
-        done = run_job(load_job(folder / "job.toml", [f"operation.0.engine={engine}"]))
-        (track,) = done.result.tracks
-        assert not track.findings
-        found[engine] = {x: np.asarray(track.columns[x]) for x in ("chip_volume_mm3", "force_n", "torque_nm")}
-    one, two = found["auto"], found["layers"]
-    assert one["chip_volume_mm3"].sum() == pytest.approx(two["chip_volume_mm3"].sum(), rel=1e-3)
-    for name in ("force_n", "torque_nm"):
-        assert one[name].max() == pytest.approx(two[name].max(), rel=0.01)
-        assert not np.array_equal(one[name], two[name])
 
 
 def test_a_slot_in_numbers(job: Path, tmp_path: Path) -> None:
@@ -274,11 +260,17 @@ def test_the_first_progress_comes_before_a_step_is_made(job: Path, monkeypatch: 
         run_job(loaded, stop, kept)
 
 
-@pytest.mark.parametrize("engine", ["auto", "moves"])
-def test_workers_share_layers_only(job: Path, engine: str) -> None:
-    code, _, err = call("check", job, "--set", "operation.0.workers=2", "--set", f"operation.0.engine={engine}")
+@pytest.mark.parametrize(
+    ("key", "text"),
+    [
+        ("engine='layers'", "operation.0.engine: removed: every program is simulated by the volume of its moves"),
+        ("workers=2", "operation.0.workers: removed: one process simulates a program: leave it out; chipload sweep"),
+    ],
+)
+def test_keys_of_the_layered_engine_are_refused_with_their_remedy(job: Path, key: str, text: str) -> None:
+    code, _, err = call("check", job, "--set", f"operation.0.{key}")
     assert code == 2
-    assert "operation.0.workers = 2: applies to layers: state engine = 'layers' or leave it out" in err
+    assert text in err
 
 
 def test_check_reads_the_stock_and_cuts_nothing(job: Path) -> None:

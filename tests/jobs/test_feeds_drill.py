@@ -32,7 +32,7 @@ def test_a_drill_goes_as_fast_as_its_limit_allows(tmp_path: Path, name: str, lim
     (tmp_path / "p.ngc").write_text(PROGRAM)
     stock = {"low_mm": (0.0, 0.0, -10.0), "high_mm": (20.0, 20.0, 0.0), "layer_mm": 1.0}
     feeds = {"slowest_percent": 10.0, "fastest_percent": 100.0, "divide": False}
-    operation = {"kind": "simulate", "step_mm": 2.0, "resolution_error": False, "engine": "layers", "feeds": feeds}
+    operation = {"kind": "simulate", "step_mm": 2.0, "resolution_error": False, "feeds": feeds}
     done = chipload.optimise_feeds(
         program={"file": "p.ngc"}, stock=stock, machine="vmc", material="steel-1045-from-group-2", cutter=[DRILL],
         operation=operation, limits={name: limit}, checks={"confidence": 0.5, "chip_range": False}, folder=tmp_path,

@@ -206,8 +206,6 @@ def test_pecks_go_back_into_their_own_hole_in_layers(tmp_path: Path) -> None:
         "--out",
         tmp_path / "r",
         "--set",
-        "operation.0.engine=layers",
-        "--set",
         "stock.layer_mm=0.5",
     )
     assert "rapid" not in out.splitlines()[0], out + error

@@ -1,4 +1,4 @@
-"""The layered engine at default settings against double sums over the edge, and its stated error against the true one.
+"""Simulations at default settings against double sums over the edge, and their stated error against the true one.
 
 Bounds: 2 % of the mean torque, 3 % of the peaks; where the settings are stated coarser, ``resolution_error`` covers it.
 """
@@ -54,7 +54,7 @@ def run(
     program: Program, cutter: Cutter, high: float = 0.0, material: Material = AL, on: str = "vmc", **keys: Any
 ) -> History:
     block = Stock.block((0.0, -16.0, -12.0), (30.0, 16.0, high), keys.pop("layer_mm", None))
-    settings = SimulationSettings(**({"engine": "layers", "step_mm": 0.25 * cutter.diameter} | keys))
+    settings = SimulationSettings(**({"step_mm": 0.25 * cutter.diameter} | keys))
     return simulate(program, block, cutter, material, on, Limits(force_n=1e6), settings=settings)
 
 
@@ -164,10 +164,10 @@ def test_a_ramp(cutter: Cutter, slope: float) -> None:
 
 @pytest.mark.parametrize("cutter", [BALL, BULL, FLAT], ids=["ball", "bull", "flat"])
 def test_a_plunge(cutter: Cutter) -> None:
-    history = run(path([[15.0, 0.0, 1.0], [15.0, 0.0, -3.0]]), cutter, step_mm=0.5)
+    history = run(path([[15.0, 0.0, 1.0], [15.0, 0.0, -3.0]]), cutter, step_mm=0.02)
     c = history.columns
     k = int(np.argmax(c["z_mm"] <= -2.0))
-    tip = (15.0, 0.0, float(c["z_mm"][k]) + 0.25)
+    tip = (15.0, 0.0, float(c["z_mm"][k]) + 0.01)
     exact = edge_sum(cutter, tip, (0, 0, 1), per_tooth(cutter, (0, 0, -1)), lambda p: p[..., 2] < 0.0, AL)
     assert off({name: float(c[name][k]) for name in COLUMNS}, exact, history.resolution_error) == {}
 
@@ -249,8 +249,8 @@ def test_coarse_settings_state_the_error_that_they_make(cutter: Cutter, depth: f
     assert uncovered(history, exact, int(np.flatnonzero(history.columns["x_mm"] > 15.0)[0])) == {}
 
 
-def test_a_shallow_ramp_removes_what_it_sweeps_or_says_that_it_does_not() -> None:
-    """0.1 mm deep at its end: by default within 10 % of the volume; in layers of 0.5 mm nothing is found, and said."""
+def test_a_shallow_ramp_removes_what_it_sweeps() -> None:
+    """0.1 mm deep at its end; the layers of what is shown, 0.5 mm thick, do not matter."""
     program = path([[2.0, 0.0, 0.0], [27.0, 0.0, -0.1]])
     x = (np.arange(20_000) + 0.5) / 20_000 * 25.0
     depth = 0.1 * x / 25.0
@@ -259,11 +259,10 @@ def test_a_shallow_ramp_removes_what_it_sweeps_or_says_that_it_does_not() -> Non
     )
     # and the front half of the cap at its end, before the tip
     volume += math.pi * 0.1**2 * (15.0 - 0.1) / 6.0
-    history = run(program, BALL, step_mm=0.5)
-    assert float(history.columns["engaged_volume_mm3"].sum()) == pytest.approx(volume, rel=0.02)
-    assert float(history.columns["chip_volume_mm3"].sum()) == pytest.approx(volume, rel=0.1)
-    blind = run(program, BALL, step_mm=0.5, layer_mm=0.5)
-    assert blind.resolution_error["force_n"] == math.inf or blind.resolution_error["torque_mean_nm"] > 0.5
+    for layer in (None, 0.5):
+        columns = run(program, BALL, step_mm=0.5, layer_mm=layer).columns
+        assert float(columns["engaged_volume_mm3"].sum()) == pytest.approx(volume, rel=0.02)
+        assert float(columns["chip_volume_mm3"].sum()) == pytest.approx(volume, rel=0.02)
 
 
 @pytest.mark.parametrize("m", [0.0, 0.25])
@@ -275,10 +274,8 @@ def test_the_energy_balance_of_a_slot_closes(m: float) -> None:
     assert history.energy_balance[1] == pytest.approx(0.0, abs=0.02)
 
 
-def test_a_wall_that_a_line_meets_at_its_end_is_within_the_stated_error() -> None:
-    """A cleared field, then a line that runs square into its wall in the last 0.45 mm: its last step looks at 0.97 mm
-    before the end or so, where nothing is cut.
-    """
+def test_a_wall_that_a_line_meets_at_its_end_has_its_force() -> None:
+    """A cleared field, then a line that runs square into its wall in the last 0.45 mm of a step of 1 mm or so."""
     words = []
     for y in (-8.0, 0.0, 8.0):
         words += [rapid((-8.0, y, 5.0), SPINDLE, 1, "link"), rapid((-8.0, y, -2.0), SPINDLE, 1, "link")]
@@ -286,9 +283,5 @@ def test_a_wall_that_a_line_meets_at_its_end_is_within_the_stated_error() -> Non
     words += [rapid((6.0, 0.0, 5.0), SPINDLE, 1, "link"), rapid((6.0, 0.0, -2.0), SPINDLE, 1, "link")]
     program = Program.join([*words, plunge((15.45, 0.0, -2.0), FAST, SPINDLE, 1, "cut")])
     coarse, fine = (run(program, FLAT, step_mm=step) for step in (1.0, 0.05))
-    error = coarse.resolution_error["force_n"]
-    peak, truth = (float(history["force_n"].max()) for history in (coarse, fine))
-    assert float(coarse["force_n"][-1]) < 0.1 * truth
-    assert truth > 1.5 * peak
-    assert peak * (1.0 + error) > truth
-    assert float(run(program, FLAT, step_mm=1.0, engine="auto")["force_n"].max()) == pytest.approx(truth, rel=0.03)
+    truth = float(fine["force_n"].max())
+    assert float(coarse["force_n"][-1]) == pytest.approx(truth, rel=0.03)

@@ -67,7 +67,6 @@ states = 4
 {{clamps}}[[operation]]
 kind = "simulate"
 step_mm = 6.0
-engine = "auto"
 [limits]
 deflection_workpiece_um = 100.0
 form_error_um = 100.0

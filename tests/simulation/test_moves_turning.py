@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material, material_named
 from chipload.engagement.tooth_surfaces import BEYOND, TIP, UNLIKE
-from chipload.errors import Cancelled, InputError
+from chipload.errors import Cancelled
 from chipload.program.build import rapid, rows
 from chipload.program.program import LINE, Program
 from chipload.simulation.accuracy import LEANING_MOVES_FLOOR
@@ -163,17 +163,20 @@ def test_a_run_that_was_stopped_gives_the_same_bytes(tmp_path: Path, monkeypatch
             raise Cancelled("stopped")
 
     with pytest.raises(Cancelled), Checkpoint(tmp_path / "run", 0.0) as kept:
-        remove_in_chunks(waving(), block(), {1: MILL}, ALLOY, FINE, kept, engine="moves", progress=stop)
+        remove_in_chunks(waving(), block(), {1: MILL}, ALLOY, FINE, kept, progress=stop)
     again = block()
     with Checkpoint(tmp_path / "run", 0.0) as kept:
-        found = remove_in_chunks(waving(), again, {1: MILL}, ALLOY, FINE, kept, engine="moves")
+        found = remove_in_chunks(waving(), again, {1: MILL}, ALLOY, FINE, kept)
         for name, values in known.columns.items():
             np.testing.assert_array_equal(np.asarray(found.columns[name]), values, err_msg=name)
     assert again.to_bytes() == stock.to_bytes()
 
 
-def test_material_above_the_flutes_of_a_leaning_cutter_is_refused() -> None:
+def test_the_shank_of_a_leaning_cutter_stands_in_what_is_above_its_flutes() -> None:
+    """The lowest point of a circle of the shank leaves the block at (3 + r sin) / cos along the axis."""
     short = replace(MILL, flute_length=2.0)
     program = path([[-8.0, 12.0, -3.0], [20.0, 12.0, -3.0]], [0.1, 0.0, 1.0])
-    with pytest.raises(InputError, match=r"above the flutes of tool 1 \(2 mm\)"):
-        remove(program, block(), {1: short}, ALLOY, FINE, engine="moves", accuracy=False)
+    found = remove(program, block(), {1: short}, ALLOY, FINE, accuracy=False).columns
+    lean, r = math.atan(0.1), 5.0 - 4.0 * FINE.tolerance
+    known = (3.0 + r * math.sin(lean)) / math.cos(lean) - 2.0
+    assert found["axial_overrun_mm"].max() == pytest.approx(known, abs=1e-6)

@@ -121,10 +121,10 @@ def test_a_reamer_takes_the_ring_that_the_drill_left() -> None:
 
 
 def test_the_neck_of_an_undercut_cutter_must_be_free() -> None:
-    """It goes 4 mm beside the edge; a neck of 5 mm does not touch, one that goes through the stock does."""
-    assert along("lollipop", rest=4.0, above=3.0).findings == ()
-    with pytest.raises(InputError, match="material stands above the flutes of tool 1"):
-        along("lollipop", rest=2.0, above=3.0)
+    """It goes 4 mm beside the edge; a neck of 5 mm does not touch; where it goes through the stock, it does in 3 mm."""
+    for rest, overrun in ((4.0, 0.0), (2.0, 3.0)):
+        found = along("lollipop", rest=rest, above=3.0).columns["axial_overrun_mm"]
+        assert found.max() == pytest.approx(overrun, abs=1e-6)
 
 
 @pytest.mark.parametrize(

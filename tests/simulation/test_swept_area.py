@@ -14,7 +14,7 @@ from chipload.program.program import Program
 from chipload.simulation import swept_area
 from chipload.simulation.chips import remove
 from chipload.simulation.removal import Resolution
-from chipload.simulation.steps import steps_of
+from chipload.simulation.steps import step_boxes, steps_of
 from chipload.stock.layers import LayeredStock
 from simulation.test_steps import five_axis
 
@@ -58,7 +58,7 @@ def test_layers_without_material_are_left_out_and_no_others(turn: float, monkeyp
 def test_a_box_holds_all_that_its_layer_is_covered_by() -> None:
     """Blocks of material that are only just in the way of a turning axis are seen."""
     steps = steps_of(leaning(0.3), 2.0, 0.01)
-    low, high = swept_area.boxes(steps, CUTTERS)
+    low, high = step_boxes(steps, CUTTERS)
     stock = LayeredStock.block((-60.0, -60.0, -16.0), (60.0, 60.0, 0.0), 2.0, 120.0)
     seen = 0
     for k, found in swept_area.swept_ahead(steps, stock, CUTTERS, 0.01, 1):

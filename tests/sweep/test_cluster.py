@@ -24,7 +24,6 @@ from chipload.jobs import FinishedJob, load_job, run_job
 from chipload.jobs.impeller import surface_search
 from chipload.jobs.impeller.checkpoint import part_bytes
 from chipload.result.summary import summary_bytes
-from chipload.simulation import strips
 from chipload.sweep.run import run_sweep
 from chipload.workers import WorkerDied, Workers, run_tasks
 from conftest import EXAMPLES
@@ -195,40 +194,6 @@ def test_programs_of_an_impeller_on_a_cluster_that_loses_a_worker_are_those_of_o
     assert spread == alone
 
 
-def test_strips_of_a_stock_on_a_cluster_that_loses_a_worker_have_the_bytes_of_one_process(
-    cluster, tmp_path, monkeypatch
-):
-    address, workers = cluster
-    job = slot_job(tmp_path / "job", step=0.05, end=14.0)
-    sets = ("stock.high_mm=[90.0, 10.0, 0.0]", "stock.layer_mm=2.0", 'operation.0.engine="layers"')
-    # a slot is too little work for strips to gain
-    monkeypatch.setattr(strips, "GAIN", 9.0)
-    monkeypatch.setattr(strips, "ROUND", 1)
-    alone = run_job(load_job(job, sets))
-    rounds, take = list[int](), strips.Strips.next
-    # a strip a worker: both must have come
-    with distributed.Client(address, set_as_default=False) as client:
-        client.wait_for_workers(2, timeout=300)
-
-    def broken(self, *more):
-        if len(rounds) == 1:
-            workers[0].kill()
-            workers[0].wait()
-        rounds.append(len(self._states))
-        return take(self, *more)
-
-    monkeypatch.setattr(strips.Strips, "next", broken)
-    spread = run_job(load_job(job, sets), workers=Workers(dask=address))
-    assert len(rounds) >= 2
-    assert set(rounds) == {2}
-    assert workers[1].poll() is None
-    a, b = (done.result.in_use[0].columns for done in (alone, spread))
-    assert {name: values.tolist() for name, values in a.items()} == {
-        name: values.tolist() for name, values in b.items()
-    }
-    assert numbers_of(alone) == numbers_of(spread)
-
-
 def numbers_of(done: FinishedJob) -> Any:
     return json.loads(summary_bytes(done.result, {}))
 
@@ -238,8 +203,7 @@ def test_a_job_without_such_parts_is_refused(job_dir, tmp_path):
     words = ["--out", str(tmp_path / "result"), "--workers"]
     for job, more, said in (
         (job_dir / "job.toml", (), "a contour job has no parts that other processes can compute"),
-        (slot, ("--set", "operation.0.engine=moves"), "share layers only"),
-        (slot, ("--set", "operation.0.engine=auto"), "share layers only"),
+        (slot, (), "a program job has no parts that other processes can compute"),
     ):
         done = CliRunner().invoke(app, ["run", str(job), *words, "2", *more])
         assert done.exit_code == 2

@@ -27,7 +27,6 @@ from chipload.simulation.linear_axes import with_linear_axes
 from chipload.simulation.moves import leans
 from chipload.simulation.removal import Resolution
 from chipload.simulation.surface import require_points
-from chipload.simulation.swept_area import require_upright
 from chipload.stock.layers import LayeredStock
 
 #: slices of a corner radius where none are stated, and how they narrow towards the bottom
@@ -77,8 +76,6 @@ def bodies_of(inputs: CheckInputs, reading: ProgramReading | ProgramSequence, st
     program, times = time_rows(reading, cutters, machine, op.interpolation)
     fine = resolution_of(op, cutters, program)
     count = count_steps(program, cutters, fine)
-    if op.engine == "layers":
-        require_upright(program, op.step_mm, op.tolerance_mm, stock, cutters)
     points = _points_of_stock(inputs, program, stock)
     part = inputs.surroundings.part
     if part is not None:

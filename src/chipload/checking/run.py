@@ -38,10 +38,11 @@ from chipload.progress import Progress, part_of, silent
 from chipload.result.provenance import sources, versions
 from chipload.simulation.accuracy import AXIAL, axial_force
 from chipload.simulation.checkpoint import Checkpoint, digest
+from chipload.simulation.chip_areas import most_divided_chip
 from chipload.simulation.chips import remove
 from chipload.simulation.chunks import remove_in_chunks
 from chipload.simulation.engagement_samples import EngagementRecorder
-from chipload.simulation.estimate import LEANING, QUICK, SLOW, UPRIGHT, estimate, slowest_step
+from chipload.simulation.estimate import LEANING, UPRIGHT, estimate, slowest_step
 from chipload.simulation.gouge_refinement import refine_gouges
 from chipload.simulation.hand import reversed_cuts
 from chipload.simulation.heights.slender_walls import distortion_not_checked
@@ -55,7 +56,6 @@ from chipload.simulation.removal import Columns, Watch
 from chipload.simulation.steps import StepBlocks
 from chipload.simulation.surface import Difference, collisions, difference, in_stock
 from chipload.stock.layers import LayeredStock
-from chipload.workers import Workers
 
 #: progress of a pass by the number of steps that are done
 Counted: TypeAlias = Callable[[int], None]
@@ -71,10 +71,8 @@ def simulation_estimate(inputs: CheckInputs, reading: ProgramReading, stock: Lay
 
 
 def _step_times(inputs: CheckInputs, program: Program, stock: LayeredStock) -> tuple[float, float]:
-    """Return the least and greatest processor time of a step [s] by the engine that will simulate most of a program."""
+    """Return the least and greatest processor time of a step [s] by moves."""
     cutters = inputs.cutters
-    if inputs.settings.engine == "layers":
-        return QUICK, SLOW
     if leans(program).any():
         return LEANING
     length = lengths(program)
@@ -90,7 +88,6 @@ def simulate_program(
     *,
     compliance: WorkpieceCompliance | None = None,
     checkpoint: Checkpoint | None = None,
-    workers: Workers | None = None,
     watch: Watch | None = None,
     progress: Progress = silent,
 ) -> SimulationResult:
@@ -102,7 +99,6 @@ def simulate_program(
     stock : before the program; changes
     compliance : of the workpiece; None: not known yet
     checkpoint : folder with finished work, from which a stopped run continues; None: all stays in memory
-    workers : processes or a cluster that remove strips of a layered stock; None: as the settings state
     watch : called with what each cutter cuts, besides the watches of the checks; without a checkpoint; None: none
 
     Raises
@@ -117,7 +113,7 @@ def simulate_program(
         compliance = compliance_of_workpiece(inputs, reading, stock, progress)
     gives = bodies.stiffness if compliance is None else stiffness_of(elasticity.stiffness, cutters, compliance.steps)
     before, stiffness = insides(stock), elasticity.stiffness
-    initial = stock.copied() if reading.skipped is not None else None
+    initial = stock.copied() if reading.skipped is not None or op.chip_diagram else None
     # layers that were cut before lie face on face, which rays do not distinguish
     blank = None if stock.cut.any() else stock.body()
     kept = KeptPasses(checkpoint, passes_key(inputs, bodies.program) if checkpoint is not None else "")
@@ -149,21 +145,22 @@ def simulate_program(
     if checkpoint is None:
         removal = remove(
             program, stock, cutters, material, fine, watch=watch_all, times=times,
-            engine=op.engine, loads=inputs.loads, outlines=inputs.outlines, processes=workers or op.workers,
-            progress=removing,
+            loads=inputs.loads, outlines=inputs.outlines, progress=removing,
         )  # fmt: skip
     else:
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
         removal = remove_in_chunks(
             program, stock, cutters, material, fine, checkpoint, watch=watch_all,
             keeps={"engagement": recorder} | ({} if stability_watch is None else {"watch": stability_watch}),
-            times=times, engine=op.engine, processes=workers or op.workers, progress=removing,
+            times=times, progress=removing,
             also=(
                 versions(), sources(), repr((stiffness, elasticity.workpiece)), repr(inputs.checks), formed,
                 None if stability_watch is None else stability_watch.dynamics,
             ),
         )  # fmt: skip
     loads = (*watched_columns(gives, formed=made is not None), *PROGRAM_COLUMNS)
+    if op.chip_diagram and initial is not None:
+        removal = replace(removal, piece=most_divided_chip(program, initial, cutters, fine, removal))
     removal = with_columns(removal, loads if inputs.loads else ("ramp_deg",))
     if inputs.limits.thrust_n is not None or any(has_lips(c) for c in cutters.values()):
         removal = with_drilling(removal, cutters, material)
@@ -191,7 +188,7 @@ def simulate_program(
     touched = _collision_check(inputs, bodies, steps, solids, stock_check, pass_progress, kept)
     skipped = None
     if reading.skipped is not None and initial is not None:
-        skipped = simulate_program(inputs, reading.skipped, initial, workers=workers)
+        skipped = simulate_program(inputs, reading.skipped, initial)
     checks = replace(bodies.checks, parts=removal.load_parts)
     return SimulationResult(
         removal, stock, machine, inputs.limits, {"kind": "simulate", **op.stated}, checks, touched, left,

@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from chipload.cutting.rigid import OF_DEPTH, OF_FEED
-from chipload.errors import InputError
 from chipload.ranges import choice_field, number_field, require_ranges
 
 
@@ -23,8 +22,7 @@ class SimulationSettings:
     step_mm : longest step of the tip
     tolerance_mm : greatest deviation of chords from the edges of chips
     interpolation : how the tool axis turns on a row: ``slerp`` at constant rate, ``lerp`` along a straight line
-    engine : ``moves``, ``layers``, or ``auto``: moves, or layers where moves cannot simulate the program
-    workers : processes that share a layered stock in strips; the result does not depend on them
+    chip_diagram : show the chip with most pieces on a layer of the stock, and the diagram of its boundary
     corner_slices : slices of a corner radius, of equal angle; None: by the inclination of the axis
     flank_mm : length of a slice of the flank; None: half the radius, or a tenth of it if the axis leans
     resolution_error : estimate the error of the loads; without it limits on loads are unproven
@@ -35,23 +33,20 @@ class SimulationSettings:
     step_mm: float = number_field(above=0.0, most=100.0)
     tolerance_mm: float = number_field(0.001, least=1e-6, most=0.1)
     interpolation: Literal["slerp", "lerp"] = choice_field("slerp", "slerp", "lerp")
-    engine: Literal["auto", "moves", "layers"] = choice_field("auto", "auto", "moves", "layers")
-    workers: int = number_field(1, least=1, most=64, whole=True)
+    chip_diagram: bool = False
     corner_slices: int | None = number_field(None, least=1, most=200, whole=True)
     flank_mm: float | None = number_field(None, above=0.0)
     resolution_error: bool = True
     stock_points_mm: float | None = number_field(None, above=0.0)
 
     def __post_init__(self) -> None:
-        """Refuse values out of range, and processes for a simulation that they cannot share."""
+        """Refuse values out of range."""
         require_ranges(self)
-        if self.workers > 1 and self.engine != "layers":
-            raise InputError(f"workers = {self.workers}: applies to layers: state engine = 'layers' or leave it out")
 
     @property
     def stated(self) -> Mapping[str, Any]:
-        """The settings that are not None, without the number of processes, on which no result depends."""
-        return {name: value for name, value in asdict(self).items() if value is not None and name != "workers"}
+        """The settings that are not None."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,9 +43,7 @@ def run(
             help="use larger steps and thicker layers for a first result; the verdict is never better than unproven",
         ),
     ] = False,
-    workers: Annotated[
-        int, typer.Option("--workers", help="number of processes that share an impeller job or a simulation by layers")
-    ] = 1,
+    workers: Annotated[int, typer.Option("--workers", help="number of processes that share an impeller job")] = 1,
     dask: Annotated[
         str | None,
         typer.Option("--dask", metavar="ADDRESS", help="address of a Dask scheduler, instead of --workers"),

@@ -69,8 +69,8 @@ class Capability:
 #: every capability; a job file belongs to the first whose table it has
 CAPABILITIES = (
     Capability("torque", "torque_control", "TorqueJobTable"),
-    Capability("feeds", "program", "FeedsJobTable", resumes=True, spreads=True, inner="feeds"),
-    Capability("program", "program", "ProgramJobTable", resumes=True, spreads=True),
+    Capability("feeds", "program", "FeedsJobTable", resumes=True, inner="feeds"),
+    Capability("program", "program", "ProgramJobTable", resumes=True),
     Capability("impeller", "impeller", "ImpellerJobTable", resumes=True, spreads=True),
     Capability("thinwall", "wall", "ThinWallJobTable", resumes=True),
     Capability("fit", "measurement", "FitJobTable"),

@@ -17,6 +17,11 @@ from chipload.errors import InputError, InputErrors
 
 #: tables of a job file that have another name now
 RENAMED = {"shell": "torque_control.shell", "control": "torque_control"}
+#: keys of an operation that are no more
+REMOVED = {
+    "engine": "removed: every program is simulated by the volume of its moves: leave it out",
+    "workers": "removed: one process simulates a program: leave it out; chipload sweep --workers runs many jobs",
+}
 
 
 def renamed_tables(keys: Iterable[str]) -> list[str]:
@@ -101,6 +106,8 @@ def _line(e: Any, root: type[BaseModel], foreign: Collection[str] = ()) -> str:
     if kind == "extra_forbidden":
         if loc[0] == "cutter" and loc[-1] in BARREL_NAMES:
             return f"{key}: {BARREL}"
+        if loc[0] == "operation" and loc[-1] in REMOVED:
+            return f"{key}: {REMOVED[loc[-1]]}"
         known = keys_at(loc[:-1], root)
         return f"{key}: unknown key; did you mean {nearest_key(str(loc[-1]), known)}?"
     if kind == "missing":

@@ -7,7 +7,7 @@ import tomllib
 from typing import Any
 
 from chipload.errors import InputError
-from chipload.jobs.messages import RENAMED, keys_at, nearest_key
+from chipload.jobs.messages import REMOVED, RENAMED, keys_at, nearest_key
 from chipload.jobs.tables import Table
 
 
@@ -37,6 +37,8 @@ def override(raw: dict[str, Any], text: str, root: type[Table]) -> None:
             known = keys_at([int(k) if k.isdecimal() else k for k in keys[:depth]], root)
             # a table of free keys, as program.parameters, has no known ones
             if known and key not in here and key not in known:
+                if keys[0] == "operation" and key in REMOVED:
+                    raise InputError(f"--set {text}: {name}: {REMOVED[key]}")
                 raise InputError(f"--set {text}: {name}: unknown key; did you mean {nearest_key(key, known)}?")
             if not last:
                 here, holder, slot = here.setdefault(key, {}), here, key

@@ -77,8 +77,8 @@ from chipload.engagement.tooth_surfaces import chip_error
 from chipload.simulation.checkpoint import in_rows
 from chipload.simulation.loads import LOADS, Cuts
 from chipload.simulation.moves import MoveRun, remove_by_moves
-from chipload.simulation.steps import Steps
-from chipload.simulation.swept_area import boxes, swept_ahead
+from chipload.simulation.steps import Steps, rows_of_steps, step_boxes
+from chipload.simulation.swept_area import swept_ahead
 from chipload.stock.layers import LayeredStock
 from chipload.stock.tile_rings import TileRings
 
@@ -403,21 +403,17 @@ def _windows(blocks: Iterable[Steps], chosen: list[int], setting: RunSettings) -
         for block in blocks:
             if at > last:
                 break
-            a, b = boxes(block, setting.cutters)
+            a, b = step_boxes(block, setting.cutters)
             for k in chosen:
                 if turn == 0 and at <= k < at + len(block):
-                    own[k] = (_rows(block, np.array([k - at])), a[k - at], b[k - at])
+                    own[k] = (rows_of_steps(block, np.array([k - at])), a[k - at], b[k - at])
                 if turn == 1:
                     _, low, high = own[k]
                     near = ((b > low) & (a < high)).all(axis=1) & (at + np.arange(len(block)) < k)
                     if near.any():
-                        earlier[k].append(_rows(block, np.flatnonzero(near)))
+                        earlier[k].append(rows_of_steps(block, np.flatnonzero(near)))
             at += len(block)
     return [Window(k, *own[k], tuple(earlier[k])) for k in chosen]
-
-
-def _rows(steps: Steps, rows: Ints) -> Steps:
-    return Steps(**{f.name: getattr(steps, f.name)[rows] for f in fields(Steps)})
 
 
 def layers_again(before: LayeredStock, setting: RunSettings, remove: Remove) -> Again:

@@ -58,20 +58,16 @@ from chipload.simulation.moves import (
     with_contact,
 )
 from chipload.simulation.removal import (
-    ChipAreas,
     Columns,
     Removal,
     Resolution,
     RunningSums,
     RunSettings,
-    TakenByLayers,
     Watch,
 )
 from chipload.simulation.steps import BLOCK, StepBlocks, Steps, moving_rows, number_of_steps, steps_in_blocks
-from chipload.simulation.strips import strips_for
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_min_from_mm_s
-from chipload.workers import Workers
 
 Floats = NDArray[np.float64]
 
@@ -95,7 +91,6 @@ def remove(
     times: Floats | None = None,
     accuracy: bool = True,
     workers: int = 2,
-    processes: int | Workers = 1,
     engine: Engine = "auto",
     loads: bool = True,
     outlines: bool = True,
@@ -116,9 +111,7 @@ def remove(
     times : (n,) float [s], time of each row of the program on the machine (:mod:`chipload.program.time`), for ``t_s``
         and ``duration_s``; None: at the commanded feed, rapids take none
     accuracy : calculate ``energy_balance`` and ``resolution_error``, for which some steps are computed once more
-    workers : threads that find areas ahead of the removal
-    processes : of layers, each with a strip of the stock (:mod:`chipload.simulation.strips`), as a number or as
-        :class:`chipload.workers.Workers`, also of a cluster; the result does not depend on threads and processes
+    workers : threads; the result does not depend on them
     engine : ``moves`` (``auto`` is the same), see :mod:`chipload.simulation.moves`, or ``layers``
     loads : False: only what is removed is needed; moves then leave the loads 0
     outlines : False: of what is left only the volume is needed: moves then leave ``stock`` as it was, and its volume
@@ -150,7 +143,7 @@ def remove(
     """
     count = count_steps(program, cutters, resolution)
     progress(0.0, "removing")
-    setting = setting_of(cutters, material, resolution, watch, workers, processes)
+    setting = setting_of(cutters, material, resolution, watch, workers)
     setting = with_engine(engine, replace(setting, loads=loads), program, stock)
     before = stock.copied() if accuracy else None
     while True:
@@ -182,11 +175,9 @@ def _blocks_removed(
     """Yield the result of :func:`remove_block` for one block of steps after another."""
     fine, size = setting.resolution, block_of(setting)
     blocks = steps_in_blocks(program, fine.step_mm, fine.tolerance, size=size, times=times)
-    with strips_for(program, stock, setting, size) as strips:
-        for steps, contact in with_contact(blocks, setting.moves, setting.workers):
-            found = None if strips is None else strips.next(steps, sums.piece)
-            sums, some, cuts = remove_block(steps, stock, sums, setting, contact, found)
-            yield sums, some, cuts
+    for steps, contact in with_contact(blocks, setting.moves, setting.workers):
+        sums, some, cuts = remove_block(steps, stock, sums, setting, contact)
+        yield sums, some, cuts
 
 
 def block_of(setting: RunSettings) -> int:
@@ -251,12 +242,10 @@ def setting_of(
     resolution: Resolution,
     watch: Watch | None,
     workers: int,
-    processes: int | Workers = 1,
 ) -> RunSettings:
     """Return the settings of a run."""
     profiles = {n: profile_of(c, resolution) for n, c in cutters.items()}
-    shared = processes if isinstance(processes, Workers) else Workers(processes)
-    return RunSettings(cutters, profiles, material, resolution, watch, workers, None, shared)
+    return RunSettings(cutters, profiles, material, resolution, watch, workers)
 
 
 def profile_of(cutter: Cutter, resolution: Resolution) -> Slices:
@@ -315,16 +304,14 @@ def remove_block(
     sums: RunningSums,
     setting: RunSettings,
     contact: Engaged | None = None,
-    found: TakenByLayers | None = None,
 ) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
     """Remove the cuts of some steps from the stock; return the sums after them, their columns and tooth engagement.
 
-    ``contact`` is their engagement by moves and ``found`` their removal by layers, if that is known.
+    ``contact`` is their engagement by moves, if that is known.
     """
     if setting.moves is not None:
         return _moved_block(steps, setting.moves, sums, setting, contact)
-    removal = removed_by_layers(steps, stock, sums.steps, setting, sums.piece) if found is None else found
-    removed, engagement, piece = removal.removed, removal.engagement, removal.piece
+    removed, engagement = removed_by_layers(steps, stock, setting)
     loads, basis, cut = np.zeros((len(steps), len(LOADS))), sums.basis, list[Cuts]()
     watched: dict[str, Floats] = {}
     for number in sorted({int(steps.tool[c.step]) for c in engagement}):
@@ -345,7 +332,7 @@ def remove_block(
             each = mean_basis(bitten, cutter, material, bitten.frame)
             basis = basis + np.tensordot(steps.seconds[at], each, 1)
     columns = {**_columns(steps, removed, loads, sums), **watched}
-    return _add_steps(sums, steps, removed, columns, basis, piece), columns, cut
+    return _add_steps(sums, steps, removed, columns, basis), columns, cut
 
 
 def _moved_block(
@@ -361,7 +348,7 @@ def _moved_block(
             for name, values in setting.watch(cut).items():
                 watched.setdefault(name, np.zeros(len(steps)))[cut.step - sums.steps] = values
     columns = {**_columns(steps, found.removed, found.loads, sums), **watched}
-    return _add_steps(sums, steps, found.removed, columns, sums.basis + found.basis, sums.piece), columns, found.cuts
+    return _add_steps(sums, steps, found.removed, columns, sums.basis + found.basis), columns, found.cuts
 
 
 def _add_steps(
@@ -370,7 +357,6 @@ def _add_steps(
     removed: Floats,
     columns: Columns,
     basis: Floats,
-    piece: ChipAreas | None,
 ) -> RunningSums:
     """Return the sums after some steps."""
     cuts = (removed[:, 0] > 0.0) & ~steps.rapid
@@ -384,7 +370,6 @@ def _add_steps(
         cut_s=sums.cut_s + float(steps.seconds[cuts].sum()),
         basis=basis,
         rapids=tuple(dict.fromkeys((*sums.rapids, *lines))),
-        piece=piece,
     )
 
 
@@ -403,7 +388,7 @@ def removal_of(
         band = (*sd[:3].tolist(), float(sd[3]) / 1000.0)
     # rapids that cut more than films
     found = tuple(Finding("rapid-cuts", line, "a rapid goes through material") for line in sums.rapids)
-    return Removal(columns, sums.before, stock.volume(), band, sums.piece, found, program.labels, cuts)
+    return Removal(columns, sums.before, stock.volume(), band, None, found, program.labels, cuts)
 
 
 def stack_blocks(blocks: Sequence[Columns]) -> dict[str, NDArray[Any]]:

@@ -16,11 +16,9 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from shapely import MultiPolygon, Polygon
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutting.material import Material
-from chipload.engagement.chips.move import Move
 from chipload.errors import InputError
 from chipload.memory import return_free_memory
 from chipload.program.program import Program
@@ -36,13 +34,11 @@ from chipload.simulation.chips import (
     with_accuracy,
     with_engine,
 )
-from chipload.simulation.moves import Engine, MaterialAboveFlutes, with_contact
-from chipload.simulation.removal import ChipAreas, Columns, Removal, Resolution, RunningSums, RunSettings, Watch
+from chipload.simulation.moves import MaterialAboveFlutes, with_contact
+from chipload.simulation.removal import Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.steps import BLOCK, steps_in_blocks
-from chipload.simulation.strips import strips_for
 from chipload.stock.layers import LayeredStock
 from chipload.stock.shapes import read_shapes, shape_bytes
-from chipload.workers import Workers
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +48,7 @@ MOST = 32 * BLOCK
 SHARE = 0.05
 #: what a file of sums says of itself, and its arrays with their numbers of dimensions
 SUMS = "chipload sums of a simulation 2"
-ARRAYS = {"numbers": 1, "basis": 2, "rapids": 1, "of": 1, "height": 1, "tip": 2, "axis": 2}
+ARRAYS = {"numbers": 1, "basis": 2, "rapids": 1}
 
 
 class WatchState(Protocol):
@@ -81,8 +77,6 @@ def remove_in_chunks(
     times: Floats | None = None,
     also: Any = (),
     workers: int = 2,
-    processes: int | Workers = 1,
-    engine: Engine = "auto",
     progress: Progress = silent,
 ) -> Removal:
     """Do what :func:`chipload.simulation.chips.remove` does, with columns in files; continue a stopped run.
@@ -91,7 +85,7 @@ def remove_in_chunks(
     ----------
     unfinished : the folder of the run; it holds the columns of the result, and stays until it is discarded
     keeps : states of ``watch`` beside its columns, by names of files
-    times, processes, engine : as of :func:`chipload.simulation.chips.remove`
+    times : as of :func:`chipload.simulation.chips.remove`
     also : values of any kind on which the result depends beside the arguments: versions, what ``watch`` uses
 
     Returns
@@ -105,17 +99,15 @@ def remove_in_chunks(
         As :func:`chipload.simulation.chips.remove`, and where the folder cannot be used.
     """
     count = count_steps(program, cutters, resolution)
-    setting = setting_of(cutters, material, resolution, watch, workers, processes)
+    setting = setting_of(cutters, material, resolution, watch, workers)
     shape = (stock.bounds, stock.xs, stock.ys, stock.cut, stock.room, stock.tidied, stock.tiles)
     part = None if stock.part is None else (np.asarray(stock.part.vertices), np.asarray(stock.part.faces))
     depends = (program, cutters, material, resolution, shape, part, watch is not None, BLOCK, times)
-    kept = unfinished.begin(digest(*depends, engine, also))
-    sums, before, state = RunningSums(stock.volume()), stock.copied(), None
+    kept = unfinished.begin(digest(*depends, also))
+    sums, before = RunningSums(stock.volume()), stock.copied()
     if kept is not None:
         try:
-            found_sums = _read_sums(kept["sums"], cutters)
-            if engine == "layers":
-                state = LayeredStock.load(kept["stock"]).state()
+            found_sums = _read_sums(kept["sums"])
             for name, state_of in keeps.items():
                 state_of.restore(kept[name])
         except (InputError, KeyError) as err:
@@ -124,19 +116,17 @@ def remove_in_chunks(
                 state_of.clear()
             kept = None
     sums = sums if kept is None else found_sums
-    setting = with_engine(engine, setting, program, stock, shank=sums.shank)
+    setting = with_engine("moves", setting, program, stock, shank=sums.shank)
     progress(sums.steps / count, "removing")
     if kept is not None:
-        if state is not None:
-            stock.restore(state)
-        elif setting.moves is not None:
+        if setting.moves is not None:
             setting.moves.skip(program, resolution.step_mm, sums.steps)
         unfinished.notice(f"continues after step {sums.steps} of {count}, kept in {unfinished.folder}")
     try:
         sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, progress)
     except MaterialAboveFlutes as found:
         unfinished.again(f"starts from the beginning, and asks for the shank in material: line {found.line}: {found}")
-        setting = with_engine(engine, setting, program, stock, shank=True)
+        setting = with_engine("moves", setting, program, stock, shank=True)
         sums = RunningSums(stock.volume(), shank=True)
         for state_of in keeps.values():
             state_of.clear()
@@ -161,37 +151,32 @@ def _remove_steps(
     progress: Progress,
 ) -> tuple[RunningSums, list[Columns]]:
     """Return the sums after all steps, and the columns that are not in files."""
-    resolution, cutters = setting.resolution, setting.cutters
+    resolution = setting.resolution
 
     def state() -> dict[str, bytes]:
         # the moves come from the program again
-        layers = {} if setting.moves is not None else {"stock": stock.to_bytes()}
-        watched = {name: kept.to_bytes() for name, kept in keeps.items()}
-        return layers | watched | {"sums": _sums_bytes(sums, cutters)}
+        return {name: kept.to_bytes() for name, kept in keeps.items()} | {"sums": _sums_bytes(sums)}
 
     done = sums.steps
     since, cost, waiting, columns = time.monotonic(), 0.0, 0, list[Columns]()
     blocks = steps_in_blocks(
         program, resolution.step_mm, resolution.tolerance, size=block_of(setting), first=done, times=times
     )
-    with strips_for(program, stock, setting, block_of(setting), done, sums.piece) as strips:
-        for steps, contact in with_contact(blocks, setting.moves, setting.workers):
-            progress(sums.steps / count, "removing")
-            found = None if strips is None else strips.next(steps, sums.piece)
-            sums, some, _ = remove_block(steps, stock, sums, setting, contact, found)
-            columns.append(some)
-            waiting += len(steps)
-            now = time.monotonic()
-            due = unfinished.every_s == 0.0 or now - since >= max(unfinished.every_s, cost / SHARE)
-            due = due and (strips is None or strips.complete)
-            if due or waiting >= MOST:
-                unfinished.add(stack_blocks(columns))
-                columns, waiting = [], 0
-                return_free_memory()
-            if due:
-                unfinished.commit(state())
-                since = time.monotonic()
-                cost = since - now
+    for steps, contact in with_contact(blocks, setting.moves, setting.workers):
+        progress(sums.steps / count, "removing")
+        sums, some, _ = remove_block(steps, stock, sums, setting, contact)
+        columns.append(some)
+        waiting += len(steps)
+        now = time.monotonic()
+        due = unfinished.every_s == 0.0 or now - since >= max(unfinished.every_s, cost / SHARE)
+        if due or waiting >= MOST:
+            unfinished.add(stack_blocks(columns))
+            columns, waiting = [], 0
+            return_free_memory()
+        if due:
+            unfinished.commit(state())
+            since = time.monotonic()
+            cost = since - now
     if unfinished.parts:
         if columns:
             unfinished.add(stack_blocks(columns))
@@ -200,34 +185,16 @@ def _remove_steps(
     return sums, columns
 
 
-def _sums_bytes(sums: RunningSums, cutters: Mapping[int, Cutter]) -> bytes:
-    piece = sums.piece
-    tool = [n for n, c in cutters.items() if piece is not None and c is piece.cutter]
-    none = np.zeros((0, 3))
-    arrays = {
-        "numbers": np.array([sums.before, sums.steps, sums.s_mm, sums.t_s, sums.cut_s, sums.shank]),
-        "basis": sums.basis,
-        "rapids": np.array(sums.rapids, dtype=np.int64),
-        "of": np.array([piece.step, *tool] if piece is not None else [], dtype=np.int64),
-        "height": np.array([piece.height] if piece is not None else []),
-        "tip": piece.move.tip if piece is not None else none,
-        "axis": piece.move.axis if piece is not None else none,
-    }
-    shapes = np.empty(0 if piece is None else 1 + len(piece.chips), dtype=object)
-    shapes[:] = [] if piece is None else [piece.before, *piece.chips]
-    return shape_bytes(SUMS, arrays, shapes)
+def _sums_bytes(sums: RunningSums) -> bytes:
+    numbers = np.array([sums.before, sums.steps, sums.s_mm, sums.t_s, sums.cut_s, sums.shank])
+    arrays = {"numbers": numbers, "basis": sums.basis, "rapids": np.array(sums.rapids, dtype=np.int64)}
+    return shape_bytes(SUMS, arrays, np.empty(0, dtype=object))
 
 
-def _read_sums(path: Path, cutters: Mapping[int, Cutter]) -> RunningSums:
-    a, shapes = read_shapes(path, SUMS, ARRAYS)
-    if a["numbers"].shape != (6,) or a["basis"].shape != (4, 6) or (len(a["of"]) == 0) != (len(shapes) == 0):
+def _read_sums(path: Path) -> RunningSums:
+    a, _ = read_shapes(path, SUMS, ARRAYS)
+    if a["numbers"].shape != (6,) or a["basis"].shape != (4, 6):
         raise InputError(f"{path}: damaged: remove its folder")
     before, steps, s_mm, t_s, cut_s, shank = a["numbers"].tolist()
-    piece = None
-    if len(shapes):
-        step, tool = a["of"].tolist()
-        chips = tuple(p for p in shapes[1:] if isinstance(p, Polygon))
-        assert isinstance(shapes[0], MultiPolygon)
-        piece = ChipAreas(step, Move(a["tip"], a["axis"]), cutters[tool], float(a["height"][0]), shapes[0], chips)
     rapids = tuple(a["rapids"].tolist())
-    return RunningSums(before, int(steps), s_mm, t_s, cut_s, a["basis"], rapids, piece, bool(shank))
+    return RunningSums(before, int(steps), s_mm, t_s, cut_s, a["basis"], rapids, bool(shank))

@@ -18,9 +18,8 @@ from chipload.cutting.material import Material
 from chipload.engagement.chips.move import Move
 from chipload.errors import Finding
 from chipload.simulation.engagement_samples import EngagementSamples
-from chipload.simulation.loads import Cuts, StepEngagement, part_of_cuts
+from chipload.simulation.loads import Cuts, part_of_cuts
 from chipload.simulation.moves import MoveRun
-from chipload.workers import Workers
 
 Floats = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
@@ -89,24 +88,6 @@ class ChipAreas:
 
 
 @dataclass(frozen=True, eq=False)
-class TakenByLayers:
-    """Removal of some steps from the layers.
-
-    Parameters
-    ----------
-    removed : (n, 4) volume [mm^3], pieces and layers of each chip, contact of the shank [mm]
-    gained : (n,) volume that the stock gained by edges that were made simpler [mm^3]
-    engagement : of the teeth, step by step, of those that cut
-    piece : the chip with most pieces so far
-    """
-
-    removed: Floats
-    gained: Floats
-    engagement: list[StepEngagement]
-    piece: ChipAreas | None
-
-
-@dataclass(frozen=True, eq=False)
 class Removal:
     """The removal of a program: its columns, volumes, accuracy and findings.
 
@@ -116,7 +97,7 @@ class Removal:
     volume_before, volume_after : of the stock [mm^3]
     mean_band : (4,) standard deviation of the mean force x, y, z [N] and torque [N m] over the time in cut, from that
         of the coefficients; None: the material does not state their uncertainty
-    piece : the chip with most pieces that are most alike; None where nothing was cut
+    piece : the chip with most pieces that are most alike (:mod:`chipload.simulation.chip_areas`); None: not asked for
     findings : rapids that cut
     labels : of the program, `label` of the columns counts in them
     cuts : tooth engagement, one for each cutter that cuts; empty unless requested
@@ -175,8 +156,7 @@ def removal_between(whole: Removal, first: int, end: int) -> Removal:
 @dataclass(frozen=True, eq=False)
 class RunSettings:
     """What a run keeps to, step after step: see :func:`remove`; ``profiles`` are slices of the cutters;
-    ``moves`` the run by moves, None where it goes by layers; ``workers`` threads; ``processes`` have strips of layers;
-    ``loads`` False: moves leave the loads 0.
+    ``moves`` the run by moves, None: by layers; ``workers`` threads; ``loads`` False: moves leave the loads 0.
     """
 
     cutters: Mapping[int, Cutter]
@@ -186,7 +166,6 @@ class RunSettings:
     watch: Watch | None
     workers: int
     moves: MoveRun | None = None
-    processes: Workers = field(default_factory=Workers)
     loads: bool = True
 
     @property
@@ -206,7 +185,6 @@ class RunningSums:
     s_mm, t_s, cut_s : their length [mm], their time and the time in cut [s]
     basis : (4, 6) integral over the time in cut of the factors of the coefficients
     rapids : lines with rapids that cut
-    piece : as in :class:`Removal`
     shank : the run asks for the shank in material
     """
 
@@ -217,5 +195,4 @@ class RunningSums:
     cut_s: float = 0.0
     basis: Floats = field(default_factory=lambda: np.zeros((4, 6)))
     rapids: tuple[int, ...] = ()
-    piece: ChipAreas | None = None
     shank: bool = False

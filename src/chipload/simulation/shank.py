@@ -106,7 +106,7 @@ def axial_overrun(stock: BrickStock, cutter: Cutter, tip: Floats, axis: Floats, 
 
     def in_material(heights: Floats) -> NDArray[np.bool_]:
         points = tip + heights[:, None, None] * axis + ring
-        return stock.contains(points.reshape(-1, 3)).reshape(len(heights), -1).any(axis=1)
+        return np.asarray(stock.contains(points.reshape(-1, 3)).reshape(len(heights), -1).any(axis=1))
 
     heights = np.linspace(first, last, max(math.ceil((last - first) / (APART * cutter.radius)), 1) + 1)
     free = np.flatnonzero(~in_material(heights))

@@ -184,7 +184,7 @@ def _depth(stock: StockOfMoves, points: Floats, along: Floats, most: Floats, mat
     low, high = np.zeros(len(points)), np.minimum(FIRST, most)
 
     def reached(some: Ints, far: Floats) -> NDArray[np.bool_]:
-        return stock.contains(points[some] + far[:, None] * along[some]) == material
+        return np.asarray(stock.contains(points[some] + far[:, None] * along[some]) == material)
 
     waiting = np.arange(len(points))
     while len(waiting):

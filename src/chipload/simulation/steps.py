@@ -7,12 +7,13 @@ become chords first. Row 0 of a program is where it begins and gives no step, a 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.program.motions import is_arc, lengths, radii, spans, straighten_arcs
 from chipload.program.path_mode import PathControl
@@ -293,3 +294,24 @@ def _turn_axes(begin: Floats, end: Floats, angle: Floats, u: Floats) -> Floats:
     out = (np.sin((1.0 - u) * angle) / over)[:, None] * begin + (np.sin(u * angle) / over)[:, None] * end
     out = np.where((small | (u == 1.0))[:, None], end, np.where((u == 0.0)[:, None], begin, out))
     return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
+
+
+def step_boxes(steps: Steps, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats]:
+    """(n, 3), (n, 3) corners of boxes that the cutter does not leave, as the axis turns by a few degrees in a step."""
+    p0, p1, a0, a1, tools = steps.p0, steps.p1, steps.a0, steps.a1, steps.tool
+    top, wide = np.empty((len(steps), 1)), np.empty((len(steps), 1))
+    for tool in np.unique(tools).tolist():
+        c = cutters[tool]
+        top[tools == tool] = c.flute_length
+        wide[tools == tool] = max(c.radius, float(c.radius_at([c.flute_length])[0]))
+    ends = np.array([p0, p1, p0 + top * a0, p1 + top * a1])
+    # the top of the cutter leaves its chord by the sagitta of the turn, and each circle reaches R across the axis
+    turn = np.linalg.norm(a1 - a0, axis=1)[:, None]
+    lean = np.sqrt(np.maximum(1.0 - np.minimum(a0, a1) ** 2, 1.0 - np.maximum(a0, a1) ** 2))
+    reach = wide * np.minimum(lean + turn, 1.0) + top * turn**2
+    return np.asarray(ends.min(axis=0) - reach), np.asarray(ends.max(axis=0) + reach)
+
+
+def rows_of_steps(steps: Steps, rows: Ints) -> Steps:
+    """Return some of the steps."""
+    return Steps(**{f.name: getattr(steps, f.name)[rows] for f in fields(Steps)})

@@ -18,10 +18,9 @@ from chipload.engagement.chips.covered import covered_rings
 from chipload.engagement.chips.move import LEAST_AXIS_Z, Move
 from chipload.engagement.chips.section import cutter_numbers
 from chipload.errors import InputError
-from chipload.program.program import Program
 from chipload.simulation.flute_end import Tiles, boxes_meet_stock, in_air
 from chipload.simulation.reach import reached_layers
-from chipload.simulation.steps import StepBlocks, Steps
+from chipload.simulation.steps import Steps, step_boxes
 from chipload.stock.areas import PlaneAreas
 from chipload.stock.layers import LayeredStock
 
@@ -60,21 +59,15 @@ def swept_ahead(
     cutters: Mapping[int, Cutter],
     tolerance: float,
     workers: int,
-    plan: Plan | None = None,
 ) -> Iterator[tuple[int, Swept]]:
     """Those steps that meet a layer, in their order; found in threads that run ahead of the caller.
-
-    Parameters
-    ----------
-    plan : corners of the plan of the whole stock [mm], where ``stock`` is a strip of it: the steps near it are found
-        together, so that each area has the same numbers in a strip as in the whole
 
     Raises
     ------
     InputError
         Beside or in the stock the axis lies, or looks down.
     """
-    low, high, near = near_stock(steps, plan_of(stock) if plan is None else plan, cutters)
+    low, high, near = near_stock(steps, plan_of(stock), cutters)
     before = stock.tiles.copy()
 
     def swept(part: range) -> list[tuple[int, Swept]]:
@@ -102,31 +95,6 @@ def swept_ahead(
                     yield k, found
 
 
-def require_upright(
-    program: Program,
-    step_mm: float,
-    chord_mm: float,
-    stock: LayeredStock,
-    cutters: Mapping[int, Cutter],
-) -> None:
-    """Refuse a program whose axis lies, or looks down, beside or in the stock; O(rows) where none lies.
-
-    Raises
-    ------
-    InputError
-        As :func:`swept_ahead`.
-    """
-    # between two axes above the horizon none is lower than both
-    if not len(program) or float(program.axis[:, 2].min()) >= 2.0 * LEAST_AXIS_Z:
-        return
-    for steps in StepBlocks(program, step_mm, chord_mm):
-        lies = np.minimum(steps.a0[:, 2], steps.a1[:, 2]) < 2.0 * LEAST_AXIS_Z
-        low, high, near = near_stock(steps, plan_of(stock), cutters)
-        for k in np.flatnonzero(lies & near).tolist():
-            if stock.layers_between(low[k, 2], high[k, 2]):
-                _move(steps, k)
-
-
 def plan_of(stock: LayeredStock) -> Plan:
     """Return x0, y0, x1, y1 of a stock [mm]."""
     return float(stock.xs[0]), float(stock.ys[0]), float(stock.xs[-1]), float(stock.ys[-1])
@@ -134,7 +102,7 @@ def plan_of(stock: LayeredStock) -> Plan:
 
 def near_stock(steps: Steps, plan: Plan, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Boxes of the steps, and which of them come over, into or under the plan of the stock."""
-    low, high = boxes(steps, cutters)
+    low, high = step_boxes(steps, cutters)
     near = (high[:, 0] >= plan[0]) & (low[:, 0] <= plan[2])
     near &= (high[:, 1] >= plan[1]) & (low[:, 1] <= plan[3])
     near &= ~np.isin(steps.tool, [n for n, c in cutters.items() if c.body])
@@ -232,22 +200,6 @@ def _flank(steps: Steps, k: int, cutter: Cutter, heights: Floats) -> NDArray[np.
     if cutter.flank_arc is not None:
         foot = cutter.flank_arc.z_to
     return np.asarray((heights > high + foot) & (heights < low + top))
-
-
-def boxes(steps: Steps, cutters: Mapping[int, Cutter]) -> tuple[Floats, Floats]:
-    """(n, 3), (n, 3) corners of boxes that the cutter does not leave, as the axis turns by a few degrees in a step."""
-    p0, p1, a0, a1, tools = steps.p0, steps.p1, steps.a0, steps.a1, steps.tool
-    top, wide = np.empty((len(steps), 1)), np.empty((len(steps), 1))
-    for tool in np.unique(tools).tolist():
-        c = cutters[tool]
-        top[tools == tool] = c.flute_length
-        wide[tools == tool] = max(c.radius, float(c.radius_at([c.flute_length])[0]))
-    ends = np.array([p0, p1, p0 + top * a0, p1 + top * a1])
-    # the top of the cutter leaves its chord by the sagitta of the turn, and each circle reaches R across the axis
-    turn = np.linalg.norm(a1 - a0, axis=1)[:, None]
-    lean = np.sqrt(np.maximum(1.0 - np.minimum(a0, a1) ** 2, 1.0 - np.maximum(a0, a1) ** 2))
-    reach = wide * np.minimum(lean + turn, 1.0) + top * turn**2
-    return np.asarray(ends.min(axis=0) - reach), np.asarray(ends.max(axis=0) + reach)
 
 
 def _move(steps: Steps, k: int) -> Move:

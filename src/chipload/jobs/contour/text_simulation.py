@@ -257,7 +257,7 @@ def simulate_text(
     contacts = () if off else contact_findings(program, steps, cutters, body, TOLERANCE_MM)
     removal = remove(
         program, body, cutters, columns.checks.material, fine, watch=watch, times=times,
-        engine="auto", progress=progress,
+        progress=progress,
     )  # fmt: skip
     found: dict[str, NDArray[Any]] = {k: v for k, v in removal.columns.items() if k not in DROPPED}
     zero = np.zeros(len(found["line"]))

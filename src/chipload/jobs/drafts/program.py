@@ -449,7 +449,6 @@ def _operation_table(program: Program, cuts: np.ndarray, sizes: Sequence[float])
         (
             Entry("kind", "simulate"),
             Entry("step_mm", step, "longest step; smaller: finer and slower"),
-            Entry("engine", note="moves: exact; layers: polygons at heights", example='"auto"'),
         ),
         repeated=True,
     )

@@ -29,22 +29,18 @@ from chipload.simulation.checkpoint import Checkpoint
 from chipload.simulation.chips import remove
 from chipload.simulation.steps import steps_of
 from chipload.stock.layers import LayeredStock
-from chipload.workers import Workers
 
 #: resolution error that new feeds leave room for, over that at the programmed feeds: at the new ones other steps have
 #: the worst loads, whose error is not yet known (example feeds: 1.07 % before, 1.51 % after)
 SPARE = 2.0
 
 
-def run(
-    job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: Workers | None = None
-) -> FeedsProgram:
+def run(job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> FeedsProgram:
     """Simulate the program of a job, give it new feeds, and simulate its new text from fresh stock.
 
     Parameters
     ----------
     checkpoint : the folder that keeps what is finished of the last simulation; None: all is kept in memory
-    workers : processes or a cluster that remove strips of a layered stock; None: as the operation states
 
     Raises
     ------
@@ -52,7 +48,6 @@ def run(
         A file cannot be read, the controller would refuse the program, its feeds cannot be changed in the text, or the
         stock and the cutters cannot be used.
     """
-    simulation.require_layers(job, workers)
     machine, share = simulation.machine_of(job), 0.1
     reading = simulation.read_for(job, machine, part_of(progress, 0.0, share))
     inputs = simulation.inputs_of(job, machine)
@@ -61,10 +56,10 @@ def run(
     compliance = compliance_of_workpiece(inputs, reading, stock, part_of(progress, share, 0.55))
     share = 0.55 if compliance is not None else share
     begin = 0.5 * (1.0 + share)
-    feeds, reading = _new_feeds(job, inputs, own, reading, stock, compliance, part_of(progress, share, begin), workers)
+    feeds, reading = _new_feeds(job, inputs, own, reading, stock, compliance, part_of(progress, share, begin))
     stock = inputs.stock.layered(reading.program, inputs.cutters)
     done = simulate_program(
-        inputs, reading, stock, compliance=compliance, checkpoint=checkpoint, workers=workers,
+        inputs, reading, stock, compliance=compliance, checkpoint=checkpoint,
         progress=part_of(progress, begin, 1.0),
     )  # fmt: skip
     done = replace(done, settings=simulation.operation_of(job))
@@ -88,7 +83,6 @@ def _new_feeds(
     stock: LayeredStock,
     compliance: WorkpieceCompliance | None,
     progress: Progress,
-    workers: Workers | None,
 ) -> tuple[FeedResult, ProgramReading]:
     """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then. ``own``:
     the text as it is, and its dialect.
@@ -106,7 +100,7 @@ def _new_feeds(
     # as it is: what its loads are, and how well they are known
     before = remove(
         program, stock, cutters, material, fine, times=times, watch=bends,
-        engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.0, 0.5),
+        progress=part_of(progress, 0.0, 0.5),
     )  # fmt: skip
     before = with_columns(before, (*watched_columns(gives), *PROGRAM_COLUMNS))
     if any(has_lips(c) for c in cutters.values()):
@@ -127,7 +121,7 @@ def _new_feeds(
         program, fresh, cutters, material, fine,
         times=times, accuracy=False,
         watch=allowed_feed_watch(steps, request, cutters, material, machine, before.columns),
-        engine=op.engine, processes=workers or op.workers, progress=part_of(progress, 0.5, 1.0),
+        progress=part_of(progress, 0.5, 1.0),
     )  # fmt: skip
     return with_new_feeds(
         *own, reading, steps, before, allowed.columns, request, cutters, machine,

@@ -17,31 +17,25 @@ from chipload.jobs.simulation.run import (
     operation_of,
     program_of,
     read_for,
-    require_layers,
 )
 from chipload.progress import Progress, part_of, silent
 from chipload.simulation.checkpoint import Checkpoint
-from chipload.workers import Workers
 
 
-def run(
-    job: SetupsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: Workers | None = None
-) -> ProgramResult:
+def run(job: SetupsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> ProgramResult:
     """Read the program of a job for its machine; simulate it if the job states an operation, and change its speeds.
 
     Parameters
     ----------
     checkpoint : folder with finished work, from which a stopped run continues; None: all stays in memory
-    workers : processes or a cluster that remove strips of a layered stock; None: as the operation states
 
     Raises
     ------
     InputError
         A file cannot be read, the controller would refuse the program, or the stock and the cutters cannot be used.
     """
-    require_layers(job, workers)
     if job.table.setup:
-        return run_setups(job, progress, checkpoint, workers)
+        return run_setups(job, progress, checkpoint)
     machine, begin = machine_of(job), 0.1 if job.simulates else 1.0
     reading = read_for(job, machine, part_of(progress, 0.0, begin))
     if not job.simulates:
@@ -54,12 +48,10 @@ def run(
     begin = 0.6 if compliance is not None else begin
     if own is not None:
         end = 0.5 * (1.0 + begin)
-        speeds, reading = new_speeds(
-            job, inputs, own, reading, stock, compliance, part_of(progress, begin, end), workers
-        )
+        speeds, reading = new_speeds(job, inputs, own, reading, stock, compliance, part_of(progress, begin, end))
         stock, begin = inputs.stock.layered(reading.program, inputs.cutters), end
     done = simulate_program(
-        inputs, reading, stock, compliance=compliance, checkpoint=checkpoint, workers=workers,
+        inputs, reading, stock, compliance=compliance, checkpoint=checkpoint,
         progress=part_of(progress, begin, 1.0),
     )  # fmt: skip
     program = program_of(job, machine, reading, replace(done, settings=operation_of(job)))

@@ -25,12 +25,9 @@ from chipload.progress import Progress, part_of, silent
 from chipload.simulation.checkpoint import Checkpoint
 from chipload.stock.layers import LayeredStock
 from chipload.stock.turned import stock_bounds, turn_matrix, turned_stock
-from chipload.workers import Workers
 
 
-def run_setups(
-    job: SetupsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: Workers | None = None
-) -> SetupsProgram:
+def run_setups(job: SetupsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> SetupsProgram:
     """Read and simulate each setup of a job in what the one before leaves of the stock.
 
     Parameters
@@ -56,7 +53,7 @@ def run_setups(
         inputs = inputs_of(one, machine, carried)
         stock = inputs.stock.layered(reading.program, inputs.cutters)
         simulated = simulate_program(
-            inputs, reading, stock, checkpoint=checkpoint if k == count - 1 else None, workers=workers,
+            inputs, reading, stock, checkpoint=checkpoint if k == count - 1 else None,
             progress=part_of(share, 0.1, 1.0),
         )  # fmt: skip
         left = simulated.stock

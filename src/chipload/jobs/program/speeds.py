@@ -34,7 +34,6 @@ from chipload.simulation.chips import remove
 from chipload.simulation.loads import Cuts, Floats
 from chipload.stock.layers import LayeredStock
 from chipload.units import rpm_from_rad_s
-from chipload.workers import Workers
 
 #: a speed that gains less than this in margin stays as it is
 GAIN = 0.02
@@ -63,7 +62,6 @@ def new_speeds(
     stock: LayeredStock,
     workpiece: WorkpieceCompliance | None,
     progress: Progress,
-    workers: Workers | None = None,
 ) -> tuple[SpeedResult, ProgramReading]:
     """Simulate the program in a stock, which changes, and return its text with new speeds and the new program.
 
@@ -88,7 +86,7 @@ def new_speeds(
 
     before = remove(
         program, stock, cutters, material, resolution_of(op, cutters, reading.program),
-        times=times, watch=watch, accuracy=False, engine=op.engine, processes=workers or op.workers, progress=progress,
+        times=times, watch=watch, accuracy=False, progress=progress,
     )  # fmt: skip
     before = with_columns(before, (*watched_columns(gives), *PROGRAM_COLUMNS, *stability.columns))
     found = stability_of(inputs, stability)

@@ -15,7 +15,7 @@ from chipload.checking.run import simulation_estimate
 from chipload.checking.settings import CheckSettings, Limits
 from chipload.checking.workpiece import FinishedPart, Stock, Surroundings
 from chipload.cutting.material import Material, material_named, read_material
-from chipload.errors import Finding, InputError, Severity, group_findings, worst_severity
+from chipload.errors import Finding, Severity, group_findings, worst_severity
 from chipload.jobs.simulation.fixtures import fixtures_of
 from chipload.jobs.simulation.job import ProgramJob
 from chipload.jobs.simulation.tables import ProgramTable
@@ -31,7 +31,6 @@ from chipload.progress import Progress, silent
 from chipload.result.provenance import provenance_of, title_of
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_s_from_mm_min, rad_s_from_rpm
-from chipload.workers import Workers
 
 
 def machine_of(job: ProgramJob) -> Machine:
@@ -82,7 +81,7 @@ def inputs_of(job: ProgramJob, machine: Machine, stock: Stock | None = None) -> 
 
 def operation_of(job: ProgramJob) -> Mapping[str, Any]:
     """Return the keys of the operation for summary.json; the result does not depend on how many processes found it."""
-    return {k: v for k, v in job.table.operation[0].model_dump().items() if v is not None and k != "workers"}
+    return {k: v for k, v in job.table.operation[0].model_dump().items() if v is not None}
 
 
 def _of_configuration(job: ProgramJob) -> tuple[dict[str, Sequence[float]], tuple[Finding, ...]]:
@@ -170,13 +169,3 @@ def text_to_change(
     straight(reading.program, key)
     bodies_of(inputs, reading, stock)
     return own
-
-
-def require_layers(job: ProgramJob, workers: Workers | None) -> None:
-    """Refuse processes and a cluster unless the job states that layers are removed."""
-    if workers is None:
-        return
-    if not job.simulates:
-        raise InputError("--workers, --dask: the job reads its program and simulates nothing: leave them out")
-    if job.table.operation[0].engine != "layers":
-        raise InputError('--workers, --dask: share layers only: state engine = "layers" or leave them out')

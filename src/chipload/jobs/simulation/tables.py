@@ -196,14 +196,10 @@ class SimulateTable(Table):
         "interpolation",
         "how the tool axis turns on a row: at constant rate, or along a straight line",
     )
-    engine: Literal["auto", "moves", "layers"] = setting_field(
+    chip_diagram: bool = setting_field(
         SimulationSettings,
-        "engine",
-        "moves: exact; layers: polygons in layers of the stock; auto: moves, or layers if moves cannot simulate the "
-        "program",
-    )
-    workers: Whole = setting_field(
-        SimulationSettings, "workers", "processes that share a layered stock in strips; does not change the result"
+        "chip_diagram",
+        "show the chip with most pieces on a layer of the stock, and the diagram of its boundary",
     )
     corner_slices: Whole | None = setting_field(
         SimulationSettings,

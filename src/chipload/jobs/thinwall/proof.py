@@ -119,7 +119,7 @@ def prove(
     fine, cutters = resolution_of(inputs, program), {o.cut.cutter.number: o.cut.cutter for o in inputs.operations}
     whole = remove(
         program, stock, cutters, inputs.cut.material, fine, keep=True, accuracy=False, times=times,
-        engine="auto", progress=progress,
+        progress=progress,
     )  # fmt: skip
     bars = {number: tool_bars(cutter) for number, cutter in cutters.items()}
     left = [np.full(places.shape, inputs.body.allowance[s]) for s in inputs.body.side_numbers]

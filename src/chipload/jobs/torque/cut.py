@@ -323,7 +323,7 @@ def cut(
     fine = resolution_in_stock(job, program)
     edge = edge_material(material)
     less = remove(
-        program, stock.copied(), job.cutters, edge, fine, keep=True, accuracy=False, engine="auto",
+        program, stock.copied(), job.cutters, edge, fine, keep=True, accuracy=False,
         progress=lambda x, what: progress(0.5 * x, what),
     )  # fmt: skip
     removal = remove(
@@ -334,7 +334,6 @@ def cut(
         fine,
         keep=True,
         accuracy=accuracy,
-        engine="auto",
         progress=lambda x, what: progress(0.5 + 0.5 * x, what),
     )
     c, own, little = removal.columns, feed_rows(removal), LITTLE_MPA / material.Ktc

@@ -169,7 +169,7 @@ def workpiece_cut(
     less, removal = (
         remove(
             program, body, job.cutters, metal, fine, keep=True, accuracy=metal is material,
-            engine="auto", progress=part_of(progress, share, share + 0.25),
+            progress=part_of(progress, share, share + 0.25),
         )
         for body, metal, share in ((stock.copied(), edge_material(material), 0.5), (stock, material, 0.75))
     )  # fmt: skip
