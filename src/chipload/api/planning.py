@@ -21,6 +21,7 @@ def plan_impeller(
     operation: Tables,
     fixture: Tables = (),
     machine_table: Values | None = None,
+    stock: Values | None = None,
     folder: str | Path = ".",
     progress: Progress = silent,
 ) -> FinishedJob:
@@ -34,6 +35,7 @@ def plan_impeller(
     machine : a shipped name, a file, or keys of the table
     operation : keys of the ``[[operation]]``
     fixture, machine_table : keys of the table of this name; None: it is left out
+    stock : keys of ``[stock]``, the stock before finishing, where no roughing is stated; None: programs are unproven
     folder : that file names are relative to
 
     Returns
@@ -50,7 +52,7 @@ def plan_impeller(
     """
     return run_tables(
         "impeller", folder, progress, impeller=impeller, surface=surface, catalogue=catalogue, machine=machine,
-        operation=operation, fixture=fixture, machine_table=machine_table,
+        operation=operation, fixture=fixture, machine_table=machine_table, stock=stock,
     )  # fmt: skip
 
 
