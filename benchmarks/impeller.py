@@ -304,7 +304,7 @@ def search_inputs() -> SearchInputs:
     """What the search of the example takes."""
     job = load_job(Path(examples.__file__).parent / "impeller" / "job.toml").job
     impeller, catalogue = read_part(job).impeller, catalogue_named(job.catalogue)
-    covering = impeller_run._covering(job, impeller, catalogue)
+    covering = impeller_run._cover_walls(job, impeller, catalogue)
     surfaces = impeller_run._surfaces(job, impeller, covering)
     table = impeller_run._tables(machine_named(job.machine), job.operation)
     return SearchInputs(surfaces, table, catalogue, job.operation.clearance_mm)

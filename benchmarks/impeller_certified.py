@@ -55,7 +55,7 @@ def main() -> None:
                 path = Path(folder) / "job.toml"
                 path.write_text(job_text(check))
                 job, begin = load_job(path).job, time.process_time()
-                off = mock.patch.object(impeller_run, "_covering", return_value=None)
+                off = mock.patch.object(impeller_run, "_cover_walls", return_value=None)
                 if covered:
                     milled = impeller_run.run(job)
                 else:

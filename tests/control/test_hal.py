@@ -16,7 +16,7 @@ from chipload.control.hal_file import load_hal, write_hal
 from chipload.control.linuxcnc.hal_client import HalPins
 from chipload.control.linuxcnc.path import locate, read_path, tool_path, write_path
 from chipload.control.linuxcnc.simulated_spindle import Load, advance, at_speed, measure
-from chipload.control.override import STATUS, allowed, begin
+from chipload.control.override import STATUS, allowed_override, begin
 from chipload.control.plant import Loop, run
 from chipload.errors import InputError
 from simulated_machine import ACCELERATION, FEED, JOB, PATH, PERIOD, RULES, SPINDLE, Simulated, round_path
@@ -107,14 +107,14 @@ def test_what_the_model_allows():
     columns = (s, np.full(4, FEED), np.zeros(4), cut)
     rules = replace(RULES, start=1.0, air_override=1.0)
     state = begin(rules, modelled=True)
-    assert allowed(rules, state, columns, 60.0, 0.5, 0.0, 500.0)[0] == pytest.approx(0.5)
+    assert allowed_override(rules, state, columns, 60.0, 0.5, 0.0, 500.0)[0] == pytest.approx(0.5)
     # 1 mm at 20 mm/s are 0.05 s, of which 0.03 are latency; it falls 5 a second
-    most, row = allowed(rules, state, columns, 49.0, 1.0, 0.03, 500.0)
+    most, row = allowed_override(rules, state, columns, 49.0, 1.0, 0.03, 500.0)
     assert most == pytest.approx(0.5 + 5.0 * 0.02)
     assert row == 1
-    assert allowed(rules, state, columns, 10.0, 1.0, 0.03, 500.0)[0] == 1.0
+    assert allowed_override(rules, state, columns, 10.0, 1.0, 0.03, 500.0)[0] == 1.0
     with pytest.raises(InputError, match="latency = 0 s: must be above 0 while nothing moves"):
-        allowed(rules, np.zeros_like(state), columns, 10.0, 0.0, 0.0, 500.0)
+        allowed_override(rules, np.zeros_like(state), columns, 10.0, 0.0, 0.0, 500.0)
 
 
 def test_the_loop_is_the_simulated_one():

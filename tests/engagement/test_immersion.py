@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import Slices, slices
-from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
+from chipload.engagement.immersion.immersion import Section, engagement_rows, tool_frame
 from chipload.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -44,7 +44,7 @@ def test_an_upright_flank_at_a_straight_wall_meets_the_closed_arc(depth: float) 
     wall = shapely.box(-50.0, -50.0, 50.0, depth - 5.0)
     section = section_of([wall, wall], [0.0, 1.3, 4.0])
     frame = tool_frame(UP, (1.0, 0.0, 0.0))
-    rows, _ = immersed((0.0, 0.0, 0.7), frame, (0.05, 0.0, 0.0), (0.0, 0.0, 0.0), slices(MILL), section)
+    rows, _ = engagement_rows((0.0, 0.0, 0.7), frame, (0.05, 0.0, 0.0), (0.0, 0.0, 0.0), slices(MILL), section)
     flank = rows[rows[:, 2] >= 0.0]
     # material on the right of travel: down milling, from pi - a to pi, cos a = 1 - depth / R
     a = math.acos(1.0 - depth / 5.0)
@@ -59,7 +59,7 @@ def test_a_counter_clockwise_spindle_counts_from_the_other_side() -> None:
     wall = shapely.box(-50.0, -50.0, 50.0, -3.0)
     section = section_of([wall], [0.0, 4.0])
     frame = tool_frame(UP, (1.0, 0.0, 0.0), clockwise=False)
-    rows, _ = immersed((0.0, 0.0, 0.0), frame, (0.05, 0.0, 0.0), (0.0, 0.0, 0.0), slices(MILL), section)
+    rows, _ = engagement_rows((0.0, 0.0, 0.0), frame, (0.05, 0.0, 0.0), (0.0, 0.0, 0.0), slices(MILL), section)
     assert rows[:, :2].ravel() == pytest.approx([0.0, math.acos(1.0 - 2.0 / 5.0)], abs=1e-8)
 
 
@@ -67,7 +67,7 @@ def test_a_plunge_cuts_with_the_whole_bottom_what_it_is_fed() -> None:
     section = section_of([shapely.box(-20.0, -20.0, 20.0, 20.0)] * 4, [-2.0, -1.0, 0.0, 1.0, 2.0])
     cutter = slices(MILL)
     frame = tool_frame(UP, (0.0, 0.0, -1.0))
-    rows, owner = immersed((1.0, 2.0, 0.3), frame, (0.0, 0.0, -0.04), (0.0, 0.0, 0.0), cutter, section)
+    rows, owner = engagement_rows((1.0, 2.0, 0.3), frame, (0.0, 0.0, -0.04), (0.0, 0.0, 0.0), cutter, section)
     assert (cutter.cos_kappa[owner] == 1.0).all()
     assert volume(rows, owner, cutter, 4) == pytest.approx(4 * 0.04 * math.pi * 25.0, rel=1e-12)
 
@@ -76,7 +76,7 @@ def test_a_half_drilled_hole_cuts_where_there_is_material_below() -> None:
     section = section_of([shapely.box(0.0, -20.0, 20.0, 20.0)], [-1.0, 0.0])
     cutter = slices(MILL)
     frame = tool_frame(UP, (0.0, 0.0, -1.0))
-    rows, owner = immersed((0.0, 0.0, -0.2), frame, (0.0, 0.0, -0.04), (0.0, 0.0, 0.0), cutter, section)
+    rows, owner = engagement_rows((0.0, 0.0, -0.2), frame, (0.0, 0.0, -0.04), (0.0, 0.0, 0.0), cutter, section)
     assert volume(rows, owner, cutter, 4) == pytest.approx(2 * 0.04 * math.pi * 25.0, rel=1e-9)
 
 
@@ -87,7 +87,7 @@ def test_a_full_slot_removes_the_area_of_the_profile_times_the_feed(cutter: Cutt
     section = section_of([shapely.box(-50.0, -50.0, 50.0, 50.0)] * layers, np.linspace(0.0, depth, layers + 1).tolist())
     fine = slices(cutter, corner_slices=200, flank_mm=0.05)
     frame = tool_frame(UP, (0.0, 1.0, 0.0))
-    rows, owner = immersed((3.0, 2.0, 0.0), frame, (0.0, 0.03, 0.0), (0.0, 0.0, 0.0), fine, section)
+    rows, owner = engagement_rows((3.0, 2.0, 0.0), frame, (0.0, 0.03, 0.0), (0.0, 0.0, 0.0), fine, section)
     z = (np.arange(20000) + 0.5) * depth / 20000
     area = 2.0 * cutter.radius_at(z).sum() * depth / 20000
     assert volume(rows, owner, fine, cutter.flutes) == pytest.approx(cutter.flutes * 0.03 * area, rel=2e-3)
@@ -115,7 +115,7 @@ def test_random_poses_agree_with_sampled_membership_in_the_solid_itself(seed: in
     turn = turn - (turn @ axis) * axis
     fine = slices(cutter, corner_slices=60, flank_mm=0.1, bottom_slices=60)
     frame = tool_frame(axis, feed, clockwise=bool(seed % 2))
-    rows, owner = immersed((0.0, 0.0, 0.0), frame, feed, turn, fine, section_of(shapes, bounds.tolist()))
+    rows, owner = engagement_rows((0.0, 0.0, 0.0), frame, feed, turn, fine, section_of(shapes, bounds.tolist()))
     phi = (np.arange(2000) + 0.5) * math.tau / 2000
     u = np.cos(phi)[:, None] * frame[1] + np.sin(phi)[:, None] * frame[0]
     true = 0.0
@@ -141,4 +141,4 @@ def test_an_axis_that_lies_is_refused() -> None:
     section = section_of([shapely.box(0.0, 0.0, 1.0, 1.0)], [0.0, 1.0])
     frame = tool_frame((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     with pytest.raises(InputError, match=r"axis z = 0: must be above 0"):
-        immersed((0.0, 0.0, 0.0), frame, (0.0, 0.1, 0.0), (0.0, 0.0, 0.0), slices(MILL), section)
+        engagement_rows((0.0, 0.0, 0.0), frame, (0.0, 0.1, 0.0), (0.0, 0.0, 0.0), slices(MILL), section)

@@ -23,7 +23,7 @@ def searched():
     surface = run._surfaces(job, part.impeller, None)[0]
     inputs = SearchInputs([surface], table, catalogue, job.operation.clearance_mm)
     (found,) = searched_surfaces(inputs, anew, spread=False)
-    return run._searched(job, 0, inputs, found, 0.0)
+    return run._search_surface(job, 0, inputs, found, 0.0)
 
 
 def test_the_cutter_is_clear_and_the_next_is_not(searched):

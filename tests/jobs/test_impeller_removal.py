@@ -16,7 +16,7 @@ from chipload.cutter.catalogue import CatalogueCutter
 from chipload.cutting.material import material_named
 from chipload.errors import Severity
 from chipload.jobs.impeller import read_program
-from chipload.jobs.impeller.channels import turned
+from chipload.jobs.impeller.channels import turn_channel
 from chipload.jobs.impeller.read_program import read_program_of
 from chipload.jobs.impeller.removal import ImpellerProgram, inputs_of, removal_of_programs, tool_with_teeth
 from chipload.machine.machine import machine_named
@@ -139,7 +139,7 @@ def test_another_channel_is_the_first_one_turned() -> None:
     """The block is the same after half a turn: so is what a turned program removes, less what was cut before it."""
     long = replace(CUTTER, cutting_length=30.0)
     for depth, share in ((DEEP, 1.0), (24.0, 16.0 / 24.0)):
-        one, on = slot(1, True, depth), turned(slot(2, True, depth), math.pi)
+        one, on = slot(1, True, depth), turn_channel(slot(2, True, depth), math.pi)
         (alone,), (first, second) = removed(written(on, long)), removed(written(one, long), written(on, long))
         np.testing.assert_allclose(
             alone.columns["chip_volume_mm3"], first.columns["chip_volume_mm3"], rtol=1e-6, atol=1e-6

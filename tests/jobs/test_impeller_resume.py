@@ -110,7 +110,7 @@ def test_point_milling_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     def again(*_: object) -> None:
         raise AssertionError("planned or checked again")
 
-    monkeypatch.setattr(point_milling, "_planned", again)
+    monkeypatch.setattr(point_milling, "_plan_shortest", again)
     monkeypatch.setattr(paths, "left_on", again)
     monkeypatch.setattr(paths, "deepest_gouge", again)
     with Checkpoint(tmp_path / "kept", 0.0) as checkpoint:

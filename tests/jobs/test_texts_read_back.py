@@ -17,7 +17,7 @@ from chipload.jobs.impeller.tables import ImpellerTable
 from chipload.jobs.thinwall.inputs import read_wall
 from chipload.jobs.thinwall.places import places_of
 from chipload.jobs.thinwall.tries import unlimited_plan
-from chipload.jobs.thinwall.wall_program import linked, on_machine
+from chipload.jobs.thinwall.wall_program import link_pass_programs, on_machine
 from chipload.jobs.torque.cut import program_of
 from chipload.jobs.torque.written_program import override_text
 from chipload.machine.machine import machine_named
@@ -81,7 +81,9 @@ def plate(tmp_path_factory) -> Path:
 def wall_text(path: Path) -> tuple[Program, str, dict, object]:
     inputs = read_wall(load_job(path, SMALL).job)
     places = places_of(inputs)
-    program = Program.join([leg.program for leg in linked(inputs, unlimited_plan(places).plan, places.grid)])
+    program = Program.join(
+        [leg.program for leg in link_pass_programs(inputs, unlimited_plan(places).plan, places.grid)]
+    )
     commands = on_machine(inputs, program).commands
     machine = inputs.cut.machine
     text = write_commands(commands, machine, title="wall", release=NOT_SIMULATED)

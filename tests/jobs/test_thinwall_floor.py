@@ -16,7 +16,7 @@ from chipload.jobs import load_job, run_job
 from chipload.jobs.thinwall.inputs import read_wall
 from chipload.jobs.thinwall.places import places_of
 from chipload.jobs.thinwall.tries import unlimited_plan
-from chipload.jobs.thinwall.wall_program import linked
+from chipload.jobs.thinwall.wall_program import link_pass_programs
 from chipload.planning.thinwall.passes import at_one_level
 from chipload.program.program import RAPID
 from chipload.result import Verdict
@@ -105,7 +105,7 @@ def test_rows_around_an_island(tmp_path):
     floor = shapely.box(4, 4, 44, 34).difference(shapely.box(20, 14, 28, 22))
     assert inputs.floor(0).face.area == pytest.approx(floor.area)
     places = places_of(inputs)
-    (leg,) = linked(inputs, unlimited_plan(places).plan, places.grid)
+    (leg,) = link_pass_programs(inputs, unlimited_plan(places).plan, places.grid)
     p = leg.program
     lines = [shapely.LineString(q) for q in zip(p.p_work[:-1, :2], p.p_work[1:, :2], strict=True)]
     low = np.minimum(p.p_work[1:, 2], p.p_work[:-1, 2])
@@ -163,7 +163,7 @@ def test_refused(tmp_path, old, new, message):
     def planned():
         inputs = read_wall(load_job(path).job)
         places = places_of(inputs)
-        linked(inputs, unlimited_plan(places).plan, places.grid)
+        link_pass_programs(inputs, unlimited_plan(places).plan, places.grid)
 
     assert message in said(planned)
 
@@ -200,7 +200,7 @@ def test_rows_of_a_turned_floor(tmp_path, degrees):
     # a rounded corner of 4 mm on each side at the closed end, none at the open one
     assert area.centres.intersection(area.outline).area == pytest.approx(39.0 * 22.0, rel=1e-6)
     places = places_of(inputs)
-    (one,) = linked(inputs, unlimited_plan(places).plan, places.grid)
+    (one,) = link_pass_programs(inputs, unlimited_plan(places).plan, places.grid)
     program = one.program
     p = np.asarray(program.p_work)
     # one feed down for each row, and for each of six pieces of the contour: no ramps

@@ -13,7 +13,7 @@ from chipload.jobs.thinwall.inputs import read_wall
 from chipload.jobs.thinwall.neighbours import wall_collisions
 from chipload.jobs.thinwall.places import places_of
 from chipload.jobs.thinwall.tries import unlimited_plan
-from chipload.jobs.thinwall.wall_program import linked
+from chipload.jobs.thinwall.wall_program import link_pass_programs
 
 
 def with_neighbour(folder, gap, change=()):
@@ -32,7 +32,7 @@ def with_neighbour(folder, gap, change=()):
 def found(loaded):
     inputs = read_wall(loaded.job)
     places = places_of(inputs)
-    legs = linked(inputs, unlimited_plan(places).plan, places.grid)
+    legs = link_pass_programs(inputs, unlimited_plan(places).plan, places.grid)
     return legs, wall_collisions(inputs, legs)
 
 

@@ -15,7 +15,7 @@ from chipload.jobs.thinwall.inputs import read_wall
 from chipload.jobs.thinwall.neighbours import part_collisions
 from chipload.jobs.thinwall.places import wall_stock
 from chipload.jobs.thinwall.result import limits_of
-from chipload.jobs.thinwall.wall_program import linked
+from chipload.jobs.thinwall.wall_program import link_pass_programs
 from chipload.planning.thinwall.blank import WallBlank
 from chipload.planning.thinwall.passes import constant
 from chipload.planning.thinwall.threshold import modelled
@@ -166,7 +166,7 @@ def test_the_shank_beside_the_neighbour(folder, shank):
     inputs = read_wall(job(folder, walls=walls, change=(f"cutter.0.shank_diameter_mm={shank}",)).job)
     surfaces = [inputs.coarse(s) for s in inputs.body.side_numbers]
     bears = modelled(np.full(surfaces[0].points.shape[:2], 1e-4).ravel(), 0.05)
-    legs = linked(inputs, constant(surfaces, lambda left, side: bears, inputs.depths.law, 0.3))
+    legs = link_pass_programs(inputs, constant(surfaces, lambda left, side: bears, inputs.depths.law, 0.3))
     found = part_collisions(inputs, wall_stock(inputs), legs)
     lean = np.radians(50.0)
     axis, across = np.array([-np.cos(lean), np.sin(lean)]), np.array([-np.sin(lean), -np.cos(lean)])

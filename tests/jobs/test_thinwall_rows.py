@@ -18,7 +18,7 @@ from chipload.jobs.thinwall.part_shape import part_of_faces
 from chipload.jobs.thinwall.places import places_of
 from chipload.jobs.thinwall.program_rows import side_at
 from chipload.jobs.thinwall.tries import Tried, unlimited_plan
-from chipload.jobs.thinwall.wall_program import linked
+from chipload.jobs.thinwall.wall_program import link_pass_programs
 from chipload.planning.thinwall.read_rows import sides_of_program
 from chipload.planning.thinwall.variants import DepthOperation, even, limited_to
 from chipload.program.apt.writer import write_apt
@@ -96,7 +96,7 @@ def planned(job, even_stock: bool):
 
 
 def program(inputs, places, plan) -> Program:
-    return Program.join([leg.program for leg in linked(inputs, plan.plan, places.grid)])
+    return Program.join([leg.program for leg in link_pass_programs(inputs, plan.plan, places.grid)])
 
 
 @pytest.mark.parametrize("side", ["[0.3, 0.0]", "[0.3, 0.3]"])
@@ -230,7 +230,7 @@ def test_depth_of_all_is_planned_for_rows(folder):
     (folder / "finish.apt").write_text(zigzag())
     inputs = read_wall(load_job(folder / "rows.toml", (*SMALL, "wall.allowance_mm=[0.0, 0.3]")).job)
     places = places_of(inputs)
-    (leg,) = linked(inputs, unlimited_plan(places).plan, places.grid)
+    (leg,) = link_pass_programs(inputs, unlimited_plan(places).plan, places.grid)
     assert leg.points[leg.contact][:, 1] == pytest.approx(-0.85, abs=1e-7)
 
 

@@ -25,7 +25,7 @@ from chipload.cutting.force import forces_over_turn
 from chipload.cutting.material import Material, material_named
 from chipload.engagement.chips.covered import covered_areas
 from chipload.engagement.chips.move import Move
-from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
+from chipload.engagement.immersion.immersion import Section, engagement_rows, tool_frame
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.geometry.contour import Contour
 from chipload.machine.machine import machine_named
@@ -313,7 +313,7 @@ def test_upright_the_chip_is_the_feed_times_the_sine() -> None:
     stock.remove_many(range(4, 10), [shape.polygon] * 6)
     section = Section(*stock.edges(range(stock.layers), (-5.2, -5.2), (5.2, 5.2)))
     frame = tool_frame((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
-    rows, owner = immersed((0.1, 0.0, -depth), frame, (f_z, 0.0, 0.0), (0.0, 0.0, 0.0), slices(FLAT), section)
+    rows, owner = engagement_rows((0.1, 0.0, -depth), frame, (f_z, 0.0, 0.0), (0.0, 0.0, 0.0), slices(FLAT), section)
     assert (rows[:, 4:] == [f_z, 0.0, 0.0]).all()
     assert rows[:, 0] == pytest.approx(0.0, abs=1e-8)
     assert rows[:, 1] == pytest.approx(math.pi, abs=1e-8)

@@ -9,7 +9,7 @@ import pytest
 from chipload.examples import copy_example
 from chipload.jobs import load_job
 from chipload.jobs.thinwall.inputs import read_wall
-from chipload.jobs.thinwall.wall_program import linked, on_machine
+from chipload.jobs.thinwall.wall_program import link_pass_programs, on_machine
 from chipload.planning.thinwall.passes import constant
 from chipload.simulation.shape_deviation import nearest
 
@@ -58,7 +58,7 @@ def test_bears_least_at_the_tip(inputs):
 def test_a_pass_is_reached_and_does_not_gouge(inputs):
     surfaces = [inputs.coarse(s) for s in inputs.body.side_numbers]
     plan = constant(surfaces, inputs.threshold(inputs.depths.deflection), inputs.depths.even_law, 0.3)
-    legs = linked(inputs, plan)
+    legs = link_pass_programs(inputs, plan)
     u, v = np.meshgrid(np.linspace(0.0, 1.0, 161), np.linspace(0.0, 1.0, 201), indexing="ij")
     cloud = np.concatenate([p.reshape(-1, 3) for p in inputs.body.shape.sides(u, v)])
     for leg in legs:

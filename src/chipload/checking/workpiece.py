@@ -112,7 +112,7 @@ class Stock:
         """
         if isinstance(self.body, LayeredStock):
             stock = self.body.copied()
-            return stock if self.refined_mm is None else _refined(stock, program, cutters, self.refined_mm)
+            return stock if self.refined_mm is None else _refine_layers(stock, program, cutters, self.refined_mm)
         # a tapered cutter is wider above its tip
         tile = TILE * max(c.diameter + 2.0 * c.flute_length * math.tan(c.taper) for c in cutters.values())
         if isinstance(self.body, tuple):
@@ -122,7 +122,7 @@ class Stock:
         else:
             layer = self.layer_mm or layer_thickness(program, cutters, float(self.body.bounds[1, 2]))
             stock = LayeredStock.of_mesh(self.body, COARSE * layer, tile)
-        return _refined(stock, program, cutters, layer)
+        return _refine_layers(stock, program, cutters, layer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,7 +281,7 @@ def insides(stock: LayeredStock) -> Callable[[NDArray[np.float64]], NDArray[np.b
     return contains
 
 
-def _refined(stock: LayeredStock, program: Program, cutters: Mapping[int, Cutter], layer: float) -> LayeredStock:
+def _refine_layers(stock: LayeredStock, program: Program, cutters: Mapping[int, Cutter], layer: float) -> LayeredStock:
     """Return the stock with layers of a thickness where cutters move, divided where they cut level; it changes."""
     top = float(stock.bounds[-1])
     stock.refine(min(_lowest(program, cutters), top), top, layer)

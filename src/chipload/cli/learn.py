@@ -115,8 +115,8 @@ def learn(
             show(line)
         if worth:
             own = following or job
-            before = done if following is None else run_job_now(own, _stating(sets, material))
-            after = run_job_now(own, _stating(sets, out.absolute()))
+            before = done if following is None else run_job_now(own, _sets_with_material(sets, material))
+            after = run_job_now(own, _sets_with_material(sets, out.absolute()))
             gain = worth_of_knowledge(own, before.result, after.result)
             write_whole(out, material_text(with_worth(found.material, gain)).encode("utf-8"))
             show(f"worth: {gain.text}")
@@ -164,7 +164,7 @@ def _next_lines(done: FinishedJob, signal: Signal) -> list[str]:
         return [f"what to measure next: {err}"]
 
 
-def _stating(sets: Sequence[str], material: Path | str) -> tuple[str, ...]:
+def _sets_with_material(sets: Sequence[str], material: Path | str) -> tuple[str, ...]:
     """Return the keys that are set, with another material."""
     key = "name" if isinstance(material, str) else "file"
     return (*sets, f"material.{key}={json.dumps(str(material))}")

@@ -90,13 +90,13 @@ def view(
     def work() -> int:
         from chipload.web.serve import serve
 
-        serve(_drafted(path), port, open_browser, show)
+        serve(_draft_folder(path), port, open_browser, show)
         return 0
 
     run_guarded(work, debug)
 
 
-def _drafted(path: Path) -> Path:
+def _draft_folder(path: Path) -> Path:
     """The folder of the job that is written for a file; a job, a result and a folder as they are."""
     if path.suffix.lower() in (".toml", ".json", ".html") or not path.is_file():
         return path

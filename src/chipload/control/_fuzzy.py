@@ -25,7 +25,7 @@ def place(centres, x):
 
 
 @njit(cache=True, nogil=True)
-def _falling(a, x):
+def _falling_side(a, x):
     """Area and moment about 1/2 of min(a, 1 - y) over y from 0 to x."""
     p = min(x, 1.0 - a)
     area = a * p
@@ -38,7 +38,7 @@ def _falling(a, x):
 
 
 @njit(cache=True, nogil=True)
-def between(a, b):
+def _area_between_clips(a, b):
     """Area and moment about the middle of max(min(a, 1 - y), min(b, y)) over y from 0 to 1."""
     if b <= a and b <= 0.5:
         left, right = 1.0 - b, b
@@ -46,8 +46,8 @@ def between(a, b):
         left, right = a, 1.0 - a
     else:
         left, right = 0.5, 0.5
-    a0, m0 = _falling(a, left)
-    a1, m1 = _falling(b, right)
+    a0, m0 = _falling_side(a, left)
+    a1, m1 = _falling_side(b, right)
     return a0 + a1, m0 - m1
 
 
@@ -68,16 +68,16 @@ def mamdani(error, change, output, rules, whole_ends, e, d, strength):
     for k in range(last):
         if strength[k] > 0.0 or strength[k + 1] > 0.0:
             width = output[k + 1] - output[k]
-            a, m = between(strength[k], strength[k + 1])
+            a, m = _area_between_clips(strength[k], strength[k + 1])
             area += width * a
             moment += width * (0.5 * (output[k] + output[k + 1]) * a + width * m)
     if whole_ends:
         width = output[1] - output[0]
-        a, m = between(0.0, strength[0])
+        a, m = _area_between_clips(0.0, strength[0])
         area += width * a
         moment += width * ((output[0] - 0.5 * width) * a + width * m)
         width = output[last] - output[last - 1]
-        a, m = between(strength[last], 0.0)
+        a, m = _area_between_clips(strength[last], 0.0)
         area += width * a
         moment += width * ((output[last] + 0.5 * width) * a + width * m)
     return moment / area

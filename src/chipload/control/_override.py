@@ -91,7 +91,7 @@ STATE = 14
 
 
 @njit(cache=True, nogil=True)
-def allowed(s, at, feed, edge, cut, torque, latency, soon, slew, cap, first):
+def allowed_override(s, at, feed, edge, cut, torque, latency, soon, slew, cap, first):
     """Override that a torque allows at ``s`` and that can still be left in time for what lies ahead.
 
     ``at, feed, edge, cut`` (n,): columns of the model; ``soon``: greatest override before this one acts, above 0;

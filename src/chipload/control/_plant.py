@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from chipload.control import _estimator
-from chipload.control._override import OVERLOAD, OVERRIDE, RUN, TRIM, Observation, allowed, step
+from chipload.control._override import OVERLOAD, OVERRIDE, RUN, TRIM, Observation, allowed_override, step
 
 Floats = NDArray[np.float64]
 
@@ -132,7 +132,7 @@ def model_override(columns, rules, state, axes, s, actual, programmed, first):
     """The override that the model allows at s, with the trim of the controller, and the row at or before s."""
     known = axes.latency + axes.every * axes.dt
     soon = max(actual, min(rules.cap, state[OVERRIDE] + rules.slew_up * known))
-    return allowed(
+    return allowed_override(
         s, columns.at, columns.feed, columns.model_edge, columns.model_cut, rules.torque_ref * state[TRIM], known, soon,
         min(rules.slew_down, axes.acceleration / programmed), rules.cap, first,
     )  # fmt: skip

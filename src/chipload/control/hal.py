@@ -35,7 +35,17 @@ from chipload.control.linuxcnc.simulated_spindle import (
     estimate_state,
     read_current,
 )
-from chipload.control.override import STATUS, STOPS, Override, Reading, Status, allowed, begin, step, stop_state
+from chipload.control.override import (
+    STATUS,
+    STOPS,
+    Override,
+    Reading,
+    Status,
+    allowed_override,
+    begin,
+    step,
+    stop_state,
+)
 from chipload.control.plant import Ended, TorqueProfile
 from chipload.control.resolution import check_light
 from chipload.control.spindle_model import AS_STATED, Spindle, SpindleDeviation
@@ -265,7 +275,7 @@ def control(
             most_allowed = None
             if job.modelled:
                 known = job.latency + job.period
-                most_allowed, row = allowed(config, state, model, s, actual, known, job.acceleration, row)
+                most_allowed, row = allowed_override(config, state, model, s, actual, known, job.acceleration, row)
             relief = float(np.interp(s, path.model.s, path.relief))
             expected = cut.state.expected / relief
             reading = Reading(torque / relief, seconds, trusted, actual, expected, most_allowed, not on)

@@ -250,7 +250,7 @@ def trim(state: Floats) -> float:
     return float(state[_override.TRIM])
 
 
-def allowed(
+def allowed_override(
     config: Override,
     state: Floats,
     profile: tuple[Floats, Floats, Floats, Floats],
@@ -286,7 +286,7 @@ def allowed(
     soon = max(actual, min(config.cap, float(state[_override.OVERRIDE]) + config.slew_up * latency))
     if not soon > 0.0:
         raise InputError(f"override.allowed: latency = {latency:g} s: must be above 0 while nothing moves")
-    most, row = _override.allowed(
+    most, row = _override.allowed_override(
         s, at, feed, edge, cut, config.torque_ref * trim(state), latency, soon,
         min(config.slew_down, acceleration / programmed), config.cap, first,
     )  # fmt: skip

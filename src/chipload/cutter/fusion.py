@@ -62,7 +62,7 @@ def read_fusion_tool(path: str | Path, tool: int | None) -> dict[str, Any]:
             raise InputError(f"cutter.tool is missing: {Path(path).name} holds {len(tools)}: state the number of one")
         chosen = tools[0]
     else:
-        chosen = _numbered(tools, tool, label)
+        chosen = _tool_of_number(tools, tool, label)
     return _cutter(chosen, tool, f"{label}: tool {tool if tool is not None else ''}".rstrip())
 
 
@@ -113,7 +113,7 @@ def _tools(path: str | Path, label: str) -> list[dict[str, Any]]:
     return listed
 
 
-def _numbered(tools: list[dict[str, Any]], number: int, label: str) -> dict[str, Any]:
+def _tool_of_number(tools: list[dict[str, Any]], number: int, label: str) -> dict[str, Any]:
     posts = [(t, t.get("post-process")) for t in tools]
     own = [(t, p.get("number")) for t, p in posts if isinstance(p, dict)]
     found = [t for t, n in own if n == number]

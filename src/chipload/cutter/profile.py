@@ -128,7 +128,7 @@ def chords_of(segments: Sequence[ProfileSegment], chord_mm: float) -> NDArray[np
     return np.vstack([p[:1], p[1:][keep]])
 
 
-def joined(segments: Sequence[ProfileSegment], tolerance: float) -> tuple[ProfileSegment, ...]:
+def join_segments(segments: Sequence[ProfileSegment], tolerance: float) -> tuple[ProfileSegment, ...]:
     """Return the segments that have a length, with a sharp corner between two that are not tangent.
 
     Raises
@@ -186,4 +186,4 @@ def apt_segments(
         foot = (bow.rho[1], bow.z[1])
     if height > foot[1]:
         segments.append(line(foot, (foot[0] + (height - foot[1]) * math.tan(beta), height), last))
-    return joined(segments, 1e-9 * d)
+    return join_segments(segments, 1e-9 * d)

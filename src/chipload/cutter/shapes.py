@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from chipload.cutter.profile import ProfileSegment, arc, joined, line
+from chipload.cutter.profile import ProfileSegment, arc, join_segments, line
 from chipload.errors import InputError
 
 
@@ -37,7 +37,9 @@ def lens(diameter: float, tip_radius: float, corner_radius: float, height: float
     segments = [arc((0.0, tip_radius), tip_radius, 0.0, end)]
     if corner_radius > 0.0:
         segments.append(arc((e, f), corner_radius, end, 0.5 * math.pi))
-    return joined([*segments, line((0.5 * diameter, f), (0.5 * diameter, height), 0.5 * math.pi)], 1e-9 * diameter)
+    return join_segments(
+        [*segments, line((0.5 * diameter, f), (0.5 * diameter, height), 0.5 * math.pi)], 1e-9 * diameter
+    )
 
 
 def lollipop(diameter: float, neck: float) -> tuple[ProfileSegment, ...]:
@@ -79,7 +81,7 @@ def dovetail(diameter: float, angle: float, corner_radius: float, height: float)
         )
     corner = [arc((e, corner_radius), corner_radius, 0.0, last)] if corner_radius > 0.0 else []
     flank = line(foot, (top, height), last)
-    return joined([line((0.0, 0.0), (e, 0.0), 0.0), *corner, flank], 1e-9 * diameter)
+    return join_segments([line((0.0, 0.0), (e, 0.0), 0.0), *corner, flank], 1e-9 * diameter)
 
 
 def thread_mill(diameter: float, pitch: float, flank: float, width: float, neck: float) -> tuple[ProfileSegment, ...]:
@@ -115,7 +117,7 @@ def thread_mill(diameter: float, pitch: float, flank: float, width: float, neck:
         line((wide, low), (wide, low + width), 0.5 * math.pi),
         line((wide, low + width), (root, pitch), math.pi - flank),
     ]
-    return joined(tooth, 1e-9 * diameter)
+    return join_segments(tooth, 1e-9 * diameter)
 
 
 def reamer(diameter: float, lead: float, angle: float, height: float) -> tuple[ProfileSegment, ...]:
@@ -138,7 +140,7 @@ def reamer(diameter: float, lead: float, angle: float, height: float) -> tuple[P
     if not height > lead:
         raise InputError(f"cutter.flute_length_mm = {height:g}: must be above lead_mm = {lead:g}")
     wide = 0.5 * diameter
-    return joined(
+    return join_segments(
         [
             line((0.0, 0.0), (root, 0.0), 0.0),
             line((root, 0.0), (wide, lead), 0.5 * math.pi - angle),

@@ -81,7 +81,7 @@ def whole(v, lag, w, u, rho, share):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def between(sums, m0, m1, v, c, s):
+def add_between(sums, m0, m1, v, c, s):
     """Add the factors ``v`` to ``sums[m0]``, where they begin, and take them from ``sums[m1]``, where they end; the
     rotations are counted from one whose cosine and sine are ``c`` and ``s``. The last column counts what cuts.
     """
@@ -104,7 +104,7 @@ def between(sums, m0, m1, v, c, s):
 
 
 @njit(cache=True, nogil=True)
-def summed(sums, table, v, acc):
+def sum_whole_edges(sums, table, v, acc):
     """Add the edges that cut whole at each rotation to ``acc`` (4 + 2 f, m); ``table`` (2, .) of cosines and sines."""
     last = len(v)
     v[:] = 0.0
@@ -242,6 +242,6 @@ def over_turn(start, rows, tooth, piece, slices, table, teeth, count, alike, c, 
                     turn = at // count
                     to = min(a1, (turn + 1) * count)
                     k = (turn % parts) * count
-                    between(sums, at - turn * count, to - turn * count, v, table[0, k], table[1, k])
+                    add_between(sums, at - turn * count, to - turn * count, v, table[0, k], table[1, k])
                     at = to
-        summed(sums, table, v, acc)
+        sum_whole_edges(sums, table, v, acc)

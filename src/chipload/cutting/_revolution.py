@@ -93,7 +93,7 @@ def add_whole(sums, m0, m1, cl, sl, one, two, w, size, arm):
 
 
 @njit(cache=True, nogil=True)
-def summed(sums, table, acc):
+def sum_whole_edges(sums, table, acc):
     """Add what cuts whole at each rotation to ``acc`` (4, m): ``table`` (4, m) of x, y, X and Y."""
     s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = s9 = s10 = s11 = n = 0.0
     for m in range(acc.shape[1]):
@@ -332,6 +332,6 @@ def over_turn(start, rows, tooth, piece, slices, table, frame, teeth, count, ali
                     if k1 - k0 < a1 - a0:
                         add_part(acc, a0, k0, k1, a1, at, step, back, table, lag, last, p, q, w, slices[k, 1], rate)
                     m0 = m2
-        summed(sums, turned, acc)
+        sum_whole_edges(sums, turned, acc)
         greatest(acc, frame, left, i, out)
         out[i, 13] = chip

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from chipload.engagement.chips.covered import covered
     from chipload.engagement.chips.move import Move
     from chipload.engagement.contact import Engagement, StockBoundary
-    from chipload.engagement.immersion.immersion import Section, immersed
+    from chipload.engagement.immersion.immersion import Section, engagement_rows
     from chipload.engagement.tooth_engagement import ToothEngagement, engagement_of_arcs
     from chipload.engagement.tooth_surfaces import chips_of_teeth
 
@@ -23,7 +23,7 @@ __all__ = [
     "chips_of_teeth",
     "covered",
     "engagement_of_arcs",
-    "immersed",
+    "engagement_rows",
 ]
 
 __getattr__, __dir__ = attach(
@@ -34,6 +34,6 @@ __getattr__, __dir__ = attach(
         "contact": "Engagement StockBoundary",
         "chips.move": "Move",
         "chips.covered": "covered",
-        "immersion.immersion": "Section immersed",
+        "immersion.immersion": "Section engagement_rows",
     },
 )

@@ -41,7 +41,7 @@ def chip(phi, f, c, R):
 
 
 @njit(cache=True, nogil=True)
-def through(p, q, hp, hm, hq):
+def sinusoid_through(p, q, hp, hm, hq):
     """(along, offset, across) of the sinusoid through hp, hm, hq at p, (p + q) / 2, q."""
     w = 0.5 * (q - p)
     m = 0.5 * (p + q)
@@ -84,7 +84,7 @@ def like(i, k, start, rows, tooth, piece, slices):
 
 
 @njit(cache=True, nogil=True)
-def rounded(rows, slices):
+def round_ranges(rows, slices):
     """Ranges rounded to :data:`GRID`, so that those of steps along a straight row are equal to the last bit: chips do
     not depend on which steps are calculated together, nor on the unit of length.
     """
@@ -169,7 +169,7 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
     """
     N = len(angles)
     e = runout[0]
-    rows = rounded(given, slices)
+    rows = round_ranges(given, slices)
     line = np.empty((N + 2, 4))
     radii = np.zeros(N)
     cut = np.zeros((5, N, N, 3))
@@ -253,7 +253,7 @@ def chips(start, given, tooth, piece, slices, runout, angles, turns, alike, shar
                     for j in range(1 if alike else N):
                         for m in range(most):
                             past = f * turns[j, m]
-                            al, of, ac = through(
+                            al, of, ac = sinusoid_through(
                                 x, y, chip(x, past, c, rho), chip(mid, past, c, rho), chip(y, past, c, rho)
                             )
                             cut[part, j, m, 0] = sine * al

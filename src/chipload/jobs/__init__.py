@@ -218,7 +218,7 @@ def _load_tables(
         errors.texts += table_errors(err, root, others)
         # tables that are valid in themselves are checked against one another
         misspelt = left_missing(err, root)
-        for text in (*module.missing(raw), *source_errors(raw, root), *cutter_errors(raw, path.parent)):
+        for text in (*module.missing_keys(raw), *source_errors(raw, root), *cutter_errors(raw, path.parent)):
             if text.split(": ")[0] not in misspelt:
                 errors.add(text)
     except OverflowError:

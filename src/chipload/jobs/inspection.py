@@ -73,10 +73,10 @@ def inspect_folder(folder: Path) -> Inspected:
         if found is not None:
             lines += found[0]
             holds &= found[1]
-    return [*lines, *_superseded(files)], holds
+    return [*lines, *_superseded_lines(files)], holds
 
 
-def _superseded(files: Sequence[Path]) -> list[str]:
+def _superseded_lines(files: Sequence[Path]) -> list[str]:
     """Lines on jobs whose material was learned further in another file."""
     from chipload.cutting.material import read_material
 

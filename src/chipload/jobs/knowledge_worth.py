@@ -24,7 +24,7 @@ def worth_of_knowledge(job: Path, before: Result, after: Result) -> KnowledgeWor
         name = nearest.name
         now = [x for c in after.limits if c.name == name and (x := share_of_limit(c)) is not None]
         shares = (share_of_limit(nearest) or 0.0, max(now, default=0.0))
-    saving = (_saving(before), _saving(after))
+    saving = (_relative_saving(before), _relative_saving(after))
     return KnowledgeWorth(
         job.name, hash_of(job), (str(before.verdict), str(after.verdict)), name, shares,
         (_seconds(before), _seconds(after)),
@@ -49,7 +49,7 @@ def _seconds(result: Result) -> float:
     return float(sum(track.time_s or 0.0 for track in result.in_use))
 
 
-def _saving(result: Result) -> float | None:
+def _relative_saving(result: Result) -> float | None:
     """Time that new feeds save of the time at the programmed feeds, relative; None: the job finds none."""
     old = [n["feeds"]["time_before_s"] for n in result.operations if "feeds" in n]
     new = [n["feeds"]["time_after_s"] for n in result.operations if "feeds" in n]

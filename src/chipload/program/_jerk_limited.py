@@ -39,7 +39,7 @@ def _free_time(length: float, v0: float, v1: float, high: float, a: float) -> fl
 
 
 @njit(cache=True, error_model="numpy")
-def _reached(v0: float, length: float, a: float, j: float) -> float:
+def _reached_speed(v0: float, length: float, a: float, j: float) -> float:
     """Greatest speed [mm/s] at the end of a way that begins with v0."""
     if length >= _change_length(v0, v0 + a * a / j, a, j):
         p = 0.5 * (a * a / j + 2.0 * v0)
@@ -71,7 +71,7 @@ def _top(length: float, v0: float, v1: float, most: float, a: float, j: float) -
 
 
 @njit(cache=True, error_model="numpy")
-def _along(t: float, v0: float, v1: float, a: float, j: float) -> tuple[float, float]:
+def _distance_and_speed(t: float, v0: float, v1: float, a: float, j: float) -> tuple[float, float]:
     """Way [mm] and speed [mm/s] at a time [s] of a change of speed."""
     dv = abs(v1 - v0)
     sense = 1.0 if v1 > v0 else -1.0
@@ -149,10 +149,10 @@ def jerk_limited(
         w[g] = v[first[g]]
     for g in range(count):
         if w[g + 1] > w[g]:
-            w[g + 1] = min(w[g + 1], _reached(w[g], s[first[g + 1]] - s[first[g]], least[g], jerk))
+            w[g + 1] = min(w[g + 1], _reached_speed(w[g], s[first[g + 1]] - s[first[g]], least[g], jerk))
     for g in range(count - 1, -1, -1):
         if w[g] > w[g + 1]:
-            w[g] = min(w[g], _reached(w[g + 1], s[first[g + 1]] - s[first[g]], least[g], jerk))
+            w[g] = min(w[g], _reached_speed(w[g + 1], s[first[g + 1]] - s[first[g]], least[g], jerk))
     for g in range(count):
         begin, end = first[g], first[g + 1]
         v0, v1, a = w[g], w[g + 1], least[g]
@@ -174,7 +174,7 @@ def jerk_limited(
         for k in range(begin, end):
             at, t1, v_end = s[k + 1] - s[begin], up + level + down, v1
             if k + 1 < end:
-                t1, v_end = _passed(at, v0, high, v1, up, level, down, rising, whole - falling, a, jerk)
+                t1, v_end = _time_at_distance(at, v0, high, v1, up, level, down, rising, whole - falling, a, jerk)
             time[k] = max(t1 - t, 0.0)
             peak[k] = high if t <= up + level and t1 >= up else (v_end if t1 < up else now)
             t, now = t1, v_end
@@ -182,7 +182,7 @@ def jerk_limited(
 
 
 @njit(cache=True, error_model="numpy")
-def _passed(
+def _time_at_distance(
     at: float, v0: float, high: float, v1: float, up: float, level: float, down: float, rising: float, even: float,
     a: float, j: float,
 ) -> tuple[float, float]:  # fmt: skip
@@ -194,8 +194,8 @@ def _passed(
     low, late = 0.0, up if before else down
     for _ in range(64):
         middle = 0.5 * (low + late)
-        if _along(middle, start, end, a, j)[0] < length:
+        if _distance_and_speed(middle, start, end, a, j)[0] < length:
             low = middle
         else:
             late = middle
-    return low if before else up + level + low, _along(low, start, end, a, j)[1]
+    return low if before else up + level + low, _distance_and_speed(low, start, end, a, j)[1]

@@ -113,7 +113,7 @@ def _segment_times(s: Segments, joints: Joints, planner: TrajectoryPlanner) -> F
     there[place[absorbed]] = False
     limit = _stopping_speeds(limit, lengths, most, there, planner.lookahead)
     v, _ = limited_speed(np.concatenate([[0.0], np.cumsum(lengths)]), limit, most)
-    seconds = _passed(lengths, speeds, most, v, limit, rapid, planner)
+    seconds = _times_of_segments(lengths, speeds, most, v, limit, rapid, planner)
     total = seconds[place]
     total[:-1][joints.kind == ARC] += 0.5 * seconds[arcs]
     total[1:][joints.kind == ARC] += 0.5 * seconds[arcs]
@@ -138,7 +138,7 @@ def _stopping_speeds(limit: Floats, length: Floats, a: Floats, there: NDArray[np
     return np.asarray(np.minimum(limit, np.sqrt(room[far] - room)))
 
 
-def _passed(
+def _times_of_segments(
     length: Floats, speed: Floats, a: Floats, v: Floats, limit: Floats, rapid: NDArray[np.bool_],
     planner: TrajectoryPlanner,
 ) -> Floats:  # fmt: skip

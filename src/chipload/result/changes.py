@@ -142,10 +142,8 @@ def feed_change(track: Track, checks: Sequence[LimitCheck]) -> Change | None:
         law = check.feed_law
         if law is None:
             continue
-        most_value, error = (1.0 - SPARE) * check.limit, partial(_factor_at, check, chip)
-        k = law.greatest_factor(
-            sizes[check.name][own], most_value, chip[own], SLOWEST, partial(_factor_at, check, chip)
-        )
+        most = (1.0 - SPARE) * check.limit
+        k = law.greatest_factor(sizes[check.name][own], most, chip[own], SLOWEST, partial(_factor_at, check, chip))
         if k is None:
             return None
         factors.append((k, check, law))
@@ -153,19 +151,19 @@ def feed_change(track: Track, checks: Sequence[LimitCheck]) -> Change | None:
         return None
     # one percent is what a person writes
     lowest, check, law = min(factors, key=lambda one: one[0])
-    factor = np.floor(100.0 * lowest) / 100.0
+    feed_share = float(np.floor(100.0 * lowest) / 100.0)
     size = sizes[check.name]
-    least, most = law.ratios(factor, chip[own])
+    least, greatest = law.ratios(feed_share, chip[own])
     rest = check.factor * float(size[~own].max(initial=0.0))
-    levels = (check.factor, _factor_at(check, chip, factor))
+    levels = (check.factor, _factor_at(check, chip, feed_share))
     low, high = (
         max(level * float((size[own] * x).max(initial=0.0)), rest)
-        for x, level in zip((least, most), levels, strict=True)
+        for x, level in zip((least, greatest), levels, strict=True)
     )
     margin, error = 1.0 - 0.5 * (low + high) / check.limit, 0.5 * (high - low) / check.limit
-    text = f"feed of {_line_text(lines)} at {number_text(100.0 * factor, 3)} %"
+    text = f"feed of {_line_text(lines)} at {number_text(100.0 * feed_share, 3)} %"
     return Change(
-        ChangeKind.FEED, text, check.column.label, margin, error, track.name, float(factor), tuple(lines.tolist())
+        ChangeKind.FEED, text, check.column.label, margin, error, track.name, feed_share, tuple(lines.tolist())
     )  # fmt: skip
 
 

@@ -84,7 +84,7 @@ def nearest(mot, i, first, last, px, py):
 
 
 @njit(cache=True, nogil=True)
-def within(mot, i, last, px, py, reach):
+def is_within(mot, i, last, px, py, reach):
     """Whether (px, py) is nearer than ``reach`` to the first share ``last`` of motion i."""
     if mot[i, 6] == 0.0:
         dx = mot[i, 2] - mot[i, 0]
@@ -215,13 +215,13 @@ def uncut(px, py, k, w, reach, own, apart, mot, grid, rows, hint):
         if cover[c] < k:
             return False
         last = hint[0]
-        if 0 <= last < k and within(mot, last, 1.0, px, py, reach + apart if last < own else reach):
+        if 0 <= last < k and is_within(mot, last, 1.0, px, py, reach + apart if last < own else reach):
             return False
         for m in range(start[c], start[c + 1]):
             q = items[m]
             if q > k:
                 break
-            if within(mot, q, 1.0 if q < k else w, px, py, reach + apart if q < own else reach):
+            if is_within(mot, q, 1.0 if q < k else w, px, py, reach + apart if q < own else reach):
                 hint[0] = q
                 return False
     if apart == 0.0 or rows[2] == 0:

@@ -19,7 +19,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from chipload.engagement.chips.section import lengthened
+from chipload.engagement.chips.section import lengthen_flutes
 from chipload.simulation.steps import Steps
 from chipload.stock.layers import LayeredStock
 
@@ -63,7 +63,7 @@ def in_air(
     k_of = np.flatnonzero(meets & (needed <= H + MOST * max(R, 1.0)))
     if not len(k_of):
         return K, set()
-    longer = lengthened(K, float(needed[k_of].max()))
+    longer = lengthen_flutes(K, float(needed[k_of].max()))
     return longer, _clear(steps, k[k_of], layers, (H, float(max(R, longer[11]))), stock, tiles, tolerance)
 
 

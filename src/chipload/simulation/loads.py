@@ -19,7 +19,7 @@ from chipload.cutting.force import forces_over_turn, in_work, mean_forces
 from chipload.cutting.material import Material
 from chipload.cutting.revolution import first_greatest
 from chipload.engagement.chips.move import Move
-from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
+from chipload.engagement.immersion.immersion import Section, engagement_rows, tool_frame
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import InputError
@@ -165,7 +165,7 @@ def engagement_of_step(
     frame = tool_frame(axis, speed if speed.any() else middle, bool(steps.spindle[k] > 0.0))
     travel = float(np.linalg.norm(speed))
     ahead = max(AHEAD * tolerance / travel - 0.5, 0.0) if travel > 0.0 else 0.0
-    rows, owner = immersed(tip + ahead * speed, frame, speed * tooth, turn * tooth, profile, section)
+    rows, owner = engagement_rows(tip + ahead * speed, frame, speed * tooth, turn * tooth, profile, section)
     return StepEngagement(k, frame, rows, owner)
 
 

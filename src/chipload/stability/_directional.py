@@ -79,7 +79,7 @@ def density(phi, row, exponents, out):
 
 
 @njit(cache=True, nogil=True)
-def powered(first, last, row, exponents, out, one):
+def integrate_with_exponents(first, last, row, exponents, out, one):
     """Integral of :func:`density` over the immersion with exponents: between peak and trough of h the variable is w,
     phi = zero +- w^3, so that a power of h at its zero is smooth enough for twelve points.
     """
@@ -130,7 +130,7 @@ def value(theta, row, exponents, out, one, two):
         for c in range(4):
             out[c] -= two[c]
     else:
-        powered(low, high, row, exponents, out, one)
+        integrate_with_exponents(low, high, row, exponents, out, one)
     for c in range(4):
         out[c] *= row[4] / span
 

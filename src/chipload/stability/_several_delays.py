@@ -31,7 +31,7 @@ from chipload.stability._directional import (
     W12,
     matrices,
 )
-from chipload.stability._spectrum import first_vector, next_vector, settled
+from chipload.stability._spectrum import first_vector, is_settled, next_vector
 from chipload.stability._tooth_period import HERMITE
 
 TAU = 2.0 * math.pi
@@ -98,7 +98,7 @@ def primitive(phi, row, factor, out):
 
 
 @njit(cache=True, nogil=True)
-def powered(low, high, row, exponents, factor, out, one):
+def integrate_with_exponents(low, high, row, exponents, factor, out, one):
     """Adds the integral of :func:`density` with exponents, times ``factor``: between peak and trough of h the variable
     is w, phi = zero +- w^3, so that a power of h at its zero is smooth enough for twelve points.
     """
@@ -143,7 +143,7 @@ def value(theta, row, exponents, out, one):
         primitive(high, row, row[4] / span, out)
         primitive(low, row, -row[4] / span, out)
     else:
-        powered(low, high, row, exponents, row[4] / span, out, one)
+        integrate_with_exponents(low, high, row, exponents, row[4] / span, out, one)
 
 
 @njit("void(float64[:,::1], int64, int64, float64, int64, float64[::1], float64[:,:,::1])", cache=True, nogil=True)
@@ -259,7 +259,7 @@ def systems(A, end, inverse, slopes, cuts):
 
 
 @njit(cache=True, nogil=True, fastmath=True, inline="always")
-def delayed(history, k, t, b, d):
+def delayed_coordinate(history, k, t, b, d):
     """Coordinate b of the state a share t of a cell after node k, and one cell later: first, h first', last, h last'.
 
     ``history`` (nodes, 2 d) holds r and h r' at the nodes; between nodes the state is the cubic Hermite.
@@ -290,7 +290,7 @@ def delayed(history, k, t, b, d):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def advanced(x, A, delay, nodes, U, free, push, end, inverse, slopes, cuts, h, history, q, v, known, new, y):
+def advance_period(x, A, delay, nodes, U, free, push, end, inverse, slopes, cuts, h, history, q, v, known, new, y):
     """The state y a period after the state x: (r, h r') at the nodes of the longest delay, q, q'.
 
     Parameters
@@ -339,7 +339,7 @@ def advanced(x, A, delay, nodes, U, free, push, end, inverse, slopes, cuts, h, h
             at = nodes + i - delay[j]
             k = math.floor(at + NODE)
             for b in range(d):
-                first, first_slope, last, last_slope = delayed(history, k, at - k, b, d)
+                first, first_slope, last, last_slope = delayed_coordinate(history, k, at - k, b, d)
                 now = history[nodes + i, b] - first
                 now_slope = history[nodes + i, d + b] - first_slope
                 for g in range(3):
@@ -384,7 +384,7 @@ def advanced(x, A, delay, nodes, U, free, push, end, inverse, slopes, cuts, h, h
 
 @njit(cache=True, nogil=True)
 def sizes(U, w, h, nodes, scale):
-    """As :func:`chipload.stability._tooth_period.scaled`, in d directions."""
+    """As :func:`chipload.stability._tooth_period.scale_state`, in d directions."""
     d, modes = U.shape
     n = 2 * d
     for i in range(nodes):
@@ -463,12 +463,14 @@ def multipliers(first, last, start, rows, which, delays, exponents, time, angle,
         for j in range(dimension):
             for i in range(n):
                 x[i] = V[j, i] / scale[i]
-            advanced(x, A, delay, nodes, U[k], free, push, end, inverse, slopes, cuts, h, history, q, v, known, new, y)
+            advance_period(
+                x, A, delay, nodes, U[k], free, push, end, inverse, slopes, cuts, h, history, q, v, known, new, y
+            )
             for i in range(n):
                 y[i] *= scale[i]
             norm = next_vector(V, H, j, y)
             used = j + 1
-            if settled(H, j, norm, dimension, tol, room, state):
+            if is_settled(H, j, norm, dimension, tol, room, state):
                 break
             for i in range(n):
                 V[j + 1, i] = y[i] / norm

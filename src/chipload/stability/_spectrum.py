@@ -188,7 +188,7 @@ def next_vector(V, H, j, y):
 
 
 @njit(cache=True, nogil=True)
-def settled(H, j, norm, most, tol, room, state):
+def is_settled(H, j, norm, most, tol, room, state):
     """Whether the greatest multiplier after j + 1 dimensions is the one that is kept. ``state``: modulus and angle, and
     the modulus one and two dimensions before.
     """

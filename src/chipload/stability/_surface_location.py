@@ -25,7 +25,7 @@ REACH = 5e-3
 
 
 @njit(cache=True, nogil=True)
-def _turned(low, high, a):
+def _turned_integral(low, high, a):
     """Integral of e^(i a phi) from low to high."""
     if abs(a) < 1e-12:
         return complex(high - low, 0.0)
@@ -37,11 +37,11 @@ def harmonic(row, q):
     """Integral over the immersion and the length of a row of the force along T and n times e^(-i q theta)."""
     low = row[0]
     high = row[1]
-    e0 = _turned(low, high, -q)
-    ep = _turned(low, high, 1.0 - q)
-    em = _turned(low, high, -1.0 - q)
-    ep2 = _turned(low, high, 2.0 - q)
-    em2 = _turned(low, high, -2.0 - q)
+    e0 = _turned_integral(low, high, -q)
+    ep = _turned_integral(low, high, 1.0 - q)
+    em = _turned_integral(low, high, -1.0 - q)
+    ep2 = _turned_integral(low, high, 2.0 - q)
+    em2 = _turned_integral(low, high, -2.0 - q)
     s = (ep - em) / 2j
     c = (ep + em) / 2.0
     sc = (ep2 - em2) / 4j

@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 
 from chipload.stability._directional import G3, W3, matrices
-from chipload.stability._spectrum import first_vector, next_vector, settled
+from chipload.stability._spectrum import first_vector, is_settled, next_vector
 
 TAU = 2.0 * math.pi
 #: the Hermite polynomials of value and slope at the start, value and slope at the end, at the Gauss points
@@ -251,7 +251,7 @@ def apply_map(x, y, ends, forces, cuts, free, push, U, h, m, q, v):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def scaled(U, w, h, m, scale):
+def scale_state(U, w, h, m, scale):
     """Factors (4 m + 2 M,) that make the parts of a state of like size: history, slopes, q, q'."""
     modes = len(w)
     fastest = w.max()
@@ -273,7 +273,7 @@ def arnoldi(ends, forces, cuts, free, push, U, w, h, m, most, tol, V, H, room, x
     """
     n = 4 * m + 2 * len(w)
     most = min(most, n - 1)
-    scaled(U, w, h, m, scale)
+    scale_state(U, w, h, m, scale)
     first_vector(V[0])
     H[:] = 0.0
     state = np.array([0.0, 0.0, -1.0, -2.0])
@@ -286,7 +286,7 @@ def arnoldi(ends, forces, cuts, free, push, U, w, h, m, most, tol, V, H, room, x
             y[i] *= scale[i]
         norm = next_vector(V, H, j, y)
         used = j + 1
-        if settled(H, j, norm, most, tol, room, state):
+        if is_settled(H, j, norm, most, tol, room, state):
             break
         for i in range(n):
             V[j + 1, i] = y[i] / norm

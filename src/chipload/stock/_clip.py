@@ -108,7 +108,7 @@ def ring_size(points, start, count):
 @njit(
     "int64(float64[:,::1], int64[:,::1], int64, int64, int64, boolean, float64[:,::1], int64)", cache=True, nogil=True
 )
-def along(P, rings, r, e0, e1, wraps, out, n):
+def copy_along(P, rings, r, e0, e1, wraps, out, n):
     """Copy the points of a ring between its edges ``e0`` and ``e1``, forwards; ``wraps``: over its first point."""
     start, count = rings[r, 0], rings[r, 1]
     for k in range(e0 + 1, e1 + 1 + (count if wraps else 0)):
@@ -121,7 +121,7 @@ def along(P, rings, r, e0, e1, wraps, out, n):
 @njit(
     "int64(float64[:,::1], int64[:,::1], int64, int64, int64, boolean, float64[:,::1], int64)", cache=True, nogil=True
 )
-def against(P, rings, r, e0, e1, wraps, out, n):
+def copy_against(P, rings, r, e0, e1, wraps, out, n):
     """Copy the points of a ring between its edges ``e0`` and ``e1``, backwards; ``wraps``: over its first point."""
     start, count = rings[r, 0], rings[r, 1]
     for k in range(e0, e1 - (count if wraps else 0), -1):
@@ -137,7 +137,7 @@ def against(P, rings, r, e0, e1, wraps, out, n):
     cache=True,
     nogil=True,
 )
-def followed(P, A, Q, C, k, taken, X, cross, out, n):
+def follow_ring(P, A, Q, C, k, taken, X, cross, out, n):
     """Points of the ring of the intersection (``taken``), or else of the difference, that goes through crossing k.
 
     Returns the place after the last one in ``out``, or DEGENERATE.
@@ -149,22 +149,22 @@ def followed(P, A, Q, C, k, taken, X, cross, out, n):
         cross[at, PASSED] = 1
         out[n, 0], out[n, 1] = X[at, 2], X[at, 3]
         then = cross[at, NEXT_A]
-        n = along(P, A, cross[at, RING_A], cross[at, EDGE_A], cross[then, EDGE_A], then <= at, out, n + 1)
+        n = copy_along(P, A, cross[at, RING_A], cross[at, EDGE_A], cross[then, EDGE_A], then <= at, out, n + 1)
         out[n, 0], out[n, 1] = X[then, 2], X[then, 3]
         n += 1
         r, e = cross[then, RING_C], cross[then, EDGE_C]
         if taken:
             at = cross[then, NEXT_C]
-            n = along(Q, C, r, e, cross[at, EDGE_C], cross[at, RANK] <= cross[then, RANK], out, n)
+            n = copy_along(Q, C, r, e, cross[at, EDGE_C], cross[at, RANK] <= cross[then, RANK], out, n)
         else:
             at = cross[then, BEFORE_C]
-            n = against(Q, C, r, e, cross[at, EDGE_C], cross[at, RANK] >= cross[then, RANK], out, n)
+            n = copy_against(Q, C, r, e, cross[at, EDGE_C], cross[at, RANK] >= cross[then, RANK], out, n)
         if at == k:
             return n
 
 
 @njit("int64(float64[:,::1], int64[:,::1], int64[::1], int64, float64[::1])", cache=True, nogil=True)
-def closed(points, rings, used, end, sizes):
+def close_ring(points, rings, used, end, sizes):
     """Enter the ring that ends at ``end``, if it is one; ``used`` holds the numbers of points and rings.
 
     ``sizes`` gets its area added.
@@ -210,7 +210,7 @@ def whole_rings(P, A, a0, a1, Q, C, c0, c1, box, left, left_rings, left_used, ch
         for k in range(start, start + count):
             into[end, 0], into[end, 1] = P[k, 0], P[k, 1]
             end += 1
-        closed(into, chip_rings if inside else left_rings, used, end, areas[2:3] if inside else areas[1:2])
+        close_ring(into, chip_rings if inside else left_rings, used, end, areas[2:3] if inside else areas[1:2])
     for r in range(c0, c1):
         start, count = C[r, 0], C[r, 1]
         crossed = False
@@ -224,8 +224,8 @@ def whole_rings(P, A, a0, a1, Q, C, c0, c1, box, left, left_rings, left_used, ch
             chip[end, 0], chip[end, 1] = Q[k, 0], Q[k, 1]
             left[back, 0], left[back, 1] = Q[k, 0], Q[k, 1]
             end, back = end + 1, back - 1
-        closed(chip, chip_rings, chip_used, end, areas[2:3])
-        closed(left, left_rings, left_used, left_used[0] + count, areas[1:2])
+        close_ring(chip, chip_rings, chip_used, end, areas[2:3])
+        close_ring(left, left_rings, left_used, left_used[0] + count, areas[1:2])
     return met
 
 
@@ -268,11 +268,11 @@ def clip(P, A, a0, a1, Q, C, c0, c1, box, left, left_rings, left_used, chip, chi
             continue
         taken = cross[k, ENTERS] == 1
         into, used = (chip, chip_used) if taken else (left, left_used)
-        end = followed(P, A, Q, C, k, taken, X, cross, into, used[0])
+        end = follow_ring(P, A, Q, C, k, taken, X, cross, into, used[0])
         if end < 0:
             left_used[0], left_used[1], chip_used[0], chip_used[1] = l0, l1, h0, h1
             return DEGENERATE
-        closed(into, chip_rings if taken else left_rings, used, end, areas[2:3] if taken else areas[1:2])
+        close_ring(into, chip_rings if taken else left_rings, used, end, areas[2:3] if taken else areas[1:2])
     status = CUT
     if abs(areas[0] - areas[1] - areas[2]) > BALANCE * (1.0 + areas[0]) or min(areas[1], areas[2]) < -BALANCE:
         status = DEGENERATE

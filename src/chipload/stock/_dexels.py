@@ -43,7 +43,7 @@ def band(z0, slope, low, high):
 
 
 @njit(cache=True, nogil=True)
-def below(a, b, c, low, high):
+def times_below(a, b, c, low, high):
     """Where a s^2 + 2 b s + c <= 0 in low .. high; the longer part where there are two (at the tip of a cone)."""
     if abs(a) < 1e-14:
         if abs(b) < 1e-14:
@@ -120,17 +120,17 @@ def pierce(k, u, v, tip, axis, shape):
         a, b = band(z0, slope, 0.0, min(z1, h))
         if a <= b:
             ms = m * slope
-            a, b = below(u2 - ms * ms, u1 - m * z0 * ms, u0 - (m * z0) ** 2, a, b)
+            a, b = times_below(u2 - ms * ms, u1 - m * z0 * ms, u0 - (m * z0) ** 2, a, b)
             if a <= b:
                 lo, hi = min(lo, a), max(hi, b)
     if r > 0.0 and z1 < h:
         a, b = band(z0, slope, z1, min(z2, h))
         if a <= b:
             if e <= 0.0:
-                a, b = below(1.0, u1 + (z0 - f) * slope, u0 + (z0 - f) ** 2 - r * r, a, b)
+                a, b = times_below(1.0, u1 + (z0 - f) * slope, u0 + (z0 - f) ** 2 - r * r, a, b)
             else:
                 # the part within e + r of the axis is finite for every ray that is not along it
-                a, b = below(u2, u1, u0 - (e + r) ** 2, a, b)
+                a, b = times_below(u2, u1, u0 - (e + r) ** 2, a, b)
                 if a <= b:
                     there, a = corner_end(a, 1.0, b, u2, u1, u0, z0, slope, r, e, f)
                     if there:
@@ -144,7 +144,7 @@ def pierce(k, u, v, tip, axis, shape):
         if a <= b:
             E, F = shape[11], shape[12]
             # the cylinder around the arc is finite for every ray that is not along it
-            a, b = below(u2, u1, u0 - (E + R) ** 2, a, b)
+            a, b = times_below(u2, u1, u0 - (E + R) ** 2, a, b)
             if a <= b:
                 there, a = corner_end(a, 1.0, b, u2, u1, u0, z0, slope, R, E, F)
                 if there:
@@ -157,7 +157,7 @@ def pierce(k, u, v, tip, axis, shape):
         a, b = band(z0, slope, z3, h)
         if a <= b:
             ms, at = tb * slope, c + tb * z0
-            a, b = below(u2 - ms * ms, u1 - at * ms, u0 - at * at, a, b)
+            a, b = times_below(u2 - ms * ms, u1 - at * ms, u0 - at * at, a, b)
             if a <= b:
                 lo, hi = min(lo, a), max(hi, b)
     return lo + tip[k], hi + tip[k]
@@ -180,7 +180,7 @@ def pierce_at(k, u, v, t, tips, axes, shape, tip, axis):
 
 
 @njit(cache=True, nogil=True)
-def signed(k, u, v, t, sign, tips, axes, shape, tip, axis):
+def signed_end(k, u, v, t, sign, tips, axes, shape, tip, axis):
     """The lower end (``sign`` 1) or less the upper end (-1) of the ray in the cutter at the moment t."""
     lo, hi = pierce_at(k, u, v, t, tips, axes, shape, tip, axis)
     if lo > hi:
@@ -190,20 +190,20 @@ def signed(k, u, v, t, sign, tips, axes, shape, tip, axis):
 
 @njit(cache=True, nogil=True)
 def deepest(k, u, v, ta, tb, sign, tol, tips, axes, shape, tip, axis):
-    """Least :func:`signed` between two moments, by golden section until chords prove that it is within ``tol``."""
-    fa = signed(k, u, v, ta, sign, tips, axes, shape, tip, axis)
-    fb = signed(k, u, v, tb, sign, tips, axes, shape, tip, axis)
+    """Least :func:`signed_end` between two moments, by golden section until chords prove that it is within ``tol``."""
+    fa = signed_end(k, u, v, ta, sign, tips, axes, shape, tip, axis)
+    fb = signed_end(k, u, v, tb, sign, tips, axes, shape, tip, axis)
     # at an end from which it rises it is least, but for what a short first step may hide
     # (by the chord over the rest of the way, less than tol)
     step = min(STEP, 0.5 * tol / abs(fb - fa)) * (tb - ta) if fa != fb else 0.0
     if fa < fb:
-        if signed(k, u, v, ta + step, sign, tips, axes, shape, tip, axis) >= fa:
+        if signed_end(k, u, v, ta + step, sign, tips, axes, shape, tip, axis) >= fa:
             return fa
-    elif fb < fa and signed(k, u, v, tb - step, sign, tips, axes, shape, tip, axis) >= fb:
+    elif fb < fa and signed_end(k, u, v, tb - step, sign, tips, axes, shape, tip, axis) >= fb:
         return fb
     t1, t2 = tb - RATIO * (tb - ta), ta + RATIO * (tb - ta)
-    f1 = signed(k, u, v, t1, sign, tips, axes, shape, tip, axis)
-    f2 = signed(k, u, v, t2, sign, tips, axes, shape, tip, axis)
+    f1 = signed_end(k, u, v, t1, sign, tips, axes, shape, tip, axis)
+    f2 = signed_end(k, u, v, t2, sign, tips, axes, shape, tip, axis)
     best = min(fa, fb, f1, f2)
     for _ in range(GOLDEN):
         if f1 <= f2:
@@ -212,14 +212,14 @@ def deepest(k, u, v, ta, tb, sign, tol, tips, axes, shape, tip, axis):
                 break
             tb, fb, t2, f2 = t2, f2, t1, f1
             t1 = tb - RATIO * (tb - ta)
-            f1 = signed(k, u, v, t1, sign, tips, axes, shape, tip, axis)
+            f1 = signed_end(k, u, v, t1, sign, tips, axes, shape, tip, axis)
             best = min(best, f1)
         else:
             if max(fb - f2, 2.0 * (f1 - f2)) < tol:
                 break
             ta, fa, t1, f1 = t1, f1, t2, f2
             t2 = ta + RATIO * (tb - ta)
-            f2 = signed(k, u, v, t2, sign, tips, axes, shape, tip, axis)
+            f2 = signed_end(k, u, v, t2, sign, tips, axes, shape, tip, axis)
             best = min(best, f2)
     return best
 

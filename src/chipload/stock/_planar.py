@@ -73,7 +73,7 @@ def half_width(d, r, R):
 
 
 @njit(cache=True, nogil=True)
-def covered(ax, ay, bx, by, r, R):
+def covered_arc(ax, ay, bx, by, r, R):
     """Arc (lo, hi) of the circle of radius r about the origin that lies in the capsule of radius R about AB.
 
     One arc always: every disc of the capsule that meets the circle covers an arc about its own direction. Its ends are
@@ -225,7 +225,7 @@ def covered_by_capsule(q, ox, oy, tx, ty, heading, r, R, axis, out, row):
         )
     ax, ay = axis[q, 0] - ox, axis[q, 1] - oy
     bx, by = axis[q, 2] - ox, axis[q, 3] - oy
-    lo, hi = covered(ax * tx + ay * ty, ay * tx - ax * ty, bx * tx + by * ty, by * tx - bx * ty, r, R)
+    lo, hi = covered_arc(ax * tx + ay * ty, ay * tx - ax * ty, bx * tx + by * ty, by * tx - bx * ty, r, R)
     out[row, 0], out[row, 1] = lo, hi
     return 1 if lo <= hi else 0
 

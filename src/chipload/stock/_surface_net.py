@@ -10,7 +10,7 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def crossing(k, at, first, pitch, count, ends, known):
+def edge_crossing(k, at, first, pitch, count, ends, known):
     """Where the edge along ``k`` from the point ``at`` crosses: the end of its ray that is nearest to its middle."""
     u, v = (k + 1) % 3, (k + 2) % 3
     middle = first[k] + (at[k] - 1) * pitch[k] + 0.5 * pitch[k]
@@ -54,11 +54,11 @@ def vertices(edges, a, b, first, pitch, count, low, high, steps, ends0, known0, 
             at[i] = edges[e, 1 + i]
             place[i] = first[i] + (at[i] - 1) * pitch[i]
         if k == 0:
-            place[k] = crossing(k, at, first, pitch, count, ends0, known0)
+            place[k] = edge_crossing(k, at, first, pitch, count, ends0, known0)
         elif k == 1:
-            place[k] = crossing(k, at, first, pitch, count, ends1, known1)
+            place[k] = edge_crossing(k, at, first, pitch, count, ends1, known1)
         else:
-            place[k] = crossing(k, at, first, pitch, count, ends2, known2)
+            place[k] = edge_crossing(k, at, first, pitch, count, ends2, known2)
         for n in range(4):
             for i in range(3):
                 c[i] = at[i] - a[i]
@@ -81,7 +81,7 @@ def vertices(edges, a, b, first, pitch, count, low, high, steps, ends0, known0, 
 
 
 @njit(cache=True, nogil=True)
-def replaced(edges, places, solid, a, least, most, quad, corners, seen, size, frame, never):
+def replace_quads(edges, places, solid, a, least, most, quad, corners, seen, size, frame, never):
     """Quads of the edges of a window that are gone, new or moved; ``places`` of :func:`vertices`; the new ``size``.
 
     Only edges with four cells from ``least`` to before ``most`` have their quads in the window; ``quad`` numbers the

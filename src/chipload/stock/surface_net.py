@@ -126,6 +126,6 @@ class SurfaceNet:
             self._seen = np.concatenate([self._seen, np.zeros_like(self._seen)])
         # vertices on the outermost cells of the window lack edges, unless the lattice ends there
         least, most = np.where(a > 0, 1, 0), b - a - 1 - np.where(b < self.count + 2, 1, 0)
-        self.size = _surface_net.replaced(
+        self.size = _surface_net.replace_quads(
             edges, places, self.solid, a, least, most, self.quad, self._corners, self._seen, self.size, frame, NEVER
         )

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.record import cutter_record
-from chipload.engagement.bricks._circle import crossing, swept_at
+from chipload.engagement.bricks._circle import crossing_direction, swept_at
 from chipload.engagement.bricks._index import what_is
-from chipload.engagement.bricks._line_chain import joined
+from chipload.engagement.bricks._line_chain import continues_move
 from chipload.engagement.bricks._sweep import WAIT, estimated_least, least, swept
 from chipload.engagement.bricks.stock import BrickStock, move_rows
 from chipload.engagement.moves._border import BESIDE
@@ -81,7 +81,7 @@ def test_steps_of_a_line_are_the_move_of_the_whole_line(lean: tuple[float, float
     rows = move_rows(p[:-1], p[1:], a[:-1], a[1:])
     known = move_rows(p[:1], p[-1:], a[:1], a[-1:])[0]
     c, m = cutter_record(FLAT)[0], rows[0].copy()
-    assert all(joined(m, s, c) for s in rows[1:])
+    assert all(continues_move(m, s, c) for s in rows[1:])
     np.testing.assert_allclose(m[:9], known[:9], atol=1e-12)
     np.testing.assert_allclose(m[12:14], known[12:14], atol=1e-12)
     if any(lean):
@@ -92,7 +92,7 @@ def test_steps_of_a_line_are_the_move_of_the_whole_line(lean: tuple[float, float
     turns = move_rows(p[-1:], p[-1:] + (p[1] - p[0]), a[-1:], unit(a[-1:] + np.array([0.01, 0.0, 0.0])))[0]
     for s in (back, aside, turns):
         kept = m.copy()
-        assert not joined(m, s, c)
+        assert not continues_move(m, s, c)
         np.testing.assert_array_equal(m, kept)
 
 
@@ -148,7 +148,7 @@ def test_a_border_found_by_secants_is_one() -> None:
         if side[0] == side[1]:
             continue
         u, s = ends if side[1] else ends[::-1]
-        c, d, before_c, before_d = crossing(ring, *u, *s, e, index, wait)
+        c, d, before_c, before_d = crossing_direction(ring, *u, *s, e, index, wait)
         assert not swept_at(ring, before_c, before_d, e, index, wait)
         assert math.hypot(c - before_c, d - before_d) < BESIDE
         to = np.array([c, d]) + BESIDE * unit(np.array(s) - np.array(u))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chipload.cutter.record import cutter_record
-from chipload.engagement.bricks._sweep import WAIT, least, outside, swept
+from chipload.engagement.bricks._sweep import WAIT, least, outside_distance, swept
 from chipload.engagement.bricks.stock import move_rows
 from engagement.bricks.programs import inside, turned, unit
 from engagement.moves.field import CUTTERS
@@ -40,7 +40,7 @@ def test_swept_is_what_some_time_of_the_move_covers(kind: str, way: str) -> None
     depth = np.full(n, np.inf)
     for t in np.linspace(0.0, 1.0, 401):
         known |= inside(cutter, p0[0] + t * np.asarray(u), turned(a0[0], a1[0], float(t)), x)
-        depth = np.minimum(depth, [outside(m, c, t, *p)[0] for p in x])
+        depth = np.minimum(depth, [outside_distance(m, c, t, *p)[0] for p in x])
     found = np.array([swept(m, c, *p, wait) for p in x])
     # between two times a point may be swept that no time shows: by no more than the way between them
     assert not (known & ~found).any()
@@ -59,6 +59,6 @@ def test_rates_are_those_of_differences(kind: str) -> None:
     a0, a1 = unit([[0.3, 0.2, 1.0]]), unit([[0.33, 0.17, 1.0]])
     m = move_rows(np.zeros((1, 3)), np.array([[1.0, 0.4, -0.3]]), a0, a1)[0]
     for p in random.uniform(-6.0, 9.0, (50, 3)):
-        rate = outside(m, c, 0.4, *p)[1]
-        known = (outside(m, c, 0.4 + 1e-6, *p)[0] - outside(m, c, 0.4 - 1e-6, *p)[0]) / 2e-6
+        rate = outside_distance(m, c, 0.4, *p)[1]
+        known = (outside_distance(m, c, 0.4 + 1e-6, *p)[0] - outside_distance(m, c, 0.4 - 1e-6, *p)[0]) / 2e-6
         assert rate == pytest.approx(known, abs=1e-4)

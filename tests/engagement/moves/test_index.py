@@ -31,7 +31,7 @@ def test_packed_lists_hold_the_moves_below_the_ceiling_in_their_order() -> None:
         low = -10.0 + reach[own] / 100.0 < level[cell, 1] + 1e-4
         wanted.append(list(zip(kept[own][low].tolist(), reach[own][low].tolist(), strict=True)))
     order = np.argsort(lists[:, 0], kind="stable")
-    total = _sweep.packed(order, GRID, lists, kept, reach, level)
+    total = _sweep.pack_lists(order, GRID, lists, kept, reach, level)
     assert total == sum(map(len, wanted))
     for cell, pairs in enumerate(wanted):
         own = slice(lists[cell, 0], lists[cell, 0] + lists[cell, 1])
@@ -44,7 +44,7 @@ def test_a_reach_in_two_bytes_is_never_above_the_height() -> None:
     for least in random.uniform(-12.0, 0.0, 500):
         steps = min(max(int(np.floor((least - GRID[4]) * GRID[5])), 0), _sweep.HEIGHTS)
         over = z[z > least - 1e-8]
-        assert all(steps < _sweep.above(h, GRID) for h in over)
+        assert all(steps < _sweep.grid_height_above(h, GRID) for h in over)
 
 
 def test_lists_grow_where_they_are_and_the_index_is_dropped() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from chipload.cutter.cutter import Cutter
 from chipload.cutter.record import cutter_record
-from chipload.engagement.moves._border import crossing
+from chipload.engagement.moves._border import crossing_direction
 from chipload.engagement.moves._sweep import from_ball, off_ball, swept
 from chipload.engagement.moves.stock import MoveStock
 from engagement.moves.field import BALL, CUTTERS, FLAT, least_height
@@ -103,7 +103,7 @@ def test_the_border_of_a_move_on_a_circle(cutter: Cutter, way: str) -> None:
             mid = 0.5 * (low + high)
             low, high = (low, mid) if inside(mid) else (mid, high)
         u, s = (math.cos(one), math.sin(one)), (math.cos(other), math.sin(other))
-        dc, ds, bc, bs = crossing(px, py, z, rho, T, *u, *s, 0, index)
+        dc, ds, bc, bs = crossing_direction(px, py, z, rho, T, *u, *s, 0, index)
         off = math.remainder(math.atan2(ds, dc) - low, math.tau)
         assert abs(off) < 1e-6, (off, one, other)
         assert not inside(math.atan2(bs, bc))

@@ -14,7 +14,7 @@ from chipload.planning.thinwall.flank_rows import FlankSide
 from chipload.planning.thinwall.flank_stock import FlankPose
 from chipload.planning.thinwall.force_table import ForceTable
 from chipload.planning.thinwall.passes import variable
-from chipload.planning.thinwall.paths import placed
+from chipload.planning.thinwall.paths import place_rows
 from chipload.planning.thinwall.threshold import modelled
 from chipload.structure.grid import from_map
 from chipload.structure.places import normals_of, on_cut, on_side, weights
@@ -110,7 +110,7 @@ def test_where_the_flank_stands(step):
         assert rows.contact.shape[0] == 5
         assert (np.diff(place[:, 0, 1]) < 0.0).all()
         assert place[0, 0, 1] < 0.999
-        tip, axis, centre = placed(rows, pose)
+        tip, axis, centre = place_rows(rows, pose)
         assert_allclose(axis, np.broadcast_to([0.0, 0.0, 1.0], axis.shape), atol=1e-12)
         assert_allclose(np.linalg.norm((centre - rows.contact), axis=2), 4.0, rtol=1e-12)
         assert_allclose(tip[..., 2], rows.contact[..., 2] - 0.5, atol=1e-12)

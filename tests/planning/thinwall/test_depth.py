@@ -14,7 +14,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import slices
 from chipload.cutting.force import mean_forces
 from chipload.cutting.material import Material
-from chipload.engagement.immersion.immersion import Section, immersed
+from chipload.engagement.immersion.immersion import Section, engagement_rows
 from chipload.engagement.tooth_engagement import ToothEngagement
 from chipload.errors import InputError
 from chipload.planning.thinwall.depth import DEEPEST, INFEASIBLE, THRESHOLD, DepthRange, largest_depths, normal_force
@@ -109,7 +109,7 @@ def test_mean_against_layers(cutter, lead, step):
     start = 8 * np.arange(len(bounds))
     tip = posture.centre - cutter.apt[3] * posture.axis
     profile = slices(cutter, corner_slices=600, bottom_slices=60)
-    rows, owner = immersed(
+    rows, owner = engagement_rows(
         tip, posture.frame, [0.05, 0.0, 0.0], [0.0, 0.0, 0.0], profile, Section(bounds, start, np.array(edges))
     )
     engagement = ToothEngagement([0, len(rows)], rows, np.full(len(rows), -1), owner, profile.columns)

@@ -15,10 +15,10 @@ from chipload.planning.thinwall.contact import ContactFinder
 from chipload.planning.thinwall.depth import DepthRange
 from chipload.planning.thinwall.finish_rows import depth_at, row_frames
 from chipload.planning.thinwall.force_table import greatest_law, law_on_stock
-from chipload.planning.thinwall.linking import FineSide, OperationMotion, beyond_edges, link_passes, refined
+from chipload.planning.thinwall.linking import FineSide, OperationMotion, beyond_edges, link_passes, refine_depths
 from chipload.planning.thinwall.pass_program import Margins
 from chipload.planning.thinwall.passes import WallPass
-from chipload.planning.thinwall.paths import PassMotion, Rows, placed
+from chipload.planning.thinwall.paths import PassMotion, Rows, place_rows
 from chipload.planning.thinwall.plane_stock import CutterPose
 from chipload.planning.thinwall.read_rows import sides_of_program
 from chipload.planning.thinwall.threshold import modelled
@@ -168,7 +168,7 @@ def test_the_cutter_touches_what_a_pass_leaves(cutter):
     left = np.broadcast_to(0.1 + 0.2 * PLACES[0][:, None], (5, 4))
     rows, place, depth = side.laid(a_pass(left), PLACES, CutterPose(cutter, 0.05, STEP, 0.0, 0.5))
     assert_allclose(depth, 0.5 - 0.1 - 0.2 * place[..., 0], atol=1e-9)
-    tip, axis, _ = placed(rows, CutterPose(cutter, 0.05, STEP, 0.0, 0.5))
+    tip, axis, _ = place_rows(rows, CutterPose(cutter, 0.05, STEP, 0.0, 0.5))
     assert_allclose(axis, np.broadcast_to([0.0, math.sqrt(0.5), math.sqrt(0.5)], axis.shape), atol=1e-12)
     n = np.array([-0.2 / 20.0, 1.0, 0.0])
     n /= np.linalg.norm(n)
@@ -196,7 +196,9 @@ def test_depths_between_places():
     rng = np.random.default_rng(2)
     values, u, v = rng.uniform(0.0, 1.0, (5, 4)), np.linspace(0.0, 1.0, 13), np.linspace(FOOT, 1.0, 9)
     a, b = np.meshgrid(u, v, indexing="ij")
-    assert_allclose(depth_at(values, PLACES, a.ravel(), b.ravel()).reshape(13, 9), refined(values, PLACES, (u, v)))
+    assert_allclose(
+        depth_at(values, PLACES, a.ravel(), b.ravel()).reshape(13, 9), refine_depths(values, PLACES, (u, v))
+    )
 
 
 def on_the_side() -> Program:

@@ -10,7 +10,7 @@ from chipload.cutter.cutter import Cutter
 from chipload.errors import InputError
 from chipload.geometry.thin_wall import plate
 from chipload.planning.thinwall.blank import FinishSurface
-from chipload.planning.thinwall.linking import FineSide, OperationMotion, link_passes, refined
+from chipload.planning.thinwall.linking import FineSide, OperationMotion, link_passes, refine_depths
 from chipload.planning.thinwall.pass_program import Margins
 from chipload.planning.thinwall.passes import WallPass
 from chipload.planning.thinwall.paths import PassMotion
@@ -52,7 +52,7 @@ def test_ball_touches_what_the_pass_leaves(step):
         centre = p.p_work + 4.0 * p.axis
         flat = leg.contact & (leg.depth > 0.0)
         u, v = leg.place[flat].T
-        low = refined(two_passes()[k].low, PLACES, (np.linspace(0.0, 1.0, 9), np.array([0.3, 1.0])))[:, 0]
+        low = refine_depths(two_passes()[k].low, PLACES, (np.linspace(0.0, 1.0, 9), np.array([0.3, 1.0])))[:, 0]
         expected = 1.0 + np.interp(u, np.linspace(0.0, 1.0, 9), low)
         n = leg.normals[flat]
         # the middle of the ball is 4 mm along the normal from the point, and that is on the surface
@@ -95,7 +95,7 @@ def test_feed_is_that_of_the_ball():
 def test_refined_stays_between_its_neighbours():
     rng = np.random.default_rng(3)
     values = rng.uniform(0.0, 1.0, (5, 4))
-    fine = refined(values, PLACES, (np.linspace(0.0, 1.0, 33), np.linspace(0.3, 1.0, 25)))
+    fine = refine_depths(values, PLACES, (np.linspace(0.0, 1.0, 33), np.linspace(0.3, 1.0, 25)))
     assert_allclose(fine[::8, ::8], values, atol=1e-12)
     for i in range(4):
         for j in range(3):

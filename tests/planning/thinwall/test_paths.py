@@ -15,7 +15,7 @@ from chipload.planning.thinwall.paths import (
     gouges,
     offset_normals,
     pass_programs,
-    placed,
+    place_rows,
     program_of,
     rows_of,
     seconds,
@@ -58,7 +58,7 @@ def test_cutter_touches_the_offset_plane(cutter, lead, tilt, step, side):
     D = 1.0 + 0.1 * s.points[..., 0] - 0.05 * s.points[..., 1]
     posture = CutterPose(cutter, 0.05, step, math.radians(lead), math.radians(tilt))
     rows = rows_of(s, D, D + 0.2, posture)
-    tip, axis, _ = placed(rows, posture)
+    tip, axis, _ = place_rows(rows, posture)
     n = np.array([-0.1, 0.05, side]) / math.sqrt(1.0 + 0.0125)
     plane = float(n @ (s.points + D[..., None] * s.normals)[0, 0])
     rho, z = sphere_like(cutter)

@@ -24,7 +24,7 @@ SECANTS = 12
 
 
 @njit(cache=True, nogil=True, inline="always")
-def asked(ring, c, s, index, hint, wait):
+def ask_circle(ring, c, s, index, hint, wait):
     """MATERIAL, AIR or the move that swept the direction (c, s) of the circle; ``hint`` is tested first."""
     return what_is(
         ring[0] + c * ring[3] + s * ring[6], ring[1] + c * ring[4] + s * ring[7], ring[2] + c * ring[5] + s * ring[8],
@@ -60,7 +60,7 @@ def solid_at(ring, c, s, index):
 
 
 @njit(cache=True, nogil=True)
-def between(cu, su, cs, ss, part):
+def chord_direction(cu, su, cs, ss, part):
     """Direction at a part of the chord from u to s."""
     dc = cu + part * (cs - cu)
     ds = su + part * (ss - su)
@@ -69,7 +69,7 @@ def between(cu, su, cs, ss, part):
 
 
 @njit(cache=True, nogil=True)
-def crossing(ring, cu, su, cs, ss, e, index, wait):
+def crossing_direction(ring, cu, su, cs, ss, e, index, wait):
     """Direction at which the volume that move e swept begins, between u, not swept by it, and s, swept; and a direction
     just before it, not swept. With AIR as e: the end of the initial body.
 
@@ -92,7 +92,7 @@ def crossing(ring, cu, su, cs, ss, e, index, wait):
                     at = to
                     break
                 at = to
-                dc, ds = between(cu, su, cs, ss, at)
+                dc, ds = chord_direction(cu, su, cs, ss, at)
                 f = estimated_least_at(ring, dc, ds, e, index)
                 if f > 0.0:
                     a = at
@@ -109,24 +109,24 @@ def crossing(ring, cu, su, cs, ss, e, index, wait):
                     side = -1
             before = max(at - 0.8 * near, 0.0)
             after = min(at + 0.8 * near, 1.0)
-            dc, ds = between(cu, su, cs, ss, before)
-            bc, bs = between(cu, su, cs, ss, after)
+            dc, ds = chord_direction(cu, su, cs, ss, before)
+            bc, bs = chord_direction(cu, su, cs, ss, after)
             if before > 0.0 and swept_at(ring, dc, ds, e, index, wait):
                 high = before
             elif after < 1.0 and not swept_at(ring, bc, bs, e, index, wait):
                 low = after
             else:
-                bc, bs = between(cu, su, cs, ss, at)
+                bc, bs = chord_direction(cu, su, cs, ss, at)
                 return bc, bs, dc, ds
     while high - low > 2.0 * near:
         at = 0.5 * (low + high)
-        dc, ds = between(cu, su, cs, ss, at)
+        dc, ds = chord_direction(cu, su, cs, ss, at)
         if swept_at(ring, dc, ds, e, index, wait) if e >= 0 else not solid_at(ring, dc, ds, index):
             high = at
         else:
             low = at
-    dc, ds = between(cu, su, cs, ss, 0.5 * (low + high))
-    bc, bs = between(cu, su, cs, ss, low)
+    dc, ds = chord_direction(cu, su, cs, ss, 0.5 * (low + high))
+    bc, bs = chord_direction(cu, su, cs, ss, low)
     return dc, ds, bc, bs
 
 
@@ -138,8 +138,8 @@ def border(ring, cm, sm, ca, sa, e, index, wait):
     for _ in range(TURNS):
         if (cm - ca) ** 2 + (sm - sa) ** 2 < NARROW:
             break
-        dc, ds, bc, bs = crossing(ring, cm, sm, ca, sa, e, index, wait)
-        f = asked(ring, bc, bs, index, e, wait)
+        dc, ds, bc, bs = crossing_direction(ring, cm, sm, ca, sa, e, index, wait)
+        f = ask_circle(ring, bc, bs, index, e, wait)
         if f == MATERIAL:
             return math.atan2(ds, dc)
         ca = bc
@@ -179,8 +179,8 @@ def ridge(ring, ca, sa, cb, sb, ea, eb, index, wait):
     for _ in range(TURNS):
         if (ca - cb) ** 2 + (sa - sb) ** 2 < NARROW or swept_at(ring, cb, sb, ea, index, wait):
             return False, 0.0, 0.0
-        _, _, bc, bs = crossing(ring, cb, sb, ca, sa, ea, index, wait)
-        f = asked(ring, bc, bs, index, eb, wait)
+        _, _, bc, bs = crossing_direction(ring, cb, sb, ca, sa, ea, index, wait)
+        f = ask_circle(ring, bc, bs, index, eb, wait)
         if f == MATERIAL:
             return True, bc, bs
         if f < 0 or f in (ea, eb):
@@ -220,7 +220,7 @@ def intervals(ring, end, apart, index, wait, out):
     c0 = c
     s0 = s
     for i in range(n + 1):
-        f = asked(ring, c, s, index, before, wait)
+        f = ask_circle(ring, c, s, index, before, wait)
         middle = first + (i - 0.5) * d
         if i > 0 and f != MATERIAL and not inside and f != before:
             found, cr, sr = ridge(ring, c0, s0, c, s, before, f, index, wait)

@@ -35,12 +35,12 @@ from chipload.engagement.bricks._contact_places import (
     reach,
 )
 from chipload.engagement.bricks._index import INDEX, enter
-from chipload.engagement.bricks._line_chain import joined
-from chipload.engagement.bricks._slices import sliced
+from chipload.engagement.bricks._line_chain import continues_move
+from chipload.engagement.bricks._slices import slice_part
 from chipload.engagement.bricks._sweep import A0, LENGTH, THETA, B, turn
 from chipload.engagement.moves._circle import APART
 from chipload.engagement.moves._contact import JUMP, STEADY, turns
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 
 __all__ = ["APART", "BRICKS", "SLICES", "run"]
 
@@ -91,7 +91,7 @@ def instant(m, t, height, at):
 
 
 @njit(cache=True, nogil=True)
-def engaged(at, c, nodes, flank, index, work, slices, rows, owner, row_at, out):
+def engage_profile(at, c, nodes, flank, index, work, slices, rows, owner, row_at, out):
     """What is engaged at an instant, within the ranges of the profile that :func:`reach` gave.
 
     Spans (psi from, to, from T) go to ``rows`` from ``row_at[0]`` on, their slices to ``slices`` from ``row_at[1]``: s
@@ -121,7 +121,7 @@ def engaged(at, c, nodes, flank, index, work, slices, rows, owner, row_at, out):
         looks = max(LOOKS, 2 * most // 3)
         if c.line[part] == FLANK_LINE or c.radius[part] > c.wide:
             looks = max(looks, min(math.ceil(size / flank), 4 * looks))
-        found = sliced(
+        found = slice_part(
             at, c, part, a, b, looks, flank, known[part], counts[part], nodes, index, work, slices, rows, owner, row_at,
             out,
         )  # fmt: skip
@@ -214,7 +214,7 @@ def instants_of(k, q, n, count, each, once, state, index, work, nodes, flank, sl
             reach(at, c, index, 0.0, work[4])
         before = row_at[0]
         slices_before = row_at[1]
-        if not engaged(at, c, nodes, flank[tool], index, work, slices, rows, owner, row_at, out[entries]):
+        if not engage_profile(at, c, nodes, flank[tool], index, work, slices, rows, owner, row_at, out[entries]):
             return -1, middle, low, high
         now = out[entries, 0] / way
         if i == count // 2:
@@ -254,7 +254,7 @@ def run(begin, instants, state, index, work, nodes, flank, slices, rows, owner, 
     index : see :mod:`chipload.engagement.bricks._index`; the moves of these steps are in it
     nodes : (N + 1, N, 3) from, to and node of so many parts of 0..1
     flank : longest slice of the flank of each cutter [mm]
-    slices, rows, owner, out : see :func:`engaged`; ``out`` has 9 more columns: T, N and A
+    slices, rows, owner, out : see :func:`engage_profile`; ``out`` has 9 more columns: T, N and A
     entry : (m, 3) step, instant and first row of each instant that cuts
     used : (3,) room taken of lists, and of blocks, and the number of the last move
 
@@ -263,12 +263,12 @@ def run(begin, instants, state, index, work, nodes, flank, slices, rows, owner, 
     The number of steps, or the one at which room ran out: ``state[1]`` 0: of rows, 2: of lists or blocks.
     """
     # the caller keeps all of them
-    index = borrowed(index)
-    work = borrowed(work)
+    index = borrow_arrays(index)
+    work = borrow_arrays(work)
     at, rate, row_at = work[7], work[8], work[9]
-    instants, state, nodes, flank = borrowed((instants, state, nodes, flank))
-    slices, rows, owner = borrowed((slices, rows, owner))
-    entry, out, used = borrowed((entry, out, used))
+    instants, state, nodes, flank = borrow_arrays((instants, state, nodes, flank))
+    slices, rows, owner = borrow_arrays((slices, rows, owner))
+    entry, out, used = borrow_arrays((entry, out, used))
     n = len(instants)
     for k in range(begin, n):
         q = state[0] + k
@@ -314,7 +314,7 @@ def run(begin, instants, state, index, work, nodes, flank, slices, rows, owner, 
             state[1] = 1
         if state[1] == 1:
             last = used[2]
-            if last < 0 or index[7][last] != tool or not joined(index[6][last], m, c):
+            if last < 0 or index[7][last] != tool or not continues_move(index[6][last], m, c):
                 used[2] = q
             state[1] = 2
         if not enter(used[2], m, c, index, used, work[6]):

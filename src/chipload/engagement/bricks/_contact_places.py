@@ -85,11 +85,11 @@ def reach(at, c, index, slack, ranges):
                             if flank and w - r > c.z[end] and ranges[end, 0] <= w - r and w + r <= ranges[end, 1]:
                                 continue
                             rho = math.sqrt(max(x * x + y * y + z * z - w * w, 0.0))
-                            reached(c, rho, w, r, ranges)
+                            widen_ranges(c, rho, w, r, ranges)
 
 
 @njit(cache=True, nogil=True)
-def reached(c, rho, w, r, ranges):
+def widen_ranges(c, rho, w, r, ranges):
     """Widen the ranges by what of the profile is within r of a point."""
     for i in range(c.count):
         if c.line[i] > 0:

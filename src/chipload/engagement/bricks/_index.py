@@ -17,7 +17,7 @@ import math
 
 from numba import njit, types
 
-from chipload.engagement.bricks._sweep import A0, THETA, B, U, around, chord, nearest_time, swept
+from chipload.engagement.bricks._sweep import A0, THETA, B, U, chord, nearest_time, swept, swept_share_of_ball
 from chipload.engagement.moves._sweep import AIR, CUTTERS, EPS, MATERIAL, in_solid, place
 
 #: bricks along a side of a block, and in it
@@ -136,7 +136,7 @@ def span(m, c, d, low, side, count):
 
 
 @njit(cache=True, nogil=True)
-def appended(q, row, bricks, kept, used):
+def append_move(q, row, bricks, kept, used):
     """Add a move to the list of a brick; False: no room."""
     at = bricks[row, 0]
     count = bricks[row, 1]
@@ -182,7 +182,7 @@ def enter(q, step, c, index, used, wait):
                 x = grid[0] + SIDE * (bi + 0.5) * grid[3]
                 y = grid[1] + SIDE * (bj + 0.5) * grid[4]
                 z = grid[2] + SIDE * (bk + 0.5) * grid[5]
-                covered = around(m, c, x, y, z, far, wait)
+                covered = swept_share_of_ball(m, c, x, y, z, far, wait)
                 if covered == 0:
                     continue
                 if covered == 1:
@@ -208,19 +208,19 @@ def enter(q, step, c, index, used, wait):
                             if bricks[row + (k & 7), 1] < 0:
                                 continue
                             z = grid[2] + (k + 0.5) * grid[5]
-                            covered = around(m, c, x, y, z, r, wait)
+                            covered = swept_share_of_ball(m, c, x, y, z, r, wait)
                             if covered == 0:
                                 continue
                             if covered == 1:
                                 bricks[row + (k & 7), 1] = -1 - q
                                 alive[block] -= 1
-                            elif not appended(q, row + (k & 7), bricks, kept, used):
+                            elif not append_move(q, row + (k & 7), bricks, kept, used):
                                 return False
     return True
 
 
 @njit(types.int64(_S2, _S1, _S1, types.int64), cache=True, nogil=True)
-def packed(bricks, kept, fresh, blocks):
+def pack_lists(bricks, kept, fresh, blocks):
     """Copy the lists close together into a new array, with half as much room again; the room that they take."""
     used = 0
     for row in range(blocks * MANY):

@@ -34,7 +34,7 @@ TURN, OFF = 0.1, 0.004
 
 
 @njit(cache=True, nogil=True)
-def joined(m, s, c):
+def continues_move(m, s, c):
     """Whether the step s (row) of a cutter c continues the move m (row), which is then extended to its end."""
     theta = m[THETA]
     fixed = theta == 0.0

@@ -11,7 +11,7 @@ from numba import njit, types
 from chipload.engagement.bricks._index import BY, INDEX, OUTSIDE, brick_of
 from chipload.engagement.bricks._sweep import WAIT, swept
 from chipload.engagement.moves._outline import HALVINGS, ends_of
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 
 _F1, _F2, _I1 = types.float64[::1], types.float64[:, ::1], types.int64[::1]
 
@@ -36,9 +36,9 @@ def sweeper(x, y, z, index, hint, wait):
 
 
 @njit(types.void(types.float64, _F1, _F1, INDEX, types.boolean[:, ::1]), cache=True, nogil=True)
-def marked(z, xs, ys, index, inside):
+def mark_nodes(z, xs, ys, index, inside):
     """Which nodes of a net were swept at a height; the outermost are not."""
-    index = borrowed(index)
+    index = borrow_arrays(index)
     wait = np.empty((WAIT, 6))
     inside[:] = False
     for i in range(1, len(xs) - 1):
@@ -51,9 +51,9 @@ def marked(z, xs, ys, index, inside):
 
 
 @njit(types.void(types.float64, _F1, _F1, INDEX, types.boolean[:, ::1], _I1, _F2), cache=True, nogil=True)
-def placed(z, xs, ys, index, inside, sides, points):
+def place_borders(z, xs, ys, index, inside, sides, points):
     """Where the borders on sides of the net are: ``points`` (n, 2)."""
-    index = borrowed(index)
+    index = borrow_arrays(index)
     wait = np.empty((WAIT, 6))
     hint = -1
     for p in range(len(sides)):

@@ -12,14 +12,14 @@ from numba import njit, types
 from chipload.engagement.bricks._index import INDEX, what_is
 from chipload.engagement.bricks._sweep import WAIT
 from chipload.engagement.moves._sweep import MATERIAL
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 
 
 @njit(types.void(types.float64[:, ::1], INDEX, types.boolean[::1]), cache=True, nogil=True)
-def marked(points, index, mask):
+def mark_points(points, index, mask):
     """Which points (n, 3) are in material."""
     # the caller keeps all of them
-    index = borrowed(index)
+    index = borrow_arrays(index)
     wait = np.empty((WAIT, 6))
     hint = -1
     for k in range(len(points)):

@@ -25,8 +25,8 @@ from chipload.engagement.bricks._contact_places import (
 
 
 @njit(cache=True, nogil=True)
-def added(at, spans, found, ring, front, to, from_s, to_s, rise_w, out):
-    """Add what a slice engages to ``out`` of :func:`chipload.engagement.bricks._contact.engaged`."""
+def add_slice(at, spans, found, ring, front, to, from_s, to_s, rise_w, out):
+    """Add what a slice engages to ``out`` of :func:`chipload.engagement.bricks._contact.engage_profile`."""
     rho = to[0]
     sk = to[2]
     ck = to[3]
@@ -89,7 +89,7 @@ def laid(at, c, part, s0, s1, many, nodes, index, work, slices, rows, owner, row
             continue
         if have == len(slices) or row + found > len(rows):
             return False
-        added(at, spans, found, ring, front, to, from_s, to_s, to_w - from_w, out)
+        add_slice(at, spans, found, ring, front, to, from_s, to_s, to_w - from_w, out)
         for j in range(found):
             rows[row, 0] = spans[j, 0] + front[4]
             rows[row, 1] = spans[j, 1] + front[4]
@@ -111,7 +111,7 @@ def laid(at, c, part, s0, s1, many, nodes, index, work, slices, rows, owner, row
 
 
 @njit(cache=True, nogil=True)
-def sliced(at, c, part, a, b, looks, flank, known, count, nodes, index, work, slices, rows, owner, row_at, out):
+def slice_part(at, c, part, a, b, looks, flank, known, count, nodes, index, work, slices, rows, owner, row_at, out):
     """Find the ranges of a part of the profile and lay slices on those in contact: their number, below 0 where there is
     no room; ``count`` of them are known from the instant before.
     """

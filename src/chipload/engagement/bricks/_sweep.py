@@ -76,7 +76,7 @@ def turn(m, t):
 
 
 @njit(cache=True, nogil=True)
-def outside(m, c, t, x, y, z):
+def outside_distance(m, c, t, x, y, z):
     """Distance f [mm] of the point (x, y, z) at the time t, and its rate."""
     cosine, sine = turn(m, t)
     ax = m[6] * cosine + m[9] * sine
@@ -115,7 +115,7 @@ def least_from(m, c, x, y, z, start, above, below, near, wait):
     The search ends where low >= above, where high < below, or where both differ by at most ``near`` [mm]. ``start`` is
     the first time that is evaluated, ``wait`` (WAIT, 6) a working array.
     """
-    f, s = outside(m, c, start, x, y, z)
+    f, s = outside_distance(m, c, start, x, y, z)
     if f < below:
         return -math.inf, f
     bend = m[THETA] * (m[THETA] * math.sqrt((x - m[0]) ** 2 + (y - m[1]) ** 2 + (z - m[2]) ** 2) + m[BEND])
@@ -125,11 +125,11 @@ def least_from(m, c, x, y, z, start, above, below, near, wait):
         return low, f
     f0, s0, f1, s1 = f, s, f, s
     if start > 0.0:
-        f0, s0 = outside(m, c, 0.0, x, y, z)
+        f0, s0 = outside_distance(m, c, 0.0, x, y, z)
         if f0 < below:
             return -math.inf, f0
     if start < 1.0:
-        f1, s1 = outside(m, c, 1.0, x, y, z)
+        f1, s1 = outside_distance(m, c, 1.0, x, y, z)
         if f1 < below:
             return -math.inf, f1
     high = min(f, min(f0, f1))
@@ -175,7 +175,7 @@ def least_from(m, c, x, y, z, start, above, below, near, wait):
         if not a < t < b or count + 2 > WAIT:
             low = min(low, floor)
             continue
-        f, s = outside(m, c, t, x, y, z)
+        f, s = outside_distance(m, c, t, x, y, z)
         if f < below:
             return -math.inf, f
         high = min(high, f)
@@ -361,20 +361,20 @@ def estimated_least(m, c, x, y, z):
     f, _, nw = from_profile(c, rho, w)
     if nw == 0.0:
         return f
-    f, s = outside(m, c, t, x, y, z)
+    f, s = outside_distance(m, c, t, x, y, z)
     size = dx * dx + dy * dy + dw * dw
     if size == 0.0:
         return f
     to = min(max(t - s * c.wide / size, 0.0), 1.0)
-    f1, s1 = outside(m, c, to, x, y, z)
+    f1, s1 = outside_distance(m, c, to, x, y, z)
     if s1 != s:
-        f2, _ = outside(m, c, min(max(to - s1 * (to - t) / (s1 - s), 0.0), 1.0), x, y, z)
+        f2, _ = outside_distance(m, c, min(max(to - s1 * (to - t) / (s1 - s), 0.0), 1.0), x, y, z)
         f1 = min(f1, f2)
     return min(f, f1)
 
 
 @njit(cache=True, nogil=True)
-def around(m, c, x, y, z, r, wait):
+def swept_share_of_ball(m, c, x, y, z, r, wait):
     """Part of a ball of radius r [mm] about a point that the move sweeps: 1 all, 0 none, -1 a part, or unknown."""
     x0, y0, w0, dx, dy, dw, off = chord(m, x, y, z)
     t = nearest_time(x0, y0, dx, dy)

@@ -124,9 +124,9 @@ class BrickStock:
         self.ids, self.faces = np.empty(0, dtype=np.int32), np.empty((0, 12))
         if body is not None:
             self.faces = faces_of(body)
-            initial.over(self.faces, self.plan, self.plan_shape, self.first, self.ids)
+            initial.faces_over_cells(self.faces, self.plan, self.plan_shape, self.first, self.ids)
             self.ids = np.empty(int(self.first[-1]), dtype=np.int32)
-            initial.over(self.faces, self.plan, self.plan_shape, self.first, self.ids)
+            initial.faces_over_cells(self.faces, self.plan, self.plan_shape, self.first, self.ids)
             initial.levels(self.faces, self.plan, self.plan_shape, self.first, self.ids, self.level)
             initial.mark_upright_faces(walls_of(body), self.plan, self.plan_shape, self.level)
 
@@ -171,7 +171,7 @@ class BrickStock:
             self.alive = np.concatenate([self.alive, np.empty_like(self.alive)])
         need = int(np.maximum(self.bricks[: blocks * index.MANY, 1], 0).sum())
         fresh = np.empty((1 << 17) + 3 * need, dtype=np.int32)
-        self.used[0] = index.packed(self.bricks, self.kept, fresh, blocks)
+        self.used[0] = index.pack_lists(self.bricks, self.kept, fresh, blocks)
         self.kept = fresh
 
     def forget(self) -> None:
@@ -268,7 +268,7 @@ class BrickStock:
         """Return which points (n, 3) [mm] are in material: in the initial body, and in no volume that a move swept."""
         at = np.ascontiguousarray(points, dtype=np.float64)
         inside = np.empty(len(at), dtype=np.bool_)
-        points_in.marked(at, self._index(), inside)
+        points_in.mark_points(at, self._index(), inside)
         # of a stock thinner than a cell the one cell reaches beyond it
         return inside & (at >= self.low).all(axis=1) & (at <= self.high).all(axis=1)
 
@@ -285,8 +285,8 @@ class BrickStock:
         )
         inside = np.empty((len(xs), len(ys)), dtype=np.bool_)
         found = self._index()
-        outline.marked(z, xs, ys, found, inside)
+        outline.mark_nodes(z, xs, ys, found, inside)
         sides, first = rings(inside)
         points = np.empty((len(sides), 2))
-        outline.placed(z, xs, ys, found, inside, sides, points)
+        outline.place_borders(z, xs, ys, found, inside, sides, points)
         return area_of(points, first, tolerance)

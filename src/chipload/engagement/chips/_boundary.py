@@ -109,7 +109,7 @@ def _cross(p, q):
 
 
 @njit(types.int64(_R2, _R2, _R1, types.float64, _F1, _F1, types.float64, _F2, types.int64), cache=True, nogil=True)
-def between(cp, ca, K, h, a, b, tol, buf, n):
+def edges_between(cp, ca, K, h, a, b, tol, buf, n):
     """Edges of the section between two grazing points that meet: it stands still there."""
     S = np.empty(27)
     C = np.empty((8, 5))
@@ -120,7 +120,7 @@ def between(cp, ca, K, h, a, b, tol, buf, n):
 
 
 @njit(cache=True, nogil=True)
-def _settled(grid, dt, tol):
+def _sign_is_settled(grid, dt, tol):
     """Whether V, its time in even knots dt apart, can't have changed sign and back by more than tol / 4 of way."""
     for i in range(grid.shape[0] - 1):
         for k in range(NODES):
@@ -145,7 +145,7 @@ def _settled(grid, dt, tol):
 
 
 @njit(cache=True, nogil=True)
-def _meeting(cp, ca, K, h, tol, vmin, t0, t1, down, up):
+def _find_meeting(cp, ca, K, h, tol, vmin, t0, t1, down, up):
     """Bring the pair of roots at t1 to where it meets towards t0, V between them within tol / 20 of way; or False."""
     S = np.empty(27)
     C = np.empty((8, 5))
@@ -239,7 +239,7 @@ def loop(cp, ca, K, h, tol, vmin, knots, ends, rows, buf, whole):
         rate = _rate_of(t, begins, stops, opens, closes)
         for k in range(NODES):
             grid[i, k] *= rate
-    if not _settled(grid, 1.0 / last, tol):
+    if not _sign_is_settled(grid, 1.0 / last, tol):
         return UNSETTLED if knots <= MOST_KNOTS else GENERAL
     whole[0] = True
     if count.max() == 0:
@@ -262,16 +262,16 @@ def loop(cp, ca, K, h, tol, vmin, knots, ends, rows, buf, whole):
     down0, up0 = R[i0, k].copy(), R[i0, 1 - k].copy()
     k = 0 if sign[i1, 0] == -1 else 1
     down1, up1 = R[i1, k].copy(), R[i1, 1 - k].copy()
-    if i0 > 0 and not _meeting(cp, ca, K, h, tol, vmin, S[i0 - 1, 21], S[i0, 21], down0, up0):
+    if i0 > 0 and not _find_meeting(cp, ca, K, h, tol, vmin, S[i0 - 1, 21], S[i0, 21], down0, up0):
         return GENERAL
-    if i1 < last and not _meeting(cp, ca, K, h, tol, vmin, S[i1 + 1, 21], S[i1, 21], down1, up1):
+    if i1 < last and not _find_meeting(cp, ca, K, h, tol, vmin, S[i1 + 1, 21], S[i1, 21], down1, up1):
         return GENERAL
     n = 0
     if i0 == 0:
         up0[2] = down0[2] + (up0[2] - down0[2]) % TAU
         n = arc(S[0], K, C[0], down0, up0, tol, FIRST, buf, n)
     else:
-        n = between(cp, ca, K, h, down0, up0, tol, buf, n)
+        n = edges_between(cp, ca, K, h, down0, up0, tol, buf, n)
     if n < 0:
         return FULL
     knot = (R[i0 : i1 + 1], sign[i0 : i1 + 1])
@@ -282,7 +282,7 @@ def loop(cp, ca, K, h, tol, vmin, knots, ends, rows, buf, whole):
         down1[2] = up1[2] + (down1[2] - up1[2]) % TAU
         n = arc(S[last], K, C[last], up1, down1, tol, LAST, buf, n)
     else:
-        n = between(cp, ca, K, h, up1, down1, tol, buf, n)
+        n = edges_between(cp, ca, K, h, up1, down1, tol, buf, n)
     if n < 0:
         return FULL
     n, more = _side(cp, ca, K, h, tol, vmin, down0, down1, knot, -1, rows, buf, n)

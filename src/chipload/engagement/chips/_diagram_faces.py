@@ -78,7 +78,7 @@ def candidates(cp, ca, K, h, tol, vmin, ta, tb, knots, buf, n, jumps):
 
 
 @njit(cache=True, nogil=True)
-def _without(R, sign, n, i, R_out, sign_out):
+def _drop_two_roots(R, sign, n, i, R_out, sign_out):
     """All roots but i and the next one."""
     k = 0
     for m in range(n):
@@ -133,13 +133,13 @@ def link(one, other, K, tol, quiet, buf, n):
         d = math.hypot(big[i, 0] - big[j, 0], big[i, 1] - big[j, 1])
         if (d > 0.2 * tol and not quiet) or (nb == 2 and sb[i] == around):
             continue
-        _without(big, sb, nb, i, rest, sr)
+        _drop_two_roots(big, sb, nb, i, rest, sr)
         total, k = _match(small, ss, rest, sr, nb - 2, tol)
         if d + total < best:
             best, pair, shift = d + total, i, k
     if pair < 0:
         return -1
-    _without(big, sb, nb, pair, rest, sr)
+    _drop_two_roots(big, sb, nb, pair, rest, sr)
     for i in range(nb - 2):
         a, b = small[i], rest[(i + shift) % (nb - 2)]
         n = edge(buf, n, a, b, a[4], a[5], b[4], b[5], kind(a, b))

@@ -121,7 +121,7 @@ def _corner(S, K, C, i, row):
 
 
 @njit(cache=True, nogil=True)
-def _sampled(S, K, C, th, vv, at, row, grid):
+def _sample_angles(S, K, C, th, vv, at, row, grid):
     """Angles ``th`` with V ``vv`` at even nodes and, before and after, at corners ``at`` (-1: a node); how many."""
     n = 0
     nc = int(S[20])
@@ -184,7 +184,7 @@ def roots(S, K, C, vmin, R, sign, grid):
     vv = np.empty(NODES + 16)
     at = np.empty(NODES + 16, np.int64)
     row = np.empty(7)
-    n = _sampled(S, K, C, th, vv, at, row, grid)
+    n = _sample_angles(S, K, C, th, vv, at, row, grid)
     start = -1
     for i in range(n):
         if abs(vv[i]) >= vmin:
@@ -248,7 +248,7 @@ def roots(S, K, C, vmin, R, sign, grid):
 
 
 @njit(cache=True, nogil=True)
-def wrapped(angle):
+def wrap_angle(angle):
     """The angle in -pi .. pi."""
     return angle - TAU * math.floor(angle / TAU + 0.5)
 

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit, types
 
-from chipload.engagement.chips._grazing_points import CORNER, MAX_ROOTS, NODES, deviation, root_near, roots, wrapped
+from chipload.engagement.chips._grazing_points import CORNER, MAX_ROOTS, NODES, deviation, root_near, roots, wrap_angle
 from chipload.engagement.chips._section import BOTTOM, TAU, TOP, extent, instant, point, reach, speed, state
 
 FIRST, LAST, GRAZING, CHORD, CHORD_END, FIRST_CHORD, LAST_CHORD = 0, 1, 2, 3, 4, 5, 6
@@ -45,7 +45,7 @@ def levels(cp, ca, K, ends):
     cache=True,
     nogil=True,
 )
-def _crossing(cp, ca, K, h, a, b, rising, cut, m, S):
+def _trace_crossing(cp, ca, K, h, a, b, rising, cut, m, S):
     for _ in range(60):
         x = 0.5 * (a + b)
         if x <= a or x >= b:
@@ -72,7 +72,7 @@ def spans(cp, ca, K, h, ends, out):
         left, right = max(i - 1, 0), min(i + 1, n)
         s = 1.0 if g[i] > 0.0 else -1.0
         if i > 0 and (g[i] > 0.0) != (g[i - 1] > 0.0):
-            m = _crossing(cp, ca, K, h, (i - 1) / n, i / n, g[i] > 0.0, cut, m, S)
+            m = _trace_crossing(cp, ca, K, h, (i - 1) / n, i / n, g[i] > 0.0, cut, m, S)
         turns = s * g[i] <= s * g[left] and s * g[i] <= s * g[right] and s * g[left] > 0.0 and s * g[right] > 0.0
         if turns and abs(g[i]) <= 2.0 * max(abs(g[i] - g[left]), abs(g[i] - g[right])):
             a, b = left / n, right / n
@@ -83,8 +83,8 @@ def spans(cp, ca, K, h, ends, out):
                 g2 = s * reach(cp, ca, K, h, x2, S)
                 if min(g1, g2) < 0.0:
                     x = x1 if g1 < g2 else x2
-                    m = _crossing(cp, ca, K, h, left / n, x, s < 0.0, cut, m, S)
-                    m = _crossing(cp, ca, K, h, x, right / n, s > 0.0, cut, m, S)
+                    m = _trace_crossing(cp, ca, K, h, left / n, x, s < 0.0, cut, m, S)
+                    m = _trace_crossing(cp, ca, K, h, x, right / n, s > 0.0, cut, m, S)
                     break
                 if g1 < g2:
                     b = x2
@@ -259,7 +259,7 @@ def track(cp, ca, K, h, tol, vmin, last, sign, out, n):
         whole = dt >= 0.999 * rest
         if whole:
             new[:] = last
-            new[2] = cur[2] + wrapped(last[2] - cur[2])
+            new[2] = cur[2] + wrap_angle(last[2] - cur[2])
         else:
             if dt > 0.5 * rest:
                 dt = 0.5 * rest
@@ -271,7 +271,7 @@ def track(cp, ca, K, h, tol, vmin, last, sign, out, n):
                 if count != 2:
                     return -1
                 new[:] = R[0] if signs[0] == sign else R[1]
-            new[2] = cur[2] + wrapped(new[2] - cur[2])
+            new[2] = cur[2] + wrap_angle(new[2] - cur[2])
         dev = deviation(cur, new)
         took = new[3] - cur[3]
         if dev > tol:

@@ -102,7 +102,7 @@ def _exit(A2, B, C):
 
 
 @njit(cache=True, nogil=True)
-def _round(K, rho, w):
+def _nearest_arc(K, rho, w):
     """The arc that the nearest point of the surface is on: TORUS or BOW (FLANK: neither), centre's rho, radius, w."""
     if K[13] > 0.0:
         x, y = rho - K[12], K[14] - w
@@ -141,7 +141,7 @@ def ray(S, K, ct, st):
     if K[1] > 0.0 or K[13] > 0.0:
         w = w0 + lam * dw
         rho = math.sqrt(max(q0 + lam * (2.0 * q1 + lam), 0.0))
-        on, e, r, f = _round(K, rho, w)
+        on, e, r, f = _nearest_arc(K, rho, w)
         y, x = f - w, rho - e
         if on != FLANK and x * x + y * y > r * r:
             code = on
@@ -162,7 +162,7 @@ def ray(S, K, ct, st):
                         break
                     rho = math.sqrt(max(q0 + lam * (2.0 * q1 + lam), 0.0))
                     if K[13] > 0.0:
-                        next_, e, r, f = _round(K, rho, w0 + lam * dw)
+                        next_, e, r, f = _nearest_arc(K, rho, w0 + lam * dw)
                         code = code if next_ == FLANK else next_
             if K[1] == 0.0:
                 code = BOW  # the sharp corner is its end

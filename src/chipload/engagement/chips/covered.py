@@ -125,9 +125,9 @@ def covered(move: Move, cutter: Cutter, height: float, tolerance: float) -> Cove
 def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], tolerance: float) -> list[CoveredArea | None]:
     """Return the covered areas of many layers, as :func:`covered`."""
     K, levels = cutter_numbers(cutter), np.array([float(h) for h in heights])
-    along = _along(move, K, tolerance)
+    along = _as_upright_move(move, K, tolerance)
     if along is not None:
-        return [_standing(*along, h, tolerance) for h in levels.tolist()]
+        return [_standing_area(*along, h, tolerance) for h in levels.tolist()]
     buffer, count, knots, whole = _loops([move], K, levels, np.array([0, len(levels)]), tolerance)
     start = np.cumsum([0, *count.clip(0)])
     out: list[CoveredArea | None] = []
@@ -135,12 +135,14 @@ def covered_areas(move: Move, cutter: Cutter, heights: Iterable[float], toleranc
         if count[i] == trace.NOTHING:
             out.append(None)
         elif count[i] == trace.GENERAL:
-            out.append(_noded(move, K, h, tolerance, max(_KNOTS, 4 * int(knots[i]))))
+            out.append(_general_area(move, K, h, tolerance, max(_KNOTS, 4 * int(knots[i]))))
         else:
             edges = buffer[start[i] : start[i + 1]].copy()
             rings: tuple[Ring, ...] = (ring_of_edges(edges),)
             if not whole[i]:
-                rings = _without_slivers(rings_of_polygons(_untangled(shapely.Polygon(edges[:, :2])), edges), tolerance)
+                rings = _without_slivers(
+                    rings_of_polygons(_untangle_loop(shapely.Polygon(edges[:, :2])), edges), tolerance
+                )
             out.append(CoveredArea(rings, h, tolerance, True))
     return out
 
@@ -158,17 +160,21 @@ def covered_rings(moves: Sequence[Move], K: Floats, heights: Sequence[Floats], t
     levels = np.concatenate([np.empty(0), *heights])
     first = np.cumsum([0, *(len(h) for h in heights)])
     fixed = np.array([_is_straight(move, K) for move in moves], dtype=np.bool_)
-    along = {m: found for m in np.flatnonzero(~fixed).tolist() if (found := _along(moves[m], K, tolerance)) is not None}
+    along = {
+        m: found
+        for m in np.flatnonzero(~fixed).tolist()
+        if (found := _as_upright_move(moves[m], K, tolerance)) is not None
+    }
     turning = ~fixed
     turning[list(along)] = False
     shapes = dict[int, Shape | None]()
     for m, standing in along.items():
         for k in range(first[m], first[m + 1]):
-            area = _standing(*standing, float(levels[k]), tolerance)
+            area = _standing_area(*standing, float(levels[k]), tolerance)
             shapes[k] = None if area is None else area.polygon
     points, count = _outlines(moves, K, heights, fixed, tolerance)
     at = np.flatnonzero(np.repeat(fixed, np.diff(first)))
-    loops, ends, general = _turning(moves, K, heights, turning, tolerance)
+    loops, ends, general = _single_loop_layers(moves, K, heights, turning, tolerance)
     shapes |= general
     # both tables in the order of their points
     which = np.concatenate([at[count > 0], np.array(list(ends), dtype=np.int64)])
@@ -198,7 +204,10 @@ def _outlines(
     first = np.cumsum([0, *(len(heights[m]) for m in which)])
     if not len(levels):
         return np.empty((0, 2)), np.empty(0, dtype=np.int64)
-    tips, axes = _filled([moves[m].tip for m in which]), _filled([moves[m].axis for m in which])[:, 0]
+    tips, axes = (
+        _fill_coefficients([moves[m].tip for m in which]),
+        _fill_coefficients([moves[m].axis for m in which])[:, 0],
+    )
     axes = axes / np.linalg.norm(axes, axis=1)[:, None]
     half = tips[:, 1] if tips.shape[1] > 1 else np.zeros((len(which), 3))
     out, count = np.empty((max(2048, 128 * len(levels)), 2)), np.empty(len(levels), dtype=np.int64)
@@ -210,7 +219,7 @@ def _outlines(
     return out[: int(count.clip(0).sum())], count
 
 
-def _turning(
+def _single_loop_layers(
     moves: Sequence[Move], K: Floats, heights: Sequence[Floats], some: NDArray[np.bool_], tolerance: float
 ) -> tuple[Floats, dict[int, tuple[int, int]], dict[int, Shape | None]]:
     """Layers of ``some`` moves whose boundary is one loop: points, and the first and the number of those of each layer;
@@ -230,7 +239,7 @@ def _turning(
         if whole[i]:
             rings[at[i]] = (a, n)
         else:
-            shapes[at[i]] = _thick(_untangled(shapely.Polygon(buffer[a : a + n, :2])), tolerance)
+            shapes[at[i]] = _thick(_untangle_loop(shapely.Polygon(buffer[a : a + n, :2])), tolerance)
     for i in np.flatnonzero(count == trace.GENERAL).tolist():
         move, h = own[int(np.searchsorted(starts, i, "right")) - 1], float(levels[i])
         edges = _candidates(move, K, h, tolerance, max(_KNOTS, 4 * int(knots[i])))
@@ -252,7 +261,7 @@ def _plane_areas(points: Floats, table: Ints, which: Ints, shapes: dict[int, Sha
     return PlaneAreas(points, table, first)
 
 
-def _along(move: Move, K: Floats, tolerance: float) -> tuple[Move, Floats] | None:
+def _as_upright_move(move: Move, K: Floats, tolerance: float) -> tuple[Move, Floats] | None:
     """A cylinder that moves along its own leaning axis as a longer one that stands at the lower end, or None.
 
     Its flank slides along itself, so that every point of it and none would be a grazing point.
@@ -272,7 +281,7 @@ def _along(move: Move, K: Floats, tolerance: float) -> tuple[Move, Floats] | Non
     return Move((move.tip[0] - abs(half) * axis)[None], axis[None]), longer
 
 
-def _standing(move: Move, K: Floats, h: float, tolerance: float) -> CoveredArea | None:
+def _standing_area(move: Move, K: Floats, h: float, tolerance: float) -> CoveredArea | None:
     """Return the area of a layer that a standing cutter covers: its section."""
     if not 0.0 < tolerance < math.inf:
         raise InputError(f"covered: tolerance = {tolerance:g} mm: must be above 0")
@@ -291,7 +300,7 @@ def _loops(
     if not np.isfinite(heights).all():
         bad = float(heights[~np.isfinite(heights)][0])
         raise InputError(f"covered: height = {bad:g} mm: must be finite")
-    tips, axes = _filled([m.tip for m in moves]), _filled([m.axis for m in moves])
+    tips, axes = _fill_coefficients([m.tip for m in moves]), _fill_coefficients([m.axis for m in moves])
     count, knots = np.empty(len(heights), np.int64), np.empty(len(heights), np.int64)
     whole = np.empty(len(heights), np.bool_)
     buffer, still = np.empty((max(2048, 128 * len(heights)), 12)), STILL * tolerance
@@ -300,7 +309,7 @@ def _loops(
     return buffer, count, knots, whole
 
 
-def _filled(coefficients: Sequence[Floats]) -> Floats:
+def _fill_coefficients(coefficients: Sequence[Floats]) -> Floats:
     """(m, n, 3) coefficients of many moves, with zeros up to the same order."""
     out = np.zeros((len(coefficients), max((len(c) for c in coefficients), default=1), 3))
     for m, c in enumerate(coefficients):
@@ -308,7 +317,7 @@ def _filled(coefficients: Sequence[Floats]) -> Floats:
     return out
 
 
-def _untangled(loop: shapely.Polygon) -> Shape:
+def _untangle_loop(loop: shapely.Polygon) -> Shape:
     """Return the area that a counter-clockwise loop, which may cross itself, surrounds at least once."""
     return cast(Shape, shapely.buffer(loop, 0.0))
 
@@ -373,7 +382,7 @@ def whole_section(move: Move, K: Floats, h: float, t: float, tolerance: float) -
     return buffer[:n].copy()
 
 
-def _noded(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> CoveredArea | None:
+def _general_area(move: Move, K: Floats, h: float, tolerance: float, knots: int) -> CoveredArea | None:
     """The general case, with the origin of each edge."""
     edges = _candidates(move, K, h, tolerance, knots)
     whole = _noded_shape(edges, move, K, h, tolerance)

@@ -102,11 +102,11 @@ def rings_of_polygons(area: shapely.Geometry, edges: Floats) -> tuple[Ring, ...]
         for k, line in enumerate((polygon.exterior, *polygon.interiors)):
             p = shapely.get_coordinates(line)[:-1]
             p = p if bool(shapely.is_ccw(line)) == (k == 0) else p[::-1]
-            out.append(_traced(p, edges, tree))
+            out.append(_trace_ring(p, edges, tree))
     return tuple(out)
 
 
-def _traced(p: Floats, edges: Floats, tree: shapely.STRtree) -> Ring:
+def _trace_ring(p: Floats, edges: Floats, tree: shapely.STRtree) -> Ring:
     q = np.roll(p, -1, axis=0)
     pairs = tree.query_nearest(shapely.points(0.5 * (p + q)), all_matches=False)
     of = np.empty(len(p), np.int64)

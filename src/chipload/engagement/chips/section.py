@@ -45,7 +45,7 @@ def cutter_numbers(cutter: Cutter) -> Floats:
     return out
 
 
-def lengthened(K: Floats, length: float) -> Floats:
+def lengthen_flutes(K: Floats, length: float) -> Floats:
     """The numbers of a cutter whose flutes extend to another length [mm] along its flank."""
     out = K.copy()
     out[10], out[11] = length, K[9] + length * K[8]

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from chipload.lazy import attach
 
 if TYPE_CHECKING:
-    from chipload.engagement.immersion.immersion import Section, immersed, tool_frame
+    from chipload.engagement.immersion.immersion import Section, engagement_rows, tool_frame
 
-__all__ = ["Section", "immersed", "tool_frame"]
+__all__ = ["Section", "engagement_rows", "tool_frame"]
 
 __getattr__, __dir__ = attach(
     __name__,
     {
-        "immersion": "Section immersed tool_frame",
+        "immersion": "Section engagement_rows tool_frame",
     },
 )

@@ -95,7 +95,7 @@ def layer_of(z, bounds):
 
 
 @njit(cache=True, nogil=True)
-def below(z, bounds):
+def layer_below(z, bounds):
     """The layer whose section lies next below z, the lowest one where there is none; -1 outside the layers."""
     l = layer_of(z, bounds)
     if l > 0 and z < 0.5 * (bounds[l] + bounds[l + 1]):
@@ -210,7 +210,7 @@ def band(
         return total
     height = tip[2] + z
     middle = 0.5 * (bounds[layer] + bounds[layer + 1])
-    under = below(height, bounds)
+    under = layer_below(height, bounds)
     steep = slice_[7] - slice_[6] > LEVEL
     has = steep and on_surface(middle - height, rho, sk, ck, r, widest, q)
     always = False
@@ -258,7 +258,7 @@ def band(
 
 @njit(cache=True, nogil=True)
 def upright(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
-    """Tooth engagement of a step of an upright cutter, see :func:`immersed`."""
+    """Tooth engagement of a step of an upright cutter, see :func:`step_engagement`."""
     breaks = np.empty(4 * len(edges) + 16)
     place = np.empty(4)
     low, high = np.empty(4), np.empty(4)
@@ -337,12 +337,12 @@ def meets(phi, tip, frame, speed, turn, slice_, bounds, start, edges):
             x += shift * nu[0] / flat
             y += shift * nu[1] / flat
             return covers(x, y, edges, start[l], start[l + 1])
-    l = below(height, bounds)
+    l = layer_below(height, bounds)
     return covers(x, y, edges, start[l], start[l + 1])
 
 
 @njit(cache=True, nogil=True)
-def changed(a, b, state, tip, frame, speed, turn, slice_, bounds, start, edges):
+def find_change(a, b, state, tip, frame, speed, turn, slice_, bounds, start, edges):
     """Where between a and b the state changes that is ``state`` at a."""
     for _ in range(HALVINGS):
         middle = 0.5 * (a + b)
@@ -354,8 +354,10 @@ def changed(a, b, state, tip, frame, speed, turn, slice_, bounds, start, edges):
 
 
 @njit(cache=True, nogil=True)
-def leaning(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
-    """Tooth engagement of a step of a leaning cutter, see :func:`immersed`: sampled over phi, each change bisected."""
+def leaning_engagement(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
+    """Tooth engagement of a step of a leaning cutter, see :func:`step_engagement`: sampled over phi, each change
+    bisected.
+    """
     h = np.empty(3)
     total = 0
     for k in range(len(slices)):
@@ -384,7 +386,7 @@ def leaning(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
                 continue
             end = begin + 2.0 * half
             if i < number:
-                end = changed(a, a + pitch, before, tip, frame, speed, turn, one, bounds, start, edges)
+                end = find_change(a, a + pitch, before, tip, frame, speed, turn, one, bounds, start, edges)
             if before and end - opened > SHORT:
                 total = add_row(rows, owner, total, opened, end, one[0], one[1], h, k)
                 if total < 0:
@@ -395,7 +397,7 @@ def leaning(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
 
 
 @njit(cache=True, nogil=True)
-def immersed(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
+def step_engagement(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner):
     """Tooth engagement of one step: fills ``rows`` (m, 7) and ``owner`` (m,), returns their number, -1 where they are
     too few.
 
@@ -404,4 +406,4 @@ def immersed(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner)
     """
     if math.hypot(frame[2, 0], frame[2, 1]) < UPRIGHT:
         return upright(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner)
-    return leaning(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner)
+    return leaning_engagement(tip, frame, speed, turn, slices, bounds, start, edges, rows, owner)

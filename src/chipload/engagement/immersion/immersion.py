@@ -97,7 +97,7 @@ def _table(cutter: Slices) -> Floats:
     return out
 
 
-def immersed(
+def engagement_rows(
     tip: ArrayLike,
     frame: ArrayLike,
     feed: ArrayLike,
@@ -133,7 +133,7 @@ def immersed(
     room = 4 * len(table) + 16
     while True:
         rows, owner = np.empty((room, 7)), np.empty(room, dtype=np.int64)
-        count = _immersion.immersed(
+        count = _immersion.step_engagement(
             np.asarray(tip, dtype=np.float64),
             R,
             np.asarray(feed, dtype=np.float64),

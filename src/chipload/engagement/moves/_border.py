@@ -30,8 +30,8 @@ ARCS, CLOSE = 60, 2e-6
 
 
 @njit(cache=True, nogil=True)
-def halved(px, py, z, rho, T, cu, su, cs, ss, m, c):
-    """:func:`crossing` of any move by halving."""
+def halve_to_crossing(px, py, z, rho, T, cu, su, cs, ss, m, c):
+    """:func:`crossing_direction` of any move by halving."""
     near = BESIDE / math.sqrt((cu - cs) ** 2 + (su - ss) ** 2)
     low = 0.0
     high = 1.0
@@ -61,7 +61,7 @@ def halved(px, py, z, rho, T, cu, su, cs, ss, m, c):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def crossing(px, py, z, rho, T, cu, su, cs, ss, e, index):
+def crossing_direction(px, py, z, rho, T, cu, su, cs, ss, e, index):
     """Direction at which the volume that move e swept begins, between the directions u, not swept by it, and s, swept;
     and a direction just before it, not swept.
 
@@ -127,7 +127,7 @@ def crossing(px, py, z, rho, T, cu, su, cs, ss, e, index):
             bc = cu
             bs = su
     else:
-        dc, ds, bc, bs = halved(px, py, z, rho, T, cu, su, cs, ss, moves[e], cutters[of[e]])
+        dc, ds, bc, bs = halve_to_crossing(px, py, z, rho, T, cu, su, cs, ss, moves[e], cutters[of[e]])
     return dc, ds, bc, bs
 
 
@@ -148,7 +148,7 @@ def border(px, py, z, rho, T, cm, sm, ca, sa, e, index):
             dc = bc
             ds = bs
         else:
-            dc, ds, bc, bs = crossing(px, py, z, rho, T, cm, sm, ca, sa, e, index)
+            dc, ds, bc, bs = crossing_direction(px, py, z, rho, T, cm, sm, ca, sa, e, index)
         f = what_is(px + rho * (bc * T[0] - bs * T[1]), py + rho * (bc * T[1] + bs * T[0]), z, index, e)
         if f == MATERIAL:
             if e >= 0:
@@ -178,7 +178,7 @@ def ridge(px, py, z, rho, T, ca, sa, cb, sb, ea, eb, index):
         y = py + rho * (cb * T[1] + sb * T[0])
         if swept_by(ea, x, y, z, index):
             return False, 0.0, 0.0
-        _, _, bc, bs = crossing(px, py, z, rho, T, cb, sb, ca, sa, ea, index)
+        _, _, bc, bs = crossing_direction(px, py, z, rho, T, cb, sb, ca, sa, ea, index)
         f = what_is(px + rho * (bc * T[0] - bs * T[1]), py + rho * (bc * T[1] + bs * T[0]), z, index, eb)
         if f == MATERIAL:
             return True, bc, bs

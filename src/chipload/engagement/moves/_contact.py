@@ -15,10 +15,10 @@ import math
 from numba import njit, types
 
 from chipload.engagement.moves._circle import ALONG, APART, intervals
-from chipload.engagement.moves._edge import FLANK, SAME, add_slice, candidates, sliced, windows
+from chipload.engagement.moves._edge import FLANK, SAME, add_slice, candidates, slice_profile, windows
 from chipload.engagement.moves._flank import BEGIN, COUNT, divide_flank
 from chipload.engagement.moves._sweep import CUTTERS, keep
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 
 PI = math.pi
 #: greatest number of heights of the stock at which the flank is divided: those of cells, above which the slices are
@@ -85,7 +85,7 @@ def add_ranges(table, k, spans, begin, found, place, end, p, u, T, slices, rows,
     place : number of the slice, by which slices follow one another
     end : of the front [rad]
     first_row : of the instant
-    p, u, T, slices, rows, owner, mine, at, out : see :func:`engaged`
+    p, u, T, slices, rows, owner, mine, at, out : see :func:`find_engagement`
     """
     row = at[0]
     have = at[1]
@@ -157,7 +157,7 @@ def begin_at_border(p, T, table, k, inner, low, high, end, apart, index, spans):
 
 
 @njit(cache=True, nogil=True)
-def engaged(
+def find_engagement(
     p, u, c, T, parts, flank, index, near, levels, scratch, spans, mine, room, held, slices, rows, owner, at, out
 ):  # fmt: skip
     """Find the engagement at a tip position; False: no room in ``rows`` or ``slices``.
@@ -174,16 +174,16 @@ def engaged(
         flutes, length of the edge [mm]
     """
     # what a call passes counts again
-    index = borrowed(index)
-    p, u, T, near, levels, scratch, spans = borrowed((p, u, T, near, levels, scratch, spans))
-    held = borrowed(held)
+    index = borrow_arrays(index)
+    p, u, T, near, levels, scratch, spans = borrow_arrays((p, u, T, near, levels, scratch, spans))
+    held = borrow_arrays(held)
     out[:] = 0.0
     hu = math.hypot(u[0], u[1])
     grid = index[0]
     count = candidates(p, T, u[2] >= 0.0, c, grid, index[1], index[2], near)
     if count == 0:
         return True
-    number, askew = sliced(p, c, near, count, u, parts, flank, levels, index, scratch)
+    number, askew = slice_profile(p, c, near, count, u, parts, flank, levels, index, scratch)
     apart = 2.5 * min(grid[2], grid[3])
     # above the flutes
     add_slice(scratch, number, 0.0, 0.0, c.wide, c.height, 1.0, 0.0, c.height, c.wide, c.wide)
@@ -280,10 +280,10 @@ def step_engaged(k, frame, instants, state, index, work, parts, flank, slices, r
     Parameters: see :func:`run`.
     """
     # what a call passes counts again
-    index = borrowed(index)
-    near, levels, scratch, spans, mine, room, p, at, held = borrowed(work)
-    frame, instants, state, parts, flank = borrowed((frame, instants, state, parts, flank))
-    slices, rows, owner, entry, out = borrowed((slices, rows, owner, entry, out))
+    index = borrow_arrays(index)
+    near, levels, scratch, spans, mine, room, p, at, held = borrow_arrays(work)
+    frame, instants, state, parts, flank = borrow_arrays((frame, instants, state, parts, flank))
+    slices, rows, owner, entry, out = borrow_arrays((slices, rows, owner, entry, out))
     q = state[0] + k
     m = index[6][q]
     c = index[8][index[7][q]]
@@ -304,7 +304,7 @@ def step_engaged(k, frame, instants, state, index, work, parts, flank, slices, r
         if entries == len(out):
             return False
         before = at[0]
-        if not engaged(
+        if not find_engagement(
             p, m[3:], c, frame[k], parts, longest, index, near, levels, scratch, spans, mine, room, held,
             slices, rows, owner, at, out[entries],
         ):  # fmt: skip
@@ -332,7 +332,7 @@ def step_engaged(k, frame, instants, state, index, work, parts, flank, slices, r
                 return False
             rows_before = at[0]
             slices_before = at[1]
-            if not engaged(
+            if not find_engagement(
                 p, m[3:], c, frame[k], parts, longest, index, near, levels, scratch, spans, mine,
                 room, held, slices, rows, owner, at, out[entries],
             ):  # fmt: skip
@@ -384,7 +384,7 @@ def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, 
     index : see :func:`chipload.engagement.moves._sweep.what_is`; the moves of these steps are in it
     work : working arrays, see ``WORK``
     parts, flank : slices of a corner; longest slice of the flank of each cutter [mm]
-    slices, rows, owner, out : see :func:`engaged`
+    slices, rows, owner, out : see :func:`find_engagement`
     entry : (m, 3) step, instant and first row of each instant that cuts
     used : (1,) room taken of the lists of the index
 
@@ -393,11 +393,11 @@ def run(begin, frame, instants, state, index, work, parts, flank, slices, rows, 
     The number of steps, or the one at which room ran out: ``state[1]`` 0: of rows, 1: of lists.
     """
     # the caller keeps all of them
-    index = borrowed(index)
-    work = borrowed(work)
-    frame, instants, state, parts, flank = borrowed((frame, instants, state, parts, flank))
-    slices, rows, owner = borrowed((slices, rows, owner))
-    entry, out, used = borrowed((entry, out, used))
+    index = borrow_arrays(index)
+    work = borrow_arrays(work)
+    frame, instants, state, parts, flank = borrow_arrays((frame, instants, state, parts, flank))
+    slices, rows, owner = borrow_arrays((slices, rows, owner))
+    entry, out, used = borrow_arrays((entry, out, used))
     n = len(instants)
     for k in range(begin, n):
         if state[1] == 0 and not step_engaged(

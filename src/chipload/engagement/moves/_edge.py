@@ -11,7 +11,7 @@ from numba import njit
 
 from chipload.cutter.record import FLANK_LINE, FLAT
 from chipload.engagement.moves._sweep import profile
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 
 PI = math.pi
 #: heights closer than this count as one [mm]
@@ -159,12 +159,12 @@ def add_arc(out, k, c, i, k0, k1, mid):
 
 
 @njit(cache=True, nogil=True)
-def sliced(p, c, near, count, u, parts, flank, levels, index, out):
+def slice_profile(p, c, near, count, u, parts, flank, levels, index, out):
     """Cut the part of the profile that the candidates touch into slices: their number, and whether the contact of the
     flank may change between its slices and its ends.
     """
     # what a call passes counts again
-    index = borrowed(index)
+    index = borrow_arrays(index)
     inner = math.inf
     outer = 0.0
     top = 0.0
@@ -179,7 +179,7 @@ def sliced(p, c, near, count, u, parts, flank, levels, index, out):
         if c.line[i] == FLANK_LINE:
             if outer >= c.rho[i] and top > c.z[i]:
                 many = len(parts) * (DOWN if u[2] < 0.0 or c.run[i] > 0.0 else 1)
-                return flanked(p, c, i, near, count, top, many, flank, levels, index, out, k)
+                return slice_flank(p, c, i, near, count, top, many, flank, levels, index, out, k)
         elif c.line[i] > 0:
             if inner < c.rho_to[i] and outer > c.rho[i] and top > c.z[i] and (u[2] < 0.0 or c.rise[i] > 0.0):
                 k = bottom_sliced(c, i, max(inner, c.rho[i]), min(outer, c.rho_to[i]), top, len(parts), out, k)
@@ -244,7 +244,7 @@ def floors_of_moves(p, c, at, near, count, top, levels, n, index):
     ``n`` of ``levels``, the lowest of them where there is no room for all: the number of levels, and whether there are
     floors that are not level.
     """
-    index = borrowed(index)
+    index = borrow_arrays(index)
     lists = index[3]
     kept = index[4]
     moves = index[6]
@@ -292,12 +292,12 @@ def floors_of_moves(p, c, at, near, count, top, levels, n, index):
 
 
 @njit(cache=True, nogil=True)
-def flanked(p, c, at, near, count, top, pieces, flank, levels, index, out, k):
+def slice_flank(p, c, at, near, count, top, pieces, flank, levels, index, out, k):
     """Slices of the flank, the line ``at``: between the heights of the stock beside it, none longer than ``flank``;
     where the cells have too many heights, ``pieces`` equal ones between the floors of level moves. Returns as
-    :func:`sliced`.
+    :func:`slice_profile`.
     """
-    index = borrowed(index)
+    index = borrow_arrays(index)
     n = 2
     levels[0] = c.z[at]
     levels[1] = top

@@ -16,7 +16,7 @@ from numba import njit
 from chipload.engagement.moves._circle import APART, intervals
 from chipload.engagement.moves._edge import FLANK, add_slice
 from chipload.engagement.moves._sweep import AIR, from_track, profile, what_is
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 
 PI = math.pi
 #: borders of two circles are alike within this share of the greatest range in contact, and this angle more [rad]
@@ -52,8 +52,8 @@ def floor_between(p, T, rho, z, spans, a, many, b, others, index):
     a on that are not among those of the circle, from row b on; infinite where there is none.
     """
     # what a call passes counts again
-    index = borrowed(index)
-    spans = borrowed(spans)
+    index = borrow_arrays(index)
+    spans = borrow_arrays(spans)
     for i in range(many):
         for k in range(1, 8, 3):
             psi = spans[a + i, 0] + 0.125 * k * (spans[a + i, 1] - spans[a + i, 0])
@@ -87,8 +87,8 @@ def divide_flank(p, T, c, first, last, end, askew, scratch, index, spans, held):
     held : (m, 12) written: the pieces, in the columns of a slice but for ``BEGIN`` and ``COUNT``; room for
         ``SEARCHES`` more than there are slices, and as many samples behind them
     """
-    index = borrowed(index)
-    p, T, scratch, spans, held = borrowed((p, T, scratch, spans, held))
+    index = borrow_arrays(index)
+    p, T, scratch, spans, held = borrow_arrays((p, T, scratch, spans, held))
     sk = scratch[first, 4]
     ck = scratch[first, 5]
     apart = 2.5 * min(index[0][2], index[0][3])

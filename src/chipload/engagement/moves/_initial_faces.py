@@ -18,7 +18,7 @@ MARGIN = 1e-7
 
 
 @njit("void(float64[:,::1], float64[::1], int64[::1], int64[::1], int32[::1])", cache=True, nogil=True)
-def over(faces, grid, shape, first, ids):
+def faces_over_cells(faces, grid, shape, first, ids):
     """Faces whose boxes lie over each cell: ``first`` (cells + 1,) and, where it has room for them, ``ids``."""
     fill = len(ids) > 0
     if not fill:

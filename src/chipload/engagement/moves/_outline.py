@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit, types
 
 from chipload.engagement.moves._contact import INDEX
-from chipload.engagement.moves._sweep import AIR, EPS, MATERIAL, above, place, swept
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._sweep import AIR, EPS, MATERIAL, grid_height_above, place, swept
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 
 #: halvings of a side
 HALVINGS = 14
@@ -40,7 +40,7 @@ def swept_in(cell, x, y, z, index, tops, hint):
     if hint >= 0 and swept(index[6][hint], index[8][index[7][hint]], x, y, z):
         return hint
     at = index[3][cell, 0]
-    high = above(z, index[0])
+    high = grid_height_above(z, index[0])
     for k in range(at + index[3][cell, 1] - 1, at - 1, -1):
         e = index[4][k]
         if index[5][k] < high and e != hint and swept(index[6][e], index[8][index[7][e]], x, y, z):
@@ -49,7 +49,7 @@ def swept_in(cell, x, y, z, index, tops, hint):
 
 
 @njit(cache=True, nogil=True)
-def turning(case):
+def outline_sides(case):
     """Sides (from, to) of a square that its outlines go through: bottom 0, right 1, top 2, left 3; -1: none. Bits of
     ``case``: corners (0, 0), (1, 0), (1, 1), (0, 1).
     """
@@ -95,11 +95,11 @@ _B2 = types.boolean[:, ::1]
 
 
 @njit(types.void(types.float64, _F1, _F1, INDEX, _F1, _B2), cache=True, nogil=True)
-def marked(z, xs, ys, index, tops, inside):
+def mark_nodes(z, xs, ys, index, tops, inside):
     """Which nodes of a net were swept at a height; ``xs``, ``ys``: nodes, the outermost beside the body, not swept."""
     # the caller keeps all of them
-    index = borrowed(index)
-    tops = borrowed(tops)
+    index = borrow_arrays(index)
+    tops = borrow_arrays(tops)
     inside[:] = False
     grid = index[0]
     n = len(xs)
@@ -121,7 +121,7 @@ def marked(z, xs, ys, index, tops, inside):
 
 
 @njit(types.int64(_B2, _I1, _I1, _I1), cache=True, nogil=True)
-def traced(inside, onward, sides, first):
+def trace_rings(inside, onward, sides, first):
     """Rings around the marked nodes: the sides that they cross and where each begins; how many, -1 where there is no
     room. ``onward``: room for a number a side.
     """
@@ -133,7 +133,7 @@ def traced(inside, onward, sides, first):
             if case == 0 or case == 15:
                 continue
             side = (2 * (i * m + j), 2 * ((i + 1) * m + j) + 1, 2 * (i * m + j + 1), 2 * (i * m + j) + 1)
-            a, b, c, d = turning(case)
+            a, b, c, d = outline_sides(case)
             onward[side[a]] = side[b]
             if c >= 0:
                 onward[side[c]] = side[d]
@@ -174,11 +174,11 @@ def ends_of(side, xs, ys, inside):
 
 
 @njit(types.void(types.float64, _F1, _F1, INDEX, _F1, _B2, _I1, _F2), cache=True, nogil=True)
-def placed(z, xs, ys, index, tops, inside, sides, points):
+def place_borders(z, xs, ys, index, tops, inside, sides, points):
     """Where the borders on sides of the net are: ``points`` (n, 2)."""
     # the caller keeps all of them
-    index = borrowed(index)
-    tops = borrowed(tops)
+    index = borrow_arrays(index)
+    tops = borrow_arrays(tops)
     for p in range(len(sides)):
         lx, ly, hx, hy, border = ends_of(sides[p], xs, ys, inside)
         for _ in range(0 if border else HALVINGS):

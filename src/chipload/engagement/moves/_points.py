@@ -10,14 +10,14 @@ from numba import njit, types
 
 from chipload.engagement.moves._contact import INDEX
 from chipload.engagement.moves._sweep import MATERIAL, what_is
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 
 
 @njit(types.void(types.float64[:, ::1], INDEX, types.boolean[::1]), cache=True, nogil=True)
-def marked(points, index, mask):
+def mark_points(points, index, mask):
     """Which points (n, 3) are in material."""
     # the caller keeps all of them
-    index = borrowed(index)
+    index = borrow_arrays(index)
     hint = -1
     for k in range(len(points)):
         by = what_is(points[k, 0], points[k, 1], points[k, 2], index, hint)

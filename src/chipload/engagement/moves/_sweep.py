@@ -60,7 +60,7 @@ def slope(c, rho):
 
 
 @njit(cache=True, nogil=True)
-def within(qx, qy, ux, uy, h2, along, radius):
+def times_within(qx, qy, ux, uy, h2, along, radius):
     """Times first, last in 0..1 between which the axis is nearer to a point than ``radius``; none: first > last.
 
     (qx, qy) the point from the start of the move, (ux, uy) the motion, h2 its square, along their product [mm, mm^2].
@@ -76,7 +76,7 @@ def within(qx, qy, ux, uy, h2, along, radius):
 
 
 @njit(cache=True, nogil=True)
-def clamped(a, b):
+def clamped_quotient(a, b):
     """Quotient a / b within 0..1; 0 if a is not above 0."""
     if a <= 0.0:
         return 0.0
@@ -99,10 +99,10 @@ def from_ball(m, r, x, y, z):
     uz = m[5]
     h2 = ux * ux + uy * uy
     along = qx * ux + qy * uy
-    t = clamped(along + w * uz, h2 + uz * uz)
+    t = clamped_quotient(along + w * uz, h2 + uz * uz)
     dz = w - t * uz
     if dz > 0.0:
-        t = clamped(along, h2)
+        t = clamped_quotient(along, h2)
         dz = 0.0
     dx = qx - t * ux
     dy = qy - t * uy
@@ -175,7 +175,7 @@ def from_track(m, first, last, x, y):
     """Square of the least distance [mm^2], in the plan, of a point (x, y) from the axis at the times first..last."""
     qx = x - m[0]
     qy = y - m[1]
-    t = min(max(clamped(qx * m[3] + qy * m[4], m[3] * m[3] + m[4] * m[4]), first), last)
+    t = min(max(clamped_quotient(qx * m[3] + qy * m[4], m[3] * m[3] + m[4] * m[4]), first), last)
     dx = qx - t * m[3]
     dy = qy - t * m[4]
     return dx * dx + dy * dy
@@ -197,17 +197,17 @@ def swept(m, c, x, y, z):
     uz = m[5]
     h2 = ux * ux + uy * uy
     along = qx * ux + qy * uy
-    first, last = within(qx, qy, ux, uy, h2, along, c.wide + EPS)
+    first, last = times_within(qx, qy, ux, uy, h2, along, c.wide + EPS)
     if first > last:
         return False
-    return below(c, qx, qy, w + EPS, ux, uy, uz, h2, along, first, last)
+    return falls_below_zero(c, qx, qy, w + EPS, ux, uy, uz, h2, along, first, last)
 
 
 @njit(cache=True, nogil=True)
-def below(c, qx, qy, w, ux, uy, uz, h2, along, first, last):
+def falls_below_zero(c, qx, qy, w, ux, uy, uz, h2, along, first, last):
     """Whether the convex F is below 0 at a time first..last: tangents at both ends bound it from below.
 
-    w is the height of the point over the tip at the start; the other arguments are those of :func:`within`.
+    w is the height of the point over the tip at the start; the other arguments are those of :func:`times_within`.
     """
     value = np.empty(2)
     rate = np.empty(2)
@@ -309,7 +309,7 @@ def swept_by(e, x, y, z, index):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def above(z, grid):
+def grid_height_above(z, grid):
     """Height z in steps of the grid, rounded so that it is above the stored reach of every move that comes below z.
 
     Moves that come below the initial body have the reach 0, and are below every height.
@@ -339,7 +339,7 @@ def what_is(x, y, z, index, hint):
     reach = index[5]
     lists = index[3]
     at = lists[cell, 0]
-    high = above(z, grid)
+    high = grid_height_above(z, grid)
     for k in range(at + lists[cell, 1] - 1, at - 1, -1):
         if reach[k] < high:
             e = kept[k]
@@ -443,7 +443,7 @@ def keep(q, m, c, grid, shape, level, list_at, kept, reach, used):
             if count > 0 and kept[at + count - 1] == q:
                 continue
             if count == list_at[cell, 2] or count >= 2 * list_at[cell, 3] + SLACK:
-                count = thinned(at, count, above(level[cell, 1], grid), kept, reach)
+                count = thin_list(at, count, grid_height_above(level[cell, 1], grid), kept, reach)
                 list_at[cell, 1] = count
                 list_at[cell, 3] = count
             if count == list_at[cell, 2]:
@@ -466,7 +466,7 @@ def keep(q, m, c, grid, shape, level, list_at, kept, reach, used):
 
 
 @njit(cache=True, nogil=True)
-def thinned(at, count, ceil, kept, reach):
+def thin_list(at, count, ceil, kept, reach):
     """Drop the moves of the list at ``at`` that do not come below ``ceil``, in steps; how many of ``count`` stay."""
     to = at
     for k in range(at, at + count):
@@ -478,7 +478,7 @@ def thinned(at, count, ceil, kept, reach):
 
 
 @njit(f"int64(int64[::1], float64[::1], {_I2}, int32[::1], uint16[::1], {_F2})", cache=True, nogil=True)
-def packed(order, grid, list_at, kept, reach, level):
+def pack_lists(order, grid, list_at, kept, reach, level):
     """Close the gaps between the lists in their own arrays; return the room that they take.
 
     ``order``: the cells in the order of their lists, so that no list overwrites a later one.
@@ -486,7 +486,7 @@ def packed(order, grid, list_at, kept, reach, level):
     used = 0
     for cell in order:
         at = list_at[cell, 0]
-        count = thinned(at, list_at[cell, 1], above(level[cell, 1], grid), kept, reach)
+        count = thin_list(at, list_at[cell, 1], grid_height_above(level[cell, 1], grid), kept, reach)
         for k in range(count):
             kept[used + k] = kept[at + k]
             reach[used + k] = reach[at + k]

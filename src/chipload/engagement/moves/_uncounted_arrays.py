@@ -14,7 +14,7 @@ from numba.extending import intrinsic
 
 
 @intrinsic
-def borrowed(typing: Any, array: Any) -> Any:
+def borrow_arrays(typing: Any, array: Any) -> Any:
     """The array itself, or a tuple of arrays, without an owner."""
 
     def loose(context: Any, builder: Any, kind: Any, value: Any) -> Any:

@@ -46,7 +46,7 @@ def rings(inside: NDArray[np.bool_]) -> tuple[Ints, Ints]:
     onward, room = np.empty(2 * inside.size, dtype=np.int64), 4096
     while True:
         sides, first = np.empty(room, dtype=np.int64), np.zeros(room, dtype=np.int64)
-        count = int(_outline.traced(inside, onward, sides, first))
+        count = int(_outline.trace_rings(inside, onward, sides, first))
         if count >= 0:
             return sides[: first[count]], first[: count + 1]
         room *= 4

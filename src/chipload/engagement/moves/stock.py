@@ -244,9 +244,9 @@ class MoveStock:
     def _body(self, body: trimesh.Trimesh) -> None:
         """Faces over each cell, and what they leave open there."""
         self.faces = faces_of(body)
-        initial.over(self.faces, self.grid, self.shape, self.first, self.ids)
+        initial.faces_over_cells(self.faces, self.grid, self.shape, self.first, self.ids)
         self.ids = np.empty(int(self.first[-1]), dtype=np.int32)
-        initial.over(self.faces, self.grid, self.shape, self.first, self.ids)
+        initial.faces_over_cells(self.faces, self.grid, self.shape, self.first, self.ids)
         initial.levels(self.faces, self.grid, self.shape, self.first, self.ids, self.level)
         initial.mark_upright_faces(walls_of(body), self.grid, self.shape, self.level)
 
@@ -271,7 +271,7 @@ class MoveStock:
     def _grow(self) -> None:
         """Pack the lists where they are, less what is no longer needed, and make room for more of them."""
         order = np.argsort(self.lists[:, 0], kind="stable")
-        used = int(_sweep.packed(order, self.grid, self.lists, self.kept, self.reach, self.level))
+        used = int(_sweep.pack_lists(order, self.grid, self.lists, self.kept, self.reach, self.level))
         need = used + ROOM[0] + max(used // 8, min(used // 2, ROOM[1]))
         if need > len(self.kept):
             # one after the other: the old array of the first is free when the second is made
@@ -369,7 +369,7 @@ class MoveStock:
         """Return which points (n, 3) [mm] are in material: in the initial body, and in no volume that a move swept."""
         at = np.ascontiguousarray(points, dtype=np.float64)
         inside = np.empty(len(at), dtype=np.bool_)
-        points_in.marked(at, self._index(), inside)
+        points_in.mark_points(at, self._index(), inside)
         # of a stock thinner than a cell the one cell reaches beyond it
         return inside & (at >= self.low).all(axis=1) & (at <= self.high).all(axis=1)
 
@@ -387,8 +387,8 @@ class MoveStock:
         """
         xs, ys = nodes_of(self.low, self.high, float(self.grid[2:4].min()), float(self.sides.min()), tolerance)
         inside, index = np.empty((len(xs), len(ys)), dtype=np.bool_), self._index()
-        outline.marked(z, xs, ys, index, self.tops, inside)
+        outline.mark_nodes(z, xs, ys, index, self.tops, inside)
         sides, first = rings(inside)
         points = np.empty((len(sides), 2))
-        outline.placed(z, xs, ys, index, self.tops, inside, sides, points)
+        outline.place_borders(z, xs, ys, index, self.tops, inside, sides, points)
         return area_of(points, first, tolerance)

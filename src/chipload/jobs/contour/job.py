@@ -60,7 +60,7 @@ def load(path: Path, table: ContourJobTable, overrides: Sequence[str]) -> Contou
         Keys do not go together.
     """
     folder, errors = path.parent, Errors()
-    errors.texts += missing(table.model_dump(exclude_none=True))
+    errors.texts += missing_keys(table.model_dump(exclude_none=True))
     sources, tools = sources_and_cutters(table, folder, errors, "machine", "material")
     errors.texts += _contradictions(table, tools)
     errors.refuse()
@@ -70,7 +70,7 @@ def load(path: Path, table: ContourJobTable, overrides: Sequence[str]) -> Contou
     )  # fmt: skip
 
 
-def missing(values: Mapping[str, Any]) -> list[str]:
+def missing_keys(values: Mapping[str, Any]) -> list[str]:
     """The keys that an operation lacks by its kind; ``values`` are those of the file."""
     return [
         f"operation.{k}.{key}: missing: state it (kind = {op['kind']} needs it)"

@@ -67,7 +67,7 @@ def load(path: Path, table: DistortionJobTable, overrides: Sequence[str]) -> Dis
         Keys do not go together, or the stress is not that of the plate.
     """
     errors = Errors()
-    errors.texts += missing(table.model_dump(exclude_none=True))
+    errors.texts += missing_keys(table.model_dump(exclude_none=True))
     for axis, low, high in zip("xyz", table.stock.low_mm, table.stock.high_mm, strict=True):
         if not low < high:
             errors.add(f"stock.high_mm: {axis} = {high:g} must be above that of low_mm, {low:g}")
@@ -95,7 +95,7 @@ def _across(profile: StressProfile) -> float:
     return float(abs(profile.along_y).max()) / along if along > 0.0 else 1.0
 
 
-def missing(values: Mapping[str, Any]) -> list[str]:
+def missing_keys(values: Mapping[str, Any]) -> list[str]:
     """Return missing keys that no single table can detect; ``values`` are those of the file."""
     stress, found = values.get("residual_stress"), list[str]()
     if not isinstance(stress, Mapping):

@@ -128,7 +128,7 @@ class PlateRelease:
                 force[k - 1] = press[columns[0]]
             if len(rows):
                 e[rows] -= _surface_motion(work, u[:, columns], surface, rows)
-        return _measured(plan, surface, e, made, force, unknowns, spread)
+        return _outcome_of_plan(plan, surface, e, made, force, unknowns, spread)
 
     def _require_made(self, plan: MillingPlan, surface: PartSurface, made: NDArray[np.int64]) -> None:
         lost = made > len(plan.setups)
@@ -150,7 +150,7 @@ def _surface_motion(work: CellBody, u: Floats, surface: PartSurface, rows: NDArr
     return np.asarray(moved.reshape(-1, 3, u.shape[1])[same])
 
 
-def _measured(
+def _outcome_of_plan(
     plan: MillingPlan,
     surface: PartSurface,
     e: Floats,

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from chipload.jobs.feeds.tables import FeedsJobTable, FeedsOperationTable
-from chipload.jobs.simulation.job import ProgramJob, missing, note_of_passes, program_job
+from chipload.jobs.simulation.job import ProgramJob, missing_keys, note_of_passes, program_job
 from chipload.jobs.simulation.tables import LOADS
 
-__all__ = ["FeedsJob", "load", "missing", "resume_note"]
+__all__ = ["FeedsJob", "load", "missing_keys", "resume_note"]
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ def load(path: Path, table: FitJobTable, overrides: Sequence[str]) -> FitJob:
         Keys do not go together.
     """
     errors = Errors()
-    errors.texts += missing(table.model_dump(exclude_none=True))
+    errors.texts += missing_keys(table.model_dump(exclude_none=True))
     for k, m in enumerate(table.measurement):
         if m.window_s is not None and not m.window_s[0] < m.window_s[1]:
             errors.add(f"measurement.{k}.window_s = {list(m.window_s)}: must rise")
@@ -61,7 +61,7 @@ def load(path: Path, table: FitJobTable, overrides: Sequence[str]) -> FitJob:
     return FitJob(path, table, cutter, arc, files, tuple(overrides))
 
 
-def missing(values: Mapping[str, Any]) -> list[str]:
+def missing_keys(values: Mapping[str, Any]) -> list[str]:
     """Return missing keys that no single table can detect; ``values`` are those of the file."""
     found, channels = [], values.get("channels")
     if isinstance(channels, Mapping) and not set(CHANNELS) & set(channels):

@@ -32,7 +32,7 @@ def channel_repeat(program: Program, machine: Machine, table: IndexTable, blades
     return Repeat(table.pallet, blades, 360.0 * table.sense)
 
 
-def turned(program: Program, angle: float) -> Program:
+def turn_channel(program: Program, angle: float) -> Program:
     """Program of a channel that lies further round the part by an angle [rad]."""
     c, s = math.cos(angle), math.sin(angle)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -52,6 +52,6 @@ def between_channels(program: Program, machine: Machine, blades: int) -> float:
         for key in ("motion", "p_work", "axis", "centre", "normal", "turns", "feed", "spindle", "tool", "line", "label")
     }
     last = {key: value[-1:] for key, value in columns.items()} | {"motion": program.motion[:1], "feed": np.zeros(1)}
-    first = {key: getattr(turned(program, math.tau / blades), key)[:1] for key in columns}
+    first = {key: getattr(turn_channel(program, math.tau / blades), key)[:1] for key in columns}
     two = Program(**{key: np.concatenate([last[key], first[key]]) for key in columns}, labels=program.labels)
     return float(times_on(two, machine)[1])

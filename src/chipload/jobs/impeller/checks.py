@@ -15,7 +15,7 @@ from chipload.jobs.impeller.names import flank_names, points_names, program_name
 from chipload.jobs.impeller.outcome import Covered, ImpellerResult
 from chipload.jobs.impeller.partitions import COLOURS
 from chipload.jobs.impeller.roughing_check import rough_sections
-from chipload.jobs.impeller.surface_figures import styled
+from chipload.jobs.impeller.surface_figures import style_figure
 from chipload.planning.impeller.surfaces import BODIES
 from chipload.program.program import RAPID
 from chipload.report.sheet import figure, table
@@ -168,7 +168,7 @@ def left_figure(covered: Covered) -> go.Figure:
             colorbar={"title": "left [mm]"}, hovertemplate="u %{x} v %{y}: %{z} mm<extra></extra>",
         )
     )  # fmt: skip
-    styled(out, 230)
+    style_figure(out, 230)
     out.update_layout(font=FONT, title={"text": covered.name, "font": {"size": 13}, "x": 0.01, "y": 0.98})
     out.update_layout(margin={"l": 60, "r": 20, "t": 28, "b": 44})
     out.update_xaxes(title="u", gridcolor=GRID)

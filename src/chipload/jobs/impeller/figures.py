@@ -106,7 +106,7 @@ def _ranges_note(op: Searched) -> str:
     return f"Where {name} is clear at the table angle {alpha:.6g} deg, exact at both ends."
 
 
-def _between(op: Searched) -> str:
+def _certified_between(op: Searched) -> str:
     """What is certified between the check points."""
     answer, covering = op.answer, op.surface.scene.covering
     if covering is None:
@@ -125,7 +125,7 @@ def _proof(op: Searched) -> list[str]:
         f"For {int(answer.bounded.sum())} of {len(op.place)} contact points it is proved that no larger cutter of "
         f"the catalogue goes at any of {len(answer.tables)} table angles and any pallet angle: the arcs of pallet "
         f"angle that a few check points forbid, found exactly, cover all of them. {used} check points do it for all "
-        f"contact points together; proof.npz has them, with every bound. {_between(op)}"
+        f"contact points together; proof.npz has them, with every bound. {_certified_between(op)}"
     )
     rows = []
     shown = [x for x in op.limiting if not op.one or x.corner_radius == op.one.cutter.corner_radius]
@@ -134,7 +134,7 @@ def _proof(op: Searched) -> list[str]:
             "any up to the catalogue's largest" if x.capped else "turned away" if x.most is None else f"{x.most:.3f}"
         )
         taken = op.one is not None and (x.corner_radius, x.table) == (op.one.cutter.corner_radius, op.one.table)
-        names = sorted({_named(op, i) for i in x.blockers})
+        names = sorted({_surface_name(op, i) for i in x.blockers})
         rows.append(
             (
                 [
@@ -176,7 +176,7 @@ def _open(op: Searched) -> list[str]:
     return out
 
 
-def _named(op: Searched, check: int) -> str:
+def _surface_name(op: Searched, check: int) -> str:
     """What a check point lies on."""
     if check < 0:
         return "own curvature at the contact"

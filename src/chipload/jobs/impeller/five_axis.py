@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.errors import InputError
-from chipload.jobs.impeller.channels import turned
+from chipload.jobs.impeller.channels import turn_channel
 from chipload.jobs.impeller.five_axis_outcome import AllChannels
 from chipload.jobs.impeller.machine_check import MachineCheck, axes_check
 from chipload.jobs.impeller.paths import EDGE, gouge_by, left_by, walls_of
@@ -137,7 +137,7 @@ def all_channels(program: Program, machine: Machine, blades: int) -> AllChannels
         inside = own.min() + min(last, 0.0) >= axis.low and own.max() + max(last, 0.0) <= axis.high
         if inside and np.abs(q[-1] - q[0] - on).max() < _SAME:
             return AllChannels(Repeat(about[0], blades, 360.0 * about[1]), program)
-    every = [turned(program, math.tau * k / blades) for k in range(blades)]
+    every = [turn_channel(program, math.tau * k / blades) for k in range(blades)]
     columns: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in every]) for name in _COLUMNS}
     whole = replace(program, **columns)
     _, beyond = to_axes(whole, machine)

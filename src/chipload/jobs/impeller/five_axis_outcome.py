@@ -162,7 +162,7 @@ def flank_numbers(one: CheckedFlank | NoFiveAxisPath, file: str, channels: int) 
         "deviation_mm": one.deviation,
         "above_least_mm": max(p.unimproved for p in one.passes),
         "excess_mm": one.excess,
-        **_found(one),
+        **_found_numbers(one),
     }
 
 
@@ -180,7 +180,7 @@ def points_numbers(one: CheckedPoints | NoFiveAxisPath, file: str, channels: int
         "slowed_share": one.slowed,
         "scallop_greatest_mm": one.excess,
         "scallop_mean_share": None if one.scallop is None else one.scallop / one.most,
-        **_found(one),
+        **_found_numbers(one),
     }
 
 
@@ -210,7 +210,7 @@ def _times(one: FiveAxisProgram, channels: int) -> dict[str, Any]:
     }
 
 
-def _found(one: FiveAxisProgram) -> dict[str, Any]:
+def _found_numbers(one: FiveAxisProgram) -> dict[str, Any]:
     return {
         "gouge_mm": one.gouge.found,
         "gouge_bound_mm": one.gouge.bound if math.isfinite(one.gouge.bound) else None,

@@ -54,7 +54,10 @@ def checked_flanks(
     sides = [s for s in job.table.surface if s.side in SIDES]
     outline = outline_of(how.scene, impeller.blades)
     out: list[CheckedFlank | NoFiveAxisPath] = []
-    parts = [PlanTask(("flank", k), _planned, (side, catalogue, table, paths, outline)) for k, side in enumerate(sides)]
+    parts = [
+        PlanTask(("flank", k), _plan_fewest_passes, (side, catalogue, table, paths, outline))
+        for k, side in enumerate(sides)
+    ]
     keep.ahead(parts, progress)
     for k, side in enumerate(sides):
         found: tuple[CatalogueCutter, list[LinkedPath]] | NoFiveAxisPath = parts[k].of(how, keep)
@@ -78,7 +81,7 @@ def checked_flanks(
     return tuple(out)
 
 
-def _planned(
+def _plan_fewest_passes(
     how: FinishSettings,
     side: SurfaceTable,
     catalogue: Catalogue,

@@ -69,7 +69,7 @@ def load(path: Path, table: ImpellerJobTable, overrides: Sequence[str]) -> Impel
     """
     folder, part, errors = path.parent, table.impeller, Errors()
     sources: dict[str, str | Path] = {}
-    errors.texts += missing(table.model_dump(exclude_none=True))
+    errors.texts += missing_keys(table.model_dump(exclude_none=True))
     with errors.collect():
         sources = sources_of(table, folder, "machine", "catalogue")
     forces = table.operation[0].forces
@@ -119,7 +119,7 @@ def resume_note(job: ImpellerJob) -> str:
     return ""
 
 
-def missing(values: Mapping[str, Any]) -> list[str]:
+def missing_keys(values: Mapping[str, Any]) -> list[str]:
     """Keys that a part lacks or has twice; ``values`` are those of the file."""
     part = values.get("impeller")
     if not isinstance(part, Mapping):

@@ -21,7 +21,7 @@ from chipload.checking.workpiece import Surroundings
 from chipload.cutter.catalogue import CatalogueCutter
 from chipload.cutter.cutter import Cutter
 from chipload.errors import Finding, InputError, Severity
-from chipload.jobs.impeller.channels import turned
+from chipload.jobs.impeller.channels import turn_channel
 from chipload.jobs.impeller.program_removal import ProgramRemoval
 from chipload.machine.limits import limit_findings
 from chipload.machine.machine import Machine
@@ -116,7 +116,7 @@ def check_cell(verdict: Verdict) -> str:
 
 def axes_check(*findings: Finding) -> MachineCheck:
     """Return the check of motions of the axes whose findings break the machine; positions are compared as written."""
-    return MachineCheck(_exceeding(tuple(f for f in findings if f.code not in LIMITS)))
+    return MachineCheck(_as_exceeding(tuple(f for f in findings if f.code not in LIMITS)))
 
 
 def around_part(surroundings: Surroundings, machine: Machine, impeller: Impeller, clearance: float) -> AroundPart:
@@ -149,10 +149,10 @@ def text_check(
     except InputError as err:
         return MachineCheck((unread(err),))
     lengths, beyond = _travel(reading, cutter)
-    program = _placed(reading.program)
+    program = _rows_after_placing(reading.program)
     found = [
         *_text_findings(reading, tool, planned), *no_end(text), *beyond, *speed_findings(program, tool),
-        *_touched(program, tool, around), *_below(program, tool, around),
+        *_deepest_contacts(program, tool, around), *_deepest_below_part(program, tool, around),
     ]  # fmt: skip
     return MachineCheck(tuple(found), lengths)
 
@@ -206,7 +206,7 @@ def every_channel(program: Program, blades: int) -> Program:
     axis = _turned_rows(ends[0].axis, on * share[:, 0])
     between = replace(ends[0], motion=np.full(count - 1, RAPID), p_work=tip, axis=axis, feed=np.zeros(count - 1))
     one = Program.join([program, between]) if len(between) else program
-    return Program.join([turned(one, pitch * k) for k in range(blades)])
+    return Program.join([turn_channel(one, pitch * k) for k in range(blades)])
 
 
 def _turned_rows(points: Floats, angle: Floats) -> Floats:
@@ -233,7 +233,7 @@ def _text_findings(reading: ProgramReading, tool: Mapping[int, Cutter], planned:
     return (f for f in reading_findings(reading, tool, planned) if f.code not in LIMITS)
 
 
-def _placed(program: Program) -> Program:
+def _rows_after_placing(program: Program) -> Program:
     """The rows from the first on before which each of X, Y and Z was sent somewhere."""
     known = np.asarray(program.path_mode)[:, 0] != PathControl.UNPLACED
     return _rows(program, known)
@@ -251,7 +251,7 @@ def _travel(reading: ProgramReading, cutter: CatalogueCutter) -> tuple[tuple[flo
     if any(axis.head for axis in machine.chain.rotary) or not len(q):
         unit = np.zeros(9)
     if cutter.length is not None:
-        return None, _exceeding(limit_findings(machine, q + cutter.length * unit, line))
+        return None, _as_exceeding(limit_findings(machine, q + cutter.length * unit, line))
     least, most = 0.0, math.inf
     for axis in machine.chain.axes:
         u = unit[axis.column]
@@ -262,14 +262,14 @@ def _travel(reading: ProgramReading, cutter: CatalogueCutter) -> tuple[tuple[flo
             least, most = max(least, ends[0]), min(most, ends[1])
     shortest = max(least, cutter.reach or cutter.cutting_length or 0.0)
     lengths = (shortest, most) if unit.any() and shortest <= most else None
-    return lengths, _exceeding(limit_findings(machine, q + shortest * unit, line))
+    return lengths, _as_exceeding(limit_findings(machine, q + shortest * unit, line))
 
 
-def _exceeding(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
+def _as_exceeding(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
     return tuple(replace(f, severity=Severity.EXCEEDS) for f in findings)
 
 
-def _touched(program: Program, tool: Mapping[int, Cutter], around: AroundPart) -> Iterator[Finding]:
+def _deepest_contacts(program: Program, tool: Mapping[int, Cutter], around: AroundPart) -> Iterator[Finding]:
     """The deepest contact of each part of the tool with each body around the part, in any channel."""
     if not around.points or not len(program):
         return
@@ -285,7 +285,7 @@ def _touched(program: Program, tool: Mapping[int, Cutter], around: AroundPart) -
         yield Finding("collision", c.line, text, Severity.EXCEEDS, c.at)
 
 
-def _below(program: Program, tool: Mapping[int, Cutter], around: AroundPart) -> tuple[Finding, ...]:
+def _deepest_below_part(program: Program, tool: Mapping[int, Cutter], around: AroundPart) -> tuple[Finding, ...]:
     """The place where a tool goes deepest below the part, if nothing that lies there is stated."""
     if around.below or not len(program):
         return ()

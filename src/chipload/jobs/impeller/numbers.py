@@ -33,16 +33,16 @@ def operation_numbers(milled: ImpellerResult) -> dict[str, Any]:
         "certified": all(row["certified"] for row in rows),
         "certified_within_mm": milled.tolerance,
         **(checked_of(milled, used) if used is not None else {}),
-        "hand_picked": None if picked is None else _picked(milled, picked),
+        "hand_picked": None if picked is None else _picked_numbers(milled, picked),
         "ways": [checked_of(milled, partition) for partition in milled.partitions],
         "scallop": {"mean_share": None if milled.used_checked is None else milled.used_checked.scallop},
         "programs": None
         if milled.programs is None
         else [_program(program_name(milled, k), p) for k, p in enumerate(milled.programs, 1)],
-        "roughing": None if milled.roughs is None else _roughing(milled),
+        "roughing": None if milled.roughs is None else _roughing_numbers(milled),
         "flank": None if milled.flanks is None else _flanks(milled),
         "point_milling": None if milled.points is None else _points(milled),
-        "finished": None if milled.covered is None else _finished(milled),
+        "finished": None if milled.covered is None else _finished_numbers(milled),
         "surfaces": rows,
         "settings": {k: list(v) if isinstance(v, tuple) else v for k, v in milled.stated.settings.items()},
     }
@@ -191,7 +191,7 @@ def _loads(p: Checked) -> dict[str, float] | None:
     }
 
 
-def _roughing(milled: ImpellerResult) -> dict[str, Any]:
+def _roughing_numbers(milled: ImpellerResult) -> dict[str, Any]:
     """All roughing programs; of one channel, or of one on either side of a splitter."""
     rows = [r.values() for r in milled.roughs or ()]
     time = sum(row["time_min"] for row in rows)
@@ -203,7 +203,7 @@ def _roughing(milled: ImpellerResult) -> dict[str, Any]:
     }
 
 
-def _finished(milled: ImpellerResult) -> dict[str, Any]:
+def _finished_numbers(milled: ImpellerResult) -> dict[str, Any]:
     """Material that all programs together leave."""
     programs, covered = milled.programs or (), milled.covered or ()
     scallops = [x for p in programs for x in p.scallops]
@@ -230,7 +230,7 @@ def _finished(milled: ImpellerResult) -> dict[str, Any]:
     }
 
 
-def _picked(milled: ImpellerResult, partition: Partition) -> dict[str, Any]:
+def _picked_numbers(milled: ImpellerResult, partition: Partition) -> dict[str, Any]:
     first = partition.divided.patches[0].table if partition.divided is not None and partition.divided.patches else None
     tables = {p.table for p in partition.divided.patches} if partition.divided is not None else set()
     return {

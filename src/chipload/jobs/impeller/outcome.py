@@ -472,7 +472,7 @@ def unreached_text(op: Searched, missed: Unreachable) -> str:
     return f"contact point {missed.point} at ({x:.3f}, {y:.3f}, {z:.3f}): {REASONS[missed.reason]}: {would}"
 
 
-def unmilled(milled: ImpellerResult) -> tuple[str, ...]:
+def unmilled_messages(milled: ImpellerResult) -> tuple[str, ...]:
     """Messages: the partition does not mill all that can be reached, or ranges of pallet angles are undecided."""
     if milled.used is None:
         return (f"{milled.partitions[-1].name} of the catalogue do not mill all that can be reached",)

@@ -91,12 +91,12 @@ def checked_partitions(
             if partition.divided is not None and not (turn and _same(partition, best[choice.name].partition))
         ]  # fmt: skip
         patches = [(job.with_catalogue(partitions[k].catalogue), partitions[k].division.patches) for k in new]
-        announce_millings(patches, memory.millings, keep, _from(progress, 0.8 * turn / _ROUNDS))
+        announce_millings(patches, memory.millings, keep, _forward_share(progress, 0.8 * turn / _ROUNDS))
         for k in new:
             choice, partition = choices[k], partitions[k]
             done = (turn + k / len(choices)) / _ROUNDS
-            plan = _planned(choice, partition, job, machine, memory, _from(progress, 0.8 * done), keep)
-            for number, row in _measured(choice.costs, plan):
+            plan = _plan_choice(choice, partition, job, machine, memory, _forward_share(progress, 0.8 * done), keep)
+            for number, row in _measure_costs(choice.costs, plan):
                 rows.setdefault(id(choice.costs), []).append((number, row))
             if choice.name not in best or plan.seconds < best[choice.name].seconds:
                 best[choice.name] = plan
@@ -109,18 +109,18 @@ def checked_partitions(
         for choice in choices:
             if choice.name in best:
                 kept = best[choice.name]
-                best[choice.name] = replace(kept, predicted=_predicted(choice, kept.partition))
+                best[choice.name] = replace(kept, predicted=_predict_time(choice, kept.partition))
         if turn + 1 < _ROUNDS:
             partitions = [choice.partition(job.workers, keep=keep) for choice in choices]
     out = []
     for k, choice in enumerate(choices):
         if choice.name in best:
-            out.append(_checked(choice, best[choice.name], job, machine, paths, memory, keep))
+            out.append(_check_choice(choice, best[choice.name], job, machine, paths, memory, keep))
         progress(0.8 + 0.2 * (k + 1) / len(choices), f"check of the programs of {choice.name}")
     return tuple(out)
 
 
-def _from(progress: Progress, done: float) -> Progress:
+def _forward_share(progress: Progress, done: float) -> Progress:
     """Forward the share that is done, scaled to the whole."""
     return lambda _, what: progress(done, what)
 
@@ -130,7 +130,7 @@ def _changes(choice: CutterChoice) -> Changes:
     return Changes(terms.cutter_change, terms.table_change)
 
 
-def _predicted(choice: CutterChoice, partition: Partition) -> float:
+def _predict_time(choice: CutterChoice, partition: Partition) -> float:
     """Time of all channels by the costs as they stand, with one program for each cutter at each table angle [s]."""
     patches = partition.division.patches
     pairs = list(dict.fromkeys((p.cutter, p.table) for p in patches))
@@ -149,7 +149,7 @@ def _place(costs: Sequence[Costs], p: Patch) -> tuple[Costs, int, int, float]:
     return own, "uv".index(p.order), int(np.abs(own.tables - p.table).argmin()), bare
 
 
-def _planned(
+def _plan_choice(
     choice: CutterChoice, partition: Partition, job: FinishSettings, machine: Machine, memory: _Memory,
     progress: Progress, keep: Keep,
 ) -> _Planned:  # fmt: skip
@@ -160,7 +160,7 @@ def _planned(
     rows = tuple(times_on(s.program, machine) for s in plan.settings)
     each = [float(row.sum()) for row in rows]
     seconds = choice.costs[0].terms.repeats * sum(each) + _change_time(plan.settings, choice)
-    return _Planned(partition, _predicted(choice, partition), plan, rows, seconds)
+    return _Planned(partition, _predict_time(choice, partition), plan, rows, seconds)
 
 
 def _change_time(settings: Sequence[CutterSetting], choice: CutterChoice) -> float:
@@ -179,7 +179,7 @@ def _same(a: Partition, b: Partition) -> bool:
     return [key(p) for p in a.divided.patches] == [key(p) for p in b.divided.patches]
 
 
-def _measured(costs: Sequence[Costs], done: _Planned) -> list[tuple[int, MeasuredCost]]:
+def _measure_costs(costs: Sequence[Costs], done: _Planned) -> list[tuple[int, MeasuredCost]]:
     """For each patch the number of its side and the cost of its program; rest passes count to the patch they finish."""
     rest_time: dict[int, float] = {}
     millings = [m for s in done.plan.settings for m in s.millings]
@@ -212,7 +212,7 @@ def _patch_of_rest(
     return min((m for m in millings if (m.patch.body, m.patch.side) == (body, side)), key=away)
 
 
-def _checked(
+def _check_choice(
     choice: CutterChoice, done: _Planned, job: FinishSettings, machine: Machine, paths: PathsTable, memory: _Memory,
     keep: Keep,
 ) -> CheckedPartition:  # fmt: skip

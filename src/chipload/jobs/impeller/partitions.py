@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chipload.jobs.impeller.machine_check import check_cell, verdict_of
 from chipload.jobs.impeller.outcome import PICKED, ImpellerResult, Searched
-from chipload.jobs.impeller.surface_figures import styled
+from chipload.jobs.impeller.surface_figures import style_figure
 from chipload.planning.impeller.compare import Partition
 from chipload.planning.impeller.patch import Patch
 from chipload.report.sheet import figure, table
@@ -32,7 +32,7 @@ def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
         "cutter and table, without lead-in, links and rapids. No sequence of the same strips, with as many cutters, "
         "takes less than the least time; patches of other shapes on the same contact points might. The reached share "
         "is of the area that has contact points.</p>",
-        _compared(milled),
+        _comparison_table(milled),
         figure("partitions", partitions_figure(milled), figures),
     ]
     if milled.checked:
@@ -40,7 +40,7 @@ def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
             "<h3>Programs of the partitions</h3>",
             '<p class="note">Every partition is written, checked and timed. All channels, without roughing: cut, leads '
             "and links, changes of cutter and table.</p>",
-            _programmed(milled),
+            _program_table(milled),
         ]
     used = milled.used
     if used is None or used.divided is None:
@@ -60,7 +60,7 @@ def divided_sections(milled: ImpellerResult, figures: dict[str, go.Figure]) -> l
     return [*out, table(head, rows, numbers=(0, 3, 5, 6, 7))]
 
 
-def _compared(milled: ImpellerResult) -> str:
+def _comparison_table(milled: ImpellerResult) -> str:
     rows, used = [], []
     base = milled.picked.divided if milled.picked is not None else None
     for partition in milled.partitions:
@@ -95,7 +95,7 @@ def _compared(milled: ImpellerResult) -> str:
     return table(head, rows, numbers=(2, 3, 4, 5, 6, 7, 8, 9), used=used)
 
 
-def _programmed(milled: ImpellerResult) -> str:
+def _program_table(milled: ImpellerResult) -> str:
     """Table of the programs of each partition."""
     rows = [
         [
@@ -133,7 +133,7 @@ def partitions_figure(milled: ImpellerResult) -> go.Figure:
             hovertemplate="%{x:.2f} min",
         )
     )  # fmt: skip
-    styled(out, 110 + 42 * len(able))
+    style_figure(out, 110 + 42 * len(able))
     out.update_layout(barmode="stack", bargap=0.35, legend={"orientation": "h", "y": 1.16, "x": 0.0})
     out.update_layout(margin={"l": 110, "r": 20, "t": 36, "b": 48})
     out.update_xaxes(title="time of all channels [min]", rangemode="tozero")
@@ -192,7 +192,7 @@ def patch_figure(milled: ImpellerResult, partition: Partition, op: Searched) -> 
         )
         out.add_annotation(x=u, y=v, text=f"<b>{n + 1}</b>", showarrow=False, font={"color": "#1f2933", "size": 13},
                            bgcolor="rgba(255,255,255,0.72)")  # fmt: skip
-    styled(out, 230)
+    style_figure(out, 230)
     out.update_layout(font=FONT, title={"text": op.surface.name, "font": {"size": 13}, "x": 0.01, "y": 0.98})
     out.update_layout(margin={"l": 60, "r": 20, "t": 28, "b": 44})
     out.update_xaxes(title="u", gridcolor=GRID)

@@ -74,7 +74,7 @@ def checked_points(
     limits = AxisLimits(math.radians(table.lean_deg), _SHARE * paths.gouge_mm, op.clearance_mm, op.scallop_mm)
     out: list[CheckedPoints | NoFiveAxisPath] = []
     given = (catalogue, table, paths, limits, reachable, outline)
-    parts = [PlanTask(("point milling", k), _planned, (side, *given)) for k, side in enumerate(job.table.surface)]
+    parts = [PlanTask(("point milling", k), _plan_shortest, (side, *given)) for k, side in enumerate(job.table.surface)]
     keep.ahead(parts, progress)
     for k, side in enumerate(job.table.surface):
         found: PlannedPoints | NoFiveAxisPath = parts[k].of(how, keep)
@@ -91,13 +91,13 @@ def checked_points(
                 f"{side.body} {side.side}", machine, found.cutter, program, got.gouge, got.left, paths.gouge_mm,
                 op.scallop_mm, got.machine_check, got.read,
                 all_channels(program, machine, impeller.blades), found.points, found.along,
-                _slowed(program, machine, feed), _scallop(found, got.left),
+                _slow_share(program, machine, feed), _scallop(found, got.left),
             ))  # fmt: skip
         progress((k + 1) / len(job.table.surface), f"point milling of {k + 1} surfaces")
     return tuple(out)
 
 
-def _planned(
+def _plan_shortest(
     how: FinishSettings, side: SurfaceTable, catalogue: Catalogue, table: PointMillingTable, paths: PathsTable,
     limits: AxisLimits, reachable: tuple[NDArray[np.float64], NDArray[np.bool_]], outline: NDArray[np.float64],
 ) -> PlannedPoints | NoFiveAxisPath:  # fmt: skip
@@ -170,7 +170,7 @@ def _path(
     return why if best is None else best
 
 
-def _slowed(program: Program, machine: Machine, feed: float) -> float:
+def _slow_share(program: Program, machine: Machine, feed: float) -> float:
     """Share of the rows in the cut in which a rotary axis is at its greatest rate."""
     cut = np.array([label == "finish" for label in program.labels])[program.label]
     return float((rotary_share(program, machine)[cut] > 1.0 - 1e-6).mean())

@@ -30,7 +30,7 @@ def program_files(milled: ImpellerResult, result: Result) -> dict[str, bytes]:
         for name, repeat in ((stem, None), (f"{stem}{ALL}", checked.repeat)):
             if name == stem or repeat is not None:
                 file = f"{name}.{ENDINGS[milled.machine.dialect]}"
-                out[file] = _released(
+                out[file] = _release_text(
                     partial(table_text, milled, checked, repeat), release_of(result, file),
                     checked.read if repeat is None else None,
                 )  # fmt: skip
@@ -40,7 +40,7 @@ def program_files(milled: ImpellerResult, result: Result) -> dict[str, bytes]:
         ending = ENDINGS[p.machine.dialect]
         for more in ("", *(() if isinstance(p.every, str) else (ALL,))):
             file = f"{stem}{more}.{ending}"
-            out[file] = _released(
+            out[file] = _release_text(
                 partial(five_axis_text, milled, p, bool(more)), release_of(result, file), None if more else p.read
             )
         release = release_of(result, f"{stem}.apt")
@@ -50,7 +50,7 @@ def program_files(milled: ImpellerResult, result: Result) -> dict[str, bytes]:
     return out
 
 
-def _released(text_of: Callable[[Release], str], release: Release, read: ReadProgram | None) -> bytes:
+def _release_text(text_of: Callable[[Release], str], release: Release, read: ReadProgram | None) -> bytes:
     """The text of a program, which is not released if its blocks are not those that were read and simulated."""
     text = text_of(release)
     given = release if read is None else release_of_text(text, read.text, release)

@@ -24,7 +24,7 @@ from chipload.jobs.impeller.outcome import (
     certified_text,
     for_all,
     uncertified_text,
-    unmilled,
+    unmilled_messages,
     unreached_text,
 )
 from chipload.jobs.impeller.paths import walls_of
@@ -51,10 +51,15 @@ def result_of(milled: ImpellerResult) -> Result:
     return Result(
         capability="impeller",
         title=milled.title,
-        tracks=(_search(milled), *_roughing(milled, walls), *_finishing(milled, walls), *_five_axis(milled)),
+        tracks=(
+            _search(milled),
+            *_roughing_tracks(milled, walls),
+            *_finishing_tracks(milled, walls),
+            *_five_axis(milled),
+        ),
         operations=(operation_numbers(milled),),
-        findings=tuple(f for c in milled.covered or () for f in _left(c)),
-        unchecked=_unchecked(milled),
+        findings=tuple(f for c in milled.covered or () for f in _rest_findings(c)),
+        unchecked=_unchecked_texts(milled),
         provenance=milled.provenance,
         maps=maps_of(milled),
         note=f"{for_all(milled)[:1].upper()}{for_all(milled)[1:]}, {certified_text(milled)}.",
@@ -70,7 +75,7 @@ def _search(milled: ImpellerResult) -> Track:
     unreached = sum(len(op.answer.unreachable) for op in milled.surfaces)
     unproved = sum(int((~op.answer.certified).sum()) for op in milled.surfaces)
     findings = [f for op in milled.surfaces for f in _surface_findings(op)]
-    findings += [Finding("impeller-partition", 0, text, Severity.EXCEEDS) for text in unmilled(milled)]
+    findings += [Finding("impeller-partition", 0, text, Severity.EXCEEDS) for text in unmilled_messages(milled)]
     why = next((t for op in milled.surfaces if (t := uncertified_text(op))), "")
     limits = (
         _count("unreached_points", unreached, Verdict.EXCEEDS),
@@ -102,7 +107,7 @@ def _surface_findings(op: Searched) -> tuple[Finding, ...]:
     return tuple(out)
 
 
-def _roughing(milled: ImpellerResult, walls: Walls) -> list[Track]:
+def _roughing_tracks(milled: ImpellerResult, walls: Walls) -> list[Track]:
     names = rough_names(milled)
     return [
         _track(
@@ -121,7 +126,7 @@ def _roughing(milled: ImpellerResult, walls: Walls) -> list[Track]:
     ]
 
 
-def _finishing(milled: ImpellerResult, walls: Walls) -> list[Track]:
+def _finishing_tracks(milled: ImpellerResult, walls: Walls) -> list[Track]:
     out, used = [], {id(p) for p in milled.programs or ()}
     for name, p in finish_names(milled):
         findings = p.machine_check.findings
@@ -276,14 +281,14 @@ def _rough_findings(r: CheckedRough) -> tuple[Finding, ...]:
     return (*(Finding("impeller-roughing", 0, text, Severity.EXCEEDS) for text in texts), *r.machine_check.findings)
 
 
-def _left(c: Covered) -> tuple[Finding, ...]:
+def _rest_findings(c: Covered) -> tuple[Finding, ...]:
     """More material than the scallop height after all programs."""
     k = c.greatest[1]
     x, y, z = (float(v) for v in c.left.wall.points[k])
     return tuple(Finding("impeller-left", 0, text, Severity.EXCEEDS, (x, y, z)) for text in c.fails)
 
 
-def _unchecked(milled: ImpellerResult) -> tuple[str, ...]:
+def _unchecked_texts(milled: ImpellerResult) -> tuple[str, ...]:
     fed = any(p.setting.loads is not None for p in milled.programs or ())
     removals = [*(r.removal for r in milled.roughs or ()), *(p.removal for p in milled.programs or ())]
     found = [r for r in removals if r is not None]

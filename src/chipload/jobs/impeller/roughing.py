@@ -83,7 +83,7 @@ def checked_roughing(
             stock[plan.index] = left
             numbered = safe.numbered(len(out) + 1)
             out.append(
-                _checked(
+                _check_plan(
                     machine, numbered, removal, rough.touch_mm3, paths, walls, workers, table, impeller.blades,
                     blanks[plan.index], keep,
                 )
@@ -124,7 +124,7 @@ def without_touch(
     return plan, removal, left
 
 
-def _checked(
+def _check_plan(
     machine: Machine, plan: RoughingSetting, removal: ChannelRemoval, touch: float, paths: PathsTable, walls:
     Sequence[SurfacePoints],
     workers: int, table: IndexTable, blades: int, blank: trimesh.Trimesh, keep: Keep,
@@ -165,12 +165,12 @@ def blank_of(impeller: Impeller, channels: Sequence[int], how: RoughingSettings,
     outer = high + how.over * (high - low) / np.linalg.norm(high - low, axis=1)[:, None]
     tops = [uncut(impeller, index, how, ahead, whole=True) for index in channels]
     angle = np.concatenate([np.arctan2(top[:, 1], top[:, 0]) for top in tops])
-    first, last = _between(angle)
+    first, last = _close_span(angle)
     edge = (1.0 - _BESIDE) * impeller.pitch
     return sector(inner, outer, first + edge, last - edge)
 
 
-def _between(theta: NDArray[np.float64]) -> tuple[float, float]:
+def _close_span(theta: NDArray[np.float64]) -> tuple[float, float]:
     """First and last of angles that stand close together [rad]: all but their widest gap."""
     around = np.sort(theta % math.tau)
     gap = np.diff(around, append=around[0] + math.tau)

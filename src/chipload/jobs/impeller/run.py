@@ -82,8 +82,8 @@ def run(
 
 def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, team: Team | None) -> ImpellerResult:
     machine, cutters, part = _machine(job), _catalogue(job), read_part(job)
-    impeller, catalogue = part.impeller, _indexed(job, cutters)
-    _picked(job, catalogue)
+    impeller, catalogue = part.impeller, _indexed_cutters(job, cutters)
+    _picked_cutter(job, catalogue)
     _rougher(job, cutters)
     _checkable(job, impeller)
     forces = force_terms(job, catalogue)
@@ -94,7 +94,7 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     provenance = _provenance(job, machine, catalogue, part)
     keep = KeptParts(checkpoint, digest(job.table.model_dump_json(), provenance.inputs, versions(), sources()), team)
     table, begin = _tables(machine, op), time.perf_counter()
-    covering = _covering(job, impeller, catalogue)
+    covering = _cover_walls(job, impeller, catalogue)
     took = time.perf_counter() - begin
     surfaces = _surfaces(job, impeller, covering)
     if checkpoint is not None:
@@ -103,9 +103,9 @@ def _run(job: ImpellerJob, progress: Progress, checkpoint: Checkpoint | None, te
     inputs = SearchInputs(surfaces, table, catalogue, op.clearance_mm)
     keep.share(inputs)
     found = searched_surfaces(inputs, keep, team is not None, first)
-    done = [_searched(job, k, inputs, one, took / len(surfaces)) for k, one in enumerate(found)]
+    done = [_search_surface(job, k, inputs, one, took / len(surfaces)) for k, one in enumerate(found)]
     for k, surface in enumerate(done):
-        _reached(k, surface)
+        _refuse_unreached(k, surface)
     pairs = [(surface.surface.scene, surface.answer) for surface in done]
     whole = keep(("one cutter",), lambda: one_cutter_of(pairs, op.clearance_mm, table.spans, WORKERS))
     one = None if whole is None else (catalogue.cutters[whole[0]], whole[1])
@@ -178,7 +178,7 @@ def _checkable(job: ImpellerJob, impeller: Impeller) -> None:
 
 def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: ImpellerPart) -> Provenance:
     files = dict(job.files)
-    files |= {key: p for key, p in _named(job) if not isinstance(p, str)}
+    files |= {key: p for key, p in _shipped_names(job) if not isinstance(p, str)}
     files |= {f"fixture {k}": job.path.parent / f.file for k, f in enumerate(job.table.fixture) if f.file is not None}
     if job.table.stock is not None and job.table.stock.file is not None:
         files["stock"] = job.path.parent / job.table.stock.file
@@ -188,7 +188,7 @@ def _provenance(job: ImpellerJob, machine: Machine, catalogue: Catalogue, part: 
     return replace(own, inputs={**own.inputs, "catalogue name": cutters, **faces})
 
 
-def _named(job: ImpellerJob) -> list[tuple[str, str | Path]]:
+def _shipped_names(job: ImpellerJob) -> list[tuple[str, str | Path]]:
     """Shipped names or files by what they are."""
     named: list[tuple[str, str | Path]] = [("machine", job.machine), ("catalogue", job.catalogue)]
     more = (
@@ -202,8 +202,8 @@ def _named(job: ImpellerJob) -> list[tuple[str, str | Path]]:
 def check(job: ImpellerJob) -> tuple[list[str], bool]:
     """Contents of the files of a job; nothing is searched."""
     machine, cutters, part = _machine(job), _catalogue(job), read_part(job)
-    impeller, catalogue = part.impeller, _indexed(job, cutters)
-    _picked(job, catalogue)
+    impeller, catalogue = part.impeller, _indexed_cutters(job, cutters)
+    _picked_cutter(job, catalogue)
     _rougher(job, cutters)
     _checkable(job, impeller)
     force_terms(job, catalogue)
@@ -249,7 +249,9 @@ def _stages(op: ImpellerOperationTable, progress: Progress) -> list[Progress]:
     return [part_of(progress, float(a), float(b)) for a, b in itertools.pairwise(edges)]
 
 
-def _searched(job: ImpellerJob, k: int, inputs: SearchInputs, found: SurfaceSearch, covering_s: float) -> Searched:
+def _search_surface(
+    job: ImpellerJob, k: int, inputs: SearchInputs, found: SurfaceSearch, covering_s: float
+) -> Searched:
     """Surface k with its largest cutters; ``covering_s`` its share of the time of the covering [s]."""
     surface, best = inputs.surfaces[k], None
     if found.one is not None:
@@ -266,7 +268,7 @@ def _choices(
     """The cutter picked by hand where one is stated, then one cutter, two, ..."""
     op = job.operation
     terms = Terms(feeds, op.scallop_mm, op.cutter_change_s, op.table_change_s, impeller.blades)
-    picked = _picked(job, catalogue)
+    picked = _picked_cutter(job, catalogue)
     index = None if picked is None else catalogue.cutters.index(picked)
     sides = [_side(x, x.answer) for x in done]
     return cutter_choices(sides, terms, index, range(1, op.most_cutters + 1), WORKERS, progress, keep)
@@ -278,7 +280,7 @@ def _side(op: Searched, answer: Answer) -> ChannelSide:
     return ChannelSide(body, s.side, s.scene, s.u, s.v, s.area, answer, op.clearance, op.table.spans)
 
 
-def _indexed(job: ImpellerJob, cutters: Catalogue) -> Catalogue:
+def _indexed_cutters(job: ImpellerJob, cutters: Catalogue) -> Catalogue:
     """The cutters that the index table is planned with: no barrels, and with feeds by the force no tapered ones.
 
     Raises
@@ -310,7 +312,7 @@ def _indexed(job: ImpellerJob, cutters: Catalogue) -> Catalogue:
     return cutters.of(able)
 
 
-def _picked(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
+def _picked_cutter(job: ImpellerJob, catalogue: Catalogue) -> CatalogueCutter | None:
     """The cutter of the catalogue that is picked by hand."""
     picked = job.operation.hand_picked
     if picked is None:
@@ -341,7 +343,7 @@ def _settings(table: Table) -> dict[str, Any]:
     return {k: v for k, v in table.model_dump().items() if v is not None}
 
 
-def _reached(k: int, op: Searched) -> None:
+def _refuse_unreached(k: int, op: Searched) -> None:
     """Refuse a catalogue that reaches nothing of a surface."""
     if (op.answer.cutter < 0).all():
         first = unreached_text(op, op.answer.unreachable[0])
@@ -358,7 +360,7 @@ def _tables(machine: Machine, op: ImpellerOperationTable) -> IndexTable:
         raise InputError(f"operation.0.table_deg: {err}") from None
 
 
-def _covering(job: ImpellerJob, impeller: Impeller, catalogue: Catalogue) -> Covering | None:
+def _cover_walls(job: ImpellerJob, impeller: Impeller, catalogue: Catalogue) -> Covering | None:
     """The walls covered for every cutter with a corner radius; None: there is no such cutter."""
     op, corner = job.operation, _least_corner(job, impeller, catalogue)
     if corner is None:

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from chipload.checking.workpiece import Stock
-from chipload.jobs.impeller.channels import turned
+from chipload.jobs.impeller.channels import turn_channel
 from chipload.jobs.impeller.five_axis_outcome import CheckedFlank, CheckedPoints
 from chipload.jobs.impeller.names import flank_names, points_names
 from chipload.jobs.impeller.outcome import Checked, ImpellerResult
@@ -107,7 +107,7 @@ def _channel_before(outcome: ImpellerResult) -> list[ImpellerProgram]:
     last = max((r.rough.index for r in roughs), default=0)
     pitch = outcome.impeller.pitch
     return [
-        ImpellerProgram("", replace(r.read, program=turned(r.read.program, -pitch)), r.rough.cutter)
+        ImpellerProgram("", replace(r.read, program=turn_channel(r.read.program, -pitch)), r.rough.cutter)
         for r in roughs
         if r.rough.index == last
     ]

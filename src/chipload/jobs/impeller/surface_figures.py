@@ -54,7 +54,7 @@ def map_figure(op: Searched) -> go.Figure:
                 marker={"symbol": "x", "size": 10, "color": LIMIT}, hoverinfo="skip", showlegend=True,
             )
         )  # fmt: skip
-    styled(out, 340)
+    style_figure(out, 340)
     out.update_xaxes(title="u, from the leading to the trailing edge", range=None, zeroline=False)
     across = "v, across the channel from the plus side" if op.surface.side == "floor" else "v, from hub to shroud"
     out.update_yaxes(title=across, zeroline=False)
@@ -88,7 +88,7 @@ def table_figure(op: Searched) -> go.Figure:
                 marker={"symbol": "circle-open", "size": 16, "color": INK, "line": {"width": 2, "color": INK}},
             )
         )  # fmt: skip
-    styled(out, 320)
+    style_figure(out, 320)
     out.update_xaxes(title="table angle [deg]")
     out.update_yaxes(title="one cutter for all, D [mm]", rangemode="tozero")
     return out
@@ -122,7 +122,7 @@ def ranges_figure(op: Searched) -> go.Figure:
                 name=f"v {op.surface.v[n]:.2f}", line={"color": colour, "width": 3},
             )
         )  # fmt: skip
-    styled(out, 380)
+    style_figure(out, 380)
     ticks = np.unique(np.linspace(0, len(op.surface.u) - 1, 10).round().astype(int))
     out.update_xaxes(
         title="u of the contact points; beside one another those of one u, from hub to shroud",
@@ -236,7 +236,7 @@ def _ijk(f: NDArray[np.int64]) -> dict[str, Any]:
     return {"i": f[:, 0].astype(np.int32), "j": f[:, 1].astype(np.int32), "k": f[:, 2].astype(np.int32)}
 
 
-def styled(figure: go.Figure, height: int) -> None:
+def style_figure(figure: go.Figure, height: int) -> None:
     """Give a figure a white background and a thin grid."""
     figure.update_layout(
         template="none", height=height, margin={"l": 70, "r": 20, "t": 14, "b": 54}, font=FONT, paper_bgcolor="white",

@@ -101,19 +101,19 @@ def searched_surfaces(
     answers, seconds = list[Answer](), list[float]()
     for k, tasks in enumerate(blocks):
         part = part_of(progress, 0.9 * k / len(blocks), 0.9 * (k + 1) / len(blocks))
-        found = [_made(inputs, task, keep, part) for task in tasks]
+        found = [_result_of_task(inputs, task, keep, part) for task in tasks]
         answers.append(join_answers([answer for answer, _ in found]))
         seconds.append(math.fsum(took for _, took in found))
     ones = [PlanTask(("one of surface", k), _one, (k, answer)) for k, answer in enumerate(answers)]
     keep.ahead(ones, lambda done, what: progress(0.9 + 0.1 * done, f"one cutter, {what}"))
     out = []
     for answer, task, took in zip(answers, ones, seconds, strict=True):
-        unreachable, one, more = _made(inputs, task, keep)
+        unreachable, one, more = _result_of_task(inputs, task, keep)
         out.append(SurfaceSearch(replace(answer, unreachable=unreachable), one, took + more))
     return tuple(out)
 
 
-def _made(inputs: SearchInputs, task: PlanTask, keep: Keep, *more: Any) -> Any:
+def _result_of_task(inputs: SearchInputs, task: PlanTask, keep: Keep, *more: Any) -> Any:
     """What a task gives, kept or made by this process on all its threads."""
     return keep(task.key, lambda: task.make(inputs, *task.arguments, WORKERS, *more))
 

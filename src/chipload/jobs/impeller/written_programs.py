@@ -85,7 +85,7 @@ class _Check:
             return checked
         text = self._texts[id(program)] = table_text(self.milled, checked, None, NOT_SIMULATED)
         found = text_check(text, _file(machine), machine, cutter_of(checked), program, self.around(machine))
-        found = found.joined(_simulated(text, checked.read))
+        found = found.joined(_check_blocks(text, checked.read))
         return replace(checked, machine_check=checked.machine_check.joined(found))
 
     def with_every_channel(self, checked: OfTable) -> OfTable:
@@ -102,11 +102,11 @@ class _Check:
         """A program on five axes with what its text of one channel shows."""
         text = five_axis_text(self.milled, p, False, NOT_SIMULATED)
         found = text_check(text, _file(p.machine), p.machine, p.cutter, p.program, self.around(p.machine))
-        found = found.joined(_simulated(text, p.read))
+        found = found.joined(_check_blocks(text, p.read))
         return replace(p, machine_check=p.machine_check.joined(found))
 
 
-def _simulated(text: str, read: ReadProgram) -> MachineCheck:
+def _check_blocks(text: str, read: ReadProgram) -> MachineCheck:
     """What is wrong if the blocks of a text are not those of the program that was simulated."""
     if not read.text or same_blocks(text, read.text):
         return MachineCheck()

@@ -9,11 +9,11 @@ from pathlib import Path
 from chipload.errors import InputError
 from chipload.jobs.program.tables import ProgramJobTable, SetupTable
 from chipload.jobs.simulation.fixtures import fixture_errors
-from chipload.jobs.simulation.job import ProgramJob, missing, note_of_passes, program_job, stock_errors
+from chipload.jobs.simulation.job import ProgramJob, missing_keys, note_of_passes, program_job, stock_errors
 from chipload.jobs.simulation.values import machine_table_errors
 from chipload.stock.turned import turn_matrix
 
-__all__ = ["SetupsJob", "load", "missing", "resume_note"]
+__all__ = ["SetupsJob", "load", "missing_keys", "resume_note"]
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ def program_job(
     named = [key for key in ("machine", "material") if getattr(table, key) is not None]
     sources: dict[str, str | Path] = {}
     tools: dict[int, Cutter] = {}
-    errors.texts += missing(table.model_dump(exclude_none=True))
+    errors.texts += missing_keys(table.model_dump(exclude_none=True))
     with errors.collect():
         sources = sources_of(table, folder, *named)
     if table.operation:
@@ -122,7 +122,7 @@ def program_job(
     )
 
 
-def missing(values: Mapping[str, Any]) -> list[str]:
+def missing_keys(values: Mapping[str, Any]) -> list[str]:
     """Return the tables that a simulation lacks; ``values`` are those of the file."""
     if not values.get("operation"):
         return []

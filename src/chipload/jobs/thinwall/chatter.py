@@ -231,7 +231,7 @@ def chatter_numbers(one: Variant, dynamics: Mapping[str, Any] | None) -> dict[st
         {
             "speed_rpm": None if m.speed is None else rpm_from_rad_s(m.speed),
             "stable_depth_mm_min": None if m.stable is None else float(m.stable.min()),
-            "governed_by_chatter": None if m.stable is None else governed(m),
+            "governed_by_chatter": None if m.stable is None else chatter_share(m),
         }
         for m in one.plan.maps
     ]
@@ -245,6 +245,6 @@ def chatter_numbers(one: Variant, dynamics: Mapping[str, Any] | None) -> dict[st
     }  # fmt: skip
 
 
-def governed(m: PassMap) -> float:
+def chatter_share(m: PassMap) -> float:
     """Share of the places of a pass whose depth is the stable depth."""
     return float((m.depth >= (1.0 - 1e-6) * m.stable).mean()) if m.stable is not None else 0.0

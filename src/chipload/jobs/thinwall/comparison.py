@@ -74,7 +74,7 @@ def least_error(
     return found if found.error_rms <= constant.error_rms else replace(constant, name="least_error")
 
 
-def compensated(
+def compensate_passes(
     places: Places, planned: PlannedVariant, before: Variant, most: float, prove: Callable[[PlannedVariant], Variant]
 ) -> Variant:
     """Plan whose last passes are moved against their predicted form error.
@@ -89,14 +89,14 @@ def compensated(
     found: list[Variant] = []
     for _ in range(MOVES):
         shift = [_shift(places, error, side, most) for side in range(len(places.surfaces))]
-        one = prove(_moved(places, planned, shift))
+        one = prove(_move_last_passes(places, planned, shift))
         error = one.finish
-        left = tuple(_remaining(places, f, shift) for f in one.finish)
+        left = tuple(_remaining_error(places, f, shift) for f in one.finish)
         found.append(replace(one, finish=left, shift=max(float(np.abs(o).max()) for o in shift)))
     return min(found, key=lambda one: one.error)
 
 
-def _between(at: tuple[Floats, Floats], values: Floats, to: tuple[Floats, Floats]) -> Floats:
+def _interpolate(at: tuple[Floats, Floats], values: Floats, to: tuple[Floats, Floats]) -> Floats:
     """Bilinear values at other parameters; beyond the outermost ones theirs."""
     inner = [np.clip(x, own[0], own[-1]) for x, own in zip(to, at, strict=True)]
     found = scipy.interpolate.RegularGridInterpolator(at, values)(np.stack(np.meshgrid(*inner, indexing="ij"), axis=-1))
@@ -113,11 +113,11 @@ def _shift(places: Places, finish: Sequence[Finish], side: int, most: float) -> 
     for f in finish:
         if _side(places, f) == side:
             known = np.where(f.made, f.error, 0.0)
-            return np.clip(_between(f.parameters, known, places.grid), -most, most)
+            return np.clip(_interpolate(f.parameters, known, places.grid), -most, most)
     return np.zeros(places.shape)
 
 
-def _moved(places: Places, planned: PlannedVariant, shift: Sequence[Floats]) -> PlannedVariant:
+def _move_last_passes(places: Places, planned: PlannedVariant, shift: Sequence[Floats]) -> PlannedVariant:
     """The plan with the last pass of each side moved."""
     plan, law = planned.plan, places.inputs.depths.law
     passes = [
@@ -131,7 +131,7 @@ def _moved(places: Places, planned: PlannedVariant, shift: Sequence[Floats]) -> 
     return replace(planned, plan=replace(plan, name="compensated", passes=tuple(passes)))
 
 
-def _remaining(places: Places, finish: Finish, shift: Sequence[Floats]) -> Finish:
+def _remaining_error(places: Places, finish: Finish, shift: Sequence[Floats]) -> Finish:
     """A finished side with the error that is left of a moved path."""
-    moved = _between(places.grid, shift[_side(places, finish)], finish.parameters)
+    moved = _interpolate(places.grid, shift[_side(places, finish)], finish.parameters)
     return replace(finish, error=finish.error - moved, rigid=finish.rigid + moved)

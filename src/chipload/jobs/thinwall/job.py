@@ -74,7 +74,7 @@ def load(path: Path, table: ThinWallJobTable, overrides: Sequence[str]) -> ThinW
         Keys do not go together.
     """
     folder, errors = path.parent, Errors()
-    errors.texts += missing(table.model_dump(exclude_none=True))
+    errors.texts += missing_keys(table.model_dump(exclude_none=True))
     sources, tools = sources_and_cutters(table, folder, errors, "machine", "material")
     errors.texts += _contradictions(table, tools)
     errors.refuse()
@@ -100,7 +100,7 @@ def resume_note(job: ThinWallJob) -> str:
     return "simulated plans are kept; the simulation of a plan does not resume: if it is stopped, it starts again"
 
 
-def missing(values: Mapping[str, Any]) -> list[str]:
+def missing_keys(values: Mapping[str, Any]) -> list[str]:
     """The keys that a wall lacks by its shape; ``values`` are those of the file."""
     wall = values.get("wall")
     if not isinstance(wall, Mapping):

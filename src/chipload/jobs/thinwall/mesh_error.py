@@ -144,13 +144,13 @@ def spread_compliance(solid: SolidWorkpiece, a: Floats, b: Floats, side: int, li
         acts at the places
     """
     factored = factorise(solid)
-    acts = _through(factored, a, b, side)
+    acts = _forces_through(factored, a, b, side)
     seen = acts
     if line:
         shares = line_nodes(b, b)[1]
-        seen = shares[0] * _through(factored, a, line[0], side)
+        seen = shares[0] * _forces_through(factored, a, line[0], side)
         for w, up in zip(shares[1:], line[1:], strict=True):
-            seen = seen + w * _through(factored, a, up, side)
+            seen = seen + w * _forces_through(factored, a, up, side)
     out = np.empty(len(a))
     for at in range(0, len(a), TOGETHER):
         some = slice(at, at + TOGETHER)
@@ -158,7 +158,7 @@ def spread_compliance(solid: SolidWorkpiece, a: Floats, b: Floats, side: int, li
     return out
 
 
-def _through(factored: Factored, a: Floats, b: Floats, side: int) -> scipy.sparse.csc_array:
+def _forces_through(factored: Factored, a: Floats, b: Floats, side: int) -> scipy.sparse.csc_array:
     """Unit forces along the normal of a side, spread through the thickness, as columns (f, k) over the free degrees of
     freedom.
     """

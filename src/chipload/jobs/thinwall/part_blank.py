@@ -89,7 +89,7 @@ class PartBlank:
         key, which = b"".join(np.ascontiguousarray(D).tobytes() for D in left), "wide" if wide else "fine"
         if key != self._last.get(which, (b"", None))[0]:
             grid = self.wide if wide else self.grid
-            stock = _layered(self.body, self.places, left, float(np.diff(self.grid.planes[2]).max()) / PER_CELL)
+            stock = _layer_part(self.body, self.places, left, float(np.diff(self.grid.planes[2]).max()) / PER_CELL)
             self._last[which] = key, cell_workpiece(stock, grid, self.elastic, self.clamps, self.clamped)
         return self._last[which][1]
 
@@ -183,7 +183,7 @@ def part_blank(job: ThinWallJob, body: PartShape, step_over: float) -> PartBlank
     )
     full = [np.full((n, m), s.allowance) for s in body.each]
     layer = float(np.ptp(body.part.bounds, axis=0).max()) / LAYERS
-    first, last = (_layered(body, places, D, layer) for D in (full, [np.zeros((n, m)) for _ in full]))
+    first, last = (_layer_part(body, places, D, layer) for D in (full, [np.zeros((n, m)) for _ in full]))
     grid, wall = cells_over(first, last, made.cell_mm, made.order or 2)
     body, clamps = replace(body, thickness=wall), placed_clamps(workpiece, first)
     clamped_parts = clamped_volumes(workpiece, first)
@@ -192,7 +192,7 @@ def part_blank(job: ThinWallJob, body: PartShape, step_over: float) -> PartBlank
     )
 
 
-def _layered(body: PartShape, places: tuple[Floats, Floats], left: Sequence[Floats], layer: float) -> LayeredStock:
+def _layer_part(body: PartShape, places: tuple[Floats, Floats], left: Sequence[Floats], layer: float) -> LayeredStock:
     """The part with its stock in layers, one tile each, that end at its level faces and divide the stock of floors."""
     mesh = body.body(places, left)
     stock = LayeredStock.of_mesh(mesh, layer, 2.0 * float(np.ptp(mesh.bounds, axis=0).max()))

@@ -184,7 +184,7 @@ def part_of_faces(job: ThinWallJob) -> PartShape:
 
 def _side(face: Face, key: str, wall: FaceWallTable, number: int, allowance: float) -> PartSide:
     """A face as the side of a wall."""
-    patch = _standing(patch_of(face, key, wall.fit_mm).patch, key, face)
+    patch = _turn_upright(patch_of(face, key, wall.fit_mm).patch, key, face)
     made = PartSide(f"{face.number}", patch, 0.0, number, allowance)
     height = made.size()[1]
     foot = require_stated(wall.foot_mm, f"wall.{number}.foot_mm")
@@ -197,7 +197,7 @@ def _side(face: Face, key: str, wall: FaceWallTable, number: int, allowance: flo
     return PartSide(made.name, patch, float(np.interp(foot, up, FEW)), number, allowance)
 
 
-def _standing(patch: BSplinePatch, key: str, face: Face) -> BSplinePatch:
+def _turn_upright(patch: BSplinePatch, key: str, face: Face) -> BSplinePatch:
     """The patch with w upwards, right-handed.
 
     Raises

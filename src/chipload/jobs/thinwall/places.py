@@ -159,7 +159,7 @@ class Places:
         """
         known, places = self.motion(left, side), self.inputs.body.places
         flat = np.clip(uv.reshape(-1, 2), 0.0, 1.0)
-        C = between(places, known[..., 2], *flat.T)
+        C = interpolate_places(places, known[..., 2], *flat.T)
         share = scipy.interpolate.RegularGridInterpolator(places, known / known[..., 2:])(flat)
         return np.asarray((C[:, None] * share).reshape(*uv.shape[:-1], 3))
 
@@ -184,7 +184,7 @@ class Places:
         def limited(left: Sequence[Floats], side: int) -> Threshold:
             if self.inputs.floor(self.inputs.body.side_numbers[side]) is not None:
                 return modelled(self._greatest_compliance(left, side, spare), deflection, factor)
-            C = between(self.inputs.body.places, self.compliance(left, side), u, v)
+            C = interpolate_places(self.inputs.body.places, self.compliance(left, side), u, v)
             if spare:
                 C *= 1.0 + error_at(self.inputs.body.places, self.error(side), u, v)
             return modelled(C, deflection, factor)
@@ -231,7 +231,7 @@ def places_of(inputs: WallInputs, keep: KeptRecords | None = None) -> Places:
     return Places(inputs, u, v, surfaces, chatter_of(inputs), keep)
 
 
-def between(places: tuple[Floats, Floats], values: Floats, u: Floats, v: Floats) -> Floats:
+def interpolate_places(places: tuple[Floats, Floats], values: Floats, u: Floats, v: Floats) -> Floats:
     """Values above 0 of places (n, m) at parameters (k,), by cubics of their logarithm."""
     n, m = values.shape
     spline = scipy.interpolate.RectBivariateSpline(*places, np.log(values), kx=min(3, n - 1), ky=min(3, m - 1))

@@ -27,7 +27,7 @@ from chipload.jobs.thinwall.mesh_error import error_at
 from chipload.jobs.thinwall.neighbours import part_collisions, wall_collisions
 from chipload.jobs.thinwall.outcome import Finish, Shape
 from chipload.jobs.thinwall.part_shape import PartShape
-from chipload.jobs.thinwall.places import Places, between
+from chipload.jobs.thinwall.places import Places, interpolate_places
 from chipload.lazy import scipy
 from chipload.planning.thinwall.blank import SIDES
 from chipload.planning.thinwall.pass_program import PassProgram
@@ -192,7 +192,7 @@ def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Ma
         return 0.0
     solid = inputs.body.wall.state(inputs.both(left))
     grid = solid.grid
-    v = float(_acting(inputs, columns["v"][k]))
+    v = float(_acting_heights(inputs, columns["v"][k]))
     places = on_side(grid, SIDES[number], [columns["u"][k]], [_rows(inputs, v) / grid.counts[1]])
     places = on_cut(places, solid.kept, SIDES[number])
     force = weights(grid, places).T @ (columns["force_normal_n"][k] * normals_of(grid, places, SIDES[number]))
@@ -200,7 +200,7 @@ def _stress(inputs: WallInputs, left: Sequence[Floats], number: int, columns: Ma
     return greatest(solid, displacement(factorise(solid), force), foot)
 
 
-def _acting(inputs: WallInputs, v: ArrayLike) -> Floats:
+def _acting_heights(inputs: WallInputs, v: ArrayLike) -> Floats:
     """Parameters v at which the force of contacts is judged: of a flank the upper ends of its contact lines."""
     at, foot = np.asarray(v, dtype=np.float64), inputs.body.foot
     return at if inputs.line is None else foot + (1.0 - foot) * inputs.line.ends((at - foot) / (1.0 - foot))[0]
@@ -247,11 +247,11 @@ def _columns(
         for within in JUDGED
     ]
     uv = [(np.clip(x[:, 0], 0.0, 1.0), np.clip(x[:, 1], inputs.body.foot, 1.0)) for _, x in spots]
-    gives = np.stack([between(inputs.body.places, C, u, v) for u, v in uv])
+    gives = np.stack([interpolate_places(inputs.body.places, C, u, v) for u, v in uv])
     if inputs.depths.experiments is None:
         allowable = inputs.depths.deflection / gives
     else:
-        allowable = np.stack([between(places.grid, F_th, u, v) for u, v in uv])
+        allowable = np.stack([interpolate_places(places.grid, F_th, u, v) for u, v in uv])
     unsure = np.stack([error_at(inputs.body.places, error, u, v) for u, v in uv]).max(axis=0)
     place, deepest = spots[MIDDLE][0], np.stack([values[:, 2] for _, values in spots]).max(axis=0)
     u, v = uv[MIDDLE]
@@ -267,7 +267,7 @@ def _columns(
     threshold = allowable[weakest, each]
     judged = np.stack([spot.point for spot, _ in spots])[weakest if loads is None else np.full(len(u), MIDDLE), each]
     if inputs.line is not None:  # along the wall, which is plane
-        up = np.stack([_acting(inputs, b) - b for _, b in uv])[weakest, each]
+        up = np.stack([_acting_heights(inputs, b) - b for _, b in uv])[weakest, each]
         judged = judged + (up * inputs.body.shape.size()[1])[:, None] * UP
     columns |= {
         "deflection_workpiece_um": 1000.0 * found["work_mm"],
@@ -337,7 +337,7 @@ def _finish(
         inputs.cut.material,
         points.reshape(-1, 3),
         normals.reshape(-1, 3),
-        work=between(inputs.body.places, C, u.ravel(), v.ravel()),
+        work=interpolate_places(inputs.body.places, C, u.ravel(), v.ravel()),
         bars=bars,
         near=0.5 * inputs.body.allowance[number],
     )

@@ -30,7 +30,7 @@ from chipload.jobs.thinwall.program_text import with_texts_read_back
 from chipload.jobs.thinwall.proof import resolution_of
 from chipload.jobs.thinwall.tries import Tried, compared_variants, constant_within, unlimited_plan, variable_within
 from chipload.jobs.thinwall.wall_operation import WallOperation
-from chipload.jobs.thinwall.wall_program import linked, on_machine
+from chipload.jobs.thinwall.wall_program import link_pass_programs, on_machine
 from chipload.number_text import number_text
 from chipload.planning.thinwall.blank import SIDES
 from chipload.planning.thinwall.experiments import Proposal, propose_cuts
@@ -161,7 +161,7 @@ def check(job: ThinWallJob) -> tuple[list[str], bool]:
     inputs = read_wall(job)
     _thick_enough(inputs)
     places = places_of(inputs)
-    pass_programs = linked(inputs, unlimited_plan(places).plan, places.grid)
+    pass_programs = link_pass_programs(inputs, unlimited_plan(places).plan, places.grid)
     program = Program.join([one.program for one in pass_programs])
     on_machine(inputs, program)
     wall_stock(inputs)

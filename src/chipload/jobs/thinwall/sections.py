@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 from chipload.jobs.thinwall.outcome import OVER, USED, ThinWallResult, Variant, remedy_text
 from chipload.jobs.thinwall.part_shape import PartShape
 from chipload.jobs.thinwall.result import verdict_of
-from chipload.jobs.thinwall.wall_figures import COLOURS, along, bars, maps, space
+from chipload.jobs.thinwall.wall_figures import COLOURS, bars, loads_along_time, maps, space
 from chipload.number_text import number_text
 from chipload.report.page import state_cell
 from chipload.report.programs import program_name
@@ -72,7 +72,7 @@ def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[s
             figures,
         ),
         "<h3>Along the path</h3>",
-        figure("along", along(walled), figures),
+        figure("along", loads_along_time(walled), figures),
         "<h3>The finished surface</h3>",
         '<p class="note">Form error by the deflection of cutter and wall at the moment each point is made; blue: '
         "material is left. Scallops between rows are not in it. Every pass meets what the passes before "
@@ -94,7 +94,7 @@ def sections_of(walled: ThinWallResult, figures: dict[str, go.Figure]) -> list[s
         *_infeasible(used),
         *_overload_section(walled),
         "<h3>Geometry</h3>",
-        _checked(walled),
+        _checked_text(walled),
     ]
     return body
 
@@ -227,7 +227,7 @@ def _overload_section(walled: ThinWallResult) -> list[str]:
     return out
 
 
-def _checked(walled: ThinWallResult) -> str:
+def _checked_text(walled: ThinWallResult) -> str:
     used = walled.variants[USED]
     s = used.shape
     texts = [

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from chipload.checking.load_budget import bounded_factors
 from chipload.jobs.kept_parts import KeptRecords
-from chipload.jobs.thinwall.comparison import compensated, least_error
+from chipload.jobs.thinwall.comparison import compensate_passes, least_error
 from chipload.jobs.thinwall.kept_proofs import RECORDS, kept_proof
 from chipload.jobs.thinwall.outcome import OVER, Help, PassMap, Variant, VariantPlan
 from chipload.jobs.thinwall.places import Places, rows_up
 from chipload.jobs.thinwall.proof import Proof, prove
 from chipload.jobs.thinwall.wall_operation import DepthRules
-from chipload.jobs.thinwall.wall_program import OnMachine, linked, on_machine
+from chipload.jobs.thinwall.wall_program import OnMachine, link_pass_programs, on_machine
 from chipload.planning.thinwall.correction import greatest_ratios
 from chipload.planning.thinwall.depth import largest_depths, normal_force
 from chipload.planning.thinwall.pass_program import PassProgram
 from chipload.planning.thinwall.passes import Plan, ThresholdOf, WallPass
-from chipload.planning.thinwall.variants import DepthOperation, even, limited_to, unlimited
+from chipload.planning.thinwall.variants import DepthOperation, even, limited_to, plan_without_limit
 from chipload.planning.thinwall.variants import PlannedVariant as Planned
 from chipload.program.program import Program
 from chipload.progress import Progress
@@ -66,7 +66,7 @@ class Tried:
         name, low = planned.plan.name, self.done
         width = share * (1.0 - low)
         self.variable += name == "variable"
-        pass_programs = linked(self.places.inputs, planned.plan, self.places.grid)
+        pass_programs = link_pass_programs(self.places.inputs, planned.plan, self.places.grid)
         program = Program.join([one.program for one in pass_programs])
         run = on_machine(self.places.inputs, program)
         proof = kept_proof(
@@ -116,7 +116,7 @@ def unlimited_plan(places: Places) -> Planned:
         DepthOperation(places.threshold(o.depths.deflection, o.depths.factor), o.depths.even_law, o.leave)
         for o in places.inputs.operations
     ]
-    return unlimited(places.surfaces, operations)
+    return plan_without_limit(places.surfaces, operations)
 
 
 def _depth_operations(places: Places, share: float, corrections: Corrections, even_stock: bool) -> list[DepthOperation]:
@@ -174,7 +174,7 @@ def constant_within(tried: Tried, free: Variant) -> tuple[Variant, Corrections]:
     modelled = inputs.depths.experiments is None
     assumed, share = _room(free)
     ones = tuple(np.ones(places.shape) for _ in places.surfaces)
-    at_most = _measured(places, free, tuple(ones for _ in inputs.operations), even_stock=True)
+    at_most = _measure_corrections(places, free, tuple(ones for _ in inputs.operations), even_stock=True)
     corrections = at_most
     for turn in range(CONSTANTS):
         deflection = share * inputs.depths.deflection if modelled else inputs.depths.deflection
@@ -182,7 +182,7 @@ def constant_within(tried: Tried, free: Variant) -> tuple[Variant, Corrections]:
         constant = tried.prove(planned, 0.4)
         if turn == CONSTANTS - 1 or _smallest(places, planned) or _overload(constant, modelled, assumed)[1]:
             break
-        corrections = _greater(corrections, _measured(places, constant, corrections, even_stock=True))
+        corrections = _greater(corrections, _measure_corrections(places, constant, corrections, even_stock=True))
     return constant, at_most
 
 
@@ -224,7 +224,7 @@ def variable_within(tried: Tried, corrections: Corrections, like: Variant) -> Va
         used = best is not None and (not modelled or best.over_with_error(modelled) >= USED_SHARE)
         if best is not None and turn >= ROUNDS - 1 and (used or turn >= RAISES):
             break
-        measured = _measured(places, one, corrections, even_stock=False)
+        measured = _measure_corrections(places, one, corrections, even_stock=False)
         if not good:
             measured = _greater(corrections, measured)
             share *= HOLD / over if (turn >= ROUNDS - 1 or not refine) and math.isfinite(over) else 1.0
@@ -247,7 +247,7 @@ def compared_variants(tried: Tried, variable: Variant, constant: Variant) -> dic
             lambda planned: program_seconds(places, planned), lambda planned: tried.prove(planned, 0.4),
         )  # fmt: skip
     if op.compensate_um > 0.0:
-        out["compensated"] = compensated(
+        out["compensated"] = compensate_passes(
             places,
             tried.planned["variable"],
             variable,
@@ -259,7 +259,7 @@ def compared_variants(tried: Tried, variable: Variant, constant: Variant) -> dic
 
 def program_seconds(places: Places, planned: Planned) -> float:
     """Time of a plan on the machine."""
-    pass_programs = linked(places.inputs, planned.plan, places.grid)
+    pass_programs = link_pass_programs(places.inputs, planned.plan, places.grid)
     return float(on_machine(places.inputs, Program.join([one.program for one in pass_programs])).times.sum())
 
 
@@ -268,7 +268,7 @@ def _greater(one: Corrections, other: Corrections) -> Corrections:
     return tuple(tuple(map(np.maximum, a, b)) for a, b in zip(one, other, strict=True))
 
 
-def _measured(places: Places, one: Variant, before: Corrections, *, even_stock: bool) -> Corrections:
+def _measure_corrections(places: Places, one: Variant, before: Corrections, *, even_stock: bool) -> Corrections:
     """Corrections of the laws by what a variant was found to do; where it did nothing, those before.
 
     The places of an operation are its own rows; those of the places are between them in proportion.

@@ -107,7 +107,7 @@ def maps(
     return out
 
 
-def along(walled: ThinWallResult) -> go.Figure:
+def loads_along_time(walled: ThinWallResult) -> go.Figure:
     """Deflection of the wall, its force over the threshold, and its force, over the time at a feed, with the variants
     in rows of one figure.
     """

@@ -54,7 +54,9 @@ def on_machine(inputs: WallInputs, program: Program) -> OnMachine:
     return OnMachine(commands, times_on(program, machine, lengths), exceeding)
 
 
-def linked(inputs: WallInputs, plan: Plan, places: tuple[Floats, Floats] | None = None) -> tuple[PassProgram, ...]:
+def link_pass_programs(
+    inputs: WallInputs, plan: Plan, places: tuple[Floats, Floats] | None = None
+) -> tuple[PassProgram, ...]:
     """Linked passes of a plan at these places, u and v; None: those of the elements."""
     motions = [_motion(inputs, k) for k in range(len(inputs.operations))]
     return link_passes(plan.passes, motions, places or inputs.body.places)

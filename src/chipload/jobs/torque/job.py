@@ -82,7 +82,7 @@ def load(path: Path, table: TorqueJobTable, overrides: Sequence[str]) -> TorqueJ
         Keys do not go together.
     """
     folder, errors = path.parent, Errors()
-    errors.texts += missing(table.model_dump(exclude_none=True))
+    errors.texts += missing_keys(table.model_dump(exclude_none=True))
     if table.program is not None and table.round is not None:
         errors.add(f"program, round: both are stated: {ONE_PROGRAM}")
     sources, tools = sources_and_cutters(table, folder, errors, "machine", "material")
@@ -101,7 +101,7 @@ def load(path: Path, table: TorqueJobTable, overrides: Sequence[str]) -> TorqueJ
     )  # fmt: skip
 
 
-def missing(values: Mapping[str, Any]) -> list[str]:
+def missing_keys(values: Mapping[str, Any]) -> list[str]:
     """What a job lacks that one of its tables alone cannot see; ``values`` are those of the file."""
     found = [f"program, round: neither is stated: {ONE_PROGRAM}"] if not {"program", "round"} & set(values) else []
     control = values.get("torque_control")

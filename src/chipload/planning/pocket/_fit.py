@@ -9,7 +9,7 @@ import math
 
 from numba import njit
 
-from chipload.planning.pocket._pass_steps import allowed, angle_at, room
+from chipload.planning.pocket._pass_steps import angle_at, in_centre_region, room
 from chipload.stock._planar import remove_segment
 
 #: radii of arcs / R, least and greatest
@@ -29,7 +29,7 @@ ABOVE = 1e-5
 
 
 @njit(cache=True, nogil=True)
-def fitted(p, i, j, tau, R, out):
+def fits_element(p, i, j, tau, R, out):
     """Whether one line or arc from vertex i to vertex j passes every vertex between within tau; ``out`` (7,) is it.
 
     Rows of ``p``: x, y, heading, sweep of the step that ends there (0: straight).
@@ -149,14 +149,14 @@ def in_region(seg, R, slack, grid, flag, edges, rows, row_edges):
     while k + 1 < n:
         k += 1
         x, y = position(seg, k / n)
-        if allowed(x, y, grid, flag, edges, rows, row_edges):
+        if in_centre_region(x, y, grid, flag, edges, rows, row_edges):
             k += int(room(x, y, grid, flag) * n / length)
             continue
         x, y, t = place(seg, k / n)
         nx, ny = -slack * math.sin(t), slack * math.cos(t)
         if not (
-            allowed(x + nx, y + ny, grid, flag, edges, rows, row_edges)
-            or allowed(x - nx, y - ny, grid, flag, edges, rows, row_edges)
+            in_centre_region(x + nx, y + ny, grid, flag, edges, rows, row_edges)
+            or in_centre_region(x - nx, y - ny, grid, flag, edges, rows, row_edges)
         ):
             return False
     return True
@@ -205,7 +205,7 @@ def farthest(p, i, last, guess, tau, slack, R, seg, grid, flag, edges, rows, row
     trial = min(max(2, guess), bad - 1)
     while good + 1 < bad:
         trial = min(bad - 1, max(good + 1, trial))
-        if fitted(p, i, i + trial, tau, R, seg) and in_region(seg, R, slack, grid, flag, edges, rows, row_edges):
+        if fits_element(p, i, i + trial, tau, R, seg) and in_region(seg, R, slack, grid, flag, edges, rows, row_edges):
             good = trial
             trial = 2 * good if bad > 2 * good else (good + bad) // 2
         else:
@@ -233,7 +233,7 @@ def write_segments(p, i, last, whole, tau, limit, spacing, slack, R, touch, segm
             break
         e = 0.0
         while True:
-            if fitted(p, i, i + good, tau, R, seg):
+            if fits_element(p, i, i + good, tau, R, seg):
                 e = engagement_along(seg, spacing, limit, r, R, grid, head, link, axis, arcs)
                 if e <= limit or good == 1:
                     break

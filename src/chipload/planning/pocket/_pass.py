@@ -9,7 +9,7 @@ import math
 
 from numba import njit
 
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 from chipload.planning.pocket._fit import write_segments
 from chipload.planning.pocket._pass_steps import (
     LONGER,
@@ -90,9 +90,9 @@ def run_pass(state, step, limit, most, right, left, lost, tau, slack, R, touch, 
     In the open a step is an arc that continues the last one; along a wall and in corners it is straight. Steps without
     material at the end are not written.
     """
-    state, steps, segments, places, numbers, seg = borrowed((state, steps, segments, places, numbers, seg))
-    grid, head, count, link, axis, arcs = borrowed((grid, head, count, link, axis, arcs))
-    flag, edges, rows, row_edges = borrowed((flag, edges, rows, row_edges))
+    state, steps, segments, places, numbers, seg = borrow_arrays((state, steps, segments, places, numbers, seg))
+    grid, head, count, link, axis, arcs = borrow_arrays((grid, head, count, link, axis, arcs))
+    flag, edges, rows, row_edges = borrow_arrays((flag, edges, rows, row_edges))
     r = R * (1.0 - touch)
     capsule, used = int(numbers[0]), int(numbers[1])
     x, y, th, bend, idle, last = state[0], state[1], state[2], state[3], state[4], state[5]

@@ -12,7 +12,7 @@ import math
 
 from numba import njit
 
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 from chipload.stock._planar import uncut, uncut_between
 
 #: turn to the left [rad] from which on a step is halved
@@ -28,7 +28,7 @@ LONGER, SMOOTH = 2.0, 1.5
 
 
 @njit(cache=True, nogil=True)
-def allowed(x, y, grid, flag, edges, rows, row_edges):
+def in_centre_region(x, y, grid, flag, edges, rows, row_edges):
     """Whether O = (x, y) is in the centre region: cell flag, else the crossings of the ray to +x."""
     h = grid[2]
     nx, ny = int(grid[3]), int(grid[4])
@@ -134,14 +134,14 @@ def step_allowed(ox, oy, th, phi, l, slack, grid, flag, edges, rows, row_edges):
     tx, ty = math.cos(th + phi), math.sin(th + phi)
     if room(ox + 0.5 * l * tx, oy + 0.5 * l * ty, grid, flag) > 0.5 * l:
         return True
-    if not allowed(ox + l * tx, oy + l * ty, grid, flag, edges, rows, row_edges):
+    if not in_centre_region(ox + l * tx, oy + l * ty, grid, flag, edges, rows, row_edges):
         return False
     for k in (4, 2, 6, 3, 5, 1, 7):
         t = 0.125 * k * l
         x, y = ox + t * tx, oy + t * ty
-        if allowed(x, y, grid, flag, edges, rows, row_edges):
+        if in_centre_region(x, y, grid, flag, edges, rows, row_edges):
             continue
-        if not allowed(x - slack * ty, y + slack * tx, grid, flag, edges, rows, row_edges):
+        if not in_centre_region(x - slack * ty, y + slack * tx, grid, flag, edges, rows, row_edges):
             return False
     return True
 
@@ -250,13 +250,13 @@ def arc_allowed(x, y, th, phi, l, margin, grid, flag, edges, rows, row_edges):
     if room(ex, ey, grid, flag) > 0.5 * l + margin:
         return True
     ex, ey, et = arc_place(x, y, th, phi, l)
-    if not allowed(ex, ey, grid, flag, edges, rows, row_edges):
+    if not in_centre_region(ex, ey, grid, flag, edges, rows, row_edges):
         return False
-    if not allowed(ex + margin * math.sin(et), ey - margin * math.cos(et), grid, flag, edges, rows, row_edges):
+    if not in_centre_region(ex + margin * math.sin(et), ey - margin * math.cos(et), grid, flag, edges, rows, row_edges):
         return False
     for k in (8, 4, 12, 2, 6, 10, 14, 1, 3, 5, 7, 9, 11, 13, 15):
         ex, ey, _ = arc_place(x, y, th, 0.0625 * k * phi, 0.0625 * k * l)
-        if not allowed(ex, ey, grid, flag, edges, rows, row_edges):
+        if not in_centre_region(ex, ey, grid, flag, edges, rows, row_edges):
             return False
     return True
 
@@ -342,8 +342,8 @@ def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, arcs, fla
     Discs are tested a spacing d apart, each larger by d^2 / (8 R), so that together they cover the capsule; d is fine
     near the ends, where the cutter may touch the material that it has just cut. The centre is tested every 0.01 R.
     """
-    grid, head, link, axis, arcs = borrowed((grid, head, link, axis, arcs))
-    flag, edges, rows, row_edges = borrowed((flag, edges, rows, row_edges))
+    grid, head, link, axis, arcs = borrow_arrays((grid, head, link, axis, arcs))
+    flag, edges, rows, row_edges = borrow_arrays((flag, edges, rows, row_edges))
     dx, dy = x1 - x0, y1 - y0
     length = math.sqrt(dx * dx + dy * dy)
     if length <= 1e-9:
@@ -353,7 +353,7 @@ def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, arcs, fla
     k = 1
     while k < n:
         x, y = x0 + k * dx / n, y0 + k * dy / n
-        if not allowed(x, y, grid, flag, edges, rows, row_edges):
+        if not in_centre_region(x, y, grid, flag, edges, rows, row_edges):
             return False
         k += 1 + int(room(x, y, grid, flag) * n / length)
     t = 0.0
@@ -364,7 +364,7 @@ def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, arcs, fla
         if t >= length:
             break
         x, y = x0 + t * tx, y0 + t * ty
-        if not allowed(x, y, grid, flag, edges, rows, row_edges):
+        if not in_centre_region(x, y, grid, flag, edges, rows, row_edges):
             return False
         r = R * (1.0 - touch) + d * d / (8.0 * R)
         if uncut(x, y, tx, ty, r, R, False, grid, head, link, axis, arcs) > 0:
@@ -376,8 +376,8 @@ def line_clear(x0, y0, x1, y1, step, R, touch, grid, head, link, axis, arcs, fla
 def open_sides(points, normals, which, eps, least, R, touch, grid, head, link, axis, arcs, flag, edges, rows, row_edges,
                out):  # fmt: skip
     """Whether material can be cut next to each point (n, 2): O moved by eps [mm] along its normal may be there."""
-    grid, head, link, axis, arcs = borrowed((grid, head, link, axis, arcs))
-    flag, edges, rows, row_edges = borrowed((flag, edges, rows, row_edges))
+    grid, head, link, axis, arcs = borrow_arrays((grid, head, link, axis, arcs))
+    flag, edges, rows, row_edges = borrow_arrays((flag, edges, rows, row_edges))
     r = R * (1.0 - touch)
     m = round(math.pi / grid[6])
     for v in range(len(which)):
@@ -385,7 +385,7 @@ def open_sides(points, normals, which, eps, least, R, touch, grid, head, link, a
         nx, ny = normals[k, 0], normals[k, 1]
         x, y = points[k, 0] + eps * nx, points[k, 1] + eps * ny
         out[v] = False
-        if allowed(x, y, grid, flag, edges, rows, row_edges):
+        if in_centre_region(x, y, grid, flag, edges, rows, row_edges):
             total = 0.0
             for q in range(uncut_between(x, y, nx, ny, r, R, m // 3, m - m // 3, grid, head, link, axis, arcs)):
                 total += arcs[q, 1] - arcs[q, 0]

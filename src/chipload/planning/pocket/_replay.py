@@ -6,7 +6,7 @@ import math
 
 from numba import njit
 
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 from chipload.planning.pocket._fit import place
 from chipload.stock._planar import remove_segment, uncut
 from chipload.stock.planar import TOUCH
@@ -27,9 +27,9 @@ def replay(segments, motion, share, block, R, angle, most, count, phi, capsule, 
     A motion is taken from the stock when its last piece is measured; one that bends so much that it meets its own cut,
     piece by piece. Returns (capsules, chain entries).
     """
-    segments, motion, share, block, seg = borrowed((segments, motion, share, block, seg))
-    angle, most, count, phi = borrowed((angle, most, count, phi))
-    grid, head, chains, link, axis, arcs = borrowed((grid, head, chains, link, axis, arcs))
+    segments, motion, share, block, seg = borrow_arrays((segments, motion, share, block, seg))
+    angle, most, count, phi = borrow_arrays((angle, most, count, phi))
+    grid, head, chains, link, axis, arcs = borrow_arrays((grid, head, chains, link, axis, arcs))
     r = R * (1.0 - TOUCH)
     for i in block:
         for c in range(7):

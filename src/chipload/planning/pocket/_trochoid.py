@@ -9,7 +9,7 @@ import math
 
 from numba import njit
 
-from chipload.engagement.moves._uncounted_arrays import borrowed
+from chipload.engagement.moves._uncounted_arrays import borrow_arrays
 from chipload.planning.pocket._pass_steps import angle_at
 
 
@@ -19,7 +19,7 @@ def circle_engagement(xc, yc, rho, n, r, R, limit, grid, head, link, axis, arcs,
 
     Ends early above the limit.
     """
-    grid, head, link, axis, arcs, met = borrowed((grid, head, link, axis, arcs, met))
+    grid, head, link, axis, arcs, met = borrow_arrays((grid, head, link, axis, arcs, met))
     most = 0.0
     for k in range(n):
         a = 2.0 * math.pi * k / n

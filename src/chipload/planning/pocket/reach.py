@@ -42,7 +42,7 @@ class Reach:
 
     def holds(self, x: float, y: float, grid: Floats) -> bool:
         """Whether the centre may be at a place."""
-        return bool(_pass_steps.allowed(x, y, grid, *self.arguments()))
+        return bool(_pass_steps.in_centre_region(x, y, grid, *self.arguments()))
 
     def arguments(self) -> tuple[NDArray[Any], ...]:
         """Arguments of the kernels."""

@@ -115,10 +115,10 @@ def _nearest(
 
 def _corner_centre(C: Floats, axis: Floats, normal: Floats, e: float) -> Floats:
     """M of corner circles with their middles at C (n, 3)."""
-    return C if e == 0.0 else C - e * across(normal, axis)
+    return C if e == 0.0 else C - e * part_across(normal, axis)
 
 
-def across(normal: Floats, axis: Floats) -> Floats:
+def part_across(normal: Floats, axis: Floats) -> Floats:
     """Part of normals (..., 3) across axes (..., 3) as unit vectors; 0 where both are parallel."""
     part = normal - (normal * axis).sum(axis=-1, keepdims=True) * axis
     size = np.linalg.norm(part, axis=-1, keepdims=True)

@@ -192,7 +192,7 @@ def largest_depths(
     solve = np.flatnonzero((above > 0) & (above < LOOKS))
     if len(solve):
         k = above[solve]
-        depth[solve], found[solve] = _below(
+        depth[solve], found[solve] = _depth_below_crossing(
             force, value[solve], looks[k - 1], looks[k], F[k - 1], F[k], limits.tolerance, progress
         )
     status = np.where(above == LOOKS, DEEPEST, np.where(above == 0, INFEASIBLE, THRESHOLD))
@@ -206,7 +206,7 @@ def largest_depths(
     return Depths(depth[back], found[back], status[back], infeasible)
 
 
-def _below(
+def _depth_below_crossing(
     force: Callable[[Floats], Floats],
     target: Floats,
     low: Floats,
@@ -262,7 +262,7 @@ def _helps(
         return edge, _bisect(at_feed, threshold, least, posture.feed_per_tooth), None
 
     def at_diameter(diameter: float) -> float:
-        return float(normal_force(_scaled(posture, diameter), material, [depth], measure=measure)[0])
+        return float(normal_force(_scale_pose(posture, diameter), material, [depth], measure=measure)[0])
 
     ratio = _least_share(posture, depth)
     smallest = 1.001 * ratio * posture.cutter.diameter
@@ -281,7 +281,7 @@ def _least_share(posture: Pose, depth: float) -> float:
     return max(depth / posture.deepest, step / cutter.diameter)
 
 
-def _scaled(posture: Pose, diameter: float) -> Pose:
+def _scale_pose(posture: Pose, diameter: float) -> Pose:
     """The pose with a cutter of another diameter [mm] and the same shape; a barrel is scaled with its flutes."""
     cutter = posture.cutter
     ratio, barrel = diameter / cutter.diameter, cutter.barrel_radius

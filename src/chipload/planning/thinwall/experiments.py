@@ -130,7 +130,7 @@ def propose_sites(
     O(m c) interpolations a sweep, of which there are a few; beyond ``COARSE`` candidates c is that many of them, spread
     over the surface, and each site is moved among its neighbours in the end.
     """
-    x, y, allowed = _checked(places, modelled, count, scatter, candidates)
+    x, y, allowed = _check_experiments(places, modelled, count, scatter, candidates)
 
     def cost(S: Sequence[int]) -> float:
         try:
@@ -178,7 +178,7 @@ def _spread(x: Floats, allowed: Ints, chosen: list[int]) -> list[int]:
     return sorted(out)
 
 
-def _checked(
+def _check_experiments(
     places: ArrayLike, modelled: ArrayLike, count: int, scatter: float, candidates: ArrayLike | None
 ) -> tuple[Floats, Floats, Ints]:
     x, F = np.asarray(places, dtype=np.float64), np.asarray(modelled, dtype=np.float64)

@@ -199,7 +199,7 @@ def rows_over(area: FloorArea, step: float) -> list[Floats]:
     for y in np.linspace(y0, y1, count) if count > 1 else [0.5 * (y0 + y1)]:
         parts = shapely.get_parts(wide.intersection(shapely.LineString([(x0 - 1.0, y), (x1 + 1.0, y)])))
         ends = sorted((float(q.bounds[0]), float(q.bounds[2])) for q in parts[shapely.intersects(parts, area.outline)])
-        rows = [_sampled(np.array([[a, y], [b, y]]), area.spacing) for a, b in ends]
+        rows = [_sample_line(np.array([[a, y], [b, y]]), area.spacing) for a, b in ends]
         out += rows if step > 0.0 else [row[::-1] for row in reversed(rows)]
     return out
 
@@ -212,10 +212,10 @@ def _contours(area: FloorArea, rows: list[shapely.LineString], down: bool) -> li
     # closed walls begin anywhere: joined where they meet
     lines = shapely.get_parts(shapely.line_merge(left, directed=True))
     found = [shapely.get_coordinates(line) for line in lines.tolist() if line.length > 10.0 * CUT]
-    return [_sampled(line if down else line[::-1], area.spacing) for line in found]
+    return [_sample_line(line if down else line[::-1], area.spacing) for line in found]
 
 
-def _sampled(line: Floats, spacing: float) -> Floats:
+def _sample_line(line: Floats, spacing: float) -> Floats:
     """The line (k, 2) [mm] with points at most ``spacing`` [mm] apart."""
     out = [line[:1]]
     for a, b in pairwise(line):
@@ -259,7 +259,7 @@ class _FloorPath:
             self._go(entry, float(self.heights.low(entry)) + ABOVE)
             self._feed(entry, float(self.heights.low(entry)))
             if entry is not start:
-                self._feed_along(_sampled(np.stack([entry, start]), self.area.spacing)[1:])
+                self._feed_along(_sample_line(np.stack([entry, start]), self.area.spacing)[1:])
         self._feed_along(stroke[1:])
         self.free.append(stroke)
         self.now = stroke[-1]

@@ -30,7 +30,7 @@ from chipload.planning.thinwall.flank_stock import Pose
 from chipload.planning.thinwall.floor_rows import FloorSide, floor_pass
 from chipload.planning.thinwall.pass_program import Margins, PassPath, PassProgram
 from chipload.planning.thinwall.passes import WallPass
-from chipload.planning.thinwall.paths import PassMotion, Rows, placed, rows_of
+from chipload.planning.thinwall.paths import PassMotion, Rows, place_rows, rows_of
 
 Floats = NDArray[np.float64]
 
@@ -55,9 +55,9 @@ class FineSide:
 
     def laid(self, p: WallPass, places: tuple[Floats, Floats], posture: Pose) -> tuple[Rows, Floats, Floats]:
         """Rows of a pass, with the parameters (r, s, 2) and the planned depth (r, s) [mm] of their contact points."""
-        low, high = (refined(d, places, (self.u, self.v)) for d in (p.low, p.high))
+        low, high = (refine_depths(d, places, (self.u, self.v)) for d in (p.low, p.high))
         rows = rows_of(self.surface, low, high, posture)
-        return (rows, *_known(rows, self, high - low))
+        return (rows, *_known_depths(rows, self, high - low))
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class OperationMotion:
     margins: Margins
 
 
-def refined(values: Floats, at: tuple[Floats, Floats], to: tuple[Floats, Floats]) -> Floats:
+def refine_depths(values: Floats, at: tuple[Floats, Floats], to: tuple[Floats, Floats]) -> Floats:
     """Depths (n, m) interpolated from parameters ``at`` to parameters ``to``; no value lies beyond its neighbours.
 
     Monotone cubics along u, then along v.
@@ -157,7 +157,7 @@ def _pass_program(
     if p.threshold.speed is not None:  # the feed per tooth stays
         own = p.threshold.speed
         pass_motion = replace(pass_motion, spindle=own, feed=pass_motion.feed * own / pass_motion.spindle)
-    tip, axis, centre = placed(rows, pass_motion.posture)
+    tip, axis, centre = place_rows(rows, pass_motion.posture)
     low_axis = float(axis[..., 2].min())
     if min(low_axis, float((axis + ASIDE * rows.normal)[..., 2].min())) < 0.02:
         raise InputError(
@@ -222,7 +222,7 @@ def _corners(points: Floats, sag: float) -> NDArray[np.int64]:
     return np.array(sorted(keep))
 
 
-def _known(rows: Rows, side: FineSide, depth: Floats) -> tuple[Floats, Floats]:
+def _known_depths(rows: Rows, side: FineSide, depth: Floats) -> tuple[Floats, Floats]:
     """Parameters (r, s, 2) and planned depth (r, s) of the contact points, in their order."""
     count = len(rows.contact)
     v = np.linspace(1.0, 0.0, count)

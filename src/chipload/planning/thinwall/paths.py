@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from chipload.errors import InputError
 from chipload.lazy import scipy
 from chipload.planning.thinwall.blank import FinishSurface
-from chipload.planning.thinwall.contact import across
+from chipload.planning.thinwall.contact import part_across
 from chipload.planning.thinwall.flank_stock import Pose
 from chipload.planning.thinwall.passes import NOTHING, WallPass
 from chipload.program.program import LINE, RAPID, Program
@@ -126,13 +126,13 @@ def rows_of(surface: FinishSurface, low: Floats, high: Floats, posture: Pose) ->
     return Rows(contact, normal, _unit(t - (t * normal).sum(axis=2, keepdims=True) * normal), cut)
 
 
-def placed(rows: Rows, posture: Pose) -> tuple[Floats, Floats, Floats]:
+def place_rows(rows: Rows, posture: Pose) -> tuple[Floats, Floats, Floats]:
     """Tip [mm], axis and middle C of the circle of the corner's centres [mm] at the contact points, (r, s, 3) float
     each.
     """
     if rows.axis is not None:
         r, e, height = posture.cutter.finishing_arc
-        C = rows.contact + r * rows.normal + e * across(rows.normal, rows.axis)
+        C = rows.contact + r * rows.normal + e * part_across(rows.normal, rows.axis)
         return C - height * rows.axis, rows.axis, C
     frame = np.stack([rows.feed, np.cross(rows.normal, rows.feed), rows.normal], axis=2)
     axis = np.einsum("k,rskc->rsc", posture.axis, frame)
@@ -148,7 +148,7 @@ def program_of(rows: Rows, pass_motion: PassMotion, label: str) -> Program:
     InputError
         Nothing is cut.
     """
-    tip, axis, _ = placed(rows, pass_motion.posture)
+    tip, axis, _ = place_rows(rows, pass_motion.posture)
     points: list[Floats] = []
     axes: list[Floats] = []
     motion: list[int] = []
@@ -209,7 +209,7 @@ def gouges(rows: Rows, surface: FinishSurface, low: Floats, posture: Pose, toler
     A point of the surface that lies nearer to the disk of the corner circle's centres than r - ``tolerance`` [mm].
     """
     q = (surface.points + low[..., None] * surface.normals).reshape(-1, 3)
-    _, axis, C = placed(rows, posture)
+    _, axis, C = place_rows(rows, posture)
     r, e = posture.cutter.finishing_arc[:2]
     # a barrel's arc lies beside the middle of its centres' circle, along the axis
     reach = e + r if e >= 0.0 else posture.cutter.flute_length + posture.cutter.diameter

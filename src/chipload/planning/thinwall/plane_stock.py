@@ -304,7 +304,7 @@ def engagement_of_depths(posture: CutterPose, depths: ArrayLike, nodes: int = 8)
     )
     circles = _circles(posture, d, nodes)
     starts, lengths = _ranges(circles, d)
-    cuts = _cutting(circles, d, starts, lengths)
+    cuts = _edge_cuts(circles, d, starts, lengths)
     step, node, part = np.nonzero(cuts)
     low = starts[step, node, part] % math.tau
     count = np.bincount(step, minlength=len(d))
@@ -398,7 +398,7 @@ def _ranges(circles: _Circles, d: Floats) -> tuple[Floats, Floats]:
     return starts, lengths
 
 
-def _cutting(circles: _Circles, d: Floats, starts: Floats, lengths: Floats) -> Bools:
+def _edge_cuts(circles: _Circles, d: Floats, starts: Floats, lengths: Floats) -> Bools:
     """Whether the edge is in stock in each range, (n, k, m) bool."""
     posture, middle = circles.posture, starts + 0.5 * lengths
     cuts = circles.along[..., None] * np.sin(middle) + circles.offset[..., None] > 1e-9 * posture.feed_per_tooth

@@ -100,7 +100,7 @@ def sides_of_program(
                 f"{where}: {len(rows)} rows touch the finished surface within {NEAR:g} mm{off}: must be at least 2: "
                 "state a finishing program of this wall, in its coordinates, whose cutter leans"
             )
-        widest = max(widest, _covered(FinishSide(side, rows, foot), where))
+        widest = max(widest, _greatest_row_distance(FinishSide(side, rows, foot), where))
         made.append(FinishSide(side, rows, foot))
     return tuple(made), widest
 
@@ -180,17 +180,17 @@ def _edges(
     u, v = found.u[here], found.v[here]
     for _ in range(HALVINGS):
         share = 0.5 * (low + high)
-        tip, axis = _between(path, here, there, share)
+        tip, axis = _places_between(path, here, there, share)
         one = finder.contacts(tip, axis, NEAR_ENOUGH)
         on = _touches(one)
         low, high = np.where(on, share, low), np.where(on, high, share)
         u, v = np.where(on, one.u, u), np.where(on, one.v, v)
-    axis = _between(path, here, there, low)[1]
+    axis = _places_between(path, here, there, low)[1]
     moved = np.linalg.norm(finder.side(u, v)[0] - finder.side(found.u[here], found.v[here])[0], axis=1)
     return [_Edge(float(u[k]), float(v[k]), axis[k], float(moved[k])) if goes_on[k] else None for k in range(len(here))]
 
 
-def _between(path: _FeedMotions, here: Ints, there: Ints, share: Floats) -> tuple[Floats, Floats]:
+def _places_between(path: _FeedMotions, here: Ints, there: Ints, share: Floats) -> tuple[Floats, Floats]:
     """Tips and axes between two places of a path each."""
     tip, axis = (x[here] + share[:, None] * (x[there] - x[here]) for x in (path.tip, path.axis))
     return tip, axis / np.linalg.norm(axis, axis=1, keepdims=True)
@@ -215,7 +215,7 @@ def _split(row: FinishRow, side: SideAt) -> list[FinishRow]:
     ]
 
 
-def _covered(side: FinishSide, where: str) -> float:
+def _greatest_row_distance(side: FinishSide, where: str) -> float:
     """Greatest distance [mm] of neighbouring rows of a side that they cover.
 
     Raises

@@ -80,7 +80,7 @@ class PlannedVariant:
     passes_otherwise: int | None
 
 
-def unlimited(surfaces: Sequence[FinishSurface], operations: Sequence[DepthOperation]) -> PlannedVariant:
+def plan_without_limit(surfaces: Sequence[FinishSurface], operations: Sequence[DepthOperation]) -> PlannedVariant:
     """Passes of the greatest depth of each operation's force law, without the limit of the wall."""
 
     def of_order(order: Order) -> PlanOf:

@@ -59,7 +59,7 @@ def place_points(block: Block, c: Controller, values: list[tuple[str, str, float
     point = block.point
     motion = next((g for g in reversed(block.g) if g in (0, 10, 20, 30)), c.state.motion)
     if memory.circle:
-        _through(block, values, here, coordinates, (u, v, iu, iv))
+        _arc_through_point(block, values, here, coordinates, (u, v, iu, iv))
     elif "RP" in point or "AP" in point:
         radius, angle = memory.polar
         if "RP" in point:
@@ -73,7 +73,7 @@ def place_points(block: Block, c: Controller, values: list[tuple[str, str, float
     elif "ANG" in point:
         _line(block, values, here, coordinates, point["ANG"][1], (u, v))
     elif "AR" in point:
-        _opened(block, values, here, coordinates, (motion, point["AR"][1]), (u, v, iu, iv))
+        _arc_by_angle(block, values, here, coordinates, (motion, point["AR"][1]), (u, v, iu, iv))
 
 
 def _plane_values(
@@ -122,7 +122,7 @@ def _line(
     _put(block, values, axes, here + direction * (along / by if abs(by) >= 1e-9 else 0.0))
 
 
-def _opened(
+def _arc_by_angle(
     block: Block, values: list[tuple[str, str, float]], here: complex, coordinates: dict[str, float],
     of: tuple[int, float], names: tuple[str, str, str, str],
 ) -> None:  # fmt: skip
@@ -149,7 +149,7 @@ def _opened(
     _put(block, values, (u, v), centre + (here - centre) * cmath.rect(1.0, turn))
 
 
-def _through(
+def _arc_through_point(
     block: Block, values: list[tuple[str, str, float]], here: complex, coordinates: dict[str, float],
     names: tuple[str, str, str, str],
 ) -> None:  # fmt: skip

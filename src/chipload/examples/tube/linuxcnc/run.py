@@ -166,7 +166,7 @@ def rows_of(file: Path) -> np.ndarray:
     return np.array([[float(x) for x in line.split(",")] for line in lines])
 
 
-def along(job: HalJob, rows: np.ndarray) -> np.ndarray:
+def place_along_path(job: HalJob, rows: np.ndarray) -> np.ndarray:
     """(n,) place along the path of the rows of `machine.csv` [mm]."""
     s, found = 0.0, np.empty(len(rows))
     for k, row in enumerate(rows):
@@ -179,7 +179,7 @@ def along(job: HalJob, rows: np.ndarray) -> np.ndarray:
 def play(args: argparse.Namespace) -> dict[str, object]:
     """Run the program once; see the head of this file."""
     out, lost, seconds = args.out, args.lost, args.seconds
-    result = args.result or made(out)
+    result = args.result or result_folder(out)
     for name in CONTROL:
         shutil.copyfile(result / name, out / name)
     limit = 1e3 * json.loads((result / "summary.json").read_text())["operations"][0]["torque_limit_nm"]
@@ -206,7 +206,7 @@ def play(args: argparse.Namespace) -> dict[str, object]:
                 while not cnc.ended() and time.monotonic() < end:
                     rows = rows_of(machine)
                     if killed is None and (args.kill_at is not None or args.kill_stopped):
-                        s = along(job, rows)
+                        s = place_along_path(job, rows)
                         stopped = args.kill_stopped and s[-1] > 20.0 and (rows[-5:, 4] == 0.0).all()
                         if stopped or (args.kill_at is not None and s[-1] >= args.kill_at):
                             controller.send_signal(signal.SIGSTOP if args.hang else signal.SIGKILL)
@@ -234,13 +234,13 @@ def play(args: argparse.Namespace) -> dict[str, object]:
     if sensor is not None:
         summary = common(job, rows) | {"fault": after_fault(job, rows, control, sensor.at, limit)}
     else:
-        summary = summed(job, rows, control, killed, limit)
+        summary = sum_up_run(job, rows, control, killed, limit)
     summary |= {"lost": lost, "processes_left": len(left), "hal_left": hal_in_use()}
     (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
     return summary
 
 
-def made(out: Path) -> Path:
+def result_folder(out: Path) -> Path:
     """The result of the job beside this folder."""
     command = [sys.executable, "-c", "from chipload.cli import main; main()", "run", str(HERE.parent / "job.toml")]
     done = subprocess.run([*command, "--out", str(out / "job")], check=False)
@@ -251,7 +251,7 @@ def made(out: Path) -> Path:
 
 def common(job: HalJob, rows: np.ndarray) -> dict[str, object]:
     """What every run says: the programmed feed, and the greatest feed over it and override on the path."""
-    s, programmed = along(job, rows), float(job.path.model.feed[0])
+    s, programmed = place_along_path(job, rows), float(job.path.model.feed[0])
     # rapids go at the machine's own speed
     on = (s > 0.0) & (s < job.path.model.s[-1])
     return {
@@ -268,7 +268,7 @@ def after_fault(
     if at is None:
         raise Failed("the sensor: its fault was not reached")
     c = dict(zip(COLUMNS, control.T, strict=True))
-    s, last = along(job, rows), float(job.path.model.s[-1])
+    s, last = place_along_path(job, rows), float(job.path.model.s[-1])
     later = (c["t_s"] >= at) & (c["s_mm"] < last - 1e-3)
     stands = (rows[:, 0] > at) & (rows[:, 4] == 0.0) & (s < last - 1e-3)
     load = c["torque_nmm"] / c["relief"] / limit
@@ -284,9 +284,11 @@ def after_fault(
     }
 
 
-def summed(job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | None, limit: float) -> dict[str, object]:
+def sum_up_run(
+    job: HalJob, rows: np.ndarray, control: np.ndarray, killed: float | None, limit: float
+) -> dict[str, object]:
     """What the run says; ``limit`` of torque [N mm] at the place where the wall bears least."""
-    s, programmed = along(job, rows), float(job.path.model.feed[0])
+    s, programmed = place_along_path(job, rows), float(job.path.model.feed[0])
     # rapids go at the machine's own speed
     on = (s > 0.0) & (s < job.path.model.s[-1])
     t, velocity, override = rows[:, 0], rows[:, 4], rows[:, 5]
