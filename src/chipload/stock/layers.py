@@ -155,7 +155,9 @@ class LayeredStock:
         part = trimesh.Trimesh(np.array(mesh.vertices), np.array(mesh.faces), process=False)
         (x0, y0, z0), (x1, y1, z1) = part.bounds
         bounds = bounds_of(bounds_or_layer_mm, float(z0), float(z1))
-        if bounds[0] > z0 or bounds[-1] < z1:
+        # bounds of a mesh that was turned differ from its own by rounding
+        rounding = 1e-9 * (z1 - z0)
+        if bounds[0] > z0 + rounding or bounds[-1] < z1 - rounding:
             raise InputError(
                 f"stock.bounds from {bounds[0]:g} to {bounds[-1]:g} mm: must hold the mesh, {z0:g} to {z1:g} mm"
             )
