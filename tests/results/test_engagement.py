@@ -24,7 +24,8 @@ def test_samples_have_the_force_and_the_chip_of_their_rows(example, name, force)
         # rotations only, one of them counts; over all steps that evens out
         mean, most = found.turn[..., 3].mean(axis=1), columns["torque_mean_nm"].max()
         assert mean == pytest.approx(columns["torque_mean_nm"], rel=0.02, abs=2e-3 + 0.06 * most)
-        assert mean.sum() == pytest.approx(columns["torque_mean_nm"].sum(), rel=0.01)
+        # the teeth that are shown are those of the instant of the greatest force, the mean is that of all instants
+        assert mean.sum() == pytest.approx(columns["torque_mean_nm"].sum(), rel=0.015)
         # h at even angles of each range
         share = np.linspace(0.0, 1.0, 41)[:, None]
         low, high, along, offset, across = found.ranges[:, :5].T
