@@ -97,6 +97,7 @@ def factor(matrix: scipy.sparse.csc_array, smallest: float = SMALLEST_PIVOT) -> 
 
     Examples
     --------
+    >>> from scipy.sparse import csc_array
     >>> factor(csc_array([[4.0, 2.0], [2.0, 2.0]])).solve(np.array([2.0, 2.0])).tolist()
     [0.0, 1.0]
     """
