@@ -125,7 +125,7 @@ CASES = (
         "material in the way of the shank, which no roughing has taken",
         stated("stock", low_mm=(98.0, 4.0, 30.0), high_mm=(104.0, 12.0, 33.0)),
         "exceeds",
-        "axial_overrun_mm",
+        "collision",
     ),
     case(
         "impeller-clamp-not-stated", "no clamps are stated", lambda job: None, "unchecked", "fixtures: none is stated"
