@@ -108,7 +108,6 @@ modulus_gpa = 600.0
 [[operation]]
 kind = "simulate"
 step_mm = 1.0
-engine = "moves"
 [limits]
 force_n = 1500.0
 """

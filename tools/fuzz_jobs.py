@@ -175,7 +175,6 @@ def small_jobs() -> dict[str, dict[str, bytes]]:
     pocket = _example("pocket").replace("housing.dxf", "closed.dxf").replace("step_mm = 0.2", "step_mm = 0.5")
     texts = {
         "program": (PROGRAM, {"part.ngc": NC.encode()}),
-        "moves": (PROGRAM.replace("step_mm = 2.0", 'step_mm = 2.0\nengine = "auto"'), {"part.ngc": NC.encode()}),
         "feeds": (
             PROGRAM.replace("[limits]", "[operation.feeds]\nslowest_percent = 30.0\nfastest_percent = 200.0\n[limits]"),
             {"part.ngc": NC.encode()},
