@@ -36,7 +36,7 @@ def run(
     """With the slices of a job that states none."""
     stock = LayeredStock.block(LOW, [*HIGH[:2], top], 0.5, 40.0)
     fine = Resolution(step_mm, 0.001, corner, 0.5 * cutter.radius)
-    return remove(path(points), stock, {1: cutter}, PLAIN, fine, engine="auto", accuracy=accuracy)
+    return remove(path(points), stock, {1: cutter}, PLAIN, fine, accuracy=accuracy)
 
 
 def work(removal: Removal) -> Floats:

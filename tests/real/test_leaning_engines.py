@@ -46,8 +46,8 @@ def by_both(
 ) -> tuple[Removal, Removal]:
     """By ``auto``, and by layers of 0.1 mm."""
     out = []
-    for engine, layer in (("auto", 0.5), ("layers", 0.1)):
-        slices = 24 if engine == "auto" else 48
+    for engine, layer in (("moves", 0.5), ("layers", 0.1)):
+        slices = 24 if engine == "moves" else 48
         fine = Resolution(2.0, 0.002, slices, 0.1 * cutter.radius, bottom_slices=12)
         stock = LayeredStock.block(low, high, layer, 4.0 * cutter.radius)
         out.append(remove(program, stock, {1: cutter}, ALLOY, fine, engine=engine, accuracy=False))  # type: ignore[arg-type]

@@ -103,7 +103,7 @@ def test_a_leaning_barrel_takes_what_dexels_lose(name: str, engine: Engine) -> N
 
 
 def test_a_barrel_is_not_handed_over() -> None:
-    found = remove(along(OVAL), wall(0.5), {1: OVAL}, PLAIN, FINE, engine="auto", accuracy=False)
+    found = remove(along(OVAL), wall(0.5), {1: OVAL}, PLAIN, FINE, accuracy=False)
     assert found.findings == ()
 
 

@@ -348,7 +348,7 @@ class Cutter:
         if self.shape:
             raise InputError(
                 f"cutter {self.number}: its shape of {len(self.shape)} segments has no seven numbers of APT, which are "
-                'needed here: state engine = "moves", or another cutter'
+                "needed here: state another cutter"
             )
         r, ta, tb = self.corner_radius, math.tan(self.bottom), math.tan(self.taper)
         pull = r / math.cos(self.taper) - r * tb / math.cos(self.bottom)

@@ -91,7 +91,7 @@ def remove(
     times: Floats | None = None,
     accuracy: bool = True,
     workers: int = 2,
-    engine: Engine = "auto",
+    engine: Engine = "moves",
     loads: bool = True,
     outlines: bool = True,
     progress: Progress = silent,
@@ -112,7 +112,7 @@ def remove(
         and ``duration_s``; None: at the commanded feed, rapids take none
     accuracy : calculate ``energy_balance`` and ``resolution_error``, for which some steps are computed once more
     workers : threads; the result does not depend on them
-    engine : ``moves`` (``auto`` is the same), see :mod:`chipload.simulation.moves`, or ``layers``
+    engine : ``moves``, see :mod:`chipload.simulation.moves`; ``layers`` is another method, to compare with
     loads : False: only what is removed is needed; moves then leave the loads 0
     outlines : False: of what is left only the volume is needed: moves then leave ``stock`` as it was, and its volume
         after them is that before less the chips

@@ -51,7 +51,7 @@ skew = LateModule("chipload.engagement.moves._skew_slices")
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Engine = Literal["auto", "moves", "layers"]
+Engine = Literal["moves", "layers"]
 
 #: slices of the engaged part of a corner over those that are asked for of the whole corner: the greatest force is then
 #: within 3 % of the converged one in 99 of 100 moves of a finishing program at the default of a job, see
