@@ -21,6 +21,20 @@ if TYPE_CHECKING:
     from chipload.cutting.material import Material
     from chipload.jobs import FinishedJob
 
+SpindleFile = Annotated[
+    Path | None, typer.Option("--spindle", metavar="FILE", help="the spindle (TOML) that chipload spindle wrote")
+]
+Efficiency = Annotated[
+    float | None, typer.Option("--efficiency", help="power of the cut over the logged power, from 0 to 1")
+]
+EfficiencyError = Annotated[
+    float | None, typer.Option("--efficiency-error", help="its relative standard deviation; default 0.05")
+]
+LogColumns = Annotated[
+    Path | None,
+    typer.Option("--columns", metavar="FILE", help="names and units of the columns (TOML), if the log states none"),
+]
+
 
 @app.command()
 def learn(
@@ -33,15 +47,9 @@ def learn(
         Path, typer.Option("--out", metavar="FILE", help="the material (TOML), for [material] file of a job")
     ],
     name: Annotated[str, typer.Option("--name", help="name of the material; default: the job's, with -learned")] = "",
-    spindle: Annotated[
-        Path | None, typer.Option("--spindle", metavar="FILE", help="the spindle (TOML) that chipload spindle wrote")
-    ] = None,
-    efficiency: Annotated[
-        float | None, typer.Option("--efficiency", help="power of the cut over the logged power, from 0 to 1")
-    ] = None,
-    efficiency_error: Annotated[
-        float | None, typer.Option("--efficiency-error", help="its relative standard deviation; default 0.05")
-    ] = None,
+    spindle: SpindleFile = None,
+    efficiency: Efficiency = None,
+    efficiency_error: EfficiencyError = None,
     following: Annotated[
         Path | None,
         typer.Option(
@@ -54,10 +62,7 @@ def learn(
             "--worth/--no-worth", help="run the next job with the material before and after, and compare the two"
         ),
     ] = True,
-    columns: Annotated[
-        Path | None,
-        typer.Option("--columns", metavar="FILE", help="names and units of the columns (TOML), if the log states none"),
-    ] = None,
+    columns: LogColumns = None,
     overrides: Sets = None,
     debug: Debug = False,
 ) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chipload.cli.app import Debug, Sets, app
+from chipload.cli.learn import Efficiency, EfficiencyError, LogColumns, SpindleFile
 from chipload.errors import InputError
 from chipload.number_text import number_text
 from chipload.terminal import EXCEEDED, run_guarded, show
@@ -29,20 +30,11 @@ def watch(
         ),
     ],
     job: Annotated[Path, typer.Option("--job", metavar="JOB", help="the job (TOML) of the program that runs")],
-    spindle: Annotated[
-        Path | None, typer.Option("--spindle", metavar="FILE", help="the spindle (TOML) that chipload spindle wrote")
-    ] = None,
-    efficiency: Annotated[
-        float | None, typer.Option("--efficiency", help="power of the cut over the logged power, from 0 to 1")
-    ] = None,
-    efficiency_error: Annotated[
-        float | None, typer.Option("--efficiency-error", help="its relative standard deviation; default 0.05")
-    ] = None,
+    spindle: SpindleFile = None,
+    efficiency: Efficiency = None,
+    efficiency_error: EfficiencyError = None,
     torque: Annotated[bool, typer.Option("--torque", help="use the logged torque instead of the power")] = False,
-    columns: Annotated[
-        Path | None,
-        typer.Option("--columns", metavar="FILE", help="names and units of the columns (TOML), if the log states none"),
-    ] = None,
+    columns: LogColumns = None,
     device: Annotated[str | None, typer.Option("--device", help="name of the device of an agent")] = None,
     component: Annotated[str | None, typer.Option("--component", help="name of its spindle")] = None,
     false_alarms: Annotated[

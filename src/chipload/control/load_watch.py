@@ -273,9 +273,9 @@ class LoadWatch:
         # beyond the end of its line a sample is not: the line tells where it is
         misfit = float(near.max() - near.min()) * min(lag / self._settings.block_s, 1.0)
         row = int(rows[len(rows) // 2])
-        return self._tested(float(values.mean()), parts, misfit, row, seconds, float(times[-1]))
+        return self._test_block(float(values.mean()), parts, misfit, row, seconds, float(times[-1]))
 
-    def _tested(
+    def _test_block(
         self, value: float, parts: Floats, misfit: float, row: int, seconds: float, time: float
     ) -> list[Finding]:
         """Return the alarms of a block by its mean signal and prediction."""

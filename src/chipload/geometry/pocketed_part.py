@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.geometry.mesh import sections
+from chipload.lazy import trimesh
 
 Floats = NDArray[np.float64]
 

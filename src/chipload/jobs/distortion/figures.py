@@ -6,11 +6,11 @@ from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.jobs.distortion.outcome import Banded, DistortionResult
 from chipload.jobs.distortion.result import UM, note
+from chipload.lazy import trimesh
 from chipload.number_text import number_text
 from chipload.report.presentation import Presentation
 from chipload.report.scene import WALL
@@ -50,7 +50,7 @@ def sections(done: DistortionResult, figures: dict[str, go.Figure]) -> list[str]
     }
     rows = [[escape(plan.name), _text(flat), _range(flat), _text(dist)] for plan, flat, dist in done.others[:LISTED]]
     used = [plan == done.used.plan for plan, _, _ in done.others[:LISTED]]
-    head = ["plan", "flatness [um]", "from plate to plate [um]", "distortion [um]"]
+    head = ["plan", "flatness [µm]", "from plate to plate [µm]", "distortion [µm]"]
     more = (
         f"<p class='note'>The {LISTED} flattest of {len(done.others)} plans.</p>" if len(done.others) > LISTED else ""
     )
@@ -63,7 +63,7 @@ def sections(done: DistortionResult, figures: dict[str, go.Figure]) -> list[str]
         "<p>Compared in wider cells; the plan in use is computed again in finer ones.</p>",
         table(head, rows, numbers=(1, 2, 3), used=used) + more,
         "<h2>Flat faces of the plan in use</h2>",
-        table(["face", "flatness [um]", "from plate to plate [um]"], faces, numbers=(1, 2)),
+        table(["face", "flatness [µm]", "from plate to plate [µm]"], faces, numbers=(1, 2)),
         "<h2>Residual stress of the plate</h2>",
         figure("stress", _stress(done), figures),
     ]

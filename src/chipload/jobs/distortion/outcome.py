@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.errors import Finding
 from chipload.jobs.distortion.job import DistortionJob
 from chipload.jobs.distortion.plans import MillingPlan
 from chipload.jobs.distortion.surface import PartSurface
+from chipload.lazy import trimesh
 from chipload.result import Provenance
 
 Floats = NDArray[np.float64]

@@ -19,7 +19,6 @@ from functools import partial
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.checking.clamped import place_clamp
@@ -29,6 +28,7 @@ from chipload.jobs.distortion.outcome import Banded, PlanOutcome
 from chipload.jobs.distortion.plans import Clamping, MillingPlan
 from chipload.jobs.distortion.shapes import PartLayers, SideCut, part_layers
 from chipload.jobs.distortion.surface import UNDERSIDE, PartSurface
+from chipload.lazy import trimesh
 from chipload.number_text import number_text
 from chipload.structure.cells.clamp import clamp_stiffness, rigid_motions
 from chipload.structure.cells.faces import flat_faces, grid_on_faces

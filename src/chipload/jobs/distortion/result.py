@@ -37,14 +37,14 @@ def result_of(done: DistortionResult) -> Result:
 def note(done: DistortionResult) -> str:
     """The plan in use in a sentence, and what it is flatter than."""
     flat, stated = done.used.flatness, done.stated.flatness
-    text = f"Flatness {number_text(UM * flat.value, 3)} um, {_band(flat)}, with the {done.used.plan.name}."
+    text = f"Flatness {number_text(UM * flat.value, 3)} µm, {_band(flat)}, with the {done.used.plan.name}."
     if done.used.plan != done.stated.plan:
-        text += f" As stated: {number_text(UM * stated.value, 3)} um."
+        text += f" As stated: {number_text(UM * stated.value, 3)} µm."
     return text
 
 
 def _band(value: Banded) -> str:
-    return f"{number_text(UM * value.low, 3)} to {number_text(UM * value.high, 3)} um from plate to plate"
+    return f"{number_text(UM * value.low, 3)} to {number_text(UM * value.high, 3)} µm from plate to plate"
 
 
 def _track(done: DistortionResult, one: PlanOutcome, in_use: bool, name: str) -> Track:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.checking.clamped import PER
@@ -18,6 +17,7 @@ from chipload.jobs.distortion.plans import MillingPlan, plans_of
 from chipload.jobs.distortion.release import PlateRelease, in_wider_cells, plate_release
 from chipload.jobs.distortion.shapes import PartLayers, part_layers
 from chipload.jobs.distortion.surface import part_surface
+from chipload.lazy import trimesh
 from chipload.number_text import number_text, percent_text
 from chipload.progress import Progress, silent
 from chipload.result import Provenance

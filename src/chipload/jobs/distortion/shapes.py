@@ -13,12 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.errors import InputError
 from chipload.geometry.mesh import sections
 from chipload.geometry.pocketed_part import distinct_levels, level_faces
+from chipload.lazy import trimesh
 from chipload.stock.layers import LayeredStock
 
 Floats = NDArray[np.float64]

@@ -10,11 +10,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from chipload.geometry.pocketed_part import LEVEL
 from chipload.jobs.distortion.shapes import OFF
+from chipload.lazy import trimesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -173,7 +173,8 @@ def peak_excess(all_peaks: Sequence[ComparedPeaks]) -> tuple[float | None, float
             if known[direction]:
                 most = np.quantile(peaks.measured[:, direction], COVERED)
                 worst.append(float(most / peaks.predicted[direction] - 1.0))
-    return tuple(float(f"{max(0.0, *worst):.4g}") if worst else None for worst in (plane, axis))  # type: ignore[return-value]
+    excess = [float(f"{max(0.0, *worst):.4g}") if worst else None for worst in (plane, axis)]
+    return excess[0], excess[1]
 
 
 def _material(job: FitJob, fit: Fit, comparisons: Sequence[Comparison]) -> tuple[Material | None, tuple[Finding, ...]]:
