@@ -159,7 +159,8 @@ def open_result(root: Path, name: str) -> PageResult:
     table = _table(path, [c for c in wanted if c in schema.names])
     missing = [c for c in PLACE if c not in table.column_names]
     if missing or table.num_rows == 0 or sum(rows.values()) != table.num_rows:
-        raise InputError(f"{name}/{HISTORY}: {'no row' if not missing else 'no ' + missing[0]}: nothing to show")
+        why = "no row" if not missing else f"no {missing[0]}"
+        raise InputError(f"{name}/{HISTORY}: {why}: nothing to show of its motion: open {name}/report.html")
     tracks, first = [], 0
     for track in result.tracks:
         if rows[track.name]:

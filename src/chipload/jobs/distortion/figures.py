@@ -48,9 +48,12 @@ def sections(done: DistortionResult, figures: dict[str, go.Figure]) -> list[str]
         "cells": f"{number_text(done.cell, 3)} mm, {done.used.unknowns} unknowns; flatness known to "
         f"{number_text(100.0 * done.cell_error, 2)} % by the cells",
     }
-    rows = [[escape(plan.name), _text(flat), _range(flat), _text(dist)] for plan, flat, dist in done.others[:LISTED]]
+    rows = [
+        [str(rank), escape(plan.name), _text(flat), _range(flat), _text(dist)]
+        for rank, (plan, flat, dist) in enumerate(done.others[:LISTED], 1)
+    ]
     used = [plan == done.used.plan for plan, _, _ in done.others[:LISTED]]
-    head = ["plan", "flatness [µm]", "from plate to plate [µm]", "distortion [µm]"]
+    head = ["rank", "plan", "flatness [µm]", "from plate to plate [µm]", "distortion [µm]"]
     more = (
         f"<p class='note'>The {LISTED} flattest of {len(done.others)} plans.</p>" if len(done.others) > LISTED else ""
     )
@@ -61,7 +64,7 @@ def sections(done: DistortionResult, figures: dict[str, go.Figure]) -> list[str]
         definitions(known),
         "<h2>Plans</h2>",
         "<p>Compared in wider cells; the plan in use is computed again in finer ones.</p>",
-        table(head, rows, numbers=(1, 2, 3), used=used) + more,
+        table(head, rows, numbers=(2, 3, 4), used=used) + more,
         "<h2>Flat faces of the plan in use</h2>",
         table(["face", "flatness [µm]", "from plate to plate [µm]"], faces, numbers=(1, 2)),
         "<h2>Residual stress of the plate</h2>",
