@@ -1,4 +1,4 @@
-"""Stress of cutters against stepped bars in closed form, finite elements, a sum over slices, and the issue's cutter."""
+"""Stress of cutters against stepped bars in closed form, finite elements, a sum over slices, and one cutter by hand."""
 
 from __future__ import annotations
 

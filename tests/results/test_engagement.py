@@ -25,12 +25,16 @@ def test_samples_have_the_force_and_the_chip_of_their_rows(example, name, force)
         mean, most = found.turn[..., 3].mean(axis=1), columns["torque_mean_nm"].max()
         assert mean == pytest.approx(columns["torque_mean_nm"], rel=0.02, abs=2e-3 + 0.06 * most)
         # the teeth that are shown are those of the instant of the greatest force, the mean is that of all instants
-        assert mean.sum() == pytest.approx(columns["torque_mean_nm"].sum(), rel=0.015)
+        assert mean.sum() == pytest.approx(columns["torque_mean_nm"].sum(), rel=0.012)
         # h at even angles of each range
         share = np.linspace(0.0, 1.0, 41)[:, None]
         low, high, along, offset, across = found.ranges[:, :5].T
         phi = low + share * (high - low)
         thick = (along * np.sin(phi) + across * np.cos(phi) + offset).max(axis=0)
-        assert np.maximum.reduceat(thick, found.start[:-1]) == pytest.approx(columns["chip_max_mm"], rel=2e-3)
+        # a step that begins or ends a cut has the greatest of several instants, of which one is shown
+        shown = np.maximum.reduceat(thick, found.start[:-1])
+        assert (shown <= columns["chip_max_mm"] * (1.0 + 2e-3)).all()
+        assert shown == pytest.approx(columns["chip_max_mm"], rel=2e-3 if name == "contour" else 0.03)
+        assert np.median(shown / columns["chip_max_mm"]) == pytest.approx(1.0, rel=2e-3)
     if name == "contour":
         assert [read_engagement(done.folder / ENGAGEMENT, k).stride for k in range(len(tracks))]
