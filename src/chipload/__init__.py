@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from chipload.api.mechanics.coefficients import fit, measured_cut
     from chipload.api.mechanics.cut import CutEngagement, engagement_of_cut
     from chipload.api.mechanics.forces import TurnForces, tooth_forces
+    from chipload.api.mechanics.layer_chip import ChipPiece, chip_on_layer
     from chipload.api.mechanics.learning import learn, spindle_log
     from chipload.api.mechanics.stability import (
         LocationErrors,
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
 __all__ = [
     "COLUMNS",
     "CheckSettings",
+    "ChipPiece",
     "ClampedPart",
     "Contour",
     "ContourLimits",
@@ -100,6 +102,7 @@ __all__ = [
     "Workpiece",
     "WorkpieceClamp",
     "check_job",
+    "chip_on_layer",
     "compliance",
     "engagement_of_cut",
     "fit",
@@ -134,6 +137,7 @@ __all__ = [
 _PLACES = {
     "COLUMNS": ("chipload.result.columns", "COLUMNS"),
     "CheckSettings": ("chipload.checking.settings", "CheckSettings"),
+    "ChipPiece": ("chipload.api.mechanics.layer_chip", "ChipPiece"),
     "ClampedPart": ("chipload.api.mechanics.bodies", "ClampedPart"),
     "Contour": ("chipload.geometry.contour", "Contour"),
     "ContourLimits": ("chipload.jobs.contour.tables", "ContourLimitsTable"),
@@ -189,6 +193,7 @@ _FUNCTIONS = {
         "mechanics.cut": "engagement_of_cut",
         "mechanics.coefficients": "fit measured_cut",
         "mechanics.forces": "tooth_forces",
+        "mechanics.layer_chip": "chip_on_layer",
         "mechanics.learning": "learn spindle_log",
         "mechanics.stability": "stability_chart stability_margin surface_location_error",
         "planning": "plan_impeller plan_thin_wall",

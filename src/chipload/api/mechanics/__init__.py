@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from chipload.api.mechanics.coefficients import fit, measured_cut
     from chipload.api.mechanics.cut import CutEngagement, engagement_of_cut
     from chipload.api.mechanics.forces import TurnForces, tooth_forces
+    from chipload.api.mechanics.layer_chip import ChipPiece, chip_on_layer
     from chipload.api.mechanics.learning import learn, spindle_log
     from chipload.api.mechanics.stability import (
         LocationErrors,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from chipload.api.mechanics.wall import WallErrors, wall_form_error
 
 __all__ = [
+    "ChipPiece",
     "ClampedPart",
     "CutEngagement",
     "LocationErrors",
@@ -38,6 +40,7 @@ __all__ = [
     "TurnForces",
     "UndeformedChip",
     "WallErrors",
+    "chip_on_layer",
     "compliance",
     "engagement_of_cut",
     "fit",
@@ -61,6 +64,7 @@ __getattr__, __dir__ = attach(
         "coefficients": "fit measured_cut",
         "cut": "CutEngagement engagement_of_cut",
         "forces": "TurnForces tooth_forces",
+        "layer_chip": "ChipPiece chip_on_layer",
         "learning": "learn spindle_log",
         "stability": "LocationErrors SpeedMargins StabilityLobes stability_chart stability_margin "
         "surface_location_error",
