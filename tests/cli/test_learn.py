@@ -10,6 +10,10 @@ import numpy as np
 import pytest
 
 from chipload import jobs
+from chipload.control import machine_watch
+from chipload.control.linuxcnc import hal_client
+from chipload.control.linuxcnc.hal_client import PinValues
+from chipload.control.logs import read_log
 from chipload.cutting.learned import LearnedRecord, LogEvidence
 from chipload.cutting.material import knowledge_text, material_named, material_text, read_material
 from chipload.errors import Severity
@@ -167,6 +171,7 @@ def test_what_to_measure_next_without_a_log(cell, monkeypatch):
     alarms = [x for x in seen["missing"][1].splitlines() if x.startswith("line ")]
     assert [x.split(":")[0] for x in alarms] == [f"line {lines[np.argmax(cut)]}"]
     assert "tool 1 cuts air where the program cuts material: missing stock, or it broke before" in alarms[0]
+    _hold_by_pins(cell, monkeypatch, t, 300.0 + cut * (lines != lines[np.argmax(cut)]), lines)
     lines = out.splitlines()
     assert lines[0].startswith("deciding load: spindle_power_w at confidence ")
     assert lines[1].startswith("share of that variance: Ktc ")
@@ -174,6 +179,46 @@ def test_what_to_measure_next_without_a_log(cell, monkeypatch):
     code, _, err = call("next-measurement", cell / "job.toml", "--efficiency-error", "1.5")
     assert code == 2
     assert "--efficiency-error = 1.5: must be from 0 to below 1" in err
+
+
+def _hold_by_pins(cell, monkeypatch, time, power, lines) -> None:
+    """Watch the stream on the pins of a LinuxCNC; the alarm holds the feed, and the log is one that is read."""
+    sent, asked = [], {}
+
+    class Pins:
+        def __init__(self, name, python, sources):
+            asked.update(sources)
+            self.rows = iter(zip(time, power, lines, strict=True))
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            return None
+
+        def exchange(self, feed, *_):
+            sent.append(feed)
+            row = next(self.rows, None)
+            return None if row is None else PinValues(row[0], 0, 0, 0, 20.0, 0, feed, current=row[1], line=row[2])
+
+    monkeypatch.setattr(hal_client, "HalPins", Pins)
+    monkeypatch.setattr(machine_watch.time, "sleep", lambda _: None)
+    words = ["watch", "hal", "--job", cell / "job.toml", "--efficiency", "0.85", "--signal-pin", "vfd.power"]
+    code, out, _ = call(*words, "--hold", "air", "--out", cell / "pins.csv")
+    assert code == 3
+    assert asked == {
+        "current-in": "vfd.power", "line-in": "motion.program-line", "velocity": "motion.current-vel"
+    }  # fmt: skip
+    assert "feed hold: air\n" in out
+    assert "feed held by watch-air: the machine stands" in out
+    assert sorted(set(sent)) == [0.0, 1.0]
+    assert sent == sorted(sent, reverse=True)
+    log, _ = read_log(cell / "pins.csv")
+    np.testing.assert_allclose(log.power, 1e3 * power[: len(log.power)], atol=1.0)
+    assert "feed hold: none: alarms are only written\n" in call(*words)[1]
+    code, _, err = call("watch", "log.csv", "--job", cell / "job.toml", "--hold", "air")
+    assert code == 2
+    assert "--hold, --signal-pin, --override-pin: apply to hal" in err
 
 
 def test_refusals(cell, tmp_path):

@@ -57,7 +57,7 @@ def test_what_the_pins_are_told(monkeypatch):
     lines = []
     pins = HalPins.__new__(HalPins)
     pins._follows_override, pins._spindle_override = True, 1.0
-    monkeypatch.setattr(HalPins, "_line", lambda self, text: lines.append(text) or "1 2 3 4 5 6 7 8 9 0.9")
+    monkeypatch.setattr(HalPins, "_line", lambda self, text: lines.append(text) or "1 2 3 4 5 6 7 8 9 0.9 12")
     pins.exchange(0.5, True, 0.15, STATUS.index("overload"), 3.0, 0.2)
     pins.exchange(0.5, True, 0.15, 0, 3.0, 0.0)
     names = [name for name, _, way in PINS if way == "out"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -40,6 +40,19 @@ class LoadSample:
     value: float
     line: int
     override: float = 1.0
+
+
+def log_text(samples: Iterable[LoadSample], kind: SignalKind) -> str:
+    """Return samples as a CSV that :func:`chipload.control.logs.read_log` reads.
+
+    >>> print(log_text([LoadSample(0.02, 3e5, 7)], SignalKind.POWER), end="")
+    time_s,power_w,line,override
+    0.0200,300.000,7,1.0000
+    """
+    column = next(name for name, (quantity, _) in KNOWN.items() if quantity == kind.value)
+    factor = UNITS[kind.value][KNOWN[column][1]]
+    rows = (f"{s.time:.4f},{s.value / factor:.3f},{s.line},{s.override:.4f}\n" for s in samples)
+    return "".join([f"time_s,{column},line,override\n", *rows])
 
 
 def follow_file(

@@ -40,12 +40,14 @@ PINS: tuple[tuple[str, str, str], ...] = (
     ("current-in", "float", "in"),
     ("speed-in", "float", "in"),
     ("spindle-override-in", "float", "in"),
+    ("line-in", "s32", "in"),
 )
 
 
 class PinValues(NamedTuple):
     """What the in pins read: time [s], position [mm], velocity on the path [mm/s], torque [N m], override in effect,
-    current of the spindle [A] and its speed [rev/s], as LinuxCNC's `spindle.0.speed-in`, spindle override in effect.
+    current of the spindle [A] and its speed [rev/s], as LinuxCNC's `spindle.0.speed-in`, spindle override in effect,
+    line of the program that runs.
     """
 
     time: float
@@ -58,6 +60,7 @@ class PinValues(NamedTuple):
     current: float = math.nan
     speed: float = math.nan
     spindle_override: float = 1.0
+    line: float = 0.0
 
 
 class ControlledMachine(Protocol):

@@ -1,12 +1,15 @@
 #!/usr/bin/python3
 """The pins of a spindle's sensor in HAL, for the Python of LinuxCNC's own modules.
 
-Each line of the input is a current [A] and a speed [rev/s], put on the pins `sensor.current` and `sensor.speed`, `nan`
-too; the answer is the time [s, monotonic], X, Y, Z [mm] and the velocity [mm/s] of the machine.
+Each line of the input is a current [A], a speed [rev/s] and a power [W], put on the pins `sensor.current`,
+`sensor.speed` and `sensor.power`, `nan` too; the answer is the time [s, monotonic], X, Y, Z [mm] and the velocity
+[mm/s] of the machine, and the line of the program.
 """
 
 import sys
 import time
+
+NAMES = ("current", "speed", "power")
 
 
 def main() -> int:
@@ -15,14 +18,15 @@ def main() -> int:
     import hal  # type: ignore[import-not-found]
 
     component = hal.component("sensor")
-    for name in ("current", "speed"):
+    for name in NAMES:
         component.newpin(name, hal.HAL_FLOAT, hal.HAL_OUT)
     component.ready()
     for line in sys.stdin:
-        component["current"], component["speed"] = map(float, line.split())
+        for name, word in zip(NAMES, line.split(), strict=True):
+            component[name] = float(word)
         try:
             row = [time.monotonic(), *(hal.get_value(f"joint.{j}.motor-pos-fb") for j in range(3))]
-            print(*row, hal.get_value("motion.current-vel"), flush=True)
+            print(*row, hal.get_value("motion.current-vel"), hal.get_value("motion.program-line"), flush=True)
         except RuntimeError:
             # the machine has left HAL
             break

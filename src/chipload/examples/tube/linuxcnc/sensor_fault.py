@@ -56,7 +56,7 @@ class SensorWithFault:
     def _exchange(self, current: float, speed: float) -> list[float]:
         if self._process.stdin is None or self._process.stdout is None:
             return []
-        self._process.stdin.write(f"{current!r} {speed / math.tau!r}\n")
+        self._process.stdin.write(f"{current!r} {speed / math.tau!r} 0.0\n")
         return [float(x) for x in self._process.stdout.readline().split()]
 
     def _follow(self) -> None:
@@ -67,7 +67,7 @@ class SensorWithFault:
         before, on = none, False
         while not self._ends.is_set():
             row = self._exchange(read, state.speed)
-            if len(row) != 5:
+            if len(row) != 6:
                 return
             now, place, velocity = row[0], row[1:4], row[4]
             found, away = locate(job.path, tuple(place), s, job.window if on else math.inf)
