@@ -51,6 +51,18 @@ def test_a_job_names_a_tool_of_a_fusion_library(library: Path) -> None:
     assert c.strength.material.value == "carbide"
 
 
+@pytest.mark.parametrize(("rows", "height"), [(1, 1.5), (4, 6.0)])
+def test_a_thread_mill_of_a_library_has_its_rows_of_teeth(tmp_path: Path, rows: int, height: float) -> None:
+    path, more = tmp_path / "mill.json", {"shoulder-diameter": 6, "thread-profile-angle": 60, "HA": 10}
+    path.write_text(json.dumps({"data": [tool(3, "thread mill", NT=rows, TP=1.5, **more)]}))
+    mill = cutter_from_table({"number": 1, "file": "mill.json", "tool": 3}, tmp_path)
+    assert (mill.tooth_rows, mill.flute_length, mill.thread_pitch, mill.body) == (rows, height, 1.5, ())
+    # half the angle of the thread: ISO 68-1, the crest an eighth of the pitch
+    crests = [0.75 + 1.5 * k for k in range(rows)]
+    assert mill.radius_at(crests).tolist() == [5.0] * rows
+    assert mill.radius_at([1.5 * k + 1e-9 for k in range(rows)]) == pytest.approx(5.0 - 0.65625 * math.sqrt(3.0))
+
+
 def test_shapes_and_units(library: Path) -> None:
     ball = read_fusion_tool(library, 4)
     assert [ball[k] for k in ("diameter_mm", "corner_radius_mm", "flute_length_mm")] == pytest.approx(

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from numpy.typing import NDArray
 
 from chipload.cutter.cutter import Cutter
@@ -59,11 +61,15 @@ def radii(name: str, z: Floats) -> Floats:
 
 def along(name: str, rest: float = REST, feed: float = 20.0, above: float = 0.0) -> Removal:
     """A pass along x beside an edge of the stock, whose top is ``above`` the end of the teeth."""
-    deep = TOPS[name]
+    return pass_beside_an_edge(CUTTERS[name], TOPS[name], feed, rest, above)
+
+
+def pass_beside_an_edge(cutter: Cutter, deep: float, feed: float, rest: float = REST, above: float = 0.0) -> Removal:
+    """The pass of :func:`along` of any cutter, ``deep`` [mm] below the top."""
     points = [-10.0, rest, -deep], [40.0, rest, -deep]
     program = Program.join([rapid(points[0], 300.0, 1, "link"), plunge(points[1], feed, 300.0, 1, "cut")])
     stock = LayeredStock.block((0.0, -20.0, -deep), (30.0, 0.0, above), 0.5, 30.0)
-    return remove(program, stock, {1: CUTTERS[name]}, PLAIN, FINE, accuracy=False)
+    return remove(program, stock, {1: cutter}, PLAIN, FINE, accuracy=False)
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -118,6 +124,48 @@ def test_a_reamer_takes_the_ring_that_the_drill_left() -> None:
     loads = drill_loads(own, PLAIN, [turn], [1e3 * torque], [True])
     assert loads.thrust[0] == pytest.approx(0.5 * k * 0.15, rel=2e-3)
     assert loads.chisel_torque[0] == 0.0
+
+
+def test_rows_of_a_thread_mill_cut_as_often_as_one() -> None:
+    """At one radial depth three rows take three times the chip of one, with three times its mean loads; with teeth that
+    do not lag the greatest loads are three times those of one, too.
+    """
+    shape = SHAPES["thread mill"]
+    one = replace(CUTTERS["thread mill"], helix=0.0, flutes=1)
+    three = replace(one, tooth_rows=3, flute_length=3.0 * PITCH)
+    assert three.segments == shape
+    found = [pass_beside_an_edge(c, deep, 20.0).columns for c, deep in ((one, PITCH), (three, 3.0 * PITCH))]
+    k = [int(np.flatnonzero(np.abs(c["x_mm"] - 15.0) < 1.1)[0]) for c in found]
+    for key in ("chip_volume_mm3", "torque_mean_nm", "force_n", "torque_nm"):
+        a, b = (c[key][i] for c, i in zip(found, k, strict=True))
+        assert a > 0.01
+        assert b == pytest.approx(3.0 * a, rel=1e-6), key
+    assert found[1]["chip_max_mm"][k[1]] == pytest.approx(found[0]["chip_max_mm"][k[0]], rel=1e-6)
+
+
+def test_a_turn_of_two_rows_is_two_turns_of_one() -> None:
+    """A helix about a hole of 14 mm: what both take is one thread."""
+    one = CUTTERS["thread mill"]
+    two = replace(one, tooth_rows=2, flute_length=2.0 * PITCH)
+    angle = np.linspace(0.0, math.tau, 25)
+    taken = []
+    for cutter, turns in ((one, 2), (two, 1)):
+        parts = [
+            rapid((0.0, 0.0, -9.0), 300.0, 1, "link"),
+            plunge((1.5, 0.0, -9.0), 5.0, 300.0, 1, "cut"),
+        ]
+        for k in range(turns):
+            rise = -9.0 + PITCH * (k + angle[1:] / math.tau)
+            points = zip(1.5 * np.cos(angle[1:]), 1.5 * np.sin(angle[1:]), rise, strict=True)
+            parts += [plunge((float(x), float(y), float(z)), 5.0, 300.0, 1, "cut") for x, y, z in points]
+        plate = trimesh.creation.annulus(r_min=7.0, r_max=12.0, height=9.0, sections=36)
+        plate.apply_translation((0.0, 0.0, -4.5))
+        stock = LayeredStock.of_mesh(plate, 0.5, 30.0)
+        coarse = Resolution(step_mm=2.0, tolerance=1e-3, corner_slices=8, flank_mm=0.5)
+        found = remove(Program.join(parts), stock, {1: cutter}, PLAIN, coarse, accuracy=False)
+        taken.append(float(found.columns["chip_volume_mm3"].sum()))
+    assert taken[0] > 10.0
+    assert taken[1] == pytest.approx(taken[0], rel=5e-3)
 
 
 def test_the_neck_of_an_undercut_cutter_must_be_free() -> None:

@@ -16,7 +16,7 @@ the bottom and that arc, so that e is free: 0 for a round tip.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -73,6 +73,7 @@ class Cutter:
         with part, stock and fixtures but not simulated; empty: the seven APT numbers are its shape
     shape : segments of the profile of a shape beside those of APT and barrels, of :mod:`chipload.cutter.shapes`; the
         numbers of APT are then left out; one that is undercut has ``shank_diameter``, its neck
+    tooth_rows : rows of teeth of ``shape`` one above the other along the axis, as of a thread mill; 1 to 100
     number : tool number, >= 0; 0: the tool of a program that names no tool
     name : name in the shop
     centre_cutting : whether its teeth reach its axis, so that it can plunge; None: not stated
@@ -122,6 +123,7 @@ class Cutter:
     runout_size: float | None = None
     web: float | None = None
     shape: tuple[ProfileSegment, ...] = ()
+    tooth_rows: int = 1
 
     def __post_init__(self) -> None:
         def need(ok: bool, key: str, value: float, limit: str) -> None:
@@ -207,6 +209,9 @@ class Cutter:
         limit = f"must be above 0 and at most 0.35 diameter_mm = {0.35 * self.diameter:g}"
         need(self.web is None or 0.0 < self.web <= 0.35 * self.diameter + 1e-9, "web_mm", self.web or 0.0, limit)
         need(self.number >= 0, "number", self.number, "must be at least 0")
+        need(1 <= self.tooth_rows <= 100, "tooth_rows", self.tooth_rows, "must be from 1 to 100")
+        limit = "must be 1: only teeth of a shape that is undercut, such as a thread mill, stand in several rows"
+        need(self.tooth_rows == 1 or (bool(self.shape) and self.undercut), "tooth_rows", self.tooth_rows, limit)
 
     def _check_corner(self) -> None:
         """Check the corner against bottom and flank, or against the arc of a barrel."""
@@ -252,7 +257,7 @@ class Cutter:
             raise InputError("cutter.shape: it has its own corner, bottom, flank and body: leave the other ones out")
         for key, value, own in (
             ("diameter_mm", self.diameter, 2.0 * wide),
-            ("flute_length_mm", self.flute_length, end.z[1]),
+            ("flute_length_mm", self.flute_length, self.tooth_rows * end.z[1]),
         ):
             if abs(value - own) > 1e-6:
                 raise InputError(f"cutter.{key} = {value:g}: must be {own:.6g}, as of its shape")
@@ -369,6 +374,20 @@ class Cutter:
         return self.shape or apt_segments(self.apt, self.flank_arc)
 
     @property
+    def one_row(self) -> Cutter:
+        """The lowest row of its teeth as a cutter of its own; itself where it has no other.
+
+        >>> from chipload.cutter.shapes import thread_mill
+        >>> teeth = thread_mill(10.0, 1.5, math.radians(30.0), 0.1875, 6.0)
+        >>> mill = Cutter(10.0, 3, 0.1, 6.0, 30.0, 6e5, shank_diameter=6.0, shape=teeth, tooth_rows=4)
+        >>> mill.one_row.flute_length, mill.radius_at([0.75, 2.25]).tolist()
+        (1.5, [5.0, 5.0])
+        """
+        if self.tooth_rows == 1:
+            return self
+        return replace(self, tooth_rows=1, flute_length=self.shape[-1].z[1])
+
+    @property
     def undercut(self) -> bool:
         """Whether it is narrower above its widest place."""
         return self.segments[-1].kappa[1] > UPRIGHT
@@ -437,7 +456,9 @@ class Cutter:
             radii, heights = np.array(self.body).T
             return np.asarray(np.interp(z, heights, radii))
         if self.shape:
-            return radius_of(self.shape, z)
+            row = self.shape[-1].z[1]
+            below = np.minimum(np.floor(z / row), self.tooth_rows - 1)
+            return radius_of(self.shape, z - below * row)
         _, r, e, f, alpha, beta, _ = self.apt
         low, high = f - r * math.cos(alpha), f - r * math.sin(beta)
         bottom = np.where(z < low, z, 0.0) / math.tan(alpha) if alpha > 0.0 else e
@@ -459,7 +480,9 @@ class Cutter:
         if self.body:
             return np.array([(0.0, 0.0), *self.body] if self.body[0][0] > 0.0 else self.body)
         if self.shape:
-            return chords_of(self.shape, chord_mm)
+            row = chords_of(self.shape, chord_mm)
+            upper = row[row[:, 1] > 0.0]
+            return np.vstack([row, *(upper + np.array([0.0, k * row[-1, 1]]) for k in range(1, self.tooth_rows))])
         _, r, e, f, alpha, _, h = self.apt
         points = [(0.0, 0.0)]
 

@@ -3,7 +3,7 @@
 A tool's ``geometry`` has the symbols of ISO 13399 in the tool's own unit: DC diameter, RE corner radius, LCF flute
 length, LB length below the holder, SFDM shank, NOF flutes, SIG point, TA taper, HA helix angle [deg], TP pitch.
 Read are end mills (flat, ball, bull nose, tapered), face mills, slot mills (T-slot), chamfer mills, drills, reamers as
-flat cutters, thread mills with one row of teeth (NT = 1) on a neck (shoulder-diameter), and circle segment barrels that
+flat cutters, thread mills with their rows of teeth (NT) on a neck (shoulder-diameter), and circle segment barrels that
 do not cut above their widest place: lower-radius corner, profile-radius flank, both tangent, axial-distance height of
 the widest place. Taps, other thread mills, dovetail, lollipop and other circle segment mills (lens, oval, taper) are
 bodies, whose chips are not simulated. Other shapes are refused.
@@ -199,16 +199,16 @@ def _tip(shape: str, geometry: dict[str, Any], out: dict[str, Any], mm: float, l
 
 
 def _thread_mill(geometry: dict[str, Any], mm: float, label: str) -> dict[str, Any]:
-    """Pitch, neck and angle of a thread mill with one row of teeth; nothing of one with several, or with no neck."""
+    """Pitch, rows of teeth, neck and angle of a thread mill; nothing of one with no rows or no neck."""
     rows, pitch, neck, angle = (
         _number(geometry, key, label) for key in ("NT", "TP", "shoulder-diameter", "thread-profile-angle")
     )
-    if rows != 1.0 or not pitch or not neck:
+    if not rows or rows != round(rows) or not pitch or not neck:
         return {}
     flank = {} if angle is None else {"flank_deg": 0.5 * angle}
     return {
         "shape": "thread mill", "thread_pitch_mm": pitch * mm, "shank_diameter_mm": neck * mm,
-        "flute_length_mm": pitch * mm, **flank,
+        "flute_length_mm": rows * pitch * mm, "tooth_rows": int(rows), **flank,
     }  # fmt: skip
 
 

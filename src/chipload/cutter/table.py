@@ -118,6 +118,9 @@ class CutterTable(BaseModel):
     tooth_width_mm: float | None = Field(
         None, description="thread mill: width of the tooth at its diameter; default: an eighth of the pitch, ISO 68-1"
     )
+    tooth_rows: int | None = Field(
+        None, description="thread mill: rows of teeth along its axis, one pitch apart; default 1"
+    )
     lead_mm: float | None = Field(None, description="reamer: length along the axis of the lead that cuts")
     lead_deg: float | None = Field(None, description="reamer: angle of its lead with the axis; default 45")
     bottom_deg: float | None = Field(None, description="angle of the bottom, APT parameter alpha; default 0")
@@ -179,7 +182,7 @@ class CutterTable(BaseModel):
                 **values,
             }
         if values.get("shape") == "thread mill" and "thread_pitch_mm" in values:
-            values = {"flute_length_mm": values["thread_pitch_mm"], **values}
+            values = {"flute_length_mm": values.get("tooth_rows", 1) * values["thread_pitch_mm"], **values}
         where = f": {self.file} does not state it" if self.file else ""
         missing = [
             f"cutter.{key} is missing{where}: state it; dimensions of a cutter are never guessed"
@@ -227,6 +230,7 @@ class CutterTable(BaseModel):
             hole_depth=values.get("hole_depth_mm"),
             web=values.get("web_mm"),
             shape=shape,
+            tooth_rows=values.get("tooth_rows", 1),
         )
 
     def _from_file(self, folder: Path) -> dict[str, Any]:
@@ -271,6 +275,7 @@ _OF_SHAPES = (
     ("shank_diameter_mm", ("lollipop", "thread mill"), ()),
     ("thread_pitch_mm", ("thread mill",), ()),
     ("tooth_width_mm", (), ("thread mill",)),
+    ("tooth_rows", (), ("thread mill",)),
     ("lead_mm", ("reamer",), ("reamer",)),
     ("lead_deg", (), ("reamer",)),
 )

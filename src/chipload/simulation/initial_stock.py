@@ -73,7 +73,8 @@ def moves_of(stock: StockOfMoves) -> EarlierMoves | None:
         a0, across, turn = rows[:, 6:9], rows[:, 9:12], rows[:, 12:13]
         axes = np.hstack([a0, a0 * np.cos(turn) + across * np.sin(turn)])
     rows = np.hstack([rows[:, :6], axes])
-    cutters = [stock.table[n] for n in stock.tools]
+    # each row of teeth makes a move of its own
+    cutters = [stock.table[n].one_row for n in stock.tools]
     near = _near(rows, of, cutters, stock.low, stock.high)
     if not near.any():
         return None

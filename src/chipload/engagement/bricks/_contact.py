@@ -186,8 +186,54 @@ _F1, _F2, _F3, _I1, _I2 = (
 WORK = types.Tuple((_F2, _F1, _F1, _F1, _F2, _F3, _F2, _F1, _F1, _I1, _I1))
 
 
+@njit(cache=True, nogil=True)
+def engage_rows(q, group, t, once, index, work, nodes, flank, slices, rows, owner, row_at, out):
+    """What ``group`` rows of teeth engage at a time t of a step, of which row r makes the move q + r; as
+    :func:`engage_profile`, T, N and A of the lowest row to the end of ``out``. A row continues the profile of the one
+    below it. False: no room.
+    """
+    at = work[7]
+    c = index[8][index[7][q]]
+    instant(index[6][q], t, c.height, at)
+    if not once:
+        reach(at, c, index, 0.0, work[4])
+    if not engage_profile(at, c, nodes, flank, index, work, slices, rows, owner, row_at, out):
+        return False
+    for d in range(9):
+        out[10 + d] = at[ALONG_T + d]
+    if group == 1:
+        return True
+    more = np.empty(len(out))
+    along = c.s[c.count] - c.s[0]
+    for r in range(1, group):
+        instant(index[6][q + r], t, c.height, at)
+        # directions count from those of the lowest row
+        for d in range(6):
+            at[ALONG_T + d] = out[10 + d]
+        reach(at, c, index, 0.0, work[4])
+        begin = row_at[1]
+        if not engage_profile(at, c, nodes, flank, index, work, slices, rows, owner, row_at, more):
+            return False
+        for j in range(begin, row_at[1]):
+            slices[j, 0] += r * along
+            slices[j, 1] += r * along
+            slices[j, 3] += r * c.height
+        out[0] += more[0]
+        out[1] += more[1]
+        out[2] = min(out[2], more[2])
+        out[3] = max(out[3], more[3])
+        for d in range(4, 8):
+            out[d] += more[d]
+        # the neck begins above the last row
+        out[8] = more[8] if r == group - 1 else 0.0
+        out[9] += more[9]
+    return True
+
+
 @njit(cache=True, nogil=True, inline="always")
-def instants_of(k, q, n, count, each, once, state, index, work, nodes, flank, slices, rows, owner, entry, out, entries):
+def instants_of(
+    k, q, n, group, count, each, once, state, index, work, nodes, flank, slices, rows, owner, entry, out, entries
+):
     """Find what step ``k``, the move ``q``, engages at ``count`` instants and, where it ends in a corner, at its end.
 
     ``each``: 1, or into how many parts each part was divided, the middles of which are known. Returns the entries so
@@ -196,12 +242,12 @@ def instants_of(k, q, n, count, each, once, state, index, work, nodes, flank, sl
     m = index[6][q]
     tool = index[7][q]
     c = index[8][tool]
-    at, row_at = work[7], work[9]
+    row_at = work[9]
     middle = 0.0
     low = math.inf
     high = -math.inf
     way = m[LENGTH] + m[THETA] * c.height
-    ends = 1 if each == 1 and turns(index[6], q, state[0] + n) else 0
+    ends = 1 if each == 1 and turns(index[6], q + group - 1, state[0] + n) else 0
     for i in range(count + ends):
         # the middle of each part was looked at
         if each > 1 and i % each == each // 2:
@@ -209,12 +255,11 @@ def instants_of(k, q, n, count, each, once, state, index, work, nodes, flank, sl
         if entries == len(out):
             return -1, middle, low, high
         t = (i + 0.5) / count if i < count else 1.0 - 0.5 / (count * state[6])
-        instant(m, t, c.height, at)
-        if not once:
-            reach(at, c, index, 0.0, work[4])
         before = row_at[0]
         slices_before = row_at[1]
-        if not engage_profile(at, c, nodes, flank[tool], index, work, slices, rows, owner, row_at, out[entries]):
+        if not engage_rows(
+            q, group, t, once, index, work, nodes, flank[tool], slices, rows, owner, row_at, out[entries]
+        ):
             return -1, middle, low, high
         now = out[entries, 0] / way
         if i == count // 2:
@@ -227,8 +272,6 @@ def instants_of(k, q, n, count, each, once, state, index, work, nodes, flank, sl
             row_at[0] = before
             row_at[1] = slices_before
         elif row_at[0] > before or out[entries, 8] > 0.0:
-            for d in range(9):
-                out[entries, 10 + d] = at[ALONG_T + d]
             entry[entries, 0] = k
             entry[entries, 1] = i
             entry[entries, 2] = before
@@ -237,15 +280,16 @@ def instants_of(k, q, n, count, each, once, state, index, work, nodes, flank, sl
 
 
 @njit(
-    types.int64(types.int64, _I1, _I1, INDEX, WORK, _F3, _F1, _F2, _F2, _I1, _I2, _F2, _I1),
+    types.int64(types.int64, _I1, _I1, _I1, INDEX, WORK, _F3, _F1, _F2, _F2, _I1, _I2, _F2, _I1),
     cache=True,
     nogil=True,
 )
-def run(begin, instants, state, index, work, nodes, flank, slices, rows, owner, entry, out, used):
+def run(begin, group, instants, state, index, work, nodes, flank, slices, rows, owner, entry, out, used):
     """Find what each step from ``begin`` on engages at its instants and enter it into the index.
 
     Parameters
     ----------
+    group : (n,) number of rows of teeth whose moves begin here, which are looked at together; 0: not the first of them
     instants : (n,) at how many times a step is looked at, the middles of so many equal parts of it; 0: not at all.
         Steps that do not cut as the one before them, or not alike all along, get more
     state : number of the move that is the first step; 1 where the engagement of step ``begin`` is known, 2 where it is
@@ -266,7 +310,8 @@ def run(begin, instants, state, index, work, nodes, flank, slices, rows, owner, 
     index = borrow_arrays(index)
     work = borrow_arrays(work)
     at, rate, row_at = work[7], work[8], work[9]
-    instants, state, nodes, flank = borrow_arrays((instants, state, nodes, flank))
+    group, instants, state = borrow_arrays((group, instants, state))
+    nodes, flank = borrow_arrays((nodes, flank))
     slices, rows, owner = borrow_arrays((slices, rows, owner))
     entry, out, used = borrow_arrays((entry, out, used))
     n = len(instants)
@@ -283,14 +328,14 @@ def run(begin, instants, state, index, work, nodes, flank, slices, rows, owner, 
             entries = state[4]
             # what of the profile is near material is found once, unless the cutter goes far
             slack = 0.5 * (m[LENGTH] + m[THETA] * (c.height + c.wide))
-            once = slack < c.wide * NEAR
+            once = slack < c.wide * NEAR and group[k] == 1
             if once and count > 0:
                 instant(m, 0.5, c.height, at)
                 reach(at, c, index, slack, work[4])
             while count > 0:
                 entries, middle, low, high = instants_of(
-                    k, q, n, count, each, once, state, index, work, nodes, flank, slices, rows, owner, entry, out,
-                    entries,
+                    k, q, n, group[k], count, each, once, state, index, work, nodes, flank, slices, rows, owner, entry,
+                    out, entries,
                 )  # fmt: skip
                 if entries < 0:
                     return k

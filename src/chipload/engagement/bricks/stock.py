@@ -3,13 +3,15 @@
 Notation: as in :mod:`chipload.engagement.bricks._sweep`. A brick is ``BRICK`` of the smallest cutter radius wide, or
 as much wider as memory requires; it decides which moves are searched at a point and what that costs, not the answer.
 Bricks are kept in blocks of 8 x 8 x 8 where moves left a surface: memory follows the surface. A cutter ends where its
-flutes end; a step with material there is reported.
+flutes end; a step with material there is reported. Each row of teeth of a thread mill makes a move of its own, and is
+looked at in the material before the step.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -103,6 +105,7 @@ class BrickStock:
         self.low, self.high = np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
         self.table = dict(cutters)
         self.tools = {n: i for i, n in enumerate(sorted(cutters))}
+        self.tooth_rows = {n: c.tooth_rows for n, c in cutters.items() if c.tooth_rows > 1}
         self.cutters = np.concatenate([cutter_record(cutters[n]) for n in self.tools])
         size = self.high - self.low
         side = max(
@@ -189,8 +192,8 @@ class BrickStock:
 
     def skip(self, p0: Floats, p1: Floats, a0: Floats, a1: Floats, tool: Ints) -> None:
         """Make steps without calculating their engagement."""
-        rows = move_rows(p0, p1, a0, a1)
-        self._run(rows, tool, np.zeros(len(rows), dtype=np.int64), 1, dict.fromkeys(self.tools, 1.0))
+        rows, tool, group = self._moves(p0, p1, a0, a1, tool)
+        self._run(rows, tool, group, np.zeros(len(rows), dtype=np.int64), 1, dict.fromkeys(self.tools, 1.0))
 
     def take(
         self,
@@ -213,8 +216,25 @@ class BrickStock:
         corner_slices : slices of a range of a corner in contact, taken as ``FEW`` at least
         flank_mm : longest slice of the flank by tool number [mm]
         """
-        rows = move_rows(p0, p1, a0, a1)
-        return self._run(rows, tool, self.instants(rows, tool), corner_slices, flank_mm)
+        rows, tool, group = self._moves(p0, p1, a0, a1, tool)
+        count = np.where(group > 0, self.instants(rows, tool), 0)
+        found = self._run(rows, tool, group, count, corner_slices, flank_mm)
+        if not self.tooth_rows:
+            return found
+        return replace(found, step=(np.cumsum(group > 0) - 1)[found.step])
+
+    def _moves(self, p0: Floats, p1: Floats, a0: Floats, a1: Floats, tool: Ints) -> tuple[Floats, Ints, Ints]:
+        """Moves, the tool of each, and of how many rows of teeth it begins a step: 1, or of a thread mill with several
+        all at its lowest row, 0 at the others.
+        """
+        if not self.tooth_rows:
+            return move_rows(p0, p1, a0, a1), tool, np.ones(len(tool), dtype=np.int64)
+        count = np.array([self.tooth_rows.get(n, 1) for n in tool.tolist()], dtype=np.int64)
+        of = np.repeat(np.arange(len(tool)), count)
+        up = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+        tall = self.cutters["height"][[self.tools[n] for n in tool[of].tolist()]]
+        ends = (p[of] + (up * tall)[:, None] * a[of] for p, a in ((p0, a0), (p1, a1)))
+        return move_rows(*ends, a0[of], a1[of]), tool[of], np.where(up == 0, count[of], 0)
 
     def _work(self, pieces: int) -> tuple[NDArray[Any], ...]:
         wide = float(self.cutters["wide"].max())
@@ -226,7 +246,9 @@ class BrickStock:
             np.empty(2, dtype=np.int64), np.zeros(MOST, dtype=np.int64),
         )  # fmt: skip
 
-    def _run(self, moves: Floats, tool: Ints, instants: Ints, pieces: int, flank_mm: Mapping[int, float]) -> Engaged:
+    def _run(
+        self, moves: Floats, tool: Ints, group: Ints, instants: Ints, pieces: int, flank_mm: Mapping[int, float]
+    ) -> Engaged:
         begin, pieces = self.count, max(pieces, FEW)
         self._enter(moves, tool)
         flank = np.array([flank_mm[n] for n in self.tools])
@@ -245,7 +267,20 @@ class BrickStock:
         while True:
             at = int(
                 front.run(
-                    at, instants, state, self._index(), work, nodes, flank, slices, rows, owner, entry, out, self.used
+                    at,
+                    group,
+                    instants,
+                    state,
+                    self._index(),
+                    work,
+                    nodes,
+                    flank,
+                    slices,
+                    rows,
+                    owner,
+                    entry,
+                    out,
+                    self.used,
                 )
             )
             if at == len(moves):
