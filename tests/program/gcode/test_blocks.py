@@ -137,6 +137,13 @@ def test_lenient_reading_keeps_unknown_words_as_findings():
     assert {x.severity for x in findings} == {Severity.UNPROVEN}
 
 
+@pytest.mark.parametrize("end", ["", "M2\n"])
+def test_a_curve_that_is_open_at_the_end_ends_a_lenient_reading(end):
+    commands, findings = read_gcode(f"F100\nG0 X0 Y0\nG5.2 X21 Y1 L3 P1\nX22 Y2 P2\nX23 Y4 P1\n{end}", lenient=True)
+    assert len(commands.position) == 1
+    assert "nc-not-read" in [x.code for x in findings]
+
+
 def test_an_oriented_spindle_stands_still():
     commands, findings = read_gcode("S1000 M3\nG1 X1 F100\nM19\nG1 X2\nM3\nG1 X3\nM2")
     assert commands.spindle.tolist() == pytest.approx([x * math.tau * 1000.0 / 60.0 for x in (1.0, 0.0, 1.0)])

@@ -103,6 +103,7 @@ class Flow:
         """Carry out the next blocks; where ``lenient``, a block that cannot be read is a finding and left out."""
         if not self.lenient:
             return self._step()
+        used_up = self.line >= len(self.source.lines)
         try:
             return self._step()
         except BoundError:
@@ -111,7 +112,7 @@ class Flow:
             self.c.leave_out("nc-not-read", f"{error}: the block is left out")
             self.c.placed = set()
             self.line += 1
-            return self.line <= len(self.source.lines)
+            return not used_up and self.line <= len(self.source.lines)
 
     def _percent(self) -> bool:
         for line, text in enumerate(self.main.lines):
