@@ -3,7 +3,7 @@
 Case k of a reader is a seed with one to four damages, all chosen by k and the reader's name: a case can be made again
 with `--reader NAME --case K --keep FILE`. Each case is read in a child process. It ends as **read** (without a word),
 **findings** (read, and something was noticed), **refused** (``InputError``), **fault** (another exception, numbers that
-are not finite, or the death of the process), **hang** (over 20 s of the processor, or 400 s of the clock) or **memory**
+are not finite, or the death of the process), **hang** (over 60 s of the processor or 1200 s of the clock) or **memory**
 (over 4 GiB). Faults, hangs and memory must be 0, and the exit code is 1 where they are not.
 
 `--jobs` sets every numeric value of the job of every example to 0, -1, 1e-9, 1e9, nan, inf and a text, loads the job
@@ -39,7 +39,7 @@ from fuzz_jobs import carry_out, case
 from fuzz_readers import READERS, Nonsense
 
 #: [s] and [bytes] that a case may take
-SLOW, MEMORY = 20.0, 4 << 30
+SLOW, MEMORY = 60.0, 4 << 30
 #: times as long by the clock, for a process that waits or sleeps
 MOST_WAIT = 20.0
 KINDS = ("cases", "read", "findings", "refused", "long", "fault", "hang", "memory")

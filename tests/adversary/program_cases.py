@@ -44,6 +44,7 @@ DRILLING = changes(
     ),
     stated("machine_table", low_mm=(-200.0, -200.0, -120.0), high_mm=(200.0, 200.0, -90.0)),
 )
+SHORT_DRILL = cutter(bottom_deg=31.0, flutes=2)
 TAP = {"number": 1, "body_mm": ((2.5, 0.0), (2.5, 20.0)), "overhang_mm": 40.0, "name": "M6 tap"}
 
 
@@ -181,6 +182,20 @@ CASES = (
         replaced("G0 X-10 Y20 Z10\nG0 Z-2", "G0 X-10 Y20 Z-2"),
         "unproven",
         "approach-unknown",
+    ),
+    Case(
+        "approach-feed-in-stock",
+        "the first motion is a cut that ends in the block",
+        replaced("G0 X-10 Y20 Z10\nG0 Z-2\nG1 X70 F900", "G1 X30 Y20 Z-2 F900\nX70"),
+        "unproven",
+        "approach-unknown",
+    ),
+    Case(
+        "approach-feed-above",
+        "nothing: the first motion is a cut that ends above the block",
+        replaced("G0 X-10 Y20 Z10", "G1 X-10 Y20 Z10 F2000"),
+        "holds",
+        "",
     ),
     Case(
         "approach-down-beside",
@@ -354,6 +369,27 @@ CASES = (
         changes(DRILLING, cutter(hole_depth_mm=15.0), hole("G81 X30 Y20 Z-20 R2 F600", 6000)),
         "exceeds",
         "deep-hole",
+    ),
+    Case(
+        "drill-sideways",
+        "a tool with the point of a drill mills a groove",
+        changes(SHORT_DRILL, replaced("G0 Z-2", "G0 Z-0.5")),
+        "unproven",
+        "drill-sideways",
+    ),
+    Case(
+        "drill-sideways-stated",
+        "a drill whose web is stated mills a groove",
+        changes(SHORT_DRILL, cutter(web_mm=1.5), replaced("G0 Z-2", "G0 Z-0.5")),
+        "exceeds",
+        "drill-sideways",
+    ),
+    Case(
+        "mill-with-a-point",
+        "nothing: a mill with a point and a stated ramp angle mills a groove",
+        changes(SHORT_DRILL, cutter(ramp_angle_deg=3.0), replaced("G0 Z-2", "G0 Z-0.5")),
+        "holds",
+        "",
     ),
     Case(
         "deep-hole-pecks",

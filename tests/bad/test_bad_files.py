@@ -154,6 +154,8 @@ def box(count: int = 12) -> bytes:
         (box()[:-7], r"its header states 12 triangles, which are 684 bytes, but the file has 677: export it again$"),
         (box(13), r"its header states 13 triangles, which are 734 bytes, but the file has 684: export it again$"),
         (b"x" * 50, r"50 bytes: not an STL file: export it again$"),
+        # as long as a file of -1 triangles would be
+        (b"x" * 34, r"34 bytes: not an STL file: export it again$"),
         (bytes(84), r"the file has no triangles"),
         (b"solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0\nendloop\nendfacet\nendsolid\n", r"0 vertices of three"),
         (b"solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 0 1 0\nendloop\nendfacet\n",

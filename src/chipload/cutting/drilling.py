@@ -46,6 +46,8 @@ STANDARD_WEB = 0.155
 MODEL_SPREAD = 0.2
 #: a tool with a flatter point is no drill [rad]
 LEAST_POINT = math.radians(5.0)
+#: angles of the lips of drills [rad]: points of 142 and 108 deg
+DRILL_POINTS = math.radians(19.0), math.radians(36.0)
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,24 @@ def is_reamer(cutter: Cutter) -> bool:
     lines = [segment.kappa[0] for segment in cutter.shape if segment.straight]
     upright = len(lines) == 3 and abs(lines[2] - 0.5 * math.pi) < 1e-9
     return upright and lines[0] == 0.0 < lines[1] < 0.5 * math.pi
+
+
+def is_drill(cutter: Cutter) -> bool:
+    """Return whether a cutter is a drill and no mill with a point.
+
+    It is one if its web or its hole depth is stated; by its shape, if it has two or three lips with a point of 108 to
+    142 deg and states no ramp angle. Spot drills and chamfer mills have sharper points, high-feed mills flatter ones.
+
+    >>> is_drill(Cutter(10.0, 2, 0.5, 60.0, 80.0, 6e5, bottom=math.radians(31.0)))
+    True
+    >>> is_drill(Cutter(10.0, 2, 0.5, 60.0, 80.0, 6e5, bottom=math.radians(31.0), ramp_angle=math.radians(3.0)))
+    False
+    """
+    if not is_pointed(cutter) or cutter.ramp_angle is not None:
+        return False
+    if cutter.web is not None or cutter.hole_depth is not None:
+        return True
+    return cutter.flutes <= 3 and DRILL_POINTS[0] <= cutter.bottom <= DRILL_POINTS[1]
 
 
 def has_lips(cutter: Cutter) -> bool:

@@ -41,7 +41,7 @@ def read_stl(path: Path, key: str) -> Floats:
     label = f"{key} = {path.name}"
     data = read_regular(path, label, LARGEST_FILE, "export it in fewer triangles")
     count = int.from_bytes(data[80:_HEAD], "little") if len(data) >= _HEAD else -1
-    if len(data) == _HEAD + _EACH * count:
+    if count >= 0 and len(data) == _HEAD + _EACH * count:
         corners = np.frombuffer(data, dtype=_TRIANGLE, count=count, offset=_HEAD)["corners"].astype(np.float64)
     elif data[:512].lstrip().lower().startswith(b"solid") and b"\0" not in data:
         corners = _text(data, label)

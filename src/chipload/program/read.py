@@ -286,7 +286,9 @@ def _check_program(
 ) -> ProgramReading:
     """A program held against the limits of a machine."""
     probes = np.unique(commands.line[commands.motion == PROBE])
-    violations = [*check_program(program, machine, travel=False, probes=probes.tolist())]
+    # where the first motion of a text begins is not known, be it a rapid or a cut: the simulation looks at its end
+    checked = check_program(program, machine, travel=False, probes=probes.tolist())
+    violations = [f for f in checked if f.code != "program-start"]
     if not machine.chain.rotary:
         violations += travel_findings(commands, machine, not any(f.code in OF_LENGTHS for f in findings))
     if machine.chain.rotary:

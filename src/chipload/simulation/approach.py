@@ -1,7 +1,7 @@
 """The first position of a program: where the tool comes from is not known.
 
-A controller moves there in a rapid from wherever its machine stands. Above the stock, or straight down beside it from
-where it was sent in X and Y, nothing is in the way; elsewhere the way may go through the stock.
+A controller moves there, most often in a rapid, from wherever its machine stands. Above the stock, or straight
+down beside it from where it was sent in X and Y, nothing is in the way; elsewhere the way may go through the stock.
 """
 
 from __future__ import annotations
@@ -38,13 +38,19 @@ def approach_findings(
     """
     row = leading_rows(program.path_mode) if len(program) else 0
     number = int(program.tool[row]) if len(program) else 0
-    if number not in cutters or program.motion[row] != RAPID:
+    if number not in cutters:
         return ()
     cutter, line = cutters[number], int(program.line[row])
     tip, axis = np.asarray(program.p_work[row]), np.asarray(program.axis[row])
     x, y, z = place = (float(tip[0]), float(tip[1]), float(tip[2]))
-    at = f"the first rapid ends at X{x:.6g} Y{y:.6g} Z{z:.6g}"
+    rapid = program.motion[row] == RAPID
+    at = f"the first {'rapid' if rapid else 'motion'} ends at X{x:.6g} Y{y:.6g} Z{z:.6g}"
     if stands_in(inside, cutter, tip, axis):
+        if not rapid:
+            text = (
+                f"{at}, in the stock: where tool {number} comes from is not known: begin with a rapid beside the stock"
+            )
+            return (Finding("approach-unknown", line, text, Severity.UNPROVEN, place, row),)
         text = f"{at}, in the stock: wherever tool {number} comes from, it goes through material"
         return (Finding("approach-through-stock", line, text, Severity.EXCEEDS, place, row),)
     corners = np.array([[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]] for i, j, k in np.ndindex(2, 2, 2)])

@@ -20,7 +20,7 @@ from chipload.program.tapping import tapping_findings
 from chipload.program.thread_milling import thread_milling_findings
 from chipload.simulation.approach import approach_findings
 from chipload.simulation.drill_depth import drill_depths
-from chipload.simulation.holes import deep_holes
+from chipload.simulation.holes import deep_holes, sideways_drills
 from chipload.simulation.steps import StepBlocks
 from chipload.simulation.stops import stop_findings
 from chipload.simulation.tool_change import changes_in_stock
@@ -89,6 +89,7 @@ def program_findings(
         *(tapping_findings(program, cutters) if around.text is None else ()),
         *thread_milling_findings(program, cutters),
         *deep_holes(columns, cutters),
+        *sideways_drills(columns, cutters),
         *drill_depths(columns, cutters, float(around.low[2])),
         *speed_findings(program, cutters),
         *(() if around.bodies_below else below_stock(program, cutters, *box)),
