@@ -7,6 +7,7 @@ in chipload; 130 stopped by Ctrl-C. Heavy libraries are imported inside the comm
 
 from __future__ import annotations
 
+import io
 import signal
 import sys
 from typing import NoReturn
@@ -41,11 +42,19 @@ def main() -> NoReturn:
             number = getattr(signal, name, None)
             if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, _stop)
+        _escape_foreign_characters()
         app()
     except KeyboardInterrupt:
         # before the command began or after it ended
         sys.exit(STOPPED)
     sys.exit(0)
+
+
+def _escape_foreign_characters() -> None:
+    r"""Print a character that the console or the pipe cannot encode, as most on Windows, as its escape, ``\u90e8``."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _stop(_number: int, _frame: object) -> NoReturn:

@@ -127,7 +127,8 @@ def _redirect(address: str) -> Iterator[Path]:
     """A file that leads a browser to an address: the words of a command, unlike the file, are open to every user."""
     with tempfile.TemporaryDirectory(prefix="chipload-") as folder:
         path = Path(folder) / "chipload.html"
-        path.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={escape(address)}">\n', "utf-8")
+        text = f'<!doctype html><meta http-equiv="refresh" content="0; url={escape(address)}">\n'
+        path.write_text(text, "utf-8", newline="")
         yield path
 
 
