@@ -3,7 +3,10 @@
 import contextlib
 import re
 import time
+from pathlib import Path
 
+#: checks accessibility in a browser; there after `npm install` in viewer/, not part of the package
+AXE = Path(__file__).parents[1] / "viewer" / "node_modules" / "axe-core" / "axe.min.js"
 #: the 3D view
 VIEW = "chiploadViewer.of(document.querySelector('.cl-stage').id)"
 #: seconds of the machine in a second of a slow play: the longest wait of a test does not come to the end
@@ -43,6 +46,16 @@ def choose(page, name: str, option: str, chosen: bool = True) -> None:
                 if field.get_attribute("aria-expanded", timeout=1000 * LOOK) == "true" and not listed.is_visible():
                     field.click(timeout=1000 * LOOK)
     raise AssertionError(f"{name}: {option} is not {'chosen' if chosen else 'left'}: {missed}")
+
+
+def serious_problems(page) -> list[tuple[str, list[str]]]:
+    """Rules of accessibility that a page breaks seriously, with the elements; empty also where axe-core is missing."""
+    if not AXE.exists():
+        return []
+    if not page.evaluate("'axe' in window"):
+        page.evaluate(AXE.read_text())
+    found = page.evaluate("axe.run(document, {resultTypes: ['violations']}).then(r => r.violations)")
+    return [(v["id"], [n["html"][:200] for n in v["nodes"]]) for v in found if v["impact"] in ("serious", "critical")]
 
 
 def settle(page, row: int) -> None:

@@ -1,14 +1,8 @@
 """The page for keyboards, readers of the screen and small windows."""
 
-from pathlib import Path
-
 import pytest
 
-from web_lists import VIEW, play_slowly, settle, stop
-
-#: checks accessibility in a browser; there after `npm install` in viewer/, not part of the package
-AXE = Path(__file__).parents[2] / "viewer" / "node_modules" / "axe-core" / "axe.min.js"
-
+from web_lists import AXE, VIEW, play_slowly, serious_problems, settle, stop
 
 #: whether a part lies inside a window of this width
 INSIDE = """([part, width]) => {
@@ -88,12 +82,7 @@ def test_axe_finds_nothing_serious(cut) -> None:
         pytest.skip("no axe-core: npm install in viewer/")
     # the teeth cut there
     cut.evaluate(f"{VIEW}.go(30)")
-    cut.evaluate(AXE.read_text())
     for tab, shown in (("limits", ".cl-checks"), ("cut", ".cv-cut-plots svg")):
         cut.locator(".cl-tabs").get_by_text(tab, exact=True).click()
         cut.locator(shown).first.wait_for()
-        found = cut.evaluate("axe.run(document, {resultTypes: ['violations']}).then(r => r.violations)")
-        serious = [
-            (v["id"], [n["html"][:200] for n in v["nodes"]]) for v in found if v["impact"] in ("serious", "critical")
-        ]
-        assert serious == [], tab
+        assert serious_problems(cut) == [], tab

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from square import FEED, FORCE, LINE, ROWS, T, X, Y
-from web_lists import VIEW, choose, click_until, drawn, play_slowly, settle, stop
+from web_lists import VIEW, choose, click_until, drawn, play_slowly, serious_problems, settle, stop
 
 BACKGROUND = (238, 241, 245)
 
@@ -40,12 +40,25 @@ def stands_at(page, row):
     assert cutter(page) == pytest.approx([X[row], Y[row], -2.0])
 
 
-def test_what_the_folder_holds_is_listed_and_opened(window) -> None:
+def test_what_the_folder_holds_is_shown_by_job_with_pictures_and_opened(window) -> None:
     page = window("")
-    page.wait_for_selector(".cl-entry")
-    names = page.locator(".cl-what").all_inner_texts()
-    assert names == ["contour/job.toml", "bare", "cut", "link", "square"]
-    page.locator(".cl-entry", has_text="square").get_by_text("Show").click()
+    page.wait_for_selector(".cl-result")
+    groups = page.locator(".cl-group .cl-what").all_inner_texts()
+    assert {"<img src=x onerror='window.hacked=1'>", "cut", "square", "contour/job.toml"} <= set(groups)
+    assert page.evaluate("window.hacked") is None
+    card = page.locator(".cl-result", has=page.locator(".cl-result-name").get_by_text("square", exact=True))
+    assert card.locator(".cl-pill").inner_text() == "exceeds"
+    assert card.locator(".answer .value").inner_text() == "force 900 of 800 N"
+    assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d$", card.locator(".cl-result-head .cl-note").inner_text())
+    page.wait_for_function("[...document.querySelectorAll('.cl-result img')].every(i => i.naturalWidth == 312)")
+    for width, least in ((420, 1), (1280, 4), (1920, 4)):
+        page.set_viewport_size({"width": width, "height": 800})
+        page.wait_for_function("w => document.documentElement.scrollWidth == w", arg=width)
+        lefts = {round(box["x"]) for one in page.locator(".cl-result").all() if (box := one.bounding_box())}
+        assert len(lefts) == 1 if least == 1 else len(lefts) >= least
+    page.set_viewport_size({"width": 1280, "height": 720})
+    assert serious_problems(page) == []
+    card.click()
     page.wait_for_selector(".cl-limits", state="visible")
     assert page.inner_text(".cl-word") == "exceeds"
     assert "cl-no" in page.get_attribute(".cl-verdict", "class")
@@ -53,6 +66,11 @@ def test_what_the_folder_holds_is_listed_and_opened(window) -> None:
     assert message.startswith(
         "Exceeds: line 8: a rapid goes through material; and 1 more. Critical limit: force 900 N "
     )
+    # back by the key, and the same list
+    page.keyboard.press("h")
+    page.wait_for_selector(".cl-limits", state="hidden")
+    assert page.locator(".cl-result").count() == 4
+    assert page.title() == "chipload"
 
 
 def test_limits_and_findings_lead_to_their_place(square) -> None:

@@ -27,7 +27,9 @@ from chipload.web.folder_access import (
     list_folder,
     resolve_name,
 )
+from chipload.web.home import home_groups
 from chipload.web.panels import RELEASE
+from chipload.web.panels.home import HomePanel
 from chipload.web.panels.job_form import JobForm
 from chipload.web.result import PageResult, open_result
 from chipload.web.result_view import VERDICTS, ResultView
@@ -40,6 +42,7 @@ KEYS = (
     ("Space", "play, pause"),
     ("1 2 3 4", "view from a corner, from above, from the front, from the side"),
     ("t", "the next operation or strategy"),
+    ("h", "all results and jobs of the folder, with pictures"),
     ("o", "open a result or a job"),
     ("?", "this list"),
 )
@@ -136,6 +139,7 @@ class Page:
     # -- frame --------------------------------------------------------------------------------------------------
     def _header(self) -> None:
         with ui.element("div").classes("cl-header"):
+            _button("", self._go_home, "home", "results and jobs of this folder (h)").mark("home")
             _button("Open", self._open, "folder_open").mark("open")
             self.title = ui.label("chipload").classes("cl-name").props("role=heading aria-level=1")
             self.name = ui.label("").classes("cl-path")
@@ -206,6 +210,7 @@ class Page:
         """What the folder holds, where no result is shown."""
         self.result = None
         found, all_seen = await asyncio.to_thread(list_folder, self.opened.root)
+        groups = await asyncio.to_thread(home_groups, self.opened.root, found)
         self.stage.set_visibility(False)
         self.home.set_visibility(True)
         self.home.clear()
@@ -224,14 +229,12 @@ class Page:
                     with ui.element("div").classes("cl-scroll cl-job"):
                         JobForm(resolve_name(self.opened.root, job), lambda values: self._request_folder(job, values))
                     ui.html(self._text(job), sanitize=True).classes("cl-scroll cl-code cl-job").props("tabindex=0")
-            ui.label("Results and jobs in this folder").classes("cl-dialog-title")
-            self._list_results(found, all_seen)
+            ui.label("Results and jobs in this folder").classes("cl-dialog-title").props("role=heading aria-level=2")
+            _list_notes(found, all_seen)
+            HomePanel(groups, self._folder_name, self.show, self._job, self._request_folder)
 
     def _list_results(self, found: list[FolderEntry], all_seen: bool) -> None:
-        if not all_seen:
-            ui.label(f"The folder holds more than {ENTRIES} files; the others were not read.").classes("cl-note")
-        if not found:
-            ui.label("This folder holds no result and no job. `chipload example` copies one.").classes("cl-note")
+        _list_notes(found, all_seen)
         for f in found:
             with ui.element("div").classes("cl-entry"):
                 ui.icon("analytics" if f.kind == "result" else "description").classes("cl-icon")
@@ -243,6 +246,14 @@ class Page:
                     ui.label("job").classes("cl-pill")
                     _button("Look", lambda n=f.name: self._job(n))
                     _button("Run", lambda n=f.name: self._request_folder(n), "play_arrow").mark(f"run-{f.name}")
+
+    async def _go_home(self) -> None:
+        """Leave the result that is shown for the list of results."""
+        self.opening.close()
+        self.view.pause()
+        ui.page_title("chipload")
+        ui.navigate.history.replace("/")
+        await self._home()
 
     async def _job(self, name: str) -> None:
         """Show a job."""
@@ -401,6 +412,8 @@ class Page:
             self.help.open()
         elif key.name == "o" and not event.action.repeat:
             await self._open()
+        elif key.name == "h" and not event.action.repeat:
+            await self._go_home()
         elif self.result is None or self.help.value or self.opening.value or self.running.value:
             return
         elif key.arrow_left or key.arrow_right:
@@ -417,6 +430,14 @@ class Page:
             self.view.scene.view_from(("iso", "top", "front", "side")[int(key.name) - 1])
         elif key.name == "t":
             self.tracks.set_value((int(self.tracks.value or 0) + 1) % len(self.result.tracks))
+
+
+def _list_notes(found: list[FolderEntry], all_seen: bool) -> None:
+    """State what a list of a folder leaves out, or that it is empty."""
+    if not all_seen:
+        ui.label(f"The folder holds more than {ENTRIES} files; the others were not read.").classes("cl-note")
+    if not found:
+        ui.label("This folder holds no result and no job. `chipload example` copies one.").classes("cl-note")
 
 
 def target_in(root: Any, out: str) -> Any:

@@ -51,7 +51,7 @@ def serve(path: str | Path, port: int | None, show: bool, show_line: Callable[[s
     os.environ["NICEGUI_STORAGE_PATH"] = str(Path(tempfile.gettempdir()) / "chipload-keeps-nothing")
     import uvicorn
 
-    application = _application(opened, own, token)
+    application = _application(opened, own, token, lambda: server.should_exit)
     config = uvicorn.Config(
         application,
         http=silent_closing_protocol(),
@@ -138,8 +138,8 @@ async def _when_started(server: Any, act: Callable[[], None]) -> None:
     act()
 
 
-def _application(opened: OpenedFolder, port: int, token: str) -> Any:
-    """The application behind its guard; its runs end with it."""
+def _application(opened: OpenedFolder, port: int, token: str, is_ending: Callable[[], bool]) -> Any:
+    """The application behind its guard; its runs end with it. ``is_ending`` tells whether the server was stopped."""
     from fastapi import FastAPI
     from nicegui import app, ui
     from starlette.responses import FileResponse, PlainTextResponse, Response
@@ -149,10 +149,11 @@ def _application(opened: OpenedFolder, port: int, token: str) -> Any:
     from chipload.web.guard import SANDBOX, Guard
     from chipload.web.page import Page, Runs
     from chipload.web.result import REPORT
+    from chipload.web.thumbnail import thumbnail
 
     # what is on its way to a window that was closed is no news for the terminal
     logging.getLogger("nicegui").setLevel(logging.ERROR)
-    runs, assets = Runs(), AssetCache()
+    runs, assets, drawing = Runs(), AssetCache(), asyncio.Lock()
 
     @app.get("/shape/{key}.bin")
     def shape(key: str) -> Response:
@@ -164,6 +165,19 @@ def _application(opened: OpenedFolder, port: int, token: str) -> Any:
     @app.get("/viewer.js")
     def viewer() -> Response:
         return Response(viewer_script(), media_type="text/javascript", headers={"cache-control": "no-cache"})
+
+    @app.get("/thumbnail")
+    async def small_picture(name: str) -> Response:
+        while drawing.locked():  # one at a time: a list asks for many at once
+            if is_ending():
+                return PlainTextResponse("the page ends\n", status_code=503)
+            await asyncio.sleep(0.05)
+        try:
+            async with drawing:
+                data = await asyncio.to_thread(thumbnail, opened.root, name)
+        except InputError as err:
+            return PlainTextResponse(f"{err}\n", status_code=404)
+        return Response(data, media_type="image/png", headers={"cache-control": "private, max-age=31536000, immutable"})
 
     @app.get("/report")
     def report(name: str) -> Response:
