@@ -18,6 +18,7 @@ from chipload.result import Verdict
 from chipload.result.changes import Change
 from chipload.web.asset_cache import AssetCache
 from chipload.web.comparison import MOST
+from chipload.web.dropped import DroppedProgram, write_answers
 from chipload.web.folder_access import (
     ENTRIES,
     FolderEntry,
@@ -29,6 +30,7 @@ from chipload.web.folder_access import (
 )
 from chipload.web.home import home_groups
 from chipload.web.panels import RELEASE
+from chipload.web.panels.dropped import DropZone, Questions
 from chipload.web.panels.home import HomePanel
 from chipload.web.panels.job_form import JobForm
 from chipload.web.result import PageResult, open_result
@@ -229,6 +231,7 @@ class Page:
                     with ui.element("div").classes("cl-scroll cl-job"):
                         JobForm(resolve_name(self.opened.root, job), lambda values: self._request_folder(job, values))
                     ui.html(self._text(job), sanitize=True).classes("cl-scroll cl-code cl-job").props("tabindex=0")
+            DropZone(self._ask_questions, lambda text: ui.notify(text, type="negative"))
             ui.label("Results and jobs in this folder").classes("cl-dialog-title").props("role=heading aria-level=2")
             _list_notes(found, all_seen)
             HomePanel(groups, self._folder_name, self.show, self._job, self._request_folder)
@@ -290,7 +293,50 @@ class Page:
                 _button("Cancel", self.running.close)
         self.running.open()
 
-    def _run(self, job: str, out: str, message: Any, overrides: Sequence[str], compared: str | None) -> None:
+    def _ask_questions(self, program: DroppedProgram) -> None:
+        """Ask what a dropped program leaves open; the answers become a job in the opened folder."""
+        self.ask.clear()
+        with self.ask:
+            questions = Questions(program)
+            ui.label("Folder of the job, in the opened folder:").classes("cl-note")
+            where = ui.input(value=program.folder).props('dense outlined aria-label="folder of the job"')
+            where.classes("cl-out").mark("out")
+            message = ui.label("").classes("cl-no")
+
+            async def write(run: bool) -> None:
+                await self._write_job(program, questions, str(where.value).strip(), message, run)
+
+            with ui.element("div").classes("cl-entry"):
+                _button("Run", lambda: write(True), "play_arrow").props("unelevated color=primary").props(
+                    remove="flat"
+                ).mark("start")
+                _button("Save the job only", lambda: write(False)).mark("save-job")
+                _button("Cancel", self.running.close)
+        self.running.open()
+
+    async def _write_job(
+        self, program: DroppedProgram, questions: Questions, folder: str, message: Any, run: bool
+    ) -> None:
+        """Write the job of a dropped program, and run it: the verdict of a coarse run comes first."""
+        try:
+            if run and self.runs.now is not None and not self.runs.now.ended:
+                raise InputError("a job is running: stop it first")
+            target = target_in(self.opened.root, folder)
+            path = await asyncio.to_thread(write_answers, program, questions.answers, target)
+        except (InputError, OutputError) as err:
+            message.set_text(str(err).replace(f"{self.opened.root}/", ""))
+            return
+        job = path.relative_to(self.opened.root).as_posix()
+        if run:
+            self._run(job, f"{folder}/result", message, (), None, draft=True)
+            await self._home()
+        else:
+            self.running.close()
+            await self._home(job)
+
+    def _run(
+        self, job: str, out: str, message: Any, overrides: Sequence[str], compared: str | None, draft: bool = False
+    ) -> None:
         """Start a run, unless one runs or its folder cannot be written."""
         root = self.opened.root
         try:
@@ -305,7 +351,7 @@ class Page:
             message.set_text(str(err).replace(f"--out {root}/", ""))
             return
         self.running.close()
-        self.runs.now = now = JobRun(job, target.relative_to(root).as_posix(), overrides, compared)
+        self.runs.now = now = JobRun(job, target.relative_to(root).as_posix(), overrides, compared, draft)
         self.seen, self.own = None, now
         self.bar.set_visibility(True)
         background_tasks.create(now.work(path, target))
@@ -347,7 +393,8 @@ class Page:
         self.bar_stop.set_visibility(now.state == "running")
         self.bar_close.set_visibility(now.ended)
         message = {
-            "running": f"{now.job}: {100.0 * now.done:.0f} % \u00b7 {now.what}",
+            "running": f"{now.job}: {100.0 * now.done:.0f} % \u00b7 {now.what}"
+            + (f" \u00b7 first look, coarse: {now.first}" if now.first else ""),
             "stopping": f"{now.job}: stopping",
             "done": f"{now.job}: done. {now.message}",
             "stopped": f"{now.job}: stopped, {now.message.removeprefix('stopped: ') or 'nothing was written'}",

@@ -1,8 +1,8 @@
 """A job in a separate process: reports progress, can be stopped, and ends with the page.
 
 Notation: the process writes a JSON value a line: ``{"done": 0..1, "what": text}`` while it works and at its end
-``{"code": exit code of `chipload run`, "message": text}``. It stops when its input closes, so that no run outlives the
-page.
+``{"code": exit code of `chipload run`, "message": text}``; of a draft before that ``{"first": text}``, the first line
+of a coarse run. It stops when its input closes, so that no run outlives the page.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from typing import Literal
 
 from chipload.processes import own_group, stop_group
 
+#: word of the worker for a draft
+DRAFT = "--draft"
 #: seconds that a run has to stop by itself
 PATIENCE = 8.0
 #: characters that are kept of the output of a failed run
@@ -33,9 +35,13 @@ class JobRun:
     job, out : names in the opened folder
     overrides : values in the place of those of the job, as `--set` takes them
     compared : name of the result that it is compared with; None: none
+    draft : run with the guesses of a draft, after a coarse run whose verdict is ``first`` as soon as it is known
     """
 
-    def __init__(self, job: str, out: str, overrides: Sequence[str] = (), compared: str | None = None) -> None:
+    def __init__(
+        self, job: str, out: str, overrides: Sequence[str] = (), compared: str | None = None, draft: bool = False
+    ) -> None:
+        self.draft, self.first = draft, ""
         self.job, self.out, self.overrides, self.compared = job, out, tuple(overrides), compared
         self.state: State = "running"
         self.done, self.what = 0.0, "starting"
@@ -51,6 +57,7 @@ class JobRun:
     async def work(self, job: Path, out: Path) -> None:
         """Start the process and follow it to its end."""
         words = [sys.executable, "-m", "chipload.web.worker", str(job), str(out), *self.overrides]
+        words += [DRAFT] if self.draft else []
         pipe = asyncio.subprocess.PIPE
         try:
             process = await asyncio.create_subprocess_exec(*words, stdin=pipe, stdout=pipe, stderr=pipe, **own_group())
@@ -91,7 +98,9 @@ class JobRun:
     def _take(self, line: bytes) -> None:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
             values = json.loads(line)
-            if "code" in values:
+            if "first" in values:
+                self.first = str(values["first"])
+            elif "code" in values:
                 self.code, self.message = int(values["code"]), str(values["message"])
             else:
                 self.done, self.what = float(values["done"]), str(values["what"])

@@ -1,4 +1,7 @@
-"""Run one job for the page: `python -m chipload.web.worker JOB OUT [KEY=VALUE]...`.
+"""Run one job for the page: `python -m chipload.web.worker JOB OUT [--draft] [KEY=VALUE]...`.
+
+With `--draft` guesses of a draft are taken as they are, as by `chipload run --accept`, and a coarse run comes first,
+as by `--coarse`, whose first line is written before the whole run begins.
 
 :mod:`chipload.web.runs` states what it writes.
 """
@@ -11,10 +14,12 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from chipload.errors import Cancelled, InputError, OutputError
 from chipload.files import cannot_write, is_full
+from chipload.progress import Progress, part_of
 
 #: seconds between two lines of progress
 BREATH = 0.1
@@ -22,9 +27,15 @@ BREATH = 0.1
 ASKED = threading.Event()
 
 
-def work(job: str, out: str, *overrides: str) -> dict[str, Any]:
+DRAFT = "--draft"
+#: share of the progress that the coarse run is
+FIRST = 0.15
+
+
+def work(job: str, out: str, *words: str) -> dict[str, Any]:
     """Run the job, with overrides, and write its result; the exit code of `chipload run`, and its message."""
-    kept_text = ""
+    kept_text, draft = "", DRAFT in words
+    overrides = tuple(word for word in words if word != DRAFT)
     try:
         from chipload.jobs import load_job, resume_note, run_job
         from chipload.report.folder import check_target, checkpoint_folder, write_finished
@@ -35,10 +46,15 @@ def work(job: str, out: str, *overrides: str) -> dict[str, Any]:
         read = load_job(job, overrides)
         report(0.0, resume_note(read) or "reading")
         check_target(out)
+        begin = 0.0
+        if draft:
+            begin = FIRST
+            _write({"first": first_line(job, overrides, part_of(report, 0.0, FIRST))})
+        report_run = part_of(report, begin, 1.0)
         with Checkpoint(checkpoint_folder(out)) as kept:
             try:
-                done = run_job(read, lambda part, what: report(0.85 * part, what), kept)
-                write_finished(done.result, done.presentation, out, lambda part, what: report(0.85 + 0.15 * part, what))
+                done = run_job(read, part_of(report_run, 0.0, 0.85), kept, accept=draft)
+                write_finished(done.result, done.presentation, out, part_of(report_run, 0.85, 1.0))
             finally:
                 kept_text = kept.what_is_kept()
             kept.discard()
@@ -55,6 +71,18 @@ def work(job: str, out: str, *overrides: str) -> dict[str, Any]:
         return {"code": 130, "message": f"stopped: {why}"}
     except Exception as err:
         return {"code": 1, "message": _fault(err)}
+
+
+def first_line(job: str, overrides: Sequence[str], report: Progress) -> str:
+    """The first line of the verdict of a coarse run of a draft; empty: it cannot be coarser."""
+    from chipload.jobs import load_job, run_job
+    from chipload.jobs.coarse import coarser, mark_coarse
+
+    try:
+        coarse = load_job(job, (*overrides, *coarser(load_job(job, overrides))))
+    except InputError:
+        return ""
+    return mark_coarse(run_job(coarse, report, accept=True)).result.first_lines[0]
 
 
 def _fault(err: Exception) -> str:

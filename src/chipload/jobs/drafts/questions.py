@@ -8,6 +8,7 @@ job marks.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from chipload.jobs.drafts.draft import DraftTable, Entry, toml
 
@@ -38,30 +39,68 @@ TABLES = {
 SHAPE = ("diameter_mm", "corner_radius_mm", "body_mm", "taper_deg")
 
 
+@dataclass(frozen=True)
+class Question:
+    """A question of a draft.
+
+    Parameters
+    ----------
+    text : what is asked, what was guessed, and the effect of another answer
+    keys : number of the table in the draft and key of each guess that an answer states
+    """
+
+    text: str
+    keys: tuple[tuple[int, str], ...]
+
+
 def questions(tables: Sequence[DraftTable]) -> tuple[str, ...]:
-    """The questions of a draft, the one with the greatest effect first.
+    """The questions of a draft as texts, the one with the greatest effect first.
 
     >>> from chipload.jobs.drafts.draft import DraftTable, Entry
     >>> unit = Entry("unit", "inch", "the program states none", guess=True)
     >>> questions([DraftTable("program", (unit,))])
     ('program.unit = "inch": the program states none? the other unit makes the part 25.4 times smaller or greater',)
     """
+    return tuple(question.text for question in questions_with_keys(tables))
+
+
+def questions_with_keys(tables: Sequence[DraftTable]) -> tuple[Question, ...]:
+    """The questions of a draft with the keys that their answers state, the one with the greatest effect first.
+
+    >>> from chipload.jobs.drafts.draft import DraftTable, Entry
+    >>> unit = Entry("unit", "inch", "the program states none", guess=True)
+    >>> questions_with_keys([DraftTable("program", (Entry("file", "a.nc"), unit))])[0].keys
+    ((0, 'unit'),)
+    """
     guessed = {t.name: t for t in tables if t.guesses and not t.repeated}
     cutters = [t for t in tables if t.name == "cutter" and t.guesses]
     program = {e.key: e for e in guessed["program"].guesses} if "program" in guessed else {}
-    out = [_one("program", program[key], effect) for key, effect in PROGRAM.items() if key in program][:4]
+
+    def keys_of(asked: Sequence[DraftTable], only: Sequence[str] = ()) -> tuple[tuple[int, str], ...]:
+        own = [(number, t) for number, t in enumerate(tables) if any(t is one for one in asked)]
+        return tuple((number, e.key) for number, t in own for e in t.guesses if not only or e.key in only)
+
+    def table_question(name: str) -> Question:
+        return Question(_table(guessed[name], *TABLES[name]), keys_of([guessed[name]]))
+
+    out = [
+        Question(_one("program", program[key], effect), keys_of([guessed["program"]], (key,)))
+        for key, effect in PROGRAM.items()
+        if key in program
+    ][:4]
     sizes = [t for t in cutters if any(e.key in SHAPE for e in t.guesses)]
-    asked = [_table(guessed[name], *TABLES[name]) for name in ("part", "wall", "stock") if name in guessed]
+    asked = [table_question(name) for name in ("part", "wall", "stock") if name in guessed]
     turned = [t for t in tables if t.name == "setup" and t.guesses]
     if turned:
-        asked.append(_table(turned[0], "how does the part lie in its later setups", "what they cut of it"))
+        text = _table(turned[0], "how does the part lie in its later setups", "what they cut of it")
+        asked.append(Question(text, keys_of(turned)))
     if sizes:
-        asked.append(_sizes(sizes))
-    asked += [_table(guessed[n], *TABLES[n]) for n in ("machine", "material", "workpiece") if n in guessed]
+        asked.append(Question(_sizes(sizes), keys_of(sizes)))
+    asked += [table_question(name) for name in ("machine", "material", "workpiece") if name in guessed]
     rest = [t for t in cutters if t not in sizes]
     if rest:
-        asked.append(_tools(rest))
-    asked += [_table(guessed["limits"], *TABLES["limits"])] if "limits" in guessed else []
+        asked.append(Question(_tools(rest), keys_of(rest)))
+    asked += [table_question("limits")] if "limits" in guessed else []
     return tuple((*out, *asked)[:MOST])
 
 
