@@ -10,7 +10,7 @@ from chipload.jobs import load_job
 from chipload.jobs.drafts.make import draft_of
 from chipload.web.dropped import LARGEST, Upload, answered, program_name, read_dropped, write_answers
 
-#: no unit, no tool size, no stock, no material: the reader guesses them
+#: no tool size, no stock, no machine, no material: the draft guesses them
 PROGRAM = "G90\nT1 M6\nS3000 M3\nG0 X0 Y0 Z5\nG1 Z-2 F480\nX40\nY40\nX0\nY0\nG0 Z5\nM2\n"
 
 
@@ -53,14 +53,13 @@ def test_the_questions_are_those_of_init(dropped, tmp_path) -> None:
     keys = {one.path: one for q in dropped.questions for one in q.keys}
     assert "vmc" in keys["machine.name"].choices
     assert "al7075-t6" in keys["material.name"].choices
-    assert set(keys["program.unit"].choices) == {"mm", "inch"}
     assert keys["cutter.0.diameter_mm"].field.unit == "mm"
 
 
 def test_answers_are_facts_of_the_job_and_the_rest_stays_a_guess(dropped, tmp_path) -> None:
     by_path = {one.path: (one.table, one.key) for q in dropped.questions for one in q.keys}
     answers = {
-        by_path["program.unit"]: "mm",
+        by_path["machine.name"]: "vmc",
         by_path["stock.low_mm"]: "-5, -5, -10",
         by_path["stock.high_mm"]: "[45 45 0]",
         by_path["cutter.0.diameter_mm"]: "8",
@@ -71,10 +70,10 @@ def test_answers_are_facts_of_the_job_and_the_rest_stays_a_guess(dropped, tmp_pa
     assert raw["stock"]["low_mm"] == [-5.0, -5.0, -10.0]
     assert raw["stock"]["high_mm"] == [45.0, 45.0, 0.0]
     assert raw["cutter"][0]["diameter_mm"] == 8.0
-    assert raw["program"]["unit"] == "mm"
+    assert raw["machine"] == {"name": "vmc"}
     assert "confirm" not in raw["stock"]
     guesses = load_job(job).guesses
-    assert not [g for g in guesses if g.startswith(("stock.", "program.unit"))]
+    assert not [g for g in guesses if g.startswith(("stock.", "machine."))]
     assert [g for g in guesses if g.startswith("material.name")]
     # what stays is what init guessed less the answers
     assert len(dropped.draft.guesses) - len(answered(dropped, answers).guesses) == len(answers)

@@ -3,12 +3,21 @@
 import asyncio
 import json
 import time
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import pytest
+
 from chipload.examples import copy_example
+from chipload.web import worker
+from chipload.web.dropped import read_dropped, write_answers
 from chipload.web.runs import JobRun
+from web_lists import serious_problems
 from web_served import Served
+
+#: a slot of one cut; tool, stock, machine and material are not stated
+SLOT = "G21 G90\nT1 M6\nS3000 M3\nG0 X-10 Y10 Z5\nG0 Z-1\nG1 X20 F240\nG0 Z5\nM2\n"
 
 
 def workers(job: Path) -> list[str]:
@@ -135,3 +144,53 @@ def test_ctrl_c_ends_the_page_and_its_run(browser, folder) -> None:
     page.close()
     assert not (folder / "contour" / "later").exists()
     assert not list((folder / "contour").glob(".chipload-*"))
+
+
+def test_a_program_that_is_dropped_is_asked_about_run_and_shown(window, folder) -> None:
+    page = window("")
+    page.wait_for_selector(".cl-drop")
+    files = [{"name": "slot.nc", "mimeType": "text/plain", "buffer": SLOT.encode()}]
+    page.set_input_files(".cl-drop input", [{**files[0], "name": "slot.step"}])
+    page.locator(".cl-drop [role=status]").get_by_text("not the ending of a program").wait_for()
+    page.set_input_files(".cl-drop input", files)
+    page.wait_for_selector(".cl-question", state="visible")
+    assert 1 <= page.locator(".cl-question").count() <= 5
+    assert serious_problems(page) == []
+    # a list with search, and two numbers
+    material = page.get_by_role("combobox", name="material.name")
+    material.fill("ti6al4v")
+    page.get_by_role("option", name="ti6al4v-", exact=False).first.click()
+    page.get_by_role("textbox", name="cutter.0.diameter_mm").fill("8")
+    page.get_by_role("textbox", name="stock.low_mm").fill("-6, -6, -12")
+    page.get_by_role("checkbox", name="question 3: it is so").click()
+    page.locator(".cl-dialog:visible").get_by_text("Run", exact=True).last.click()
+    job = folder / "slot-job" / "job.toml"
+    wait(job.exists)
+    raw = tomllib.loads(job.read_text())
+    assert raw["cutter"][0]["diameter_mm"] == 8.0
+    assert raw["stock"]["low_mm"] == [-6.0, -6.0, -12.0]
+    assert raw["material"]["name"].startswith("ti6al4v")
+    assert (folder / "slot-job" / "slot.nc").read_bytes() == SLOT.encode()
+    # the verdict of the coarse run comes while the whole run works, then its result is shown
+    page.wait_for_selector(".cl-limits", state="visible", timeout=300_000)
+    summary = json.loads((folder / "slot-job" / "result" / "summary.json").read_text())
+    assert summary["verdict"] == "unproven"
+    page.wait_for_function("document.querySelector('.cl-word').textContent == 'unproven'")
+    assert any("guess" in f["text"] for f in summary["findings"])
+
+
+def test_the_first_look_of_a_draft_comes_before_its_result(tmp_path) -> None:
+    dropped = read_dropped("slot.nc", SLOT.encode())
+    job = write_answers(dropped, {}, tmp_path / "slot-job")
+    written = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(worker, "_write", written.append)
+        end = worker.work(str(job), str(tmp_path / "out"), worker.DRAFT)
+    assert end["code"] == 3
+    places = [k for k, line in enumerate(written) if "first" in line]
+    assert len(places) == 1
+    assert written[places[0]]["first"].startswith("Unproven: ")
+    assert all(line["done"] <= worker.FIRST for line in written[: places[0]])
+    assert all(line["done"] >= worker.FIRST for line in written[places[0] + 1 :])
+    # without the word for a draft its guesses are refused, as by the command
+    assert worker.work(str(job), str(tmp_path / "other"))["code"] == 2

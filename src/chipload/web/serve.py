@@ -168,13 +168,18 @@ def _application(opened: OpenedFolder, port: int, token: str, is_ending: Callabl
 
     @app.get("/thumbnail")
     async def small_picture(name: str) -> Response:
-        while drawing.locked():  # one at a time: a list asks for many at once
+        async def drawn() -> bytes:
+            async with drawing:  # one at a time: a list asks for many at once
+                return await asyncio.to_thread(thumbnail, opened.root, name)
+
+        task = asyncio.ensure_future(drawn())
+        while not task.done():
             if is_ending():
+                task.cancel()
                 return PlainTextResponse("the page ends\n", status_code=503)
-            await asyncio.sleep(0.05)
+            await asyncio.wait({task}, timeout=0.05)
         try:
-            async with drawing:
-                data = await asyncio.to_thread(thumbnail, opened.root, name)
+            data = task.result()
         except InputError as err:
             return PlainTextResponse(f"{err}\n", status_code=404)
         return Response(data, media_type="image/png", headers={"cache-control": "private, max-age=31536000, immutable"})

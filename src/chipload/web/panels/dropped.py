@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import Callable
 from html import escape
 from typing import Any
@@ -13,6 +14,8 @@ from chipload.errors import ChiploadError
 from chipload.jobs.drafts.draft import toml
 from chipload.web.dropped import LARGEST, AskedKey, AskedQuestion, DroppedProgram, Upload, read_dropped
 
+#: what a question says of the command line
+_COMMAND = re.compile(r"; (?:--|chipload )[^;]*")
 #: findings of the draft that are listed
 NOTES = 4
 
@@ -77,7 +80,7 @@ class Questions:
         with ui.element("fieldset").classes("cl-question").mark(f"question-{number}"):
             # what is asked comes before what was guessed, which the fields show
             with ui.element("legend"):
-                ui.label(f"{number}. {question.text}")
+                ui.label(f"{number}. {_COMMAND.sub('', question.text)}")
             with ui.element("div").classes("cl-answers"):
                 for one in question.keys:
                     self._field(one)
