@@ -8,7 +8,7 @@ import pytest
 from chipload.errors import InputError
 from chipload.jobs import load_job
 from chipload.jobs.drafts.make import draft_of
-from chipload.web.dropped import LARGEST, Upload, answered, program_name, read_dropped, write_answers
+from chipload.web.dropped import LARGEST, Upload, draft_with_answers, program_name, read_dropped, write_answers
 
 #: no tool size, no stock, no machine, no material: the draft guesses them
 PROGRAM = "G90\nT1 M6\nS3000 M3\nG0 X0 Y0 Z5\nG1 Z-2 F480\nX40\nY40\nX0\nY0\nG0 Z5\nM2\n"
@@ -76,7 +76,7 @@ def test_answers_are_facts_of_the_job_and_the_rest_stays_a_guess(dropped, tmp_pa
     assert not [g for g in guesses if g.startswith(("stock.", "machine."))]
     assert [g for g in guesses if g.startswith("material.name")]
     # what stays is what init guessed less the answers
-    assert len(dropped.draft.guesses) - len(answered(dropped, answers).guesses) == len(answers)
+    assert len(dropped.draft.guesses) - len(draft_with_answers(dropped, answers).guesses) == len(answers)
     for path, text, message in (
         ("stock.low_mm", "1, 2", "must be 3 numbers"),
         ("cutter.0.diameter_mm", "wide", "must be a number"),

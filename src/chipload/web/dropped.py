@@ -142,10 +142,12 @@ def read_dropped(name: str, data: bytes) -> DroppedProgram:
         (folder / name).write_bytes(data)
         draft = draft_program(folder / name, folder)
         fields = {f.path: f for f in job_fields(write_draft(draft, folder))}
-    return DroppedProgram(name, data, draft, tuple(_asked(draft, q, fields) for q in questions_with_keys(draft.tables)))
+    return DroppedProgram(
+        name, data, draft, tuple(_question_of(draft, q, fields) for q in questions_with_keys(draft.tables))
+    )
 
 
-def answered(program: DroppedProgram, answers: Mapping[tuple[int, str], Any]) -> Draft:
+def draft_with_answers(program: DroppedProgram, answers: Mapping[tuple[int, str], Any]) -> Draft:
     """The draft with answers in the place of its guesses, and the program beside the job.
 
     Parameters
@@ -180,7 +182,7 @@ def write_answers(program: DroppedProgram, answers: Mapping[tuple[int, str], Any
     OutputError
         The folder cannot be written.
     """
-    draft = answered(program, answers)
+    draft = draft_with_answers(program, answers)
     with tempfile.TemporaryDirectory(prefix="chipload-") as above:
         errors = job_errors(write_draft(draft, Path(above) / "job"), ())
     if errors:
@@ -189,7 +191,7 @@ def write_answers(program: DroppedProgram, answers: Mapping[tuple[int, str], Any
 
 
 # -- parts ------------------------------------------------------------------------------------------------------
-def _asked(draft: Draft, question: Question, fields: Mapping[str, FormField]) -> AskedQuestion:
+def _question_of(draft: Draft, question: Question, fields: Mapping[str, FormField]) -> AskedQuestion:
     out = []
     for number, key in question.keys:
         table = draft.tables[number]

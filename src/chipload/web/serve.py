@@ -168,11 +168,11 @@ def _application(opened: OpenedFolder, port: int, token: str, is_ending: Callabl
 
     @app.get("/thumbnail")
     async def small_picture(name: str) -> Response:
-        async def drawn() -> bytes:
+        async def draw_next() -> bytes:
             async with drawing:  # one at a time: a list asks for many at once
                 return await asyncio.to_thread(thumbnail, opened.root, name)
 
-        task = asyncio.ensure_future(drawn())
+        task = asyncio.ensure_future(draw_next())
         while not task.done():
             if is_ending():
                 task.cancel()
