@@ -383,15 +383,17 @@ def _parquet() -> list[bytes]:
 
 #: a summary of one track of 200 rows, after docs/summary.schema.json
 SUMMARY: Mapping[str, Any] = {
-    "schema_version": 1, "capability": "program", "job": "x", "verdict": "holds", "message": "every limit holds",
+    "schema_version": 1, "capability": "program", "job": "x", "verdict": "unproven", "message": "nothing was checked",
     "note": "", "limits": [], "findings": [], "unchecked": [], "maps": [], "operations": [{"use": "plain"}],
     "tracks": [
         {
-            "name": "a", "kind": "program", "operation": 0, "in_use": True, "verdict": "holds", "time_s": 1.0,
-            "parameters": {}, "programs": [], "rows": 200, "limits": [], "findings": [],
+            "name": "a", "kind": "program", "operation": 0, "in_use": True, "verdict": "unproven", "time_s": 1.0,
+            "time_high_s": None, "times": None, "parameters": {}, "programs": [], "rows": 200, "energy_balance": {},
+            "limits": [], "findings": [],
         }
     ],
     "provenance": {"inputs": {}, "overrides": [], "machine": "vmc", "materials": {}, "versions": {}},
+    "history_sha256": "",
 }  # fmt: skip
 
 

@@ -38,6 +38,15 @@ def test_few_cases_of_every_reader() -> None:
     assert all(int(count) > 0 for _, count in rows)
 
 
+@pytest.mark.parametrize("name", ["summary", "parquet"])
+def test_what_is_damaged_is_read_where_it_is_not_damaged(name: str, tmp_path: Path) -> None:
+    reader = fuzz_readers.READERS[name]
+    for k, seed in enumerate(reader.seeds()):
+        path = tmp_path / f"{k}{reader.suffix}"
+        path.write_bytes(seed)
+        assert reader.read(path) == 0
+
+
 def test_a_case_is_the_same_each_time(tmp_path: Path) -> None:
     for name in ("a.stl", "b.stl"):
         ran("--reader", "stl", "--case", "7", "--keep", str(tmp_path / name))
