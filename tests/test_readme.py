@@ -1,5 +1,6 @@
 """The Python of the README runs and prints the number that stands beside it."""
 
+import ast
 import contextlib
 import io
 import re
@@ -28,6 +29,15 @@ def test_examples(tmp_path, monkeypatch):
         with contextlib.redirect_stdout(out):
             exec(compile(code, "README.md", "exec"), names)
         assert out.getvalue().strip() == shown
+
+
+def test_the_page_of_the_interface_shows_lines_of_the_readme():
+    """So they run, and print what stands beside them."""
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    shown, run = ("".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)) for text in (page, README))
+    assert len(ast.parse(shown).body) == 6
+    assert {ast.dump(line) for line in ast.parse(shown).body} <= {ast.dump(line) for line in ast.parse(run).body}
+    assert set(re.findall(r"  # (.*)", shown)) <= set(re.findall(r"  # (.*)", run))
 
 
 def test_the_explained_job_is_the_example_but_for_its_defaults():

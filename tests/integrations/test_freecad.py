@@ -9,12 +9,16 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
+from chipload.jobs.feeds.tables import FeedsTable
 from chipload.machine.machine import machine_named
 from chipload.program.program import DWELL, RAPID, Program
 from chipload.program.read import read_program
@@ -103,6 +107,62 @@ def test_what_cannot_be_done_is_refused(found: dict[str, object]) -> None:
     assert found["no_program"].startswith("/nowhere/chipload: cannot be started")
 
 
+# -- without FreeCAD ---------------------------------------------------------------------------------------------
+@pytest.fixture
+def addon(monkeypatch: pytest.MonkeyPatch) -> dict[str, ModuleType]:
+    """Modules of the add-on that need no FreeCAD."""
+    monkeypatch.syspath_prepend(str(ADDON))
+    return {name: import_module(f"chipload_freecad.{name}") for name in ("client", "feeds", "job_folder")}
+
+
+def cam_job(settings: list[str], document: Path) -> SimpleNamespace:
+    """What the add-on reads of a CAM job."""
+    document.write_bytes(b"")
+    return SimpleNamespace(
+        Name="Job",
+        PropertiesList=["ChiploadSettings"],
+        ChiploadSettings=settings,
+        Document=SimpleNamespace(saveCopy=lambda name: shutil.copyfile(document, name)),
+    )
+
+
+def test_new_feeds_are_asked_for_without_divided_lines(addon, tmp_path, monkeypatch):
+    """A command of an operation has one feed: chipload divides lines unless it is told not to."""
+    calls: list[list[str]] = []
+    monkeypatch.setattr(addon["job_folder"], "call", lambda *words: calls.append([str(w) for w in words]) or "")
+    monkeypatch.setattr(addon["job_folder"], "read_result", lambda *_: None)
+    job = cam_job(["operation.0.feeds.fastest_percent = 150"], tmp_path / "a.FCStd")
+    addon["job_folder"].check(job, tmp_path / "job", feeds=True)
+    words = calls[1]
+    sets = dict(words[k + 1].split("=") for k, word in enumerate(words) if word == "--set")
+    keys = {key.removeprefix("operation.0.feeds."): json.loads(value) for key, value in sets.items()}
+    assert FeedsTable.model_fields["divide"].default
+    table = FeedsTable(**keys)
+    assert (table.divide, table.fastest_percent, table.slowest_percent) == (False, 150.0, 25.0)
+    job.ChiploadSettings.append("operation.0.feeds.divide = true")
+    with pytest.raises(addon["client"].ChiploadError) as err:
+        addon["job_folder"].check(job, tmp_path / "job", feeds=True)
+    assert str(err.value) == (
+        "ChiploadSettings: 'operation.0.feeds.divide = true': leave it out: a command of an operation has one feed"
+    )
+
+
+def test_feeds_go_to_the_commands_of_their_lines(addon, tmp_path):
+    """Feeds in mm/s, modal; a program of more lines than that of the document is refused."""
+    (tmp_path / "feeds").mkdir()
+    (tmp_path / "program.ngc").write_text("G21\nG1 X1 F60\nG1 X2\n(b) G0 X3\nG2 X4 I.5 J0\n")
+    (tmp_path / "program_lines.csv").write_text("line,operation,command\n2,A,0\n3,A,1\n4,A,2\n5,B,0\n")
+    new = tmp_path / "feeds" / "program-feeds.ngc"
+    new.write_text("G21\nG1 X1 F120\nG1 X2 F90\n(b) G0 X3\nG2 X4 I.5 J0\n")
+    assert addon["feeds"].new_feeds(tmp_path) == {
+        ("A", 0): (2.0, {"X": 1.0}), ("A", 1): (1.5, {"X": 2.0}), ("B", 0): (1.5, {"X": 4.0, "I": 0.5, "J": 0.0}),
+    }  # fmt: skip
+    new.write_text("G21\nG1 X.5 F120\nG1 X1 F60\nG1 X2 F90\n(b) G0 X3\nG2 X4 I.5 J0\n")
+    with pytest.raises(addon["client"].ChiploadError) as err:
+        addon["feeds"].new_feeds(tmp_path)
+    assert str(err.value) == ("program-feeds.ngc: 6 lines, program.ngc: 5: a line was divided: look for feeds again")
+
+
 def test_the_package_names_what_is_there() -> None:
     """What FreeCAD's add-on manager reads, and the class that InitGui.py registers."""
     space = "{https://wiki.freecad.org/Package_Metadata}"
@@ -111,3 +171,10 @@ def test_the_package_names_what_is_there() -> None:
     assert bench.findtext(f"{space}classname") == "ChiploadWorkbench"
     assert "class ChiploadWorkbench" in (ADDON / "InitGui.py").read_text()
     assert (ADDON / bench.findtext(f"{space}subdirectory") / "Init.py").is_file()
+    project = tomllib.loads((ADDON.parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert root.findtext(f"{space}version") == project["version"]
+    assert root.find(f"{space}maintainer").get("email")
+    for icon in (root.findtext(f"{space}icon"), bench.findtext(f"{space}icon")):
+        assert ElementTree.parse(ADDON / icon).getroot().tag == "{http://www.w3.org/2000/svg}svg"
+    # the folder is copied alone: it holds its licence
+    assert (ADDON / root.find(f"{space}license").get("file")).read_text() == (ADDON.parents[1] / "LICENSE").read_text()

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from chipload_freecad.client import ChiploadError
-from chipload_freecad.job_folder import FEEDS, origins
+from chipload_freecad.job_folder import FEEDS, PROGRAM, origins
 
 _FEED = re.compile(r"F\s*([0-9]*\.?[0-9]+)")
 _WORD = re.compile(r"([A-Z])\s*([-+]?[0-9]*\.?[0-9]+)")
@@ -20,12 +20,17 @@ def new_feeds(folder):
     Raises
     ------
     ChiploadError
-        There is no program with new feeds in the folder.
+        There is no program with new feeds in the folder, or its lines are not those of the program.
     """
     programs = sorted((Path(folder) / FEEDS).glob("*-feeds.ngc"))
     if len(programs) != 1:
         raise ChiploadError(f"{folder}: no program with new feeds: look for them first")
     lines = programs[0].read_text(encoding="ascii", errors="replace").splitlines()
+    own = len((Path(folder) / PROGRAM).read_text(encoding="ascii", errors="replace").splitlines())
+    if len(lines) != own:
+        raise ChiploadError(
+            f"{programs[0].name}: {len(lines)} lines, {PROGRAM}: {own}: a line was divided: look for feeds again"
+        )
     feed, out, known = None, {}, origins(folder)
     for number, line in enumerate(lines, 1):
         text = re.sub(r"\([^)]*\)", "", line)

@@ -16,12 +16,14 @@ from chipload_freecad.client import ChiploadError, call, read_result
 #: property of a job: keys of job.toml with their values
 SETTINGS = "ChiploadSettings"
 #: files of the folder
-DOCUMENT, JOB, LINES, RESULT, TABLE, FEEDS = (
-    "document.FCStd", "job.toml", "program_lines.csv", "result", "table", "feeds",
+DOCUMENT, JOB, PROGRAM, LINES, RESULT, TABLE, FEEDS = (
+    "document.FCStd", "job.toml", "program.ngc", "program_lines.csv", "result", "table", "feeds",
 )  # fmt: skip
 #: what begins the settings of new feeds, and those of a job that states none
 FEED_KEYS = "operation.0.feeds."
 FEED_SETTINGS = ("operation.0.feeds.slowest_percent = 25", "operation.0.feeds.fastest_percent = 200")
+#: a command of an operation has one feed: its line is not divided
+UNDIVIDED = "operation.0.feeds.divide"
 
 
 def jobs_of(document):
@@ -60,7 +62,7 @@ def write_job(job, folder, command="chipload"):
         chipload refuses the document.
     """
     folder = Path(folder)
-    for name in (DOCUMENT, JOB, "program.ngc", LINES):
+    for name in (DOCUMENT, JOB, PROGRAM, LINES):
         if (folder / name).exists():
             (folder / name).unlink()
     folder.mkdir(parents=True, exist_ok=True)
@@ -74,14 +76,18 @@ def check(job, folder, command="chipload", feeds=False):
     Raises
     ------
     ChiploadError
-        chipload refuses the job.
+        chipload refuses the job, or the settings state whether lines are divided.
     """
     folder = Path(folder)
     write_job(job, folder, command)
     lines = settings_of(job)
     asked = [line for line in lines if line.startswith(FEED_KEYS)]
     lines = [line for line in lines if line not in asked]
-    lines += [*FEED_SETTINGS, *asked] if feeds else []
+    if feeds:
+        divided = [line for line in asked if line.partition("=")[0].strip() == UNDIVIDED]
+        if divided:
+            raise ChiploadError(f"{SETTINGS}: {divided[0]!r}: leave it out: a command of an operation has one feed")
+        lines += [*FEED_SETTINGS, *asked, f"{UNDIVIDED} = false"]
     sets = [word for line in lines for word in ("--set", _stated(line))]
     out, table = folder / (FEEDS if feeds else RESULT), folder / TABLE
     for old in (out, table):

@@ -58,6 +58,13 @@ def check_job(
     ------
     InputError
         The job, or a file that it names, cannot be used.
+
+    Examples
+    --------
+    >>> from importlib.resources import files
+    >>> lines, ready = check_job(files("chipload") / "examples" / "contour" / "job.toml")
+    >>> ready
+    True
     """
     from chipload import jobs
 

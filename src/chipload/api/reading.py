@@ -66,7 +66,7 @@ def read_program(
     setup: Setup | None = None,
     progress: Progress = silent,
 ) -> ProgramReading:
-    """Read NC text or CL data as the controller of a machine interprets it.
+    r"""Read NC text or CL data as the controller of a machine interprets it.
 
     Parameters
     ----------
@@ -88,6 +88,16 @@ def read_program(
     ------
     InputError
         The program cannot be read, or the machine has not the axes that it moves.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "line.ngc"
+    ...     _ = file.write_text("G21 G90\nG0 X0 Y0 Z5\nG0 X10\nM30\n", encoding="ascii", newline="")
+    ...     reading = read_program(file, "vmc")
+    >>> reading.program.p_work[-1].tolist()
+    [10.0, 0.0, 5.0]
     """
     from chipload.program import read
     from chipload.units import mm_s_from_mm_min

@@ -70,6 +70,15 @@ def read_dxf(
     InputError
         The file is missing, is no DXF, is too large, has no such layer, no geometry, no unit, an entity that is not
         parallel to the XY plane, or a number that is not finite.
+
+    Examples
+    --------
+    The corner of the example ``contour``: one open contour.
+
+    >>> from importlib.resources import files
+    >>> drawing = read_dxf(files("chipload") / "examples" / "contour" / "corner.dxf", units_if_unstated="mm")
+    >>> [contour.closed for contour in drawing.contours]
+    [False]
     """
     file = Path(path)
     if not (np.isfinite(tolerance_mm) and tolerance_mm > 0.0):

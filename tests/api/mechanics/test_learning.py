@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
+import math
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -47,6 +53,24 @@ def test_learn(histories):
     for value, k, name in ((950.0, 0, "Ktc"), (22.0, 3, "Kte")):
         assert abs(getattr(found.material, name) - value) < 2.0 * sd[k]
         assert sd[k] < 0.06 * value
+
+
+def test_the_page_runs(histories, capsys):
+    """docs/how-to/learn.md: its call of simulate can be made so, and the rest runs on the history of another one."""
+    page = (Path(__file__).parents[3] / "docs" / "how-to" / "learn.md").read_text(encoding="utf-8")
+    first, *rest = ast.parse("".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))).body
+    assert ast.unparse(first.value.func) == "chipload.simulate"
+    inspect.signature(chipload.simulate).bind(*first.value.args, **{k.arg: k.value for k in first.value.keywords})
+    _, result, true = histories
+    columns = true.in_use[0].columns
+    time = np.arange(0.0, columns["t_s"][-1], 0.05)
+    power = columns["torque_mean_nm"] * 8000.0 * math.tau / 60.0 / 0.85  # S8000
+    names = {"chipload": chipload, "history": result, "time_s": time}
+    names["power_w"] = power[np.searchsorted(columns["t_s"], time)]
+    exec(compile(ast.Module(rest, []), "learn.md", "exec"), names)
+    found = names["found"].material
+    assert abs(found.Ktc - 950.0) < 2.0 * math.sqrt(found.variances[0, 0])
+    assert capsys.readouterr().out.startswith(f"{found.Ktc}")
 
 
 def test_refusals(histories):

@@ -77,7 +77,8 @@ def chip_on_layer(
     A cutter of 10 mm goes 2 mm: 2 R d = 20 mm2 are new.
 
     >>> import chipload
-    >>> mill = chipload.Cutter(diameter_mm=10, flutes=4, flute_length_mm=22, overhang_mm=35, modulus_gpa=580)
+    >>> mill = chipload.Cutter(diameter_mm=10, flutes=4, helix_deg=30, flute_length_mm=22, overhang_mm=35,
+    ...                        modulus_gpa=580)
     >>> pieces = chip_on_layer(mill, [[0, 0, 0], [2, 0, 0]], [[0, 0, 1], [0, 0, 1]], 1.0, tolerance_mm=1e-5)
     >>> [round(piece.area_mm2, 3) for piece in pieces]
     [20.0]
