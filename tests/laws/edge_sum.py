@@ -20,7 +20,7 @@ from chipload.cutting.material import Material
 Floats = NDArray[np.float64]
 #: which of some points (..., 3) [mm] are in material
 Solid = Callable[[Floats], NDArray[np.bool_]]
-ANGLES = 1440
+ANGLES = 360
 
 
 @dataclass(frozen=True)

@@ -118,7 +118,7 @@ def test_a_finishing_wave(apart: float, depth: float) -> None:
     first, second = raster(depth, np.arange(2.75, 8.0, 0.5)), raster(0.0, np.arange(4.0, 7.0, 0.5))
     points = np.vstack([first, [[first[-1, 0], first[-1, 1], 5.0], [second[0, 0], second[0, 1], 5.0]], second])
     removal = run(points, BALL6)
-    field = Field(LOW, HIGH, 0.05)
+    field = Field(LOW, HIGH, 0.1)
     lost = np.array([field.cut(BALL6, a, b) for a, b in itertools.pairwise(points)])
     n = len(second) - 1
     assert work(removal)[-n:].sum() == pytest.approx(KTC * lost[-n:].sum(), rel=0.02)

@@ -137,7 +137,7 @@ def test_a_straight_slot_against_the_true_paths(cutter: Cutter, depth: float, fe
     history = run(path([[-10.0, 0.0, -depth], [10.0, 0.0, -depth]], feed), cutter, material=REAL, step_mm=0.5)
     f = feed * math.tau / (cutter.flutes * SPINDLE)
     cut = Cut(10.0, cutter.flutes, math.degrees(cutter.helix), depth, 10.0, f, ball=cutter is BALL)
-    force, torque, mean, chip = true_loads(cut, astuple(REAL)[1:7], rotations=1440, slices=2000)
+    force, torque, mean, chip = true_loads(cut, astuple(REAL)[1:7], rotations=360, slices=1000)
     assert off(at(history, 7.0), Sum(mean / 1e3, torque / 1e3, force, chip), history.resolution_error) == {}
 
 

@@ -84,7 +84,7 @@ def polygon_engagement(old: Contour, outside: bool, centre, heading) -> float:
     return float(np.degrees((np.diff(ends) * np.concatenate([has[change], has[-1:]])).sum()))
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("outside", [False, True], ids=["inside", "outside"])
 @pytest.mark.parametrize("sense", [1, -1], ids=["ccw", "cw"])
 def test_three_ways_agree(seed, outside, sense):

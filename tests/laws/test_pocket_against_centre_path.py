@@ -38,7 +38,7 @@ def cleared(contours, milling="down", **limits):
     return done.strategies["pocket"]
 
 
-@pytest.fixture(scope="module", params=[(c, m) for c in CASES for m in ("down", "up")], ids=lambda p: " ".join(p))
+@pytest.fixture(scope="module", params=[*((c, "down") for c in CASES), ("L", "up")], ids=lambda p: " ".join(p))
 def result(request):
     name, milling = request.param
     return CASES[name], cleared(CASES[name], milling)

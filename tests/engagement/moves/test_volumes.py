@@ -83,7 +83,7 @@ def test_a_plunge_removes_the_cutter(kind: str) -> None:
 def test_a_shallow_ramp_removes_a_wedge() -> None:
     """0.04 mm down over 6 mm: half of 6 x 8 x 0.04, and what the rim reaches in front of it."""
     points = line((15.0, 12.0, 0.0), (21.0, 12.0, -0.04), 0.1)
-    field = Field(LOW, HIGH, 0.04)
+    field = Field(LOW, HIGH, 0.08)
     known = field.cut(FLAT, points[0], points[-1])
     assert volumes(MoveStock(LOW, HIGH, {1: FLAT}), points).sum() == pytest.approx(known, rel=5e-3)
 
@@ -93,7 +93,7 @@ def test_a_shallow_ramp_removes_a_wedge() -> None:
 def test_random_programs_remove_what_a_fine_field_loses(kind: str, seed: int) -> None:
     cutter = CUTTERS[kind]
     points = random_program(seed, cutter)
-    stock, field = MoveStock(LOW, HIGH, {1: cutter}), Field(LOW, HIGH, 0.04)
+    stock, field = MoveStock(LOW, HIGH, {1: cutter}), Field(LOW, HIGH, 0.08)
     parts = [line(a, b, 0.1)[1:] for a, b in itertools.pairwise(points)]
     found = volumes(stock, np.vstack([points[:1], *parts]))
     known = np.array([field.cut(cutter, a, b) for a, b in itertools.pairwise(points)])
