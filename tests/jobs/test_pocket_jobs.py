@@ -11,27 +11,29 @@ import pytest
 import shapely
 
 from chipload.errors import InputError
+from chipload.jobs import load_job
+from chipload.jobs.contour.run import _resolve_operation, read_inputs
 from pocket_job import SMALL, SQUARE, checked, done, operation, swept, written
 
 #: the limits are used up by the nominal loads
 NOMINAL = "\n[checks]\nconfidence = 0.5\n"
 
 
-def test_levels(tmp_path):
-    """10 mm in levels of at most 4: three of 3.333 mm, each the same path, and three times the cutting time."""
-    (one,), _ = done(written(tmp_path, {"part": [SMALL]}, operation("radial_depth_mm = 1.2")))
-    (three,), outcome = done(written(tmp_path, {"part": [SMALL]}, operation("radial_depth_mm = 1.2\ndepth_mm = 10.0")))
-    assert three.summary["levels"] == 3
-    floors = three.program.p_work[:, 2]
-    for k, z in enumerate((-10.0 / 3.0, -20.0 / 3.0, -10.0)):
-        at = np.isclose(floors, z, atol=1e-9)
-        assert at.any()
-        assert swept(three.program, 4.0, z).area == pytest.approx(swept(one.program, 4.0, -4.0).area, rel=1e-6), k
-    assert three.summary["cutting_s"] == pytest.approx(3.0 * one.summary["cutting_s"], rel=1e-3)
-    assert three.summary["passes"] == 3 * one.summary["passes"]
-    assert three.summary["lifts"] == 3 * (one.summary["lifts"] + 1) - 1
-    assert outcome.operations[0].depth == 10.0
-    assert (np.diff(three.history["t_s"]) >= -1e-9).all()
+def test_levels_at_an_engagement_that_is_stated(tmp_path):
+    """7 mm in levels of at most 4: two of 3.5 mm, each the same path, and twice the cutting time."""
+    (one,), _ = done(written(tmp_path, {"part": [SMALL]}, operation("engagement_deg = 40.0")))
+    assert one.summary["engagement_deg"]["wanted"] == pytest.approx(40.0)
+    (two,), outcome = done(written(tmp_path, {"part": [SMALL]}, operation("engagement_deg = 40.0\ndepth_mm = 7.0")))
+    assert two.summary["levels"] == 2
+    floors = two.program.p_work[:, 2]
+    for z in (-3.5, -7.0):
+        assert np.isclose(floors, z, atol=1e-9).any()
+        assert swept(two.program, 4.0, z).area == pytest.approx(swept(one.program, 4.0, -4.0).area, rel=1e-6), z
+    assert two.summary["cutting_s"] == pytest.approx(2.0 * one.summary["cutting_s"], rel=1e-3)
+    assert two.summary["passes"] == 2 * one.summary["passes"]
+    assert two.summary["lifts"] == 2 * (one.summary["lifts"] + 1) - 1
+    assert outcome.operations[0].depth == 7.0
+    assert (np.diff(two.history["t_s"]) >= -1e-9).all()
 
 
 def test_a_part_that_stands_in_the_stock(tmp_path):
@@ -149,19 +151,15 @@ def test_the_engagement_that_the_limits_allow(tmp_path, limits, by, drawn):
     limit = float(limits.split("\n")[0].split("=")[1])
     cut = pocket.history["pass"] == "pocket"
     assert 0.6 * limit < pocket.history[by][cut].max() <= limit
-    (tighter,), _ = done(
+    job = load_job(
         written(
             tmp_path, {"part": [drawn]}, operation('engagement_deg = "limit"'),
             limits=limits.replace(str(limit), str(0.9 * limit)) + NOMINAL,
         )
-    )  # fmt: skip
-    assert tighter.summary["engagement_deg"]["wanted"] < pocket.summary["engagement_deg"]["wanted"]
-
-
-def test_an_engagement_that_is_stated(tmp_path):
-    path = written(tmp_path, {"part": [SMALL]}, operation("engagement_deg = 40.0"))
-    (pocket,), _ = done(path)
-    assert pocket.summary["engagement_deg"]["wanted"] == pytest.approx(40.0)
+    ).job  # fmt: skip
+    tighter, _ = _resolve_operation(job, read_inputs(job), job.operations[0])
+    wanted = math.degrees(math.acos(1.0 - tighter.radial_depth_mm / 4.0))
+    assert wanted < pocket.summary["engagement_deg"]["wanted"]
 
 
 @pytest.mark.parametrize(
