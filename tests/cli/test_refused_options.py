@@ -54,7 +54,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("filter slot.ngc", "--machine: missing: name the .ini of the machine, or run LinuxCNC, which sets INI_FILE"),
         (
             "run read.toml --out r --workers 2",
-            "--workers, --dask: a program job has no parts that other processes ",
+            "--workers = 2: nothing is simulated in a job without [[operation]]: leave it out",
         ),
         ("run tube.toml --out r --workers 2", "--workers, --dask: a torque job has no parts that other processes can "),
         ("run read.toml --out r --keep-s -1", "--keep-s = -1: must be at least 0 s"),

@@ -264,7 +264,7 @@ def test_the_first_progress_comes_before_a_step_is_made(job: Path, monkeypatch: 
     ("key", "text"),
     [
         ("engine='layers'", "operation.0.engine: removed: every program is simulated by the volume of its moves"),
-        ("workers=2", "operation.0.workers: removed: one process simulates a program: leave it out; chipload sweep"),
+        ("workers=2", "operation.0.workers: removed: chipload run --workers states how many threads share the "),
     ],
 )
 def test_keys_of_the_layered_engine_are_refused_with_their_remedy(job: Path, key: str, text: str) -> None:

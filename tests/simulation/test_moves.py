@@ -200,13 +200,15 @@ def all_bytes(removal: Removal, stock: LayeredStock) -> list[bytes]:
 
 def test_workers_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("chipload.simulation.chips.BLOCK", 3)
+    # blocks of 24 steps, which 4 threads share
+    monkeypatch.setattr("chipload.simulation.strips.FEWEST", 1)
     every = []
-    for workers in (1, 2):
+    for workers in (1, 2, 4):
         stock = block()
         removal = run(zigzag(), stock=stock, keep=True, watch=watch, workers=workers)
         every.append(all_bytes(removal, stock))
         assert removal.columns["chip_volume_mm3"].any()
-    assert every[0] == every[1]
+    assert every[0] == every[1] == every[2]
 
 
 def watch(cuts: Cuts) -> dict[str, Floats]:
@@ -218,6 +220,7 @@ def test_a_run_that_was_stopped_goes_on_with_the_same_bytes(
     tmp_path: Path, flutes: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("chipload.simulation.chips.BLOCK", 8 if flutes > 3.0 else 64)
+    monkeypatch.setattr("chipload.simulation.strips.FEWEST", 1)
     cutters = {1: replace(MILL, flute_length=flutes), 2: BALL}
     stock = block()
     whole = remove(zigzag(), stock, cutters, ALLOY, FINE, watch=watch)

@@ -54,6 +54,7 @@ from chipload.simulation.ramp import ramp_angle
 from chipload.simulation.remaining_stock import Inside
 from chipload.simulation.removal import Columns, Watch
 from chipload.simulation.steps import StepBlocks
+from chipload.simulation.strips import threads_of
 from chipload.simulation.surface import Difference, collisions, difference, in_stock
 from chipload.stock.layers import LayeredStock
 
@@ -89,6 +90,7 @@ def simulate_program(
     compliance: WorkpieceCompliance | None = None,
     checkpoint: Checkpoint | None = None,
     watch: Watch | None = None,
+    workers: int | None = None,
     progress: Progress = silent,
 ) -> SimulationResult:
     """Simulate a program in its stock and check it.
@@ -100,6 +102,7 @@ def simulate_program(
     compliance : of the workpiece; None: not known yet
     checkpoint : folder with finished work, from which a stopped run continues; None: all stays in memory
     watch : called with what each cutter cuts, besides the watches of the checks; without a checkpoint; None: none
+    workers : threads; None: as :func:`chipload.simulation.strips.threads_of`
 
     Raises
     ------
@@ -145,14 +148,14 @@ def simulate_program(
     if checkpoint is None:
         removal = remove(
             program, stock, cutters, material, fine, watch=watch_all, times=times,
-            loads=inputs.loads, outlines=inputs.outlines, progress=removing,
+            loads=inputs.loads, outlines=inputs.outlines, workers=threads_of(workers), progress=removing,
         )  # fmt: skip
     else:
         formed = None if made is None else (made.points, made.faces, made.distance, made.step)
         removal = remove_in_chunks(
             program, stock, cutters, material, fine, checkpoint, watch=watch_all,
             keeps={"engagement": recorder} | ({} if stability_watch is None else {"watch": stability_watch}),
-            times=times, progress=removing,
+            times=times, workers=threads_of(workers), progress=removing,
             also=(
                 versions(), sources(), repr((stiffness, elasticity.workpiece)), repr(inputs.checks), formed,
                 None if stability_watch is None else stability_watch.dynamics,

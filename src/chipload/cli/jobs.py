@@ -43,7 +43,14 @@ def run(
             help="use larger steps and thicker layers for a first result; the verdict is never better than unproven",
         ),
     ] = False,
-    workers: Annotated[int, typer.Option("--workers", help="number of processes that share an impeller job")] = 1,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers",
+            help="number of processes that share an impeller job (without: 1), or of threads that share the simulation "
+            "of a program (without: one for each core, at most 4)",
+        ),
+    ] = None,
     dask: Annotated[
         str | None,
         typer.Option("--dask", metavar="ADDRESS", help="address of a Dask scheduler, instead of --workers"),
@@ -67,7 +74,7 @@ def run(
         from chipload.simulation.checkpoint import Checkpoint
         from chipload.workers import Workers
 
-        where = Workers(workers, dask)
+        where = None if workers is None and dask is None else Workers(1 if workers is None else workers, dask)
         check_target(out)
         if not 0.0 <= keep_s < math.inf:
             raise InputError(f"--keep-s = {keep_s:g}: must be at least 0 s")

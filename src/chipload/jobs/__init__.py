@@ -47,6 +47,7 @@ class Capability:
     resumes : whether a stopped run continues from its checkpoint
     inner : the table of an operation that only its job files have; empty: ``key`` alone identifies them
     spreads : whether parts of a run can be computed by other processes
+    threads : whether threads of this process share its simulation
     """
 
     name: str
@@ -55,6 +56,7 @@ class Capability:
     resumes: bool = False
     inner: str = ""
     spreads: bool = False
+    threads: bool = False
 
     def module(self, part: str) -> ModuleType:
         """A file of its folder, imported when it is needed."""
@@ -69,8 +71,8 @@ class Capability:
 #: every capability; a job file belongs to the first whose table it has
 CAPABILITIES = (
     Capability("torque", "torque_control", "TorqueJobTable"),
-    Capability("feeds", "program", "FeedsJobTable", resumes=True, inner="feeds"),
-    Capability("program", "program", "ProgramJobTable", resumes=True),
+    Capability("feeds", "program", "FeedsJobTable", resumes=True, inner="feeds", threads=True),
+    Capability("program", "program", "ProgramJobTable", resumes=True, threads=True),
     Capability("impeller", "impeller", "ImpellerJobTable", resumes=True, spreads=True),
     Capability("thinwall", "wall", "ThinWallJobTable", resumes=True),
     Capability("fit", "measurement", "FitJobTable"),
@@ -241,7 +243,8 @@ def run_job(
     ----------
     checkpoint : keeps finished work, so that a stopped run continues; used by the capabilities that can resume
     accept : run a job with guesses of a draft, which is refused else; nothing holds or exceeds by them
-    workers : processes or a cluster that compute parts of the run; None: this process alone. What is found is the same
+    workers : processes or a cluster that compute parts of the run, of a simulation of a program threads of this
+        process; None: this process alone, a simulation on its cores. What is found is the same
 
     Raises
     ------
@@ -255,7 +258,9 @@ def run_job(
     if loaded.guesses and not accept:
         raise InputErrors(*loaded.guesses, unconfirmed_text(loaded))
     more: dict[str, Any] = {"checkpoint": checkpoint} if capability.resumes else {}
-    if workers is not None and not workers.alone:
+    if workers is not None and workers.dask is None and capability.threads:
+        more["workers"] = workers.processes
+    elif workers is not None and not workers.alone:
         if not capability.spreads:
             raise InputError(
                 f"--workers, --dask: {_article(capability.name)} job has no parts that other processes can compute: "

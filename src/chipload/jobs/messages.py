@@ -20,7 +20,7 @@ RENAMED = {"shell": "torque_control.shell", "control": "torque_control"}
 #: keys of an operation that are no more
 REMOVED = {
     "engine": "removed: every program is simulated by the volume of its moves: leave it out",
-    "workers": "removed: one process simulates a program: leave it out; chipload sweep --workers runs many jobs",
+    "workers": "removed: chipload run --workers states how many threads share the simulation: leave it out",
 }
 
 

@@ -23,7 +23,6 @@ from chipload.cutter.cutter import Cutter
 from chipload.cutter.slices import Slices, slices
 from chipload.cutting.band import deviations, mean_basis
 from chipload.cutting.material import Material
-from chipload.engagement.moves.stock import Engaged
 from chipload.engagement.tooth_surfaces import chips_of_teeth
 from chipload.errors import Finding, InputError
 from chipload.number_text import number_text
@@ -52,10 +51,9 @@ from chipload.simulation.loads import (
 from chipload.simulation.moves import (
     Engine,
     MaterialAboveFlutes,
+    Moved,
     MoveRun,
-    remove_by_moves,
     run_by_moves,
-    with_contact,
 )
 from chipload.simulation.removal import (
     Columns,
@@ -66,6 +64,7 @@ from chipload.simulation.removal import (
     Watch,
 )
 from chipload.simulation.steps import BLOCK, StepBlocks, Steps, moving_rows, number_of_steps, steps_in_blocks
+from chipload.simulation.strips import number_of_strips, remove_in_strips
 from chipload.stock.layers import LayeredStock
 from chipload.units import mm_min_from_mm_s
 
@@ -150,7 +149,7 @@ def remove(
         begun = sums = RunningSums(stock.volume(), shank=setting.asks_shank)
         kept, columns = dict[int, list[Cuts]](), list[Columns]()
         try:
-            for sums, some, cuts in _blocks_removed(program, stock, begun, setting, times):
+            for sums, some, cuts in _blocks_removed(program, stock, begun, setting, times, count):
                 progress(sums.steps / count, "removing")
                 columns.append(some)
                 for engaged in cuts if keep else ():
@@ -170,13 +169,14 @@ def remove(
 
 
 def _blocks_removed(
-    program: Program, stock: LayeredStock, sums: RunningSums, setting: RunSettings, times: Floats | None
+    program: Program, stock: LayeredStock, sums: RunningSums, setting: RunSettings, times: Floats | None, count: int
 ) -> Iterator[tuple[RunningSums, Columns, list[Cuts]]]:
-    """Yield the result of :func:`remove_block` for one block of steps after another."""
+    """Yield the result of :func:`remove_block` for one block of the ``count`` steps after another."""
     fine, size = setting.resolution, block_of(setting)
     blocks = steps_in_blocks(program, fine.step_mm, fine.tolerance, size=size, times=times)
-    for steps, contact in with_contact(blocks, setting.moves, setting.workers):
-        sums, some, cuts = remove_block(steps, stock, sums, setting, contact)
+    runs = runs_of_threads(program, stock, setting, count)
+    for steps, moved in remove_in_strips(blocks, setting, runs, sums.steps):
+        sums, some, cuts = remove_block(steps, stock, sums, setting, moved)
         yield sums, some, cuts
 
 
@@ -189,14 +189,24 @@ def with_engine(
     engine: Engine, setting: RunSettings, program: Program, stock: LayeredStock, *, shank: bool = False
 ) -> RunSettings:
     """Return the settings with the engine; ``shank``: material stands above the flutes, and the shank is looked for."""
-    if engine == "layers":
-        return setting
+    return setting if engine == "layers" else replace(setting, moves=_run_of(setting, program, stock, shank=shank))
+
+
+def runs_of_threads(program: Program, stock: LayeredStock, setting: RunSettings, count: int) -> list[MoveRun]:
+    """Return the run of each thread that shares ``count`` steps, that of the settings first; none by layers."""
+    if setting.moves is None:
+        return []
+    further = number_of_strips(setting.workers, count, block_of(setting)) - 1
+    return [setting.moves, *(_run_of(setting, program, stock, shank=setting.asks_shank) for _ in range(further))]
+
+
+def _run_of(setting: RunSettings, program: Program, stock: LayeredStock, *, shank: bool) -> MoveRun:
+    """A run of the program by moves, before its first step."""
     fine = setting.resolution
-    run = run_by_moves(
+    return run_by_moves(
         program, stock, setting.cutters, fine.step_mm, fine.tolerance, fine.corner_slices, fine.flank_mm,
         setting.loads, shank=shank,
     )  # fmt: skip
-    return replace(setting, moves=run)
 
 
 def with_accuracy(removal: Removal, program: Program, before: LayeredStock | None, setting: RunSettings) -> Removal:
@@ -303,14 +313,14 @@ def remove_block(
     stock: LayeredStock,
     sums: RunningSums,
     setting: RunSettings,
-    contact: Engaged | None = None,
+    moved: Moved | None = None,
 ) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
     """Remove the cuts of some steps from the stock; return the sums after them, their columns and tooth engagement.
 
-    ``contact`` is their engagement by moves, if that is known.
+    ``moved`` is their removal by moves; None: they are removed from the layers of the stock.
     """
-    if setting.moves is not None:
-        return _moved_block(steps, setting.moves, sums, setting, contact)
+    if moved is not None:
+        return _moved_block(steps, moved, sums, setting)
     removed, engagement = removed_by_layers(steps, stock, setting)
     loads, basis, cut = np.zeros((len(steps), len(LOADS))), sums.basis, list[Cuts]()
     watched: dict[str, Floats] = {}
@@ -336,12 +346,9 @@ def remove_block(
 
 
 def _moved_block(
-    steps: Steps, run: MoveRun, sums: RunningSums, setting: RunSettings, contact: Engaged | None
+    steps: Steps, found: Moved, sums: RunningSums, setting: RunSettings
 ) -> tuple[RunningSums, dict[str, NDArray[Any]], list[Cuts]]:
     """:func:`remove_block` by moves."""
-    found = remove_by_moves(
-        steps, run, sums.steps, setting.cutters, setting.material, setting.resolution.rotation, contact, setting.loads
-    )
     watched: dict[str, Floats] = dict(found.bands)
     if setting.watch is not None:
         for cut in found.cuts:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
@@ -29,14 +30,16 @@ from chipload.simulation.chips import (
     count_steps,
     removal_of,
     remove_block,
+    runs_of_threads,
     setting_of,
     stack_blocks,
     with_accuracy,
     with_engine,
 )
-from chipload.simulation.moves import MaterialAboveFlutes, with_contact
+from chipload.simulation.moves import MaterialAboveFlutes
 from chipload.simulation.removal import Columns, Removal, Resolution, RunningSums, RunSettings, Watch
 from chipload.simulation.steps import BLOCK, steps_in_blocks
+from chipload.simulation.strips import remove_in_strips
 from chipload.stock.layers import LayeredStock
 from chipload.stock.shapes import read_shapes, shape_bytes
 
@@ -119,8 +122,6 @@ def remove_in_chunks(
     setting = with_engine("moves", setting, program, stock, shank=sums.shank)
     progress(sums.steps / count, "removing")
     if kept is not None:
-        if setting.moves is not None:
-            setting.moves.skip(program, resolution.step_mm, sums.steps)
         unfinished.notice(f"continues after step {sums.steps} of {count}, kept in {unfinished.folder}")
     try:
         sums, columns = _remove_steps(program, stock, sums, setting, unfinished, count, times, keeps, progress)
@@ -162,9 +163,13 @@ def _remove_steps(
     blocks = steps_in_blocks(
         program, resolution.step_mm, resolution.tolerance, size=block_of(setting), first=done, times=times
     )
-    for steps, contact in with_contact(blocks, setting.moves, setting.workers):
+    runs = runs_of_threads(program, stock, setting, count)
+    if done:
+        with ThreadPoolExecutor(max(len(runs), 1)) as pool:
+            list(pool.map(lambda run: run.skip(program, resolution.step_mm, done), runs))
+    for steps, moved in remove_in_strips(blocks, setting, runs, done):
         progress(sums.steps / count, "removing")
-        sums, some, _ = remove_block(steps, stock, sums, setting, contact)
+        sums, some, _ = remove_block(steps, stock, sums, setting, moved)
         columns.append(some)
         waiting += len(steps)
         now = time.monotonic()

@@ -28,6 +28,7 @@ from chipload.simulation.accuracy import AXIAL, axial_force
 from chipload.simulation.checkpoint import Checkpoint
 from chipload.simulation.chips import remove
 from chipload.simulation.steps import steps_of
+from chipload.simulation.strips import threads_of
 from chipload.stock.layers import LayeredStock
 
 #: resolution error that new feeds leave room for, over that at the programmed feeds: at the new ones other steps have
@@ -35,12 +36,15 @@ from chipload.stock.layers import LayeredStock
 SPARE = 2.0
 
 
-def run(job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> FeedsProgram:
+def run(
+    job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: int | None = None
+) -> FeedsProgram:
     """Simulate the program of a job, give it new feeds, and simulate its new text from fresh stock.
 
     Parameters
     ----------
     checkpoint : the folder that keeps what is finished of the last simulation; None: all is kept in memory
+    workers : threads that share a simulation; None: as :func:`chipload.simulation.strips.threads_of`
 
     Raises
     ------
@@ -56,10 +60,12 @@ def run(job: FeedsJob, progress: Progress = silent, checkpoint: Checkpoint | Non
     compliance = compliance_of_workpiece(inputs, reading, stock, part_of(progress, share, 0.55))
     share = 0.55 if compliance is not None else share
     begin = 0.5 * (1.0 + share)
-    feeds, reading = _new_feeds(job, inputs, own, reading, stock, compliance, part_of(progress, share, begin))
+    feeds, reading = _new_feeds(
+        job, inputs, own, reading, stock, compliance, part_of(progress, share, begin), threads_of(workers)
+    )  # fmt: skip
     stock = inputs.stock.layered(reading.program, inputs.cutters)
     done = simulate_program(
-        inputs, reading, stock, compliance=compliance, checkpoint=checkpoint,
+        inputs, reading, stock, compliance=compliance, checkpoint=checkpoint, workers=workers,
         progress=part_of(progress, begin, 1.0),
     )  # fmt: skip
     done = replace(done, settings=simulation.operation_of(job))
@@ -83,6 +89,7 @@ def _new_feeds(
     stock: LayeredStock,
     compliance: WorkpieceCompliance | None,
     progress: Progress,
+    threads: int,
 ) -> tuple[FeedResult, ProgramReading]:
     """The text with new feeds, from what the program cuts of a stock, which changes; and what it does then. ``own``:
     the text as it is, and its dialect.
@@ -99,7 +106,7 @@ def _new_feeds(
     program, times = time_rows(reading, cutters, machine, op.interpolation)
     # as it is: what its loads are, and how well they are known
     before = remove(
-        program, stock, cutters, material, fine, times=times, watch=bends,
+        program, stock, cutters, material, fine, times=times, watch=bends, workers=threads,
         progress=part_of(progress, 0.0, 0.5),
     )  # fmt: skip
     before = with_columns(before, (*watched_columns(gives), *PROGRAM_COLUMNS))
@@ -119,7 +126,7 @@ def _new_feeds(
     fresh = inputs.stock.layered(reading.program, cutters)
     allowed = remove(
         program, fresh, cutters, material, fine,
-        times=times, accuracy=False,
+        times=times, accuracy=False, workers=threads,
         watch=allowed_feed_watch(steps, request, cutters, material, machine, before.columns),
         progress=part_of(progress, 0.5, 1.0),
     )  # fmt: skip

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from chipload.checking.outcome import ProgramResult
 from chipload.checking.run import compliance_of_workpiece, simulate_program
+from chipload.errors import InputError
 from chipload.jobs.program.job import SetupsJob
 from chipload.jobs.program.outcome import SpeedsProgram
 from chipload.jobs.program.setups import jobs_of_setups, reading_of_setup, run_setups
@@ -22,20 +23,25 @@ from chipload.progress import Progress, part_of, silent
 from chipload.simulation.checkpoint import Checkpoint
 
 
-def run(job: SetupsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> ProgramResult:
+def run(
+    job: SetupsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: int | None = None
+) -> ProgramResult:
     """Read the program of a job for its machine; simulate it if the job states an operation, and change its speeds.
 
     Parameters
     ----------
     checkpoint : folder with finished work, from which a stopped run continues; None: all stays in memory
+    workers : threads that share a simulation; None: as :func:`chipload.simulation.strips.threads_of`
 
     Raises
     ------
     InputError
         A file cannot be read, the controller would refuse the program, or the stock and the cutters cannot be used.
     """
+    if workers is not None and not job.simulates:
+        raise InputError(f"--workers = {workers}: nothing is simulated in a job without [[operation]]: leave it out")
     if job.table.setup:
-        return run_setups(job, progress, checkpoint)
+        return run_setups(job, progress, checkpoint, workers)
     machine, begin = machine_of(job), 0.1 if job.simulates else 1.0
     reading = read_for(job, machine, part_of(progress, 0.0, begin))
     if not job.simulates:
@@ -48,10 +54,12 @@ def run(job: SetupsJob, progress: Progress = silent, checkpoint: Checkpoint | No
     begin = 0.6 if compliance is not None else begin
     if own is not None:
         end = 0.5 * (1.0 + begin)
-        speeds, reading = new_speeds(job, inputs, own, reading, stock, compliance, part_of(progress, begin, end))
+        speeds, reading = new_speeds(
+            job, inputs, own, reading, stock, compliance, part_of(progress, begin, end), workers
+        )  # fmt: skip
         stock, begin = inputs.stock.layered(reading.program, inputs.cutters), end
     done = simulate_program(
-        inputs, reading, stock, compliance=compliance, checkpoint=checkpoint,
+        inputs, reading, stock, compliance=compliance, checkpoint=checkpoint, workers=workers,
         progress=part_of(progress, begin, 1.0),
     )  # fmt: skip
     program = program_of(job, machine, reading, replace(done, settings=operation_of(job)))

@@ -27,12 +27,15 @@ from chipload.stock.layers import LayeredStock
 from chipload.stock.turned import stock_bounds, turn_matrix, turned_stock
 
 
-def run_setups(job: SetupsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None) -> SetupsProgram:
+def run_setups(
+    job: SetupsJob, progress: Progress = silent, checkpoint: Checkpoint | None = None, workers: int | None = None
+) -> SetupsProgram:
     """Read and simulate each setup of a job in what the one before leaves of the stock.
 
     Parameters
     ----------
     checkpoint : of the last setup; those before it start again
+    workers : threads that share a simulation; None: as :func:`chipload.simulation.strips.threads_of`
 
     Raises
     ------
@@ -54,7 +57,7 @@ def run_setups(job: SetupsJob, progress: Progress = silent, checkpoint: Checkpoi
         stock = inputs.stock.layered(reading.program, inputs.cutters)
         simulated = simulate_program(
             inputs, reading, stock, checkpoint=checkpoint if k == count - 1 else None,
-            progress=part_of(share, 0.1, 1.0),
+            workers=workers, progress=part_of(share, 0.1, 1.0),
         )  # fmt: skip
         left = simulated.stock
         done.append(program_of(one, machine, reading, replace(simulated, settings=operation_of(job))))

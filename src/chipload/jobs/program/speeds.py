@@ -32,6 +32,7 @@ from chipload.program.read import ProgramReading, line_times
 from chipload.progress import Progress
 from chipload.simulation.chips import remove
 from chipload.simulation.loads import Cuts, Floats
+from chipload.simulation.strips import threads_of
 from chipload.stock.layers import LayeredStock
 from chipload.units import rpm_from_rad_s
 
@@ -62,12 +63,14 @@ def new_speeds(
     stock: LayeredStock,
     workpiece: WorkpieceCompliance | None,
     progress: Progress,
+    workers: int | None = None,
 ) -> tuple[SpeedResult, ProgramReading]:
     """Simulate the program in a stock, which changes, and return its text with new speeds and the new program.
 
     Parameters
     ----------
     own : the text of the program, and its dialect
+    workers : threads that share a simulation; None: as :func:`chipload.simulation.strips.threads_of`
 
     Raises
     ------
@@ -86,7 +89,7 @@ def new_speeds(
 
     before = remove(
         program, stock, cutters, material, resolution_of(op, cutters, reading.program),
-        times=times, watch=watch, accuracy=False, progress=progress,
+        times=times, watch=watch, accuracy=False, workers=threads_of(workers), progress=progress,
     )  # fmt: skip
     before = with_columns(before, (*watched_columns(gives), *PROGRAM_COLUMNS, *stability.columns))
     found = stability_of(inputs, stability)
