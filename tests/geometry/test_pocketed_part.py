@@ -7,7 +7,8 @@ import pytest
 import shapely
 import trimesh
 
-from chipload.geometry.pocketed_part import find_pockets, level_faces
+from chipload.geometry.part_walls import find_walls
+from chipload.geometry.pocketed_part import find_pockets, level_faces, slabs_of
 
 
 def prism(shape, low, high):
@@ -44,6 +45,7 @@ def test_floors_depths_corners_and_openness(part):
     assert second.corner_mm == pytest.approx(3.0, rel=0.02)
     assert sharp.corner_mm == 0.0
     assert [p.open for p in (first, second, sharp, step)] == [False, False, False, True]
+    assert [p.floor_thickness_mm for p in (first, second, sharp, step)] == pytest.approx([2.0, 2.0, 10.0, 20.0])
 
 
 def test_level_faces(part):
@@ -52,3 +54,17 @@ def test_level_faces(part):
 
 def test_a_block_has_none():
     assert find_pockets(trimesh.creation.box(bounds=[(0, 0, 0), (9, 9, 9)])) == ()
+
+
+def test_walls_with_their_height_over_the_higher_floor(part):
+    """By hand: every wall is 2 mm thick; those beside the step and the sharp pocket stand on the higher floor."""
+    found = find_walls(slabs_of(part), 5.0)
+    assert [w.thickness_mm for w in found] == pytest.approx([2.0] * len(found))
+    kinds = sorted((round(w.height_mm, 6), w.outer, round(w.length_mm)) for w in found)
+    outside = [(28.0, True, 44), *[(28.0, True, 26)] * 2, *[(28.0, True, 22)] * 2, *[(20.0, True, 23)] * 2]
+    between = [(28.0, False, 44), (20.0, False, 50), (10.0, False, 56)]
+    assert kinds == sorted([*outside, *between])
+    rib = next(w for w in found if not w.outer and w.height_mm > 25.0)
+    assert sorted([*rib.start, *rib.end]) == pytest.approx([8.0, 41.0, 41.0, 52.0], abs=0.1)
+    assert len(find_walls(slabs_of(part), 5.1)) == len(found) - 1
+    assert slabs_of(trimesh.creation.box(bounds=[(0, 0, 0), (9, 9, 9)])) is None

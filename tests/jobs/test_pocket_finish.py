@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 import shapely
 
+from chipload.cutter.cutter import Cutter
+from chipload.cutting.material import material_named
 from chipload.errors import InputError
+from chipload.geometry.contour import Contour
+from chipload.machine.machine import machine_named
+from chipload.planning.pocket.plan import plan_pocket
+from chipload.planning.pocket.request import Clearing, FloorFinish, WallFinish
 from pocket_job import SMALL, checked, done, operation, swept, written
 
 FINISH = """radial_depth_mm = 1.2
@@ -124,3 +130,26 @@ def test_refused(tmp_path, more, text):
     with pytest.raises(InputError) as err:
         checked(written(tmp_path, {"part": [SMALL]}, operation(f"radial_depth_mm = 1.2\n{more}")))
     assert text in str(err.value)
+
+
+def test_walls_by_level():
+    """By level: clear, walls, clear, floor, walls, as deep as the walls may be at once; the clock runs on."""
+    square = [Contour.polyline([(0, 0), (12, 0), (12, 10), (0, 10)], closed=True)]
+    setting = Clearing(
+        "down", 1.2, 4.0, 16.0, 830.0, 0.0, 5.0, 0.4, allowance=0.3, depth=6.0, floor_allowance=0.5,
+        floor_finish=FloorFinish(10.0, 900.0), wall_finish=WallFinish(8.0, 900.0, 2.0, by_level=True),
+    )  # fmt: skip
+    cutter = Cutter(diameter=4.0, flutes=3, helix=0.5, flute_length=12.0, overhang=20.0, modulus=580e3)
+    planned = plan_pocket(square, setting, cutter, material_named("al7075-t6"), machine_named("vmc"), {})
+    pocket = planned.strategies["pocket"]
+    p = pocket.program
+    named = np.array(p.labels, dtype=object)[p.label]
+    at = [(str(name), round(float(z), 6)) for name, z in zip(named, p.p_work[:, 2], strict=True)]
+    at = [one for one in at if one[0] in ("pocket", "floor", "wall")]
+    assert list(dict.fromkeys(at)) == [
+        ("pocket", -2.75), ("wall", -1.375), ("wall", -2.75), ("pocket", -5.5), ("floor", -6.0),
+        ("wall", -4.375), ("wall", -6.0),
+    ]  # fmt: skip
+    assert all(one == at[k] or one not in at[: k + 1] for k, one in enumerate(at[1:]))
+    assert pocket.summary["finish"]["wall"]["levels"] == 4
+    assert (np.diff(pocket.history["t_s"]) >= 0.0).all()

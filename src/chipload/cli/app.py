@@ -18,7 +18,9 @@ app = typer.Typer(
     "exceeded or unproven; 4 the result cannot be written, finished work is kept; 130 stopped.",
 )
 
-JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="the job file (TOML)")]
+JobFile = Annotated[
+    Path, typer.Argument(metavar="JOB", help="the job file (TOML), or with run a folder of numbered jobs")
+]
 Sets = Annotated[
     list[str] | None,
     typer.Option(

@@ -10,6 +10,7 @@ import typer
 from chipload.cli.app import Debug, MachineName, Sets, Tools, app
 from chipload.cli.inputs import show_verdict
 from chipload.errors import InputError
+from chipload.jobs.drafts.folder import RESULTS
 from chipload.terminal import bar, run_guarded, show
 
 File = Annotated[
@@ -49,8 +50,9 @@ def init(
 ) -> None:
     """Write a job for a file. Values that the file does not state are guesses for you to confirm.
 
-    The command does not overwrite an existing job. `chipload init --material DIR` writes a commented material template;
-    --machine, --catalogue, --controller and --fixture do the same for other files.
+    A model with thin walls gives a folder of jobs, which `chipload run DIR` runs in their order. The command does not
+    overwrite an existing job. `chipload init --material DIR` writes a commented material template; --machine,
+    --catalogue, --controller and --fixture do the same for other files.
     """
 
     def work() -> int:
@@ -63,19 +65,30 @@ def init(
             return _templates(kinds, file)
         if folder is None:
             raise InputError(f"{file}: the folder is missing: use chipload init FILE DIR")
-        from chipload.jobs.drafts.draft import write_draft
-        from chipload.jobs.drafts.make import draft_of
+        from chipload.jobs.drafts.draft import write_drafts
+        from chipload.jobs.drafts.make import drafts_of
+        from chipload.jobs.drafts.questions import questions_of
 
         if (folder / "job.toml").exists():
             raise InputError(f"{folder / 'job.toml'}: already exists: name another folder")
-        draft = draft_of(file, folder, machine=for_machine, tools=tools, job=job)
-        written = write_draft(draft, folder)
-        show(draft.title)
-        for note in draft.notes:
-            show(f"found: {note}")
-        for question in draft.questions:
+        drafts = drafts_of(file, folder, machine=for_machine, tools=tools, job=job)
+        written = write_drafts(drafts, folder)
+        first, *_ = drafts.values()
+        show(first.title)
+        for draft in drafts.values():
+            for note in draft.notes:
+                show(f"found: {note}")
+        for question in questions_of(drafts.values()):
             show(f"question: {question}")
-        show(f"written: {written}: {len(draft.guesses)} guesses to confirm; then chipload run {written} --out result")
+        guesses = sum(len(draft.guesses) for draft in drafts.values())
+        if len(drafts) == 1:
+            show(f"written: {written[0]}: {guesses} guesses to confirm; then chipload run {written[0]} --out result")
+            return 0
+        for path, draft in zip(written, drafts.values(), strict=True):
+            show(f"written: {path}: {draft.title}")
+        pictures = [str(folder / name) for draft in drafts.values() for name in draft.files]
+        show(f"picture: {', '.join(pictures)}")
+        show(f"{guesses} guesses to confirm; then chipload run {folder} --out {folder / RESULTS}")
         return 0
 
     run_guarded(work, debug)

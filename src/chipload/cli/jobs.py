@@ -59,10 +59,28 @@ def run(
 ) -> None:
     """Run a job: plan or read its programs, simulate and check them, and write the result folder.
 
-    The same command continues a simulation or an impeller job that was stopped.
+    The same command continues a simulation or an impeller job that was stopped. Of a folder all jobs with a number run
+    in their order, as `chipload init` writes them for a part with thin walls.
     """
 
     def work() -> int:
+        if job.is_dir():
+            return _run_folder()
+        return _run_one(job, out)
+
+    def _run_folder() -> int:
+        from chipload.jobs.drafts.folder import jobs_in, results_of
+
+        if sets:
+            raise InputError(f"--set: {job} is a folder of jobs: change their files, or run one of them")
+        target, code = results_of(job, out), 0
+        target.mkdir(parents=True, exist_ok=True)
+        for path in jobs_in(job):
+            show(f"{path.name}:")
+            code = max(code, _run_one(path, target / path.stem))
+        return code
+
+    def _run_one(job: Path, out: Path) -> int:
         from chipload.jobs import load_job, resume_note, run_job
 
         loaded = load_job(job, sets or ())

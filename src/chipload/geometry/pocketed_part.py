@@ -7,7 +7,7 @@ corner radius is that of the largest circle that reaches all of the free area ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
@@ -30,13 +30,35 @@ OPEN = 0.01
 
 @dataclass(frozen=True)
 class Pocket:
-    """A pocket: height of its floor, depth, area of its floor, radius of its corners, whether a side is open."""
+    """A pocket: height of its floor, depth, area of its floor, radius of its corners, whether a side is open, thickness
+    of its floor (0: it goes through), and outline of its floor.
+    """
 
     floor_mm: float
     depth_mm: float
     area_mm2: float
     corner_mm: float
     open: bool
+    floor_thickness_mm: float = 0.0
+    outline: shapely.Polygon = field(default_factory=shapely.Polygon, compare=False, repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Slabs:
+    """A part between its level faces.
+
+    Attributes
+    ----------
+    levels : (n + 1,) float [mm], heights of its level faces, rising
+    material : section of the part in each slab
+    free : what is free above each slab, and in it, within the silhouette
+    whole : silhouette
+    """
+
+    levels: Floats
+    material: tuple[shapely.Geometry, ...]
+    free: tuple[shapely.Geometry, ...]
+    whole: shapely.Geometry
 
 
 def level_faces(mesh: trimesh.Trimesh) -> Floats:
@@ -51,6 +73,21 @@ def distinct_levels(values: Floats) -> Floats:
     return v[np.concatenate([[True], np.diff(v) > ONE])] if len(v) else v
 
 
+def slabs_of(mesh: trimesh.Trimesh) -> Slabs | None:
+    """A part between its level faces; None: it has fewer than three heights of them."""
+    levels = level_faces(mesh)
+    if len(levels) < 3:
+        return None
+    material = [shapely.union_all([s]) for s in sections(mesh, 0.5 * (levels[1:] + levels[:-1]))]
+    whole = shapely.union_all(material)
+    free: list[shapely.Geometry] = []
+    above: shapely.Geometry = shapely.Polygon()
+    for slab in reversed(material):
+        above = above.union(slab)
+        free.append(whole.difference(above))
+    return Slabs(levels, tuple(material), tuple(reversed(free)), whole)
+
+
 def find_pockets(mesh: trimesh.Trimesh) -> tuple[Pocket, ...]:
     """Pockets of a part, the deepest first, then the largest.
 
@@ -60,26 +97,23 @@ def find_pockets(mesh: trimesh.Trimesh) -> tuple[Pocket, ...]:
     >>> find_pockets(block)
     ()
     """
-    levels = level_faces(mesh)
-    if len(levels) < 3:
+    slabs = slabs_of(mesh)
+    if slabs is None:
         return ()
-    middles = 0.5 * (levels[1:] + levels[:-1])
-    slabs = [shapely.union_all([s]) for s in sections(mesh, middles)]
-    whole = shapely.union_all(slabs)
-    free: list[shapely.Geometry] = []
-    above: shapely.Geometry = shapely.Polygon()
-    for slab in reversed(slabs):
-        above = above.union(slab)
-        free.append(whole.difference(above))
-    free.reverse()
+    levels, free, whole = slabs.levels, slabs.free, slabs.whole
     top, out = float(mesh.bounds[1, 2]), list[Pocket]()
-    for k in range(1, len(slabs)):
+    for k in range(1, len(free)):
         for floor in _areas(free[k].difference(free[k - 1]), LEAST_FLOOR * whole.area):
             point = floor.representative_point()
             around = next((a for a in _areas(free[k], 0.0) if a.intersects(point)), floor)
             open_side = around.distance(whole.boundary) < OPEN
             z = float(levels[k])
-            out.append(Pocket(z, top - z, float(floor.area), _corner_radius(around, whole), bool(open_side)))
+            under = z - next(
+                (float(levels[j + 1]) for j in range(k - 1, -1, -1) if not slabs.material[j].covers(point)),
+                float(levels[0]),
+            )
+            corner = _corner_radius(around, whole)
+            out.append(Pocket(z, top - z, float(floor.area), corner, bool(open_side), under, floor))
     return tuple(sorted(out, key=lambda p: (p.floor_mm, -p.area_mm2)))
 
 

@@ -366,7 +366,7 @@ def _wall_finish(op: OperationTable) -> WallFinish | None:
     if own is None:
         return None
     feed, speed = mm_s_from_mm_min(own.feed_mm_min), rad_s_from_rpm(own.speed_rpm)
-    return WallFinish(feed, speed, own.axial_depth_mm, own.allowance_mm)
+    return WallFinish(feed, speed, own.axial_depth_mm, own.allowance_mm, own.by_level)
 
 
 def _planner_request(

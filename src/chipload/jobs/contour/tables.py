@@ -92,9 +92,16 @@ class WallFinishTable(Table):
     feed_mm_min: Positive = Field(le=1e5, description="feed of the cutter's centre")
     speed_rpm: Positive = Field(le=1e6, description="spindle speed")
     axial_depth_mm: Positive | None = Field(
-        None, description="greatest depth of a level; default: the whole depth of the pocket at once"
+        None,
+        description="greatest depth of a level; default: the whole depth of the pocket, with by_level of a level, at "
+        "once",
     )
     allowance_mm: NotNegative = Field(0.0, description="allowance that the wall finish leaves on the walls")
+    by_level: bool = Field(
+        False,
+        description="whether the walls beside a level are finished, in all pockets, before the next level is cleared: "
+        "thin walls stand on uncut stock",
+    )
 
 
 class TabsTable(Table):

@@ -180,11 +180,17 @@ def write_draft(draft: Draft, folder: Path) -> Path:
     OutputError
         It cannot be written.
     """
-    job = folder / "job.toml"
-    for name in ("job.toml", *draft.files):
+    return write_drafts({"job": draft}, folder)[0]
+
+
+def write_drafts(drafts: Mapping[str, Draft], folder: Path) -> list[Path]:
+    """Write jobs by their names, and their files, whole or not at all; return the job files. Errors as of a draft."""
+    jobs = {f"{name}.toml": draft.text().encode() for name, draft in drafts.items()}
+    contents = {**{name: data for draft in drafts.values() for name, data in draft.files.items()}, **jobs}
+    paths = [folder / name for name in jobs]
+    for name in contents:
         if (folder / name).exists():
             raise InputError(f"{folder / name}: already exists and is not overwritten: name another folder")
-    contents = {**draft.files, "job.toml": draft.text().encode()}
     try:
         if folder.exists():
             if not folder.is_dir():
@@ -198,7 +204,7 @@ def write_draft(draft: Draft, folder: Path) -> Path:
                 for path in done:
                     path.unlink(missing_ok=True)
                 raise
-            return job
+            return paths
         folder.parent.mkdir(parents=True, exist_ok=True)
         with fresh_folder(folder.parent) as fresh:
             for name, data in contents.items():
@@ -207,4 +213,4 @@ def write_draft(draft: Draft, folder: Path) -> Path:
             fresh.rename(folder)
     except OSError as err:
         raise cannot_write(folder, err) from None
-    return job
+    return paths

@@ -67,15 +67,15 @@ def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft
     InputError
         The drawing cannot be read, or no cutter fits it.
     """
-    on = _machine(machine)
+    on = machine_of(machine)
     drawing, contours, entries = _read_contours(file, on)
     part = DraftTable("part", (Entry("file", relative(file, folder)), *entries, *_origin(contours, on)))
     top = Entry("top_mm", 0.0, "a drawing has no height: its plane is the top", True)
     tables = (part, DraftTable("stock", (top,)))
     notes = tuple(str(f) for f in drawing.findings[:8])
     if all(c.closed for c in contours):
-        size, region, narrow = _cutter_for(contours)
-        rest = _rest(on, machine, size, _axial(size), "pocket", narrow=narrow)
+        size, region, narrow = cutter_for(contours)
+        rest = planned_tables(on, machine, size, _axial(size), "pocket", narrow=narrow)
         if len(contours) > 1:
             notes = (f"{len(contours)} closed contours: {NESTED}", *notes)
         return Draft(
@@ -84,7 +84,7 @@ def draft_drawing(file: Path, folder: Path, machine: str | None = None) -> Draft
             notes,
         )
     size, side = _side_of(contours)
-    rest = _rest(on, machine, size, _axial(size), "contour", side)
+    rest = planned_tables(on, machine, size, _axial(size), "contour", side)
     return Draft(f"Finish the contours of {file.name} at limited engagement.", (*tables, *rest), notes)
 
 
@@ -209,7 +209,11 @@ def draft_model(file: Path, folder: Path, machine: str | None = None) -> Draft:
     depth = top - level if top - level > axial + 1e-3 else 0.0
     stands = "the top of the model" if top > level + 1e-3 else "one depth of cut above the face"
     stock = DraftTable("stock", (Entry("top_mm", round(level + (depth or axial), 6), stands, True),))
-    tables = (part, stock, *_rest(_machine(machine), machine, size, axial, "pocket", narrow=narrow, depth=depth))
+    tables = (
+        part,
+        stock,
+        *planned_tables(machine_of(machine), machine, size, axial, "pocket", narrow=narrow, depth=depth),
+    )
     notes = (*thin_rings(model.faces), *found_lines(file, level, size), *(str(f) for f in drawing.findings[:8]))
     return Draft(f"Clear the face at z = {level:g} mm of {file.name}: {number_text(region)} mm2.", tables, notes)
 
@@ -254,7 +258,7 @@ def _floors(file: Path, planes: Sequence[Face], top: float) -> list[tuple[float,
         try:
             drawing = read_step_face(file, z_mm=z)
             if drawing.contours and all(c.closed for c in drawing.contours):
-                return [(z, drawing, *_cutter_for(drawing.contours))]
+                return [(z, drawing, *cutter_for(drawing.contours))]
         except InputError:
             continue
     return []
@@ -290,7 +294,7 @@ def _of_layer(drawing: Drawing, layer: str) -> list[Contour]:
     return [c for c, own in zip(drawing.contours, drawing.layers, strict=True) if own == layer]
 
 
-def _cutter_for(contours: Sequence[Contour]) -> tuple[float, float, bool]:
+def cutter_for(contours: Sequence[Contour]) -> tuple[float, float, bool]:
     """Diameter [mm] of the largest cutter that reaches nearly all, with room in its channels if half of it has, the
     area [mm^2], and whether channels are narrow for it all the same.
     """
@@ -333,13 +337,14 @@ def _axial(d: float) -> float:
     return (AXIAL if d > SMALL else AXIAL_SMALL) * d
 
 
-def _machine(name: str | None) -> Machine:
+def machine_of(name: str | None) -> Machine:
+    """Return the machine of a draft: a shipped one by its name, that of a file, or a usual one."""
     if name is None:
         return machine_named("vmc")
     return read_machine(name) if name.lower().endswith(".toml") else machine_named(name)
 
 
-def _rest(
+def planned_tables(
     machine: Machine,
     named: str | None,
     d: float,

@@ -42,7 +42,7 @@ def found_lines(file: Path, face_z: float, diameter: float) -> tuple[str, ...]:
     wall, floor = thinnest_wall(stock, side / 1000.0, side / THICK), thinnest_floor(stock, side / THICK)
     deepest = max(p.depth_mm for p in pockets)
     beside = f" beside pockets {number_text(deepest)} mm deep"
-    out = [_list_pockets(pockets)]
+    out = [list_pockets(pockets)]
     thin = [
         f"{name} of {number_text(t, 2)} mm{more}"
         for name, t, more in (
@@ -72,7 +72,7 @@ def found_lines(file: Path, face_z: float, diameter: float) -> tuple[str, ...]:
     return tuple(out)
 
 
-def _list_pockets(pockets: tuple[Pocket, ...]) -> str:
+def list_pockets(pockets: tuple[Pocket, ...]) -> str:
     """Pockets in a sentence, those that are alike together."""
     kinds = Counter(
         (round(p.floor_mm, 3), round(p.depth_mm, 3), "" if p.open else number_text(p.corner_mm, 2), p.open)

@@ -69,3 +69,21 @@ def draft_of(
         }
         return draft_program(file, folder, Known(machine=machine, cutters=library))
     return draft_program(file, folder, Known(machine=machine, tools=tools))
+
+
+def drafts_of(
+    file: Path, folder: Path, *, machine: str | None = None, tools: Path | None = None, job: str | None = None
+) -> dict[str, Draft]:
+    """Return the drafts of all jobs for a file by their names, in the order in which they run.
+
+    A model with thin walls beside pockets gives several, any other file one, which is named ``job``. Parameters and
+    errors as :func:`draft_of`.
+    """
+    if file.suffix.lower() in (".step", ".stp") and is_file(file) and job is None:
+        from chipload.jobs.drafts.frame import find_frame, frame_drafts
+
+        require_utf8(file)
+        found = find_frame(file)
+        if found is not None:
+            return frame_drafts(found, folder, machine)
+    return {"job": draft_of(file, folder, machine=machine, tools=tools, job=job)}

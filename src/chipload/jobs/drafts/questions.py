@@ -7,10 +7,11 @@ job marks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from chipload.jobs.drafts.draft import DraftTable, Entry, toml
+from chipload.jobs.drafts.draft import Draft, DraftTable, Entry, toml
 
 #: most questions before a first verdict
 MOST = 5
@@ -102,6 +103,18 @@ def questions_with_keys(tables: Sequence[DraftTable]) -> tuple[Question, ...]:
         asked.append(Question(_tools(rest), keys_of(rest)))
     asked += [table_question("limits")] if "limits" in guessed else []
     return tuple((*out, *asked)[:MOST])
+
+
+def questions_of(drafts: Iterable[Draft]) -> tuple[str, ...]:
+    """The questions of drafts whose jobs follow one another: a table that several have is asked once."""
+    out: dict[tuple[str, object], DraftTable] = {}
+    for draft in drafts:
+        count = Counter[str]()
+        for table in draft.tables:
+            number = next((e.value for e in table.entries if e.key == "number"), -count[table.name])
+            count[table.name] += 1
+            out.setdefault((table.name, number), table)
+    return questions(tuple(out.values()))
 
 
 def _one(table: str, entry: Entry, effect: str) -> str:

@@ -41,7 +41,15 @@ from chipload.planning.pocket.motions import (
 )
 from chipload.planning.pocket.reach import CHORD
 from chipload.planning.pocket.request import Clearing, ClearingTask, laid_out, material_before
-from chipload.planning.pocket.stages import FLOOR, TROCHOIDAL, PocketStage, require_finish, sections_of, stages_of
+from chipload.planning.pocket.stages import (
+    FLOOR,
+    TROCHOIDAL,
+    PocketStage,
+    require_finish,
+    sections_of,
+    stage_order,
+    stages_of,
+)
 from chipload.planning.pocket.totals import summary_of
 from chipload.planning.result import Columns, Event, OperationResult, StrategyResult
 from chipload.program.program import Program
@@ -153,18 +161,22 @@ def _history(
         ]
         for stage, levels in zip(stages, each, strict=True)
     ]
-    program = Program.join([p for levels in parts for runs in levels for p in runs])
+    order = stage_order(stages, setting.wall_finish is not None and setting.wall_finish.by_level)
+    program = Program.join([p for k, j in order for p in parts[k][j]])
     ends = row_ends(program, machine)
+    sampled = [samples_of(levels[0], stage.task.step) for stage, levels in zip(stages, each, strict=True)]
+    made = [
+        _columns(stage, levels[0], samples, setting, cutter, material, machine)
+        for stage, levels, samples in zip(stages, each, sampled, strict=True)
+    ]
     rows, first, travelled = [], 0, 0.0
-    for stage, levels, programs in zip(stages, each, parts, strict=True):
-        samples = samples_of(levels[0], stage.task.step)
-        columns, own = _columns(stage, levels[0], samples, setting, cutter, material, machine)
-        for m, runs in zip(levels, programs, strict=True):
-            count = sum(len(p) for p in runs)
-            time = clock(m, samples, own, runs, ends[first : first + count])
-            z = m.height[samples.motion]
-            rows.append({**columns, "z_mm": z, "t_s": time, "s_mm": columns["s_mm"] + travelled})
-            first, travelled = first + count, travelled + float(columns["s_mm"][-1])
+    for k, j in order:
+        m, runs, samples, (columns, own) = each[k][j], parts[k][j], sampled[k], made[k]
+        count = sum(len(p) for p in runs)
+        time = clock(m, samples, own, runs, ends[first : first + count])
+        z = m.height[samples.motion]
+        rows.append({**columns, "z_mm": z, "t_s": time, "s_mm": columns["s_mm"] + travelled})
+        first, travelled = first + count, travelled + float(columns["s_mm"][-1])
     history = {name: np.concatenate([r[name] for r in rows]) for name in rows[0]}
     return (
         history,

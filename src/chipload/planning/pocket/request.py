@@ -53,14 +53,16 @@ class WallFinish:
 
     Parameters
     ----------
-    axial_depth : greatest depth of a level; None: the whole depth of the pocket in one
+    axial_depth : greatest depth of a level; None: the whole depth of the pocket, or of a level that clears, in one
     allowance : that they leave in turn
+    by_level : whether the walls beside each level that clears are finished before the next, while all below stands
     """
 
     feed: float
     spindle_speed: float
     axial_depth: float | None = None
     allowance: float = 0.0
+    by_level: bool = False
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +119,25 @@ def require_finish(setting: Clearing) -> None:
         )
 
 
+def stage_order(stages: Sequence[PocketStage], by_level: bool) -> list[tuple[int, int]]:
+    """Number of the stage and of its level, in the order of the program.
+
+    With ``by_level`` the levels of each section run from above: what clears a level, then the floor, then its walls.
+    """
+    pairs = [(k, j) for k, stage in enumerate(stages) for j in range(len(stage.heights))]
+    if not by_level:
+        return pairs
+    starts = {stage.section: [h.top for h in stage.heights] for stage in stages if stage.name == CLEARING}
+
+    def place(pair: tuple[int, int]) -> tuple[int, int, int, int]:
+        stage = stages[pair[0]]
+        top = stage.heights[pair[1]].top
+        level = sum(start >= top - LEAST_FLOOR_MM for start in starts[stage.section]) - 1
+        return stage.section, level, *pair
+
+    return sorted(pairs, key=place)
+
+
 def sections_of(task: ClearingTask, setting: Clearing) -> list[PocketSection]:
     """The whole depth, or what lies above the tops of the tabs and what lies below."""
     if setting.tabs is None:
@@ -188,7 +208,12 @@ def _stages(
         )
     if wall is not None:
         floor = out[-1].heights[-1].floor
-        axial_depth = section.top - floor if wall.axial_depth is None else wall.axial_depth
+        tops = [h.top for h in clearing.heights] if wall.by_level else [section.top]
+        levels = [
+            level
+            for top, low in pairwise([*tops, floor])
+            for level in setting.levels_between(top, low, wall.axial_depth or top - low)
+        ]
         earlier = EarlierPath.of(path, centre_region(task.region, radius + setting.allowance))
         out.append(
             PocketStage(
@@ -196,7 +221,7 @@ def _stages(
                 number,
                 task,
                 path_of(wall.allowance, earlier, (0.7, 0.3)),
-                tuple(setting.levels_between(section.top, floor, axial_depth)),
+                tuple(levels),
                 wall.feed,
                 wall.spindle_speed,
                 wall.allowance,
