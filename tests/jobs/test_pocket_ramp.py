@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from chipload.checking.settings import CheckSettings
 from chipload.errors import InputError, Severity
+from chipload.jobs import load_job
 from chipload.jobs.contour.result import findings_of
+from chipload.jobs.tables import value_of
 from chipload.planning.pocket.clearing_path import ENTRY, LIFT
 from chipload.planning.pocket.motions import Heights, Motions, entries
 from chipload.program.program import LINE, RAPID
@@ -74,7 +78,8 @@ def test_circles_need_a_bore(tmp_path):
 
 @pytest.mark.parametrize("entry", ["ramp", "helix"])
 def test_an_entry_is_no_steeper_than_its_cutter_allows(tmp_path, entry):
-    job = written(tmp_path, {"0": [WIDE]}, operation(RAMP.replace('"ramp"', f'"{entry}"')))
+    more = RAMP.replace('"ramp"', f'"{entry}"').replace("depth_mm = 5.0", "depth_mm = 3.0")
+    job = written(tmp_path, {"0": [WIDE]}, operation(more))
     text = job.read_text()
     job.write_text(text.replace("diameter_mm = 8.0\n", "diameter_mm = 8.0\nramp_angle_deg = 1.0\n"))
     (strategy,), outcome = done(job)
@@ -99,10 +104,13 @@ def test_an_entry_of_a_cutter_without_teeth_at_its_centre_is_unproven(tmp_path):
     text = job.read_text()
     job.write_text(text.replace("diameter_mm = 8.0\n", "diameter_mm = 8.0\ncentre_cutting = false\n"))
     _, outcome = done(job)
+    (op,) = outcome.operations
     (found,) = (f for f in findings_of(outcome.operations[0], "pocket") if f.code == "plunge")
     assert found.severity is Severity.UNPROVEN
     assert "tool 1 ramps into solid material at 2." in found.text
     assert "state ramp_angle_deg (RMPX)" in found.text
     job.write_text(job.read_text() + "[checks]\nplunge = false\n")
-    _, outcome = done(job)
-    assert [f.code for f in findings_of(outcome.operations[0], "pocket") if f.code == "plunge"] == []
+    off = value_of(CheckSettings, load_job(job).job.table.checks).off
+    assert off == ("plunge",)
+    without = replace(op, checks=replace(op.checks, off=off))
+    assert [f.code for f in findings_of(without, "pocket") if f.code == "plunge"] == []
