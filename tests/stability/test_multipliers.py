@@ -201,11 +201,11 @@ def test_margins_of_teeth_that_are_not_evenly_spaced(rpm, depth):
         assert abs(largest_multipliers(uneven, 3.0)[0]) < 1.0
 
 
-def test_a_simulation_in_time_agrees_on_80_random_cuts():
+def test_a_simulation_in_time_agrees_on_40_random_cuts():
     """The sign of log |mu|, and where it is not near 0 its value."""
     rng = np.random.default_rng(7)
     near, unstable, errors = 0, 0, []
-    for _ in range(80):
+    for _ in range(40):
         count = int(rng.integers(1, 4))
         modes = Modes(
             rng.uniform(400.0, 1200.0, count), rng.uniform(0.01, 0.05, count), rng.uniform(3000.0, 20000.0, count),
@@ -227,8 +227,8 @@ def test_a_simulation_in_time_agrees_on_80_random_cuts():
         assert np.sign(told) == np.sign(exact), (exact, told)
         unstable += exact > 0.0
         errors.append(abs(told - exact))
-    assert near < 12
-    assert 16 < unstable < 64
+    assert near < 6
+    assert 8 < unstable < 32
     assert np.quantile(errors, 0.9) < 0.04
 
 
