@@ -348,9 +348,9 @@ def by_the_text(out, program):
 
     def away(points):
         """Distance of each point from the cutter in all its poses, its corner as that of a ball at its rim."""
-        y = points[:, None] - tip
-        h = (y * axis).sum(axis=2)
-        d = np.sqrt(np.maximum((y * y).sum(axis=2) - h * h, 0.0))
+        h = points @ axis.T - (tip * axis).sum(axis=1)
+        square = (points * points).sum(axis=1)[:, None] - 2.0 * points @ tip.T + (tip * tip).sum(axis=1)
+        d = np.sqrt(np.maximum(square - h * h, 0.0))
         low = np.where(d > R - r, np.hypot(d - R + r, h - r), r - h) - r
         return np.where(h >= r, d - R, low).min(axis=1)
 
